@@ -1,0 +1,4 @@
+//! truetwin
+pub mod progress;
+pub mod twin;
+pub mod twins;

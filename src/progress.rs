@@ -1,0 +1,150 @@
+//! One handle for progress and cancellation, silent by default.
+//!
+//! Long work takes a [`Progress`], opens a [`Stage`] for each part, and ticks it. Whoever embeds the crate
+//! listens by implementing [`Listener`]; the library itself never prints.
+//!
+//! ```
+//! use std::sync::atomic::{AtomicU64, Ordering};
+//! use truetwin::progress::{Listener, Progress};
+//!
+//! #[derive(Default)]
+//! struct Count(AtomicU64);
+//! impl Listener for Count {
+//!     fn advanced(&self, _stage: &str, done: u64, _total: u64) {
+//!         self.0.store(done, Ordering::Relaxed);
+//!     }
+//! }
+//!
+//! let listener = std::sync::Arc::new(Count::default());
+//! let progress = Progress::new(listener.clone());
+//! let stage = progress.stage("bank", 2);
+//! stage.tick()?;
+//! stage.tick()?;
+//! assert_eq!(listener.0.load(Ordering::Relaxed), 2);
+//! # Ok::<(), truetwin::progress::Cancelled>(())
+//! ```
+
+use std::fmt;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// What an application implements to see progress and to stop long work.
+///
+/// Methods are called from worker threads, often: keep them short.
+pub trait Listener: Send + Sync {
+    /// `stage` has `done` of `total` units behind it. The first call of a stage has `done` = 0.
+    fn advanced(&self, stage: &str, done: u64, total: u64);
+
+    /// Asked at each unit of work; `true` ends the work with [`Cancelled`].
+    fn cancelled(&self) -> bool {
+        false
+    }
+}
+
+/// The work was stopped by [`Listener::cancelled`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("cancelled")]
+pub struct Cancelled;
+
+/// A cheap, cloneable handle that long work reports to.
+#[derive(Clone, Default)]
+pub struct Progress(Option<Arc<dyn Listener>>);
+
+impl Progress {
+    /// Reports to `listener`.
+    pub fn new(listener: Arc<dyn Listener>) -> Self {
+        Self(Some(listener))
+    }
+
+    /// Reports to nobody and is never cancelled.
+    pub fn silent() -> Self {
+        Self(None)
+    }
+
+    /// Opens a stage of `total` units.
+    pub fn stage(&self, name: &'static str, total: usize) -> Stage {
+        if let Some(listener) = &self.0 {
+            listener.advanced(name, 0, total as u64);
+        }
+        Stage {
+            progress: self.clone(),
+            name,
+            done: AtomicU64::new(0),
+            total: total as u64,
+        }
+    }
+
+    /// Fails where the listener asks to stop.
+    pub fn checkpoint(&self) -> Result<(), Cancelled> {
+        match &self.0 {
+            Some(listener) if listener.cancelled() => Err(Cancelled),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl fmt::Debug for Progress {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.0.is_some() {
+            "Progress(listening)"
+        } else {
+            "Progress(silent)"
+        })
+    }
+}
+
+/// One part of long work; shared by threads.
+#[derive(Debug)]
+pub struct Stage {
+    progress: Progress,
+    name: &'static str,
+    done: AtomicU64,
+    total: u64,
+}
+
+impl Stage {
+    /// One unit is done. Fails where the listener asks to stop.
+    pub fn tick(&self) -> Result<(), Cancelled> {
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        if let Some(listener) = &self.progress.0 {
+            listener.advanced(self.name, done, self.total);
+        }
+        self.progress.checkpoint()
+    }
+
+    /// The stage ended before its last unit (early stop): report it complete.
+    pub fn finish(&self) {
+        if let Some(listener) = &self.progress.0 {
+            listener.advanced(self.name, self.total, self.total);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct StopAfter(u64, AtomicU64);
+    impl Listener for StopAfter {
+        fn advanced(&self, _: &str, done: u64, _: u64) {
+            self.1.store(done, Ordering::Relaxed);
+        }
+        fn cancelled(&self) -> bool {
+            self.1.load(Ordering::Relaxed) >= self.0
+        }
+    }
+
+    #[test]
+    fn a_listener_stops_the_work() {
+        let progress = Progress::new(Arc::new(StopAfter(3, AtomicU64::new(0))));
+        let stage = progress.stage("work", 10);
+        let done = (0..10).take_while(|_| stage.tick().is_ok()).count();
+        assert_eq!(done, 2, "the third tick is refused");
+    }
+
+    #[test]
+    fn silence_is_never_cancelled() {
+        let stage = Progress::silent().stage("work", 1);
+        assert_eq!(stage.tick(), Ok(()));
+    }
+}

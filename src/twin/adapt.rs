@@ -1,0 +1,391 @@
+//! A twin in another setting: prior, bounds, limits, noise and start changed from outside.
+
+use super::{
+    DigitalTwin, Drive, Integrator, Interval, Noise, Now, Outline, Parameter, ParameterError,
+    ParameterSpace, Role, Signal, Signals, SimulationError, StateSpace,
+};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A number that is either known or to be estimated; files write `0.1` or `"estimate"`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(from = "LevelText", into = "LevelText")]
+pub enum Level {
+    /// Known.
+    Known(f64),
+    /// Unknown: it becomes a parameter.
+    Estimate,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(untagged)]
+enum LevelText {
+    Number(f64),
+    Word(Word),
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Word {
+    Estimate,
+}
+
+impl From<LevelText> for Level {
+    fn from(text: LevelText) -> Self {
+        match text {
+            LevelText::Number(value) => Self::Known(value),
+            LevelText::Word(Word::Estimate) => Self::Estimate,
+        }
+    }
+}
+
+impl From<Level> for LevelText {
+    fn from(level: Level) -> Self {
+        match level {
+            Level::Known(value) => Self::Number(value),
+            Level::Estimate => Self::Word(Word::Estimate),
+        }
+    }
+}
+
+/// What is changed in a twin; each map goes by the names of parameters, states and outputs.
+///
+/// An unknown start or noise level lengthens θ by a parameter `start.<state>` or `noise.<state or output>`. Its
+/// prior is `prior["start.h1"]`, or else the state's limits; for noise, a tenth to three times the twin's own level.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Adaptation {
+    /// Prior box by parameter.
+    pub prior: BTreeMap<String, Interval>,
+    /// Physical bounds by parameter.
+    pub bounds: BTreeMap<String, Interval>,
+    /// Limits by state, in place of the twin's own.
+    pub limits: BTreeMap<String, Interval>,
+    /// Noise by state (standard deviation of the increment a step) or output (standard deviation).
+    pub noise: BTreeMap<String, Level>,
+    /// Start by state.
+    pub start: BTreeMap<String, Level>,
+}
+
+/// Why a twin cannot be changed so.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum AdaptationError {
+    /// A name that the twin does not have.
+    #[error("[{table}] names {name}, the twin has {known}; use one of these")]
+    Unknown {
+        /// Table of the study file.
+        table: &'static str,
+        /// The name.
+        name: String,
+        /// Known names.
+        known: String,
+    },
+    /// A black box has neither limits, noise levels nor starts.
+    #[error(
+        "[{table}] needs the twin's equations, which a black box does not show; remove the table or implement StateSpace"
+    )]
+    BlackBox {
+        /// Table of the study file.
+        table: &'static str,
+    },
+    /// A noise level or start that is no number of its kind.
+    #[error("[{table}] {name} = {value}; {remedy}")]
+    Value {
+        /// Table of the study file.
+        table: &'static str,
+        /// Name.
+        name: String,
+        /// Value.
+        value: f64,
+        /// What to write.
+        remedy: &'static str,
+    },
+    /// Nothing says where an unknown start or noise level lies.
+    #[error("nothing says where the unknown {name} lies; add [prior] \"{name}\" = [low, high]")]
+    NoPrior {
+        /// Parameter.
+        name: String,
+    },
+    /// Parameters that make no sense together.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
+}
+
+/// The twin in another setting; θ is the twin's, then unknown noise levels, then unknown starts.
+pub fn adapt(
+    base: Arc<dyn DigitalTwin>,
+    adaptation: &Adaptation,
+) -> Result<Arc<dyn DigitalTwin>, AdaptationError> {
+    let Some(equations) = base.state_space() else {
+        for (table, used) in [
+            ("limits", !adaptation.limits.is_empty()),
+            ("noise", !adaptation.noise.is_empty()),
+            ("start", !adaptation.start.is_empty()),
+        ] {
+            if used {
+                return Err(AdaptationError::BlackBox { table });
+            }
+        }
+        let mut parameters = base.parameters();
+        rebox(&mut parameters, adaptation)?;
+        return Ok(Arc::new(AdaptedBlackBox { base, parameters }));
+    };
+    let mut outline = equations.outline();
+    let n = outline.parameters.len();
+    let position = |table, name: &str, known: &[String]| {
+        (known.iter().position(|k| k == name)).ok_or_else(|| AdaptationError::Unknown {
+            table,
+            name: name.into(),
+            known: known.join(", "),
+        })
+    };
+    let states: Vec<String> = outline.states.iter().map(|s| s.name.clone()).collect();
+    let outputs = outline.outputs.iter().map(|y| y.name.clone());
+    let noisy: Vec<String> = states.iter().cloned().chain(outputs).collect();
+    let mut limits = equations.limits();
+    for (name, &limit) in &adaptation.limits {
+        limits[position("limits", name, &states)?] = limit;
+    }
+    let declared = declared_noise(equations, &outline);
+    let mut added: Vec<Parameter> = Vec::new();
+    let mut noise = Vec::new();
+    for (name, &level) in &adaptation.noise {
+        let index = position("noise", name, &noisy)?;
+        let what = match level {
+            Level::Known(value) if value >= 0.0 && value.is_finite() => Setting::Known(value),
+            Level::Known(value) => {
+                return Err(AdaptationError::Value {
+                    table: "noise",
+                    name: name.clone(),
+                    value,
+                    remedy: "a standard deviation is 0 or more",
+                });
+            }
+            Level::Estimate => {
+                let twin = declared[index];
+                let guess = (twin > 0.0).then(|| Interval::unchecked(0.1 * twin, 3.0 * twin));
+                added.push(unknown(
+                    adaptation,
+                    &format!("noise.{name}"),
+                    guess,
+                    Role::Noise,
+                )?);
+                Setting::Parameter(n + added.len() - 1)
+            }
+        };
+        noise.push((index, what));
+    }
+    let mut start = Vec::new();
+    for (name, &level) in &adaptation.start {
+        let index = position("start", name, &states)?;
+        let what = match level {
+            Level::Known(value) if limits[index].contains(value) && value.is_finite() => {
+                Setting::Known(value)
+            }
+            Level::Known(value) => {
+                return Err(AdaptationError::Value {
+                    table: "start",
+                    name: name.clone(),
+                    value,
+                    remedy: "a start lies within the state's limits",
+                });
+            }
+            Level::Estimate => {
+                let guess = Some(limits[index]).filter(|limit| limit.is_finite());
+                added.push(unknown(
+                    adaptation,
+                    &format!("start.{name}"),
+                    guess,
+                    Role::Start,
+                )?);
+                Setting::Parameter(n + added.len() - 1)
+            }
+        };
+        start.push((index, what));
+    }
+    outline.parameters = ParameterSpace::new(outline.parameters.iter().cloned().chain(added));
+    rebox(&mut outline.parameters, adaptation)?;
+    Ok(Arc::new(AdaptedEquations {
+        outline,
+        limits,
+        noise,
+        start,
+        own: n,
+        base,
+    }))
+}
+
+/// Noise levels of states, then outputs, at the prior's centre.
+fn declared_noise(twin: &dyn StateSpace, outline: &Outline) -> Vec<f64> {
+    let (mut q, mut r) = (
+        vec![0.0; outline.states.len()],
+        vec![0.0; outline.outputs.len()],
+    );
+    let centre = outline.parameters.centre();
+    let now = Now {
+        t: 0.0,
+        dt: 1.0,
+        u: &vec![0.0; outline.inputs.len()],
+        theta: &centre,
+    };
+    twin.noise(&now, &mut q, &mut r);
+    q.extend(r);
+    q
+}
+
+/// A parameter for an unknown start or noise level.
+fn unknown(
+    adaptation: &Adaptation,
+    name: &str,
+    guess: Option<Interval>,
+    role: Role,
+) -> Result<Parameter, AdaptationError> {
+    let given = adaptation.prior.get(name).copied();
+    let prior = given
+        .or(guess)
+        .ok_or_else(|| AdaptationError::NoPrior { name: name.into() })?;
+    let mut parameter = Parameter::new(name, "", prior.low(), prior.high()).role(role);
+    if let Some(guess) = guess {
+        let (low, high) = (guess.low().min(prior.low()), guess.high().max(prior.high()));
+        parameter = parameter.within(low, high);
+    }
+    Ok(parameter)
+}
+
+/// Sets prior boxes and bounds. Bounds that are not given widen to hold a given prior.
+fn rebox(parameters: &mut ParameterSpace, adaptation: &Adaptation) -> Result<(), AdaptationError> {
+    for (table, boxes) in [("prior", &adaptation.prior), ("bounds", &adaptation.bounds)] {
+        for (name, &interval) in boxes {
+            let known = parameters.names().join(", ");
+            let parameter = parameters
+                .iter_mut()
+                .find(|p| p.name == *name)
+                .ok_or_else(|| AdaptationError::Unknown {
+                    table,
+                    name: name.clone(),
+                    known,
+                })?;
+            match table {
+                "prior" => parameter.prior = interval,
+                _ => parameter.bounds = interval,
+            }
+        }
+    }
+    for p in parameters.iter_mut() {
+        if !adaptation.bounds.contains_key(&p.name) {
+            let (low, high) = (p.bounds.low(), p.bounds.high());
+            p.bounds = Interval::unchecked(low.min(p.prior.low()), high.max(p.prior.high()));
+        }
+    }
+    Ok(parameters.check()?)
+}
+
+/// Where a start or noise level comes from.
+#[derive(Debug, Clone, Copy)]
+enum Setting {
+    Known(f64),
+    /// Index in θ.
+    Parameter(usize),
+}
+
+impl Setting {
+    fn value(self, theta: &[f64]) -> f64 {
+        match self {
+            Self::Known(value) => value,
+            Self::Parameter(index) => theta[index],
+        }
+    }
+}
+
+/// Equations in another setting.
+struct AdaptedEquations {
+    base: Arc<dyn DigitalTwin>,
+    outline: Outline,
+    limits: Vec<Interval>,
+    /// Index among states, then outputs.
+    noise: Vec<(usize, Setting)>,
+    start: Vec<(usize, Setting)>,
+    /// Length of the base twin's θ.
+    own: usize,
+}
+
+impl AdaptedEquations {
+    fn inner(&self) -> &dyn StateSpace {
+        self.base
+            .state_space()
+            .expect("adapt builds this type for twins with equations only")
+    }
+
+    fn own<'a>(&self, now: &Now<'a>) -> Now<'a> {
+        Now {
+            theta: &now.theta[..self.own],
+            ..*now
+        }
+    }
+}
+
+impl StateSpace for AdaptedEquations {
+    fn outline(&self) -> Outline {
+        self.outline.clone()
+    }
+    fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+        self.inner().drift(&self.own(now), x, dx);
+    }
+    fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
+        self.inner().observe(&self.own(now), x, y);
+    }
+    fn readout(&self, now: &Now<'_>, y: &mut [f64]) {
+        self.inner().readout(&self.own(now), y);
+    }
+    fn update(&self, now: &Now<'_>, x: &mut [f64]) {
+        self.inner().update(&self.own(now), x);
+    }
+    fn constrain(&self, now: &Now<'_>, x: &mut [f64]) {
+        self.inner().constrain(&self.own(now), x);
+    }
+    fn integrator(&self) -> Integrator {
+        self.inner().integrator()
+    }
+    fn limits(&self) -> Vec<Interval> {
+        self.limits.clone()
+    }
+    fn start(&self, now: &Now<'_>, x: &mut [f64]) {
+        self.inner().start(&self.own(now), x);
+        for &(i, setting) in &self.start {
+            x[i] = setting.value(now.theta);
+        }
+    }
+    fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+        self.inner().noise(&self.own(now), process, measurement);
+        for &(i, setting) in &self.noise {
+            let level = match i.checked_sub(process.len()) {
+                None => &mut process[i],
+                Some(j) => &mut measurement[j],
+            };
+            *level = setting.value(now.theta);
+        }
+    }
+}
+
+/// A black box with another prior or other bounds.
+struct AdaptedBlackBox {
+    base: Arc<dyn DigitalTwin>,
+    parameters: ParameterSpace,
+}
+
+impl DigitalTwin for AdaptedBlackBox {
+    fn parameters(&self) -> ParameterSpace {
+        self.parameters.clone()
+    }
+    fn signals(&self) -> Signals {
+        self.base.signals()
+    }
+    fn simulate(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Signal, SimulationError> {
+        self.base.simulate(theta, drive, noise)
+    }
+}

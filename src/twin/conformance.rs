@@ -1,0 +1,391 @@
+//! What is wrong with a new twin, found before any training.
+
+use super::{DigitalTwin, Drive, Noise, Signal, SimulationError, free_run};
+use nalgebra::DMatrix;
+
+/// How bad a finding is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// As it should be.
+    Pass,
+    /// Worth knowing; the twin can be used.
+    Warning,
+    /// The twin breaks a rule that estimation relies on.
+    Failure,
+}
+
+/// The outcome of one check.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding {
+    /// Short name of the check.
+    pub check: &'static str,
+    /// How bad it is.
+    pub severity: Severity,
+    /// What was found, and the remedy.
+    pub message: String,
+}
+
+impl Finding {
+    fn new(check: &'static str, severity: Severity, message: impl Into<String>) -> Self {
+        Self {
+            check,
+            severity,
+            message: message.into(),
+        }
+    }
+}
+
+/// Relative size under which a singular value counts as zero: this direction does not move the free run.
+const FLAT: f64 = 1e-6;
+/// Noise draws of nearby parameters must agree to this part of their spread.
+const PAIRED: f64 = 1e-2;
+
+/// Runs every check under `drive`; `seed` draws the noise and the parameters.
+///
+/// 1. *parameters*: names, prior boxes and bounds make sense;
+/// 2. *channels*: outputs have the declared shape;
+/// 3. *finite*: trajectories are finite at the centre and the corners of the prior box (up to 64 of them);
+/// 4. *repeatable*: the same arguments give the same bits;
+/// 5. *noise*: another sample gives another trajectory;
+/// 6. *paired*: noise draws do not depend on θ (common random numbers);
+/// 7. *identifiable*: no direction in θ leaves the free run unchanged (first order, centre of the prior).
+///
+/// In a test: `assert!(check(&twin, &drive, 1).iter().all(|f| f.severity < Severity::Failure))`.
+pub fn check(twin: &dyn DigitalTwin, drive: &Drive, seed: u64) -> Vec<Finding> {
+    let space = twin.parameters();
+    let mut findings = Vec::new();
+    if let Err(error) = space.check() {
+        return vec![Finding::new(
+            "parameters",
+            Severity::Failure,
+            error.to_string(),
+        )];
+    }
+    findings.push(Finding::new(
+        "parameters",
+        Severity::Pass,
+        format!("{} to estimate: {}", space.len(), space.names().join(", ")),
+    ));
+    let centre = space.centre();
+    let noise = Noise::new(seed, "check", 0);
+    let first = match twin.simulate(&centre, drive, noise) {
+        Ok(outputs) => outputs,
+        Err(error) => {
+            let message = format!("at the prior's centre {centre:?}: {error}");
+            findings.push(Finding::new("finite", Severity::Failure, message));
+            return findings;
+        }
+    };
+    let expected = (drive.samples(), twin.signals().outputs.len());
+    if first.dim() != expected {
+        findings.push(Finding::new(
+            "channels",
+            Severity::Failure,
+            format!("outputs are {:?}, {expected:?} (samples, channels) were declared; return one row a sample and one column an output", first.dim()),
+        ));
+        return findings;
+    }
+    findings.push(Finding::new(
+        "channels",
+        Severity::Pass,
+        format!("{} samples, {} outputs", expected.0, expected.1),
+    ));
+    findings.push(finite(twin, drive, noise));
+    findings.push(repeatable(twin, drive, noise, &first));
+    let (finding, spread) = noisy(twin, drive, seed, &first);
+    findings.push(finding);
+    findings.push(paired(twin, drive, noise, &first, spread));
+    findings.push(identifiable(twin, drive));
+    findings
+}
+
+/// Corners of the prior box: all of them up to six parameters, 64 spread ones beyond.
+fn corners(twin: &dyn DigitalTwin) -> Vec<Vec<f64>> {
+    let space = twin.parameters();
+    let count = 1usize << space.len().min(6);
+    (0..count)
+        .map(|c| {
+            (space.iter().enumerate())
+                // Beyond six parameters, Walsh codes keep the corners apart.
+                .map(|(j, p)| {
+                    let bit = if j < 6 {
+                        c >> j & 1
+                    } else {
+                        (c & (j + 1)).count_ones() as usize & 1
+                    };
+                    if bit == 1 {
+                        p.prior.high()
+                    } else {
+                        p.prior.low()
+                    }
+                })
+                .collect()
+        })
+        .collect()
+}
+
+fn finite(twin: &dyn DigitalTwin, drive: &Drive, noise: Noise) -> Finding {
+    let corners = corners(twin);
+    let mut bad = corners.iter().filter_map(|theta| {
+        let problem = match twin.simulate(theta, drive, noise) {
+            Ok(outputs) if outputs.iter().all(|v| v.is_finite()) => return None,
+            Ok(_) => "outputs are not finite".to_owned(),
+            Err(error) => error.to_string(),
+        };
+        Some((theta, problem))
+    });
+    let Some((theta, problem)) = bad.next() else {
+        let message = format!("finite at the {} corners of the prior", corners.len());
+        return Finding::new("finite", Severity::Pass, message);
+    };
+    let others = bad.count();
+    Finding::new(
+        "finite",
+        if others + 1 == corners.len() {
+            Severity::Failure
+        } else {
+            Severity::Warning
+        },
+        format!(
+            "{problem} at the prior's corner {theta:?} ({} of {} corners); such draws are redrawn: shrink the prior or the step",
+            others + 1,
+            corners.len()
+        ),
+    )
+}
+
+fn repeatable(twin: &dyn DigitalTwin, drive: &Drive, noise: Noise, first: &Signal) -> Finding {
+    let again = twin.simulate(&twin.parameters().centre(), drive, noise);
+    match again {
+        Ok(again) if again == *first => Finding::new(
+            "repeatable",
+            Severity::Pass,
+            "the same arguments give the same bits",
+        ),
+        _ => Finding::new(
+            "repeatable",
+            Severity::Failure,
+            "two runs with the same arguments differ; take all randomness from `noise` and keep no state between runs",
+        ),
+    }
+}
+
+/// Root mean square of a difference.
+fn rms(a: &Signal, b: &Signal) -> f64 {
+    ((a - b).mapv(|d| d * d).mean().unwrap_or(0.0)).sqrt()
+}
+
+fn noisy(twin: &dyn DigitalTwin, drive: &Drive, seed: u64, first: &Signal) -> (Finding, f64) {
+    let other = twin.simulate(
+        &twin.parameters().centre(),
+        drive,
+        Noise::new(seed, "check", 1),
+    );
+    let spread = other.map_or(0.0, |other| rms(first, &other));
+    let finding = if spread > 0.0 {
+        let message = format!("two noise samples differ by {spread:.3e} rms");
+        Finding::new("noise", Severity::Pass, message)
+    } else {
+        Finding::new(
+            "noise",
+            Severity::Warning,
+            "the twin has no noise: statistics of features cannot be simulated; give it noise levels",
+        )
+    };
+    (finding, spread)
+}
+
+fn paired(
+    twin: &dyn DigitalTwin,
+    drive: &Drive,
+    noise: Noise,
+    first: &Signal,
+    spread: f64,
+) -> Finding {
+    let space = twin.parameters();
+    let mut moved = space.centre();
+    for (value, width) in moved.iter_mut().zip(space.widths()) {
+        *value += 1e-9 * width;
+    }
+    let change = twin.simulate(&moved, drive, noise).map(|y| rms(first, &y));
+    match change {
+        Ok(change) if change <= PAIRED * spread || spread == 0.0 => {
+            Finding::new("paired", Severity::Pass, "noise draws do not depend on θ")
+        }
+        Ok(change) => Finding::new(
+            "paired",
+            Severity::Failure,
+            format!(
+                "1e-9 of the prior's width moves the outputs by {change:.1e} rms (noise: {spread:.1e}): draws depend on θ; open each source of noise by its own name and draw the same number of times"
+            ),
+        ),
+        Err(error) => Finding::new("paired", Severity::Failure, error.to_string()),
+    }
+}
+
+/// Singular directions of the free run's Jacobian at the prior's centre, θ in units of the prior's width.
+fn identifiable(twin: &dyn DigitalTwin, drive: &Drive) -> Finding {
+    let space = twin.parameters();
+    let (centre, widths) = (space.centre(), space.widths());
+    let column = |j: usize| -> Result<Vec<f64>, SimulationError> {
+        let side = |sign: f64| {
+            let mut theta = centre.clone();
+            theta[j] += sign * 1e-4 * widths[j];
+            free_run(twin, &theta, drive)
+        };
+        let difference = side(1.0)? - side(-1.0)?;
+        Ok(difference.iter().map(|d| d / 2e-4).collect())
+    };
+    let columns: Result<Vec<_>, _> = (0..space.len()).map(column).collect();
+    let columns = match columns {
+        Ok(columns) => columns,
+        Err(error) => {
+            return Finding::new(
+                "identifiable",
+                Severity::Warning,
+                format!("not known: {error}"),
+            );
+        }
+    };
+    let jacobian = DMatrix::from_fn(columns[0].len(), columns.len(), |i, j| columns[j][i]);
+    let svd = jacobian.svd(false, true);
+    let largest = svd.singular_values.max();
+    let flat: Vec<String> = (svd.singular_values.iter().enumerate())
+        .filter(|(_, s)| **s <= FLAT * largest)
+        .filter_map(|(i, _)| {
+            let row = svd.v_t.as_ref()?.row(i).transpose();
+            Some(combination(&space.names(), row.as_slice()))
+        })
+        .collect();
+    if flat.is_empty() {
+        let ratio = svd.singular_values.min() / largest;
+        let message =
+            format!("every direction moves the free run (weakest to strongest: {ratio:.1e})");
+        return Finding::new("identifiable", Severity::Pass, message);
+    }
+    Finding::new(
+        "identifiable",
+        Severity::Warning,
+        format!(
+            "the free run does not change along {} (θ over the prior's width): only noise can tell; fix one parameter there, or report combinations",
+            flat.join("; ")
+        ),
+    )
+}
+
+/// A direction in words: `0.71·k1 − 0.71·k2`, parts under a twentieth of the largest left out.
+pub fn combination(names: &[&str], direction: &[f64]) -> String {
+    let largest = direction.iter().fold(0.0f64, |a, v| a.max(v.abs()));
+    // The sign of a direction means nothing: the largest part is written first as positive.
+    let sign = direction
+        .iter()
+        .find(|v| v.abs() == largest)
+        .map_or(1.0, |v| v.signum());
+    let mut text = String::new();
+    for (name, value) in names.iter().zip(direction) {
+        if value.abs() > 0.05 * largest {
+            let value = sign * value;
+            text.push_str(match (text.is_empty(), value < 0.0) {
+                (true, true) => "−",
+                (true, false) => "",
+                (false, true) => " − ",
+                (false, false) => " + ",
+            });
+            text.push_str(&format!("{:.2}·{name}", value.abs()));
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::twin::{Parameter, ParameterSpace, Quantity, Signals};
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    /// y = a·b·k/10 + noise, with a flaw.
+    struct Flawed(Flaw, AtomicU64);
+    #[derive(PartialEq)]
+    enum Flaw {
+        None,
+        KeepsState,
+        DrawsDependOnTheta,
+        Diverges,
+        Product,
+    }
+    impl DigitalTwin for Flawed {
+        fn parameters(&self) -> ParameterSpace {
+            ParameterSpace::new(["a", "b"].map(|n| Parameter::new(n, "", 1.0, 2.0)))
+        }
+        fn signals(&self) -> Signals {
+            Signals {
+                inputs: vec![],
+                outputs: vec![Quantity::new("y", "")],
+            }
+        }
+        fn simulate(
+            &self,
+            theta: &[f64],
+            drive: &Drive,
+            noise: Noise,
+        ) -> Result<Signal, SimulationError> {
+            let (a, b) = (theta[0], theta[1]);
+            let mut source = noise.source("v");
+            if self.0 == Flaw::DrawsDependOnTheta {
+                source = noise.source(&format!("{a}"));
+            }
+            if self.0 == Flaw::Diverges && a * b > 3.9 {
+                return Err(SimulationError::Diverged { at: 1.0 });
+            }
+            let calls = self.1.fetch_add(1, Ordering::Relaxed) as f64;
+            let shift = if self.0 == Flaw::KeepsState {
+                calls
+            } else {
+                0.0
+            };
+            Ok(Signal::from_shape_fn((drive.samples(), 1), |(k, _)| {
+                let k = k as f64 / 10.0;
+                let trend = if self.0 == Flaw::Product {
+                    a * b * k
+                } else {
+                    a * k + b * k * k
+                };
+                trend + shift + source.normal()
+            }))
+        }
+    }
+
+    fn worst(flaw: Flaw) -> Vec<(&'static str, Severity)> {
+        let drive = Drive::autonomous(0.1, 30).unwrap();
+        check(&Flawed(flaw, AtomicU64::new(0)), &drive, 1)
+            .into_iter()
+            .filter(|f| f.severity > Severity::Pass)
+            .map(|f| (f.check, f.severity))
+            .collect()
+    }
+
+    #[test]
+    fn each_flaw_is_found_and_a_good_twin_passes() {
+        assert_eq!(worst(Flaw::None), []);
+        assert!(worst(Flaw::KeepsState).contains(&("repeatable", Severity::Failure)));
+        assert_eq!(
+            worst(Flaw::DrawsDependOnTheta)[0],
+            ("paired", Severity::Failure)
+        );
+        assert_eq!(worst(Flaw::Diverges), [("finite", Severity::Warning)]);
+    }
+
+    /// A black box's mean over seeds cannot be flat to 1e-6, but a product's direction is: draws are paired.
+    #[test]
+    fn an_unidentifiable_product_is_named() {
+        let drive = Drive::autonomous(0.1, 30).unwrap();
+        let twin = Flawed(Flaw::Product, AtomicU64::new(0));
+        let finding = check(&twin, &drive, 1).pop().unwrap();
+        assert_eq!(finding.severity, Severity::Warning);
+        assert!(
+            finding.message.contains("0.71·a − 0.71·b"),
+            "{}",
+            finding.message
+        );
+    }
+}

@@ -1,0 +1,127 @@
+//! The one trait that every simulator has.
+
+use super::{Drive, Noise, ParameterSpace, Signal, StateSpace};
+use std::error::Error;
+
+/// A simulator of a physical system: parameters and inputs in, outputs out.
+///
+/// Two methods make a black box a twin. A simulator whose equations are at hand implements [`StateSpace`]
+/// instead and is a `DigitalTwin` by that.
+///
+/// # What an implementation owes
+///
+/// - Row k of the result is what is measured at time k·Δt; row 0 is the start. Input k acts from k·Δt on.
+/// - The same arguments give the same bits.
+/// - Draws come from `noise` by named sources and do not depend on `theta`, so that two runs with the same
+///   `noise` are paired. With [`Noise::OFF`] the run is free of noise.
+/// - [`crate::twin::conformance`] tells whether a twin keeps to this.
+///
+/// ```
+/// use truetwin::twin::*;
+///
+/// /// y = a·u + noise.
+/// struct Amplifier;
+/// impl DigitalTwin for Amplifier {
+///     fn parameters(&self) -> ParameterSpace {
+///         ParameterSpace::new([Parameter::new("a", "-", 0.5, 2.0)])
+///     }
+///     fn simulate(&self, theta: &[f64], drive: &Drive, noise: Noise) -> Result<Signal, SimulationError> {
+///         let mut v = noise.source("sensor");
+///         Ok(drive.inputs().mapv(|u| theta[0] * u + 0.1 * v.normal()))
+///     }
+/// }
+/// let drive = Drive::new(0.1, Signal::ones((20, 1)))?;
+/// let y = Amplifier.simulate(&[1.5], &drive, Noise::OFF)?;
+/// assert_eq!(y[[0, 0]], 1.5);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub trait DigitalTwin: Send + Sync {
+    /// Names, units, prior box and physical bounds, in the order of θ.
+    fn parameters(&self) -> ParameterSpace;
+
+    /// Outputs (N × channels) at parameters `theta` under `drive`.
+    ///
+    /// # Errors
+    ///
+    /// [`SimulationError::Diverged`] costs this one run; [`SimulationError::Fatal`] ends the whole work.
+    fn simulate(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Signal, SimulationError>;
+
+    /// Input and output channels. One input `u` and one output `y` unless said otherwise.
+    fn signals(&self) -> Signals {
+        self.state_space().map_or_else(Signals::default, |twin| {
+            let outline = twin.outline();
+            Signals {
+                inputs: outline.inputs,
+                outputs: outline.outputs,
+            }
+        })
+    }
+
+    /// The equations, of a twin that can show them.
+    fn state_space(&self) -> Option<&dyn StateSpace> {
+        None
+    }
+}
+
+/// A named physical quantity with its unit.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Quantity {
+    /// Name.
+    pub name: String,
+    /// Unit, for people.
+    pub unit: String,
+}
+
+impl Quantity {
+    /// `name` in `unit`.
+    pub fn new(name: &str, unit: &str) -> Self {
+        Self {
+            name: name.into(),
+            unit: unit.into(),
+        }
+    }
+}
+
+/// The channels of a twin.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Signals {
+    /// Inputs, in the order of a drive's columns.
+    pub inputs: Vec<Quantity>,
+    /// Outputs, in the order of a record's columns.
+    pub outputs: Vec<Quantity>,
+}
+
+impl Default for Signals {
+    fn default() -> Self {
+        Self {
+            inputs: vec![Quantity::new("u", "")],
+            outputs: vec![Quantity::new("y", "")],
+        }
+    }
+}
+
+/// Why a simulation gave no outputs.
+#[derive(Debug, thiserror::Error)]
+pub enum SimulationError {
+    /// The trajectory left the finite numbers: these parameters are not for this input.
+    #[error("the simulation diverged at t = {at} s")]
+    Diverged {
+        /// Time of the first non-finite value, in seconds.
+        at: f64,
+    },
+    /// The simulator does not work at all; no other parameters will help.
+    #[error("the simulator failed: {0}")]
+    Fatal(Box<dyn Error + Send + Sync>),
+}
+
+impl SimulationError {
+    /// A fatal error from a message.
+    pub fn fatal(message: impl Into<String>) -> Self {
+        Self::Fatal(message.into().into())
+    }
+}

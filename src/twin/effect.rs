@@ -1,0 +1,329 @@
+//! What a twin may lack: the trait of an unmodelled effect.
+
+use super::{Interval, Outline, Signals, Source};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt::Debug;
+use std::sync::Arc;
+
+/// The effects added to a twin, in the order in which they lengthen θ.
+pub type Effects = Vec<Arc<dyn UnmodelledEffect>>;
+
+/// Position along a sensor's signal at which the measurement noise enters; see [`UnmodelledEffect::order`].
+pub const NOISE_ENTERS: u32 = 70;
+
+/// Magnitudes as a file gives them: `magnitudes = { tau = 2.5 }`. What is not given is free, a part of θ.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Given(BTreeMap<String, f64>);
+
+impl Given {
+    /// From pairs of name and value.
+    pub fn new<'a>(values: impl IntoIterator<Item = (&'a str, f64)>) -> Self {
+        Self(values.into_iter().map(|(n, v)| (n.into(), v)).collect())
+    }
+
+    /// The value of one magnitude, where the file gives it.
+    pub fn get(&self, name: &str) -> Option<f64> {
+        self.0.get(name).copied()
+    }
+}
+
+/// One number of an effect's law.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Magnitude {
+    /// Name, as in effect files.
+    pub name: &'static str,
+    /// Unit, for people.
+    pub unit: &'static str,
+    /// The value that switches the effect off; none for a *shape*, which has no effect of its own.
+    pub off: Option<f64>,
+    /// Values that a fit starts from, per unit of the signal or rate that the effect bends.
+    pub starts: &'static [f64],
+    /// Values that make sense: sign and size.
+    pub limits: Interval,
+}
+
+impl Magnitude {
+    /// A magnitude that is off at 0, of either sign.
+    pub const fn signed(name: &'static str, unit: &'static str, starts: &'static [f64]) -> Self {
+        Self {
+            name,
+            unit,
+            off: Some(0.0),
+            starts,
+            limits: Interval::EVERYTHING,
+        }
+    }
+
+    /// A magnitude that is off at 0 and never negative.
+    pub const fn positive(name: &'static str, unit: &'static str, starts: &'static [f64]) -> Self {
+        Self {
+            limits: Interval::unchecked(0.0, f64::INFINITY),
+            ..Self::signed(name, unit, starts)
+        }
+    }
+
+    /// With another off value.
+    pub const fn off(mut self, off: f64) -> Self {
+        self.off = Some(off);
+        self
+    }
+
+    /// A shape: no value of it alone switches the effect off.
+    pub const fn shape(mut self) -> Self {
+        self.off = None;
+        self
+    }
+
+    /// Within `[low, high]`.
+    pub const fn within(mut self, low: f64, high: f64) -> Self {
+        self.limits = Interval::unchecked(low, high);
+        self
+    }
+}
+
+/// Which law of the twin an effect bends, and so what its target names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Law {
+    /// An output signal; target `sensor`, or `sensor1`… where there are several.
+    Sensor,
+    /// An input signal; target `actuator`, or `actuator1`…
+    Actuator,
+    /// The rate of a state; target is the state.
+    Force,
+    /// A limit on a state; target is the state.
+    Limit,
+    /// A parameter over time; target is the parameter.
+    Parameter,
+    /// The noise of an output; target as for a sensor.
+    MeasurementNoise,
+    /// Rare large errors of an output, after everything else; target as for a sensor.
+    Outliers,
+    /// The noise of a state; target is the state.
+    ProcessNoise,
+}
+
+/// Time of a sample, and the step, in seconds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Instant {
+    /// Seconds from the first sample.
+    pub t: f64,
+    /// Step Δt.
+    pub dt: f64,
+}
+
+/// An effect that a twin may lack: what it bends, by how much, and how.
+///
+/// Implement the three required methods and the one that belongs to [`law`](Self::law); the rest is provided.
+/// Registered with `#[typetag::serde(name = "…")]`, the name is the effect's id in files.
+///
+/// `m` holds the magnitudes in the order of [`magnitudes`](Self::magnitudes). At the off values an effect must
+/// change no bit of a trajectory.
+#[typetag::serde(tag = "id")]
+pub trait UnmodelledEffect: Debug + Send + Sync {
+    /// What is bent: `sensor`, `actuator`, a state or a parameter.
+    fn target(&self) -> &str;
+
+    /// The numbers of the law.
+    fn magnitudes(&self) -> Vec<Magnitude>;
+
+    /// Which law is bent.
+    fn law(&self) -> Law;
+
+    /// Magnitudes that the file fixed.
+    fn given(&self) -> &Given;
+
+    /// The other state of a law between two: `from` which it acts, or `to` which it spills.
+    fn other(&self) -> Option<&str> {
+        None
+    }
+
+    /// Where along the signal the effect stands: small first; the measurement noise enters at
+    /// [`NOISE_ENTERS`]. Of no meaning outside signals.
+    fn order(&self) -> u32 {
+        0
+    }
+
+    /// Whether these magnitudes can be simulated with step `dt`; the message names the remedy.
+    fn check(&self, _m: &[f64], _dt: f64) -> Result<(), String> {
+        Ok(())
+    }
+
+    /// Number of memory values that a signal law needs.
+    fn memory(&self) -> usize {
+        0
+    }
+
+    /// Fills the memory before the first sample, whose value is `first`.
+    fn begin(&self, _m: &[f64], memory: &mut [f64], first: f64) {
+        memory.fill(first);
+    }
+
+    /// [`Law::Sensor`], [`Law::Actuator`]: the signal after the effect; `memory` may change, once a sample.
+    fn signal(&self, _m: &[f64], _now: Instant, _memory: &mut [f64], value: f64) -> f64 {
+        value
+    }
+
+    /// [`Law::Force`]: what is added to the rate of the target, at `x` and the other state `other`.
+    fn force(&self, _m: &[f64], _t: f64, _x: f64, _other: f64) -> f64 {
+        0.0
+    }
+
+    /// [`Law::Limit`]: bends the target and the other state after a step.
+    fn limit(&self, _m: &[f64], _x: &mut f64, _other: Option<&mut f64>) {}
+
+    /// [`Law::Parameter`]: the parameter's value at time `t`.
+    fn parameter(&self, _m: &[f64], _t: f64, value: f64) -> f64 {
+        value
+    }
+
+    /// [`Law::MeasurementNoise`], [`Law::ProcessNoise`]: standard deviation that joins the twin's in quadrature.
+    fn noise_level(&self, _m: &[f64]) -> f64 {
+        0.0
+    }
+
+    /// [`Law::Outliers`]: what is added to a sample, drawn from the effect's own source.
+    fn outlier(&self, _m: &[f64], _source: &mut Source) -> f64 {
+        0.0
+    }
+}
+
+/// Why an effect cannot be added to a twin.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum EffectError {
+    /// The target, or the other state, is not there.
+    #[error("effect {id}: the twin has no {what} \"{name}\"; choose one of {known}")]
+    Target {
+        /// Effect.
+        id: String,
+        /// Kind of target.
+        what: &'static str,
+        /// The name.
+        name: String,
+        /// What there is.
+        known: String,
+    },
+    /// A dynamics effect on a black box.
+    #[error(
+        "effect {id} bends the equations, which a black-box twin does not show; only sensor and actuator effects can be added"
+    )]
+    BlackBox {
+        /// Effect.
+        id: String,
+    },
+    /// A magnitude that the effect does not have.
+    #[error("effect {id} has no magnitude \"{name}\"; it has {known}")]
+    Magnitude {
+        /// Effect.
+        id: String,
+        /// The name.
+        name: String,
+        /// What there is.
+        known: String,
+    },
+    /// A memory after the noise, where the framework keeps none.
+    #[error(
+        "effect {id} remembers and stands after the noise; give it an order below {NOISE_ENTERS}"
+    )]
+    Memory {
+        /// Effect.
+        id: String,
+    },
+    /// A magnitude out of its limits.
+    #[error("effect {id}: {name} = {value} is outside {limits}; choose a value inside")]
+    Value {
+        /// Effect.
+        id: String,
+        /// Magnitude.
+        name: String,
+        /// The value.
+        value: f64,
+        /// Its limits.
+        limits: Interval,
+    },
+}
+
+/// Names of the targets that a law can have in a twin.
+pub(super) fn targets(law: Law, outline: Option<&Outline>, signals: &Signals) -> Vec<String> {
+    let numbered = |word: &str, n: usize| match n {
+        1 => vec![word.to_owned()],
+        _ => (1..=n).map(|j| format!("{word}{j}")).collect(),
+    };
+    match law {
+        Law::Sensor | Law::MeasurementNoise | Law::Outliers => {
+            numbered("sensor", signals.outputs.len())
+        }
+        Law::Actuator => numbered("actuator", signals.inputs.len()),
+        Law::Force | Law::Limit | Law::ProcessNoise => outline.map_or_else(Vec::new, |o| {
+            o.states.iter().map(|s| s.name.clone()).collect()
+        }),
+        Law::Parameter => outline.map_or_else(Vec::new, |o| {
+            o.parameters.iter().map(|p| p.name.clone()).collect()
+        }),
+    }
+}
+
+/// Whether each effect can be added to a twin with these equations (none: a black box) and signals.
+pub fn check_effects(
+    effects: &[Arc<dyn UnmodelledEffect>],
+    outline: Option<&Outline>,
+    signals: &Signals,
+) -> Result<(), EffectError> {
+    for effect in effects {
+        let (id, law) = (effect.typetag_name().to_owned(), effect.law());
+        let on_signals = matches!(
+            law,
+            Law::Sensor | Law::Actuator | Law::MeasurementNoise | Law::Outliers
+        );
+        if outline.is_none() && !on_signals {
+            return Err(EffectError::BlackBox { id });
+        }
+        if effect.memory() > 0 && effect.order() > NOISE_ENTERS {
+            return Err(EffectError::Memory { id });
+        }
+        let known = targets(law, outline, signals);
+        let what = match law {
+            Law::Sensor | Law::MeasurementNoise | Law::Outliers => "sensor",
+            Law::Actuator => "actuator",
+            Law::Parameter => "parameter",
+            Law::Force | Law::Limit | Law::ProcessNoise => "state",
+        };
+        for name in [Some(effect.target()), effect.other()]
+            .into_iter()
+            .flatten()
+        {
+            if !known.iter().any(|k| k == name) {
+                return Err(EffectError::Target {
+                    id,
+                    what,
+                    name: name.into(),
+                    known: known.join(", "),
+                });
+            }
+        }
+        let declared = effect.magnitudes();
+        for (name, &value) in &effect.given().0 {
+            let Some(magnitude) = declared.iter().find(|m| m.name == name) else {
+                return Err(EffectError::Magnitude {
+                    id,
+                    name: name.clone(),
+                    known: declared
+                        .iter()
+                        .map(|m| m.name)
+                        .collect::<Vec<_>>()
+                        .join(", "),
+                });
+            };
+            if !magnitude.limits.contains(value) {
+                return Err(EffectError::Value {
+                    id,
+                    name: name.clone(),
+                    value,
+                    limits: magnitude.limits,
+                });
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,30 @@
+//! The trajectory that a twin would show without noise.
+
+use super::{DigitalTwin, Drive, Noise, Signal, SimulationError};
+
+/// Runs that a black box's free run is the mean of: its noise cannot be switched off from outside.
+pub const BLACK_BOX_SEEDS: u64 = 32;
+
+/// Outputs of a run without noise (N × channels); of a black box, the mean of [`BLACK_BOX_SEEDS`] runs.
+pub fn free_run(
+    twin: &dyn DigitalTwin,
+    theta: &[f64],
+    drive: &Drive,
+) -> Result<Signal, SimulationError> {
+    if twin.state_space().is_some() {
+        return twin.simulate(theta, drive, Noise::OFF);
+    }
+    let mut mean = Signal::zeros((drive.samples(), twin.signals().outputs.len()));
+    for sample in 0..BLACK_BOX_SEEDS {
+        let run = twin.simulate(theta, drive, Noise::new(0, "free run", sample))?;
+        if run.dim() != mean.dim() {
+            return Err(SimulationError::fatal(format!(
+                "the twin gave {:?} rows and columns, {:?} were expected",
+                run.dim(),
+                mean.dim()
+            )));
+        }
+        mean += &run;
+    }
+    Ok(mean / BLACK_BOX_SEEDS as f64)
+}

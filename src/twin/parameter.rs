@@ -1,0 +1,331 @@
+//! What is estimated: names, units, prior box and physical bounds.
+
+use super::{Interval, Noise};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+
+/// What a parameter stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Role {
+    /// A parameter of the twin's own equations; what the user wants to know.
+    #[default]
+    Physical,
+    /// An unknown start of a state.
+    Start,
+    /// An unknown noise level.
+    Noise,
+    /// The magnitude of an effect that the twin lacked.
+    Effect,
+}
+
+/// One parameter.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Parameter {
+    /// Short name, as on the command line and in study files.
+    pub name: String,
+    /// Unit, for people.
+    pub unit: String,
+    /// Where simulations for training are drawn from, uniformly.
+    pub prior: Interval,
+    /// What is physically possible; estimates never leave it. Encloses the prior.
+    pub bounds: Interval,
+    /// What the parameter stands for.
+    pub role: Role,
+}
+
+impl Parameter {
+    /// A physical parameter with prior `[low, high]` and the same bounds; ends are checked with the twin.
+    pub fn new(name: &str, unit: &str, low: f64, high: f64) -> Self {
+        let prior = Interval::unchecked(low, high);
+        Self {
+            name: name.into(),
+            unit: unit.into(),
+            prior,
+            bounds: prior,
+            role: Role::Physical,
+        }
+    }
+
+    /// With physical bounds `[low, high]`.
+    pub fn within(mut self, low: f64, high: f64) -> Self {
+        self.bounds = Interval::unchecked(low, high);
+        self
+    }
+
+    /// With another role.
+    pub fn role(mut self, role: Role) -> Self {
+        self.role = role;
+        self
+    }
+}
+
+/// The parameters of a twin, in the order of θ.
+///
+/// ```
+/// use truetwin::twin::{Parameter, ParameterSpace};
+/// let space = ParameterSpace::new([Parameter::new("k", "1/s", 0.1, 1.0).within(0.0, 2.0)]);
+/// space.check()?;
+/// assert_eq!(space.centre(), [0.55]);
+/// assert!(space.check_point(&[3.0]).unwrap_err().to_string().contains("k = 3"));
+/// # Ok::<(), truetwin::twin::ParameterError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct ParameterSpace(Vec<Parameter>);
+
+/// What is wrong with parameters, or with a point.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ParameterError {
+    /// No parameter at all.
+    #[error("the twin has no parameter to estimate; declare or free at least one")]
+    Empty,
+    /// The same name twice.
+    #[error("parameter {0} stands there twice; give each its own name")]
+    Duplicate(String),
+    /// A box with its ends exchanged, or not finite.
+    #[error("{what} of {name} is {interval}; write finite [low, high] with low < high")]
+    Box {
+        /// Parameter.
+        name: String,
+        /// "prior" or "bounds".
+        what: &'static str,
+        /// What was given.
+        interval: Interval,
+    },
+    /// A prior that leaves the physical bounds.
+    #[error(
+        "prior {prior} of {name} leaves its bounds {bounds}; shrink the prior or widen the bounds"
+    )]
+    PriorOutside {
+        /// Parameter.
+        name: String,
+        /// The prior box.
+        prior: Interval,
+        /// The physical bounds.
+        bounds: Interval,
+    },
+    /// A point with too many or too few numbers.
+    #[error("{given} values for {expected} parameters ({names})")]
+    Length {
+        /// How many were given.
+        given: usize,
+        /// How many are needed.
+        expected: usize,
+        /// Their names.
+        names: String,
+    },
+    /// A value outside the physical bounds, or not a number.
+    #[error("{name} = {value} is outside its bounds {bounds}; choose a value inside")]
+    OutOfBounds {
+        /// Parameter.
+        name: String,
+        /// The value.
+        value: f64,
+        /// Its bounds.
+        bounds: Interval,
+    },
+    /// A name that no parameter has.
+    #[error("no parameter is called {name}; there are {names}")]
+    Unknown {
+        /// The name.
+        name: String,
+        /// The known names.
+        names: String,
+    },
+}
+
+impl ParameterSpace {
+    /// From its parameters, in the order of θ. [`check`](Self::check) tells whether they make sense.
+    pub fn new(parameters: impl IntoIterator<Item = Parameter>) -> Self {
+        Self(parameters.into_iter().collect())
+    }
+
+    /// Whether names are unique, boxes in order, and priors inside bounds.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        if self.0.is_empty() {
+            return Err(ParameterError::Empty);
+        }
+        let mut seen = BTreeSet::new();
+        for parameter in &self.0 {
+            if !seen.insert(&parameter.name) {
+                return Err(ParameterError::Duplicate(parameter.name.clone()));
+            }
+            for (what, interval) in [("prior", parameter.prior), ("bounds", parameter.bounds)] {
+                if interval.check().is_err() || !interval.is_finite() {
+                    return Err(ParameterError::Box {
+                        name: parameter.name.clone(),
+                        what,
+                        interval,
+                    });
+                }
+            }
+            let (prior, bounds) = (parameter.prior, parameter.bounds);
+            if !bounds.contains(prior.low()) || !bounds.contains(prior.high()) {
+                return Err(ParameterError::PriorOutside {
+                    name: parameter.name.clone(),
+                    prior,
+                    bounds,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether `theta` has the right length and lies in the bounds.
+    pub fn check_point(&self, theta: &[f64]) -> Result<(), ParameterError> {
+        if theta.len() != self.len() {
+            return Err(ParameterError::Length {
+                given: theta.len(),
+                expected: self.len(),
+                names: self.names().join(", "),
+            });
+        }
+        for (parameter, &value) in self.0.iter().zip(theta) {
+            if !parameter.bounds.contains(value) {
+                return Err(ParameterError::OutOfBounds {
+                    name: parameter.name.clone(),
+                    value,
+                    bounds: parameter.bounds,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Number of parameters, d.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// One after the other.
+    pub fn iter(&self) -> std::slice::Iter<'_, Parameter> {
+        self.0.iter()
+    }
+
+    /// To change them, for instance by a study file.
+    pub fn iter_mut(&mut self) -> std::slice::IterMut<'_, Parameter> {
+        self.0.iter_mut()
+    }
+
+    /// Names in the order of θ.
+    pub fn names(&self) -> Vec<&str> {
+        self.0.iter().map(|p| p.name.as_str()).collect()
+    }
+
+    /// Index in θ of the parameter called `name`.
+    pub fn position(&self, name: &str) -> Result<usize, ParameterError> {
+        self.0
+            .iter()
+            .position(|p| p.name == name)
+            .ok_or_else(|| ParameterError::Unknown {
+                name: name.into(),
+                names: self.names().join(", "),
+            })
+    }
+
+    /// Centre of the prior box.
+    pub fn centre(&self) -> Vec<f64> {
+        self.0.iter().map(|p| p.prior.centre()).collect()
+    }
+
+    /// Widths of the prior box: the scale of each parameter.
+    pub fn widths(&self) -> Vec<f64> {
+        self.0.iter().map(|p| p.prior.width()).collect()
+    }
+
+    /// Physical bounds.
+    pub fn bounds(&self) -> Vec<Interval> {
+        self.0.iter().map(|p| p.bounds).collect()
+    }
+
+    /// `theta` moved to the nearest point in the bounds.
+    pub fn clamp(&self, theta: &[f64]) -> Vec<f64> {
+        self.0
+            .iter()
+            .zip(theta)
+            .map(|(p, &v)| p.bounds.clamp(v))
+            .collect()
+    }
+
+    /// Uniform in the prior box, from the noise source `theta`.
+    pub fn draw_prior(&self, noise: Noise) -> Vec<f64> {
+        let mut source = noise.source("theta");
+        self.0
+            .iter()
+            .map(|p| p.prior.low() + source.uniform() * p.prior.width())
+            .collect()
+    }
+
+    /// Uniform in the physical bounds, from the noise source `theta`.
+    pub fn draw_bounds(&self, noise: Noise) -> Vec<f64> {
+        let mut source = noise.source("theta");
+        self.0
+            .iter()
+            .map(|p| p.bounds.low() + source.uniform() * p.bounds.width())
+            .collect()
+    }
+}
+
+impl std::ops::Index<usize> for ParameterSpace {
+    type Output = Parameter;
+    fn index(&self, index: usize) -> &Parameter {
+        &self.0[index]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pair() -> ParameterSpace {
+        ParameterSpace::new([
+            Parameter::new("a", "s", 1.0, 3.0).within(0.0, 9.0),
+            Parameter::new("b", "m", -1.0, 1.0),
+        ])
+    }
+
+    #[test]
+    fn a_prior_turned_inside_out_is_named() {
+        let space = ParameterSpace::new([Parameter::new("k4", "-", 1.2, 0.8)]);
+        let error = space.check().unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "prior of k4 is [1.2, 0.8]; write finite [low, high] with low < high"
+        );
+    }
+
+    #[test]
+    fn a_prior_outside_the_bounds_is_named() {
+        let space = ParameterSpace::new([Parameter::new("k", "-", 0.0, 2.0).within(0.5, 3.0)]);
+        assert!(matches!(
+            space.check(),
+            Err(ParameterError::PriorOutside { .. })
+        ));
+    }
+
+    #[test]
+    fn nan_is_out_of_bounds() {
+        assert!(pair().check_point(&[f64::NAN, 0.0]).is_err());
+        assert!(pair().check_point(&[1.0]).is_err());
+        assert!(pair().check_point(&[9.0, -1.0]).is_ok());
+    }
+
+    /// Seeds are contracts: these draws may not change between versions.
+    #[test]
+    fn prior_draws_are_pinned_and_uniform() {
+        let space = pair();
+        let draws: Vec<_> = (0..2000)
+            .map(|i| space.draw_prior(Noise::new(1, "test", i)))
+            .collect();
+        assert!(draws.iter().all(|t| space[0].prior.contains(t[0])));
+        let mean = draws.iter().map(|t| t[0]).sum::<f64>() / 2000.0;
+        // sd of the mean: (width/√12)/√n = 0.013
+        assert!((mean - 2.0).abs() < 0.06, "{mean}");
+        assert_eq!(space.draw_prior(Noise::new(1, "test", 0)), draws[0]);
+    }
+}

@@ -1,0 +1,381 @@
+//! Records and inputs as CSV files.
+//!
+//! A header, then one row a sample: `t` in seconds, uniform to 1e-3 of a step and increasing; inputs `u` or
+//! `u1,u2,…`; outputs `y` or `y1,y2,…`. Rows are counted as an editor counts lines: the header is row 1.
+
+use super::record::column_names;
+use super::{Drive, DriveError, Record, RecordError, Signal};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// What is wrong with a file: which file, where, which value, and what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum CsvError {
+    /// The file cannot be read or written.
+    #[error("{}: {error}", path.display())]
+    Io {
+        /// File.
+        path: PathBuf,
+        /// What the system said.
+        error: std::io::Error,
+    },
+    /// The text is no CSV table.
+    #[error("{}: {error}; each row needs as many cells as the header", path.display())]
+    Syntax {
+        /// File.
+        path: PathBuf,
+        /// What the parser said.
+        error: csv::Error,
+    },
+    /// The header does not name a record's columns.
+    #[error("{}: {problem}", path.display())]
+    Header {
+        /// File.
+        path: PathBuf,
+        /// What is wrong, and the remedy.
+        problem: String,
+    },
+    /// A cell that is no finite number.
+    #[error(
+        "{}, row {row}, column {column}: \"{value}\" is no finite number; correct or remove the row",
+        path.display()
+    )]
+    Cell {
+        /// File.
+        path: PathBuf,
+        /// Line of the file, the header being 1.
+        row: usize,
+        /// Column name.
+        column: String,
+        /// What stands there.
+        value: String,
+    },
+    /// Time that is not uniform or not increasing.
+    #[error(
+        "{}, row {row}, column t: {value} s where {expected} s was expected; time must increase by the same step to 1e-3 of it: resample the record",
+        path.display()
+    )]
+    Time {
+        /// File.
+        path: PathBuf,
+        /// Line of the file, the header being 1.
+        row: usize,
+        /// Time found.
+        value: f64,
+        /// Time expected.
+        expected: f64,
+    },
+    /// Too few rows to know the step.
+    #[error("{}: {rows} rows of data; at least 2 are needed to know the step", path.display())]
+    Short {
+        /// File.
+        path: PathBuf,
+        /// Rows of data.
+        rows: usize,
+    },
+    /// The columns do not make a record.
+    #[error("{}: {error}", path.display())]
+    Record {
+        /// File.
+        path: PathBuf,
+        /// Why.
+        error: RecordError,
+    },
+}
+
+/// Reads a measured record.
+pub fn read_record(path: &Path) -> Result<Record, CsvError> {
+    let table = Table::read(path)?;
+    if table.outputs.ncols() == 0 {
+        return Err(CsvError::Header {
+            path: path.into(),
+            problem: "no output column; a record needs y, or y1,y2,…".into(),
+        });
+    }
+    let record = |error| CsvError::Record {
+        path: path.into(),
+        error,
+    };
+    let drive = Drive::new(table.dt, table.inputs).map_err(|e| record(e.into()))?;
+    Record::new(drive, table.outputs).map_err(record)
+}
+
+/// Reads time and inputs to simulate with; outputs, if the file is a record, are ignored.
+pub fn read_drive(path: &Path) -> Result<Drive, CsvError> {
+    let table = Table::read(path)?;
+    Drive::new(table.dt, table.inputs).map_err(|error: DriveError| CsvError::Record {
+        path: path.into(),
+        error: error.into(),
+    })
+}
+
+/// Writes a record, so that reading it gives the same bits of u and y; the file appears whole or not at all.
+pub fn write_record(path: &Path, record: &Record) -> Result<(), CsvError> {
+    let io = |error| CsvError::Io {
+        path: path.into(),
+        error,
+    };
+    let (drive, outputs) = (record.drive(), record.outputs());
+    let mut header = vec!["t".to_owned()];
+    header.extend(column_names("u", drive.inputs().ncols()));
+    header.extend(column_names("y", outputs.ncols()));
+    let mut text = header.join(",");
+    text.push('\n');
+    for k in 0..record.samples() {
+        text.push_str(&rounded_time(drive.time(k)).to_string());
+        for value in drive.input(k).iter().chain(outputs.row(k)) {
+            text.push_str(&format!(",{value}"));
+        }
+        text.push('\n');
+    }
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    let mut file = tempfile::NamedTempFile::new_in(folder.unwrap_or(Path::new("."))).map_err(io)?;
+    file.write_all(text.as_bytes()).map_err(io)?;
+    file.persist(path).map_err(|error| io(error.error))?;
+    Ok(())
+}
+
+/// Time to the picosecond, so that 3·0.1 is written as 0.3.
+fn rounded_time(t: f64) -> f64 {
+    let rounded = (t * 1e12).round() / 1e12;
+    if rounded.is_finite() { rounded } else { t }
+}
+
+/// The numbers of a file.
+struct Table {
+    dt: f64,
+    inputs: Signal,
+    outputs: Signal,
+}
+
+impl Table {
+    fn read(path: &Path) -> Result<Self, CsvError> {
+        let mut reader = csv::ReaderBuilder::new()
+            .trim(csv::Trim::All)
+            .from_path(path)
+            .map_err(|error| csv_error(path, error))?;
+        let header = reader.headers().map_err(|e| csv_error(path, e))?.clone();
+        let (inputs, outputs) = channels(&header).map_err(|problem| CsvError::Header {
+            path: path.into(),
+            problem,
+        })?;
+        let columns = 1 + inputs + outputs;
+        // Where column j of the file goes in a row ordered t, u1, u2, …, y1, y2, ….
+        let places: Vec<usize> = header.iter().map(|name| place(name, inputs)).collect();
+        let mut values = Vec::new();
+        let mut cells = csv::StringRecord::new();
+        let mut rows = 0;
+        while reader
+            .read_record(&mut cells)
+            .map_err(|e| csv_error(path, e))?
+        {
+            let line = cells.position().map_or(rows + 2, |p| p.line() as usize);
+            values.resize(values.len() + columns, 0.0);
+            let row = &mut values[rows * columns..];
+            for ((cell, &place), name) in cells.iter().zip(&places).zip(&header) {
+                row[place] =
+                    (cell.parse::<f64>().ok().filter(|v| v.is_finite())).ok_or_else(|| {
+                        CsvError::Cell {
+                            path: path.into(),
+                            row: line,
+                            column: name.into(),
+                            value: cell.into(),
+                        }
+                    })?;
+            }
+            rows += 1;
+        }
+        if rows < 2 {
+            return Err(CsvError::Short {
+                path: path.into(),
+                rows,
+            });
+        }
+        let all =
+            Signal::from_shape_vec((rows, columns), values).map_err(|error| CsvError::Header {
+                path: path.into(),
+                problem: error.to_string(),
+            })?;
+        let dt = uniform_step(path, all.column(0).iter().copied().collect())?;
+        let part = |from: usize, to: usize| all.slice(ndarray::s![.., from..to]).to_owned();
+        Ok(Self {
+            dt,
+            inputs: part(1, 1 + inputs),
+            outputs: part(1 + inputs, columns),
+        })
+    }
+}
+
+fn csv_error(path: &Path, error: csv::Error) -> CsvError {
+    let path = path.to_path_buf();
+    match error.into_kind() {
+        csv::ErrorKind::Io(error) => CsvError::Io { path, error },
+        kind => CsvError::Syntax {
+            path,
+            error: kind_error(kind),
+        },
+    }
+}
+
+/// The parser's error again, from its kind.
+fn kind_error(kind: csv::ErrorKind) -> csv::Error {
+    csv::Error::from(std::io::Error::other(match kind {
+        csv::ErrorKind::UnequalLengths {
+            pos,
+            expected_len,
+            len,
+        } => format!(
+            "row {} has {len} cells, the header has {expected_len}",
+            pos.map_or(0, |p| p.line())
+        ),
+        csv::ErrorKind::Utf8 { pos, err } => {
+            format!("row {}: {err}", pos.map_or(0, |p| p.line()))
+        }
+        other => format!("{other:?}"),
+    }))
+}
+
+/// Number of inputs and outputs that a header names; each of t, u…, y… once and without gaps.
+fn channels(header: &csv::StringRecord) -> Result<(usize, usize), String> {
+    let count = |letter: char| header.iter().filter(|n| n.starts_with(letter)).count();
+    let (inputs, outputs) = (count('u'), count('y'));
+    let mut expected = vec!["t".to_owned()];
+    expected.extend(column_names("u", inputs));
+    expected.extend(column_names("y", outputs));
+    let known = |name: &str| {
+        expected.iter().any(|e| e == name)
+            || [("u", inputs), ("y", outputs)]
+                .iter()
+                .any(|(l, n)| *n == 1 && name == format!("{l}1"))
+    };
+    if let Some(name) = header.iter().find(|name| !known(name)) {
+        return Err(format!(
+            "column \"{name}\" is not part of a record; name the columns t, u or u1,u2,…, y or y1,y2,… and remove others"
+        ));
+    }
+    if header.len() != expected.len() || !header.iter().any(|name| name == "t") {
+        return Err(format!(
+            "columns {} are not {}; t and each channel must stand there once",
+            header.iter().collect::<Vec<_>>().join(","),
+            expected.join(",")
+        ));
+    }
+    let mut names: Vec<_> = header.iter().collect();
+    names.sort_unstable();
+    names.dedup();
+    if names.len() != header.len() {
+        return Err("a column stands there twice; give each its own name".into());
+    }
+    Ok((inputs, outputs))
+}
+
+/// Where a column goes: t first, then inputs, then outputs.
+fn place(name: &str, inputs: usize) -> usize {
+    let number = name[1..].parse::<usize>().unwrap_or(1);
+    match name.as_bytes()[0] {
+        b'u' => number,
+        b'y' => inputs + number,
+        _ => 0,
+    }
+}
+
+/// The common step of a time column.
+fn uniform_step(path: &Path, t: Vec<f64>) -> Result<f64, CsvError> {
+    let span = t[t.len() - 1] - t[0];
+    let dt = span / (t.len() - 1) as f64;
+    let off = |k: usize, expected: f64| CsvError::Time {
+        path: path.into(),
+        row: k + 2,
+        value: t[k],
+        expected,
+    };
+    if let Some(k) = (1..t.len()).find(|&k| t[k] <= t[k - 1]) {
+        let step = if k > 1 { t[1] - t[0] } else { dt.abs() };
+        return Err(off(k, t[k - 1] + step));
+    }
+    // A single gap shifts the mean step: name the row where the steps first change, not where they add up.
+    let first = t[1] - t[0];
+    if let Some(k) = (1..t.len()).find(|&k| (t[k] - t[0] - k as f64 * dt).abs() > 1e-3 * dt) {
+        let jump = (1..t.len()).find(|&k| (t[k] - t[k - 1] - first).abs() > 1e-3 * first);
+        return Err(jump.map_or_else(
+            || off(k, t[0] + k as f64 * dt),
+            |k| off(k, t[k - 1] + first),
+        ));
+    }
+    Ok(dt)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Record, CsvError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("r.csv");
+        std::fs::write(&path, text).unwrap();
+        read_record(&path)
+    }
+
+    fn message(text: &str) -> String {
+        read(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn columns_come_in_any_order() {
+        let record = read("y2,t,u,y1\n20,0,1,10\n21,0.5,2,11\n22,1.0,3,12\n").unwrap();
+        assert_eq!(record.drive().dt(), 0.5);
+        assert_eq!(record.drive().input(2), [3.0]);
+        assert_eq!(record.outputs().row(1).to_vec(), [11.0, 21.0]);
+    }
+
+    #[test]
+    fn cells_are_named_by_row_and_column() {
+        for bad in ["NaN", "abc", "", "inf"] {
+            let text = message(&format!("t,u,y\n0,1,2\n1,1,{bad}\n2,1,2\n"));
+            assert!(text.contains("row 3, column y"), "{text}");
+            assert!(text.contains(&format!("\"{bad}\"")), "{text}");
+        }
+    }
+
+    #[test]
+    fn headers_are_checked() {
+        assert!(message("t,u,y,temperature\n0,1,2,3\n").contains("\"temperature\""));
+        assert!(message("t,u\n0,1\n1,1\n").contains("no output"));
+        assert!(message("u,y\n0,1\n1,1\n").contains("t"));
+        assert!(message("t,y1,y3\n0,1,1\n1,1,1\n").contains("\"y3\""));
+        assert!(message("t,y1,y1\n0,1,1\n1,1,1\n").contains("twice"));
+        assert!(message("t,y\n0,1\n1\n2,2\n").contains("row 3"));
+        assert!(message("t,y\n0,1\n").contains("1 rows"));
+    }
+
+    #[test]
+    fn time_must_increase_uniformly() {
+        assert!(message("t,y\n0,1\n1,1\n0.5,1\n").contains("row 4, column t"));
+        assert!(
+            message("t,y\n0,1\n1,1\n2,1\n4,1\n5,1\n").contains("row 5, column t: 4 s where 3 s")
+        );
+        assert!(
+            read("t,y\n0,1\n1.0001,1\n2,1\n").is_ok(),
+            "1e-4 of a step is within tolerance"
+        );
+    }
+
+    #[test]
+    fn a_record_survives_the_file() {
+        let inputs = Signal::from_shape_fn((4, 2), |(k, j)| (k as f64 + 0.1) / (j as f64 + 3.0));
+        let drive = Drive::new(0.1, inputs).unwrap();
+        let outputs = Signal::from_shape_fn((4, 1), |(k, _)| (k as f64).sin() * 1e-7);
+        let record = Record::new(drive, outputs).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("r.csv");
+        write_record(&path, &record).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(
+            text.starts_with("t,u1,u2,y\n0,") && text.contains("\n0.3,"),
+            "{text}"
+        );
+        let back = read_record(&path).unwrap();
+        assert_eq!(back.outputs(), record.outputs());
+        assert_eq!(back.drive().inputs(), record.drive().inputs());
+    }
+}

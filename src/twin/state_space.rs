@@ -1,0 +1,303 @@
+//! Twins that can show their equations, and the loop that simulates them.
+
+use super::{
+    DigitalTwin, Drive, Integrator, Interval, Noise, ParameterSpace, Quantity, Signal,
+    SimulationError, Workspace,
+};
+
+/// A twin given by its equations
+///
+/// ```text
+/// ẋ = f(t, x, u, θ)            drift, carried over a step by an integrator
+/// x ← x + Q·w,  w ~ N(0, I)     noise, added once a step
+/// y = g(t, x, u, θ) + R·v       observe, v ~ N(0, I)
+/// ```
+///
+/// Three methods are required; it is then a [`DigitalTwin`], and everything that needs equations (filters,
+/// effects in the dynamics, unknown starts) works with it.
+///
+/// # Order within a sample
+///
+/// Row k is y(t_k), observed first; then u_k acts from t_k to t_k + Δt: [`update`](Self::update), drift, noise,
+/// [`constrain`](Self::constrain), [`limits`](Self::limits). Row 0 is the start.
+///
+/// ```
+/// use truetwin::twin::*;
+///
+/// /// A leaking tank: ḣ = u − k·h.
+/// struct Tank;
+/// impl StateSpace for Tank {
+///     fn outline(&self) -> Outline {
+///         Outline {
+///             parameters: ParameterSpace::new([Parameter::new("k", "1/s", 0.1, 1.0)]),
+///             states: vec![Quantity::new("h", "m")],
+///             inputs: vec![Quantity::new("u", "m/s")],
+///             outputs: vec![Quantity::new("y", "m")],
+///         }
+///     }
+///     fn drift(&self, now: &Now, x: &[f64], dx: &mut [f64]) {
+///         dx[0] = now.u[0] - now.theta[0] * x[0];
+///     }
+///     fn observe(&self, _: &Now, x: &[f64], y: &mut [f64]) {
+///         y[0] = x[0];
+///     }
+/// }
+/// let y = Tank.simulate(&[0.5], &Drive::new(0.1, Signal::ones((3, 1)))?, Noise::OFF)?;
+/// assert_eq!(y.column(0).to_vec(), [0.0, 0.1, 0.195]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub trait StateSpace: Send + Sync {
+    /// Parameters, states, inputs and outputs with names and units.
+    fn outline(&self) -> Outline;
+
+    /// `dx` = f: rates of the states `x`, in state units per second.
+    fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]);
+
+    /// `y` = g: what the sensors show of `x` without noise.
+    fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]);
+
+    /// State at the first sample; zero unless said otherwise.
+    fn start(&self, _now: &Now<'_>, x: &mut [f64]) {
+        x.fill(0.0);
+    }
+
+    /// Noise levels: standard deviation of the increment added to each state a step, and of each output.
+    /// None unless said otherwise. Both slices come zeroed.
+    fn noise(&self, _now: &Now<'_>, _process: &mut [f64], _measurement: &mut [f64]) {}
+
+    /// Boxes that the states are held in after each step; unbounded unless said otherwise.
+    fn limits(&self) -> Vec<Interval> {
+        vec![Interval::EVERYTHING; self.outline().states.len()]
+    }
+
+    /// Constraints that are no boxes (an overflow from one state into another), after noise, before limits.
+    fn constrain(&self, _now: &Now<'_>, _x: &mut [f64]) {}
+
+    /// States that change at samples only (memories), before the motion starts; nothing unless said otherwise.
+    fn update(&self, _now: &Now<'_>, _x: &mut [f64]) {}
+
+    /// What happens to an output after its noise (saturation, quantisation); nothing unless said otherwise.
+    fn readout(&self, _now: &Now<'_>, _y: &mut [f64]) {}
+
+    /// How the drift is carried over a step.
+    fn integrator(&self) -> Integrator {
+        Integrator::Euler
+    }
+
+    /// One step without noise and limits: memories, then motion.
+    fn advance(&self, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
+        self.update(now, x);
+        self.integrator()
+            .step(now, x, work, |now, x, dx| self.drift(now, x, dx));
+    }
+}
+
+/// Where the equations are evaluated.
+#[derive(Debug, Clone, Copy)]
+pub struct Now<'a> {
+    /// Time in seconds from the first sample.
+    pub t: f64,
+    /// Step Δt in seconds.
+    pub dt: f64,
+    /// Inputs, held over the step.
+    pub u: &'a [f64],
+    /// Parameters θ.
+    pub theta: &'a [f64],
+}
+
+/// Names and units of everything in the equations.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outline {
+    /// Parameters, in the order of θ.
+    pub parameters: ParameterSpace,
+    /// States, in the order of x.
+    pub states: Vec<Quantity>,
+    /// Inputs, in the order of u.
+    pub inputs: Vec<Quantity>,
+    /// Outputs, in the order of y.
+    pub outputs: Vec<Quantity>,
+}
+
+impl<T: StateSpace> DigitalTwin for T {
+    fn parameters(&self) -> ParameterSpace {
+        self.outline().parameters
+    }
+
+    fn state_space(&self) -> Option<&dyn StateSpace> {
+        Some(self)
+    }
+
+    fn simulate(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Signal, SimulationError> {
+        simulate_equations(self, theta, drive, noise)
+    }
+}
+
+/// Checks lengths once, before the loop relies on them.
+pub(super) fn check_lengths(
+    parameters: usize,
+    inputs: usize,
+    theta: &[f64],
+    drive: &Drive,
+) -> Result<(), SimulationError> {
+    let given = drive.inputs().ncols();
+    if theta.len() != parameters {
+        return Err(SimulationError::fatal(format!(
+            "{} parameter values given, the twin has {parameters}",
+            theta.len()
+        )));
+    }
+    if given != inputs {
+        return Err(SimulationError::fatal(format!(
+            "the drive has {given} inputs, the twin has {inputs}"
+        )));
+    }
+    Ok(())
+}
+
+/// The simulation loop. Allocates its buffers once; nothing inside the loop.
+fn simulate_equations(
+    twin: &(impl StateSpace + ?Sized),
+    theta: &[f64],
+    drive: &Drive,
+    noise: Noise,
+) -> Result<Signal, SimulationError> {
+    let outline = twin.outline();
+    check_lengths(outline.parameters.len(), outline.inputs.len(), theta, drive)?;
+    let (n, p) = (outline.states.len(), outline.outputs.len());
+    let limits: Vec<(usize, Interval)> = twin
+        .limits()
+        .into_iter()
+        .enumerate()
+        .filter(|(_, limit)| *limit != Interval::EVERYTHING)
+        .collect();
+    let mut process: Vec<_> = (outline.states.iter())
+        .map(|s| noise.source(&format!("process/{}", s.name)))
+        .collect();
+    let mut measurement: Vec<_> = (outline.outputs.iter())
+        .map(|y| noise.source(&format!("measurement/{}", y.name)))
+        .collect();
+    let (mut q, mut r) = (vec![0.0; n], vec![0.0; p]);
+    let mut x = vec![0.0; n];
+    let mut work = Workspace::new(n);
+    let mut outputs = vec![0.0; drive.samples() * p];
+    let mut now = Now {
+        t: 0.0,
+        dt: drive.dt(),
+        u: drive.input(0),
+        theta,
+    };
+    twin.start(&now, &mut x);
+    for k in 0..drive.samples() {
+        (now.t, now.u) = (drive.time(k), drive.input(k));
+        let y = &mut outputs[k * p..(k + 1) * p];
+        twin.observe(&now, &x, y);
+        if !noise.is_off() {
+            q.fill(0.0);
+            r.fill(0.0);
+            twin.noise(&now, &mut q, &mut r);
+            for ((y, r), v) in y.iter_mut().zip(&r).zip(&mut measurement) {
+                if *r != 0.0 {
+                    *y += r * v.normal();
+                }
+            }
+        }
+        twin.readout(&now, y);
+        if !y.iter().all(|v| v.is_finite()) {
+            return Err(SimulationError::Diverged { at: now.t });
+        }
+        twin.advance(&now, &mut x, &mut work);
+        if !noise.is_off() {
+            for ((x, q), w) in x.iter_mut().zip(&q).zip(&mut process) {
+                if *q != 0.0 {
+                    *x += q * w.normal();
+                }
+            }
+        }
+        twin.constrain(&now, &mut x);
+        for &(i, limit) in &limits {
+            x[i] = limit.clamp(x[i]);
+        }
+        if !x.iter().all(|v| v.is_finite()) {
+            return Err(SimulationError::Diverged { at: now.t + now.dt });
+        }
+    }
+    Signal::from_shape_vec((drive.samples(), p), outputs)
+        .map_err(|error| SimulationError::Fatal(error.into()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::twin::Parameter;
+
+    /// x ← a·x + w, observed with noise; two outputs.
+    struct Walk;
+    impl StateSpace for Walk {
+        fn outline(&self) -> Outline {
+            Outline {
+                parameters: ParameterSpace::new([Parameter::new("rate", "1/s", -2.0, 30.0)]),
+                states: vec![Quantity::new("x", "m")],
+                inputs: vec![],
+                outputs: vec![Quantity::new("y1", "m"), Quantity::new("y2", "m")],
+            }
+        }
+        fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+            dx[0] = now.theta[0] * x[0];
+        }
+        fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+            y.copy_from_slice(&[x[0], -x[0]]);
+        }
+        fn start(&self, _: &Now<'_>, x: &mut [f64]) {
+            x[0] = 1.0;
+        }
+        fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+            process[0] = 0.3;
+            measurement[1] = 0.2;
+        }
+    }
+
+    fn drive(samples: usize) -> Drive {
+        Drive::autonomous(0.1, samples).unwrap()
+    }
+
+    #[test]
+    fn noise_levels_are_standard_deviations() {
+        let drive = drive(2);
+        let n = 4000u32;
+        let [mut increments, mut errors] = [0.0, 0.0];
+        for i in 0..n {
+            let y = (Walk.simulate(&[0.0], &drive, Noise::new(3, "t", i.into()))).unwrap();
+            increments += (y[[1, 0]] - 1.0).powi(2) / f64::from(n);
+            errors += (y[[0, 1]] + 1.0).powi(2) / f64::from(n);
+        }
+        // Relative sd of a variance from n draws: √(2/n) = 0.022; five of them.
+        assert!((increments / 0.09 - 1.0).abs() < 0.11, "{increments}");
+        assert!((errors / 0.04 - 1.0).abs() < 0.11, "{errors}");
+    }
+
+    #[test]
+    fn divergence_tells_the_time_and_wrong_lengths_are_fatal() {
+        let blown = Walk.simulate(&[1e300], &drive(10), Noise::OFF);
+        assert!(matches!(blown, Err(SimulationError::Diverged { at }) if at > 0.0));
+        assert!(matches!(
+            Walk.simulate(&[], &drive(10), Noise::OFF),
+            Err(SimulationError::Fatal(_))
+        ));
+        let driven = Drive::new(0.1, Signal::zeros((3, 1))).unwrap();
+        let error = Walk.simulate(&[0.0], &driven, Noise::OFF).unwrap_err();
+        assert!(error.to_string().contains("1 inputs, the twin has 0"));
+    }
+
+    #[test]
+    fn common_noise_pairs_runs_at_different_parameters() {
+        let noise = Noise::new(5, "t", 0);
+        let a = Walk.simulate(&[-1.0], &drive(50), noise).unwrap();
+        let b = Walk.simulate(&[-1.0 + 1e-9], &drive(50), noise).unwrap();
+        assert!((&a - &b).iter().all(|d| d.abs() < 1e-7));
+    }
+}

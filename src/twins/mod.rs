@@ -1,0 +1,7 @@
+//! Reference twins, in the setting of the paper. They use nothing that a user's twin could not.
+
+mod cascaded_tanks;
+mod van_der_pol;
+
+pub use cascaded_tanks::CascadedTanks;
+pub use van_der_pol::VanDerPol;
