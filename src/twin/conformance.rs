@@ -1,6 +1,6 @@
 //! What is wrong with a new twin, found before any training.
 
-use super::{DigitalTwin, Drive, Noise, Signal, SimulationError, free_run};
+use super::{DigitalTwin, Drive, Noise, Signal, SimulationError, combination, free_run};
 use nalgebra::DMatrix;
 
 /// How bad a finding is.
@@ -271,30 +271,6 @@ fn identifiable(twin: &dyn DigitalTwin, drive: &Drive) -> Finding {
             flat.join("; ")
         ),
     )
-}
-
-/// A direction in words: `0.71·k1 − 0.71·k2`, parts under a twentieth of the largest left out.
-pub fn combination(names: &[&str], direction: &[f64]) -> String {
-    let largest = direction.iter().fold(0.0f64, |a, v| a.max(v.abs()));
-    // The sign of a direction means nothing: the largest part is written first as positive.
-    let sign = direction
-        .iter()
-        .find(|v| v.abs() == largest)
-        .map_or(1.0, |v| v.signum());
-    let mut text = String::new();
-    for (name, value) in names.iter().zip(direction) {
-        if value.abs() > 0.05 * largest {
-            let value = sign * value;
-            text.push_str(match (text.is_empty(), value < 0.0) {
-                (true, true) => "−",
-                (true, false) => "",
-                (false, true) => " − ",
-                (false, false) => " + ",
-            });
-            text.push_str(&format!("{:.2}·{name}", value.abs()));
-        }
-    }
-    text
 }
 
 #[cfg(test)]

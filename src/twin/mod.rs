@@ -15,6 +15,7 @@ mod adapt;
 mod augment;
 pub mod conformance;
 mod digital_twin;
+mod direction;
 mod drive;
 mod effect;
 mod fix;
@@ -30,6 +31,7 @@ mod state_space;
 pub use adapt::{Adaptation, AdaptationError, Level, adapt};
 pub use augment::augment;
 pub use digital_twin::{DigitalTwin, Quantity, Signals, SimulationError};
+pub use direction::{combination, oriented};
 pub use drive::{Drive, DriveError, Signal};
 pub use effect::{
     EffectError, Effects, Given, Instant, Law, Magnitude, NOISE_ENTERS, UnmodelledEffect,

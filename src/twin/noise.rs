@@ -44,6 +44,15 @@ impl Noise {
         }
     }
 
+    /// Sample number `index` of a family that shares this value's key.
+    pub fn sample(self, index: u64) -> Self {
+        Self {
+            key: self
+                .key
+                .map(|(key, sample)| (mix(key ^ mix(sample)), index)),
+        }
+    }
+
     /// The stream of one source of noise. The same name gives the same stream again.
     pub fn source(self, name: &str) -> Source {
         Source(self.key.map(|(key, sample)| {

@@ -1,0 +1,96 @@
+//! Stage 1: from a trajectory to a few features.
+//!
+//! A file holds a [`FeatureRecipe`]; *bound* to a twin it is a [`FeatureMap`].
+//!
+//! | recipe | features | suits |
+//! |---|---|---|
+//! | [`Ar`] | AR(p) coefficients of each output | twins without input |
+//! | [`Arx`] | ARX(p, q) coefficients of each output, with all inputs | twins with inputs |
+//! | [`Deviation`] | block means of the output's deviation from a reference run | records that the twin must *track*; starts; misspecified twins |
+
+mod ar;
+mod arx;
+mod deviation;
+mod regression;
+
+pub use ar::Ar;
+pub use arx::Arx;
+pub use deviation::Deviation;
+
+use crate::math::LeastSquaresError;
+use crate::twin::{DigitalTwin, Drive, Signal, SimulationError};
+use std::fmt::Debug;
+use std::sync::Arc;
+
+/// A fixed compression h of a trajectory to n numbers.
+///
+/// Source: Lakshminarayanan, Guerrero & Rojas, section III-A.
+pub trait FeatureMap: Send + Sync {
+    /// Number of features n.
+    fn dim(&self) -> usize;
+
+    /// Features of outputs (N × channels) under `drive`; length [`dim`](Self::dim), all finite.
+    fn extract(&self, drive: &Drive, outputs: &Signal) -> Result<Vec<f64>, FeatureError>;
+}
+
+/// What study and estimator files hold of a feature map: `{ kind = "ar", order = 5 }`.
+///
+/// Register an own recipe with `#[typetag::serde(name = "…")]`; the name is its `kind`.
+#[typetag::serde(tag = "kind")]
+pub trait FeatureRecipe: Debug + Send + Sync {
+    /// The map for a twin.
+    fn bind(&self, twin: &Arc<dyn DigitalTwin>) -> Result<Arc<dyn FeatureMap>, FeatureError>;
+}
+
+/// Why there are no features.
+#[derive(Debug, thiserror::Error)]
+pub enum FeatureError {
+    /// Orders or sizes that make no sense.
+    #[error("features {kind}: {problem}")]
+    Setting {
+        /// Recipe.
+        kind: &'static str,
+        /// What is wrong, and the remedy.
+        problem: String,
+    },
+    /// Fewer samples than the features need.
+    #[error(
+        "the record has {samples} samples, these features need {needed}; lower their order or take a longer record"
+    )]
+    TooShort {
+        /// Samples of the record.
+        samples: usize,
+        /// Samples needed.
+        needed: usize,
+    },
+    /// An output that never changes.
+    #[error(
+        "output {channel} is constant ({value}); nothing can be estimated from it: check the sensor, or drive the system"
+    )]
+    Constant {
+        /// Channel, from 1.
+        channel: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// The regression failed.
+    #[error("the regression of the features failed: {0}")]
+    Regression(#[from] LeastSquaresError),
+    /// The reference run failed.
+    #[error("the reference run of the features failed: {0}")]
+    Reference(#[from] SimulationError),
+}
+
+/// Refuses an output that never changes.
+fn check_varies(outputs: &Signal) -> Result<(), FeatureError> {
+    for (j, column) in outputs.columns().into_iter().enumerate() {
+        let value = column[0];
+        if column.iter().all(|v| *v == value) {
+            return Err(FeatureError::Constant {
+                channel: j + 1,
+                value,
+            });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,335 @@
+use nalgebra::{DMatrix, DVector};
+
+/// Where to evaluate a function of θ for its Jacobian, and how to put the values together.
+///
+/// For each parameter, with step h along its axis,
+///
+/// ```text
+/// central        ∂f/∂θ_j ≈ (f(θ + h) − f(θ − h)) / 2h                        error O(h²)
+/// at a bound     ∂f/∂θ_j ≈ ±(−3 f(θ) + 4 f(θ ± h) − f(θ ± 2h)) / 2h          error O(h²)
+/// ```
+///
+/// The one-sided form is taken where θ ± h leaves the bounds, on the side with more room, with h at most half of
+/// that room; every point respects the bounds. Two points a parameter, and θ itself once if any is one-sided.
+///
+/// The stencil evaluates nothing: the caller takes the [`points`](Self::points), runs them in any order on any number of
+/// threads, and hands the values back. A random function must use the *same* seeds at all points.
+///
+/// Choose h relative to each parameter's scale: about 6e-6 of it for a smooth function in f64 (the cube root of the
+/// rounding), 0.01 to 0.03 of it for simulators with kinks.
+///
+/// # Example
+///
+/// ```
+/// use nalgebra::{DVector, dvector};
+/// use rayon::prelude::*;
+/// use truetwin::math::{DifferenceError, Stencil};
+///
+/// let f = |p: &[f64]| dvector![p[0] * p[1], p[1].sin()];
+/// let stencil = Stencil::new(&[2.0, 0.0], &[1e-5, 1e-5], &[0.0, 0.0], &[9.0, 9.0])?;
+/// let values: Vec<DVector<f64>> = stencil.points().par_iter().map(|p| f(p)).collect();
+/// let jacobian = stencil.assemble(&values)?; // rows: outputs, columns: parameters
+/// assert!((jacobian[(0, 1)] - 2.0).abs() < 1e-8);
+/// # Ok::<(), DifferenceError>(())
+/// ```
+///
+/// # Reference
+///
+/// Nocedal & Wright, *Numerical Optimization*, second edition, section 8.1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stencil {
+    points: Vec<Vec<f64>>,
+    /// For each parameter, the points that make its column, with their weights.
+    columns: Vec<Vec<(usize, f64)>>,
+}
+
+impl Stencil {
+    /// Around `theta` with one step for each parameter, inside `lower` ≤ θ ≤ `upper` (all of length d, the parameters'
+    /// units; bounds may be infinite).
+    ///
+    /// # Errors
+    ///
+    /// [`DifferenceError`]: lengths that disagree, a step that is not positive or vanishes in rounding, θ outside of
+    /// its bounds, bounds without room.
+    pub fn new(
+        theta: &[f64],
+        steps: &[f64],
+        lower: &[f64],
+        upper: &[f64],
+    ) -> Result<Self, DifferenceError> {
+        let dimension = theta.len();
+        for (name, length) in [
+            ("steps", steps.len()),
+            ("lower", lower.len()),
+            ("upper", upper.len()),
+        ] {
+            if length != dimension {
+                return Err(DifferenceError::Length {
+                    name,
+                    length,
+                    dimension,
+                });
+            }
+        }
+        let mut stencil = Self {
+            points: Vec::with_capacity(2 * dimension + 1),
+            columns: Vec::with_capacity(dimension),
+        };
+        let mut centre = None;
+        for (index, (&at, &step)) in theta.iter().zip(steps).enumerate() {
+            let (low, high) = (lower[index], upper[index]);
+            if !(at.is_finite() && low <= at && at <= high) {
+                return Err(DifferenceError::Outside {
+                    index,
+                    value: at,
+                    lower: low,
+                    upper: high,
+                });
+            }
+            let invalid = DifferenceError::Step { index, step };
+            if !(step.is_finite() && step > 0.0) {
+                return Err(invalid);
+            }
+            let mut point = |value: f64| {
+                let mut point = theta.to_vec();
+                point[index] = value;
+                stencil.points.push(point);
+                stencil.points.len() - 1
+            };
+            // Divide by the distance between the points as they are after rounding, not by the step asked for.
+            let column = if at - step >= low && at + step <= high {
+                let (left, right) = (at - step, at + step);
+                let weight = 1.0 / (right - left);
+                vec![(point(right), weight), (point(left), -weight)]
+            } else {
+                let (room, sign) = if high - at >= at - low {
+                    (high - at, 1.0)
+                } else {
+                    (at - low, -1.0)
+                };
+                let near = (at + sign * step.min(room / 2.0)).clamp(low, high);
+                let far = (near + (near - at)).clamp(low, high);
+                let (a, b) = (near - at, far - at);
+                if a == 0.0 || a == b {
+                    return Err(if room == 0.0 {
+                        DifferenceError::NoRoom { index, value: at }
+                    } else {
+                        invalid
+                    });
+                }
+                // The derivative at 0 of the parabola through 0, a and b; for b = 2a the formula above.
+                let (near, far) = (point(near), point(far));
+                let centre = *centre.get_or_insert_with(|| {
+                    stencil.points.push(theta.to_vec());
+                    stencil.points.len() - 1
+                });
+                vec![
+                    (centre, -(a + b) / (a * b)),
+                    (near, b / (a * (b - a))),
+                    (far, -a / (b * (b - a))),
+                ]
+            };
+            if column.iter().any(|(_, weight)| !weight.is_finite()) {
+                return Err(invalid);
+            }
+            stencil.columns.push(column);
+        }
+        Ok(stencil)
+    }
+
+    /// The points to evaluate, each of length d.
+    pub fn points(&self) -> &[Vec<f64>] {
+        &self.points
+    }
+
+    /// The Jacobian, outputs × d, from the values at [`points`](Self::points) in their order.
+    ///
+    /// # Errors
+    ///
+    /// [`DifferenceError::Values`] unless there is one value for each point, all of the same length.
+    pub fn assemble(&self, values: &[DVector<f64>]) -> Result<DMatrix<f64>, DifferenceError> {
+        let rows = values.first().map_or(0, DVector::len);
+        if values.len() != self.points.len() || values.iter().any(|v| v.len() != rows) {
+            return Err(DifferenceError::Values {
+                points: self.points.len(),
+                values: values.len(),
+            });
+        }
+        let mut jacobian = DMatrix::zeros(rows, self.columns.len());
+        for (mut column, terms) in jacobian.column_iter_mut().zip(&self.columns) {
+            for &(point, weight) in terms {
+                column.axpy(weight, &values[point], 1.0);
+            }
+        }
+        Ok(jacobian)
+    }
+
+    /// The Jacobian of `f`, one point after the other; the first failure ends it.
+    ///
+    /// # Errors
+    ///
+    /// Those of `f` and of [`assemble`](Self::assemble).
+    pub fn jacobian<E: From<DifferenceError>>(
+        &self,
+        f: impl FnMut(&[f64]) -> Result<DVector<f64>, E>,
+    ) -> Result<DMatrix<f64>, E> {
+        let points = self.points.iter().map(Vec::as_slice);
+        let values = points.map(f).collect::<Result<Vec<_>, E>>()?;
+        Ok(self.assemble(&values)?)
+    }
+}
+
+/// Why there is no finite-difference Jacobian.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum DifferenceError {
+    /// A slice is not as long as θ.
+    #[error("{name} has {length} entries for {dimension} parameters; give one for each")]
+    Length {
+        /// Which slice.
+        name: &'static str,
+        /// Its length.
+        length: usize,
+        /// The number of parameters.
+        dimension: usize,
+    },
+    /// A step is not positive, or too small beside its parameter.
+    #[error(
+        "step = {step} of parameter {index} cannot be taken; choose about 1e-5 of the parameter's scale"
+    )]
+    Step {
+        /// Which parameter.
+        index: usize,
+        /// The step.
+        step: f64,
+    },
+    /// θ is not inside of its bounds.
+    #[error(
+        "parameter {index} = {value} is outside of its bounds [{lower}, {upper}]; clamp it first"
+    )]
+    Outside {
+        /// Which parameter.
+        index: usize,
+        /// Its value.
+        value: f64,
+        /// Its lower bound.
+        lower: f64,
+        /// Its upper bound.
+        upper: f64,
+    },
+    /// The bounds of a parameter are equal.
+    #[error("parameter {index} is held at {value} by its bounds; take it out of θ or widen them")]
+    NoRoom {
+        /// Which parameter.
+        index: usize,
+        /// Where it is held.
+        value: f64,
+    },
+    /// Not one value for each point, or of different lengths.
+    #[error(
+        "{values} values for {points} points, or of unequal lengths; give one for each point, all equally long"
+    )]
+    Values {
+        /// Points of the stencil.
+        points: usize,
+        /// Values that were given.
+        values: usize,
+    },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{dmatrix, dvector};
+
+    const FREE: [f64; 2] = [f64::INFINITY; 2];
+    const BELOW: [f64; 2] = [f64::NEG_INFINITY; 2];
+
+    fn smooth(p: &[f64]) -> Result<DVector<f64>, DifferenceError> {
+        Ok(dvector![p[0].exp() * p[1], p[0].sin(), p[1].powi(3)])
+    }
+
+    fn exact(p: &[f64]) -> DMatrix<f64> {
+        dmatrix![p[0].exp() * p[1], p[0].exp(); p[0].cos(), 0.0; 0.0, 3.0 * p[1].powi(2)]
+    }
+
+    #[test]
+    fn a_smooth_function_is_differentiated_to_ten_digits() {
+        let at = [0.3, -1.2];
+        let stencil = Stencil::new(&at, &[1e-5; 2], &BELOW, &FREE).unwrap();
+        assert_eq!(stencil.points().len(), 4);
+        assert!((stencil.jacobian(smooth).unwrap() - exact(&at)).amax() < 1e-9);
+    }
+
+    /// Both forms are of second order: a step ten times smaller, an error a hundred times smaller.
+    #[test]
+    fn convergence_is_of_second_order_also_at_a_bound() {
+        let at = [0.3, -1.2];
+        for lower in [BELOW, at] {
+            let error = |h: f64| {
+                let stencil = Stencil::new(&at, &[h; 2], &lower, &FREE).unwrap();
+                (stencil.jacobian(smooth).unwrap() - exact(&at)).amax()
+            };
+            let order = (error(1e-2) / error(1e-3)).log10();
+            assert!((order - 2.0).abs() < 0.05, "order {order}");
+        }
+    }
+
+    #[test]
+    fn every_point_respects_the_bounds() {
+        let (lower, upper) = ([0.0, 0.999], [0.15, 1.0]);
+        let at = [0.05, 1.0];
+        let stencil = Stencil::new(&at, &[0.1, 0.1], &lower, &upper).unwrap();
+        assert_eq!(stencil.points().len(), 5, "θ itself is shared");
+        for point in stencil.points() {
+            assert!(
+                (0..2).all(|j| (lower[j]..=upper[j]).contains(&point[j])),
+                "{point:?}"
+            );
+        }
+        let linear = |p: &[f64]| Ok::<_, DifferenceError>(dvector![2.0 * p[0] - 3.0 * p[1]]);
+        assert!((stencil.jacobian(linear).unwrap() - dmatrix![2.0, -3.0]).amax() < 1e-9);
+    }
+
+    #[test]
+    fn a_failure_of_the_function_comes_back() {
+        #[derive(Debug, PartialEq)]
+        enum Failure {
+            Diverged,
+            Difference,
+        }
+        impl From<DifferenceError> for Failure {
+            fn from(_: DifferenceError) -> Self {
+                Self::Difference
+            }
+        }
+        let stencil = Stencil::new(&[0.0], &[0.1], &BELOW[..1], &FREE[..1]).unwrap();
+        assert_eq!(
+            stencil.jacobian(|_| Err(Failure::Diverged)),
+            Err(Failure::Diverged)
+        );
+        let mut length = 0;
+        let uneven = stencil.jacobian(|_| {
+            length += 1;
+            Ok(DVector::zeros(length))
+        });
+        assert_eq!(uneven, Err(Failure::Difference));
+    }
+
+    #[test]
+    fn bad_input_is_named() {
+        let error = Stencil::new(&[1.0], &[0.1], &[1.0], &[1.0]).unwrap_err();
+        assert_eq!(
+            error,
+            DifferenceError::NoRoom {
+                index: 0,
+                value: 1.0
+            }
+        );
+        let error = Stencil::new(&[1e9], &[1e-12], &[0.0], &[1e10]).unwrap_err();
+        assert!(error.to_string().contains("1e-5 of the parameter's scale"));
+        let error = Stencil::new(&[2.0], &[0.1], &[0.0], &[1.0]).unwrap_err();
+        assert!(error.to_string().contains("outside of its bounds [0, 1]"));
+        let error = Stencil::new(&[2.0], &[], &[0.0], &[1.0]).unwrap_err();
+        assert!(error.to_string().contains("steps has 0 entries"));
+    }
+}

@@ -1,0 +1,125 @@
+//! What can go wrong with a network, each with its remedy.
+
+use crate::progress::Cancelled;
+
+/// Why a network could not be built, trained, evaluated or restored.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NetworkError {
+    /// A training setting is outside its range.
+    #[error("{field} = {value}; {remedy}")]
+    Setting {
+        /// The field of [`Training`](super::Training).
+        field: &'static str,
+        /// Its value, as text.
+        value: String,
+        /// What it must be.
+        remedy: String,
+    },
+    /// The data has more features than the architecture was written for.
+    #[error(
+        "{features} features, but architecture `{architecture}` takes at most {limit}; \
+         use fewer features or an architecture with larger `Features`"
+    )]
+    TooManyFeatures {
+        /// [`HeadArchitecture::ID`](super::HeadArchitecture::ID).
+        architecture: &'static str,
+        /// Columns of the data.
+        features: usize,
+        /// Most columns that the architecture takes.
+        limit: usize,
+    },
+    /// A matrix has another size than the network or its partner asks for.
+    #[error("{what}: expected {expected}, found {found}")]
+    Size {
+        /// What was counted.
+        what: &'static str,
+        /// The number that is needed.
+        expected: usize,
+        /// The number that was given.
+        found: usize,
+    },
+    /// A network needs at least one of these.
+    #[error("no {what}; at least {least} needed")]
+    Empty {
+        /// What is missing.
+        what: &'static str,
+        /// The smallest number that works.
+        least: usize,
+    },
+    /// A value is NaN, infinite, or too large for 32 bits.
+    #[error("{what}, row {row}, column {column}: {value} is not a finite 32-bit number")]
+    NotFinite {
+        /// Which matrix.
+        what: &'static str,
+        /// Row, from 0.
+        row: usize,
+        /// Column, from 0.
+        column: usize,
+        /// The value.
+        value: f64,
+    },
+    /// The loss left the finite numbers.
+    #[error(
+        "the loss is not finite in epoch {epoch} at learning rate {learning_rate}; \
+         lower learning_rate or standardise features and targets"
+    )]
+    Diverged {
+        /// The epoch, from 1.
+        epoch: usize,
+        /// The learning rate in that epoch.
+        learning_rate: f64,
+    },
+    /// A stored network lacks a tensor of the architecture.
+    #[error("tensor `{name}` of shape {expected:?} is missing; was it stored by `{architecture}`?")]
+    MissingTensor {
+        /// Name of the tensor.
+        name: String,
+        /// Its shape in the architecture.
+        expected: Vec<usize>,
+        /// The architecture that was asked to restore.
+        architecture: &'static str,
+    },
+    /// A stored network holds a tensor that the architecture has not.
+    #[error(
+        "tensor `{name}` of shape {found:?} has no place in `{architecture}`; was it stored by another architecture?"
+    )]
+    SurplusTensor {
+        /// Name of the tensor.
+        name: String,
+        /// Its stored shape.
+        found: Vec<usize>,
+        /// The architecture that was asked to restore.
+        architecture: &'static str,
+    },
+    /// A stored tensor has another shape than in the architecture.
+    #[error("tensor `{name}`: expected shape {expected:?}, found {found:?} with {values} values")]
+    MisshapenTensor {
+        /// Name of the tensor.
+        name: String,
+        /// Its shape in the architecture.
+        expected: Vec<usize>,
+        /// Its stored shape.
+        found: Vec<usize>,
+        /// How many values are stored.
+        values: usize,
+    },
+    /// A stored tensor holds NaN or infinity.
+    #[error("tensor `{name}` holds a value that is not finite; the file is damaged")]
+    DamagedTensor {
+        /// Name of the tensor.
+        name: String,
+    },
+    /// The tensor library failed: in practice, out of memory.
+    #[error("tensor operation failed: {0}")]
+    Backend(String),
+    /// The listener asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl From<dfdx::tensor::CpuError> for NetworkError {
+    fn from(error: dfdx::tensor::CpuError) -> Self {
+        Self::Backend(error.to_string())
+    }
+}

@@ -1,0 +1,235 @@
+//! Tensors by name: how weights leave a network and come back, and what is set before training.
+
+use super::NetworkError;
+use dfdx::nn::tensor_collection::{
+    RecursiveWalker, ScalarOptions, TensorCollection, TensorOptions, TensorVisitor, ViewTensorMut,
+    ViewTensorName, ViewTensorRef,
+};
+use dfdx::prelude::{Cpu, HasShape, Shape, Tensor};
+use num_traits::NumCast;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// One tensor of a network.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NamedTensor {
+    /// Its place, such as `trunk.0.weight` or `heads.2.1.gamma`.
+    pub name: String,
+    /// Size of each dimension; a weight is outputs × inputs.
+    pub shape: Vec<usize>,
+    /// The numbers, row-major.
+    pub values: Vec<f32>,
+}
+
+/// What a visitor of tensors returns: it builds nothing.
+type Visited<S> = Result<Option<Tensor<S, f32, Cpu>>, NetworkError>;
+
+fn sizes<S: Shape>(tensor: &Tensor<S, f32, Cpu>) -> Vec<usize> {
+    tensor.shape().concrete().into()
+}
+
+/// Appends the tensors of `module`, their names beginning with `prefix`.
+pub(super) fn collect<M: TensorCollection<f32, Cpu>>(
+    module: &M,
+    prefix: &str,
+    tensors: &mut Vec<NamedTensor>,
+) {
+    struct Collect<'a>(&'a mut Vec<NamedTensor>);
+    impl TensorVisitor<f32, Cpu> for Collect<'_> {
+        type Viewer = (ViewTensorRef, ViewTensorName);
+        type Err = NetworkError;
+        type E2 = f32;
+        type D2 = Cpu;
+
+        fn visit<S: Shape>(
+            &mut self,
+            _: TensorOptions<S, f32, Cpu>,
+            (tensor, name): (&Tensor<S, f32, Cpu>, String),
+        ) -> Visited<S> {
+            self.0.push(NamedTensor {
+                name,
+                shape: sizes(tensor),
+                values: tensor.as_vec(),
+            });
+            Ok(None)
+        }
+    }
+    M::iter_tensors(&mut RecursiveWalker {
+        m: (module, prefix.to_owned()),
+        f: &mut Collect(tensors),
+    })
+    .expect("collecting refuses nothing");
+}
+
+/// Gives each tensor of `module` the values stored under its name, taking them out of `stored`.
+pub(super) fn assign<'s, M: TensorCollection<f32, Cpu>>(
+    module: &mut M,
+    prefix: &str,
+    architecture: &'static str,
+    stored: &mut BTreeMap<&'s str, &'s NamedTensor>,
+) -> Result<(), NetworkError> {
+    struct Assign<'a, 'b> {
+        architecture: &'static str,
+        stored: &'a mut BTreeMap<&'b str, &'b NamedTensor>,
+    }
+    impl TensorVisitor<f32, Cpu> for Assign<'_, '_> {
+        type Viewer = (ViewTensorMut, ViewTensorName);
+        type Err = NetworkError;
+        type E2 = f32;
+        type D2 = Cpu;
+
+        fn visit<S: Shape>(
+            &mut self,
+            _: TensorOptions<S, f32, Cpu>,
+            (tensor, name): (&mut Tensor<S, f32, Cpu>, String),
+        ) -> Visited<S> {
+            let expected = sizes(tensor);
+            let Some(found) = self.stored.remove(name.as_str()) else {
+                return Err(NetworkError::MissingTensor {
+                    name,
+                    expected,
+                    architecture: self.architecture,
+                });
+            };
+            let count: usize = expected.iter().product();
+            if found.shape != expected || found.values.len() != count {
+                return Err(NetworkError::MisshapenTensor {
+                    name,
+                    expected,
+                    found: found.shape.clone(),
+                    values: found.values.len(),
+                });
+            }
+            if !found.values.iter().all(|v| v.is_finite()) {
+                return Err(NetworkError::DamagedTensor { name });
+            }
+            tensor.copy_from(&found.values);
+            Ok(None)
+        }
+    }
+    M::iter_tensors(&mut RecursiveWalker {
+        m: (module, prefix.to_owned()),
+        f: &mut Assign {
+            architecture,
+            stored,
+        },
+    })?;
+    Ok(())
+}
+
+/// Sets the probability of every dropout in `module`: each stored number that is named `p`, as dfdx and we do.
+pub(super) fn set_dropout<M: TensorCollection<f32, Cpu>>(module: &mut M, probability: f64) {
+    struct SetDropout(f64);
+    impl TensorVisitor<f32, Cpu> for SetDropout {
+        type Viewer = (ViewTensorMut, ViewTensorName);
+        type Err = NetworkError;
+        type E2 = f32;
+        type D2 = Cpu;
+
+        fn visit<S: Shape>(
+            &mut self,
+            _: TensorOptions<S, f32, Cpu>,
+            _: (&mut Tensor<S, f32, Cpu>, String),
+        ) -> Visited<S> {
+            Ok(None)
+        }
+
+        fn visit_scalar<N: NumCast>(
+            &mut self,
+            _: ScalarOptions<N>,
+            (number, name): (&mut N, String),
+        ) -> Result<Option<N>, NetworkError> {
+            if let (Some("p"), Some(p)) = (name.rsplit('.').next(), N::from(self.0)) {
+                *number = p;
+            }
+            Ok(None)
+        }
+    }
+    M::iter_tensors(&mut RecursiveWalker {
+        m: (module, String::new()),
+        f: &mut SetDropout(probability),
+    })
+    .expect("setting dropout refuses nothing");
+}
+
+/// Scales the first layer of `module`, whose weight takes `padded` inputs, as if it had been initialised for `inputs`.
+///
+/// Weights start in ±1/√(fan in), and the padding carries nothing into a layer.
+pub(super) fn widen_first_layer<M: TensorCollection<f32, Cpu>>(
+    module: &mut M,
+    inputs: usize,
+    padded: usize,
+) {
+    struct Widen {
+        padded: usize,
+        factor: f32,
+        layer: Option<String>,
+    }
+    impl TensorVisitor<f32, Cpu> for Widen {
+        type Viewer = (ViewTensorMut, ViewTensorName);
+        type Err = NetworkError;
+        type E2 = f32;
+        type D2 = Cpu;
+
+        fn visit<S: Shape>(
+            &mut self,
+            _: TensorOptions<S, f32, Cpu>,
+            (tensor, name): (&mut Tensor<S, f32, Cpu>, String),
+        ) -> Visited<S> {
+            let (layer, field) = name.rsplit_once('.').unwrap_or(("", &name));
+            let first = match &self.layer {
+                None => field == "weight" && sizes(tensor).last() == Some(&self.padded),
+                Some(first) => first == layer && field == "bias",
+            };
+            if first {
+                self.layer = Some(layer.to_owned());
+                let scaled: Vec<f32> = tensor.as_vec().iter().map(|v| v * self.factor).collect();
+                tensor.copy_from(&scaled);
+            }
+            Ok(None)
+        }
+    }
+    M::iter_tensors(&mut RecursiveWalker {
+        m: (module, String::new()),
+        f: &mut Widen {
+            padded,
+            factor: (padded as f32 / inputs as f32).sqrt(),
+            layer: None,
+        },
+    })
+    .expect("scaling refuses nothing");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dfdx::nn::DeviceBuildExt;
+    use dfdx::prelude::{Dropout, Linear, ReLU};
+
+    use crate::network::NormDense;
+
+    type Mixed = ((Linear<9, 4>, Dropout), NormDense<4, 4, ReLU>, Linear<4, 1>);
+
+    #[test]
+    fn dropout_is_set_in_plain_and_fused_layers() {
+        let mut module = Cpu::default().build_module::<Mixed, f32>();
+        set_dropout(&mut module, 0.25);
+        assert_eq!((module.0.1.p, module.1.p), (0.25, 0.25));
+    }
+
+    #[test]
+    fn only_the_first_layer_is_widened() {
+        let before = Cpu::default().build_module::<Mixed, f32>();
+        let mut after = before.clone();
+        widen_first_layer(&mut after, 1, 9);
+        let scaled = |x: Vec<f32>| x.into_iter().map(|v| v * 3.0).collect::<Vec<_>>();
+        assert_eq!(
+            after.0.0.weight.as_vec(),
+            scaled(before.0.0.weight.as_vec())
+        );
+        assert_eq!(after.0.0.bias.as_vec(), scaled(before.0.0.bias.as_vec()));
+        assert_eq!(after.1.weight.as_vec(), before.1.weight.as_vec());
+        assert_eq!(after.1.bias.as_vec(), before.1.bias.as_vec());
+    }
+}

@@ -1,0 +1,412 @@
+//! The module from outside: what a user of networks relies on.
+
+use super::layers::*;
+use super::*;
+use crate::progress::{Cancelled, Listener};
+use ndarray::{Axis, concatenate, s};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Small, and with each kind of layer and dropout.
+struct Mixed;
+impl HeadArchitecture for Mixed {
+    const ID: &'static str = "mixed";
+    type Features = Const<8>;
+    type Hidden = Const<16>;
+    type Trunk = (
+        Dense<8, 24, ReLU>,
+        Linear<24, 16>,
+        LayerNorm1D<16>,
+        Leaky,
+        Dropout,
+    );
+    type Head = (NormDense<16, 8, Tanh>, Linear<8, 1>);
+    const DROPOUT: f64 = 0.05;
+}
+
+/// No dropout, so that a linear map can be fitted closely.
+struct Smooth;
+impl HeadArchitecture for Smooth {
+    const ID: &'static str = "smooth";
+    type Features = Const<8>;
+    type Hidden = Const<32>;
+    type Trunk = Dense<8, 32, Tanh>;
+    type Head = (Dense<32, 16, Tanh>, Linear<16, 1>);
+}
+
+/// Features in ±1.7 without a pattern, and d linear targets of them.
+fn samples(count: usize, n: usize, d: usize) -> (Array2<f64>, Array2<f64>) {
+    let features = Array2::from_shape_fn((count, n), |(i, j)| {
+        let x = ((i * n + j + 1) as f64 * 0.618_033_988_749_895).fract();
+        ((x * 9973.0).fract() - 0.5) * 3.4
+    });
+    let map = Array2::from_shape_fn((n, d), |(i, j)| {
+        ((i + 2 * j) % 3) as f64 * 0.4 - 0.4 + 0.2 * (i == j) as u8 as f64
+    });
+    let targets = features.dot(&map);
+    (features, targets)
+}
+
+fn quick(epochs: usize) -> Training {
+    Training {
+        epochs,
+        learning_rate: 3e-3,
+        orthogonality: 1e-3,
+        ..Training::default()
+    }
+}
+
+fn train_one<A: HeadArchitecture>(
+    (features, targets): &(Array2<f64>, Array2<f64>),
+    settings: &Training,
+    seed: u64,
+) -> Result<(Arc<dyn Network>, History), NetworkError> {
+    architecture::<A>().train(features, targets, settings, seed, &Progress::silent())
+}
+
+#[test]
+fn a_linear_map_is_learnt_for_any_number_of_features_and_targets() {
+    for (n, d) in [(1, 1), (3, 2), (5, 1), (8, 4)] {
+        let (features, targets) = samples(600, n, d);
+        let known = (
+            features.slice(s![..500, ..]).to_owned(),
+            targets.slice(s![..500, ..]).to_owned(),
+        );
+        let settings = Training {
+            schedule: Schedule::Cosine,
+            orthogonality: 0.0,
+            patience: 0,
+            ..quick(80)
+        };
+        let (network, history) = train_one::<Smooth>(&known, &settings, 1).unwrap();
+        assert_eq!((network.inputs(), network.outputs()), (n, d));
+        let predicted = network
+            .predict(&features.slice(s![500.., ..]).to_owned())
+            .unwrap();
+        let miss = (&predicted - &targets.slice(s![500.., ..]))
+            .mapv(|e| e * e)
+            .mean()
+            .unwrap();
+        let spread = targets.mapv(|t| t * t).mean().unwrap();
+        assert!(miss < 0.01 * spread, "n={n} d={d}: {miss} of {spread}");
+        assert!(history.holdout[history.best_epoch] < 0.1 * history.holdout[0]);
+    }
+}
+
+#[test]
+fn the_seed_decides_every_bit() {
+    let data = samples(150, 4, 3);
+    let weights = |seed| {
+        train_one::<Mixed>(&data, &quick(3), seed)
+            .unwrap()
+            .0
+            .weights()
+    };
+    let (once, again, other) = (weights(5), weights(5), weights(6));
+    assert_eq!(once, again);
+    for (a, b) in once.iter().zip(&other) {
+        assert_ne!(a.values, b.values, "{}", a.name);
+    }
+}
+
+#[test]
+fn tuning_moves_the_heads_and_nothing_else() {
+    let (features, targets) = samples(200, 5, 2);
+    let data = (features, targets);
+    let (network, _) = train_one::<Mixed>(&data, &quick(5), 1).unwrap();
+    let before = network.weights();
+    let moved = data.1.mapv(|t| 0.5 * t + 0.3);
+    let tune = |seed| network.tune_heads(&data.0, &moved, &quick(40), seed, &Progress::silent());
+    let (tuned, history) = tune(2).unwrap();
+    assert_eq!(network.weights(), before, "the original stays");
+    assert_eq!(tuned.weights(), tune(2).unwrap().0.weights(), "repeatable");
+    for (a, b) in before.iter().zip(&tuned.weights()) {
+        assert_eq!(a.name, b.name);
+        assert_eq!(
+            a.values == b.values,
+            a.name.starts_with("trunk."),
+            "{}",
+            a.name
+        );
+    }
+    let hidden = network.hidden(&data.0).unwrap();
+    assert_eq!(hidden.dim(), (200, 16));
+    assert_eq!(hidden, tuned.hidden(&data.0).unwrap());
+    assert!(history.holdout[history.best_epoch] < 0.5 * history.holdout[0]);
+}
+
+#[test]
+fn padding_changes_nothing() {
+    let data = samples(60, 5, 2);
+    let (network, _) = train_one::<Mixed>(&data, &quick(2), 1).unwrap();
+    let wide = architecture::<Mixed>()
+        .restore(8, 2, &network.weights())
+        .unwrap();
+    let padded = concatenate(Axis(1), &[data.0.view(), Array2::zeros((60, 3)).view()]).unwrap();
+    assert_eq!(
+        network.predict(&data.0).unwrap(),
+        wide.predict(&padded).unwrap()
+    );
+}
+
+#[test]
+fn rows_are_predicted_alike_alone_and_together() {
+    let data = samples(600, 5, 2);
+    let (network, _) = train_one::<Mixed>(&data, &quick(1), 1).unwrap();
+    let together = network.predict(&data.0).unwrap();
+    for i in [0, 255, 256, 599] {
+        let alone = network
+            .predict(&data.0.slice(s![i..=i, ..]).to_owned())
+            .unwrap();
+        let gap = (&alone - &together.slice(s![i..=i, ..]))
+            .mapv(f64::abs)
+            .sum();
+        assert!(gap < 1e-5, "row {i}: {gap}");
+    }
+    assert_eq!(
+        network.predict(&Array2::zeros((0, 5))).unwrap().dim(),
+        (0, 2)
+    );
+}
+
+#[test]
+fn what_does_not_fit_is_refused_with_numbers_and_remedy() {
+    let said =
+        |result: Result<(Arc<dyn Network>, History), NetworkError>| result.unwrap_err().to_string();
+    assert_eq!(
+        said(train_one::<Mixed>(&samples(20, 9, 1), &quick(1), 1)),
+        "9 features, but architecture `mixed` takes at most 8; \
+         use fewer features or an architecture with larger `Features`"
+    );
+    let (features, targets) = samples(20, 3, 1);
+    let short = (features.clone(), targets.slice(s![..19, ..]).to_owned());
+    assert_eq!(
+        said(train_one::<Mixed>(&short, &quick(1), 1)),
+        "rows of targets: expected 20, found 19"
+    );
+    let weighted = Training {
+        target_weights: vec![1.0, 2.0],
+        ..quick(1)
+    };
+    assert_eq!(
+        said(train_one::<Mixed>(
+            &(features.clone(), targets.clone()),
+            &weighted,
+            1
+        )),
+        "target_weights = 2 weights; give 1, one for each target, or none"
+    );
+    let mut holed = features.clone();
+    holed[(4, 2)] = f64::NAN;
+    assert_eq!(
+        said(train_one::<Mixed>(&(holed, targets.clone()), &quick(1), 1)),
+        "features, row 4, column 2: NaN is not a finite 32-bit number"
+    );
+    let (network, _) = train_one::<Mixed>(&(features, targets), &quick(1), 1).unwrap();
+    let error = network.predict(&Array2::zeros((2, 4))).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "features of a sample: expected 3, found 4"
+    );
+}
+
+#[test]
+fn a_network_comes_back_from_its_weights() {
+    let data = samples(60, 4, 3);
+    let (network, _) = train_one::<Mixed>(&data, &quick(2), 1).unwrap();
+    let weights = network.weights();
+    let names: Vec<_> = weights.iter().map(|t| t.name.as_str()).collect();
+    assert_eq!(&names[..2], ["trunk.0.weight", "trunk.0.bias"]);
+    assert!(names.contains(&"heads.2.0.gamma"));
+    let same = architecture::<Mixed>().restore(4, 3, &weights).unwrap();
+    assert_eq!(
+        network.predict(&data.0).unwrap(),
+        same.predict(&data.0).unwrap()
+    );
+    assert_eq!(weights, same.weights());
+}
+
+#[test]
+fn altered_weights_are_refused_by_name() {
+    let (network, _) = train_one::<Mixed>(&samples(30, 4, 2), &quick(1), 1).unwrap();
+    let refused = |alter: &dyn Fn(&mut Vec<NamedTensor>)| {
+        let mut weights = network.weights();
+        alter(&mut weights);
+        let result = architecture::<Mixed>().restore(4, 2, &weights);
+        result.unwrap_err().to_string()
+    };
+    assert_eq!(
+        refused(&|w| drop(w.remove(0))),
+        "tensor `trunk.0.weight` of shape [24, 8] is missing; was it stored by `mixed`?"
+    );
+    assert_eq!(
+        refused(&|w| w[1].shape = vec![4, 6]),
+        "tensor `trunk.0.bias`: expected shape [24], found [4, 6] with 24 values"
+    );
+    assert!(refused(&|w| w[0].values.truncate(191)).contains("with 191 values"));
+    assert!(refused(&|w| w.push(w[0].clone())).starts_with("tensor `trunk.0.weight`"));
+    assert!(refused(&|w| w[2].values[0] = f32::NAN).contains("not finite"));
+    let one_head = architecture::<Mixed>().restore(4, 1, &network.weights());
+    assert_eq!(
+        one_head.unwrap_err().to_string(),
+        "tensor `heads.1.0.beta` of shape [8] has no place in `mixed`; was it stored by another architecture?"
+    );
+}
+
+/// Targets without relation to the features: the holdout loss soon rises, and the best weights must be kept.
+#[test]
+fn early_stopping_restores_the_best_epoch() {
+    let (features, _) = samples(80, 8, 1);
+    let targets = Array2::from_shape_fn((80, 1), |(i, _)| ((i * i * 7) % 13) as f64 / 6.0 - 1.0);
+    let data = (features, targets);
+    let settings = Training {
+        patience: 10,
+        learning_rate: 1e-2,
+        ..quick(300)
+    };
+    let (best, history) = train_one::<Smooth>(&data, &settings, 1).unwrap();
+    assert_eq!(history.epochs_run, history.best_epoch + 11);
+    assert_eq!(history.holdout.len(), history.epochs_run);
+    let least = history
+        .holdout
+        .iter()
+        .copied()
+        .fold(f64::INFINITY, f64::min);
+    assert_eq!(history.holdout[history.best_epoch], least);
+    // A constant learning rate makes a run of best_epoch + 1 epochs the beginning of the longer one.
+    let until_best = Training {
+        epochs: history.best_epoch + 1,
+        ..settings
+    };
+    let (shorter, _) = train_one::<Smooth>(&data, &until_best, 1).unwrap();
+    assert_eq!(best.weights(), shorter.weights());
+}
+
+#[test]
+fn a_listener_counts_the_epochs_and_cancels() {
+    struct StopAt(u64, AtomicU64);
+    impl Listener for StopAt {
+        fn advanced(&self, stage: &str, done: u64, total: u64) {
+            assert_eq!((stage, total), ("train", 50));
+            self.1.store(done, Ordering::Relaxed);
+        }
+        fn cancelled(&self) -> bool {
+            self.1.load(Ordering::Relaxed) >= self.0
+        }
+    }
+    let (features, targets) = samples(40, 3, 1);
+    let listener = Arc::new(StopAt(4, AtomicU64::new(0)));
+    let progress = Progress::new(listener.clone());
+    let result = architecture::<Mixed>().train(&features, &targets, &quick(50), 1, &progress);
+    assert_eq!(result.unwrap_err(), NetworkError::Cancelled(Cancelled));
+    assert_eq!(listener.1.load(Ordering::Relaxed), 4);
+}
+
+#[test]
+fn a_loss_that_diverges_names_epoch_and_remedy() {
+    for holdout in [0.0, 0.2] {
+        let wild = Training {
+            learning_rate: 1e38,
+            holdout,
+            ..quick(5)
+        };
+        let error = train_one::<Smooth>(&samples(64, 3, 1), &wild, 1).unwrap_err();
+        let said = error.to_string();
+        assert!(
+            said.starts_with("the loss is not finite in epoch "),
+            "{said}"
+        );
+        assert!(said.contains("lower learning_rate"), "{said}");
+    }
+}
+
+#[test]
+fn weight_decay_shrinks_the_weights() {
+    let data = samples(100, 4, 1);
+    let size = |weight_decay| -> f32 {
+        let settings = Training {
+            weight_decay,
+            ..quick(20)
+        };
+        let (network, _) = train_one::<Smooth>(&data, &settings, 1).unwrap();
+        let weights = network.weights();
+        weights.iter().flat_map(|t| &t.values).map(|v| v * v).sum()
+    };
+    assert!(size(0.1) < 0.8 * size(0.0));
+}
+
+#[test]
+fn the_penalty_turns_the_heads_apart() {
+    let data = samples(100, 4, 3);
+    let overlap = |orthogonality| -> f64 {
+        let settings = Training {
+            orthogonality,
+            ..quick(20)
+        };
+        let (network, _) = train_one::<Smooth>(&data, &settings, 1).unwrap();
+        let weights = network.weights();
+        let first: Vec<_> = weights
+            .iter()
+            .filter(|t| t.name.starts_with("heads.") && t.name.ends_with(".0.weight"))
+            .map(|t| Array2::from_shape_vec((16, 32), t.values.clone()).unwrap())
+            .collect();
+        assert_eq!(first.len(), 3);
+        let pair =
+            |j: usize, k: usize| first[j].dot(&first[k].t()).mapv(|g| f64::from(g * g)).sum();
+        pair(0, 1) + pair(0, 2) + pair(1, 2)
+    };
+    assert!(overlap(0.1) < 0.2 * overlap(0.0));
+}
+
+/// Products of plain layers this large are spread over rayon's threads, and still each sum keeps its order.
+#[test]
+fn the_number_of_threads_changes_no_bit() {
+    struct Wide;
+    impl HeadArchitecture for Wide {
+        const ID: &'static str = "wide";
+        type Features = Const<128>;
+        type Hidden = Const<256>;
+        type Trunk = (Linear<128, 256>, Tanh, Dropout);
+        type Head = Linear<256, 1>;
+        const DROPOUT: f64 = 0.1;
+    }
+    let data = samples(200, 128, 2);
+    let [one, three] = [1, 3].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        let (network, _) = pool
+            .install(|| train_one::<Wide>(&data, &quick(2), 1))
+            .unwrap();
+        network.weights()
+    });
+    assert_eq!(one, three);
+}
+
+#[test]
+fn the_ready_architectures_train() {
+    let few = samples(70, 5, 1);
+    let (network, _) = train_one::<Compact>(&few, &quick(1), 1).unwrap();
+    assert!(
+        network
+            .predict(&few.0)
+            .unwrap()
+            .iter()
+            .all(|v| v.is_finite())
+    );
+    let many = samples(70, 128, 4);
+    let (network, _) = train_one::<Deep>(&many, &quick(1), 1).unwrap();
+    assert!(
+        network
+            .predict(&many.0)
+            .unwrap()
+            .iter()
+            .all(|v| v.is_finite())
+    );
+    assert_eq!(architecture::<Deep>().max_features(), 128);
+    assert_eq!(architecture::<Compact>().id(), "compact");
+    assert_eq!(
+        format!("{network:?}"),
+        "Network { architecture: \"deep\", inputs: 128, outputs: 4 }"
+    );
+}

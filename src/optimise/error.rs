@@ -1,0 +1,97 @@
+use std::error::Error;
+
+use super::EvaluationError;
+
+/// Why nothing was minimised.
+#[derive(Debug, thiserror::Error)]
+pub enum OptimiseError {
+    /// A vector is not as long as θ.
+    #[error("{what} has {length} entries for {dimension} parameters; give one for each")]
+    Dimension {
+        /// Which vector.
+        what: &'static str,
+        /// Its length.
+        length: usize,
+        /// The number of parameters.
+        dimension: usize,
+    },
+    /// A number that cannot be used.
+    #[error("{name} = {value}; {remedy}")]
+    Setting {
+        /// Which setting.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        remedy: &'static str,
+    },
+    /// Something that needs a box was given a half-space.
+    #[error(
+        "parameter {index} has no finite bounds; points cannot be spread over it, give it both"
+    )]
+    Unbounded {
+        /// Which parameter.
+        index: usize,
+    },
+    /// There is no value at the start.
+    #[error("the search cannot begin at its start: {0}; start elsewhere")]
+    Start(#[source] Box<dyn Error + Send + Sync>),
+    /// No start has a value.
+    #[error(
+        "all {count} starts failed, the first with: {first}; widen the bounds or check the twin"
+    )]
+    AllStarts {
+        /// How many there were.
+        count: usize,
+        /// What the first one said.
+        #[source]
+        first: Box<OptimiseError>,
+    },
+    /// The evaluation asked for an end.
+    #[error(transparent)]
+    Fatal(Box<dyn Error + Send + Sync>),
+}
+
+impl OptimiseError {
+    /// Recovers what an evaluation said from what argmin carried.
+    pub(super) fn from_argmin(error: argmin::core::Error) -> Self {
+        match error.downcast::<EvaluationError>() {
+            Ok(EvaluationError::Rejected(cause)) => Self::Start(cause),
+            Ok(EvaluationError::Fatal(cause)) => Self::Fatal(cause),
+            Err(other) => Self::Fatal(other.into()),
+        }
+    }
+
+    /// Fails unless `length` is `dimension`.
+    pub(super) fn check_length(
+        what: &'static str,
+        length: usize,
+        dimension: usize,
+    ) -> Result<(), Self> {
+        if length == dimension {
+            return Ok(());
+        }
+        Err(Self::Dimension {
+            what,
+            length,
+            dimension,
+        })
+    }
+
+    /// Fails with `remedy` unless `valid`.
+    pub(super) fn check_setting(
+        name: &'static str,
+        value: f64,
+        valid: bool,
+        remedy: &'static str,
+    ) -> Result<(), Self> {
+        if valid {
+            return Ok(());
+        }
+        Err(Self::Setting {
+            name,
+            value,
+            remedy,
+        })
+    }
+}

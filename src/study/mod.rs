@@ -1,0 +1,301 @@
+//! A twin together with everything that estimating its parameters needs, checked.
+
+mod file;
+mod plan;
+mod settings;
+
+pub use file::{Library, RecordTable, StudyFile, StudyFileError};
+pub use plan::{DriveSource, InputPlan, Levels, PlanError, RecordPlan};
+pub use settings::{CloudSampler, CloudSettings, Preset, PresetName, Settings, SettingsError};
+
+use crate::feature::{Ar, Arx, FeatureError, FeatureMap, FeatureRecipe};
+use crate::network::{Architecture, Deep, HeadArchitecture, architecture};
+use crate::twin::{
+    Adaptation, AdaptationError, DigitalTwin, EffectError, ParameterError, Record, RecordError,
+    adapt, augment, fix,
+};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A twin, the records it is compared with, and the recipes for its estimator.
+///
+/// ```
+/// use truetwin::study::{RecordPlan, Study};
+/// use truetwin::twins::VanDerPol;
+/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 300))?;
+/// assert_eq!(study.twin().parameters().names(), ["nu"]);
+/// # Ok::<(), truetwin::study::StudyError>(())
+/// ```
+#[derive(Clone)]
+pub struct Study {
+    name: String,
+    /// As registered.
+    base: Arc<dyn DigitalTwin>,
+    /// In the setting of `file`.
+    twin: Arc<dyn DigitalTwin>,
+    plan: RecordPlan,
+    presets: BTreeMap<PresetName, Preset>,
+    file: StudyFile,
+}
+
+impl std::fmt::Debug for Study {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Study")
+            .field("name", &self.name)
+            .field("plan", &self.plan)
+            .field("file", &self.file)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Why there is no such study, or why a record does not belong to it.
+#[derive(Debug, thiserror::Error)]
+pub enum StudyError {
+    /// Of the file.
+    #[error(transparent)]
+    File(#[from] StudyFileError),
+    /// The file is about another twin.
+    #[error("the study is about twin \"{given}\"; known are {known}")]
+    Twin {
+        /// In the file.
+        given: String,
+        /// Known twins.
+        known: String,
+    },
+    /// Of prior, bounds, limits, noise, start.
+    #[error(transparent)]
+    Adaptation(#[from] AdaptationError),
+    /// Of effects.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+    /// Of fixed parameters.
+    #[error("[fixed]: {0}")]
+    Fixed(ParameterError),
+    /// Of the twin's own parameters.
+    #[error("twin \"{name}\": {error}")]
+    Parameters {
+        /// Twin.
+        name: String,
+        /// What is wrong.
+        error: ParameterError,
+    },
+    /// Of step, length, input.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// Of features.
+    #[error(transparent)]
+    Feature(#[from] FeatureError),
+    /// Of a record's channels.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+}
+
+impl Study {
+    /// A study of `twin` under `name`. Features are AR(5), or ARX(8, 8) for a twin with inputs, the network is
+    /// [`Deep`], unless said otherwise.
+    pub fn new(
+        name: &str,
+        twin: impl DigitalTwin + 'static,
+        plan: RecordPlan,
+    ) -> Result<Self, StudyError> {
+        let base: Arc<dyn DigitalTwin> = Arc::new(twin);
+        base.parameters()
+            .check()
+            .map_err(|error| StudyError::Parameters {
+                name: name.into(),
+                error,
+            })?;
+        let features: Arc<dyn FeatureRecipe> = match base.signals().inputs.len() {
+            0 => Arc::new(Ar { order: 5 }),
+            _ => Arc::new(Arx {
+                outputs: 8,
+                inputs: 8,
+            }),
+        };
+        let preset = |settings| Preset {
+            features: features.clone(),
+            architecture: architecture::<Deep>(),
+            settings,
+        };
+        Ok(Self {
+            name: name.into(),
+            twin: base.clone(),
+            base,
+            plan,
+            presets: BTreeMap::from([
+                (PresetName::Default, preset(Settings::default())),
+                (PresetName::Paper, preset(Settings::paper())),
+            ]),
+            file: StudyFile {
+                twin: name.into(),
+                ..StudyFile::default()
+            },
+        })
+    }
+
+    /// With another recipe under a preset's name.
+    pub fn with_preset(mut self, name: PresetName, preset: Preset) -> Self {
+        self.presets.insert(name, preset);
+        self
+    }
+
+    /// With other features, in both presets.
+    pub fn with_features(mut self, features: impl FeatureRecipe + 'static) -> Self {
+        let features: Arc<dyn FeatureRecipe> = Arc::new(features);
+        for preset in self.presets.values_mut() {
+            preset.features = features.clone();
+        }
+        self
+    }
+
+    /// With another network, in both presets.
+    pub fn with_architecture<A: HeadArchitecture>(mut self) -> Self {
+        for preset in self.presets.values_mut() {
+            preset.architecture = architecture::<A>();
+        }
+        self
+    }
+
+    /// With other numbers, in the default preset.
+    pub fn with_settings(mut self, settings: Settings) -> Self {
+        if let Some(preset) = self.presets.get_mut(&PresetName::Default) {
+            preset.settings = settings;
+        }
+        self
+    }
+
+    /// The study in the setting of a file about the same twin. θ becomes: the twin's parameters that are not fixed,
+    /// unknown noise levels, unknown starts, effects' magnitudes that are not given.
+    pub fn configure(&self, file: &StudyFile) -> Result<Self, StudyError> {
+        if file.twin != self.name {
+            return Err(StudyError::Twin {
+                given: file.twin.clone(),
+                known: self.name.clone(),
+            });
+        }
+        // Boxes of magnitudes apply once the effects are there; all others before.
+        let of_effects = |name: &str| name.contains('@');
+        let part = |boxes: &BTreeMap<String, _>, effects: bool| {
+            (boxes.iter())
+                .filter(|(name, _)| of_effects(name) == effects)
+                .map(|(name, value)| (name.clone(), *value))
+                .collect()
+        };
+        let first = Adaptation {
+            prior: part(&file.prior, false),
+            bounds: part(&file.bounds, false),
+            limits: file.limits.clone(),
+            noise: file.noise.clone(),
+            start: file.start.clone(),
+        };
+        let second = Adaptation {
+            prior: part(&file.prior, true),
+            bounds: part(&file.bounds, true),
+            ..Adaptation::default()
+        };
+        let mut twin = adapt(self.base.clone(), &first)?;
+        twin = augment(twin, file.effect.clone())?;
+        if second != Adaptation::default() {
+            twin = adapt(twin, &second)?;
+        }
+        let space = twin.parameters();
+        for (name, &value) in &file.fixed {
+            let parameter = &space[space.position(name).map_err(StudyError::Fixed)?];
+            if !parameter.bounds.contains(value) {
+                return Err(StudyError::Fixed(ParameterError::OutOfBounds {
+                    name: name.clone(),
+                    value,
+                    bounds: parameter.bounds,
+                }));
+            }
+        }
+        let mut held = file.fixed.clone();
+        held.extend(given_magnitudes(file));
+        twin = fix(twin, &held).map_err(StudyError::Fixed)?;
+        let RecordTable {
+            step,
+            samples,
+            input,
+        } = file.record.clone();
+        let mut study = Self {
+            twin,
+            plan: RecordPlan {
+                step: step.unwrap_or(self.plan.step),
+                samples: samples.unwrap_or(self.plan.samples),
+                input: input.or_else(|| self.plan.input.clone()),
+            },
+            file: file.clone(),
+            ..self.clone()
+        };
+        if let Some(features) = &file.features {
+            for preset in study.presets.values_mut() {
+                preset.features = features.clone();
+            }
+        }
+        Ok(study)
+    }
+
+    /// Name of the twin.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The twin in this study's setting.
+    pub fn twin(&self) -> &Arc<dyn DigitalTwin> {
+        &self.twin
+    }
+
+    /// Step, length and input of simulated records.
+    pub fn plan(&self) -> &RecordPlan {
+        &self.plan
+    }
+
+    /// The file that would make this study from the registered one.
+    pub fn file(&self) -> &StudyFile {
+        &self.file
+    }
+
+    /// A recipe.
+    pub fn preset(&self, name: PresetName) -> &Preset {
+        &self.presets[&name]
+    }
+
+    /// The features of a recipe, bound to the twin.
+    pub fn features(
+        &self,
+        recipe: &dyn FeatureRecipe,
+    ) -> Result<Arc<dyn FeatureMap>, FeatureError> {
+        recipe.bind(&self.twin)
+    }
+
+    /// An architecture of this study by its id.
+    pub fn architecture(&self, id: &str) -> Option<Arc<dyn Architecture>> {
+        (self.presets.values())
+            .map(|preset| &preset.architecture)
+            .find(|a| a.id() == id)
+            .cloned()
+    }
+
+    /// What drives are drawn from.
+    pub fn drives(&self) -> Result<DriveSource, PlanError> {
+        self.plan.prepare(&self.twin.signals())
+    }
+
+    /// Whether a record has the step and the channels of this study.
+    pub fn check_record(&self, record: &Record) -> Result<(), StudyError> {
+        record.check_channels(&self.twin.signals())?;
+        Ok(self.plan.check_step(record)?)
+    }
+}
+
+/// Magnitudes that a file gives, by the names of their parameters.
+fn given_magnitudes(file: &StudyFile) -> BTreeMap<String, f64> {
+    let named = file.effect.iter().flat_map(|effect| {
+        let label = format!("{}@{}", effect.typetag_name(), effect.target());
+        effect.magnitudes().into_iter().filter_map(move |m| {
+            let value = effect.given().get(m.name)?;
+            Some((format!("{label}.{}", m.name), value))
+        })
+    });
+    named.collect()
+}

@@ -1,0 +1,208 @@
+//! What a simulated record looks like: step, length, input.
+
+use crate::twin::{
+    CsvError, Drive, DriveError, Interval, Noise, Record, Signal, Signals, read_drive,
+};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Where the inputs of simulated records come from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum InputPlan {
+    /// Each input an independent staircase: levels uniform in `levels`, each held for `hold` samples; fresh for each
+    /// record.
+    Levels(Levels),
+    /// The inputs of a file, for every record; its step and length are the study's.
+    File(PathBuf),
+}
+
+/// A staircase of random levels.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Levels {
+    /// Range of the levels.
+    pub levels: Interval,
+    /// Samples that a level is held.
+    pub hold: usize,
+}
+
+/// Step, length and input of simulated records.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordPlan {
+    /// Step Δt in seconds.
+    pub step: f64,
+    /// Samples N.
+    pub samples: usize,
+    /// Inputs; `None` for a twin without.
+    pub input: Option<InputPlan>,
+}
+
+/// Why no input can be made, or why a record does not fit.
+#[derive(Debug, thiserror::Error)]
+pub enum PlanError {
+    /// Step or samples that make no record.
+    #[error(transparent)]
+    Drive(#[from] DriveError),
+    /// A hold of zero samples.
+    #[error("[record] hold = 0; a level is held for at least 1 sample")]
+    Hold,
+    /// The twin has inputs, and nothing says which.
+    #[error(
+        "the twin has {0} inputs; say what they look like: [record] input = {{ levels = [low, high], hold = n }}, or a file"
+    )]
+    NoInput(usize),
+    /// An input file that cannot be read.
+    #[error(transparent)]
+    Csv(#[from] CsvError),
+    /// An input file with another number of inputs.
+    #[error("{}: {given} inputs, the twin has {expected}; give each its column", path.display())]
+    Channels {
+        /// File.
+        path: PathBuf,
+        /// In the file.
+        given: usize,
+        /// In the twin.
+        expected: usize,
+    },
+    /// A record with another step than the study's.
+    #[error(
+        "the record's step is {given} s, the study's {expected} s; resample the record, or set [record] step = {given} in a study file and pretrain again"
+    )]
+    Step {
+        /// In the record.
+        given: f64,
+        /// In the study.
+        expected: f64,
+    },
+}
+
+impl RecordPlan {
+    /// A record without inputs.
+    pub fn autonomous(step: f64, samples: usize) -> Self {
+        Self {
+            step,
+            samples,
+            input: None,
+        }
+    }
+
+    /// A record under random levels in `[low, high]`, each held for `hold` samples.
+    pub fn levels(step: f64, samples: usize, low: f64, high: f64, hold: usize) -> Self {
+        let levels = Interval::unchecked(low, high);
+        Self {
+            step,
+            samples,
+            input: Some(InputPlan::Levels(Levels { levels, hold })),
+        }
+    }
+
+    /// Makes ready what drives are drawn from; reads the input file, if one is named.
+    pub fn prepare(&self, signals: &Signals) -> Result<DriveSource, PlanError> {
+        let channels = signals.inputs.len();
+        let fixed = match &self.input {
+            _ if channels == 0 => Some(Drive::autonomous(self.step, self.samples)?),
+            None => return Err(PlanError::NoInput(channels)),
+            Some(InputPlan::File(path)) => Some(self.read(path, channels)?),
+            Some(InputPlan::Levels(Levels { levels, hold })) => {
+                if *hold == 0 {
+                    return Err(PlanError::Hold);
+                }
+                // Step and ends are checked here, once, so that drawing cannot fail.
+                Drive::new(
+                    self.step,
+                    Signal::from_elem((self.samples, 1), levels.centre()),
+                )?;
+                None
+            }
+        };
+        Ok(DriveSource {
+            plan: self.clone(),
+            channels,
+            fixed,
+        })
+    }
+
+    fn read(&self, path: &Path, channels: usize) -> Result<Drive, PlanError> {
+        let drive = read_drive(path)?;
+        let given = drive.inputs().ncols();
+        if given != channels {
+            return Err(PlanError::Channels {
+                path: path.into(),
+                given,
+                expected: channels,
+            });
+        }
+        Ok(drive)
+    }
+
+    /// Whether a record has the study's step, to 1e-3 of it.
+    pub fn check_step(&self, record: &Record) -> Result<(), PlanError> {
+        let (given, expected) = (record.drive().dt(), self.step);
+        if (given - expected).abs() > 1e-3 * expected {
+            return Err(PlanError::Step { given, expected });
+        }
+        Ok(())
+    }
+}
+
+/// Draws the inputs of simulated records.
+#[derive(Debug, Clone)]
+pub struct DriveSource {
+    plan: RecordPlan,
+    channels: usize,
+    fixed: Option<Drive>,
+}
+
+impl DriveSource {
+    /// The drive of one record; random levels come from the noise sources `input/1`, `input/2`, ….
+    pub fn draw(&self, noise: Noise) -> Result<Drive, DriveError> {
+        if let Some(drive) = &self.fixed {
+            return Ok(drive.clone());
+        }
+        let mut inputs = Signal::zeros((self.plan.samples, self.channels));
+        if let Some(InputPlan::Levels(Levels { levels, hold })) = &self.plan.input {
+            for (j, mut channel) in inputs.columns_mut().into_iter().enumerate() {
+                let mut source = noise.source(&format!("input/{}", j + 1));
+                let mut level = 0.0;
+                for (k, value) in channel.iter_mut().enumerate() {
+                    if k % hold == 0 {
+                        level = levels.low() + levels.width() * source.uniform();
+                    }
+                    *value = level;
+                }
+            }
+        }
+        Drive::new(self.plan.step, inputs)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_are_held_and_fresh_for_each_record() {
+        let plan = RecordPlan::levels(0.5, 100, 0.0, 3.0, 30);
+        let source = plan.prepare(&Signals::default()).unwrap();
+        let a = source.draw(Noise::new(1, "t", 0)).unwrap();
+        let b = source.draw(Noise::new(1, "t", 1)).unwrap();
+        assert_ne!(a, b);
+        for drive in [&a, &b] {
+            let u: Vec<f64> = drive.inputs().iter().copied().collect();
+            assert!(u.iter().all(|v| (0.0..3.0).contains(v)));
+            assert!((1..100).all(|k| (u[k] != u[k - 1]) == (k % 30 == 0)));
+        }
+    }
+
+    #[test]
+    fn what_is_missing_is_named() {
+        let error = RecordPlan::autonomous(0.5, 9).prepare(&Signals::default());
+        assert!(error.unwrap_err().to_string().contains("1 inputs"));
+        let plan = RecordPlan::levels(0.5, 9, 0.0, 1.0, 0);
+        assert!(matches!(
+            plan.prepare(&Signals::default()),
+            Err(PlanError::Hold)
+        ));
+    }
+}

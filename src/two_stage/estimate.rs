@@ -1,0 +1,423 @@
+//! From a measured record to a calibrated twin.
+
+use super::cloud::{cloud, tune};
+use super::{Estimator, Tracking, track};
+use crate::bank::{BankError, FeatureSimulator};
+use crate::feature::FeatureError;
+use crate::gate::{Gate, GateError, GateOutcome};
+use crate::network::NetworkError;
+use crate::optimise::OptimiseError;
+use crate::progress::{Cancelled, Progress};
+use crate::refine::{Information, RefineError, Refined, Refinement};
+use crate::sample::EllipsoidError;
+use crate::study::{PresetName, Settings, SettingsError, StudyError};
+use crate::twin::{Drive, Noise, Record, Role};
+use nalgebra::DVector;
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use std::time::Instant;
+
+/// Level of the intervals given with an estimate.
+pub const INTERVAL_LEVEL: f64 = 0.9;
+/// The tuned estimate is kept while its whitened misfit is within this quantile of χ²_d.
+const KEEP_TUNED: f64 = 0.999;
+
+/// What may be chosen for an estimate.
+#[derive(Debug, Clone, Default)]
+pub struct EstimateOptions {
+    /// Seed of all simulations.
+    pub seed: u64,
+    /// Numbers of another preset than the estimator's own; features and network stay.
+    pub preset: Option<PresetName>,
+    /// Refine and tune whatever the gate says.
+    pub always_refine: bool,
+    /// A second record to score the calibrated twin on.
+    pub validation: Option<Record>,
+}
+
+/// What an estimate is made of. Skipped stages are `None`.
+#[derive(Debug, Clone)]
+pub struct Estimate {
+    /// Names of θ: the twin's parameters, then unknown noise levels, starts and magnitudes.
+    pub names: Vec<String>,
+    /// What each parameter stands for.
+    pub roles: Vec<Role>,
+    /// The network's estimate.
+    pub initial: Vec<f64>,
+    /// The test of the network's estimate.
+    pub gate: GateOutcome,
+    /// Gauss–Newton's estimate.
+    pub gauss_newton: Option<Vec<f64>>,
+    /// The tuned heads' estimate.
+    pub fine: Option<Vec<f64>>,
+    /// The estimate: the network's where the gate kept it, else the tuned one unless its misfit is too large, else
+    /// Gauss–Newton's.
+    pub theta: Vec<f64>,
+    /// Standard errors of `theta`.
+    pub std_error: Vec<f64>,
+    /// Ends of the interval at [`INTERVAL_LEVEL`], within the bounds.
+    pub low: Vec<f64>,
+    /// Upper ends.
+    pub high: Vec<f64>,
+    /// Information and directions at Gauss–Newton's estimate, or at the network's where the gate kept it.
+    pub information: Option<Information>,
+    /// The test after the refit; `None` where no degree of freedom is left.
+    pub after: Option<GateOutcome>,
+    /// Whether a refit was made at all.
+    pub refitted: bool,
+    /// The free run at `theta`, unknown starts refitted.
+    pub tracking: Tracking,
+    /// The free run at the network's estimate, for comparison.
+    pub tracking_initial: Option<Tracking>,
+    /// Free-run RMSE on the validation record.
+    pub validation: Option<Tracking>,
+    /// Simulator calls.
+    pub simulations: usize,
+    /// Draws of the cloud that were redrawn.
+    pub redrawn: usize,
+    /// Wall-clock times.
+    pub seconds: Seconds,
+}
+
+/// Wall-clock seconds of each stage; `None` for skipped ones.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Seconds {
+    /// Features and network.
+    pub predict: f64,
+    /// The test.
+    pub gate: f64,
+    /// Gauss–Newton.
+    pub gauss_newton: Option<f64>,
+    /// The cloud.
+    pub cloud: Option<f64>,
+    /// The heads.
+    pub tune: Option<f64>,
+    /// Everything, free runs included.
+    pub total: f64,
+}
+
+/// A parameter that is estimated without being asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Nuisance {
+    /// State, output, or `id@target.magnitude`.
+    pub name: String,
+    /// "start", "noise" or "effect".
+    pub role: &'static str,
+    /// Estimate.
+    pub value: f64,
+    /// Standard error.
+    pub std_error: f64,
+}
+
+/// Why there is no estimate.
+#[derive(Debug, thiserror::Error)]
+pub enum EstimateError {
+    /// The record is not one of this study.
+    #[error(transparent)]
+    Study(#[from] StudyError),
+    /// The record has no features.
+    #[error(transparent)]
+    Feature(#[from] FeatureError),
+    /// A setting is out of range.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    /// Simulations failed.
+    #[error(transparent)]
+    Bank(#[from] BankError),
+    /// The test failed.
+    #[error(transparent)]
+    Gate(#[from] GateError),
+    /// Gauss–Newton failed.
+    #[error(transparent)]
+    Refine(#[from] RefineError),
+    /// The cloud has no ellipsoid.
+    #[error(transparent)]
+    Ellipsoid(#[from] EllipsoidError),
+    /// The network failed.
+    #[error(transparent)]
+    Network(#[from] NetworkError),
+    /// The free run failed.
+    #[error("the free run at the estimate failed: {0}")]
+    Tracking(#[from] OptimiseError),
+    /// Stopped from outside.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl Estimate {
+    /// Start states, noise levels and magnitudes among θ.
+    pub fn nuisance(&self) -> Vec<Nuisance> {
+        (0..self.names.len())
+            .filter_map(|j| {
+                let role = match self.roles[j] {
+                    Role::Physical => return None,
+                    Role::Start => "start",
+                    Role::Noise => "noise",
+                    Role::Effect => "effect",
+                };
+                let name = self.names[j].strip_prefix(&format!("{role}."));
+                Some(Nuisance {
+                    name: name.unwrap_or(&self.names[j]).into(),
+                    role,
+                    value: self.theta[j],
+                    std_error: self.std_error[j],
+                })
+            })
+            .collect()
+    }
+
+    /// The twin's own parameters out of a vector over all of θ.
+    pub fn physical<T: Clone>(&self, all: &[T]) -> Vec<T> {
+        (all.iter().zip(&self.roles))
+            .filter(|(_, role)| **role == Role::Physical)
+            .map(|(value, _)| value.clone())
+            .collect()
+    }
+}
+
+impl Estimator {
+    /// Estimates θ from a record: features, network, gate; and where the gate rejects: Gauss–Newton, cloud, tuned
+    /// heads, gate again.
+    ///
+    /// # Errors
+    ///
+    /// A record that does not fit, simulations that fail, a listener that cancels: [`EstimateError`].
+    pub fn estimate(
+        &self,
+        record: &Record,
+        options: &EstimateOptions,
+        progress: &Progress,
+    ) -> Result<Estimate, EstimateError> {
+        let clock = Instant::now();
+        self.study.check_record(record)?;
+        if let Some(validation) = &options.validation {
+            self.study.check_record(validation)?;
+        }
+        let settings = match options.preset {
+            Some(name) if name != self.preset => &self.study.preset(name).settings,
+            _ => &self.settings,
+        };
+        settings.check()?;
+        let observed = self.observe(record)?;
+        let initial = self.predict_one(&observed)?;
+        let mut seconds = Seconds {
+            predict: clock.elapsed().as_secs_f64(),
+            ..Seconds::default()
+        };
+        let run = Run {
+            estimator: self,
+            settings,
+            drive: record.drive(),
+            observed: &observed,
+            noise: Noise::new(options.seed, "estimate", 0),
+            seed: options.seed,
+            progress,
+        };
+        let simulator = self.simulator();
+        let lap = Instant::now();
+        let noise = run.noise.child("gate");
+        let gate = Gate::at(
+            &simulator,
+            &initial,
+            run.drive,
+            &settings.gate,
+            noise,
+            progress,
+        )?
+        .test(&observed);
+        seconds.gate = lap.elapsed().as_secs_f64();
+        let outcome = if gate.out_of_distribution || options.always_refine {
+            run.refit(&simulator, &initial, &mut seconds)?
+        } else {
+            run.keep(&simulator, &initial)?
+        };
+        let twin = self.study.twin().as_ref();
+        let tracking = track(twin, &outcome.theta, record)?;
+        let validation = (options.validation.as_ref())
+            .map(|record| track(twin, &tracking.theta, record))
+            .transpose()?;
+        let space = twin.parameters();
+        seconds.total = clock.elapsed().as_secs_f64();
+        Ok(Estimate {
+            names: space.names().into_iter().map(str::to_owned).collect(),
+            roles: space.iter().map(|p| p.role).collect(),
+            tracking_initial: track(twin, &initial, record).ok(),
+            initial,
+            gate,
+            gauss_newton: outcome.gauss_newton,
+            fine: outcome.fine,
+            low: space.clamp(&outcome.low),
+            high: space.clamp(&outcome.high),
+            theta: outcome.theta,
+            std_error: outcome.std_error,
+            information: outcome.information,
+            after: outcome.after,
+            refitted: outcome.refitted,
+            tracking,
+            validation,
+            simulations: simulator.calls(),
+            redrawn: outcome.redrawn,
+            seconds,
+        })
+    }
+}
+
+/// One estimate under way.
+struct Run<'a> {
+    estimator: &'a Estimator,
+    settings: &'a Settings,
+    drive: &'a Drive,
+    observed: &'a DVector<f64>,
+    noise: Noise,
+    seed: u64,
+    progress: &'a Progress,
+}
+
+/// What the stages after the gate give.
+struct Outcome {
+    gauss_newton: Option<Vec<f64>>,
+    fine: Option<Vec<f64>>,
+    theta: Vec<f64>,
+    std_error: Vec<f64>,
+    low: Vec<f64>,
+    high: Vec<f64>,
+    information: Option<Information>,
+    after: Option<GateOutcome>,
+    refitted: bool,
+    redrawn: usize,
+}
+
+impl Run<'_> {
+    fn refinement<'a>(&'a self, simulator: &'a FeatureSimulator) -> Refinement<'a> {
+        Refinement {
+            simulator,
+            drive: self.drive,
+            observed: self.observed,
+            settings: &self.settings.refine,
+            gate: &self.settings.gate,
+            noise: self.noise.child("refine"),
+        }
+    }
+
+    /// The gate kept the network's estimate: its error is that of simulations predicted nearby.
+    fn keep(
+        &self,
+        simulator: &FeatureSimulator,
+        initial: &[f64],
+    ) -> Result<Outcome, EstimateError> {
+        let space = self.estimator.study.twin().parameters();
+        let spread = (self.estimator.calibration).spread(initial, &space.widths(), INTERVAL_LEVEL);
+        let shifted = |by: Option<&Vec<f64>>| match by {
+            Some(by) => initial.iter().zip(by).map(|(t, b)| t + b).collect(),
+            None => vec![f64::NAN; initial.len()],
+        };
+        // The estimate stands whether or not its directions can be told.
+        let information = match self.refinement(simulator).describe_at(initial) {
+            Ok(refined) => Some(refined.information),
+            Err(RefineError::Cancelled(stop)) => return Err(stop.into()),
+            Err(_) => None,
+        };
+        Ok(Outcome {
+            gauss_newton: None,
+            fine: None,
+            theta: initial.to_vec(),
+            std_error: spread
+                .as_ref()
+                .map_or_else(|| vec![f64::NAN; initial.len()], |s| s.std_error.clone()),
+            low: shifted(spread.as_ref().map(|s| &s.low)),
+            high: shifted(spread.as_ref().map(|s| &s.high)),
+            information,
+            after: None,
+            refitted: false,
+            redrawn: 0,
+        })
+    }
+
+    /// Gauss–Newton, cloud, tuned heads, gate again.
+    fn refit(
+        &self,
+        simulator: &FeatureSimulator,
+        initial: &[f64],
+        seconds: &mut Seconds,
+    ) -> Result<Outcome, EstimateError> {
+        let (settings, progress) = (self.settings, self.progress);
+        let lap = Instant::now();
+        let refinement = self.refinement(simulator);
+        let refined = refinement.run(initial, progress)?;
+        seconds.gauss_newton = Some(lap.elapsed().as_secs_f64());
+        let lap = Instant::now();
+        let noise = self.noise.child("cloud");
+        let draws = cloud(simulator, &refined, self.drive, settings, noise, progress)?;
+        seconds.cloud = Some(lap.elapsed().as_secs_f64());
+        let lap = Instant::now();
+        let (observed, seed) = (self.observed, self.seed);
+        let tuned = tune(
+            self.estimator,
+            &draws,
+            &refined,
+            observed,
+            settings,
+            seed,
+            progress,
+        )?;
+        seconds.tune = Some(lap.elapsed().as_secs_f64());
+        let gauss_newton = refined.theta.as_slice().to_vec();
+        let keep = self.keeps(&refinement, &refined, &tuned.theta);
+        let mut outcome = Outcome {
+            theta: gauss_newton.clone(),
+            std_error: refined.information.std_error.clone(),
+            low: vec![],
+            high: vec![],
+            after: None,
+            refitted: true,
+            redrawn: draws.redrawn,
+            fine: Some(tuned.theta.clone()),
+            information: None,
+            gauss_newton: Some(gauss_newton),
+        };
+        let normal = Normal::standard().inverse_cdf(0.5 + 0.5 * INTERVAL_LEVEL);
+        let half: Vec<f64> = outcome.std_error.iter().map(|s| normal * s).collect();
+        outcome.low = outcome
+            .theta
+            .iter()
+            .zip(&half)
+            .map(|(t, h)| t - h)
+            .collect();
+        outcome.high = outcome
+            .theta
+            .iter()
+            .zip(&half)
+            .map(|(t, h)| t + h)
+            .collect();
+        if keep {
+            outcome.theta = tuned.theta;
+            if let Some(spread) = tuned.spread {
+                let shifted = |by: &[f64]| -> Vec<f64> {
+                    outcome.theta.iter().zip(by).map(|(t, b)| t + b).collect()
+                };
+                (outcome.low, outcome.high) = (shifted(&spread.low), shifted(&spread.high));
+                outcome.std_error = spread.std_error;
+            }
+        }
+        outcome.after = Gate::after_refit(
+            simulator,
+            &outcome.theta,
+            self.drive,
+            &refined.jacobian,
+            self.observed,
+            &settings.gate,
+            self.noise.child("after"),
+            progress,
+        )?;
+        outcome.information = Some(refined.information);
+        Ok(outcome)
+    }
+
+    /// Whether the tuned estimate stays within the misfit that θ could still explain by chance: the part of its whitened
+    /// residual in the Jacobian's column space against χ²_d(0.999).
+    fn keeps(&self, refinement: &Refinement<'_>, refined: &Refined, theta: &[f64]) -> bool {
+        let threshold = ChiSquared::new(theta.len() as f64).map(|chi| chi.inverse_cdf(KEEP_TUNED));
+        let misfit = (refinement.whitened_residual(refined, theta))
+            .map(|residual| refined.explainable_misfit(&residual));
+        matches!((misfit, threshold), (Ok(misfit), Ok(threshold)) if misfit <= threshold)
+    }
+}

@@ -1,0 +1,387 @@
+//! One file for an estimator: weights, scalers, study, recipe, seed, checksum.
+//!
+//! The file is a [safetensors](https://github.com/huggingface/safetensors) container, so other programs can read the
+//! weights; what is not a tensor stands as one JSON text under the metadata key `truetwin`. The SHA-256 of that text
+//! (checksum empty) and of all tensors is checked before anything is used. It holds data only, never code.
+
+use super::{Calibration, Estimator, Scaler};
+use crate::feature::{FeatureError, FeatureRecipe};
+use crate::network::{NamedTensor, NetworkError};
+use crate::study::{PresetName, Settings, Study, StudyError, StudyFile, StudyFileError};
+use ndarray::Array2;
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::collections::{BTreeMap, HashMap};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Layout of the file; raised when it changes.
+const SCHEMA: u32 = 1;
+/// Key of the JSON text in the container's metadata.
+const KEY: &str = "truetwin";
+/// Prefix of the network's tensors.
+const NETWORK: &str = "network/";
+
+/// What is not a tensor.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Header {
+    schema: u32,
+    study: String,
+    names: Vec<String>,
+    preset: PresetName,
+    features: Arc<dyn FeatureRecipe>,
+    architecture: String,
+    settings: Settings,
+    inputs: usize,
+    outputs: usize,
+    seed: u64,
+    sha256: String,
+}
+
+/// Why an estimator file cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum EstimatorFileError {
+    /// It cannot be read or written.
+    #[error("{}: {error}", path.display())]
+    Io {
+        /// File.
+        path: PathBuf,
+        /// What the system said.
+        error: std::io::Error,
+    },
+    /// It is something else, or cut off.
+    #[error("{}: not a whole estimator file ({reason}); make one with `truetwin pretrain`", path.display())]
+    Foreign {
+        /// File.
+        path: PathBuf,
+        /// What does not fit.
+        reason: String,
+    },
+    /// Its bytes were changed.
+    #[error("{}: the checksum does not match, the file was altered; pretrain again", path.display())]
+    Altered {
+        /// File.
+        path: PathBuf,
+    },
+    /// It was written by another version.
+    #[error("{}: file schema {found}, this version reads {SCHEMA}; pretrain again with this version", path.display())]
+    Schema {
+        /// File.
+        path: PathBuf,
+        /// Schema found.
+        found: u32,
+    },
+    /// Its twin is not among the known ones.
+    #[error("{}: made for twin \"{twin}\", known are {known}; use the program that has this twin", path.display())]
+    Twin {
+        /// File.
+        path: PathBuf,
+        /// Twin of the file.
+        twin: String,
+        /// Known twins.
+        known: String,
+    },
+    /// Its network is not among those of the twin's study.
+    #[error("{}: made with network \"{architecture}\", which this program's study of the twin does not have; pretrain again", path.display())]
+    Architecture {
+        /// File.
+        path: PathBuf,
+        /// Network of the file.
+        architecture: String,
+    },
+    /// The twin has changed since.
+    #[error("{}: made for parameters {file}, the twin now has {twin}; pretrain again", path.display())]
+    Parameters {
+        /// File.
+        path: PathBuf,
+        /// Parameters in the file.
+        file: String,
+        /// Parameters of the twin.
+        twin: String,
+    },
+    /// Its study cannot be made.
+    #[error("{}: {error}", path.display())]
+    Study {
+        /// File.
+        path: PathBuf,
+        /// Why.
+        error: Box<StudyError>,
+    },
+}
+
+/// Maps the errors of one file.
+struct At<'a>(&'a Path);
+
+impl At<'_> {
+    fn io(&self, error: std::io::Error) -> EstimatorFileError {
+        EstimatorFileError::Io {
+            path: self.0.into(),
+            error,
+        }
+    }
+    fn foreign(&self, reason: impl ToString) -> EstimatorFileError {
+        EstimatorFileError::Foreign {
+            path: self.0.into(),
+            reason: reason.to_string(),
+        }
+    }
+    fn study(&self, error: impl Into<StudyError>) -> EstimatorFileError {
+        EstimatorFileError::Study {
+            path: self.0.into(),
+            error: Box::new(error.into()),
+        }
+    }
+}
+
+impl Estimator {
+    /// Writes the file; it appears whole or not at all. The same estimator gives the same bytes.
+    pub fn save(&self, path: &Path) -> Result<(), EstimatorFileError> {
+        let at = At(path);
+        let study = toml::to_string(self.study.file()).map_err(|e| at.foreign(e))?;
+        let space = self.study.twin().parameters();
+        let mut header = Header {
+            schema: SCHEMA,
+            study,
+            names: space.names().into_iter().map(str::to_owned).collect(),
+            preset: self.preset,
+            features: self.recipe.clone(),
+            architecture: self.architecture.id().into(),
+            settings: self.settings.clone(),
+            inputs: self.network.inputs(),
+            outputs: self.network.outputs(),
+            seed: self.seed,
+            sha256: String::new(),
+        };
+        let tensors = self.tensors();
+        header.sha256 = checksum(&header, &tensors).map_err(|e| at.foreign(e))?;
+        let text = serde_json::to_string(&header).map_err(|e| at.foreign(e))?;
+        let views: Vec<(&String, TensorView<'_>)> = (tensors.iter())
+            .map(|(name, t)| {
+                let view = TensorView::new(t.dtype, t.shape.clone(), &t.bytes);
+                Ok((name, view.map_err(|e| at.foreign(format!("{e:?}")))?))
+            })
+            .collect::<Result<_, EstimatorFileError>>()?;
+        let metadata = Some(HashMap::from([(KEY.to_owned(), text)]));
+        let bytes = safetensors::serialize(views, &metadata)
+            .map_err(|error| at.foreign(format!("{error:?}")))?;
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+        let mut file = tempfile::NamedTempFile::new_in(folder.unwrap_or(Path::new(".")))
+            .map_err(|e| at.io(e))?;
+        file.write_all(&bytes).map_err(|e| at.io(e))?;
+        file.as_file().sync_all().map_err(|e| at.io(e))?;
+        file.persist(path).map_err(|e| at.io(e.error))?;
+        Ok(())
+    }
+
+    /// Reads a file made for one of `studies`.
+    pub fn load(path: &Path, studies: &[Study]) -> Result<Self, EstimatorFileError> {
+        let at = At(path);
+        let bytes = std::fs::read(path).map_err(|e| at.io(e))?;
+        let (_, metadata) =
+            SafeTensors::read_metadata(&bytes).map_err(|e| at.foreign(format!("{e:?}")))?;
+        let text = (metadata.metadata().as_ref().and_then(|m| m.get(KEY)))
+            .ok_or_else(|| at.foreign("no truetwin header"))?;
+        let header = parse_header(&at, text)?;
+        let container =
+            SafeTensors::deserialize(&bytes).map_err(|e| at.foreign(format!("{e:?}")))?;
+        let tensors: BTreeMap<String, RawTensor> = (container.tensors().into_iter())
+            .map(|(name, view)| (name, RawTensor::of(&view)))
+            .collect();
+        let unsigned = Header {
+            sha256: String::new(),
+            ..header.clone()
+        };
+        if checksum(&unsigned, &tensors).ok().as_ref() != Some(&header.sha256) {
+            return Err(EstimatorFileError::Altered { path: path.into() });
+        }
+        let file = StudyFile::parse(&header.study, path)
+            .map_err(|error: StudyFileError| at.study(error))?;
+        let Some(registered) = studies.iter().find(|s| s.name() == file.twin) else {
+            let known: Vec<_> = studies.iter().map(Study::name).collect();
+            return Err(EstimatorFileError::Twin {
+                path: path.into(),
+                twin: file.twin,
+                known: known.join(", "),
+            });
+        };
+        let study = registered.configure(&file).map_err(|e| at.study(e))?;
+        let names = study.twin().parameters().names().join(", ");
+        if names != header.names.join(", ") {
+            return Err(EstimatorFileError::Parameters {
+                path: path.into(),
+                file: header.names.join(", "),
+                twin: names,
+            });
+        }
+        let Some(architecture) = study.architecture(&header.architecture) else {
+            return Err(EstimatorFileError::Architecture {
+                path: path.into(),
+                architecture: header.architecture,
+            });
+        };
+        let weights = weights(&tensors);
+        let network = (architecture.restore(header.inputs, header.outputs, &weights))
+            .map_err(|error: NetworkError| at.foreign(error))?;
+        let map = (study.features(header.features.as_ref()))
+            .map_err(|error: FeatureError| at.study(error))?;
+        if map.dim() != header.inputs {
+            let reason = format!(
+                "{} features, the network reads {}",
+                map.dim(),
+                header.inputs
+            );
+            return Err(at.foreign(reason));
+        }
+        let matrix = |name: &str| -> Result<Array2<f64>, EstimatorFileError> {
+            (tensors.get(name).and_then(RawTensor::matrix))
+                .ok_or_else(|| at.foreign(format!("tensor {name} is missing or misshapen")))
+        };
+        let scaler = |what: &str, width: usize| -> Result<Scaler, EstimatorFileError> {
+            let row = |part: &str| {
+                let values = matrix(&format!("{what}.{part}"))?;
+                match values.dim() {
+                    (1, n) if n == width => Ok(values.into_iter().collect()),
+                    shape => Err(at.foreign(format!("tensor {what}.{part} is {shape:?}"))),
+                }
+            };
+            Ok(Scaler {
+                mean: row("mean")?,
+                scale: row("scale")?,
+            })
+        };
+        let calibration = Calibration {
+            predicted: matrix("calibration.predicted")?,
+            truth: matrix("calibration.truth")?,
+        };
+        let pairs = calibration.truth.nrows();
+        if calibration.predicted.dim() != (pairs, header.outputs)
+            || calibration.truth.ncols() != header.outputs
+        {
+            return Err(at.foreign("calibration tensors do not fit each other"));
+        }
+        Ok(Self {
+            features: scaler("features", header.inputs)?,
+            targets: scaler("targets", header.outputs)?,
+            calibration,
+            preset: header.preset,
+            settings: header.settings,
+            recipe: header.features,
+            seed: header.seed,
+            map,
+            architecture,
+            network,
+            study,
+        })
+    }
+
+    /// Weights, scalers and calibration by name.
+    fn tensors(&self) -> BTreeMap<String, RawTensor> {
+        let mut tensors = BTreeMap::new();
+        for tensor in self.network.weights() {
+            tensors.insert(
+                format!("{NETWORK}{}", tensor.name),
+                RawTensor {
+                    dtype: Dtype::F32,
+                    shape: tensor.shape,
+                    bytes: tensor.values.iter().flat_map(|v| v.to_le_bytes()).collect(),
+                },
+            );
+        }
+        let mut put = |name: &str, rows: usize, values: Vec<f64>| {
+            tensors.insert(
+                name.to_owned(),
+                RawTensor {
+                    dtype: Dtype::F64,
+                    shape: vec![rows, values.len() / rows.max(1)],
+                    bytes: values.iter().flat_map(|v| v.to_le_bytes()).collect(),
+                },
+            );
+        };
+        for (what, scaler) in [("features", &self.features), ("targets", &self.targets)] {
+            put(&format!("{what}.mean"), 1, scaler.mean.clone());
+            put(&format!("{what}.scale"), 1, scaler.scale.clone());
+        }
+        let Calibration { predicted, truth } = &self.calibration;
+        for (what, matrix) in [("predicted", predicted), ("truth", truth)] {
+            let values = matrix.iter().copied().collect();
+            put(&format!("calibration.{what}"), matrix.nrows(), values);
+        }
+        tensors
+    }
+}
+
+/// Reads the header, telling another schema from a foreign file.
+fn parse_header(at: &At<'_>, text: &str) -> Result<Header, EstimatorFileError> {
+    let value: serde_json::Value = serde_json::from_str(text).map_err(|e| at.foreign(e))?;
+    match value.get("schema").and_then(serde_json::Value::as_u64) {
+        Some(schema) if schema == u64::from(SCHEMA) => {
+            serde_json::from_value(value).map_err(|e| at.foreign(e))
+        }
+        Some(schema) => Err(EstimatorFileError::Schema {
+            path: at.0.into(),
+            found: schema as u32,
+        }),
+        None => Err(at.foreign("its header has no schema")),
+    }
+}
+
+/// The network's tensors among all.
+fn weights(tensors: &BTreeMap<String, RawTensor>) -> Vec<NamedTensor> {
+    (tensors.iter())
+        .filter_map(|(name, tensor)| {
+            Some(NamedTensor {
+                name: name.strip_prefix(NETWORK)?.to_owned(),
+                shape: tensor.shape.clone(),
+                values: (tensor.bytes.chunks_exact(4))
+                    .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+                    .collect(),
+            })
+        })
+        .collect()
+}
+
+/// A tensor as it lies in the file.
+struct RawTensor {
+    dtype: Dtype,
+    shape: Vec<usize>,
+    bytes: Vec<u8>,
+}
+
+impl RawTensor {
+    fn of(view: &TensorView<'_>) -> Self {
+        Self {
+            dtype: view.dtype(),
+            shape: view.shape().to_vec(),
+            bytes: view.data().to_vec(),
+        }
+    }
+
+    fn matrix(&self) -> Option<Array2<f64>> {
+        let (&[rows, columns], Dtype::F64) = (self.shape.as_slice(), self.dtype) else {
+            return None;
+        };
+        let values = (self.bytes.chunks_exact(8))
+            .map(|b| b.try_into().map(f64::from_le_bytes))
+            .collect::<Result<Vec<f64>, _>>()
+            .ok()?;
+        let matrix = Array2::from_shape_vec((rows, columns), values).ok()?;
+        matrix.iter().all(|v| v.is_finite()).then_some(matrix)
+    }
+}
+
+/// SHA-256 over the header without checksum and every tensor, in the order of names.
+fn checksum(
+    header: &Header,
+    tensors: &BTreeMap<String, RawTensor>,
+) -> Result<String, serde_json::Error> {
+    let mut hash = Sha256::new();
+    hash.update(serde_json::to_string(header)?);
+    for (name, tensor) in tensors {
+        hash.update(format!("\n{name} {:?} {:?}\n", tensor.dtype, tensor.shape));
+        hash.update(&tensor.bytes);
+    }
+    Ok(hash.finalize().iter().map(|b| format!("{b:02x}")).collect())
+}

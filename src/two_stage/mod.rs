@@ -1,0 +1,24 @@
+//! The Two-Stage estimator: pretrained on simulations, tested, refined, tuned.
+//!
+//! [`pretrain`] makes an [`Estimator`]; [`Estimator::estimate`] takes a record through gate, Gauss–Newton, cloud and
+//! tuned heads; [`Estimator::save`] and [`Estimator::load`] keep it in one file.
+//!
+//! Source: Lakshminarayanan, Guerrero & Rojas, "Fine-Tuning a Simulation-Driven Estimator".
+
+mod calibration;
+mod cloud;
+mod estimate;
+mod estimator;
+mod file;
+mod pretrain;
+mod scaler;
+mod tracking;
+
+pub use calibration::{Calibration, Spread};
+pub use cloud::{Tuned, cloud, tune};
+pub use estimate::{Estimate, EstimateError, EstimateOptions, INTERVAL_LEVEL, Nuisance, Seconds};
+pub use estimator::Estimator;
+pub use file::EstimatorFileError;
+pub use pretrain::{PretrainError, PretrainOptions, pretrain};
+pub use scaler::Scaler;
+pub use tracking::{Tracking, track};
