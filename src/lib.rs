@@ -1,14 +1,52 @@
-//! truetwin
-pub mod bank;
-pub mod feature;
-pub mod gate;
+//! # truetwin
+//!
+//! A simulator ("digital twin") is fitted to the one real system in front of you, told when it cannot be trusted, and
+//! calibrated where its training never went.
+//!
+//! ```text
+//! prior ─ simulate ─▶ bank ─ features ─▶ train ─▶ estimator            pretrain, once
+//! record ─ features ─▶ estimator ─▶ θ_init ─▶ gate ─ consistent ─▶ θ̂      estimate, each record
+//!                                              │ not
+//!                        Gauss–Newton ─▶ cloud of simulations ─▶ tuned heads ─▶ θ̂ ─▶ gate again
+//! ```
+//!
+//! | to … | look at |
+//! |---|---|
+//! | plug in a simulator | [`twin::StateSpace`], [`twin::DigitalTwin`] |
+//! | say what records look like and which recipe to use | [`study::Study`] |
+//! | train, save, load, estimate | [`two_stage::pretrain`], [`two_stage::Estimator`] |
+//! | compress records otherwise | [`feature::FeatureMap`], [`feature::FeatureRecipe`] |
+//! | shape the network | [`network::HeadArchitecture`] |
+//! | add an effect that a twin lacks | [`effect`], [`twin::augment`] |
+//! | give a twin the whole command line | [`cli::run`] |
+//!
+//! The library never prints, never exits and sets no global thread pool; long work reports to a
+//! [`progress::Progress`] and can be cancelled through it. Source of the method: Lakshminarayanan, Guerrero & Rojas,
+//! "Fine-Tuning a Simulation-Driven Estimator".
+
+// Layers, lowest first; a module uses only what stands above it here (tests/layering.rs holds it so).
 pub mod math;
-pub mod network;
 pub mod optimise;
 pub mod progress;
+
+pub mod twin;
+
+pub mod feature;
+pub mod network;
+
+pub mod twins;
+
+pub mod effect;
+
+pub mod bank;
+pub mod gate;
 pub mod refine;
 pub mod sample;
 pub mod study;
-pub mod twin;
-pub mod twins;
+
 pub mod two_stage;
+
+pub mod experiment;
+pub mod report;
+
+pub mod cli;

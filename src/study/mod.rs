@@ -11,7 +11,7 @@ pub use settings::{CloudSampler, CloudSettings, Preset, PresetName, Settings, Se
 use crate::feature::{Ar, Arx, FeatureError, FeatureMap, FeatureRecipe};
 use crate::network::{Architecture, Deep, HeadArchitecture, architecture};
 use crate::twin::{
-    Adaptation, AdaptationError, DigitalTwin, EffectError, ParameterError, Record, RecordError,
+    Adaptation, AdaptationError, CsvError, DigitalTwin, EffectError, ParameterError, Record, RecordError,
     adapt, augment, fix,
 };
 use std::collections::BTreeMap;
@@ -36,6 +36,7 @@ pub struct Study {
     plan: RecordPlan,
     presets: BTreeMap<PresetName, Preset>,
     file: StudyFile,
+    demo: Option<Arc<Record>>,
 }
 
 impl std::fmt::Debug for Study {
@@ -85,6 +86,9 @@ pub enum StudyError {
     /// Of features.
     #[error(transparent)]
     Feature(#[from] FeatureError),
+    /// The demo record cannot be read.
+    #[error(transparent)]
+    Demo(#[from] CsvError),
     /// Of a record's channels.
     #[error(transparent)]
     Record(#[from] RecordError),
@@ -130,6 +134,7 @@ impl Study {
                 twin: name.into(),
                 ..StudyFile::default()
             },
+            demo: None,
         })
     }
 
@@ -161,6 +166,12 @@ impl Study {
         if let Some(preset) = self.presets.get_mut(&PresetName::Default) {
             preset.settings = settings;
         }
+        self
+    }
+
+    /// With a record to show the program on.
+    pub fn with_demo(mut self, record: Record) -> Self {
+        self.demo = Some(Arc::new(record));
         self
     }
 
@@ -233,6 +244,11 @@ impl Study {
             }
         }
         Ok(study)
+    }
+
+    /// A record to show the program on.
+    pub fn demo(&self) -> Option<&Record> {
+        self.demo.as_deref()
     }
 
     /// Name of the twin.

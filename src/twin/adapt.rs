@@ -346,6 +346,12 @@ impl StateSpace for AdaptedEquations {
     fn integrator(&self) -> Integrator {
         self.inner().integrator()
     }
+    fn admit(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {
+        self.inner().admit(&theta[..self.own], dt)
+    }
+    fn strike(&self, theta: &[f64], noise: Noise, outputs: &mut Signal) {
+        self.inner().strike(&theta[..self.own], noise, outputs);
+    }
     fn limits(&self) -> Vec<Interval> {
         self.limits.clone()
     }

@@ -104,6 +104,18 @@ pub enum Law {
     ProcessNoise,
 }
 
+impl Law {
+    /// What the target of such an effect is: `sensor`, `actuator`, `state` or `parameter`.
+    pub fn target(self) -> &'static str {
+        match self {
+            Self::Sensor | Self::MeasurementNoise | Self::Outliers => "sensor",
+            Self::Actuator => "actuator",
+            Self::Parameter => "parameter",
+            Self::Force | Self::Limit | Self::ProcessNoise => "state",
+        }
+    }
+}
+
 /// Time of a sample, and the step, in seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Instant {
@@ -244,8 +256,8 @@ pub enum EffectError {
     },
 }
 
-/// Names of the targets that a law can have in a twin.
-pub(super) fn targets(law: Law, outline: Option<&Outline>, signals: &Signals) -> Vec<String> {
+/// Names of the targets that a law can have in a twin with these equations (none: a black box) and signals.
+pub fn targets(law: Law, outline: Option<&Outline>, signals: &Signals) -> Vec<String> {
     let numbered = |word: &str, n: usize| match n {
         1 => vec![word.to_owned()],
         _ => (1..=n).map(|j| format!("{word}{j}")).collect(),
@@ -279,16 +291,11 @@ pub fn check_effects(
         if outline.is_none() && !on_signals {
             return Err(EffectError::BlackBox { id });
         }
-        if effect.memory() > 0 && effect.order() > NOISE_ENTERS {
+        if law == Law::Sensor && effect.memory() > 0 && effect.order() > NOISE_ENTERS {
             return Err(EffectError::Memory { id });
         }
         let known = targets(law, outline, signals);
-        let what = match law {
-            Law::Sensor | Law::MeasurementNoise | Law::Outliers => "sensor",
-            Law::Actuator => "actuator",
-            Law::Parameter => "parameter",
-            Law::Force | Law::Limit | Law::ProcessNoise => "state",
-        };
+        let what = law.target();
         for name in [Some(effect.target()), effect.other()]
             .into_iter()
             .flatten()

@@ -139,6 +139,13 @@ impl StateSpace for FixedEquations {
     fn integrator(&self) -> Integrator {
         self.equations().integrator()
     }
+    fn admit(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {
+        self.equations().admit(&self.map.complete(theta), dt)
+    }
+    fn strike(&self, theta: &[f64], noise: Noise, outputs: &mut Signal) {
+        self.equations()
+            .strike(&self.map.complete(theta), noise, outputs);
+    }
 }
 
 /// A black box with held parameters.

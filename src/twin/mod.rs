@@ -35,7 +35,7 @@ pub use direction::{combination, oriented};
 pub use drive::{Drive, DriveError, Signal};
 pub use effect::{
     EffectError, Effects, Given, Instant, Law, Magnitude, NOISE_ENTERS, UnmodelledEffect,
-    check_effects,
+    check_effects, targets,
 };
 pub use fix::fix;
 pub use free_run::{BLACK_BOX_SEEDS, free_run};
@@ -44,5 +44,7 @@ pub use interval::{Interval, IntervalError};
 pub use noise::{Noise, Source};
 pub use parameter::{Parameter, ParameterError, ParameterSpace, Role};
 pub use record::{Record, RecordError};
-pub use record_csv::{CsvError, read_drive, read_record, write_record};
+pub use record_csv::{
+    CsvError, parse_record, read_drive, read_record, record_csv_text, write_record,
+};
 pub use state_space::{Now, Outline, StateSpace};

@@ -85,19 +85,7 @@ pub enum CsvError {
 
 /// Reads a measured record.
 pub fn read_record(path: &Path) -> Result<Record, CsvError> {
-    let table = Table::read(path)?;
-    if table.outputs.ncols() == 0 {
-        return Err(CsvError::Header {
-            path: path.into(),
-            problem: "no output column; a record needs y, or y1,y2,…".into(),
-        });
-    }
-    let record = |error| CsvError::Record {
-        path: path.into(),
-        error,
-    };
-    let drive = Drive::new(table.dt, table.inputs).map_err(|e| record(e.into()))?;
-    Record::new(drive, table.outputs).map_err(record)
+    Table::read(path)?.record(path)
 }
 
 /// Reads time and inputs to simulate with; outputs, if the file is a record, are ignored.
@@ -109,12 +97,13 @@ pub fn read_drive(path: &Path) -> Result<Drive, CsvError> {
     })
 }
 
-/// Writes a record, so that reading it gives the same bits of u and y; the file appears whole or not at all.
-pub fn write_record(path: &Path, record: &Record) -> Result<(), CsvError> {
-    let io = |error| CsvError::Io {
-        path: path.into(),
-        error,
-    };
+/// Parses the text of a record that stands in the program itself; `path` is for messages.
+pub fn parse_record(text: &str, path: &Path) -> Result<Record, CsvError> {
+    Table::parse(text.as_bytes(), path)?.record(path)
+}
+
+/// The text of a record file; reading it gives the same bits of u and y.
+pub fn record_csv_text(record: &Record) -> String {
     let (drive, outputs) = (record.drive(), record.outputs());
     let mut header = vec!["t".to_owned()];
     header.extend(column_names("u", drive.inputs().ncols()));
@@ -128,9 +117,18 @@ pub fn write_record(path: &Path, record: &Record) -> Result<(), CsvError> {
         }
         text.push('\n');
     }
+    text
+}
+
+/// Writes a record; the file appears whole or not at all.
+pub fn write_record(path: &Path, record: &Record) -> Result<(), CsvError> {
+    let io = |error| CsvError::Io {
+        path: path.into(),
+        error,
+    };
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
     let mut file = tempfile::NamedTempFile::new_in(folder.unwrap_or(Path::new("."))).map_err(io)?;
-    file.write_all(text.as_bytes()).map_err(io)?;
+    file.write_all(record_csv_text(record).as_bytes()).map_err(io)?;
     file.persist(path).map_err(|error| io(error.error))?;
     Ok(())
 }
@@ -150,10 +148,33 @@ struct Table {
 
 impl Table {
     fn read(path: &Path) -> Result<Self, CsvError> {
+        let file = std::fs::File::open(path).map_err(|error| CsvError::Io {
+            path: path.into(),
+            error,
+        })?;
+        Self::parse(file, path)
+    }
+
+    /// The table as a record, which needs outputs.
+    fn record(self, path: &Path) -> Result<Record, CsvError> {
+        if self.outputs.ncols() == 0 {
+            return Err(CsvError::Header {
+                path: path.into(),
+                problem: "no output column; a record needs y, or y1,y2,…".into(),
+            });
+        }
+        let record = |error| CsvError::Record {
+            path: path.into(),
+            error,
+        };
+        let drive = Drive::new(self.dt, self.inputs).map_err(|e| record(e.into()))?;
+        Record::new(drive, self.outputs).map_err(record)
+    }
+
+    fn parse(text: impl std::io::Read, path: &Path) -> Result<Self, CsvError> {
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
-            .from_path(path)
-            .map_err(|error| csv_error(path, error))?;
+            .from_reader(text);
         let header = reader.headers().map_err(|e| csv_error(path, e))?.clone();
         let (inputs, outputs) = channels(&header).map_err(|problem| CsvError::Header {
             path: path.into(),

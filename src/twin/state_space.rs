@@ -79,6 +79,14 @@ pub trait StateSpace: Send + Sync {
     /// What happens to an output after its noise (saturation, quantisation); nothing unless said otherwise.
     fn readout(&self, _now: &Now<'_>, _y: &mut [f64]) {}
 
+    /// Whether these parameters can be simulated at this step; asked once before a run. Always, unless said otherwise.
+    fn admit(&self, _theta: &[f64], _dt: f64) -> Result<(), SimulationError> {
+        Ok(())
+    }
+
+    /// What befalls the finished outputs of a run (outliers); nothing unless said otherwise.
+    fn strike(&self, _theta: &[f64], _noise: Noise, _outputs: &mut Signal) {}
+
     /// How the drift is carried over a step.
     fn integrator(&self) -> Integrator {
         Integrator::Euler
@@ -168,6 +176,7 @@ fn simulate_equations(
 ) -> Result<Signal, SimulationError> {
     let outline = twin.outline();
     check_lengths(outline.parameters.len(), outline.inputs.len(), theta, drive)?;
+    twin.admit(theta, drive.dt())?;
     let (n, p) = (outline.states.len(), outline.outputs.len());
     let limits: Vec<(usize, Interval)> = twin
         .limits()
@@ -226,8 +235,10 @@ fn simulate_equations(
             return Err(SimulationError::Diverged { at: now.t + now.dt });
         }
     }
-    Signal::from_shape_vec((drive.samples(), p), outputs)
-        .map_err(|error| SimulationError::Fatal(error.into()))
+    let mut outputs = Signal::from_shape_vec((drive.samples(), p), outputs)
+        .map_err(|error| SimulationError::Fatal(error.into()))?;
+    twin.strike(theta, noise, &mut outputs);
+    Ok(outputs)
 }
 
 #[cfg(test)]

@@ -1,9 +1,10 @@
 //! A state-space twin with effects.
 
+use super::outliers::strike;
 use super::{Slot, Slots};
 use crate::twin::{
-    DigitalTwin, Instant, Integrator, Interval, Law, NOISE_ENTERS, Now, Outline, Quantity,
-    StateSpace,
+    DigitalTwin, Instant, Integrator, Interval, Law, NOISE_ENTERS, Noise, Now, Outline, Quantity,
+    Signal as Record, SimulationError, StateSpace,
 };
 use smallvec::SmallVec;
 use std::ops::Range;
@@ -16,7 +17,7 @@ type Short = SmallVec<[f64; 16]>;
 /// actuator effect stands), then the memories of the signal effects; the added ones carry no noise.
 pub(super) struct AugmentedEquations {
     base: Arc<dyn DigitalTwin>,
-    pub(super) slots: Slots,
+    slots: Slots,
     /// Number of the base twin's states.
     states: usize,
     /// Held inputs in the state; empty without actuator effects.
@@ -92,20 +93,15 @@ impl AugmentedEquations {
         theta
     }
 
-    /// Calls `with` with the base twin, its own `Now`, and the base part of the state.
+    /// Calls `with` with the base twin, its own `Now` under the inputs `u`, and the base part of the state.
     fn inner<'x, R>(
         &self,
         now: &Now<'_>,
+        u: &[f64],
         x: &'x [f64],
         with: impl FnOnce(&dyn StateSpace, &Now<'_>, &'x [f64]) -> R,
     ) -> R {
         let theta = self.base_theta(now);
-        // Inputs as the effects left them at the last sample.
-        let u = if self.held.is_empty() {
-            now.u
-        } else {
-            &x[self.held.clone()]
-        };
         let now = Now {
             u,
             theta: &theta,
@@ -114,19 +110,35 @@ impl AugmentedEquations {
         with(equations(&self.base), &now, &x[..self.states])
     }
 
+    /// The inputs of this sample behind the actuator effects; advances their memories in `x`.
+    fn actuate(&self, now: &Now<'_>, x: &mut [f64]) -> Short {
+        let instant = Instant {
+            t: now.t,
+            dt: now.dt,
+        };
+        let mut u = Short::from_slice(now.u);
+        for Signal { slot, memory } in &self.actuators {
+            let (m, value) = (slot.m(now.theta), &mut u[slot.target]);
+            *value = slot
+                .effect
+                .signal(m, instant, &mut x[memory.clone()], *value);
+        }
+        u
+    }
+
     /// Passes `y` through the sensor effects before (or after) the noise. Memories are read from `x`, and
     /// advanced in it when it is `keep`.
     fn sense(&self, now: &Now<'_>, memory: &mut [f64], y: &mut [f64], after_noise: bool) {
         for Signal { slot, memory: at } in &self.sensors {
             if (slot.effect.order() > NOISE_ENTERS) == after_noise {
-                let value = &mut y[slot.target];
+                let (m, value) = (slot.m(now.theta), &mut y[slot.target]);
                 let instant = Instant {
                     t: now.t,
                     dt: now.dt,
                 };
-                *value =
-                    slot.effect
-                        .signal(slot.m(now.theta), instant, &mut memory[at.clone()], *value);
+                // After the noise nobody remembers, and `memory` is empty.
+                let memory = memory.get_mut(at.clone()).unwrap_or_default();
+                *value = slot.effect.signal(m, instant, memory, *value);
             }
         }
     }
@@ -146,7 +158,13 @@ impl StateSpace for AugmentedEquations {
     fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
         let (base, added) = dx.split_at_mut(self.states);
         added.fill(0.0);
-        self.inner(now, x, |twin, now, x| twin.drift(now, x, base));
+        // Inputs as the effects left them at the last sample.
+        let u = if self.held.is_empty() {
+            now.u
+        } else {
+            &x[self.held.clone()]
+        };
+        self.inner(now, u, x, |twin, now, x| twin.drift(now, x, base));
         for slot in &self.forces {
             let other = slot.other.map_or(0.0, |j| x[j]);
             base[slot.target] += slot
@@ -156,9 +174,10 @@ impl StateSpace for AugmentedEquations {
     }
 
     fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
-        self.inner(now, x, |twin, now, x| twin.observe(now, x, y));
-        // The memory advances in `update`, once a sample; looking changes nothing.
+        // Memories advance in `update`, once a sample; looking changes nothing.
         let mut scratch = Short::from_slice(x);
+        let u = self.actuate(now, &mut scratch);
+        self.inner(now, &u, x, |twin, now, x| twin.observe(now, x, y));
         self.sense(now, &mut scratch, y, false);
     }
 
@@ -174,12 +193,6 @@ impl StateSpace for AugmentedEquations {
 
     fn start(&self, now: &Now<'_>, x: &mut [f64]) {
         x.fill(0.0);
-        let theta = self.base_theta(now);
-        let inner = Now {
-            theta: &theta,
-            ..*now
-        };
-        equations(&self.base).start(&inner, &mut x[..self.states]);
         let instant = Instant {
             t: now.t,
             dt: now.dt,
@@ -191,9 +204,18 @@ impl StateSpace for AugmentedEquations {
             let mut scratch = Short::from_slice(&x[memory.clone()]);
             *value = slot.effect.signal(m, instant, &mut scratch, *value);
         }
-        x[self.held.clone()].copy_from_slice(if self.held.is_empty() { &[] } else { &u });
+        if !self.held.is_empty() {
+            x[self.held.clone()].copy_from_slice(&u);
+        }
+        let theta = self.base_theta(now);
+        let inner = Now {
+            u: &u,
+            theta: &theta,
+            ..*now
+        };
+        equations(&self.base).start(&inner, &mut x[..self.states]);
         let mut y = Short::from_elem(0.0, self.outline.outputs.len());
-        self.inner(now, x, |twin, now, x| twin.observe(now, x, &mut y));
+        equations(&self.base).observe(&inner, &x[..self.states], &mut y);
         for Signal { slot, memory } in &self.sensors {
             let (m, value) = (slot.m(now.theta), &mut y[slot.target]);
             slot.effect.begin(m, &mut x[memory.clone()], *value);
@@ -203,31 +225,22 @@ impl StateSpace for AugmentedEquations {
     }
 
     fn update(&self, now: &Now<'_>, x: &mut [f64]) {
+        let u = self.actuate(now, x);
+        if !self.held.is_empty() {
+            x[self.held.clone()].copy_from_slice(&u);
+        }
+        if !self.sensors.is_empty() {
+            let mut y = Short::from_elem(0.0, self.outline.outputs.len());
+            self.inner(now, &u, x, |twin, now, x| twin.observe(now, x, &mut y));
+            self.sense(now, x, &mut y, false);
+        }
         let theta = self.base_theta(now);
         let inner = Now {
+            u: &u,
             theta: &theta,
             ..*now
         };
-        if !self.sensors.is_empty() {
-            let mut y = Short::from_elem(0.0, self.outline.outputs.len());
-            self.inner(now, x, |twin, now, x| twin.observe(now, x, &mut y));
-            self.sense(now, x, &mut y, false);
-        }
         equations(&self.base).update(&inner, &mut x[..self.states]);
-        if !self.held.is_empty() {
-            let instant = Instant {
-                t: now.t,
-                dt: now.dt,
-            };
-            let mut u = Short::from_slice(now.u);
-            for Signal { slot, memory } in &self.actuators {
-                let value = &mut u[slot.target];
-                *value =
-                    slot.effect
-                        .signal(slot.m(now.theta), instant, &mut x[memory.clone()], *value);
-            }
-            x[self.held.clone()].copy_from_slice(&u);
-        }
     }
 
     fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
@@ -273,5 +286,17 @@ impl StateSpace for AugmentedEquations {
 
     fn integrator(&self) -> Integrator {
         equations(&self.base).integrator()
+    }
+
+    fn admit(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {
+        equations(&self.base).admit(&theta[..self.slots.base], dt)?;
+        self.slots.check(theta, dt)
+    }
+
+    fn strike(&self, theta: &[f64], noise: Noise, outputs: &mut Record) {
+        equations(&self.base).strike(&theta[..self.slots.base], noise, outputs);
+        for slot in self.slots.with(Law::Outliers) {
+            strike(slot, theta, noise, outputs);
+        }
     }
 }

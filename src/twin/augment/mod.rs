@@ -3,7 +3,6 @@
 mod black_box;
 mod equations;
 mod outliers;
-mod with_equations;
 
 use super::{
     DigitalTwin, EffectError, Effects, Interval, Law, Parameter, ParameterSpace, Role,
@@ -12,7 +11,6 @@ use super::{
 use black_box::AugmentedBlackBox;
 use equations::AugmentedEquations;
 use std::sync::Arc;
-use with_equations::AugmentedTwin;
 
 /// The twin with `effects` added: a twin, its θ longer by their magnitudes, named `id@target.magnitude`.
 ///
@@ -38,9 +36,7 @@ pub fn augment(
     if outline.is_none() {
         return Ok(Arc::new(AugmentedBlackBox::new(base, slots)));
     }
-    Ok(Arc::new(AugmentedTwin::new(AugmentedEquations::new(
-        base, slots,
-    ))))
+    Ok(Arc::new(AugmentedEquations::new(base, slots)))
 }
 
 /// One effect and where its numbers stand.
@@ -129,7 +125,12 @@ fn magnitude_parameters(effect: &dyn UnmodelledEffect) -> Vec<Parameter> {
                 |limit: f64, fallback: f64| if limit.is_finite() { limit } else { fallback };
             let low = finite(m.limits.low(), off.min(0.0) - 10.0 * reach);
             let high = finite(m.limits.high(), off.max(0.0) + 10.0 * reach);
-            let bounds = Interval::unchecked(low, high);
+            // What a file holds is within bounds, however far from the starts.
+            let given = effect.given().get(m.name).filter(|v| v.is_finite());
+            let bounds = Interval::unchecked(
+                given.map_or(low, |v| low.min(v)),
+                given.map_or(high, |v| high.max(v)),
+            );
             let near = |v: f64| bounds.clamp(v);
             let prior = match m.limits.low() {
                 0.0.. => Interval::unchecked(near(0.0), near(2.0 * reach)),

@@ -1,0 +1,174 @@
+//! The verbs and their options.
+
+use crate::study::PresetName;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// Calibrate a digital twin from a measured record, and be told when it cannot be trusted.
+#[derive(Debug, Parser)]
+#[command(
+    name = "truetwin",
+    version,
+    after_help = "A first look:   truetwin demo\n\
+        The main job:   truetwin pretrain --twin tanks --out tanks.est\n                \
+        truetwin estimate record.csv --estimator tanks.est --out result\n\n\
+        Records are CSV: t (seconds, uniform), inputs u or u1,u2,…, outputs y or y1,y2,…\n\
+        Exit: 0 done, 2 the call or a file is wrong (one line says what, where and what to do), 1 anything else."
+)]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    pub command: Command,
+    /// Standard output is one JSON object.
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Seed of everything random; the same seed gives the same bits on any number of threads.
+    #[arg(long, global = true, default_value_t = 1)]
+    pub seed: u64,
+    /// Threads to use; all cores unless said.
+    #[arg(long, global = true)]
+    pub threads: Option<usize>,
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    /// List the twins: parameters, units, prior, bounds, channels.
+    Twins,
+    /// List the effects that a twin may lack, with their targets and magnitudes.
+    Effects(Subject),
+    /// Check a twin before any training: repeatable, paired noise, finite, identifiable.
+    Check(Subject),
+    /// Simulate a record.
+    Simulate(SimulateOptions),
+    /// Simulate a bank from the prior, train the network, write one estimator file.
+    Pretrain(PretrainArguments),
+    /// Estimate the parameters behind a measured record.
+    Estimate(EstimateArguments),
+    /// Score the estimator's stages on the paper's test points.
+    Reproduce(ReproduceArguments),
+    /// Calibrate a twin to an embedded record, in seconds, to see what it looks like.
+    Demo(DemoArguments),
+}
+
+/// Which twin, in which setting.
+#[derive(Debug, Clone, Args)]
+#[group(required = true, multiple = false)]
+pub(super) struct Subject {
+    /// A twin by name (see `truetwin twins`).
+    #[arg(long)]
+    pub twin: Option<String>,
+    /// A twin in your own setting: a TOML file with step, prior, noise, limits, start, features.
+    #[arg(long, value_name = "S.toml")]
+    pub study: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct SimulateOptions {
+    #[command(flatten)]
+    pub subject: Subject,
+    /// Parameters: name=value, separated by commas. Unknown starts and noise levels may be left out.
+    #[arg(long, value_name = "a=..,b=..")]
+    pub theta: String,
+    /// Effects to add: a TOML file of [[effect]] tables.
+    #[arg(long, value_name = "E.toml")]
+    pub effect: Option<PathBuf>,
+    /// Time and inputs to simulate with; random levels as in the study unless given.
+    #[arg(long, value_name = "U.csv")]
+    pub input: Option<PathBuf>,
+    /// Without process and measurement noise.
+    #[arg(long)]
+    pub noise_free: bool,
+    /// Where to write the record; standard output unless given.
+    #[arg(long, value_name = "R.csv")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum PresetArgument {
+    /// As in the paper.
+    Paper,
+    /// What was found to be better, on any twin.
+    Default,
+}
+
+impl From<PresetArgument> for PresetName {
+    fn from(argument: PresetArgument) -> Self {
+        match argument {
+            PresetArgument::Paper => Self::Paper,
+            PresetArgument::Default => Self::Default,
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+pub(super) struct PretrainArguments {
+    #[command(flatten)]
+    pub subject: Subject,
+    /// Where to write the estimator.
+    #[arg(long, value_name = "EST")]
+    pub out: PathBuf,
+    /// Simulations to train on; the preset's unless given.
+    #[arg(long, value_name = "M")]
+    pub bank_size: Option<usize>,
+    /// Passes over the bank; the preset's unless given.
+    #[arg(long)]
+    pub epochs: Option<usize>,
+    /// Recipe.
+    #[arg(long, value_enum, default_value = "default")]
+    pub preset: PresetArgument,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct EstimateArguments {
+    /// The measured record.
+    #[arg(value_name = "R.csv")]
+    pub record: PathBuf,
+    /// The estimator, from `truetwin pretrain`.
+    #[arg(long, value_name = "EST")]
+    pub estimator: PathBuf,
+    /// A second record of the same system to score the calibrated twin on.
+    #[arg(long, value_name = "V.csv")]
+    pub validation: Option<PathBuf>,
+    /// Numbers of the refinement; the estimator's own unless given.
+    #[arg(long, value_enum)]
+    pub preset: Option<PresetArgument>,
+    /// Refine and tune even where the gate would keep the network's estimate.
+    #[arg(long)]
+    pub always_refine: bool,
+    /// A new folder for estimate.json, overlay.svg and trajectories.csv.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ReproduceArguments {
+    #[command(flatten)]
+    pub subject: Subject,
+    /// 1 and 2: the paper's points outside the prior; 0: θ drawn from the prior.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=2))]
+    pub scenario: u8,
+    /// Simulated records.
+    #[arg(long, default_value_t = 100)]
+    pub runs: usize,
+    /// Recipe.
+    #[arg(long, value_enum, default_value = "default")]
+    pub preset: PresetArgument,
+    /// An estimator to score, instead of pretraining one.
+    #[arg(long, value_name = "EST")]
+    pub estimator: Option<PathBuf>,
+    /// Simulations to train on; the preset's unless given.
+    #[arg(long, value_name = "M")]
+    pub bank_size: Option<usize>,
+    /// Passes over the bank; the preset's unless given.
+    #[arg(long)]
+    pub epochs: Option<usize>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct DemoArguments {
+    /// A twin by name; the first one that has a demo unless given.
+    #[arg(long)]
+    pub twin: Option<String>,
+    /// A new folder for the result, the picture and the record.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}

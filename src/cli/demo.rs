@@ -1,0 +1,63 @@
+//! `demo`: the main job on a record that comes with the program.
+
+use super::args::DemoArguments;
+use super::estimate::{show, write_results};
+use super::{Context, Failure, output};
+use crate::study::{PresetName, Study};
+use crate::twin::{Noise, Record, write_record};
+use crate::two_stage::{EstimateOptions, PretrainOptions, pretrain};
+use std::process::ExitCode;
+
+/// A small bank and few epochs: seconds, not minutes. The refinement makes up for what the network lacks.
+const BANK: usize = 2000;
+const EPOCHS: usize = 40;
+
+pub(super) fn run(context: &Context<'_>, options: &DemoArguments) -> Result<ExitCode, Failure> {
+    if let Some(out) = &options.out {
+        output::check_new(out)?;
+    }
+    let study = match &options.twin {
+        Some(name) => context.named(name)?,
+        None => (context.studies.iter().find(|s| s.demo().is_some()))
+            .or(context.studies.first())
+            .ok_or_else(|| Failure::user("there is no twin to show"))?,
+    };
+    let (record, origin) = match study.demo() {
+        Some(record) => (record.clone(), "a record made beforehand by this program"),
+        None => (simulated(context, study)?, "a record simulated somewhere in the bounds"),
+    };
+    eprintln!(
+        "demo: {origin}, twin {}; training on {BANK} simulations from the prior",
+        study.name()
+    );
+    let settings = PretrainOptions {
+        preset: PresetName::Default,
+        bank_size: Some(BANK),
+        epochs: Some(EPOCHS),
+        seed: context.seed,
+    };
+    let (estimator, _) = pretrain(study, &settings, context.progress)?;
+    let settings = EstimateOptions {
+        seed: context.seed,
+        ..EstimateOptions::default()
+    };
+    let estimate = estimator.estimate(&record, &settings, context.progress)?;
+    if let Some(out) = &options.out {
+        let folder = output::NewFolder::new(out)?;
+        write_record(&folder.file("record.csv"), &record)?;
+        write_results(&folder, study, &record, &estimate)?;
+        folder.finish()?;
+        eprintln!("demo: {0}/overlay.svg shows measured against twin, {0}/record.csv the record", out.display());
+    }
+    show(context, study, &estimate)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A record of the twin somewhere in its bounds, so most likely outside of the prior.
+fn simulated(context: &Context<'_>, study: &Study) -> Result<Record, Failure> {
+    let noise = Noise::new(context.seed, "demo", 0);
+    let drive = study.drives()?.draw(noise)?;
+    let theta = study.twin().parameters().draw_bounds(noise);
+    let outputs = study.twin().simulate(&theta, &drive, noise)?;
+    Ok(Record::new(drive, outputs)?)
+}

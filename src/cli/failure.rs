@@ -1,0 +1,171 @@
+//! From any error to one line and an exit code.
+
+use crate::bank::BankError;
+use crate::effect::EffectFileError;
+use crate::experiment::MonteCarloError;
+use crate::feature::FeatureError;
+use crate::gate::GateError;
+use crate::network::NetworkError;
+use crate::refine::RefineError;
+use crate::study::{PlanError, StudyError};
+use crate::twin::{
+    AdaptationError, CsvError, DriveError, EffectError, ParameterError, RecordError,
+    SimulationError,
+};
+use crate::two_stage::{EstimateError, EstimatorFileError, PretrainError};
+use std::fmt::Display;
+use std::path::Path;
+use std::process::ExitCode;
+
+/// The call or a file is wrong.
+const USER: u8 = 2;
+/// Anything else.
+const INTERNAL: u8 = 1;
+
+/// Why a verb ended early.
+#[derive(Debug)]
+pub(super) struct Failure {
+    message: String,
+    code: u8,
+}
+
+impl Failure {
+    /// The user can mend it; the message says how.
+    pub fn user(message: impl Display) -> Self {
+        Self {
+            message: message.to_string(),
+            code: USER,
+        }
+    }
+
+    /// The user cannot mend it.
+    pub fn internal(message: impl Display) -> Self {
+        Self {
+            message: message.to_string(),
+            code: INTERNAL,
+        }
+    }
+
+    /// A wrong call, in one line.
+    pub fn usage(error: &clap::Error) -> Self {
+        let text = error.to_string();
+        let first = text.split("\n\n").next().unwrap_or(&text);
+        let line = first.split_whitespace().collect::<Vec<_>>().join(" ");
+        let line = line.strip_prefix("error: ").unwrap_or(&line);
+        Self::user(format!("{line}; see `truetwin --help` and `truetwin VERB --help`"))
+    }
+
+    /// Names the file that the message is about, unless it does.
+    pub fn within(mut self, path: &Path) -> Self {
+        let name = path.display().to_string();
+        if !self.message.contains(&name) {
+            self.message = format!("{name}: {}", self.message);
+        }
+        self
+    }
+
+    /// Prints the line and gives the exit code.
+    pub fn report(self) -> ExitCode {
+        let line = self.message.split_whitespace().collect::<Vec<_>>().join(" ");
+        eprintln!("error: {line}");
+        ExitCode::from(self.code)
+    }
+}
+
+/// Errors that only the user's input can cause.
+macro_rules! users {
+    ($($error:ty),* $(,)?) => {
+        $(impl From<$error> for Failure {
+            fn from(error: $error) -> Self {
+                Self::user(error)
+            }
+        })*
+    };
+}
+users!(
+    AdaptationError,
+    CsvError,
+    DriveError,
+    EffectError,
+    EffectFileError,
+    EstimatorFileError,
+    FeatureError,
+    ParameterError,
+    PlanError,
+    RecordError,
+    SimulationError,
+    StudyError,
+);
+
+impl From<NetworkError> for Failure {
+    fn from(error: NetworkError) -> Self {
+        match error {
+            NetworkError::Backend(_) | NetworkError::Cancelled(_) => Self::internal(error),
+            _ => Self::user(error),
+        }
+    }
+}
+
+impl From<BankError> for Failure {
+    fn from(error: BankError) -> Self {
+        match error {
+            BankError::Cancelled(_) => Self::internal(error),
+            _ => Self::user(error),
+        }
+    }
+}
+
+impl From<GateError> for Failure {
+    fn from(error: GateError) -> Self {
+        match error {
+            GateError::Bank(error) => error.into(),
+            GateError::Whitening(_) => Self::user(error),
+        }
+    }
+}
+
+impl From<RefineError> for Failure {
+    fn from(error: RefineError) -> Self {
+        match error {
+            RefineError::Bank(error) => error.into(),
+            RefineError::Gate(error) => error.into(),
+            RefineError::NoStart { .. } | RefineError::Information(_) => Self::user(error),
+            RefineError::Optimise(_) | RefineError::Cancelled(_) => Self::internal(error),
+        }
+    }
+}
+
+impl From<PretrainError> for Failure {
+    fn from(error: PretrainError) -> Self {
+        match error {
+            PretrainError::Bank(error) => error.into(),
+            PretrainError::Network(error) => error.into(),
+            _ => Self::user(error),
+        }
+    }
+}
+
+impl From<EstimateError> for Failure {
+    fn from(error: EstimateError) -> Self {
+        match error {
+            EstimateError::Bank(error) => error.into(),
+            EstimateError::Gate(error) => error.into(),
+            EstimateError::Refine(error) => error.into(),
+            EstimateError::Network(error) => error.into(),
+            EstimateError::Cancelled(_)
+            | EstimateError::Tracking(_)
+            | EstimateError::Ellipsoid(_) => Self::internal(error),
+            _ => Self::user(error),
+        }
+    }
+}
+
+impl From<MonteCarloError> for Failure {
+    fn from(error: MonteCarloError) -> Self {
+        match error {
+            MonteCarloError::Cancelled(_) => Self::internal(error),
+            MonteCarloError::Estimate { error, .. } => (*error).into(),
+            _ => Self::user(error),
+        }
+    }
+}

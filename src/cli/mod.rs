@@ -1,0 +1,135 @@
+//! One command line over any twins.
+//!
+//! The `truetwin` binary hands it the reference twins; a user's three-line `main` hands it their own:
+//!
+//! ```no_run
+//! use truetwin::study::{RecordPlan, Study};
+//! use truetwin::twins::VanDerPol;
+//!
+//! fn main() -> std::process::ExitCode {
+//!     truetwin::cli::run([Study::new("mine", VanDerPol, RecordPlan::autonomous(0.05, 300))])
+//! }
+//! ```
+//!
+//! Results go to standard output, progress and messages to standard error. Exit 0: done; 2: the call or a file is
+//! wrong, in one line with the remedy; 1: anything else.
+
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
+mod args;
+mod check;
+mod demo;
+mod effects;
+mod estimate;
+mod failure;
+mod output;
+mod pretrain;
+mod progress;
+mod reproduce;
+mod simulate;
+mod twins;
+
+use crate::progress::Progress;
+use crate::study::{Study, StudyError, StudyFile};
+use args::{Arguments, Command, Subject};
+use clap::{CommandFactory, FromArgMatches};
+use failure::Failure;
+use std::process::ExitCode;
+
+/// Runs the command line of this process over `studies`.
+pub fn run<E: Into<StudyError>>(studies: impl IntoIterator<Item = Result<Study, E>>) -> ExitCode {
+    run_from(studies, std::env::args_os())
+}
+
+/// Runs the command line `arguments`, the program's name first, over `studies`.
+pub fn run_from<E: Into<StudyError>>(
+    studies: impl IntoIterator<Item = Result<Study, E>>,
+    arguments: impl IntoIterator<Item = impl Into<std::ffi::OsString> + Clone>,
+) -> ExitCode {
+    let matches = Arguments::command().try_get_matches_from(arguments);
+    let parsed = match matches.and_then(|matches| Arguments::from_arg_matches(&matches)) {
+        Ok(parsed) => parsed,
+        Err(error) if !error.use_stderr() => {
+            // Help and version are results.
+            print!("{error}");
+            return ExitCode::SUCCESS;
+        }
+        Err(error) => return Failure::usage(&error).report(),
+    };
+    let studies: Result<Vec<Study>, E> = studies.into_iter().collect();
+    let result = studies
+        .map_err(|error| Failure::from(error.into()))
+        .and_then(|studies| in_pool(parsed.threads, || dispatch(&parsed, &studies)));
+    match result {
+        Ok(code) => code,
+        Err(failure) => failure.report(),
+    }
+}
+
+/// Runs `work` in a pool of its own, where a number of threads is asked for; the global pool is left alone.
+fn in_pool<R: Send>(
+    threads: Option<usize>,
+    work: impl FnOnce() -> Result<R, Failure> + Send,
+) -> Result<R, Failure> {
+    match threads {
+        None => work(),
+        Some(0) => Err(Failure::user("--threads 0: at least 1 is needed")),
+        Some(threads) => rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .map_err(Failure::internal)?
+            .install(work),
+    }
+}
+
+fn dispatch(arguments: &Arguments, studies: &[Study]) -> Result<ExitCode, Failure> {
+    let progress = progress::bars();
+    let context = Context {
+        studies,
+        json: arguments.json,
+        seed: arguments.seed,
+        progress: &progress,
+    };
+    match &arguments.command {
+        Command::Twins => twins::run(&context),
+        Command::Effects(subject) => effects::run(&context, subject),
+        Command::Check(subject) => check::run(&context, subject),
+        Command::Simulate(options) => simulate::run(&context, options),
+        Command::Pretrain(options) => pretrain::run(&context, options),
+        Command::Estimate(options) => estimate::run(&context, options),
+        Command::Reproduce(options) => reproduce::run(&context, options),
+        Command::Demo(options) => demo::run(&context, options),
+    }
+}
+
+/// What every verb sees.
+struct Context<'a> {
+    studies: &'a [Study],
+    json: bool,
+    seed: u64,
+    progress: &'a Progress,
+}
+
+impl Context<'_> {
+    /// The study that `--twin` or `--study` names.
+    fn study(&self, subject: &Subject) -> Result<Study, Failure> {
+        match (&subject.twin, &subject.study) {
+            (Some(name), _) => Ok(self.named(name)?.clone()),
+            (None, Some(path)) => {
+                let file = StudyFile::read(path).map_err(StudyError::from)?;
+                let at = |failure: Failure| failure.within(path);
+                let study = self.named(&file.twin).map_err(at)?;
+                study.configure(&file).map_err(|error| at(error.into()))
+            }
+            (None, None) => Err(Failure::user("name a twin with --twin, or a file with --study")),
+        }
+    }
+
+    fn named(&self, name: &str) -> Result<&Study, Failure> {
+        let found = self.studies.iter().find(|study| study.name() == name);
+        Ok(found.ok_or_else(|| StudyError::Twin {
+            given: name.into(),
+            known: self.studies.iter().map(Study::name).collect::<Vec<_>>().join(", "),
+        })?)
+    }
+}

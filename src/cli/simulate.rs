@@ -1,0 +1,147 @@
+//! `simulate`: a synthetic record.
+
+use super::args::SimulateOptions;
+use super::{Context, Failure, output};
+use crate::effect::read_effects;
+use crate::twin::{
+    DigitalTwin, Drive, Noise, ParameterSpace, Record, Role, augment, read_drive, record_csv_text,
+    write_record,
+};
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+pub(super) fn run(context: &Context<'_>, options: &SimulateOptions) -> Result<ExitCode, Failure> {
+    if let Some(out) = &options.out {
+        output::check_new(out)?;
+    }
+    let study = context.study(&options.subject)?;
+    let given = parse_theta(&options.theta)?;
+    let (twin, magnitudes) = with_effects(context, study.twin().clone(), options)?;
+    let theta = complete(&twin.parameters(), given, &magnitudes)?;
+    let noise = Noise::new(context.seed, "simulate", 0);
+    let drive = match &options.input {
+        Some(path) => read_drive(path)?,
+        None => study.drives()?.draw(noise)?,
+    };
+    check_inputs(twin.as_ref(), &drive, options)?;
+    let noise = if options.noise_free { Noise::OFF } else { noise };
+    let outputs = twin.simulate(&theta, &drive, noise)?;
+    let record = Record::new(drive, outputs)?;
+    match &options.out {
+        Some(out) => write_record(out, &record)?,
+        None if !context.json => output::print(&record_csv_text(&record))?,
+        None => {}
+    }
+    if context.json {
+        let names = twin.parameters();
+        output::print_json(&json!({
+            "schema": "truetwin.simulate/1",
+            "twin": study.name(),
+            "names": names.names(),
+            "theta": theta,
+            "seed": context.seed,
+            "noise_free": options.noise_free,
+            "samples": record.samples(),
+            "step": record.drive().dt(),
+            "record": options.out,
+            "y": if options.out.is_none() { Some(record.outputs().rows().into_iter().map(|r| r.to_vec()).collect::<Vec<_>>()) } else { None },
+        }))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// `a=1,b=2` as pairs.
+fn parse_theta(text: &str) -> Result<BTreeMap<String, f64>, Failure> {
+    let mut values = BTreeMap::new();
+    for part in text.split(',').map(str::trim).filter(|p| !p.is_empty()) {
+        let wrong = || Failure::user(format!("--theta: \"{part}\" is not name=value"));
+        let (name, value) = part.split_once('=').ok_or_else(wrong)?;
+        let value: f64 = value.trim().parse().map_err(|_| wrong())?;
+        if values.insert(name.trim().to_owned(), value).is_some() {
+            let name = name.trim();
+            return Err(Failure::user(format!("--theta gives {name} twice; give it once")));
+        }
+    }
+    Ok(values)
+}
+
+/// The twin with the effects of a file, and the magnitudes that the file gives.
+fn with_effects(
+    context: &Context<'_>,
+    twin: Arc<dyn DigitalTwin>,
+    options: &SimulateOptions,
+) -> Result<(Arc<dyn DigitalTwin>, BTreeMap<String, f64>), Failure> {
+    let _ = context;
+    let Some(path) = &options.effect else {
+        return Ok((twin, BTreeMap::new()));
+    };
+    let effects = read_effects(path)?;
+    let mut given = BTreeMap::new();
+    for effect in &effects {
+        for magnitude in effect.magnitudes() {
+            if let Some(value) = effect.given().get(magnitude.name) {
+                let (id, target) = (effect.typetag_name(), effect.target());
+                given.insert(format!("{id}@{target}.{}", magnitude.name), value);
+            }
+        }
+    }
+    let twin = augment(twin, effects).map_err(|error| Failure::from(error).within(path))?;
+    Ok((twin, given))
+}
+
+/// θ from what the call and the effect file give; unknown starts and noise levels may stay at their prior's centre.
+fn complete(
+    space: &ParameterSpace,
+    mut given: BTreeMap<String, f64>,
+    magnitudes: &BTreeMap<String, f64>,
+) -> Result<Vec<f64>, Failure> {
+    let mut theta = Vec::new();
+    for p in space.iter() {
+        let value = given.remove(&p.name);
+        let value = match (value, magnitudes.get(&p.name), p.role) {
+            (Some(value), _, _) if !p.bounds.contains(value) => {
+                return Err(Failure::user(format!(
+                    "--theta: {} = {value} is outside its bounds {}; choose a value inside",
+                    p.name, p.bounds
+                )));
+            }
+            (Some(value), _, _) => value,
+            // Limits of magnitudes are checked with the effect; off values may be infinite.
+            (None, Some(magnitude), _) => *magnitude,
+            (None, None, Role::Start | Role::Noise) => p.prior.centre(),
+            (None, None, _) => {
+                return Err(Failure::user(format!(
+                    "--theta gives no {}; give {}",
+                    p.name,
+                    space.names().join(", ")
+                )));
+            }
+        };
+        theta.push(value);
+    }
+    match given.keys().next() {
+        Some(name) => Err(Failure::user(format!(
+            "--theta: no parameter is called {name}; there are {}",
+            space.names().join(", ")
+        ))),
+        None => Ok(theta),
+    }
+}
+
+fn check_inputs(
+    twin: &dyn DigitalTwin,
+    drive: &Drive,
+    options: &SimulateOptions,
+) -> Result<(), Failure> {
+    let (given, expected) = (drive.inputs().ncols(), twin.signals().inputs.len());
+    if given == expected {
+        return Ok(());
+    }
+    let path = options.input.as_deref().unwrap_or(std::path::Path::new("input"));
+    Err(Failure::user(format!(
+        "{}: {given} inputs, the twin has {expected}; give t and one column for each input",
+        path.display()
+    )))
+}

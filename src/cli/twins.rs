@@ -1,0 +1,80 @@
+//! `twins`: what there is.
+
+use super::{Context, Failure, output};
+use crate::study::Study;
+use crate::twin::{Parameter, Quantity};
+use serde_json::{Value, json};
+use std::process::ExitCode;
+
+pub(super) fn run(context: &Context<'_>) -> Result<ExitCode, Failure> {
+    if context.json {
+        let twins: Vec<Value> = context.studies.iter().map(describe).collect();
+        output::print_json(&json!({ "schema": "truetwin.twins/1", "twins": twins }))?;
+    } else {
+        let blocks: Vec<String> = context.studies.iter().map(in_words).collect();
+        output::print(&blocks.join("\n"))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn quantities(all: &[Quantity]) -> Vec<Value> {
+    (all.iter())
+        .map(|q| json!({ "name": q.name, "unit": q.unit }))
+        .collect()
+}
+
+fn parameter(p: &Parameter) -> Value {
+    json!({ "name": p.name, "unit": p.unit, "prior": p.prior, "bounds": p.bounds, "role": p.role })
+}
+
+fn describe(study: &Study) -> Value {
+    let twin = study.twin();
+    let signals = twin.signals();
+    let states = (twin.state_space()).map(|equations| quantities(&equations.outline().states));
+    json!({
+        "name": study.name(),
+        "equations": states.is_some(),
+        "parameters": twin.parameters().iter().map(parameter).collect::<Vec<_>>(),
+        "states": states.unwrap_or_default(),
+        "inputs": quantities(&signals.inputs),
+        "outputs": quantities(&signals.outputs),
+        "record": { "step": study.plan().step, "samples": study.plan().samples },
+    })
+}
+
+fn in_words(study: &Study) -> String {
+    let twin = study.twin();
+    let signals = twin.signals();
+    let names = |all: &[Quantity]| match all.len() {
+        0 => "none".to_owned(),
+        _ => (all.iter())
+            .map(|q| format!("{} [{}]", q.name, q.unit))
+            .collect::<Vec<_>>()
+            .join(", "),
+    };
+    let states = match twin.state_space() {
+        Some(equations) => names(&equations.outline().states),
+        None => "not shown (black box)".into(),
+    };
+    let mut text = format!(
+        "{}\n  states  {states}\n  inputs  {}\n  outputs {}\n  record  {} samples, step {} s\n  {:<12} {:<8} {:<16} bounds\n",
+        study.name(),
+        names(&signals.inputs),
+        names(&signals.outputs),
+        study.plan().samples,
+        study.plan().step,
+        "parameter",
+        "unit",
+        "prior",
+    );
+    for p in twin.parameters().iter() {
+        text.push_str(&format!(
+            "  {:<12} {:<8} {:<16} {}\n",
+            p.name,
+            p.unit,
+            p.prior.to_string(),
+            p.bounds
+        ));
+    }
+    text
+}

@@ -1,0 +1,42 @@
+//! An actuator whose zero is off.
+
+use crate::twin::{Given, Instant, Law, Magnitude, UnmodelledEffect};
+use serde::{Deserialize, Serialize};
+
+/// A constant error of the zero: u + offset.
+///
+/// Magnitude: `offset` in the unit of the signal, of either sign, off at 0.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ActuatorBias {
+    /// `actuator`, or `actuator1`… where there are several.
+    pub target: String,
+    /// Magnitudes held at a value; the others are free.
+    #[serde(default)]
+    pub magnitudes: Given,
+}
+
+#[typetag::serde(name = "actuator-bias")]
+impl UnmodelledEffect for ActuatorBias {
+    accessors!();
+
+    fn magnitudes(&self) -> Vec<Magnitude> {
+        vec![Magnitude::signed(
+            "offset",
+            "signal",
+            &[-0.3, -0.1, 0.1, 0.3],
+        )]
+    }
+
+    fn law(&self) -> Law {
+        Law::Actuator
+    }
+
+    fn order(&self) -> u32 {
+        20
+    }
+
+    fn signal(&self, m: &[f64], _now: Instant, _memory: &mut [f64], u: f64) -> f64 {
+        u + m[0]
+    }
+}

@@ -1,0 +1,39 @@
+//! An actuator with a limited range.
+
+use super::laws::{HIGH, LOW, clamp};
+use crate::twin::{Given, Instant, Law, Magnitude, UnmodelledEffect};
+use serde::{Deserialize, Serialize};
+
+/// A limited range: clamp(u, low, high).
+///
+/// Magnitudes: `low` and `high` in the unit of the signal, off at −∞ and +∞. Where low exceeds high, high wins.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ActuatorSaturation {
+    /// `actuator`, or `actuator1`… where there are several.
+    pub target: String,
+    /// Magnitudes held at a value; the others are free.
+    #[serde(default)]
+    pub magnitudes: Given,
+}
+
+#[typetag::serde(name = "actuator-saturation")]
+impl UnmodelledEffect for ActuatorSaturation {
+    accessors!();
+
+    fn magnitudes(&self) -> Vec<Magnitude> {
+        vec![LOW, HIGH]
+    }
+
+    fn law(&self) -> Law {
+        Law::Actuator
+    }
+
+    fn order(&self) -> u32 {
+        50
+    }
+
+    fn signal(&self, m: &[f64], _now: Instant, _memory: &mut [f64], u: f64) -> f64 {
+        clamp(u, m[0], m[1])
+    }
+}

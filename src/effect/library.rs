@@ -1,0 +1,215 @@
+//! All effects of the library, and where in a twin each can stand.
+
+use super::*;
+use crate::twin::{
+    DigitalTwin, Effects, Given, Law, Magnitude, Noise, Now, Outline, ParameterSpace, Role,
+    StateSpace, targets,
+};
+use std::sync::Arc;
+
+/// What an effect is, for people and tables.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Description {
+    /// Id, as in files.
+    pub id: &'static str,
+    /// The law that it bends; [`Law::target`] names the kind of target.
+    pub law: Law,
+    /// The key of the other state in files: `from` or `to`.
+    pub other: Option<&'static str>,
+    /// Magnitudes in the order of θ.
+    pub magnitudes: Vec<Magnitude>,
+    /// The law in one line.
+    pub formula: &'static str,
+}
+
+/// One line of the library: how to make the effect, and its law in words.
+struct Member {
+    /// From its target and the other state.
+    make: fn(&str, &str) -> Arc<dyn UnmodelledEffect>,
+    other: Option<&'static str>,
+    formula: &'static str,
+}
+
+/// `member!(Type: "formula")`; `member!(Type + from: "formula")` of a law between two states.
+macro_rules! member {
+    ($effect:ident $(+ $other:ident)?: $formula:literal) => {
+        Member {
+            make: |target, _other| {
+                Arc::new($effect {
+                    target: target.into(),
+                    $($other: _other.into(),)?
+                    magnitudes: Given::default(),
+                })
+            },
+            other: [$(stringify!($other),)?].first().copied(),
+            formula: $formula,
+        }
+    };
+}
+
+/// The library, in the order of its table.
+fn members() -> Vec<Member> {
+    vec![
+        member!(SensorBias: "s + offset"),
+        member!(SensorGain: "s·(1 + error)"),
+        member!(SensorDrift: "s + rate·t"),
+        member!(SensorLag: "z ← a·z + (1 − a)·s, a = exp(−Δt/τ)"),
+        member!(SensorDelay: "s(t − delay), linear between samples"),
+        member!(SensorRectification: "(1 − f)·s + f·abs(s)"),
+        member!(SensorNoise: "r² + std² for the variance r² of the twin's own noise"),
+        member!(SensorSaturation: "clamp(s, low, high)"),
+        member!(SensorQuantization: "step·⌊s/step + ½⌋"),
+        member!(SensorOutliers: "s + N(0, scale²) with that probability"),
+        member!(ActuatorGain: "u·(1 + error)"),
+        member!(ActuatorBias: "u + offset"),
+        member!(ActuatorDeadZone: "u − clamp(u, ±width/2)"),
+        member!(ActuatorBacklash: "v ← clamp(v, u ± width/2)"),
+        member!(ActuatorSaturation: "clamp(u, low, high)"),
+        member!(ActuatorRateLimit: "v ← v + clamp(u − v, ±rate·Δt)"),
+        member!(ActuatorLag: "v ← a·v + (1 − a)·u, a = exp(−Δt/τ)"),
+        member!(ActuatorDelay: "u(t − delay), linear between samples"),
+        member!(ConstantForcing: "ẋ + force"),
+        member!(CoulombFriction: "ẋ − force·sign x"),
+        member!(LinearLoss: "ẋ − rate·x"),
+        member!(CrossCoupling + from: "ẋ + rate·x_from"),
+        member!(QuadraticDrag: "ẋ − c·abs(x)·x"),
+        member!(CubicStiffness + from: "ẋ − c·x_from³"),
+        member!(PowerLaw: "ẋ − c·abs(x)^e·sign x"),
+        member!(PeriodicDisturbance: "ẋ + amplitude·sin(2π·f·t + phase)"),
+        member!(StateCeiling + to: "the excess over level is cut; spill × excess is added to `to`"),
+        member!(ProcessNoise: "q² + std² for the variance q² of the twin's own increment a step"),
+        member!(ParameterDrift: "θ·(1 + rate·t)"),
+        member!(ParameterStep: "θ·(1 + size) from that time on"),
+    ]
+}
+
+/// Every effect of the library, in the order of its table.
+pub fn library() -> Vec<Description> {
+    (members().into_iter())
+        .map(|member| {
+            let effect = (member.make)("", "");
+            Description {
+                id: effect.typetag_name(),
+                law: effect.law(),
+                other: member.other,
+                magnitudes: effect.magnitudes(),
+                formula: member.formula,
+            }
+        })
+        .collect()
+}
+
+/// Every effect of the library that this twin may lack, once for each target and other state, all magnitudes free.
+///
+/// Targets are the twin's own states and parameters, not the memories and magnitudes of effects already added.
+/// `cubic-stiffness` is offered where a state is the rate of another, which is found by probing the drift.
+pub fn applicable(twin: &dyn DigitalTwin) -> Effects {
+    let (equations, signals) = (twin.state_space(), twin.signals());
+    let outline = equations.map(|twin| own(twin.outline()));
+    let rates = equations.map_or_else(Vec::new, rates);
+    let mut effects = Effects::new();
+    for Member { make, other, .. } in members() {
+        let law = make("", "").law();
+        let known = targets(law, outline.as_ref(), &signals);
+        for target in &known {
+            let others = match (make("", "").typetag_name(), other) {
+                (_, None) => vec![""],
+                ("cubic-stiffness", _) => (rates.iter())
+                    .filter(|(rate, _)| rate == target)
+                    .map(|(_, of)| of.as_str())
+                    .collect(),
+                // What a single vessel spills is lost.
+                (_, Some("to")) if known.len() == 1 => vec![target.as_str()],
+                _ => (known.iter().filter(|name| *name != target))
+                    .map(String::as_str)
+                    .collect(),
+            };
+            effects.extend(others.into_iter().map(|other| make(target, other)));
+        }
+    }
+    effects
+}
+
+/// The outline without what effects and unknown levels have added. Names of added states hold a slash.
+fn own(mut outline: Outline) -> Outline {
+    outline.states.retain(|state| !state.name.contains('/'));
+    outline.parameters = ParameterSpace::new(
+        (outline.parameters.iter())
+            .filter(|p| p.role == Role::Physical)
+            .cloned(),
+    );
+    outline
+}
+
+/// Pairs (rate, of): the drift of the second state is the first state, at every one of a few random points.
+fn rates(twin: &dyn StateSpace) -> Vec<(String, String)> {
+    const POINTS: u64 = 5;
+    let (outline, limits) = (twin.outline(), twin.limits());
+    let states = &outline.states;
+    let mut pairs: Vec<(usize, usize)> = (0..states.len())
+        .flat_map(|i| (0..states.len()).map(move |j| (i, j)))
+        .filter(|(i, j)| i != j)
+        .collect();
+    for point in 0..POINTS {
+        let mut source = Noise::new(0, "rates", point).source("point");
+        let x: Vec<f64> = (limits.iter())
+            .map(|limit| {
+                if limit.is_finite() {
+                    limit.low() + source.uniform() * limit.width()
+                } else {
+                    limit.clamp(source.normal())
+                }
+            })
+            .collect();
+        let u: Vec<f64> = outline.inputs.iter().map(|_| source.uniform()).collect();
+        let theta = outline.parameters.draw_prior(Noise::new(0, "rates", point));
+        let now = Now {
+            t: 0.0,
+            dt: 1.0,
+            u: &u,
+            theta: &theta,
+        };
+        let mut dx = vec![0.0; x.len()];
+        twin.drift(&now, &x, &mut dx);
+        pairs.retain(|&(i, j)| dx[j] == x[i]);
+    }
+    let name = |i: usize| states[i].name.clone();
+    pairs.into_iter().map(|(i, j)| (name(i), name(j))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The table that people read says what the code does.
+    #[test]
+    fn the_table_of_the_docs_is_the_library() {
+        let rows: Vec<_> = (include_str!("mod.rs").lines())
+            .filter(|line| line.starts_with("//! | `"))
+            .collect();
+        let written: Vec<String> = (library().into_iter())
+            .map(|member| {
+                let magnitudes: Vec<_> = (member.magnitudes.iter())
+                    .map(|m| {
+                        let shape = if m.off.is_none() { "shape " } else { "" };
+                        let off = match m.off {
+                            Some(f64::INFINITY) => ", off ∞",
+                            Some(f64::NEG_INFINITY) => ", off −∞",
+                            _ => "",
+                        };
+                        format!("{shape}`{}` ({}{off})", m.name, m.unit)
+                    })
+                    .collect();
+                let other = (member.other).map_or(String::new(), |other| format!(", `{other}`"));
+                format!(
+                    "//! | `{}` | {}{other} | {} | {} |",
+                    member.id,
+                    member.law.target(),
+                    magnitudes.join(", "),
+                    member.formula
+                )
+            })
+            .collect();
+        assert_eq!(rows, written);
+    }
+}

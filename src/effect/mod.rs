@@ -1,0 +1,132 @@
+//! The library of effects that a twin may lack, one a file.
+//!
+//! s is a sensor's signal, u an actuator's, x a state, θ a parameter. A *shape* has no off value. At the off values
+//! a trajectory does not change by a bit.
+//!
+//! | effect | target | magnitudes (unit; off 0 unless said) | law |
+//! |---|---|---|---|
+//! | `sensor-bias` | sensor | `offset` (signal) | s + offset |
+//! | `sensor-gain` | sensor | `error` (1) | s·(1 + error) |
+//! | `sensor-drift` | sensor | `rate` (signal/s) | s + rate·t |
+//! | `sensor-lag` | sensor | `tau` (s) | z ← a·z + (1 − a)·s, a = exp(−Δt/τ) |
+//! | `sensor-delay` | sensor | `delay` (s) | s(t − delay), linear between samples |
+//! | `sensor-rectification` | sensor | `fraction` (1) | (1 − f)·s + f·abs(s) |
+//! | `sensor-noise` | sensor | `std` (signal) | r² + std² for the variance r² of the twin's own noise |
+//! | `sensor-saturation` | sensor | `low` (signal, off −∞), `high` (signal, off ∞) | clamp(s, low, high) |
+//! | `sensor-quantization` | sensor | `step` (signal) | step·⌊s/step + ½⌋ |
+//! | `sensor-outliers` | sensor | `probability` (1), shape `scale` (signal) | s + N(0, scale²) with that probability |
+//! | `actuator-gain` | actuator | `error` (1) | u·(1 + error) |
+//! | `actuator-bias` | actuator | `offset` (signal) | u + offset |
+//! | `actuator-dead-zone` | actuator | `width` (signal) | u − clamp(u, ±width/2) |
+//! | `actuator-backlash` | actuator | `width` (signal) | v ← clamp(v, u ± width/2) |
+//! | `actuator-saturation` | actuator | `low` (signal, off −∞), `high` (signal, off ∞) | clamp(u, low, high) |
+//! | `actuator-rate-limit` | actuator | `rate` (signal/s, off ∞) | v ← v + clamp(u − v, ±rate·Δt) |
+//! | `actuator-lag` | actuator | `tau` (s) | v ← a·v + (1 − a)·u, a = exp(−Δt/τ) |
+//! | `actuator-delay` | actuator | `delay` (s) | u(t − delay), linear between samples |
+//! | `constant-forcing` | state | `force` (state/s) | ẋ + force |
+//! | `coulomb-friction` | state | `force` (state/s) | ẋ − force·sign x |
+//! | `linear-loss` | state | `rate` (1/s) | ẋ − rate·x |
+//! | `cross-coupling` | state, `from` | `rate` (state/(from·s)) | ẋ + rate·x_from |
+//! | `quadratic-drag` | state | `coefficient` (1/(state·s)) | ẋ − c·abs(x)·x |
+//! | `cubic-stiffness` | state, `from` | `coefficient` (state/(from³·s)) | ẋ − c·x_from³ |
+//! | `power-law` | state | `coefficient` (state^(1−e)/s), shape `exponent` (1) | ẋ − c·abs(x)^e·sign x |
+//! | `periodic-disturbance` | state | `amplitude` (state/s), shape `frequency` (Hz), shape `phase` (rad) | ẋ + amplitude·sin(2π·f·t + phase) |
+//! | `state-ceiling` | state, `to` | `level` (state, off ∞), shape `spill` (1) | the excess over level is cut; spill × excess is added to `to` |
+//! | `process-noise` | state | `std` (state) | q² + std² for the variance q² of the twin's own increment a step |
+//! | `parameter-drift` | parameter | `rate` (1/s) | θ·(1 + rate·t) |
+//! | `parameter-step` | parameter | `size` (1), shape `time` (s) | θ·(1 + size) from that time on |
+//!
+//! Several effects on one signal act in the table's order, whatever the order of a file; the measurement noise enters
+//! after rectification. Starts of a fit are for a signal of size 1 and a step of 1 s; scale them by their units.
+//!
+//! # Add one
+//!
+//! Copy the nearest neighbour, change the law, and add a line to `library.rs` and to the table above (a test compares
+//! both). Outside of this crate, implement [`UnmodelledEffect`] under an id of your own; files then know it too.
+
+use crate::twin::UnmodelledEffect;
+
+/// What every effect answers from its fields: target, given magnitudes, and the other state where there is one.
+macro_rules! accessors {
+    ($($other:ident)?) => {
+        fn target(&self) -> &str {
+            &self.target
+        }
+
+        fn given(&self) -> &Given {
+            &self.magnitudes
+        }
+        $(
+            fn other(&self) -> Option<&str> {
+                Some(&self.$other)
+            }
+        )?
+    };
+}
+
+mod actuator_backlash;
+mod actuator_bias;
+mod actuator_dead_zone;
+mod actuator_delay;
+mod actuator_gain;
+mod actuator_lag;
+mod actuator_rate_limit;
+mod actuator_saturation;
+mod constant_forcing;
+mod coulomb_friction;
+mod cross_coupling;
+mod cubic_stiffness;
+mod file;
+mod laws;
+mod library;
+mod linear_loss;
+mod parameter_drift;
+mod parameter_step;
+mod periodic_disturbance;
+mod power_law;
+mod process_noise;
+mod quadratic_drag;
+mod sensor_bias;
+mod sensor_delay;
+mod sensor_drift;
+mod sensor_gain;
+mod sensor_lag;
+mod sensor_noise;
+mod sensor_outliers;
+mod sensor_quantization;
+mod sensor_rectification;
+mod sensor_saturation;
+mod state_ceiling;
+
+pub use actuator_backlash::ActuatorBacklash;
+pub use actuator_bias::ActuatorBias;
+pub use actuator_dead_zone::ActuatorDeadZone;
+pub use actuator_delay::ActuatorDelay;
+pub use actuator_gain::ActuatorGain;
+pub use actuator_lag::ActuatorLag;
+pub use actuator_rate_limit::ActuatorRateLimit;
+pub use actuator_saturation::ActuatorSaturation;
+pub use constant_forcing::ConstantForcing;
+pub use coulomb_friction::CoulombFriction;
+pub use cross_coupling::CrossCoupling;
+pub use cubic_stiffness::CubicStiffness;
+pub use file::{EffectFileError, parse_effects, read_effects};
+pub use library::{Description, applicable, library};
+pub use linear_loss::LinearLoss;
+pub use parameter_drift::ParameterDrift;
+pub use parameter_step::ParameterStep;
+pub use periodic_disturbance::PeriodicDisturbance;
+pub use power_law::PowerLaw;
+pub use process_noise::ProcessNoise;
+pub use quadratic_drag::QuadraticDrag;
+pub use sensor_bias::SensorBias;
+pub use sensor_delay::SensorDelay;
+pub use sensor_drift::SensorDrift;
+pub use sensor_gain::SensorGain;
+pub use sensor_lag::SensorLag;
+pub use sensor_noise::SensorNoise;
+pub use sensor_outliers::SensorOutliers;
+pub use sensor_quantization::SensorQuantization;
+pub use sensor_rectification::SensorRectification;
+pub use sensor_saturation::SensorSaturation;
+pub use state_ceiling::StateCeiling;

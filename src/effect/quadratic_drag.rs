@@ -1,0 +1,38 @@
+//! Drag with the square of the state.
+
+use crate::twin::{Given, Law, Magnitude, UnmodelledEffect};
+use serde::{Deserialize, Serialize};
+
+/// Turbulent drag: ẋ − c·|x|·x.
+///
+/// Magnitude: `coefficient` (c) in 1/(unit of the state · s), 0 or more, off at 0.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct QuadraticDrag {
+    /// The state.
+    pub target: String,
+    /// Magnitudes held at a value; the others are free.
+    #[serde(default)]
+    pub magnitudes: Given,
+}
+
+#[typetag::serde(name = "quadratic-drag")]
+impl UnmodelledEffect for QuadraticDrag {
+    accessors!();
+
+    fn magnitudes(&self) -> Vec<Magnitude> {
+        vec![Magnitude::positive(
+            "coefficient",
+            "1/(state·s)",
+            &[0.03, 0.1, 0.3],
+        )]
+    }
+
+    fn law(&self) -> Law {
+        Law::Force
+    }
+
+    fn force(&self, m: &[f64], _t: f64, x: f64, _from: f64) -> f64 {
+        -m[0] * x.abs() * x
+    }
+}

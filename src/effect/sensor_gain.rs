@@ -1,0 +1,38 @@
+//! A sensor whose scale is off.
+
+use crate::twin::{Given, Instant, Law, Magnitude, UnmodelledEffect};
+use serde::{Deserialize, Serialize};
+
+/// A relative error of the scale: s·(1 + error).
+///
+/// Magnitude: `error` without unit, −1 (a dead sensor) or more, off at 0.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensorGain {
+    /// `sensor`, or `sensor1`… where there are several.
+    pub target: String,
+    /// Magnitudes held at a value; the others are free.
+    #[serde(default)]
+    pub magnitudes: Given,
+}
+
+#[typetag::serde(name = "sensor-gain")]
+impl UnmodelledEffect for SensorGain {
+    accessors!();
+
+    fn magnitudes(&self) -> Vec<Magnitude> {
+        vec![Magnitude::signed("error", "1", &[-0.2, -0.05, 0.05, 0.2]).within(-1.0, f64::INFINITY)]
+    }
+
+    fn law(&self) -> Law {
+        Law::Sensor
+    }
+
+    fn order(&self) -> u32 {
+        20
+    }
+
+    fn signal(&self, m: &[f64], _now: Instant, _memory: &mut [f64], s: f64) -> f64 {
+        s * (1.0 + m[0])
+    }
+}

@@ -1,0 +1,42 @@
+//! A sensor with coarse digits.
+
+use crate::twin::{Given, Instant, Law, Magnitude, UnmodelledEffect};
+use serde::{Deserialize, Serialize};
+
+/// Rounding to a multiple of the step, halves upwards: step·⌊s/step + ½⌋.
+///
+/// Magnitude: `step` in the unit of the signal, 0 or more, off at 0.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensorQuantization {
+    /// `sensor`, or `sensor1`… where there are several.
+    pub target: String,
+    /// Magnitudes held at a value; the others are free.
+    #[serde(default)]
+    pub magnitudes: Given,
+}
+
+#[typetag::serde(name = "sensor-quantization")]
+impl UnmodelledEffect for SensorQuantization {
+    accessors!();
+
+    fn magnitudes(&self) -> Vec<Magnitude> {
+        vec![Magnitude::positive("step", "signal", &[0.02, 0.1, 0.5])]
+    }
+
+    fn law(&self) -> Law {
+        Law::Sensor
+    }
+
+    fn order(&self) -> u32 {
+        90
+    }
+
+    fn signal(&self, m: &[f64], _now: Instant, _memory: &mut [f64], s: f64) -> f64 {
+        if m[0] > 0.0 {
+            m[0] * (s / m[0] + 0.5).floor()
+        } else {
+            s
+        }
+    }
+}

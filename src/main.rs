@@ -1,0 +1,11 @@
+//! The `truetwin` command: the generic command line over the reference twins.
+
+use std::process::ExitCode;
+use truetwin::study::StudyError;
+
+fn main() -> ExitCode {
+    match truetwin::experiment::reference_studies() {
+        Ok(studies) => truetwin::cli::run(studies.into_iter().map(Ok::<_, StudyError>)),
+        Err(error) => truetwin::cli::run([Err(error)]),
+    }
+}
