@@ -9,7 +9,9 @@ use std::process::ExitCode;
 
 pub(super) fn run(context: &Context<'_>, subject: &Subject) -> Result<ExitCode, Failure> {
     let study = context.study(subject)?;
-    let drive = study.drives()?.draw(Noise::new(context.seed, "check input", 0))?;
+    let drive = study
+        .drives()?
+        .draw(Noise::new(context.seed, "check input", 0))?;
     let findings = check(study.twin().as_ref(), &drive, context.seed);
     let word = |severity| match severity {
         Severity::Pass => "pass",
@@ -19,7 +21,9 @@ pub(super) fn run(context: &Context<'_>, subject: &Subject) -> Result<ExitCode, 
     let failed = findings.iter().any(|f| f.severity == Severity::Failure);
     if context.json {
         let findings: Vec<Value> = (findings.iter())
-            .map(|f| json!({ "check": f.check, "severity": word(f.severity), "message": f.message }))
+            .map(
+                |f| json!({ "check": f.check, "severity": word(f.severity), "message": f.message }),
+            )
             .collect();
         output::print_json(&json!({
             "schema": "truetwin.check/1", "twin": study.name(), "passed": !failed, "findings": findings,
@@ -30,5 +34,9 @@ pub(super) fn run(context: &Context<'_>, subject: &Subject) -> Result<ExitCode, 
             .collect();
         output::print(&lines.join("\n"))?;
     }
-    Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+    Ok(if failed {
+        ExitCode::FAILURE
+    } else {
+        ExitCode::SUCCESS
+    })
 }

@@ -24,7 +24,10 @@ pub(super) fn run(context: &Context<'_>, options: &DemoArguments) -> Result<Exit
     };
     let (record, origin) = match study.demo() {
         Some(record) => (record.clone(), "a record made beforehand by this program"),
-        None => (simulated(context, study)?, "a record simulated somewhere in the bounds"),
+        None => (
+            simulated(context, study)?,
+            "a record simulated somewhere in the bounds",
+        ),
     };
     eprintln!(
         "demo: {origin}, twin {}; training on {BANK} simulations from the prior",
@@ -47,7 +50,10 @@ pub(super) fn run(context: &Context<'_>, options: &DemoArguments) -> Result<Exit
         write_record(&folder.file("record.csv"), &record)?;
         write_results(&folder, study, &record, &estimate)?;
         folder.finish()?;
-        eprintln!("demo: {0}/overlay.svg shows measured against twin, {0}/record.csv the record", out.display());
+        eprintln!(
+            "demo: {0}/overlay.svg shows measured against twin, {0}/record.csv the record",
+            out.display()
+        );
     }
     show(context, study, &estimate)?;
     Ok(ExitCode::SUCCESS)

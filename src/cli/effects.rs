@@ -14,7 +14,11 @@ pub(super) fn run(context: &Context<'_>, subject: &Subject) -> Result<ExitCode, 
             let places: Vec<String> = (possible.iter())
                 .filter(|e| e.typetag_name() == description.id)
                 .map(|e| match e.other() {
-                    Some(other) => format!("{} ({} {other})", e.target(), description.other.unwrap_or("with")),
+                    Some(other) => format!(
+                        "{} ({} {other})",
+                        e.target(),
+                        description.other.unwrap_or("with")
+                    ),
                     None => e.target().to_owned(),
                 })
                 .collect();

@@ -20,7 +20,10 @@ pub(super) fn run(context: &Context<'_>, options: &EstimateArguments) -> Result<
         always_refine: options.always_refine,
         validation: options.validation.as_deref().map(read_record).transpose()?,
     };
-    if let Some((validation, path)) = settings.validation.as_ref().zip(options.validation.as_ref())
+    if let Some((validation, path)) = settings
+        .validation
+        .as_ref()
+        .zip(options.validation.as_ref())
     {
         let checked = estimator.study().check_record(validation);
         checked.map_err(|error| Failure::from(error).within(path))?;

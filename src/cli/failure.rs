@@ -52,7 +52,9 @@ impl Failure {
         let first = text.split("\n\n").next().unwrap_or(&text);
         let line = first.split_whitespace().collect::<Vec<_>>().join(" ");
         let line = line.strip_prefix("error: ").unwrap_or(&line);
-        Self::user(format!("{line}; see `truetwin --help` and `truetwin VERB --help`"))
+        Self::user(format!(
+            "{line}; see `truetwin --help` and `truetwin VERB --help`"
+        ))
     }
 
     /// Names the file that the message is about, unless it does.
@@ -66,7 +68,11 @@ impl Failure {
 
     /// Prints the line and gives the exit code.
     pub fn report(self) -> ExitCode {
-        let line = self.message.split_whitespace().collect::<Vec<_>>().join(" ");
+        let line = self
+            .message
+            .split_whitespace()
+            .collect::<Vec<_>>()
+            .join(" ");
         eprintln!("error: {line}");
         ExitCode::from(self.code)
     }

@@ -121,7 +121,9 @@ impl Context<'_> {
                 let study = self.named(&file.twin).map_err(at)?;
                 study.configure(&file).map_err(|error| at(error.into()))
             }
-            (None, None) => Err(Failure::user("name a twin with --twin, or a file with --study")),
+            (None, None) => Err(Failure::user(
+                "name a twin with --twin, or a file with --study",
+            )),
         }
     }
 
@@ -129,7 +131,12 @@ impl Context<'_> {
         let found = self.studies.iter().find(|study| study.name() == name);
         Ok(found.ok_or_else(|| StudyError::Twin {
             given: name.into(),
-            known: self.studies.iter().map(Study::name).collect::<Vec<_>>().join(", "),
+            known: self
+                .studies
+                .iter()
+                .map(Study::name)
+                .collect::<Vec<_>>()
+                .join(", "),
         })?)
     }
 }

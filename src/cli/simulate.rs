@@ -26,7 +26,11 @@ pub(super) fn run(context: &Context<'_>, options: &SimulateOptions) -> Result<Ex
         None => study.drives()?.draw(noise)?,
     };
     check_inputs(twin.as_ref(), &drive, options)?;
-    let noise = if options.noise_free { Noise::OFF } else { noise };
+    let noise = if options.noise_free {
+        Noise::OFF
+    } else {
+        noise
+    };
     let outputs = twin.simulate(&theta, &drive, noise)?;
     let record = Record::new(drive, outputs)?;
     match &options.out {
@@ -61,7 +65,9 @@ fn parse_theta(text: &str) -> Result<BTreeMap<String, f64>, Failure> {
         let value: f64 = value.trim().parse().map_err(|_| wrong())?;
         if values.insert(name.trim().to_owned(), value).is_some() {
             let name = name.trim();
-            return Err(Failure::user(format!("--theta gives {name} twice; give it once")));
+            return Err(Failure::user(format!(
+                "--theta gives {name} twice; give it once"
+            )));
         }
     }
     Ok(values)
@@ -139,7 +145,10 @@ fn check_inputs(
     if given == expected {
         return Ok(());
     }
-    let path = options.input.as_deref().unwrap_or(std::path::Path::new("input"));
+    let path = options
+        .input
+        .as_deref()
+        .unwrap_or(std::path::Path::new("input"));
     Err(Failure::user(format!(
         "{}: {given} inputs, the twin has {expected}; give t and one column for each input",
         path.display()

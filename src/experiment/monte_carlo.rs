@@ -131,12 +131,13 @@ fn one(estimator: &Estimator, plan: &MonteCarlo, run: usize) -> Result<Run, Mont
         always_refine: true,
         ..EstimateOptions::default()
     };
-    let estimate = (estimator.estimate(&record, &options, &Progress::silent())).map_err(|error| {
-        MonteCarloError::Estimate {
-            run,
-            error: Box::new(error),
-        }
-    })?;
+    let estimate =
+        (estimator.estimate(&record, &options, &Progress::silent())).map_err(|error| {
+            MonteCarloError::Estimate {
+                run,
+                error: Box::new(error),
+            }
+        })?;
     let error = |theta: &[f64]| {
         let squares = theta.iter().zip(&truth).map(|(a, b)| (a - b).powi(2));
         squares.sum::<f64>() / truth.len() as f64

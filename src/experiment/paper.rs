@@ -9,9 +9,13 @@ use crate::feature::{Ar, Arx};
 use crate::network::{Compact, Deep, Training, architecture};
 use crate::refine::RefineSettings;
 use crate::study::{CloudSettings, Preset, PresetName, RecordPlan, Settings, Study, StudyError};
-use crate::twin::{Drive, DriveError, Noise, Signal};
+use crate::twin::{Drive, DriveError, Noise, Signal, parse_record};
 use crate::twins::{CascadedTanks, VanDerPol};
+use std::path::Path;
 use std::sync::Arc;
+
+/// Made by `truetwin simulate --twin van-der-pol --theta nu=3.2 --seed 2026`.
+const DEMO: &str = include_str!("demo-van-der-pol.csv");
 
 /// The reference twins under their command-line names, `van-der-pol` and `tanks`.
 pub fn reference_studies() -> Result<Vec<Study>, StudyError> {
@@ -27,9 +31,11 @@ fn van_der_pol() -> Result<Study, StudyError> {
         settings,
     };
     let plan = RecordPlan::autonomous(0.05, 300);
+    let demo = parse_record(DEMO, Path::new("demo-van-der-pol.csv"))?;
     Ok(Study::new("van-der-pol", VanDerPol, plan)?
         .with_preset(PresetName::Paper, preset(settings))
-        .with_preset(PresetName::Default, preset(Settings::default())))
+        .with_preset(PresetName::Default, preset(Settings::default()))
+        .with_demo(demo))
 }
 
 fn tanks() -> Result<Study, StudyError> {

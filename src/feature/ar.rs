@@ -64,10 +64,10 @@ impl FeatureMap for Bound {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twins::VanDerPol;
+    use crate::feature::testing::Tank;
 
     fn features(order: usize, y: &[f64]) -> Result<Vec<f64>, FeatureError> {
-        let twin: Arc<dyn DigitalTwin> = Arc::new(VanDerPol);
+        let twin: Arc<dyn DigitalTwin> = Arc::new(Tank(0));
         let outputs = Signal::from_shape_vec((y.len(), 1), y.to_vec()).unwrap();
         let drive = Drive::autonomous(1.0, y.len()).unwrap();
         Ar { order }.bind(&twin)?.extract(&drive, &outputs)

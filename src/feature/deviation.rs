@@ -77,12 +77,12 @@ impl FeatureMap for Bound {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::feature::testing::Tank;
     use crate::twin::Noise;
-    use crate::twins::CascadedTanks;
 
     #[test]
     fn a_constant_offset_is_every_feature() {
-        let twin: Arc<dyn DigitalTwin> = Arc::new(CascadedTanks);
+        let twin: Arc<dyn DigitalTwin> = Arc::new(Tank(1));
         let drive = Drive::new(0.5, Signal::from_elem((50, 1), 1.0)).unwrap();
         let map = Deviation { blocks: 7 }.bind(&twin).unwrap();
         let centre = twin.parameters().centre();

@@ -94,3 +94,28 @@ fn check_varies(outputs: &Signal) -> Result<(), FeatureError> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod testing {
+    use crate::twin::{Now, Outline, Parameter, ParameterSpace, Quantity, StateSpace};
+
+    /// One state, `inputs` inputs, one output: ẋ = −k·x + Σu.
+    pub(super) struct Tank(pub usize);
+
+    impl StateSpace for Tank {
+        fn outline(&self) -> Outline {
+            Outline {
+                parameters: ParameterSpace::new([Parameter::new("k", "1/s", 0.1, 1.0)]),
+                states: vec![Quantity::new("x", "m")],
+                inputs: vec![Quantity::new("u", "m/s"); self.0],
+                outputs: vec![Quantity::new("y", "m")],
+            }
+        }
+        fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+            dx[0] = now.u.iter().sum::<f64>() - now.theta[0] * x[0];
+        }
+        fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+            y[0] = x[0];
+        }
+    }
+}

@@ -11,8 +11,8 @@ pub use settings::{CloudSampler, CloudSettings, Preset, PresetName, Settings, Se
 use crate::feature::{Ar, Arx, FeatureError, FeatureMap, FeatureRecipe};
 use crate::network::{Architecture, Deep, HeadArchitecture, architecture};
 use crate::twin::{
-    Adaptation, AdaptationError, CsvError, DigitalTwin, EffectError, ParameterError, Record, RecordError,
-    adapt, augment, fix,
+    Adaptation, AdaptationError, CsvError, DigitalTwin, EffectError, ParameterError, Record,
+    RecordError, adapt, augment, fix,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -128,7 +128,8 @@ pub fn write_record(path: &Path, record: &Record) -> Result<(), CsvError> {
     };
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
     let mut file = tempfile::NamedTempFile::new_in(folder.unwrap_or(Path::new("."))).map_err(io)?;
-    file.write_all(record_csv_text(record).as_bytes()).map_err(io)?;
+    file.write_all(record_csv_text(record).as_bytes())
+        .map_err(io)?;
     file.persist(path).map_err(|error| io(error.error))?;
     Ok(())
 }

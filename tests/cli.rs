@@ -1,0 +1,435 @@
+//! The command line as a user meets it: exit codes, one-line messages, JSON, nothing half-written.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+fn truetwin(arguments: &[&str]) -> Output {
+    (Command::new(env!("CARGO_BIN_EXE_truetwin"))
+        .args(arguments)
+        .output())
+    .unwrap()
+}
+
+/// Exit 2, nothing on standard output, one line on standard error that has these parts.
+fn refused(arguments: &[&str], parts: &[&str]) {
+    let output = truetwin(arguments);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+    assert!(output.stdout.is_empty(), "{arguments:?}");
+    assert_eq!(message.trim_end().lines().count(), 1, "{message}");
+    for part in parts {
+        assert!(
+            message.contains(part),
+            "{arguments:?}: \"{part}\" is not in: {message}"
+        );
+    }
+}
+
+fn done(arguments: &[&str]) -> String {
+    let output = truetwin(arguments);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {message}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn json(arguments: &[&str]) -> serde_json::Value {
+    serde_json::from_str(&done(arguments)).unwrap()
+}
+
+/// A folder with a small oscillator estimator and a record, made once.
+fn workplace() -> &'static Path {
+    static PLACE: OnceLock<PathBuf> = OnceLock::new();
+    PLACE.get_or_init(|| {
+        let place =
+            Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("cli-{}", std::process::id()));
+        fs::create_dir_all(&place).unwrap();
+        let at = |name: &str| place.join(name).display().to_string();
+        done(&[
+            "pretrain",
+            "--twin",
+            "van-der-pol",
+            "--bank-size",
+            "500",
+            "--epochs",
+            "10",
+            "--out",
+            &at("v.est"),
+        ]);
+        done(&[
+            "simulate",
+            "--twin",
+            "van-der-pol",
+            "--theta",
+            "nu=3",
+            "--out",
+            &at("r.csv"),
+        ]);
+        place
+    })
+}
+
+fn at(name: &str) -> String {
+    workplace().join(name).display().to_string()
+}
+
+/// A file in the workplace.
+fn file(name: &str, text: &str) -> String {
+    fs::write(workplace().join(name), text).unwrap();
+    at(name)
+}
+
+#[test]
+fn twins_effects_and_check_tell_what_there_is() {
+    assert!(done(&["twins"]).contains("nu"));
+    let twins = json(&["twins", "--json"]);
+    let tanks = &twins["twins"][1];
+    assert_eq!(tanks["name"], "tanks");
+    assert_eq!(
+        tanks["parameters"][3]["prior"],
+        serde_json::json!([0.8, 1.2])
+    );
+    assert_eq!(tanks["states"][0]["name"], "h1");
+    let effects = json(&["effects", "--twin", "tanks", "--json"]);
+    assert!(effects["effects"].as_array().unwrap().len() > 25);
+    assert_eq!(
+        json(&["check", "--twin", "tanks", "--json"])["passed"],
+        true
+    );
+    assert!(done(&["--help"]).contains("Calibrate a digital twin"));
+    assert!(done(&["estimate", "--help"]).contains("--validation"));
+}
+
+#[test]
+fn simulations_repeat_whatever_the_threads() {
+    let simulate = |seed: &str, threads: &str| {
+        done(&[
+            "simulate",
+            "--twin",
+            "tanks",
+            "--theta",
+            "k1=0.6,k2=0.5,k3=0.55,k4=1",
+            "--seed",
+            seed,
+            "--threads",
+            threads,
+        ])
+    };
+    assert_eq!(simulate("4", "1"), simulate("4", "2"));
+    assert_ne!(simulate("4", "1"), simulate("5", "1"));
+    assert_eq!(simulate("4", "1").lines().count(), 401);
+}
+
+#[test]
+fn an_input_file_and_an_effect_shape_the_record() {
+    let input = file("u.csv", "t,u\n0,1\n0.5,1\n1,2\n1.5,0\n");
+    let effect = file(
+        "e.toml",
+        "[[effect]]\nid = 'sensor-bias'\ntarget = 'sensor'\nmagnitudes = { offset = 0.5 }\n",
+    );
+    let common = [
+        "simulate",
+        "--twin",
+        "tanks",
+        "--theta",
+        "k1=0.6,k2=0.5,k3=0.55,k4=1",
+        "--noise-free",
+        "--input",
+        &input,
+    ];
+    let plain = done(&common);
+    let biased = done(&[&common[..], &["--effect", &effect]].concat());
+    assert!(plain.starts_with("t,u,y\n0,1,0\n"), "{plain}");
+    assert!(biased.starts_with("t,u,y\n0,1,0.5\n"), "{biased}");
+}
+
+#[test]
+fn an_estimate_repeats_fits_its_schema_and_writes_its_folder() {
+    let (record, estimator, out) = (at("r.csv"), at("v.est"), at("out"));
+    let run = |threads: &str| {
+        let mut value = json(&[
+            "estimate",
+            &record,
+            "--estimator",
+            &estimator,
+            "--json",
+            "--threads",
+            threads,
+        ]);
+        value["seconds"] = serde_json::Value::Null;
+        value
+    };
+    let value = run("1");
+    assert_eq!(value, run("2"));
+    assert_eq!(value["gate"]["out_of_distribution"], true);
+    let theta = value["theta"]["final"][0].as_f64().unwrap();
+    assert!((theta - 3.0).abs() < 0.06, "{theta}");
+    let text = done(&[
+        "estimate",
+        &record,
+        "--estimator",
+        &estimator,
+        "--validation",
+        &record,
+        "--out",
+        &out,
+    ]);
+    assert!(text.contains("nu"), "{text}");
+    let mut names: Vec<_> = fs::read_dir(&out)
+        .unwrap()
+        .map(|e| e.unwrap().file_name())
+        .collect();
+    names.sort();
+    assert_eq!(names, ["estimate.json", "overlay.svg", "trajectories.csv"]);
+    assert!(
+        fs::read_to_string(format!("{out}/overlay.svg"))
+            .unwrap()
+            .starts_with("<svg")
+    );
+    refused(
+        &[
+            "estimate",
+            &record,
+            "--estimator",
+            &estimator,
+            "--out",
+            &out,
+        ],
+        &["exists already"],
+    );
+}
+
+#[test]
+fn wrong_records_are_named_by_file_row_column_value_and_remedy() {
+    let estimator = at("v.est");
+    let estimate = |record: &str, parts: &[&str]| {
+        refused(&["estimate", record, "--estimator", &estimator], parts);
+    };
+    let rows = |change: &dyn Fn(usize) -> String| {
+        (0..300).fold("t,y\n".to_owned(), |text, k| text + &change(k) + "\n")
+    };
+    let row = |k: usize| format!("{},{}", k as f64 / 20.0, (k as f64).sin());
+    for bad in ["NaN", "broken", ""] {
+        let cell = |k: usize| if k == 40 { format!("2,{bad}") } else { row(k) };
+        estimate(
+            &file("cell.csv", &rows(&cell)),
+            &["cell.csv, row 42, column y", "correct"],
+        );
+    }
+    estimate(
+        &file("extra.csv", "t,y,temperature\n0,1,2\n1,1,2\n"),
+        &["extra.csv", "\"temperature\"", "remove"],
+    );
+    estimate(
+        &file("missing.csv", "t\n0\n1\n"),
+        &["missing.csv", "no output column"],
+    );
+    let jump = |k: usize| if k < 50 { row(k) } else { row(k + 1) };
+    estimate(
+        &file("jump.csv", &rows(&jump)),
+        &["jump.csv, row 52, column t: 2.55 s where 2.5 s", "resample"],
+    );
+    let back = |k: usize| if k == 9 { "0.1,1".into() } else { row(k) };
+    estimate(
+        &file("back.csv", &rows(&back)),
+        &["back.csv, row 11, column t", "increase"],
+    );
+    estimate(
+        &file("short.csv", "t,y\n0,1\n0.05,2\n0.1,1\n"),
+        &["short.csv", "3 samples", "need"],
+    );
+    let flat = |k: usize| format!("{},1.5", k as f64 / 20.0);
+    estimate(
+        &file("flat.csv", &rows(&flat)),
+        &["flat.csv", "output 1 is constant (1.5)"],
+    );
+    let slow = |k: usize| format!("{k},{}", (k as f64).sin());
+    estimate(
+        &file("slow.csv", &rows(&slow)),
+        &["slow.csv", "step is 1 s", "0.05 s", "pretrain again"],
+    );
+    estimate(
+        &file("driven.csv", "t,u,y\n0,1,1\n0.05,1,2\n"),
+        &["driven.csv", "1 inputs, the twin has 0"],
+    );
+    estimate(&at("nowhere.csv"), &["nowhere.csv", "No such file"]);
+    estimate(&file("binary.csv", "\u{0}\u{1}PNG"), &["binary.csv"]);
+}
+
+#[test]
+fn wrong_calls_are_refused_with_the_remedy() {
+    let new = at("never.est");
+    let theta = "k1=0.6,k2=0.5,k3=0.55,k4=1";
+    refused(
+        &["simulate", "--twin", "tank", "--theta", "a=1"],
+        &["\"tank\"", "van-der-pol, tanks"],
+    );
+    refused(
+        &["simulate", "--twin", "tanks", "--theta", "k1=0.6"],
+        &["no k2", "k1, k2, k3, k4"],
+    );
+    refused(
+        &["simulate", "--twin", "tanks", "--theta", "k9=0.6"],
+        &["--theta"],
+    );
+    refused(
+        &[
+            "simulate",
+            "--twin",
+            "tanks",
+            "--theta",
+            &theta.replace("0.6", "9"),
+        ],
+        &["k1 = 9", "[0.1, 1.5]"],
+    );
+    refused(
+        &["simulate", "--twin", "tanks", "--theta", "k1"],
+        &["\"k1\" is not name=value"],
+    );
+    refused(&["pretrain", "--twin", "tanks"], &["--out"]);
+    refused(
+        &[
+            "pretrain",
+            "--twin",
+            "tanks",
+            "--out",
+            &at("no/such/folder.est"),
+        ],
+        &["does not exist"],
+    );
+    refused(
+        &[
+            "pretrain",
+            "--twin",
+            "tanks",
+            "--out",
+            &new,
+            "--bank-size",
+            "3",
+        ],
+        &["bank size = 3", "100"],
+    );
+    refused(
+        &[
+            "pretrain",
+            "--twin",
+            "tanks",
+            "--out",
+            &new,
+            "--threads",
+            "0",
+        ],
+        &["--threads 0"],
+    );
+    refused(
+        &["estimate", &at("r.csv"), "--estimator", &at("r.csv")],
+        &["r.csv", "truetwin pretrain"],
+    );
+    refused(
+        &["estimate", &at("r.csv"), "--estimator", &at("none.est")],
+        &["none.est"],
+    );
+    refused(&["conjure"], &["conjure", "--help"]);
+    assert!(
+        !Path::new(&new).exists(),
+        "a refused call leaves nothing behind"
+    );
+}
+
+#[test]
+fn wrong_studies_are_refused_with_file_and_line() {
+    let check = |text: &str, parts: &[&str]| {
+        refused(
+            &["check", "--study", &file("s.toml", text)],
+            &[&["s.toml"], parts].concat(),
+        );
+    };
+    check(
+        "twin = 'tanks'\n[prior]\nk1 = [0.8, 0.4]\n",
+        &["line 2", "k1: [0.8, 0.4] is turned inside out"],
+    );
+    check(
+        "twin = 'tanks'\n[prior]\nk7 = [0.4, 0.8]\n",
+        &["[prior] names k7", "k1, k2, k3, k4"],
+    );
+    check(
+        "twin = 'tanks'\nsamples = 3\n",
+        &["line 2", "unknown field"],
+    );
+    check(
+        "twin = 'tanks'\n[fixed]\nk4 = 9\n",
+        &["k4 = 9", "[0.5, 1.5]"],
+    );
+    check("twin = 'tanks'\n[start]\nh1 = 11\n", &["h1 = 11", "limits"]);
+    check(
+        "twin = 'tanks'\n[noise]\ny = -1\n",
+        &["y = -1", "0 or more"],
+    );
+    check(
+        "twin = 'van-der-pol'\n[start]\nx1 = 'estimate'\n",
+        &["start.x1", "[prior]"],
+    );
+    check("twin = 'reactor'\n", &["\"reactor\"", "tanks"]);
+    check(
+        "twin = 'tanks'\n[features]\nkind = 'arma'\n",
+        &["line 3", "arma"],
+    );
+    check(
+        "twin = 'tanks'\n[[effect]]\nid = 'sensor-lag'\ntarget = 'h1'\n",
+        &["sensor-lag", "\"h1\"", "sensor"],
+    );
+    let high = file(
+        "high.toml",
+        "twin = 'tanks'\n[features]\nkind = 'arx'\noutputs = 300\ninputs = 300\n",
+    );
+    refused(
+        &["pretrain", "--study", &high, "--out", &at("h.est")],
+        &["600", "128"],
+    );
+    let short = file(
+        "short.toml",
+        "twin = 'tanks'\n[record]\nsamples = 30\n[features]\nkind = 'arx'\noutputs = 20\ninputs = 20\n",
+    );
+    refused(
+        &["pretrain", "--study", &short, "--out", &at("h.est")],
+        &["30 samples", "lower their order"],
+    );
+}
+
+#[test]
+fn a_study_file_sets_step_prior_noise_limits_and_unknown_start() {
+    let study = file(
+        "own.toml",
+        "twin = 'tanks'\n[record]\nstep = 2\nsamples = 200\ninput = { levels = [0, 3], hold = 20 }\n\
+         [prior]\nk1 = [0.2, 0.3]\n[fixed]\nk4 = 1.0\n[limits]\nh1 = [0, 5]\n[noise]\nh1 = 0\ny = 'estimate'\n\
+         [start]\nh2 = 'estimate'\n[features]\nkind = 'deviation'\nblocks = 20\n",
+    );
+    let (estimator, record) = (at("own.est"), at("own.csv"));
+    done(&[
+        "pretrain",
+        "--study",
+        &study,
+        "--out",
+        &estimator,
+        "--bank-size",
+        "300",
+        "--epochs",
+        "3",
+    ]);
+    done(&[
+        "simulate",
+        "--study",
+        &study,
+        "--theta",
+        "k1=0.25,k2=0.6,k3=0.6,start.h2=4,noise.y=0.2",
+        "--out",
+        &record,
+    ]);
+    let value = json(&["estimate", &record, "--estimator", &estimator, "--json"]);
+    assert_eq!(value["names"], serde_json::json!(["k1", "k2", "k3"]));
+    let roles: Vec<_> = (value["nuisance"].as_array().unwrap().iter())
+        .map(|n| (n["name"].as_str().unwrap(), n["role"].as_str().unwrap()))
+        .collect();
+    assert_eq!(roles, [("y", "noise"), ("h2", "start")]);
+}

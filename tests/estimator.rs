@@ -1,0 +1,275 @@
+//! The whole way of a record, and the file in between.
+
+use ndarray::Array2;
+use std::fs;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
+use truetwin::experiment::reference_studies;
+use truetwin::progress::{Listener, Progress};
+use truetwin::study::{RecordPlan, Study};
+use truetwin::twin::{DigitalTwin, Signals};
+use truetwin::twin::{Drive, Noise, Parameter, ParameterSpace, Record, Signal, SimulationError};
+use truetwin::twins::VanDerPol;
+use truetwin::two_stage::{EstimateOptions, Estimator, PretrainError, PretrainOptions, pretrain};
+
+fn studies() -> Vec<Study> {
+    reference_studies().unwrap()
+}
+
+/// One small oscillator estimator for all tests.
+fn estimator() -> &'static Estimator {
+    static ESTIMATOR: OnceLock<Estimator> = OnceLock::new();
+    ESTIMATOR.get_or_init(|| {
+        let options = PretrainOptions {
+            bank_size: Some(5000),
+            epochs: Some(80),
+            seed: 1,
+            ..PretrainOptions::default()
+        };
+        pretrain(&studies()[0], &options, &Progress::silent())
+            .unwrap()
+            .0
+    })
+}
+
+fn record(nu: f64, seed: u64) -> Record {
+    let drive = Drive::autonomous(0.05, 300).unwrap();
+    let noise = Noise::new(seed, "test record", 0);
+    let outputs = VanDerPol.simulate(&[nu], &drive, noise).unwrap();
+    Record::new(drive, outputs).unwrap()
+}
+
+fn estimate(nu: f64, seed: u64) -> truetwin::two_stage::Estimate {
+    let options = EstimateOptions {
+        seed,
+        ..EstimateOptions::default()
+    };
+    estimator()
+        .estimate(&record(nu, seed), &options, &Progress::silent())
+        .unwrap()
+}
+
+/// Outside of the prior [0, 2.5] the network is wrong by half a unit; gate, Gauss–Newton and tuned heads are not.
+#[test]
+fn out_of_distribution_records_are_found_and_mended() {
+    let mut square = 0.0;
+    for seed in 0..5 {
+        let estimate = estimate(3.0, seed);
+        assert!(estimate.gate.out_of_distribution && estimate.refitted);
+        assert!((estimate.initial[0] - 3.0).abs() > 0.3);
+        assert!(estimate.after.is_some_and(|after| after.p_value > 0.005));
+        square += (estimate.theta[0] - 3.0).powi(2) / 5.0;
+        let expected = estimate.std_error[0];
+        assert!((0.002..0.05).contains(&expected), "{expected}");
+    }
+    // The Cramér–Rao bound of these features is 6.8e-5; five records, five times that.
+    assert!(square < 3.4e-4, "{square}");
+}
+
+#[test]
+fn in_distribution_most_records_keep_the_network_estimate() {
+    let kept: Vec<_> = (0..10)
+        .map(|seed| estimate(1.2, seed))
+        .filter(|e| !e.gate.out_of_distribution)
+        .collect();
+    assert!(kept.len() >= 5, "{} of 10 kept", kept.len());
+    for estimate in kept {
+        assert_eq!(estimate.theta, estimate.initial);
+        assert!(estimate.gauss_newton.is_none() && estimate.fine.is_none());
+        assert!(estimate.low[0] < estimate.theta[0] && estimate.theta[0] < estimate.high[0]);
+        assert!(
+            estimate.information.is_some(),
+            "directions are given all the same"
+        );
+    }
+}
+
+/// Neither the number of threads nor a run before changes a bit.
+#[test]
+fn threads_change_no_bit() {
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| {
+            let options = PretrainOptions {
+                bank_size: Some(300),
+                epochs: Some(3),
+                seed: 9,
+                ..PretrainOptions::default()
+            };
+            let (estimator, _) = pretrain(&studies()[1], &options, &Progress::silent()).unwrap();
+            let drive = Drive::new(0.5, Array2::from_elem((400, 1), 1.0)).unwrap();
+            let twin = estimator.study().twin();
+            let outputs = twin.simulate(&[1.0, 1.0, 0.8, 1.0], &drive, Noise::new(3, "t", 0));
+            let record = Record::new(drive, outputs.unwrap()).unwrap();
+            let options = EstimateOptions {
+                always_refine: true,
+                ..EstimateOptions::default()
+            };
+            let estimate = estimator
+                .estimate(&record, &options, &Progress::silent())
+                .unwrap();
+            (
+                estimate.initial,
+                estimate.gauss_newton,
+                estimate.fine,
+                estimate.simulations,
+            )
+        })
+    };
+    assert_eq!(on(1), on(2));
+}
+
+fn saved() -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("e.est");
+    estimator().save(&path).unwrap();
+    (folder, path)
+}
+
+#[test]
+fn a_file_gives_the_same_estimator_and_the_same_bytes() {
+    let (folder, path) = saved();
+    let again = Estimator::load(&path, &studies()).unwrap();
+    let copy = folder.path().join("copy.est");
+    again.save(&copy).unwrap();
+    assert_eq!(fs::read(&path).unwrap(), fs::read(&copy).unwrap());
+    let of = |estimator: &Estimator| {
+        let x = estimator.observe(&record(3.0, 1)).unwrap();
+        estimator.predict_one(&x).unwrap()
+    };
+    assert_eq!(of(estimator()), of(&again));
+}
+
+/// Every truncation and every flipped byte is refused in one line that names the file.
+#[test]
+fn truncated_and_altered_files_are_refused() {
+    let (_folder, path) = saved();
+    let bytes = fs::read(&path).unwrap();
+    let refused = |changed: &[u8]| {
+        fs::write(&path, changed).unwrap();
+        let error = Estimator::load(&path, &studies()).unwrap_err().to_string();
+        assert!(error.contains("e.est") && !error.contains('\n'), "{error}");
+        error
+    };
+    for length in [0, 7, 100, bytes.len() / 2, bytes.len() - 1] {
+        refused(&bytes[..length]);
+    }
+    for at in (0..bytes.len()).step_by(bytes.len() / 97) {
+        let mut changed = bytes.clone();
+        changed[at] ^= 0x10;
+        refused(&changed);
+    }
+    let mut weight = bytes.clone();
+    *weight.last_mut().unwrap() ^= 1;
+    assert!(refused(&weight).contains("altered"));
+    assert!(refused(b"t,u,y\n0,1,2\n").contains("pretrain"));
+}
+
+#[test]
+fn files_of_another_program_or_schema_are_refused() {
+    let (_folder, path) = saved();
+    let only_tanks = &studies()[1..];
+    let error = Estimator::load(&path, only_tanks).unwrap_err().to_string();
+    assert!(
+        error.contains("\"van-der-pol\", known are tanks"),
+        "{error}"
+    );
+    let text = fs::read(&path).unwrap();
+    let from = b"\\\"schema\\\":1,";
+    let at = text.windows(from.len()).position(|w| w == from).unwrap();
+    let mut newer = text.clone();
+    newer[at + from.len() - 2] = b'7';
+    fs::write(&path, newer).unwrap();
+    let error = Estimator::load(&path, &studies()).unwrap_err().to_string();
+    assert!(
+        error.contains("file schema 7, this version reads 1"),
+        "{error}"
+    );
+}
+
+#[test]
+fn records_of_another_step_or_channels_are_refused_with_the_remedy() {
+    let other = |drive: Drive, outputs: usize| {
+        let y = Signal::from_shape_fn((drive.samples(), outputs), |(k, _)| (k as f64).sin());
+        let record = Record::new(drive, y).unwrap();
+        let options = EstimateOptions::default();
+        let error = estimator().estimate(&record, &options, &Progress::silent());
+        error.unwrap_err().to_string()
+    };
+    let error = other(Drive::autonomous(0.1, 300).unwrap(), 1);
+    assert!(
+        error.contains("step is 0.1 s, the study's 0.05 s; resample"),
+        "{error}"
+    );
+    let error = other(Drive::autonomous(0.05, 300).unwrap(), 2);
+    assert!(error.contains("2 outputs, the twin has 1 (y)"), "{error}");
+    let error = other(Drive::new(0.05, Signal::zeros((300, 1))).unwrap(), 1);
+    assert!(error.contains("1 inputs, the twin has 0"), "{error}");
+    let error = other(Drive::autonomous(0.05, 7).unwrap(), 1);
+    assert!(error.contains("7 samples"), "{error}");
+}
+
+/// Stops at a given number of units.
+struct StopAt(u64, AtomicU64);
+impl Listener for StopAt {
+    fn advanced(&self, _: &str, _: u64, _: u64) {
+        self.1.fetch_add(1, Ordering::Relaxed);
+    }
+    fn cancelled(&self) -> bool {
+        self.1.load(Ordering::Relaxed) > self.0
+    }
+}
+
+#[test]
+fn long_work_can_be_cancelled_in_every_stage() {
+    let total = Arc::new(StopAt(u64::MAX, AtomicU64::new(0)));
+    let options = EstimateOptions {
+        always_refine: true,
+        ..EstimateOptions::default()
+    };
+    let run = |listener: Arc<StopAt>| {
+        estimator().estimate(&record(3.0, 1), &options, &Progress::new(listener))
+    };
+    run(total.clone()).unwrap();
+    let units = total.1.load(Ordering::Relaxed);
+    for part in [1, units / 4, units / 2, units - 2] {
+        let error = run(Arc::new(StopAt(part, AtomicU64::new(0)))).unwrap_err();
+        assert!(
+            error.to_string().contains("cancelled"),
+            "after {part} of {units}: {error}"
+        );
+    }
+}
+
+/// Nothing but failures: the error names the share and the remedy.
+struct Broken;
+impl DigitalTwin for Broken {
+    fn parameters(&self) -> ParameterSpace {
+        ParameterSpace::new([Parameter::new("a", "", 0.0, 1.0)])
+    }
+    fn signals(&self) -> Signals {
+        Signals {
+            inputs: vec![],
+            ..Signals::default()
+        }
+    }
+    fn simulate(&self, _: &[f64], _: &Drive, _: Noise) -> Result<Signal, SimulationError> {
+        Err(SimulationError::Diverged { at: 0.5 })
+    }
+}
+
+#[test]
+fn a_diverging_twin_stops_with_the_remedy() {
+    let study = Study::new("broken", Broken, RecordPlan::autonomous(0.1, 100)).unwrap();
+    let error = pretrain(&study, &PretrainOptions::default(), &Progress::silent()).unwrap_err();
+    assert!(matches!(error, PretrainError::Bank(_)));
+    let text = error.to_string();
+    assert!(
+        text.contains("diverged at t = 0.5 s") && text.contains("shrink the prior"),
+        "{text}"
+    );
+}

@@ -1,0 +1,110 @@
+//! The gate rejects a right θ as often as it says; the paper's form does not.
+//!
+//! The full figure for the tanks' 128 features takes minutes:
+//! `cargo test --release --test gate_calibration -- --ignored --nocapture`.
+
+use nalgebra::DVector;
+use rayon::prelude::*;
+use truetwin::bank::FeatureSimulator;
+use truetwin::experiment::reference_studies;
+use truetwin::gate::{Gate, GateForm, GateSettings};
+use truetwin::math::binomial_bounds;
+use truetwin::progress::Progress;
+use truetwin::study::{PresetName, Study};
+use truetwin::twin::Noise;
+
+fn study(name: &str) -> Study {
+    let mut studies = reference_studies().unwrap().into_iter();
+    studies.find(|s| s.name() == name).unwrap()
+}
+
+/// Records rejected at the true θ, with a fresh null for each.
+fn rejected(name: &str, settings: &GateSettings, records: u64) -> u64 {
+    let study = study(name);
+    let map = study
+        .features(study.preset(PresetName::Paper).features.as_ref())
+        .unwrap();
+    let simulator = FeatureSimulator::new(study.twin().clone(), map);
+    let drives = study.drives().unwrap();
+    let theta = study.twin().parameters().centre();
+    (0..records)
+        .into_par_iter()
+        .filter(|&i| {
+            let record = Noise::new(11, "record", i);
+            let drive = drives.draw(record).unwrap();
+            let x = simulator.features(&theta, &drive, record).unwrap();
+            let null = Noise::new(11, "null", i);
+            let gate = Gate::at(
+                &simulator,
+                &theta,
+                &drive,
+                settings,
+                null,
+                &Progress::silent(),
+            );
+            gate.unwrap()
+                .test(&DVector::from_vec(x))
+                .out_of_distribution
+        })
+        .count() as u64
+}
+
+fn paper() -> GateSettings {
+    GateSettings {
+        form: GateForm::Paper,
+        ..GateSettings::default()
+    }
+}
+
+fn assert_calibrated(name: &str, rejected: u64, records: u64) {
+    let bounds = binomial_bounds(records, 0.10, 0.999).unwrap();
+    println!("{name}: calibrated form rejects {rejected} of {records} at 10 %");
+    assert!(
+        bounds.contains(&rejected),
+        "{name}: {rejected} of {records}, expected {bounds:?}"
+    );
+}
+
+#[test]
+fn five_features_a_thousand_records() {
+    let records = 1000;
+    assert_calibrated(
+        "van-der-pol",
+        rejected("van-der-pol", &GateSettings::default(), records),
+        records,
+    );
+    let paper = rejected("van-der-pol", &paper(), records);
+    println!("van-der-pol: paper's form rejects {paper} of {records}");
+    assert!(
+        paper > 100,
+        "{paper}: the paper's form rejects too often at n = 5"
+    );
+}
+
+/// The rank is exact whatever the covariance: four simulations a feature are enough to show it.
+#[test]
+fn a_hundred_and_twenty_eight_features() {
+    let settings = GateSettings {
+        per_feature: 4,
+        null: 99,
+        ..GateSettings::default()
+    };
+    assert_calibrated("tanks", rejected("tanks", &settings, 150), 150);
+    assert_eq!(
+        rejected("tanks", &paper(), 20),
+        20,
+        "the paper's form rejects every record"
+    );
+}
+
+#[test]
+#[ignore = "minutes; the figure in docs/statistics.md"]
+fn the_full_figure_for_the_tanks() {
+    let records = 1000;
+    let count = rejected("tanks", &GateSettings::default(), records);
+    assert_calibrated("tanks", count, records);
+    println!(
+        "tanks: paper's form rejects {} of {records}",
+        rejected("tanks", &paper(), records)
+    );
+}
