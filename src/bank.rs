@@ -81,6 +81,14 @@ pub struct Draws {
     pub redrawn: usize,
 }
 
+/// One simulation of a set.
+struct Row {
+    theta: Vec<f64>,
+    features: Vec<f64>,
+    /// Attempts that were rejected before.
+    failed: usize,
+}
+
 impl FeatureSimulator {
     /// Couples a twin with a map bound to it.
     pub fn new(twin: Arc<dyn DigitalTwin>, map: Arc<dyn FeatureMap>) -> Self {
@@ -166,7 +174,7 @@ impl FeatureSimulator {
         draw: impl Fn(u64, Noise) -> Result<Option<Draw<'a>>, BankError> + Sync,
         stage: &Stage,
     ) -> Result<Draws, BankError> {
-        let rows: Vec<(Vec<f64>, Vec<f64>, usize)> = (0..size as u64)
+        let rows: Vec<Row> = (0..size as u64)
             .into_par_iter()
             .map(|i| {
                 let row = self.one(i, noise(i), &draw)?;
@@ -174,7 +182,7 @@ impl FeatureSimulator {
                 Ok(row)
             })
             .collect::<Result<_, BankError>>()?;
-        let redrawn: usize = rows.iter().map(|row| row.2).sum();
+        let redrawn: usize = rows.iter().map(|row| row.failed).sum();
         if redrawn as f64 > HOPELESS * (size + redrawn) as f64 {
             return Err(BankError::Hopeless {
                 failed: redrawn,
@@ -182,7 +190,7 @@ impl FeatureSimulator {
                 reason: "out of bounds or diverged".into(),
             });
         }
-        let stack = |of: fn(&(Vec<f64>, Vec<f64>, usize)) -> &Vec<f64>, width: usize| {
+        let stack = |of: fn(&Row) -> &Vec<f64>, width: usize| {
             let mut all = Array2::zeros((size, width));
             for (mut row, values) in all.rows_mut().into_iter().zip(rows.iter().map(of)) {
                 row.assign(&ndarray::ArrayView1::from(values));
@@ -190,19 +198,19 @@ impl FeatureSimulator {
             all
         };
         Ok(Draws {
-            theta: stack(|row| &row.0, self.twin.parameters().len()),
-            features: stack(|row| &row.1, self.dim()),
+            theta: stack(|row| &row.theta, self.twin.parameters().len()),
+            features: stack(|row| &row.features, self.dim()),
             redrawn,
         })
     }
 
-    /// One row: θ, features, failed attempts.
+    /// One row.
     fn one<'a>(
         &self,
         i: u64,
         noise: Noise,
         draw: &impl Fn(u64, Noise) -> Result<Option<Draw<'a>>, BankError>,
-    ) -> Result<(Vec<f64>, Vec<f64>, usize), BankError> {
+    ) -> Result<Row, BankError> {
         let mut reason = "out of bounds".to_owned();
         for attempt in 0..ATTEMPTS {
             let noise = match attempt {
@@ -213,7 +221,13 @@ impl FeatureSimulator {
                 continue;
             };
             match self.features(&theta, &drive, noise) {
-                Ok(features) => return Ok((theta, features, attempt)),
+                Ok(features) => {
+                    return Ok(Row {
+                        theta,
+                        features,
+                        failed: attempt,
+                    });
+                }
                 Err(DrawError::Rejected(text)) => reason = text,
                 Err(DrawError::Fatal(error)) => return Err(error),
             }

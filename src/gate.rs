@@ -159,7 +159,98 @@ pub enum GateError {
     Whitening(#[from] WhiteningError),
 }
 
-/// The test at one θ, with everything that later steps reuse.
+/// What the test simulates with.
+#[derive(Clone, Copy)]
+pub struct GateTest<'a> {
+    /// Twin and features.
+    pub simulator: &'a FeatureSimulator,
+    /// The record's input.
+    pub drive: &'a Drive,
+    /// Settings.
+    pub settings: &'a GateSettings,
+    /// Randomness; divided into what μ and S need, and the null.
+    pub noise: Noise,
+    /// Who listens.
+    pub progress: &'a Progress,
+}
+
+impl GateTest<'_> {
+    /// Simulates the null at `theta`.
+    pub fn at(&self, theta: &[f64]) -> Result<Gate, GateError> {
+        let simulated = self.simulate(theta)?;
+        let whitening = self.settings.whiten(&simulated.whitening)?;
+        Ok(Gate {
+            null: whitening.squared_distances(simulated.ranked()),
+            whitening,
+            settings: self.settings.clone(),
+        })
+    }
+
+    /// The test again after θ was refitted to the record with features x: columns of the Jacobian ∂f̄/∂θ (n × d), which
+    /// the refit has used up, are projected out of the record's whitened residual and of the null's alike
+    /// (Sargan–Hansen, n − d degrees of freedom). `None` where no degree of freedom is left.
+    ///
+    /// The Jacobian may be that of a point nearby: only its column space matters.
+    pub fn after_refit(
+        &self,
+        theta: &[f64],
+        jacobian: &DMatrix<f64>,
+        features: &DVector<f64>,
+    ) -> Result<Option<GateOutcome>, GateError> {
+        // Calibrated whatever the form of the first test was: it is a check, not a part of the paper's method.
+        let settings = GateSettings {
+            form: GateForm::Calibrated,
+            ..self.settings.clone()
+        };
+        let calibrated = GateTest {
+            settings: &settings,
+            ..*self
+        };
+        let simulated = calibrated.simulate(theta)?;
+        let whitening = settings.whiten(&simulated.whitening)?;
+        let used = column_space(&whitening.apply_columns(jacobian));
+        if whitening.rank() <= used.ncols() {
+            return Ok(None);
+        }
+        let rest = |x: &DVector<f64>| {
+            let residual = whitening.residual(x);
+            (residual.norm_squared() - used.tr_mul(&residual).norm_squared()).max(0.0)
+        };
+        let null = (simulated.ranked().rows().into_iter())
+            .map(|row| rest(&DVector::from_iterator(row.len(), row.iter().copied())))
+            .collect();
+        let statistic = rest(features);
+        let gate = Gate {
+            whitening,
+            null,
+            settings,
+        };
+        Ok(Some(gate.decide(statistic)))
+    }
+
+    fn simulate(&self, theta: &[f64]) -> Result<NullFeatures, GateError> {
+        let size = self.settings.whitening_simulations(self.simulator.dim());
+        let fresh = match self.settings.form {
+            GateForm::Calibrated => self.settings.null,
+            GateForm::Paper => 0,
+        };
+        let stage = self.progress.stage("gate", size + fresh);
+        let simulate = |size: usize, purpose: &'static str| {
+            let noise = self.noise.child(purpose);
+            self.simulator
+                .repeat(theta, self.drive, size, |i| noise.sample(i), &stage)
+        };
+        Ok(NullFeatures {
+            whitening: simulate(size, "whitening")?,
+            fresh: match fresh {
+                0 => None,
+                _ => Some(simulate(fresh, "null")?),
+            },
+        })
+    }
+}
+
+/// The null at one θ.
 #[derive(Debug, Clone)]
 pub struct Gate {
     /// μ and S^{-1/2} at θ.
@@ -170,25 +261,6 @@ pub struct Gate {
 }
 
 impl Gate {
-    /// Simulates the null at `theta` under `drive`. `noise` is divided into what μ and S need, and the null.
-    pub fn at(
-        simulator: &FeatureSimulator,
-        theta: &[f64],
-        drive: &Drive,
-        settings: &GateSettings,
-        noise: Noise,
-        progress: &Progress,
-    ) -> Result<Self, GateError> {
-        let simulated = NullFeatures::at(simulator, theta, drive, settings, noise, progress)?;
-        let whitening = settings.whiten(&simulated.whitening)?;
-        let null = whitening.squared_distances(simulated.ranked());
-        Ok(Self {
-            whitening,
-            null,
-            settings: settings.clone(),
-        })
-    }
-
     /// Tests features x.
     pub fn test(&self, features: &DVector<f64>) -> GateOutcome {
         self.decide(self.whitening.squared_distance(features))
@@ -212,62 +284,19 @@ impl Gate {
             out_of_distribution,
         }
     }
-
-    /// The test again after θ was refitted to the record: columns of the whitened Jacobian, which the refit has used
-    /// up, are projected out of the record's residual and of the null's alike (Sargan–Hansen, n − d degrees of
-    /// freedom). `None` where no degree of freedom is left.
-    pub fn after_refit(
-        simulator: &FeatureSimulator,
-        theta: &[f64],
-        drive: &Drive,
-        jacobian: &DMatrix<f64>,
-        features: &DVector<f64>,
-        settings: &GateSettings,
-        noise: Noise,
-        progress: &Progress,
-    ) -> Result<Option<GateOutcome>, GateError> {
-        // Calibrated whatever the form of the first test was: it is a check, not a part of the paper's method.
-        let settings = GateSettings {
-            form: GateForm::Calibrated,
-            ..settings.clone()
-        };
-        let simulated = NullFeatures::at(simulator, theta, drive, &settings, noise, progress)?;
-        let whitening = settings.whiten(&simulated.whitening)?;
-        let whitened = whitening.apply_columns(jacobian);
-        let (used, rank) = column_space(&whitened);
-        if whitening.rank() <= rank {
-            return Ok(None);
-        }
-        let rest = |x: &DVector<f64>| {
-            let residual = whitening.residual(x);
-            let explained = used.tr_mul(&residual);
-            (residual.norm_squared() - explained.norm_squared()).max(0.0)
-        };
-        let null = (simulated.ranked().rows().into_iter())
-            .map(|row| rest(&DVector::from_iterator(row.len(), row.iter().copied())))
-            .collect();
-        let gate = Self {
-            whitening: whitening.clone(),
-            null,
-            settings,
-        };
-        Ok(Some(gate.decide(rest(features))))
-    }
 }
 
-/// Orthonormal basis of the columns of `matrix`, and its rank.
-fn column_space(matrix: &DMatrix<f64>) -> (DMatrix<f64>, usize) {
+/// Orthonormal basis of the columns of `matrix`.
+fn column_space(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let svd = matrix.clone().svd(true, false);
     let largest = svd.singular_values.iter().copied().fold(0.0, f64::max);
     let kept: Vec<usize> = (0..svd.singular_values.len())
         .filter(|&i| svd.singular_values[i] > 1e-9 * largest)
         .collect();
-    let basis = svd.u.map_or_else(
+    svd.u.map_or_else(
         || DMatrix::zeros(matrix.nrows(), 0),
         |u| u.select_columns(&kept),
-    );
-    let rank = basis.ncols();
-    (basis, rank)
+    )
 }
 
 /// Features simulated at one θ.
@@ -277,33 +306,6 @@ struct NullFeatures {
 }
 
 impl NullFeatures {
-    fn at(
-        simulator: &FeatureSimulator,
-        theta: &[f64],
-        drive: &Drive,
-        settings: &GateSettings,
-        noise: Noise,
-        progress: &Progress,
-    ) -> Result<Self, GateError> {
-        let size = settings.whitening_simulations(simulator.dim());
-        let fresh = match settings.form {
-            GateForm::Calibrated => settings.null,
-            GateForm::Paper => 0,
-        };
-        let stage = progress.stage("gate", size + fresh);
-        let simulate = |size: usize, purpose: &'static str| {
-            let noise = noise.child(purpose);
-            simulator.repeat(theta, drive, size, |i| noise.sample(i), &stage)
-        };
-        Ok(Self {
-            whitening: simulate(size, "whitening")?,
-            fresh: match fresh {
-                0 => None,
-                _ => Some(simulate(fresh, "null")?),
-            },
-        })
-    }
-
     fn ranked(&self) -> &Array2<f64> {
         self.fresh.as_ref().unwrap_or(&self.whitening)
     }

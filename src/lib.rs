@@ -24,6 +24,12 @@
 //! [`progress::Progress`] and can be cancelled through it. Source of the method: Lakshminarayanan, Guerrero & Rojas,
 //! "Fine-Tuning a Simulation-Driven Estimator".
 
+// The library never prints and never panics on data; tests may.
+#![cfg_attr(
+    not(test),
+    warn(clippy::print_stdout, clippy::print_stderr, clippy::unwrap_used)
+)]
+
 // Layers, lowest first; a module uses only what stands above it here (tests/layering.rs holds it so).
 pub mod math;
 pub mod optimise;

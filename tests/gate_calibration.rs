@@ -7,9 +7,10 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 use truetwin::bank::FeatureSimulator;
 use truetwin::experiment::reference_studies;
-use truetwin::gate::{Gate, GateForm, GateSettings};
+use truetwin::gate::{GateForm, GateSettings, GateTest};
 use truetwin::math::binomial_bounds;
 use truetwin::progress::Progress;
+use truetwin::refine::{RefineSettings, Refinement};
 use truetwin::study::{PresetName, Study};
 use truetwin::twin::Noise;
 
@@ -33,16 +34,14 @@ fn rejected(name: &str, settings: &GateSettings, records: u64) -> u64 {
             let record = Noise::new(11, "record", i);
             let drive = drives.draw(record).unwrap();
             let x = simulator.features(&theta, &drive, record).unwrap();
-            let null = Noise::new(11, "null", i);
-            let gate = Gate::at(
-                &simulator,
-                &theta,
-                &drive,
+            let test = GateTest {
+                simulator: &simulator,
+                drive: &drive,
                 settings,
-                null,
-                &Progress::silent(),
-            );
-            gate.unwrap()
+                noise: Noise::new(11, "null", i),
+                progress: &Progress::silent(),
+            };
+            (test.at(&theta).unwrap())
                 .test(&DVector::from_vec(x))
                 .out_of_distribution
         })
@@ -79,6 +78,62 @@ fn five_features_a_thousand_records() {
         paper > 100,
         "{paper}: the paper's form rejects too often at n = 5"
     );
+}
+
+/// After θ was refitted to the record, the test must not be surprised by how well it fits: both twins, α = 0.10.
+#[test]
+fn after_a_refit_the_test_is_still_calibrated() {
+    for (name, records) in [("van-der-pol", 200), ("tanks", 100)] {
+        let study = study(name);
+        let map = study
+            .features(study.preset(PresetName::Default).features.as_ref())
+            .unwrap();
+        let drives = study.drives().unwrap();
+        let space = study.twin().parameters();
+        let gate = GateSettings::default();
+        let settings = RefineSettings {
+            starts: 1,
+            ..RefineSettings::default()
+        };
+        let rejected = (0..records)
+            .into_par_iter()
+            .filter(|&i| {
+                let noise = Noise::new(12, "record", i);
+                let simulator = FeatureSimulator::new(study.twin().clone(), map.clone());
+                let drive = drives.draw(noise).unwrap();
+                let theta = space.draw_prior(noise);
+                let x = simulator.features(&theta, &drive, noise).unwrap();
+                let observed = DVector::from_vec(x);
+                let refinement = Refinement {
+                    simulator: &simulator,
+                    drive: &drive,
+                    observed: &observed,
+                    settings: &settings,
+                    gate: &gate,
+                    noise: noise.child("refine"),
+                };
+                let refined = refinement
+                    .run(&space.centre(), &Progress::silent())
+                    .unwrap();
+                let test = GateTest {
+                    simulator: &simulator,
+                    drive: &drive,
+                    settings: &gate,
+                    noise: noise.child("after"),
+                    progress: &Progress::silent(),
+                };
+                let after =
+                    test.after_refit(refined.theta.as_slice(), &refined.jacobian, &observed);
+                after.unwrap().unwrap().out_of_distribution
+            })
+            .count() as u64;
+        println!("{name}: after a refit {rejected} of {records} rejected at 10 %");
+        let bounds = binomial_bounds(records, 0.10, 0.999).unwrap();
+        assert!(
+            bounds.contains(&rejected),
+            "{name}: {rejected}, expected {bounds:?}"
+        );
+    }
 }
 
 /// The rank is exact whatever the covariance: four simulations a feature are enough to show it.

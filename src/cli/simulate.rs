@@ -4,13 +4,12 @@ use super::args::SimulateOptions;
 use super::{Context, Failure, output};
 use crate::effect::read_effects;
 use crate::twin::{
-    DigitalTwin, Drive, Noise, ParameterSpace, Record, Role, augment, read_drive, record_csv_text,
-    write_record,
+    DigitalTwin, Drive, Noise, ParameterSpace, Record, Role, augment, given_magnitudes, read_drive,
+    record_csv_text, write_record,
 };
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::process::ExitCode;
-use std::sync::Arc;
 
 pub(super) fn run(context: &Context<'_>, options: &SimulateOptions) -> Result<ExitCode, Failure> {
     if let Some(out) = &options.out {
@@ -18,7 +17,13 @@ pub(super) fn run(context: &Context<'_>, options: &SimulateOptions) -> Result<Ex
     }
     let study = context.study(&options.subject)?;
     let given = parse_theta(&options.theta)?;
-    let (twin, magnitudes) = with_effects(context, study.twin().clone(), options)?;
+    let mut twin = study.twin().clone();
+    let mut magnitudes = BTreeMap::new();
+    if let Some(path) = &options.effect {
+        let effects = read_effects(path)?;
+        magnitudes = given_magnitudes(&effects);
+        twin = augment(twin, effects).map_err(|error| Failure::from(error).within(path))?;
+    }
     let theta = complete(&twin.parameters(), given, &magnitudes)?;
     let noise = Noise::new(context.seed, "simulate", 0);
     let drive = match &options.input {
@@ -71,30 +76,6 @@ fn parse_theta(text: &str) -> Result<BTreeMap<String, f64>, Failure> {
         }
     }
     Ok(values)
-}
-
-/// The twin with the effects of a file, and the magnitudes that the file gives.
-fn with_effects(
-    context: &Context<'_>,
-    twin: Arc<dyn DigitalTwin>,
-    options: &SimulateOptions,
-) -> Result<(Arc<dyn DigitalTwin>, BTreeMap<String, f64>), Failure> {
-    let _ = context;
-    let Some(path) = &options.effect else {
-        return Ok((twin, BTreeMap::new()));
-    };
-    let effects = read_effects(path)?;
-    let mut given = BTreeMap::new();
-    for effect in &effects {
-        for magnitude in effect.magnitudes() {
-            if let Some(value) = effect.given().get(magnitude.name) {
-                let (id, target) = (effect.typetag_name(), effect.target());
-                given.insert(format!("{id}@{target}.{}", magnitude.name), value);
-            }
-        }
-    }
-    let twin = augment(twin, effects).map_err(|error| Failure::from(error).within(path))?;
-    Ok((twin, given))
 }
 
 /// θ from what the call and the effect file give; unknown starts and noise levels may stay at their prior's centre.

@@ -26,7 +26,7 @@ impl Hybrid {
 
 impl Sampler for Hybrid {
     fn draw(&self, index: u64, noise: Noise) -> DVector<f64> {
-        if index % 2 == 0 {
+        if index.is_multiple_of(2) {
             self.ellipsoid.draw(index, noise)
         } else {
             self.sensitivity.draw(index, noise)

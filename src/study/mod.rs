@@ -12,7 +12,7 @@ use crate::feature::{Ar, Arx, FeatureError, FeatureMap, FeatureRecipe};
 use crate::network::{Architecture, Deep, HeadArchitecture, architecture};
 use crate::twin::{
     Adaptation, AdaptationError, CsvError, DigitalTwin, EffectError, ParameterError, Record,
-    RecordError, adapt, augment, fix,
+    RecordError, adapt, augment, fix, given_magnitudes,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -221,7 +221,7 @@ impl Study {
             }
         }
         let mut held = file.fixed.clone();
-        held.extend(given_magnitudes(file));
+        held.extend(given_magnitudes(&file.effect));
         twin = fix(twin, &held).map_err(StudyError::Fixed)?;
         let RecordTable {
             step,
@@ -302,16 +302,4 @@ impl Study {
         record.check_channels(&self.twin.signals())?;
         Ok(self.plan.check_step(record)?)
     }
-}
-
-/// Magnitudes that a file gives, by the names of their parameters.
-fn given_magnitudes(file: &StudyFile) -> BTreeMap<String, f64> {
-    let named = file.effect.iter().flat_map(|effect| {
-        let label = format!("{}@{}", effect.typetag_name(), effect.target());
-        effect.magnitudes().into_iter().filter_map(move |m| {
-            let value = effect.given().get(m.name)?;
-            Some((format!("{label}.{}", m.name), value))
-        })
-    });
-    named.collect()
 }

@@ -11,6 +11,9 @@ pub fn oriented(direction: &[f64]) -> Vec<f64> {
 
 /// A direction in words: `0.71·k1 − 0.71·k2`, parts under a twentieth of the largest left out.
 pub fn combination(names: &[&str], direction: &[f64]) -> String {
+    if let [name] = names {
+        return (*name).to_owned();
+    }
     let direction = oriented(direction);
     let largest = direction.iter().fold(0.0f64, |a, v| a.max(v.abs()));
     let mut text = String::new();
@@ -40,5 +43,6 @@ mod tests {
             "0.70·a − 0.70·b"
         );
         assert_eq!(combination(&names, &[-0.3, 0.9, 0.0]), "−0.30·a + 0.90·b");
+        assert_eq!(combination(&["nu"], &[1.0]), "nu");
     }
 }

@@ -29,7 +29,7 @@ mod record_csv;
 mod state_space;
 
 pub use adapt::{Adaptation, AdaptationError, Level, adapt};
-pub use augment::augment;
+pub use augment::{augment, given_magnitudes};
 pub use digital_twin::{DigitalTwin, Quantity, Signals, SimulationError};
 pub use direction::{combination, oriented};
 pub use drive::{Drive, DriveError, Signal};

@@ -4,7 +4,7 @@ use super::cloud::{cloud, tune};
 use super::{Estimator, Tracking, track};
 use crate::bank::{BankError, FeatureSimulator};
 use crate::feature::FeatureError;
-use crate::gate::{Gate, GateError, GateOutcome};
+use crate::gate::{GateError, GateOutcome, GateTest};
 use crate::network::NetworkError;
 use crate::optimise::OptimiseError;
 use crate::progress::{Cancelled, Progress};
@@ -66,13 +66,13 @@ pub struct Estimate {
     pub refitted: bool,
     /// The free run at `theta`, unknown starts refitted.
     pub tracking: Tracking,
-    /// The free run at the network's estimate, for comparison.
+    /// The free run at the network's estimate, for comparison; `None` without a refit, or where it diverges.
     pub tracking_initial: Option<Tracking>,
     /// Free-run RMSE on the validation record.
     pub validation: Option<Tracking>,
     /// Simulator calls.
     pub simulations: usize,
-    /// Draws of the cloud that were redrawn.
+    /// Draws of the cloud that were drawn again: out of bounds, diverged, or without features.
     pub redrawn: usize,
     /// Wall-clock times.
     pub seconds: Seconds,
@@ -214,16 +214,7 @@ impl Estimator {
         };
         let simulator = self.simulator();
         let lap = Instant::now();
-        let noise = run.noise.child("gate");
-        let gate = Gate::at(
-            &simulator,
-            &initial,
-            run.drive,
-            &settings.gate,
-            noise,
-            progress,
-        )?
-        .test(&observed);
+        let gate = (run.gate_test(&simulator, "gate").at(&initial)?).test(&observed);
         seconds.gate = lap.elapsed().as_secs_f64();
         let outcome = if gate.out_of_distribution || options.always_refine {
             run.refit(&simulator, &initial, &mut seconds)?
@@ -235,12 +226,15 @@ impl Estimator {
         let validation = (options.validation.as_ref())
             .map(|record| track(twin, &tracking.theta, record))
             .transpose()?;
+        let tracking_initial = (outcome.refitted)
+            .then(|| track(twin, &initial, record).ok())
+            .flatten();
         let space = twin.parameters();
         seconds.total = clock.elapsed().as_secs_f64();
         Ok(Estimate {
             names: space.names().into_iter().map(str::to_owned).collect(),
             roles: space.iter().map(|p| p.role).collect(),
-            tracking_initial: track(twin, &initial, record).ok(),
+            tracking_initial,
             initial,
             gate,
             gauss_newton: outcome.gauss_newton,
@@ -287,6 +281,16 @@ struct Outcome {
 }
 
 impl Run<'_> {
+    fn gate_test<'a>(&'a self, simulator: &'a FeatureSimulator, purpose: &str) -> GateTest<'a> {
+        GateTest {
+            simulator,
+            drive: self.drive,
+            settings: &self.settings.gate,
+            noise: self.noise.child(purpose),
+            progress: self.progress,
+        }
+    }
+
     fn refinement<'a>(&'a self, simulator: &'a FeatureSimulator) -> Refinement<'a> {
         Refinement {
             simulator,
@@ -398,15 +402,10 @@ impl Run<'_> {
                 outcome.std_error = spread.std_error;
             }
         }
-        outcome.after = Gate::after_refit(
-            simulator,
+        outcome.after = self.gate_test(simulator, "after").after_refit(
             &outcome.theta,
-            self.drive,
             &refined.jacobian,
             self.observed,
-            &settings.gate,
-            self.noise.child("after"),
-            progress,
         )?;
         outcome.information = Some(refined.information);
         Ok(outcome)

@@ -10,6 +10,7 @@ use super::{
 };
 use black_box::AugmentedBlackBox;
 use equations::AugmentedEquations;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// The twin with `effects` added: a twin, its θ longer by their magnitudes, named `id@target.magnitude`.
@@ -37,6 +38,22 @@ pub fn augment(
         return Ok(Arc::new(AugmentedBlackBox::new(base, slots)));
     }
     Ok(Arc::new(AugmentedEquations::new(base, slots)))
+}
+
+/// Magnitudes that effects' files give, by the names that [`augment`] gives their parameters.
+pub fn given_magnitudes(effects: &[Arc<dyn UnmodelledEffect>]) -> BTreeMap<String, f64> {
+    let named = effects.iter().flat_map(|effect| {
+        effect.magnitudes().into_iter().filter_map(move |m| {
+            let value = effect.given().get(m.name)?;
+            Some((parameter_name(effect.as_ref(), m.name), value))
+        })
+    });
+    named.collect()
+}
+
+/// `id@target.magnitude`.
+fn parameter_name(effect: &dyn UnmodelledEffect, magnitude: &str) -> String {
+    format!("{}@{}.{magnitude}", effect.typetag_name(), effect.target())
 }
 
 /// One effect and where its numbers stand.
@@ -116,7 +133,6 @@ impl Slots {
 
 /// Magnitudes as parameters: bounds from their limits, made finite by the largest start.
 fn magnitude_parameters(effect: &dyn UnmodelledEffect) -> Vec<Parameter> {
-    let label = format!("{}@{}", effect.typetag_name(), effect.target());
     (effect.magnitudes().into_iter())
         .map(|m| {
             let reach = m.starts.iter().fold(1e-6, |a: f64, s| a.max(s.abs()));
@@ -137,7 +153,7 @@ fn magnitude_parameters(effect: &dyn UnmodelledEffect) -> Vec<Parameter> {
                 _ => Interval::unchecked(near(-2.0 * reach), near(2.0 * reach)),
             };
             Parameter {
-                name: format!("{label}.{}", m.name),
+                name: parameter_name(effect, m.name),
                 unit: m.unit.into(),
                 prior: if prior.check().is_ok() { prior } else { bounds },
                 bounds,

@@ -1,0 +1,149 @@
+//! One panel: axes, ticks, legend, lines.
+
+use super::decimate::decimate;
+use super::text::{BOLD, clipped, text, width};
+use super::ticks::{Ticks, padded};
+use super::{EDGE, LINE, Panel, ROOM, Series, TEXT, WIDTH, widest};
+use std::fmt::Write;
+
+/// Length of a line in the legend, with the gap after it.
+pub(super) const SWATCH: f64 = 28.0;
+
+/// Between entries of the legend.
+const GAP: f64 = 16.0;
+
+/// What all panels share.
+pub(super) struct Frame {
+    pub(super) x: (f64, f64),
+    pub(super) ticks: Ticks,
+    pub(super) left: f64,
+    pub(super) right: f64,
+    /// That lines are thinned to.
+    pub(super) columns: usize,
+}
+
+impl Frame {
+    fn x(&self, value: f64) -> f64 {
+        let share = (value - self.x.0) / (self.x.1 - self.x.0);
+        self.left + share * (self.right - self.left)
+    }
+}
+
+/// A panel with its range and ticks.
+pub(super) struct Axes<'a> {
+    panel: &'a Panel,
+    range: (f64, f64),
+    ticks: Ticks,
+}
+
+impl<'a> Axes<'a> {
+    pub(super) fn new(panel: &'a Panel) -> Self {
+        let values = panel
+            .series
+            .iter()
+            .flat_map(|s| s.points.iter().map(|p| p.1));
+        let range = padded(values, 0.05);
+        Self {
+            ticks: Ticks::new(range, (panel.height / 34.0) as usize),
+            panel,
+            range,
+        }
+    }
+
+    /// Room for the labels of the ticks.
+    pub(super) fn margin(&self) -> f64 {
+        EDGE + widest(&self.ticks) + 8.0
+    }
+
+    /// Draws below `top`; returns where it ends.
+    pub(super) fn draw(&self, out: &mut String, frame: &Frame, top: f64, last: bool) -> f64 {
+        let top = self.legend(out, top) + 8.0;
+        let bottom = top + self.panel.height;
+        let y = |value: f64| {
+            bottom - (value - self.range.0) / (self.range.1 - self.range.0) * self.panel.height
+        };
+        let (left, right) = (frame.left, frame.right);
+        for (value, label) in frame.ticks.labelled() {
+            let x = frame.x(value);
+            let _ = writeln!(
+                out,
+                r##"<path d="M{x:.1} {top:.1}V{bottom:.1}" stroke="#e4e4e4"/>"##
+            );
+            if last {
+                text(out, (x, bottom + LINE - 3.0), "middle", TEXT, false, &label);
+            }
+        }
+        for (value, label) in self.ticks.labelled() {
+            let y = y(value);
+            let colour = if value == 0.0 { "#a8a8a8" } else { "#e4e4e4" };
+            let _ = writeln!(
+                out,
+                r#"<path d="M{left:.1} {y:.1}H{right:.1}" stroke="{colour}"/>"#
+            );
+            text(
+                out,
+                (left - 6.0, y + 0.35 * TEXT),
+                "end",
+                TEXT,
+                false,
+                &label,
+            );
+        }
+        let _ = writeln!(
+            out,
+            r##"<path d="M{left:.1} {top:.1}V{bottom:.1}H{right:.1}" fill="none" stroke="#555555"/>"##
+        );
+        for series in &self.panel.series {
+            let mut path = String::new();
+            let mut pen = 'M';
+            for (px, py) in decimate(&series.points, frame.columns) {
+                if py.is_finite() {
+                    let _ = write!(path, "{pen}{:.1} {:.1}", frame.x(px), y(py));
+                    pen = 'L';
+                } else {
+                    pen = 'M';
+                }
+            }
+            let stroke = series.style.stroke();
+            let _ = writeln!(
+                out,
+                r#"<path d="{path}" fill="none" {stroke} stroke-linejoin="round"/>"#
+            );
+        }
+        bottom
+    }
+
+    /// The quantity, then lines with their labels: beside it, or below in as many rows as they need. Returns the last
+    /// baseline.
+    fn legend(&self, out: &mut String, top: f64) -> f64 {
+        let quantity = clipped(&self.panel.y, TEXT * BOLD, ROOM);
+        let mut at = (EDGE, top + LINE);
+        text(out, at, "start", TEXT, true, &quantity);
+        at.0 += width(&quantity, TEXT * BOLD) + GAP;
+        let entries: Vec<(String, f64, &Series)> = (self.panel.series.iter())
+            .filter(|series| !series.label.is_empty())
+            .map(|series| {
+                let label = clipped(&series.label, TEXT, ROOM - SWATCH);
+                (label.clone(), SWATCH + width(&label, TEXT), series)
+            })
+            .collect();
+        let all: f64 = entries.iter().map(|(_, needs, _)| needs + GAP).sum();
+        if at.0 + all - GAP > WIDTH - EDGE && !entries.is_empty() {
+            at = (EDGE, at.1 + LINE);
+        }
+        for (label, needs, series) in entries {
+            if at.0 > EDGE && at.0 + needs > WIDTH - EDGE {
+                at = (EDGE, at.1 + LINE);
+            }
+            let (y, stroke) = (at.1 - 0.35 * TEXT, series.style.stroke());
+            let (x, end) = (at.0, at.0 + SWATCH - 6.0);
+            let _ = writeln!(
+                out,
+                r#"<path d="M{x:.1} {y:.1}H{end:.1}" fill="none" {stroke}/>"#
+            );
+            text(out, (at.0 + SWATCH, at.1), "start", TEXT, false, &label);
+            at.0 += needs + GAP;
+        }
+        at.1
+    }
+}

@@ -1,0 +1,148 @@
+//! Numbers for people: as many digits as they are worth.
+
+/// Significant digits of a standard error, and of a number without one.
+const OF_ERROR: i32 = 2;
+const OF_NUMBER: i32 = 3;
+/// Most significant digits of a value, however small its error.
+const MOST: i32 = 7;
+
+/// How a number is written: all numbers of one quantity alike, so that they can be compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Digits {
+    /// Digits after the point.
+    Fixed(usize),
+    /// Digits after the point of the mantissa.
+    Scientific(usize),
+}
+
+impl Digits {
+    /// What `std_error` supports for numbers the size of `value`: two digits of the error, at most seven of
+    /// the value.
+    pub(super) fn supported(value: f64, std_error: f64) -> Self {
+        if !(std_error > 0.0 && std_error.is_finite()) {
+            return Self::significant(value, OF_NUMBER + 1);
+        }
+        let last = rounded_magnitude(std_error, OF_ERROR) - (OF_ERROR - 1);
+        let largest = value.abs().max(std_error);
+        Self::down_to(last.max(magnitude(largest) - (MOST - 1)), largest)
+    }
+
+    /// `digits` significant ones.
+    pub(super) fn significant(value: f64, digits: i32) -> Self {
+        Self::down_to(rounded_magnitude(value, digits) - (digits - 1), value.abs())
+    }
+
+    /// Down to the place 10^last, for numbers up to `largest`.
+    pub(super) fn down_to(last: i32, largest: f64) -> Self {
+        let first = magnitude(largest);
+        if first >= 6 || (first < -3 && last < -5) {
+            Self::Scientific((first - last).clamp(0, 15) as usize)
+        } else {
+            Self::Fixed((-last).clamp(0, 15) as usize)
+        }
+    }
+
+    /// The number with a true minus sign; a dash where it is none.
+    pub(super) fn write(self, value: f64) -> String {
+        if !value.is_finite() {
+            return "–".into();
+        }
+        let text = match self {
+            Self::Fixed(places) => format!("{value:.places$}"),
+            Self::Scientific(places) => format!("{value:.places$e}"),
+        };
+        if value == 0.0 && matches!(self, Self::Scientific(_)) {
+            return "0".into();
+        }
+        let zero = !text.contains(|c: char| ('1'..='9').contains(&c));
+        match text.strip_prefix('-') {
+            Some(rest) if zero => rest.into(),
+            _ => text.replace('-', "−"),
+        }
+    }
+}
+
+/// A probability, three places.
+pub(super) fn probability(p: f64) -> String {
+    match p {
+        p if p < 0.0005 => "p < 0.001".into(),
+        p => format!("p = {p:.3}"),
+    }
+}
+
+/// A standard error, two significant digits.
+pub(super) fn error(value: f64) -> String {
+    Digits::significant(value, OF_ERROR).write(value)
+}
+
+/// Three significant digits.
+pub(super) fn short(value: f64) -> String {
+    Digits::significant(value, OF_NUMBER).write(value)
+}
+
+/// " V", or nothing where a quantity has no unit.
+pub(super) fn unit_suffix(unit: &str) -> String {
+    match unit {
+        "" | "-" => String::new(),
+        unit => format!(" {unit}"),
+    }
+}
+
+/// The power of ten of the leading digit; 0 for zero.
+fn magnitude(value: f64) -> i32 {
+    match value.abs() {
+        v if v > 0.0 && v.is_finite() => v.log10().floor() as i32,
+        _ => 0,
+    }
+}
+
+/// [`magnitude`] of the value rounded to `digits` significant ones: 0.0996 becomes 0.10.
+fn rounded_magnitude(value: f64, digits: i32) -> i32 {
+    let unit = 10f64.powi(magnitude(value) - (digits - 1));
+    magnitude((value / unit).round() * unit * (1.0 + 1e-12))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_has_the_digits_of_its_error() {
+        for (value, error, expected) in [
+            (0.731_234, 0.0213, "0.731"),
+            (0.731_234, 0.0996, "0.73"),
+            (12.345_67, 3.21, "12.3"),
+            (1234.5, 87.0, "1234"),
+            (-0.000_123_4, 0.000_002_1, "−1.234e−4"),
+            (4.2e8, 1.3e6, "4.200e8"),
+            (0.001, 0.02, "0.001"),
+            (0.5, f64::NAN, "0.5000"),
+            (1.234_567_89e8, 0.01, "1.234568e8"),
+            (-0.001, 0.2, "0.00"),
+        ] {
+            let written = Digits::supported(value, error).write(value);
+            assert_eq!(written, expected, "{value} ± {error}");
+        }
+        assert_eq!(error(0.0996), "0.10");
+        assert_eq!(Digits::Fixed(2).write(f64::NAN), "–");
+    }
+
+    #[test]
+    fn probabilities_never_read_zero() {
+        assert_eq!(probability(0.0001), "p < 0.001");
+        assert_eq!(probability(0.005), "p = 0.005");
+    }
+
+    #[test]
+    fn numbers_without_an_error_have_three_digits() {
+        for (value, expected) in [
+            (0.0, "0.00"),
+            (0.61234, "0.612"),
+            (9.996, "10.0"),
+            (1234.0, "1234"),
+            (1.2e-7, "1.20e−7"),
+        ] {
+            assert_eq!(short(value), expected);
+        }
+    }
+}

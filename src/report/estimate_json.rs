@@ -1,0 +1,183 @@
+//! An estimate as JSON, `truetwin.estimate/1`.
+
+use crate::refine::Direction;
+use crate::study::Study;
+use crate::two_stage::{Estimate, INTERVAL_LEVEL};
+use serde_json::{Value, json};
+
+/// The estimate as one JSON object, `truetwin.estimate/1`.
+///
+/// | key | holds |
+/// |---|---|
+/// | `names`, `theta`, `std_error`, `interval` | the twin's own parameters, in one order, in their units |
+/// | `nuisance` | start states, noise levels and magnitudes of effects, estimated beside them |
+/// | `gate`, `after` | the test at the network's estimate, and at the refitted one; `after` is null without a refit, its values are null where the refit left no degree of freedom |
+/// | `weak_directions` | unit vectors in θ over the prior's width that the prior knows better than the record |
+/// | `free_run` | root mean square of record − noise-free run, in output units |
+/// | `simulations`, `seconds` | what it took |
+///
+/// Beyond the contract: `parameters` (unit, prior, bounds), `directions` (all, least known first; null where the
+/// features do not tell them), `refitted`, `redrawn`.
+///
+/// All keys are always there. Stages that were skipped are null, and so are numbers that are not finite.
+pub fn estimate_json(study: &Study, estimate: &Estimate) -> Value {
+    let own = |all: &[f64]| estimate.physical(all);
+    let stage = |all: &Option<Vec<f64>>| all.as_deref().map(own);
+    let after = estimate.refitted.then(|| {
+        json!({
+            "p_value": estimate.after.map(|test| test.p_value),
+            "consistent": estimate.after.map(|test| !test.out_of_distribution),
+            "alpha": estimate.after.map(|test| test.alpha),
+            "statistic": estimate.after.map(|test| test.statistic),
+        })
+    });
+    let nuisance: Vec<Value> = (estimate.nuisance().iter())
+        .map(|n| json!({ "name": n.name, "role": n.role, "value": n.value, "std_error": n.std_error }))
+        .collect();
+    let directions = (estimate.information.as_ref())
+        .map(|known| known.directions.iter().map(direction).collect::<Vec<_>>());
+    let weak: Vec<Value> = (estimate.information.iter())
+        .flat_map(|known| known.weak().map(direction))
+        .collect();
+    let space = study.twin().parameters();
+    let described: Vec<_> = space.iter().collect();
+    let parameters: Vec<Value> = (estimate.physical(&described).iter())
+        .map(|p| json!({ "name": p.name, "unit": p.unit, "prior": p.prior, "bounds": p.bounds }))
+        .collect();
+    let seconds = &estimate.seconds;
+    json!({
+        "schema": "truetwin.estimate/1",
+        "twin": study.name(),
+        "names": estimate.physical(&estimate.names),
+        "gate": {
+            "p_value": estimate.gate.p_value,
+            "alpha": estimate.gate.alpha,
+            "out_of_distribution": estimate.gate.out_of_distribution,
+            "statistic": estimate.gate.statistic,
+        },
+        "theta": {
+            "initial": own(&estimate.initial),
+            "gauss_newton": stage(&estimate.gauss_newton),
+            "fine": stage(&estimate.fine),
+            "final": own(&estimate.theta),
+        },
+        "std_error": own(&estimate.std_error),
+        "nuisance": nuisance,
+        "interval": {
+            "level": INTERVAL_LEVEL,
+            "low": own(&estimate.low),
+            "high": own(&estimate.high),
+        },
+        "weak_directions": weak,
+        "after": after,
+        "free_run": {
+            "rmse": estimate.tracking.rmse,
+            "validation_rmse": estimate.validation.as_ref().map(|run| run.rmse),
+            "initial_rmse": estimate.tracking_initial.as_ref().map(|run| run.rmse),
+        },
+        "simulations": estimate.simulations,
+        "seconds": {
+            "predict": seconds.predict,
+            "gate": seconds.gate,
+            "gauss_newton": seconds.gauss_newton,
+            "cloud": seconds.cloud,
+            "tune": seconds.tune,
+            "total": seconds.total,
+        },
+        "parameters": parameters,
+        "directions": directions,
+        "refitted": estimate.refitted,
+        "redrawn": estimate.redrawn,
+    })
+}
+
+fn direction(known: &Direction) -> Value {
+    json!({
+        "direction": known.direction,
+        "std_error": known.std_error,
+        "combination": known.combination,
+        "weak": known.weak,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::fixture::{estimates, validator};
+
+    fn checked(estimate: &Estimate) -> Value {
+        let value = estimate_json(&estimates().study, estimate);
+        // As a reader gets it.
+        let read: Value = serde_json::from_str(&value.to_string()).unwrap();
+        let complaints: Vec<String> = (validator("estimate").iter_errors(&read))
+            .map(|error| format!("{}: {error}", error.instance_path))
+            .collect();
+        assert!(complaints.is_empty(), "{complaints:?}");
+        read
+    }
+
+    /// The contract's keys in the order of the design, before any of our own.
+    const KEYS: [&str; 13] = [
+        "schema",
+        "twin",
+        "names",
+        "gate",
+        "theta",
+        "std_error",
+        "nuisance",
+        "interval",
+        "weak_directions",
+        "after",
+        "free_run",
+        "simulations",
+        "seconds",
+    ];
+
+    #[test]
+    fn both_ways_through_the_gate_keep_to_the_contract() {
+        let found = estimates();
+        let kept = checked(&found.kept);
+        assert!(kept["after"].is_null() && kept["theta"]["fine"].is_null());
+        assert!(kept["interval"]["low"][0].is_number() && kept["seconds"]["cloud"].is_null());
+        assert!(kept["free_run"]["validation_rmse"].is_null());
+        let refined = checked(&found.refined);
+        assert!(refined["after"]["consistent"].is_boolean());
+        assert!(refined["seconds"]["tune"].is_number());
+        assert!(refined["free_run"]["validation_rmse"].is_number());
+        for value in [kept, refined] {
+            let keys: Vec<_> = value.as_object().unwrap().keys().collect();
+            assert_eq!(keys[..KEYS.len()], KEYS);
+        }
+    }
+
+    #[test]
+    fn the_start_is_a_nuisance_and_no_parameter() {
+        let value = checked(&estimates().refined);
+        assert_eq!(value["names"], json!(["nu"]));
+        assert_eq!(value["theta"]["final"].as_array().unwrap().len(), 1);
+        let nuisance = &value["nuisance"][0];
+        assert_eq!(
+            (&nuisance["name"], &nuisance["role"]),
+            (&json!("x1"), &json!("start"))
+        );
+        assert_eq!(value["parameters"][0]["bounds"], json!([0.0, 7.0]));
+    }
+
+    #[test]
+    fn what_cannot_be_told_is_null() {
+        let mut estimate = estimates().refined.clone();
+        estimate.after = None;
+        estimate.std_error.fill(f64::NAN);
+        estimate.tracking.rmse = f64::INFINITY;
+        estimate.information = None;
+        let value = checked(&estimate);
+        assert_eq!(value["after"]["p_value"], Value::Null);
+        assert_eq!(value["std_error"], json!([null]));
+        assert_eq!(value["nuisance"][0]["std_error"], Value::Null);
+        assert_eq!(value["free_run"]["rmse"], Value::Null);
+        assert_eq!(
+            (&value["weak_directions"], &value["directions"]),
+            (&json!([]), &Value::Null)
+        );
+    }
+}

@@ -1,0 +1,104 @@
+use super::*;
+use crate::gate::GateOutcome;
+use crate::refine::Direction;
+use crate::report::fixture::estimates;
+use crate::study::RecordPlan;
+use crate::twin::{DigitalTwin, Drive, Noise, ParameterSpace, Signal, SimulationError};
+
+fn fits(text: &str) {
+    assert!(text.lines().count() <= LINES, "{text}");
+    assert!(text.lines().all(|line| length(line) <= COLUMNS), "{text}");
+    assert!(!text.contains('\u{1b}'));
+}
+
+/// Lines as one, so that breaks do not matter.
+fn joined(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn both_ways_through_the_gate_are_told() {
+    let found = estimates();
+    let kept = estimate_text(&found.study, &found.kept);
+    fits(&kept);
+    let kept = joined(&kept);
+    assert!(
+        kept.contains("it was kept") && !kept.contains("consistent"),
+        "{kept}"
+    );
+    let refined = estimate_text(&found.study, &found.refined);
+    fits(&refined);
+    for expected in [
+        "refined",
+        "start of x1",
+        "90 % interval",
+        " → ",
+        "validation record",
+    ] {
+        assert!(refined.contains(expected), "{refined}");
+    }
+}
+
+#[test]
+fn a_twin_that_lacks_something_is_called_so() {
+    let found = estimates();
+    let mut estimate = found.refined.clone();
+    let test = |p_value| GateOutcome {
+        statistic: 9.0,
+        p_value,
+        alpha: 0.1,
+        out_of_distribution: p_value <= 0.1,
+    };
+    for (after, expected) in [
+        (Some(test(0.005)), "seems to lack something"),
+        (Some(test(0.5)), "is consistent with the record (p = 0.500)"),
+        (None, "cannot be tested"),
+    ] {
+        estimate.after = after;
+        let text = joined(&estimate_text(&found.study, &estimate));
+        assert!(text.contains(expected), "{text}");
+    }
+}
+
+/// Forty parameters with long names.
+struct Many;
+impl DigitalTwin for Many {
+    fn parameters(&self) -> ParameterSpace {
+        let name = |j| format!("a-very-long-name-of-a-parameter-{j}@some-long-target.magnitude");
+        ParameterSpace::new((0..40).map(|j| Parameter::new(&name(j), "m^3/(kg s^2)", -1e-9, 1e9)))
+    }
+    fn simulate(&self, _: &[f64], _: &Drive, _: Noise) -> Result<Signal, SimulationError> {
+        Err(SimulationError::fatal("never run"))
+    }
+}
+
+#[test]
+fn any_number_of_parameters_fits_the_terminal() {
+    let study = Study::new("many", Many, RecordPlan::levels(0.1, 10, 0.0, 1.0, 5)).unwrap();
+    let mut estimate = estimates().refined.clone();
+    let space = study.twin().parameters();
+    estimate.names = space.names().into_iter().map(str::to_owned).collect();
+    estimate.roles = vec![Role::Physical; 40];
+    for all in [
+        &mut estimate.initial,
+        &mut estimate.theta,
+        &mut estimate.low,
+        &mut estimate.high,
+    ] {
+        *all = vec![-1.234_567_89e8; 40];
+    }
+    estimate.std_error = vec![0.0123; 40];
+    let weak = Direction {
+        direction: vec![40f64.powf(-0.5); 40],
+        std_error: 3.0,
+        weak: true,
+        combination: crate::twin::combination(&space.names(), &vec![40f64.powf(-0.5); 40]),
+    };
+    estimate.information.as_mut().unwrap().directions = vec![weak; 40];
+    let text = estimate_text(&study, &estimate);
+    fits(&text);
+    assert!(
+        text.contains("more; --json has them all") && text.contains("and 38 more"),
+        "{text}"
+    );
+}

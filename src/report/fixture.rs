@@ -1,0 +1,87 @@
+//! Estimates that the tests of this module render: a small estimator of the oscillator, really trained.
+
+use crate::progress::Progress;
+use crate::study::{RecordPlan, Study, StudyFile};
+use crate::twin::{Noise, Record};
+use crate::twins::VanDerPol;
+use crate::two_stage::{Estimate, EstimateOptions, PretrainOptions, pretrain};
+use std::path::Path;
+use std::sync::OnceLock;
+
+/// A study, one record, and two estimates from it.
+pub(super) struct Estimates {
+    pub(super) study: Study,
+    pub(super) record: Record,
+    /// The gate kept the network's estimate.
+    pub(super) kept: Estimate,
+    /// Refined, and scored on a validation record.
+    pub(super) refined: Estimate,
+}
+
+/// Made once.
+pub(super) fn estimates() -> &'static Estimates {
+    static MADE: OnceLock<Estimates> = OnceLock::new();
+    MADE.get_or_init(make)
+}
+
+/// The schema of `tests/contract/{name}.schema.json`.
+pub(super) fn validator(name: &str) -> jsonschema::Validator {
+    let path =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/contract/{name}.schema.json"));
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    jsonschema::validator_for(&serde_json::from_str(&text).unwrap()).unwrap()
+}
+
+/// A record of the study's twin at `theta`.
+pub(super) fn simulated(study: &Study, theta: &[f64], sample: u64) -> Record {
+    let noise = Noise::new(7, "report", sample);
+    let drive = study.drives().unwrap().draw(noise).unwrap();
+    let outputs = study.twin().simulate(theta, &drive, noise).unwrap();
+    Record::new(drive, outputs).unwrap()
+}
+
+fn make() -> Estimates {
+    let file = StudyFile::parse(
+        "twin = 'van-der-pol'\n[start]\nx1 = 'estimate'\n[prior]\nstart.x1 = [0.5, 1.5]\n",
+        Path::new("study.toml"),
+    );
+    let registered = Study::new("van-der-pol", VanDerPol, RecordPlan::autonomous(0.05, 200));
+    let study = registered.unwrap().configure(&file.unwrap()).unwrap();
+    let options = PretrainOptions {
+        bank_size: Some(200),
+        epochs: Some(2),
+        ..PretrainOptions::default()
+    };
+    let (estimator, _) = pretrain(&study, &options, &Progress::silent()).unwrap();
+    let estimate = |record: &Record, options: &EstimateOptions| {
+        estimator
+            .estimate(record, options, &Progress::silent())
+            .unwrap()
+    };
+    let record = simulated(&study, &[1.2, 1.1], 0);
+    let refined = estimate(
+        &record,
+        &EstimateOptions {
+            always_refine: true,
+            validation: Some(simulated(&study, &[1.2, 1.1], 1)),
+            ..EstimateOptions::default()
+        },
+    );
+    // Two epochs teach little: records at a fixed point of the network are those that the gate keeps.
+    let mut guess = vec![1.25, 1.0];
+    for _ in 0..10 {
+        let features = estimator.observe(&simulated(&study, &guess, 2)).unwrap();
+        guess = estimator.predict_one(&features).unwrap();
+    }
+    let kept = (2..20)
+        .map(|sample| simulated(&study, &guess, sample))
+        .map(|record| estimate(&record, &EstimateOptions::default()))
+        .find(|estimate| !estimate.refitted)
+        .unwrap();
+    Estimates {
+        study,
+        record,
+        kept,
+        refined,
+    }
+}
