@@ -56,3 +56,8 @@ pub mod experiment;
 pub mod report;
 
 pub mod cli;
+
+/// The code in the README compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

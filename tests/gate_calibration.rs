@@ -83,7 +83,7 @@ fn five_features_a_thousand_records() {
 /// After θ was refitted to the record, the test must not be surprised by how well it fits: both twins, α = 0.10.
 #[test]
 fn after_a_refit_the_test_is_still_calibrated() {
-    for (name, records) in [("van-der-pol", 200), ("tanks", 100)] {
+    for (name, records) in [("van-der-pol", 200), ("tanks", 50)] {
         let study = study(name);
         let map = study
             .features(study.preset(PresetName::Default).features.as_ref())

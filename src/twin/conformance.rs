@@ -37,6 +37,8 @@ impl Finding {
 
 /// Relative size under which a singular value counts as zero: this direction does not move the free run.
 const FLAT: f64 = 1e-6;
+/// The standard deviation of a uniform prior over its width, 1/√12.
+const PRIOR_DEVIATION: f64 = 0.288_675_134_594_812_9;
 /// Noise draws of nearby parameters must agree to this part of their spread.
 const PAIRED: f64 = 1e-2;
 
@@ -48,7 +50,8 @@ const PAIRED: f64 = 1e-2;
 /// 4. *repeatable*: the same arguments give the same bits;
 /// 5. *noise*: another sample gives another trajectory;
 /// 6. *paired*: noise draws do not depend on θ (common random numbers);
-/// 7. *identifiable*: no direction in θ leaves the free run unchanged (first order, centre of the prior).
+/// 7. *identifiable*: no direction in θ leaves the free run unchanged, or moves it less than the noise does over the whole
+///    prior (first order, centre of the prior, noise taken as white).
 ///
 /// In a test: `assert!(check(&twin, &drive, 1).iter().all(|f| f.severity < Severity::Failure))`.
 pub fn check(twin: &dyn DigitalTwin, drive: &Drive, seed: u64) -> Vec<Finding> {
@@ -95,7 +98,7 @@ pub fn check(twin: &dyn DigitalTwin, drive: &Drive, seed: u64) -> Vec<Finding> {
     let (finding, spread) = noisy(twin, drive, seed, &first);
     findings.push(finding);
     findings.push(paired(twin, drive, noise, &first, spread));
-    findings.push(identifiable(twin, drive));
+    findings.push(identifiable(twin, drive, spread));
     findings
 }
 
@@ -223,8 +226,57 @@ fn paired(
     }
 }
 
-/// Singular directions of the free run's Jacobian at the prior's centre, θ in units of the prior's width.
-fn identifiable(twin: &dyn DigitalTwin, drive: &Drive) -> Finding {
+/// Singular directions of the free run's Jacobian at the prior's centre, θ in units of the prior's width, against the
+/// noise: two noisy runs differ by `spread` rms.
+fn identifiable(twin: &dyn DigitalTwin, drive: &Drive, spread: f64) -> Finding {
+    let space = twin.parameters();
+    let jacobian = match free_run_jacobian(twin, drive) {
+        Ok(jacobian) => jacobian,
+        Err(error) => {
+            let message = format!("not known: {error}");
+            return Finding::new("identifiable", Severity::Warning, message);
+        }
+    };
+    let svd = jacobian.svd(false, true);
+    let largest = svd.singular_values.max();
+    // Standard deviation of the direction if the noise were white, in prior widths.
+    let deviation = |s: f64| spread / 2f64.sqrt() / s;
+    let named = |weak: &dyn Fn(f64) -> bool| -> Vec<String> {
+        let chosen = (svd.singular_values.iter().enumerate()).filter(|(_, s)| weak(**s));
+        let words = chosen.filter_map(|(i, _)| {
+            let row = svd.v_t.as_ref()?.row(i).transpose();
+            Some(combination(&space.names(), row.as_slice()))
+        });
+        words.collect()
+    };
+    let flat = named(&|s| s <= FLAT * largest);
+    let drowned = named(&|s| s > FLAT * largest && deviation(s) > PRIOR_DEVIATION);
+    if !flat.is_empty() {
+        let message = format!(
+            "the free run does not change along {} (θ over the prior's width): only noise can tell; fix one parameter there, or report combinations",
+            flat.join("; ")
+        );
+        return Finding::new("identifiable", Severity::Warning, message);
+    }
+    if !drowned.is_empty() {
+        let message = format!(
+            "a record of this length tells less than the prior about {} (θ over the prior's width): expect wide intervals there; take longer records or another input",
+            drowned.join("; ")
+        );
+        return Finding::new("identifiable", Severity::Warning, message);
+    }
+    let weakest = deviation(svd.singular_values.min());
+    let message = format!(
+        "every direction moves the free run (the weakest is known to about {weakest:.1e} prior widths)"
+    );
+    Finding::new("identifiable", Severity::Pass, message)
+}
+
+/// ∂(free run)/∂(θ over the prior's width) at the prior's centre, by central differences; N·channels × d.
+fn free_run_jacobian(
+    twin: &dyn DigitalTwin,
+    drive: &Drive,
+) -> Result<DMatrix<f64>, SimulationError> {
     let space = twin.parameters();
     let (centre, widths) = (space.centre(), space.widths());
     let column = |j: usize| -> Result<Vec<f64>, SimulationError> {
@@ -236,41 +288,10 @@ fn identifiable(twin: &dyn DigitalTwin, drive: &Drive) -> Finding {
         let difference = side(1.0)? - side(-1.0)?;
         Ok(difference.iter().map(|d| d / 2e-4).collect())
     };
-    let columns: Result<Vec<_>, _> = (0..space.len()).map(column).collect();
-    let columns = match columns {
-        Ok(columns) => columns,
-        Err(error) => {
-            return Finding::new(
-                "identifiable",
-                Severity::Warning,
-                format!("not known: {error}"),
-            );
-        }
-    };
-    let jacobian = DMatrix::from_fn(columns[0].len(), columns.len(), |i, j| columns[j][i]);
-    let svd = jacobian.svd(false, true);
-    let largest = svd.singular_values.max();
-    let flat: Vec<String> = (svd.singular_values.iter().enumerate())
-        .filter(|(_, s)| **s <= FLAT * largest)
-        .filter_map(|(i, _)| {
-            let row = svd.v_t.as_ref()?.row(i).transpose();
-            Some(combination(&space.names(), row.as_slice()))
-        })
-        .collect();
-    if flat.is_empty() {
-        let ratio = svd.singular_values.min() / largest;
-        let message =
-            format!("every direction moves the free run (weakest to strongest: {ratio:.1e})");
-        return Finding::new("identifiable", Severity::Pass, message);
-    }
-    Finding::new(
-        "identifiable",
-        Severity::Warning,
-        format!(
-            "the free run does not change along {} (θ over the prior's width): only noise can tell; fix one parameter there, or report combinations",
-            flat.join("; ")
-        ),
-    )
+    let columns: Vec<Vec<f64>> = (0..space.len()).map(column).collect::<Result<_, _>>()?;
+    Ok(DMatrix::from_fn(columns[0].len(), columns.len(), |i, j| {
+        columns[j][i]
+    }))
 }
 
 #[cfg(test)]
@@ -321,11 +342,12 @@ mod tests {
             };
             Ok(Signal::from_shape_fn((drive.samples(), 1), |(k, _)| {
                 let k = k as f64 / 10.0;
-                let trend = if self.0 == Flaw::Product {
-                    a * b * k
-                } else {
-                    a * k + b * k * k
-                };
+                let trend = 30.0
+                    * if self.0 == Flaw::Product {
+                        a * b * k
+                    } else {
+                        a * k + b * k * k
+                    };
                 trend + shift + source.normal()
             }))
         }
