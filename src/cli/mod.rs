@@ -36,6 +36,9 @@ use clap::{CommandFactory, FromArgMatches};
 use failure::Failure;
 use std::process::ExitCode;
 
+/// More threads than any machine has cores are a slip of the keyboard.
+const MOST_THREADS: usize = 1024;
+
 /// Runs the command line of this process over `studies`.
 pub fn run<E: Into<StudyError>>(studies: impl IntoIterator<Item = Result<Study, E>>) -> ExitCode {
     run_from(studies, std::env::args_os())
@@ -73,7 +76,9 @@ fn in_pool<R: Send>(
 ) -> Result<R, Failure> {
     match threads {
         None => work(),
-        Some(0) => Err(Failure::user("--threads 0: at least 1 is needed")),
+        Some(threads) if !(1..=MOST_THREADS).contains(&threads) => Err(Failure::user(format!(
+            "--threads {threads}: choose between 1 and {MOST_THREADS}"
+        ))),
         Some(threads) => rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
