@@ -1,8 +1,10 @@
 //! Simulations compressed to features: banks for training, clouds around an estimate, nulls for tests.
 
-use crate::feature::{FeatureError, FeatureMap};
+use crate::feature::{FeatureError, FeatureMap, FeatureRecipe};
 use crate::progress::{Cancelled, Stage};
-use crate::twin::{DigitalTwin, Drive, Noise, SimulationError};
+use crate::twin::{
+    DigitalTwin, Drive, Noise, ParameterSpace, Record, Signal, Signals, SimulationError, StateSpace,
+};
 use nalgebra::DVector;
 use ndarray::Array2;
 use rayon::prelude::*;
@@ -10,16 +12,42 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Tries for one sample before the draws count as hopeless; a twin that fails nine times in ten passes.
+/// Failures of one sample before the draws count as hopeless; a twin that fails nine times in ten passes.
 const ATTEMPTS: usize = 200;
 /// Share of failed draws beyond which the work stops.
 const HOPELESS: f64 = 0.9;
 
-/// A twin seen through its features; counts its own calls.
+/// A twin seen through its features; counts every simulation, also those that the features make.
 pub struct FeatureSimulator {
-    twin: Arc<dyn DigitalTwin>,
+    twin: Arc<Counted>,
     map: Arc<dyn FeatureMap>,
+}
+
+/// A twin that counts its calls.
+struct Counted {
+    inner: Arc<dyn DigitalTwin>,
     calls: AtomicUsize,
+}
+
+impl DigitalTwin for Counted {
+    fn parameters(&self) -> ParameterSpace {
+        self.inner.parameters()
+    }
+    fn signals(&self) -> Signals {
+        self.inner.signals()
+    }
+    fn state_space(&self) -> Option<&dyn StateSpace> {
+        self.inner.state_space()
+    }
+    fn simulate(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Signal, SimulationError> {
+        self.calls.fetch_add(1, Ordering::Relaxed);
+        self.inner.simulate(theta, drive, noise)
+    }
 }
 
 /// Why one simulation gave no features.
@@ -44,7 +72,7 @@ pub enum BankError {
     Feature(FeatureError),
     /// Nearly all draws failed.
     #[error(
-        "{failed} of {tried} draws failed ({reason}); shrink the prior, the bounds or the step"
+        "{failed} of {tried} draws failed ({reason}); shrink the prior, the bounds or the step, or mend the twin"
     )]
     Hopeless {
         /// Failed draws.
@@ -85,18 +113,33 @@ pub struct Draws {
 struct Row {
     theta: Vec<f64>,
     features: Vec<f64>,
-    /// Attempts that were rejected before.
+    /// Draws before that were out of bounds.
+    rejected: usize,
+    /// Draws before that diverged or had no features.
     failed: usize,
+    /// Why the last of these failed.
+    reason: Option<String>,
 }
 
 impl FeatureSimulator {
-    /// Couples a twin with a map bound to it.
-    pub fn new(twin: Arc<dyn DigitalTwin>, map: Arc<dyn FeatureMap>) -> Self {
-        Self {
-            twin,
-            map,
+    /// Couples a twin with features, which are bound to it here.
+    ///
+    /// # Errors
+    ///
+    /// Features that this twin cannot have.
+    pub fn new(
+        twin: Arc<dyn DigitalTwin>,
+        features: &dyn FeatureRecipe,
+    ) -> Result<Self, FeatureError> {
+        let twin = Arc::new(Counted {
+            inner: twin,
             calls: AtomicUsize::new(0),
-        }
+        });
+        let counted: Arc<dyn DigitalTwin> = twin.clone();
+        Ok(Self {
+            map: features.bind(&counted)?,
+            twin,
+        })
     }
 
     /// The twin.
@@ -111,7 +154,13 @@ impl FeatureSimulator {
 
     /// Simulator calls so far.
     pub fn calls(&self) -> usize {
-        self.calls.load(Ordering::Relaxed)
+        self.twin.calls.load(Ordering::Relaxed)
+    }
+
+    /// Features of a record.
+    pub fn observe(&self, record: &Record) -> Result<DVector<f64>, FeatureError> {
+        let features = self.map.extract(record.drive(), record.outputs())?;
+        Ok(DVector::from_vec(features))
     }
 
     /// Features of one simulation.
@@ -121,7 +170,6 @@ impl FeatureSimulator {
         drive: &Drive,
         noise: Noise,
     ) -> Result<Vec<f64>, DrawError> {
-        self.calls.fetch_add(1, Ordering::Relaxed);
         let outputs = match self.twin.simulate(theta, drive, noise) {
             Ok(outputs) => outputs,
             Err(error @ SimulationError::Diverged { .. }) => {
@@ -165,13 +213,13 @@ impl FeatureSimulator {
 
     /// `size` simulations on all cores of the current rayon pool; row i depends on `noise(i)` alone.
     ///
-    /// `draw` says where to simulate, or rejects (`None`: out of bounds). A rejected or failed draw is drawn
-    /// again with the child noise of the next attempt, and counted.
+    /// `draw(i, attempt, noise)` says where to simulate, or rejects (`None`: out of bounds). A rejected or failed draw is
+    /// drawn again with the child noise of the next attempt, and counted; failures alone can stop the work.
     pub fn draws<'a>(
         &self,
         size: usize,
         noise: impl Fn(u64) -> Noise + Sync,
-        draw: impl Fn(u64, Noise) -> Result<Option<Draw<'a>>, BankError> + Sync,
+        draw: impl Fn(u64, usize, Noise) -> Result<Option<Draw<'a>>, BankError> + Sync,
         stage: &Stage,
     ) -> Result<Draws, BankError> {
         let rows: Vec<Row> = (0..size as u64)
@@ -182,12 +230,13 @@ impl FeatureSimulator {
                 Ok(row)
             })
             .collect::<Result<_, BankError>>()?;
-        let redrawn: usize = rows.iter().map(|row| row.failed).sum();
-        if redrawn as f64 > HOPELESS * (size + redrawn) as f64 {
+        let failed: usize = rows.iter().map(|row| row.failed).sum();
+        if failed as f64 > HOPELESS * (size + failed) as f64 {
+            let reason = rows.iter().rev().find_map(|row| row.reason.clone());
             return Err(BankError::Hopeless {
-                failed: redrawn,
-                tried: size + redrawn,
-                reason: "out of bounds or diverged".into(),
+                failed,
+                tried: size + failed,
+                reason: reason.unwrap_or_default(),
             });
         }
         let stack = |of: fn(&Row) -> &Vec<f64>, width: usize| {
@@ -200,7 +249,7 @@ impl FeatureSimulator {
         Ok(Draws {
             theta: stack(|row| &row.theta, self.twin.parameters().len()),
             features: stack(|row| &row.features, self.dim()),
-            redrawn,
+            redrawn: failed + rows.iter().map(|row| row.rejected).sum::<usize>(),
         })
     }
 
@@ -209,15 +258,17 @@ impl FeatureSimulator {
         &self,
         i: u64,
         noise: Noise,
-        draw: &impl Fn(u64, Noise) -> Result<Option<Draw<'a>>, BankError>,
+        draw: &impl Fn(u64, usize, Noise) -> Result<Option<Draw<'a>>, BankError>,
     ) -> Result<Row, BankError> {
-        let mut reason = "out of bounds".to_owned();
-        for attempt in 0..ATTEMPTS {
+        let (mut rejected, mut failed, mut reason) = (0, 0, None);
+        while failed < ATTEMPTS && rejected < ATTEMPTS {
+            let attempt = rejected + failed;
             let noise = match attempt {
                 0 => noise,
                 _ => noise.child(&format!("attempt {attempt}")),
             };
-            let Some(Draw { theta, drive }) = draw(i, noise)? else {
+            let Some(Draw { theta, drive }) = draw(i, attempt, noise)? else {
+                rejected += 1;
                 continue;
             };
             match self.features(&theta, &drive, noise) {
@@ -225,17 +276,22 @@ impl FeatureSimulator {
                     return Ok(Row {
                         theta,
                         features,
-                        failed: attempt,
+                        rejected,
+                        failed,
+                        reason,
                     });
                 }
-                Err(DrawError::Rejected(text)) => reason = text,
+                Err(DrawError::Rejected(text)) => {
+                    failed += 1;
+                    reason = Some(text);
+                }
                 Err(DrawError::Fatal(error)) => return Err(error),
             }
         }
         Err(BankError::Hopeless {
-            failed: ATTEMPTS,
-            tried: ATTEMPTS,
-            reason,
+            failed: rejected + failed,
+            tried: rejected + failed,
+            reason: reason.unwrap_or_else(|| "out of bounds".into()),
         })
     }
 
@@ -248,7 +304,7 @@ impl FeatureSimulator {
         noise: impl Fn(u64) -> Noise + Sync,
         stage: &Stage,
     ) -> Result<Array2<f64>, BankError> {
-        let draw = |_, _| {
+        let draw = |_, _, _| {
             Ok(Some(Draw {
                 theta: theta.to_vec(),
                 drive: Cow::Borrowed(drive),
@@ -261,15 +317,13 @@ impl FeatureSimulator {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::feature::{Ar, FeatureRecipe};
+    use crate::feature::Ar;
     use crate::progress::Progress;
-    use crate::twin::{Parameter, ParameterSpace, Signal, Signals};
+    use crate::twin::Parameter;
     use crate::twins::VanDerPol;
 
     fn simulator(twin: impl DigitalTwin + 'static) -> FeatureSimulator {
-        let twin: Arc<dyn DigitalTwin> = Arc::new(twin);
-        let map = Ar { order: 2 }.bind(&twin).unwrap();
-        FeatureSimulator::new(twin, map)
+        FeatureSimulator::new(Arc::new(twin), &Ar { order: 2 }).unwrap()
     }
 
     fn bank(simulator: &FeatureSimulator, size: usize) -> Result<Draws, BankError> {
@@ -278,7 +332,7 @@ mod tests {
         simulator.draws(
             size,
             |i| Noise::new(1, "bank", i),
-            |_, noise| {
+            |_, _, noise| {
                 Ok(Some(Draw {
                     theta: space.draw_prior(noise),
                     drive: Cow::Borrowed(&drive),

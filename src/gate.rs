@@ -155,7 +155,9 @@ pub enum GateError {
     #[error(transparent)]
     Bank(#[from] BankError),
     /// The simulated features have no covariance.
-    #[error("the features simulated at the estimate cannot be whitened: {0}")]
+    #[error(
+        "the features simulated at the estimate cannot be whitened: {0}; a twin without noise has no statistics: give it noise levels ([noise] in a study)"
+    )]
     Whitening(#[from] WhiteningError),
 }
 

@@ -31,6 +31,7 @@
 )]
 
 // Layers, lowest first; a module uses only what stands above it here (tests/layering.rs holds it so).
+pub mod files;
 pub mod math;
 pub mod optimise;
 pub mod progress;

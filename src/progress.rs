@@ -74,6 +74,16 @@ impl Progress {
         }
     }
 
+    /// A stage that is not shown, but ends when the listener asks to stop.
+    pub fn unseen(&self) -> Stage {
+        Stage {
+            progress: self.clone(),
+            name: "",
+            done: AtomicU64::new(0),
+            total: 0,
+        }
+    }
+
     /// Fails where the listener asks to stop.
     pub fn checkpoint(&self) -> Result<(), Cancelled> {
         match &self.0 {
@@ -106,7 +116,9 @@ impl Stage {
     /// One unit is done. Fails where the listener asks to stop.
     pub fn tick(&self) -> Result<(), Cancelled> {
         let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
-        if let Some(listener) = &self.progress.0 {
+        if let Some(listener) = &self.progress.0
+            && !self.name.is_empty()
+        {
             listener.advanced(self.name, done, self.total);
         }
         self.progress.checkpoint()

@@ -331,6 +331,39 @@ fn wrong_calls_are_refused_with_the_remedy() {
         &["none.est"],
     );
     refused(&["conjure"], &["conjure", "--help"]);
+    refused(
+        &[
+            "simulate",
+            "--twin",
+            "tanks",
+            "--theta",
+            theta,
+            "--threads",
+            "1000000",
+        ],
+        &["1024"],
+    );
+    refused(
+        &[
+            "pretrain",
+            "--twin",
+            "tanks",
+            "--out",
+            &new,
+            "--bank-size",
+            "99999999999",
+        ],
+        &["10 million"],
+    );
+    refused(
+        &["reproduce", "--twin", "tanks", "--runs", "0"],
+        &["at least 1"],
+    );
+    refused(
+        &["reproduce", "--twin", "tanks", "--estimator", &at("v.est")],
+        &["made for twin van-der-pol"],
+    );
+    refused(&[], &["no verb", "--help"]);
     assert!(
         !Path::new(&new).exists(),
         "a refused call leaves nothing behind"
@@ -379,6 +412,44 @@ fn wrong_studies_are_refused_with_file_and_line() {
         "twin = 'tanks'\n[[effect]]\nid = 'sensor-lag'\ntarget = 'h1'\n",
         &["sensor-lag", "\"h1\"", "sensor"],
     );
+    check(
+        "twin = 'tanks'\n[record]\nsamples = 100000000000\n",
+        &["samples = 100000000000"],
+    );
+    check("twin = 'tanks'\n[record]\nstep = 0\n", &["step = 0 s"]);
+    check(
+        "twin = 'tanks'\n[record]\ninput = { levels = [3, 0], hold = 2 }\n",
+        &["levels = [low, high]"],
+    );
+    check(
+        "twin = 'tanks'\n[noise]\ny = 'foo'\n",
+        &["line 3", "a number, or \"estimate\""],
+    );
+    check(
+        "twin = 'tanks'\n[prior]\nk1 = [0.5, 9]\n",
+        &["k1", "bounds [0.1, 1.5]"],
+    );
+    check(
+        "twin = 'tanks'\n[prior]\nk4 = [0.9, 1]\n[fixed]\nk4 = 1\n",
+        &["k4 stands in [fixed] and in [prior]"],
+    );
+    check(
+        "twin = 'tanks'\n[library]\nonly = ['magic']\n",
+        &["magic", "effects"],
+    );
+    check(
+        "twin = 'van-der-pol'\n[record]\ninput = { levels = [0, 3], hold = 2 }\n",
+        &["no input; remove"],
+    );
+    let deaf = file(
+        "deaf.toml",
+        "twin = 'tanks'\n[features]\nkind = 'arx'\noutputs = 300\ninputs = 300\n",
+    );
+    assert_eq!(
+        truetwin(&["check", "--study", &deaf]).status.code(),
+        Some(1),
+        "features are checked"
+    );
     let high = file(
         "high.toml",
         "twin = 'tanks'\n[features]\nkind = 'arx'\noutputs = 300\ninputs = 300\n",
@@ -395,6 +466,67 @@ fn wrong_studies_are_refused_with_file_and_line() {
         &["pretrain", "--study", &short, "--out", &at("h.est")],
         &["30 samples", "lower their order"],
     );
+}
+
+/// Step and length come from an input file; a record with another step is refused, also by the estimator.
+#[test]
+fn a_study_with_an_input_file_has_its_step() {
+    let rows: String = (0..60).map(|k| format!("{k},{}\n", k / 10 % 3)).collect();
+    file("grid.csv", &format!("t,u\n{rows}"));
+    let study = file(
+        "grid.toml",
+        "twin = 'tanks'\n[record]\ninput = 'grid.csv'\n",
+    );
+    let estimator = at("grid.est");
+    done(&[
+        "pretrain",
+        "--study",
+        &study,
+        "--out",
+        &estimator,
+        "--bank-size",
+        "200",
+        "--epochs",
+        "2",
+    ]);
+    let theta = "k1=0.6,k2=0.5,k3=0.55,k4=1";
+    done(&[
+        "simulate",
+        "--twin",
+        "tanks",
+        "--theta",
+        theta,
+        "--out",
+        &at("half.csv"),
+    ]);
+    refused(
+        &["estimate", &at("half.csv"), "--estimator", &estimator],
+        &["step is 0.5 s, the study's 1 s"],
+    );
+    let other = file(
+        "other.toml",
+        "twin = 'tanks'\n[record]\nstep = 2\ninput = 'grid.csv'\n",
+    );
+    refused(
+        &["check", "--study", &other],
+        &["contradicts", "60 samples, step 1 s"],
+    );
+}
+
+/// The twin's own noise level is taken at the study's step.
+#[test]
+fn an_estimated_noise_level_may_be_the_twins_own() {
+    let study = file(
+        "level.toml",
+        "twin = 'van-der-pol'\n[noise]\nx2 = 'estimate'\n",
+    );
+    done(&[
+        "simulate",
+        "--study",
+        &study,
+        "--theta",
+        "nu=1,noise.x2=0.00707",
+    ]);
 }
 
 #[test]

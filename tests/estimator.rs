@@ -245,6 +245,56 @@ fn long_work_can_be_cancelled_in_every_stage() {
     }
 }
 
+/// θ in a corner of the bounds, where nearly every free draw of the cloud falls outside.
+#[test]
+fn an_estimate_in_a_corner_of_the_bounds_stands() {
+    let study = &studies()[1];
+    let options = PretrainOptions {
+        bank_size: Some(500),
+        epochs: Some(5),
+        seed: 1,
+        ..PretrainOptions::default()
+    };
+    let (estimator, _) = pretrain(study, &options, &Progress::silent()).unwrap();
+    let noise = Noise::new(5, "corner", 0);
+    let drive = study.drives().unwrap().draw(noise).unwrap();
+    let outputs = (study
+        .twin()
+        .simulate(&[1.45, 0.15, 1.4, 0.55], &drive, noise))
+    .unwrap();
+    let record = Record::new(drive, outputs).unwrap();
+    let options = EstimateOptions {
+        always_refine: true,
+        ..EstimateOptions::default()
+    };
+    let estimate = (estimator.estimate(&record, &options, &Progress::silent())).unwrap();
+    let bounds = study.twin().parameters().bounds();
+    assert!(estimate.fine.is_some() && estimate.redrawn > 0);
+    assert!(
+        estimate
+            .theta
+            .iter()
+            .zip(&bounds)
+            .all(|(t, b)| b.contains(*t))
+    );
+}
+
+/// Every call of the simulator is counted: gate 150 + 199, and what the refinement, the cloud, the second gate and the
+/// free runs need. Effort is a result; a change of it should be seen.
+#[test]
+fn simulator_calls_are_pinned() {
+    let kept = estimate(1.2, kept_seed());
+    assert_eq!(kept.simulations, 349 + 150 + 64 + 2 * 64 + 1);
+    assert!(estimate(3.0, 0).simulations < 12_000);
+}
+
+/// A seed whose in-distribution record the gate keeps.
+fn kept_seed() -> u64 {
+    (0..10)
+        .find(|&seed| !estimate(1.2, seed).gate.out_of_distribution)
+        .unwrap()
+}
+
 /// Nothing but failures: the error names the share and the remedy.
 struct Broken;
 impl DigitalTwin for Broken {

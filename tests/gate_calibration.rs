@@ -22,10 +22,8 @@ fn study(name: &str) -> Study {
 /// Records rejected at the true θ, with a fresh null for each.
 fn rejected(name: &str, settings: &GateSettings, records: u64) -> u64 {
     let study = study(name);
-    let map = study
-        .features(study.preset(PresetName::Paper).features.as_ref())
-        .unwrap();
-    let simulator = FeatureSimulator::new(study.twin().clone(), map);
+    let features = study.preset(PresetName::Paper).features.clone();
+    let simulator = FeatureSimulator::new(study.twin().clone(), features.as_ref()).unwrap();
     let drives = study.drives().unwrap();
     let theta = study.twin().parameters().centre();
     (0..records)
@@ -81,9 +79,8 @@ fn five_features_a_thousand_records() {
 fn after_a_refit_the_test_is_still_calibrated() {
     for (name, records) in [("van-der-pol", 200), ("tanks", 50)] {
         let study = study(name);
-        let map = study
-            .features(study.preset(PresetName::Default).features.as_ref())
-            .unwrap();
+        let features = study.preset(PresetName::Default).features.clone();
+        let simulator = FeatureSimulator::new(study.twin().clone(), features.as_ref()).unwrap();
         let drives = study.drives().unwrap();
         let space = study.twin().parameters();
         let gate = GateSettings::default();
@@ -95,7 +92,6 @@ fn after_a_refit_the_test_is_still_calibrated() {
             .into_par_iter()
             .filter(|&i| {
                 let noise = Noise::new(12, "record", i);
-                let simulator = FeatureSimulator::new(study.twin().clone(), map.clone());
                 let drive = drives.draw(noise).unwrap();
                 let theta = space.draw_prior(noise);
                 let x = simulator.features(&theta, &drive, noise).unwrap();
@@ -107,10 +103,9 @@ fn after_a_refit_the_test_is_still_calibrated() {
                     settings: &settings,
                     gate: &gate,
                     noise: noise.child("refine"),
+                    progress: &Progress::silent(),
                 };
-                let refined = refinement
-                    .run(&space.centre(), &Progress::silent())
-                    .unwrap();
+                let refined = refinement.run(&space.centre()).unwrap();
                 let test = GateTest {
                     simulator: &simulator,
                     drive: &drive,

@@ -51,7 +51,7 @@ fn the_cascaded_tanks_are_followed_on_a_record_never_seen() {
     let estimate = estimator
         .estimate(&record, &options, &Progress::silent())
         .unwrap();
-    let after = estimate.tracking.rmse;
+    let after = estimate.tracking.as_ref().unwrap().rmse;
     let unseen = estimate.validation.as_ref().map(|v| v.rmse).unwrap();
     println!("free-run RMSE {after:.3} V, on the validation record {unseen:.3} V");
     assert!(estimate.gate.out_of_distribution);

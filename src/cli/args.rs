@@ -2,7 +2,7 @@
 
 use crate::study::PresetName;
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Calibrate a digital twin from a measured record, and be told when it cannot be trusted.
 #[derive(Debug, Parser)]
@@ -47,6 +47,20 @@ pub(super) enum Command {
     Reproduce(ReproduceArguments),
     /// Calibrate a twin to an embedded record, in seconds, to see what it looks like.
     Demo(DemoArguments),
+}
+
+impl Command {
+    /// The study file of the call, if it has one.
+    pub fn study(&self) -> Option<&Path> {
+        let subject = match self {
+            Self::Twins | Self::Estimate(_) | Self::Demo(_) => return None,
+            Self::Effects(subject) | Self::Check(subject) => subject,
+            Self::Simulate(options) => &options.subject,
+            Self::Pretrain(options) => &options.subject,
+            Self::Reproduce(options) => &options.subject,
+        };
+        subject.study.as_deref()
+    }
 }
 
 /// Which twin, in which setting.
@@ -147,13 +161,13 @@ pub(super) struct ReproduceArguments {
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=2))]
     pub scenario: u8,
     /// Simulated records.
-    #[arg(long, default_value_t = 100)]
+    #[arg(long, default_value_t = 100, value_parser = at_least_one)]
     pub runs: usize,
     /// Recipe.
     #[arg(long, value_enum, default_value = "default")]
     pub preset: PresetArgument,
     /// An estimator to score, instead of pretraining one.
-    #[arg(long, value_name = "EST")]
+    #[arg(long, value_name = "EST", conflicts_with_all = ["preset", "bank_size", "epochs"])]
     pub estimator: Option<PathBuf>,
     /// Simulations to train on; the preset's unless given.
     #[arg(long, value_name = "M")]
@@ -161,6 +175,15 @@ pub(super) struct ReproduceArguments {
     /// Passes over the bank; the preset's unless given.
     #[arg(long)]
     pub epochs: Option<usize>,
+}
+
+/// A number of runs.
+fn at_least_one(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(0) => Err("at least 1 is needed".into()),
+        Ok(number) => Ok(number),
+        Err(error) => Err(format!("{error}")),
+    }
 }
 
 #[derive(Debug, Args)]

@@ -2,6 +2,7 @@
 
 use super::args::Subject;
 use super::{Context, Failure, output};
+use crate::study::PresetName;
 use crate::twin::Noise;
 use crate::twin::conformance::{Severity, check};
 use serde_json::{Value, json};
@@ -12,7 +13,10 @@ pub(super) fn run(context: &Context<'_>, subject: &Subject) -> Result<ExitCode, 
     let drive = study
         .drives()?
         .draw(Noise::new(context.seed, "check input", 0))?;
-    let findings = check(study.twin().as_ref(), &drive, context.seed);
+    let mut findings = check(study.twin().as_ref(), &drive, context.seed);
+    if findings.iter().all(|f| f.severity < Severity::Failure) {
+        findings.push(study.check_features(PresetName::Default, &drive, context.seed)?);
+    }
     let word = |severity| match severity {
         Severity::Pass => "pass",
         Severity::Warning => "warning",

@@ -62,7 +62,10 @@ pub(super) fn write_results(
     let json = serde_json::to_string_pretty(&estimate_json(study, estimate));
     folder.write("estimate.json", &json.map_err(Failure::internal)?)?;
     let before = estimate.tracking_initial.as_ref().map(|t| &t.outputs);
-    let after = &estimate.tracking.outputs;
+    // A free run that diverged leaves nothing to draw; the text says so.
+    let Some(after) = estimate.tracking.as_ref().map(|t| &t.outputs) else {
+        return Ok(());
+    };
     folder.write("overlay.svg", &overlay_svg(study, record, before, after))?;
     folder.write("trajectories.csv", &trajectories_csv(record, before, after))
 }

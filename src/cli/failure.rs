@@ -27,6 +27,8 @@ const INTERNAL: u8 = 1;
 pub(super) struct Failure {
     message: String,
     code: u8,
+    /// Whether the study may be what is wrong.
+    about_study: bool,
 }
 
 impl Failure {
@@ -35,6 +37,7 @@ impl Failure {
         Self {
             message: message.to_string(),
             code: USER,
+            about_study: false,
         }
     }
 
@@ -43,11 +46,15 @@ impl Failure {
         Self {
             message: message.to_string(),
             code: INTERNAL,
+            about_study: false,
         }
     }
 
     /// A wrong call, in one line.
     pub fn usage(error: &clap::Error) -> Self {
+        if error.kind() == clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+            return Self::user("no verb given; see `truetwin --help`, or try `truetwin demo`");
+        }
         let text = error.to_string();
         let first = text.split("\n\n").next().unwrap_or(&text);
         let line = first.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -55,6 +62,14 @@ impl Failure {
         Self::user(format!(
             "{line}; see `truetwin --help` and `truetwin VERB --help`"
         ))
+    }
+
+    /// Names the study file, where the study may be what is wrong.
+    pub fn of_study(self, path: Option<&Path>) -> Self {
+        match path {
+            Some(path) if self.about_study => self.within(path),
+            _ => self,
+        }
     }
 
     /// Names the file that the message is about, unless it does.
@@ -95,13 +110,22 @@ users!(
     EffectError,
     EffectFileError,
     EstimatorFileError,
-    FeatureError,
     ParameterError,
-    PlanError,
     RecordError,
     SimulationError,
-    StudyError,
 );
+
+/// Errors that the setting of the study can cause.
+macro_rules! studies {
+    ($($error:ty),* $(,)?) => {
+        $(impl From<$error> for Failure {
+            fn from(error: $error) -> Self {
+                Self { about_study: true, ..Self::user(error) }
+            }
+        })*
+    };
+}
+studies!(FeatureError, PlanError, StudyError);
 
 impl From<NetworkError> for Failure {
     fn from(error: NetworkError) -> Self {
@@ -116,7 +140,10 @@ impl From<BankError> for Failure {
     fn from(error: BankError) -> Self {
         match error {
             BankError::Cancelled(_) => Self::internal(error),
-            _ => Self::user(error),
+            _ => Self {
+                about_study: true,
+                ..Self::user(error)
+            },
         }
     }
 }
@@ -146,7 +173,13 @@ impl From<PretrainError> for Failure {
         match error {
             PretrainError::Bank(error) => error.into(),
             PretrainError::Network(error) => error.into(),
-            _ => Self::user(error),
+            PretrainError::Settings(_) => Self::user(error),
+            PretrainError::Plan(error) => error.into(),
+            PretrainError::Feature(error) => error.into(),
+            PretrainError::TooManyFeatures { .. } => Self {
+                about_study: true,
+                ..Self::user(error)
+            },
         }
     }
 }
@@ -158,9 +191,7 @@ impl From<EstimateError> for Failure {
             EstimateError::Gate(error) => error.into(),
             EstimateError::Refine(error) => error.into(),
             EstimateError::Network(error) => error.into(),
-            EstimateError::Cancelled(_)
-            | EstimateError::Tracking(_)
-            | EstimateError::Ellipsoid(_) => Self::internal(error),
+            EstimateError::Cancelled(_) | EstimateError::Ellipsoid(_) => Self::internal(error),
             _ => Self::user(error),
         }
     }

@@ -95,7 +95,7 @@ fn dispatch(arguments: &Arguments, studies: &[Study]) -> Result<ExitCode, Failur
         seed: arguments.seed,
         progress: &progress,
     };
-    match &arguments.command {
+    let result = match &arguments.command {
         Command::Twins => twins::run(&context),
         Command::Effects(subject) => effects::run(&context, subject),
         Command::Check(subject) => check::run(&context, subject),
@@ -104,7 +104,8 @@ fn dispatch(arguments: &Arguments, studies: &[Study]) -> Result<ExitCode, Failur
         Command::Estimate(options) => estimate::run(&context, options),
         Command::Reproduce(options) => reproduce::run(&context, options),
         Command::Demo(options) => demo::run(&context, options),
-    }
+    };
+    result.map_err(|failure| failure.of_study(arguments.command.study()))
 }
 
 /// What every verb sees.

@@ -13,7 +13,18 @@ pub(super) fn run(
 ) -> Result<ExitCode, Failure> {
     let study = context.study(&options.subject)?;
     let estimator = match &options.estimator {
-        Some(path) => Estimator::load(path, context.studies)?,
+        Some(path) => {
+            let estimator = Estimator::load(path, context.studies)?;
+            let made_for = estimator.study().name();
+            if made_for != study.name() {
+                let asked = study.name();
+                return Err(Failure::user(format!(
+                    "{}: made for twin {made_for}, --twin says {asked}; name the same twin",
+                    path.display()
+                )));
+            }
+            estimator
+        }
         None => {
             let settings = PretrainOptions {
                 preset: options.preset.into(),

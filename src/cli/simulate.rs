@@ -65,7 +65,11 @@ pub(super) fn run(context: &Context<'_>, options: &SimulateOptions) -> Result<Ex
 fn parse_theta(text: &str) -> Result<BTreeMap<String, f64>, Failure> {
     let mut values = BTreeMap::new();
     for part in text.split(',').map(str::trim).filter(|p| !p.is_empty()) {
-        let wrong = || Failure::user(format!("--theta: \"{part}\" is not name=value"));
+        let wrong = || {
+            Failure::user(format!(
+                "--theta: \"{part}\" is not name=value; write k=0.5, with commas between"
+            ))
+        };
         let (name, value) = part.split_once('=').ok_or_else(wrong)?;
         let value: f64 = value.trim().parse().map_err(|_| wrong())?;
         if values.insert(name.trim().to_owned(), value).is_some() {

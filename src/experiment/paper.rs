@@ -101,17 +101,29 @@ pub fn scenario(
     scenario: Scenario,
     noise: Noise,
 ) -> Option<Result<(Vec<f64>, Drive), DriveError>> {
-    let (first, second): (&[f64], &[f64]) = match study.name() {
-        "van-der-pol" => (&[3.0], &[5.0]),
-        "tanks" => (&[1.2, 1.2, 0.9, 1.0], &[1.3, 1.3, 0.6, 0.7]),
+    // Name, OOD 1, OOD 2.
+    let points: &[(&str, f64, f64)] = match study.name() {
+        "van-der-pol" => &[("nu", 3.0, 5.0)],
+        "tanks" => &[
+            ("k1", 1.2, 1.3),
+            ("k2", 1.2, 1.3),
+            ("k3", 0.9, 0.6),
+            ("k4", 1.0, 0.7),
+        ],
         _ => return None,
     };
     let space = study.twin().parameters();
-    let theta = match scenario {
-        Scenario::InDistribution => space.draw_prior(noise),
-        Scenario::First => first.to_vec(),
-        Scenario::Second => second.to_vec(),
-    };
+    let drawn = space.draw_prior(noise);
+    // What a study has beyond the paper's parameters is drawn from its prior.
+    let theta = (space.iter().zip(drawn))
+        .map(
+            |(p, drawn)| match points.iter().find(|(name, ..)| *name == p.name) {
+                Some((_, first, _)) if scenario == Scenario::First => *first,
+                Some((_, _, second)) if scenario == Scenario::Second => *second,
+                _ => drawn,
+            },
+        )
+        .collect();
     let plan = study.plan();
     let inputs = study.twin().signals().inputs.len();
     let levels = Signal::from_shape_fn((plan.samples, inputs), |(k, _)| {

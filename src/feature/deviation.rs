@@ -3,7 +3,7 @@
 use super::{FeatureError, FeatureMap, FeatureRecipe};
 use crate::twin::{DigitalTwin, Drive, Signal, free_run};
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Block means of y − ŷ, where ŷ is the free run at the centre of the prior on the same input:
 ///
@@ -36,6 +36,7 @@ impl FeatureRecipe for Deviation {
             outputs: twin.signals().outputs.len(),
             centre: twin.parameters().centre(),
             twin: twin.clone(),
+            last: Mutex::new(None),
         }))
     }
 }
@@ -45,6 +46,26 @@ struct Bound {
     outputs: usize,
     centre: Vec<f64>,
     twin: Arc<dyn DigitalTwin>,
+    /// The reference run of the last drive: around one record the drive never changes.
+    last: Mutex<Option<(Drive, Arc<Signal>)>>,
+}
+
+impl Bound {
+    /// ŷ under `drive`.
+    fn reference(&self, drive: &Drive) -> Result<Arc<Signal>, FeatureError> {
+        // A thread that panicked in here has left nothing half-done.
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((known, run)) = last.as_ref()
+            && known == drive
+        {
+            return Ok(run.clone());
+        }
+        drop(last);
+        let run = Arc::new(free_run(self.twin.as_ref(), &self.centre, drive)?);
+        last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        *last = Some((drive.clone(), run.clone()));
+        Ok(run)
+    }
 }
 
 impl FeatureMap for Bound {
@@ -61,7 +82,7 @@ impl FeatureMap for Bound {
             });
         }
         super::check_varies(outputs)?;
-        let deviation = outputs - &free_run(self.twin.as_ref(), &self.centre, drive)?;
+        let deviation = outputs - self.reference(drive)?.as_ref();
         let edge = |b: usize| b * samples / self.blocks;
         let mut features = Vec::with_capacity(self.dim());
         for column in deviation.columns() {

@@ -62,12 +62,13 @@ impl Whitening {
     /// [`WhiteningError`]: fewer than two draws, an entry that is not finite, no feature that varies.
     pub fn calibrated(samples: &ArrayRef2<f64>) -> Result<Self, WhiteningError> {
         let Draws { mean, centred } = Draws::new(samples)?;
-        // A constant feature has the rounding of its mean as its standard deviation.
+        // A constant feature has the rounding of its mean, at most K·ε of its size, as its standard deviation.
+        let rounding = samples.nrows() as f64 * f64::EPSILON;
         let varying = |(feature, column): &(usize, f64)| {
             let largest = samples
                 .column(*feature)
                 .fold(0.0, |a: f64, v| a.max(v.abs()));
-            *column > 16.0 * f64::EPSILON * largest
+            *column > rounding * largest
         };
         let (kept, deviations): (Vec<usize>, Vec<f64>) = centred
             .column_iter()

@@ -192,6 +192,18 @@ pub enum RefineError {
     Cancelled(#[from] Cancelled),
 }
 
+impl RefineError {
+    /// Whether no other start will help.
+    fn is_fatal(&self) -> bool {
+        let bank = |error: &BankError| !matches!(error, BankError::Hopeless { .. });
+        match self {
+            Self::Bank(error) | Self::Gate(GateError::Bank(error)) => bank(error),
+            Self::Optimise(OptimiseError::Fatal(_)) | Self::Cancelled(_) => true,
+            _ => false,
+        }
+    }
+}
+
 /// What the refinement works on.
 pub struct Refinement<'a> {
     /// Twin and features.
@@ -206,6 +218,8 @@ pub struct Refinement<'a> {
     pub gate: &'a GateSettings,
     /// Randomness.
     pub noise: Noise,
+    /// Who listens; asked at every simulation.
+    pub progress: &'a Progress,
 }
 
 /// Where one start has come to.
@@ -224,10 +238,12 @@ struct Local {
 
 impl Refinement<'_> {
     /// Runs it from `initial`.
-    pub fn run(&self, initial: &[f64], progress: &Progress) -> Result<Refined, RefineError> {
+    pub fn run(&self, initial: &[f64]) -> Result<Refined, RefineError> {
         let space = self.simulator.twin().parameters();
         let settings = self.settings;
-        let stage = progress.stage("Gauss–Newton", settings.starts + settings.rounds);
+        let stage = self
+            .progress
+            .stage("Gauss–Newton", settings.starts + settings.rounds);
         let initial = DVector::from_vec(space.clamp(initial));
         let (mut best, mut failed, mut last): (Option<Candidate>, _, _) = (None, 0, String::new());
         for start in starts(&space, &initial, settings.starts)? {
@@ -242,10 +258,7 @@ impl Refinement<'_> {
                         best = Some(candidate);
                     }
                 }
-                Err(RefineError::Optimise(OptimiseError::Fatal(error))) => {
-                    return Err(RefineError::Optimise(OptimiseError::Fatal(error)));
-                }
-                Err(error @ RefineError::Cancelled(_)) => return Err(error),
+                Err(error) if error.is_fatal() => return Err(error),
                 Err(error) => {
                     failed += 1;
                     last = error.to_string();
@@ -289,6 +302,7 @@ impl Refinement<'_> {
             drive: self.drive,
             observed: self.observed,
             noise: self.noise.child("mean features"),
+            progress: self.progress,
             seeds,
             whitening: None,
             pull: self.settings.pull.sqrt(),
@@ -316,13 +330,12 @@ impl Refinement<'_> {
     fn whiten(&self, theta: &DVector<f64>) -> Result<Local, RefineError> {
         let size = self.gate.whitening_simulations(self.simulator.dim());
         let noise = self.noise.child("whitening");
-        let silent = Progress::silent().stage("whitening", size);
         let features = self.simulator.repeat(
             theta.as_slice(),
             self.drive,
             size,
             |i| noise.sample(i),
-            &silent,
+            &self.progress.unseen(),
         )?;
         let whitening = self.gate.whiten(&features).map_err(GateError::from)?;
         let spread = (whitening.squared_distances(&features).iter())

@@ -3,6 +3,7 @@
 use crate::bank::{BankError, DrawError, FeatureSimulator};
 use crate::math::{DifferenceError, Stencil, Whitening};
 use crate::optimise::{EvaluationError, ResidualProblem};
+use crate::progress::Progress;
 use crate::twin::{Drive, Noise};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -13,6 +14,7 @@ pub(super) struct FeatureResidual<'a> {
     pub drive: &'a Drive,
     pub observed: &'a DVector<f64>,
     pub noise: Noise,
+    pub progress: &'a Progress,
     pub seeds: usize,
     /// Set before the residual is asked for.
     pub whitening: Option<Whitening>,
@@ -43,6 +45,7 @@ impl From<DifferenceError> for EvaluationError {
 impl FeatureResidual<'_> {
     /// f̄(θ).
     pub fn mean_features(&self, theta: &DVector<f64>) -> Result<DVector<f64>, EvaluationError> {
+        self.progress.checkpoint().map_err(EvaluationError::fatal)?;
         let noise = |i| self.noise.sample(i);
         let mean =
             (self.simulator).mean_features(theta.as_slice(), self.drive, noise, self.seeds)?;

@@ -71,7 +71,7 @@ pub fn estimate_json(study: &Study, estimate: &Estimate) -> Value {
         "weak_directions": weak,
         "after": after,
         "free_run": {
-            "rmse": estimate.tracking.rmse,
+            "rmse": estimate.tracking.as_ref().map(|run| run.rmse),
             "validation_rmse": estimate.validation.as_ref().map(|run| run.rmse),
             "initial_rmse": estimate.tracking_initial.as_ref().map(|run| run.rmse),
         },
@@ -168,7 +168,7 @@ mod tests {
         let mut estimate = estimates().refined.clone();
         estimate.after = None;
         estimate.std_error.fill(f64::NAN);
-        estimate.tracking.rmse = f64::INFINITY;
+        estimate.tracking = None;
         estimate.information = None;
         let value = checked(&estimate);
         assert_eq!(value["after"]["p_value"], Value::Null);

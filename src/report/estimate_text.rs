@@ -168,7 +168,7 @@ fn after(estimate: &Estimate) -> Option<String> {
     Some(match estimate.after {
         None => "Whether the calibrated twin explains the record cannot be tested: the features have no more numbers than θ.".into(),
         Some(test) if test.out_of_distribution => format!(
-            "The calibrated twin does not explain the record ({}; a complete twin fails this test in {} % of records): it seems to lack something that no parameter makes up for. Run diagnose to learn what.",
+            "The calibrated twin does not explain the record ({}; a complete twin fails this test in {} % of records): it seems to lack something that no parameter makes up for. The standard errors hold only if nothing is missing.",
             probability(test.p_value),
             100.0 * test.alpha,
         ),
@@ -189,7 +189,10 @@ fn tracking(study: &Study, estimate: &Estimate) -> String {
         }
         _ => String::new(),
     };
-    let after = short(estimate.tracking.rmse);
+    let Some(after) = &estimate.tracking else {
+        return "The free run at the estimate diverges: the twin cannot be run without noise there.".into();
+    };
+    let after = short(after.rmse);
     let mut text = match &estimate.tracking_initial {
         Some(before) if estimate.refitted => {
             format!("Free-run RMSE {} → {after}{unit}", short(before.rmse))

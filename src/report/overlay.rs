@@ -118,7 +118,7 @@ mod tests {
         let found = estimates();
         let (before, after) = (
             found.refined.tracking_initial.as_ref(),
-            &found.refined.tracking,
+            found.refined.tracking.as_ref().unwrap(),
         );
         let svg = overlay_svg(
             &found.study,

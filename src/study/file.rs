@@ -1,8 +1,9 @@
 //! The study file: a twin in the user's own setting.
 
 use crate::feature::FeatureRecipe;
+use crate::files::{folder, with_remedy};
 use crate::study::plan::InputPlan;
-use crate::twin::{Effects, Interval, Level};
+use crate::twin::{CsvError, Effects, Interval, Level, read_drive};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -127,7 +128,7 @@ impl Library {
 #[derive(Debug, thiserror::Error)]
 pub enum StudyFileError {
     /// It cannot be read.
-    #[error("{}: {error}", path.display())]
+    #[error("{}: {}", path.display(), with_remedy(error))]
     Io {
         /// File.
         path: PathBuf,
@@ -144,20 +145,51 @@ pub enum StudyFileError {
         /// What the parser said, in one line.
         message: String,
     },
+    /// The input file cannot be read.
+    #[error(transparent)]
+    Input(#[from] CsvError),
+    /// Step or samples contradict the input file.
+    #[error(
+        "{}: [record] contradicts {}, which has {samples} samples, step {step} s; leave step and samples out",
+        path.display(),
+        input.display()
+    )]
+    Grid {
+        /// File.
+        path: PathBuf,
+        /// Input file.
+        input: PathBuf,
+        /// Step of the input file, in seconds.
+        step: f64,
+        /// Samples of the input file.
+        samples: usize,
+    },
 }
 
 impl StudyFile {
-    /// Reads a study file. A relative input file is looked for beside it.
+    /// Reads a study file. A relative input file is looked for beside it; its step and length become the study's.
     pub fn read(path: &Path) -> Result<Self, StudyFileError> {
         let text = std::fs::read_to_string(path).map_err(|error| StudyFileError::Io {
             path: path.into(),
             error,
         })?;
         let mut file = Self::parse(&text, path)?;
-        if let Some(InputPlan::File(input)) = &mut file.record.input
-            && let Some(folder) = path.parent()
-        {
-            *input = folder.join(&*input);
+        let record = &mut file.record;
+        if let Some(InputPlan::File(input)) = &mut record.input {
+            *input = folder(path).join(&*input);
+            let drive = read_drive(input)?;
+            let (step, samples) = (drive.dt(), drive.samples());
+            let other = record.step.is_some_and(|s| (s - step).abs() > 1e-3 * step)
+                || record.samples.is_some_and(|n| n != samples);
+            if other {
+                return Err(StudyFileError::Grid {
+                    path: path.into(),
+                    input: input.clone(),
+                    step,
+                    samples,
+                });
+            }
+            (record.step, record.samples) = (Some(step), Some(samples));
         }
         Ok(file)
     }

@@ -10,9 +10,10 @@ pub use settings::{CloudSampler, CloudSettings, Preset, PresetName, Settings, Se
 
 use crate::feature::{Ar, Arx, FeatureError, FeatureMap, FeatureRecipe};
 use crate::network::{Architecture, Deep, HeadArchitecture, architecture};
+use crate::twin::conformance::{Finding, Severity};
 use crate::twin::{
-    Adaptation, AdaptationError, CsvError, DigitalTwin, EffectError, ParameterError, Record,
-    RecordError, adapt, augment, fix, given_magnitudes,
+    Adaptation, AdaptationError, CsvError, DigitalTwin, Drive, EffectError, Noise, ParameterError,
+    Record, RecordError, adapt, augment, fix, given_magnitudes,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -56,7 +57,7 @@ pub enum StudyError {
     #[error(transparent)]
     File(#[from] StudyFileError),
     /// The file is about another twin.
-    #[error("the study is about twin \"{given}\"; known are {known}")]
+    #[error("no twin is called \"{given}\"; there are {known}")]
     Twin {
         /// In the file.
         given: String,
@@ -69,6 +70,12 @@ pub enum StudyError {
     /// Of effects.
     #[error(transparent)]
     Effect(#[from] EffectError),
+    /// A parameter is fixed, and has a prior or bounds.
+    #[error("{0} stands in [fixed] and in [prior] or [bounds]; remove one of them")]
+    Contradiction(String),
+    /// `[library]` names an effect that there is not.
+    #[error("[library] names {0}, which is no effect; `truetwin effects --twin T` lists them")]
+    Library(String),
     /// Of fixed parameters.
     #[error("[fixed]: {0}")]
     Fixed(ParameterError),
@@ -92,6 +99,14 @@ pub enum StudyError {
     /// Of a record's channels.
     #[error(transparent)]
     Record(#[from] RecordError),
+}
+
+/// Whether `[library]` names effects only, as `id` or `id@target`.
+fn check_library(library: &Library) -> Result<(), StudyError> {
+    let known: Vec<_> = crate::effect::library().into_iter().map(|d| d.id).collect();
+    let unknown = (library.only.iter().chain(&library.without))
+        .find(|name| !known.contains(&name.split('@').next().unwrap_or(name)));
+    unknown.map_or(Ok(()), |name| Err(StudyError::Library(name.clone())))
 }
 
 impl Study {
@@ -192,6 +207,13 @@ impl Study {
                 .map(|(name, value)| (name.clone(), *value))
                 .collect()
         };
+        let step = file.record.step.unwrap_or(self.plan.step);
+        for table in [&file.prior, &file.bounds] {
+            if let Some(name) = table.keys().find(|name| file.fixed.contains_key(*name)) {
+                return Err(StudyError::Contradiction(name.clone()));
+            }
+        }
+        check_library(&file.library)?;
         let first = Adaptation {
             prior: part(&file.prior, false),
             bounds: part(&file.bounds, false),
@@ -204,10 +226,10 @@ impl Study {
             bounds: part(&file.bounds, true),
             ..Adaptation::default()
         };
-        let mut twin = adapt(self.base.clone(), &first)?;
+        let mut twin = adapt(self.base.clone(), &first, step)?;
         twin = augment(twin, file.effect.clone())?;
         if second != Adaptation::default() {
-            twin = adapt(twin, &second)?;
+            twin = adapt(twin, &second, step)?;
         }
         let space = twin.parameters();
         for (name, &value) in &file.fixed {
@@ -295,6 +317,48 @@ impl Study {
     /// What drives are drawn from.
     pub fn drives(&self) -> Result<DriveSource, PlanError> {
         self.plan.prepare(&self.twin.signals())
+    }
+
+    /// Whether a recipe's features can be taken from a simulated record, and its network reads as many.
+    ///
+    /// # Errors
+    ///
+    /// As [`features`](Self::features).
+    pub fn check_features(
+        &self,
+        preset: PresetName,
+        drive: &Drive,
+        seed: u64,
+    ) -> Result<Finding, FeatureError> {
+        let Preset {
+            features,
+            architecture,
+            ..
+        } = self.preset(preset);
+        let map = self.features(features.as_ref())?;
+        let noise = Noise::new(seed, "check features", 0);
+        let most = architecture.max_features();
+        let extracted = (self
+            .twin
+            .simulate(&self.twin.parameters().centre(), drive, noise))
+        .map_err(|error| error.to_string())
+        .and_then(|y| map.extract(drive, &y).map_err(|error| error.to_string()));
+        let (severity, message) = match extracted {
+            Err(error) => (Severity::Failure, error),
+            Ok(x) if x.len() > most => {
+                let (n, id) = (x.len(), architecture.id());
+                let problem = format!(
+                    "{n} features, network \"{id}\" takes at most {most}; lower their order"
+                );
+                (Severity::Failure, problem)
+            }
+            Ok(x) => (Severity::Pass, format!("{} features of a record", x.len())),
+        };
+        Ok(Finding {
+            check: "features",
+            severity,
+            message,
+        })
     }
 
     /// Whether a record has the step and the channels of this study.

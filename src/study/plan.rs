@@ -6,9 +6,15 @@ use crate::twin::{
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
+/// Longest record that is simulated.
+const MOST_SAMPLES: usize = 50_000_000;
+
 /// Where the inputs of simulated records come from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(
+    untagged,
+    expecting = "expected { levels = [low, high], hold = n } with low < high, or the name of a CSV file"
+)]
 pub enum InputPlan {
     /// Each input an independent staircase: levels uniform in `levels`, each held for `hold` samples; fresh for each
     /// record.
@@ -47,6 +53,14 @@ pub enum PlanError {
     /// A hold of zero samples.
     #[error("[record] hold = 0; a level is held for at least 1 sample")]
     Hold,
+    /// The twin has no input, and the study gives one.
+    #[error("[record] input is given, but the twin has no input; remove it")]
+    Surplus,
+    /// More samples than any record has.
+    #[error(
+        "[record] samples = {0}; at most {MOST_SAMPLES} can be simulated: take a larger step or a shorter record"
+    )]
+    Samples(usize),
     /// The twin has inputs, and nothing says which.
     #[error(
         "the twin has {0} inputs; say what they look like: [record] input = {{ levels = [low, high], hold = n }}, or a file"
@@ -101,7 +115,9 @@ impl RecordPlan {
     pub fn prepare(&self, signals: &Signals) -> Result<DriveSource, PlanError> {
         let channels = signals.inputs.len();
         let fixed = match &self.input {
-            _ if channels == 0 => Some(Drive::autonomous(self.step, self.samples)?),
+            Some(_) if channels == 0 => return Err(PlanError::Surplus),
+            _ if self.samples > MOST_SAMPLES => return Err(PlanError::Samples(self.samples)),
+            None if channels == 0 => Some(Drive::autonomous(self.step, self.samples)?),
             None => return Err(PlanError::NoInput(channels)),
             Some(InputPlan::File(path)) => Some(self.read(path, channels)?),
             Some(InputPlan::Levels(Levels { levels, hold })) => {

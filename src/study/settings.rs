@@ -7,6 +7,9 @@ use crate::refine::{RefineSettings, RefineSettingsError};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
+/// Largest bank that is held in memory.
+const MOST_SIMULATIONS: usize = 10_000_000;
+
 /// Which of a study's two recipes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -206,6 +209,14 @@ impl Settings {
         if self.bank_size < 100 {
             let value = self.bank_size as f64;
             return refuse("bank size", value, "train on at least 100 simulations");
+        }
+        if self.bank_size > MOST_SIMULATIONS {
+            let value = self.bank_size as f64;
+            return refuse(
+                "bank size",
+                value,
+                "at most 10 million simulations fit into memory",
+            );
         }
         if self.cloud.size < 10 {
             let value = self.cloud.size as f64;

@@ -19,7 +19,7 @@ pub enum Level {
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected a number, or \"estimate\"")]
 enum LevelText {
     Number(f64),
     Word(Word),
@@ -111,10 +111,12 @@ pub enum AdaptationError {
     Parameter(#[from] ParameterError),
 }
 
-/// The twin in another setting; θ is the twin's, then unknown noise levels, then unknown starts.
+/// The twin in another setting; θ is the twin's, then unknown noise levels, then unknown starts. `step` is the Δt, in
+/// seconds, at which the twin's own noise levels are taken.
 pub fn adapt(
     base: Arc<dyn DigitalTwin>,
     adaptation: &Adaptation,
+    step: f64,
 ) -> Result<Arc<dyn DigitalTwin>, AdaptationError> {
     let Some(equations) = base.state_space() else {
         for (table, used) in [
@@ -146,7 +148,7 @@ pub fn adapt(
     for (name, &limit) in &adaptation.limits {
         limits[position("limits", name, &states)?] = limit;
     }
-    let declared = declared_noise(equations, &outline);
+    let declared = declared_noise(equations, &outline, step);
     let mut added: Vec<Parameter> = Vec::new();
     let mut noise = Vec::new();
     for (name, &level) in &adaptation.noise {
@@ -216,7 +218,7 @@ pub fn adapt(
 }
 
 /// Noise levels of states, then outputs, at the prior's centre.
-fn declared_noise(twin: &dyn StateSpace, outline: &Outline) -> Vec<f64> {
+fn declared_noise(twin: &dyn StateSpace, outline: &Outline, step: f64) -> Vec<f64> {
     let (mut q, mut r) = (
         vec![0.0; outline.states.len()],
         vec![0.0; outline.outputs.len()],
@@ -224,7 +226,7 @@ fn declared_noise(twin: &dyn StateSpace, outline: &Outline) -> Vec<f64> {
     let centre = outline.parameters.centre();
     let now = Now {
         t: 0.0,
-        dt: 1.0,
+        dt: step,
         u: &vec![0.0; outline.inputs.len()],
         theta: &centre,
     };
@@ -252,7 +254,7 @@ fn unknown(
     Ok(parameter)
 }
 
-/// Sets prior boxes and bounds. Bounds that are not given widen to hold a given prior.
+/// Sets prior boxes and bounds.
 fn rebox(parameters: &mut ParameterSpace, adaptation: &Adaptation) -> Result<(), AdaptationError> {
     for (table, boxes) in [("prior", &adaptation.prior), ("bounds", &adaptation.bounds)] {
         for (name, &interval) in boxes {
@@ -269,12 +271,6 @@ fn rebox(parameters: &mut ParameterSpace, adaptation: &Adaptation) -> Result<(),
                 "prior" => parameter.prior = interval,
                 _ => parameter.bounds = interval,
             }
-        }
-    }
-    for p in parameters.iter_mut() {
-        if !adaptation.bounds.contains_key(&p.name) {
-            let (low, high) = (p.bounds.low(), p.bounds.high());
-            p.bounds = Interval::unchecked(low.min(p.prior.low()), high.max(p.prior.high()));
         }
     }
     Ok(parameters.check()?)

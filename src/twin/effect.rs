@@ -234,6 +234,22 @@ pub enum EffectError {
         /// What there is.
         known: String,
     },
+    /// The same effect on the same target twice.
+    #[error("effect {id} on {target} is given twice; give it once")]
+    Duplicate {
+        /// Effect.
+        id: String,
+        /// Target.
+        target: String,
+    },
+    /// An effect between a state and itself.
+    #[error("effect {id} goes from {target} to itself; name another state")]
+    Itself {
+        /// Effect.
+        id: String,
+        /// Target.
+        target: String,
+    },
     /// A memory after the noise, where the framework keeps none.
     #[error(
         "effect {id} remembers and stands after the noise; give it an order below {NOISE_ENTERS}"
@@ -305,9 +321,22 @@ pub fn check_effects(
                     id,
                     what,
                     name: name.into(),
-                    known: known.join(", "),
+                    known: match known.is_empty() {
+                        true => "none: there is nothing of the kind".into(),
+                        false => known.join(", "),
+                    },
                 });
             }
+        }
+        let target = effect.target().to_owned();
+        let same = |other: &Arc<dyn UnmodelledEffect>| {
+            other.typetag_name() == id && other.target() == target
+        };
+        if effects.iter().filter(|other| same(other)).count() > 1 {
+            return Err(EffectError::Duplicate { id, target });
+        }
+        if law == Law::Force && effect.other() == Some(effect.target()) {
+            return Err(EffectError::Itself { id, target });
         }
         let declared = effect.magnitudes();
         for (name, &value) in &effect.given().0 {

@@ -1,5 +1,6 @@
 //! A twin with some parameters held at known values.
 
+use super::state_space::check_parameters;
 use super::{
     DigitalTwin, Drive, Integrator, Interval, Noise, Now, Outline, ParameterError, ParameterSpace,
     Signal, Signals, SimulationError, StateSpace,
@@ -80,7 +81,8 @@ impl DigitalTwin for FixedTwin {
         drive: &Drive,
         noise: Noise,
     ) -> Result<Signal, SimulationError> {
-        let FixedEquations { base, map, .. } = &self.equations;
+        let FixedEquations { base, map, outline } = &self.equations;
+        check_parameters(outline.parameters.len(), theta)?;
         base.simulate(&map.complete(theta), drive, noise)
     }
 }
@@ -168,6 +170,7 @@ impl DigitalTwin for FixedBlackBox {
         drive: &Drive,
         noise: Noise,
     ) -> Result<Signal, SimulationError> {
+        check_parameters(self.free.len(), theta)?;
         self.base.simulate(&self.map.complete(theta), drive, noise)
     }
 }

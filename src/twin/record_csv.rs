@@ -5,14 +5,14 @@
 
 use super::record::column_names;
 use super::{Drive, DriveError, Record, RecordError, Signal};
-use std::io::Write;
+use crate::files::{with_remedy, write_new};
 use std::path::{Path, PathBuf};
 
 /// What is wrong with a file: which file, where, which value, and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum CsvError {
     /// The file cannot be read or written.
-    #[error("{}: {error}", path.display())]
+    #[error("{}: {}", path.display(), with_remedy(error))]
     Io {
         /// File.
         path: PathBuf,
@@ -20,7 +20,7 @@ pub enum CsvError {
         error: std::io::Error,
     },
     /// The text is no CSV table.
-    #[error("{}: {error}; each row needs as many cells as the header", path.display())]
+    #[error("{}: {error}; a record is UTF-8 text, each row with as many cells as the header", path.display())]
     Syntax {
         /// File.
         path: PathBuf,
@@ -111,7 +111,7 @@ pub fn record_csv_text(record: &Record) -> String {
     let mut text = header.join(",");
     text.push('\n');
     for k in 0..record.samples() {
-        text.push_str(&rounded_time(drive.time(k)).to_string());
+        text.push_str(&rounded_time(drive.time(k), drive.dt()).to_string());
         for value in drive.input(k).iter().chain(outputs.row(k)) {
             text.push_str(&format!(",{value}"));
         }
@@ -120,23 +120,18 @@ pub fn record_csv_text(record: &Record) -> String {
     text
 }
 
-/// Writes a record; the file appears whole or not at all.
+/// Writes a record to a new file, which appears whole or not at all.
 pub fn write_record(path: &Path, record: &Record) -> Result<(), CsvError> {
-    let io = |error| CsvError::Io {
+    write_new(path, record_csv_text(record).as_bytes()).map_err(|error| CsvError::Io {
         path: path.into(),
         error,
-    };
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-    let mut file = tempfile::NamedTempFile::new_in(folder.unwrap_or(Path::new("."))).map_err(io)?;
-    file.write_all(record_csv_text(record).as_bytes())
-        .map_err(io)?;
-    file.persist(path).map_err(|error| io(error.error))?;
-    Ok(())
+    })
 }
 
-/// Time to the picosecond, so that 3·0.1 is written as 0.3.
-fn rounded_time(t: f64) -> f64 {
-    let rounded = (t * 1e12).round() / 1e12;
+/// Time to a billionth of the step, so that 3·0.1 is written as 0.3.
+fn rounded_time(t: f64, dt: f64) -> f64 {
+    let digits = 10f64.powi(9 - dt.log10().floor() as i32);
+    let rounded = (t * digits).round() / digits;
     if rounded.is_finite() { rounded } else { t }
 }
 
@@ -274,6 +269,9 @@ fn channels(header: &csv::StringRecord) -> Result<(usize, usize), String> {
         return Err(format!(
             "column \"{name}\" is not part of a record; name the columns t, u or u1,u2,…, y or y1,y2,… and remove others"
         ));
+    }
+    if header.iter().all(str::is_empty) {
+        return Err("the file is empty; a record needs a header t,u,y and rows".into());
     }
     if header.len() != expected.len() || !header.iter().any(|name| name == "t") {
         return Err(format!(

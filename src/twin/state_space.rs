@@ -91,7 +91,11 @@ pub trait StateSpace: Send + Sync {
     fn integrator(&self) -> Integrator {
         Integrator::Euler
     }
+}
 
+/// One step of any equations. Not a part of [`StateSpace`], so that no twin can have a step of its own which twins made of
+/// it would not know.
+pub trait Advance: StateSpace {
     /// One step without noise and limits: memories, then motion.
     fn advance(&self, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
         self.update(now, x);
@@ -99,6 +103,8 @@ pub trait StateSpace: Send + Sync {
             .step(now, x, work, |now, x, dx| self.drift(now, x, dx));
     }
 }
+
+impl<T: StateSpace + ?Sized> Advance for T {}
 
 /// Where the equations are evaluated.
 #[derive(Debug, Clone, Copy)]
@@ -145,20 +151,21 @@ impl<T: StateSpace> DigitalTwin for T {
     }
 }
 
-/// Checks lengths once, before the loop relies on them.
-pub(super) fn check_lengths(
-    parameters: usize,
-    inputs: usize,
-    theta: &[f64],
-    drive: &Drive,
-) -> Result<(), SimulationError> {
-    let given = drive.inputs().ncols();
-    if theta.len() != parameters {
-        return Err(SimulationError::fatal(format!(
-            "{} parameter values given, the twin has {parameters}",
-            theta.len()
-        )));
+/// Whether θ has the twin's length.
+pub(super) fn check_parameters(parameters: usize, theta: &[f64]) -> Result<(), SimulationError> {
+    if theta.len() == parameters {
+        return Ok(());
     }
+    Err(SimulationError::fatal(format!(
+        "{} parameter values given, the twin has {parameters}",
+        theta.len()
+    )))
+}
+
+/// Checks lengths once, before the loop relies on them.
+fn check_lengths(outline: &Outline, theta: &[f64], drive: &Drive) -> Result<(), SimulationError> {
+    check_parameters(outline.parameters.len(), theta)?;
+    let (given, inputs) = (drive.inputs().ncols(), outline.inputs.len());
     if given != inputs {
         return Err(SimulationError::fatal(format!(
             "the drive has {given} inputs, the twin has {inputs}"
@@ -175,7 +182,7 @@ fn simulate_equations(
     noise: Noise,
 ) -> Result<Signal, SimulationError> {
     let outline = twin.outline();
-    check_lengths(outline.parameters.len(), outline.inputs.len(), theta, drive)?;
+    check_lengths(&outline, theta, drive)?;
     twin.admit(theta, drive.dt())?;
     let (n, p) = (outline.states.len(), outline.outputs.len());
     let limits: Vec<(usize, Interval)> = twin

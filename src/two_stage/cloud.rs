@@ -10,7 +10,7 @@ use crate::progress::Progress;
 use crate::refine::Refined;
 use crate::sample::{Ellipsoid, Hybrid, Sampler, Sensitivity};
 use crate::study::{CloudSampler, Settings};
-use crate::twin::{Drive, Noise};
+use crate::twin::{Drive, Interval, Noise};
 use nalgebra::DVector;
 use ndarray::{Array2, s};
 use std::borrow::Cow;
@@ -28,6 +28,10 @@ pub struct Tuned {
     /// Losses.
     pub history: History,
 }
+
+/// Draws out of bounds before a draw is reflected at them: where the estimate lies in a corner of many dimensions, hardly
+/// any draw falls inside by itself.
+const REDRAWS: usize = 10;
 
 /// Part of the cloud that is simulated beyond M_FT, to measure the error of the tuned heads.
 const CALIBRATION_SHARE: usize = 5;
@@ -49,8 +53,11 @@ pub fn cloud(
     let draws = simulator.draws(
         size,
         |i| noise.sample(i),
-        |i, noise| {
-            let theta = sampler.draw(i, noise).as_slice().to_vec();
+        |i, attempt, noise| {
+            let mut theta = sampler.draw(i, noise).as_slice().to_vec();
+            if attempt >= REDRAWS {
+                reflect(&mut theta, &space.bounds());
+            }
             Ok(space.check_point(&theta).is_ok().then_some(Draw {
                 theta,
                 drive: Cow::Borrowed(drive),
@@ -59,6 +66,22 @@ pub fn cloud(
         &stage,
     )?;
     Ok(draws)
+}
+
+/// Folds each value into its bounds, as light between two mirrors.
+fn reflect(theta: &mut [f64], bounds: &[Interval]) {
+    for (value, bounds) in theta.iter_mut().zip(bounds) {
+        let width = bounds.width();
+        let phase = (*value - bounds.low()).rem_euclid(2.0 * width);
+        let inside = bounds.low()
+            + if phase > width {
+                2.0 * width - phase
+            } else {
+                phase
+            };
+        // Rounding may leave the box by a bit.
+        *value = bounds.clamp(inside);
+    }
 }
 
 /// The sampler of the settings around θ_GN.
@@ -143,4 +166,18 @@ pub fn tune(
         network,
         history,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reflection_ends_inside_and_leaves_the_inside_alone() {
+        let bounds = [Interval::new(1.0, 3.0).unwrap(); 5];
+        let mut theta = [2.5, 3.5, 0.25, 5.5, -40.0];
+        reflect(&mut theta, &bounds);
+        assert_eq!(theta[..4], [2.5, 2.5, 1.75, 1.5]);
+        assert!(bounds[4].contains(theta[4]));
+    }
 }

@@ -6,7 +6,6 @@ use crate::bank::{BankError, FeatureSimulator};
 use crate::feature::FeatureError;
 use crate::gate::{GateError, GateOutcome, GateTest};
 use crate::network::NetworkError;
-use crate::optimise::OptimiseError;
 use crate::progress::{Cancelled, Progress};
 use crate::refine::{Information, RefineError, Refined, Refinement};
 use crate::sample::EllipsoidError;
@@ -64,11 +63,11 @@ pub struct Estimate {
     pub after: Option<GateOutcome>,
     /// Whether a refit was made at all.
     pub refitted: bool,
-    /// The free run at `theta`, unknown starts refitted.
-    pub tracking: Tracking,
+    /// The free run at `theta`, unknown starts refitted; `None` where it diverges.
+    pub tracking: Option<Tracking>,
     /// The free run at the network's estimate, for comparison; `None` without a refit, or where it diverges.
     pub tracking_initial: Option<Tracking>,
-    /// Free-run RMSE on the validation record.
+    /// The free run on the validation record; `None` without one, or where it diverges.
     pub validation: Option<Tracking>,
     /// Simulator calls.
     pub simulations: usize,
@@ -135,9 +134,6 @@ pub enum EstimateError {
     /// The network failed.
     #[error(transparent)]
     Network(#[from] NetworkError),
-    /// The free run failed.
-    #[error("the free run at the estimate failed: {0}")]
-    Tracking(#[from] OptimiseError),
     /// Stopped from outside.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -197,7 +193,8 @@ impl Estimator {
             _ => &self.settings,
         };
         settings.check()?;
-        let observed = self.observe(record)?;
+        let simulator = self.simulator()?;
+        let observed = simulator.observe(record)?;
         let initial = self.predict_one(&observed)?;
         let mut seconds = Seconds {
             predict: clock.elapsed().as_secs_f64(),
@@ -212,7 +209,6 @@ impl Estimator {
             seed: options.seed,
             progress,
         };
-        let simulator = self.simulator();
         let lap = Instant::now();
         let gate = (run.gate_test(&simulator, "gate").at(&initial)?).test(&observed);
         seconds.gate = lap.elapsed().as_secs_f64();
@@ -221,13 +217,14 @@ impl Estimator {
         } else {
             run.keep(&simulator, &initial)?
         };
-        let twin = self.study.twin().as_ref();
-        let tracking = track(twin, &outcome.theta, record)?;
-        let validation = (options.validation.as_ref())
-            .map(|record| track(twin, &tracking.theta, record))
-            .transpose()?;
+        let twin = simulator.twin();
+        // A free run may diverge where noisy runs do not; the estimate stands all the same.
+        let follow = |theta: &[f64], record: &Record| track(twin, theta, record).ok();
+        let tracking = follow(&outcome.theta, record);
+        let fitted = tracking.as_ref().map_or(&outcome.theta, |t| &t.theta);
+        let validation = (options.validation.as_ref()).and_then(|record| follow(fitted, record));
         let tracking_initial = (outcome.refitted)
-            .then(|| track(twin, &initial, record).ok())
+            .then(|| follow(&initial, record))
             .flatten();
         let space = twin.parameters();
         seconds.total = clock.elapsed().as_secs_f64();
@@ -299,6 +296,7 @@ impl Run<'_> {
             settings: &self.settings.refine,
             gate: &self.settings.gate,
             noise: self.noise.child("refine"),
+            progress: self.progress,
         }
     }
 
@@ -346,7 +344,7 @@ impl Run<'_> {
         let (settings, progress) = (self.settings, self.progress);
         let lap = Instant::now();
         let refinement = self.refinement(simulator);
-        let refined = refinement.run(initial, progress)?;
+        let refined = refinement.run(initial)?;
         seconds.gauss_newton = Some(lap.elapsed().as_secs_f64());
         let lap = Instant::now();
         let noise = self.noise.child("cloud");
@@ -402,11 +400,17 @@ impl Run<'_> {
                 outcome.std_error = spread.std_error;
             }
         }
-        outcome.after = self.gate_test(simulator, "after").after_refit(
+        let after = self.gate_test(simulator, "after").after_refit(
             &outcome.theta,
             &refined.jacobian,
             self.observed,
-        )?;
+        );
+        outcome.after = match after {
+            Ok(after) => after,
+            // Simulations at the answer cannot be tested (they diverge, say); the answer stands.
+            Err(GateError::Bank(BankError::Hopeless { .. }) | GateError::Whitening(_)) => None,
+            Err(error) => return Err(error.into()),
+        };
         outcome.information = Some(refined.information);
         Ok(outcome)
     }

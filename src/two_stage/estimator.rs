@@ -2,7 +2,7 @@
 
 use super::{Calibration, Scaler};
 use crate::bank::FeatureSimulator;
-use crate::feature::{FeatureError, FeatureMap, FeatureRecipe};
+use crate::feature::{FeatureError, FeatureRecipe};
 use crate::network::{Architecture, Network, NetworkError};
 use crate::study::{PresetName, Settings, Study};
 use crate::twin::Record;
@@ -19,7 +19,6 @@ pub struct Estimator {
     pub(super) preset: PresetName,
     pub(super) settings: Settings,
     pub(super) recipe: Arc<dyn FeatureRecipe>,
-    pub(super) map: Arc<dyn FeatureMap>,
     pub(super) architecture: Arc<dyn Architecture>,
     pub(super) network: Arc<dyn Network>,
     pub(super) features: Scaler,
@@ -67,14 +66,13 @@ impl Estimator {
     }
 
     /// Twin and features, with a call counter of its own.
-    pub fn simulator(&self) -> FeatureSimulator {
-        FeatureSimulator::new(self.study.twin().clone(), self.map.clone())
+    pub fn simulator(&self) -> Result<FeatureSimulator, FeatureError> {
+        FeatureSimulator::new(self.study.twin().clone(), self.recipe.as_ref())
     }
 
     /// Features of a record.
     pub fn observe(&self, record: &Record) -> Result<DVector<f64>, FeatureError> {
-        let features = self.map.extract(record.drive(), record.outputs())?;
-        Ok(DVector::from_vec(features))
+        self.simulator()?.observe(record)
     }
 
     /// Predictions (rows: samples, columns: parameters) from features, clipped to the physical bounds.

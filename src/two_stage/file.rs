@@ -6,6 +6,7 @@
 
 use super::{Calibration, Estimator, Scaler};
 use crate::feature::{FeatureError, FeatureRecipe};
+use crate::files::{with_remedy, write_new};
 use crate::network::{NamedTensor, NetworkError};
 use crate::study::{PresetName, Settings, Study, StudyError, StudyFile, StudyFileError};
 use ndarray::Array2;
@@ -13,7 +14,6 @@ use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, HashMap};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -45,7 +45,7 @@ struct Header {
 #[derive(Debug, thiserror::Error)]
 pub enum EstimatorFileError {
     /// It cannot be read or written.
-    #[error("{}: {error}", path.display())]
+    #[error("{}: {}", path.display(), with_remedy(error))]
     Io {
         /// File.
         path: PathBuf,
@@ -137,7 +137,7 @@ impl At<'_> {
 }
 
 impl Estimator {
-    /// Writes the file; it appears whole or not at all. The same estimator gives the same bytes.
+    /// Writes a new file; it appears whole or not at all. The same estimator gives the same bytes.
     pub fn save(&self, path: &Path) -> Result<(), EstimatorFileError> {
         let at = At(path);
         let study = toml::to_string(self.study.file()).map_err(|e| at.foreign(e))?;
@@ -167,13 +167,7 @@ impl Estimator {
         let metadata = Some(HashMap::from([(KEY.to_owned(), text)]));
         let bytes = safetensors::serialize(views, &metadata)
             .map_err(|error| at.foreign(format!("{error:?}")))?;
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-        let mut file = tempfile::NamedTempFile::new_in(folder.unwrap_or(Path::new(".")))
-            .map_err(|e| at.io(e))?;
-        file.write_all(&bytes).map_err(|e| at.io(e))?;
-        file.as_file().sync_all().map_err(|e| at.io(e))?;
-        file.persist(path).map_err(|e| at.io(e.error))?;
-        Ok(())
+        write_new(path, &bytes).map_err(|e| at.io(e))
     }
 
     /// Reads a file made for one of `studies`.
@@ -270,7 +264,6 @@ impl Estimator {
             settings: header.settings,
             recipe: header.features,
             seed: header.seed,
-            map,
             architecture,
             network,
             study,

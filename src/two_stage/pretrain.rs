@@ -74,17 +74,16 @@ pub fn pretrain(
     settings.bank_size = options.bank_size.unwrap_or(settings.bank_size);
     settings.training.epochs = options.epochs.unwrap_or(settings.training.epochs);
     settings.check()?;
-    let map = study.features(preset.features.as_ref())?;
+    let simulator = FeatureSimulator::new(study.twin().clone(), preset.features.as_ref())?;
     let most = preset.architecture.max_features();
-    if map.dim() > most {
+    if simulator.dim() > most {
         return Err(PretrainError::TooManyFeatures {
-            features: map.dim(),
+            features: simulator.dim(),
             network: preset.architecture.id(),
             most,
         });
     }
     let drives = study.drives()?;
-    let simulator = FeatureSimulator::new(study.twin().clone(), map.clone());
     let stage = progress.stage("bank", settings.bank_size + CALIBRATION);
     let seed = options.seed;
     let bank =
@@ -105,7 +104,6 @@ pub fn pretrain(
         preset: options.preset,
         settings,
         recipe: preset.features.clone(),
-        map,
         architecture: preset.architecture.clone(),
         network,
         features,
@@ -133,7 +131,7 @@ fn simulate(
     simulator.draws(
         size,
         |i| Noise::new(seed, purpose, i),
-        |_, noise| {
+        |_, _, noise| {
             let drive = drives
                 .draw(noise)
                 .map_err(|error| BankError::Input(error.to_string()))?;
