@@ -1,6 +1,6 @@
 //! Simulations compressed to features: banks for training, clouds around an estimate, nulls for tests.
 
-use crate::feature::{FeatureError, FeatureMap, FeatureRecipe};
+use crate::feature::{Centred, FeatureError, FeatureMap, FeatureRecipe};
 use crate::progress::{Cancelled, Stage};
 use crate::twin::{
     DigitalTwin, Drive, Noise, ParameterSpace, Record, Signal, Signals, SimulationError, StateSpace,
@@ -163,6 +163,28 @@ impl FeatureSimulator {
         Ok(DVector::from_vec(features))
     }
 
+    /// The simulator with its features centred on a record, and where the record puts θ; `None` for features that do not
+    /// centre themselves. Calls are counted together.
+    ///
+    /// # Errors
+    ///
+    /// As [`FeatureMap::centred`].
+    pub fn centred(
+        &self,
+        record: &Record,
+        initial: &[f64],
+        noise: Noise,
+    ) -> Result<Option<(Self, Centred)>, FeatureError> {
+        let found = self.map.centred(record, initial, noise)?;
+        Ok(found.map(|centred| {
+            let simulator = Self {
+                twin: self.twin.clone(),
+                map: centred.map.clone(),
+            };
+            (simulator, centred)
+        }))
+    }
+
     /// Features of one simulation.
     pub fn features(
         &self,
@@ -184,8 +206,12 @@ impl FeatureSimulator {
             Err(
                 error @ (FeatureError::Constant { .. }
                 | FeatureError::Regression(_)
+                | FeatureError::Information
                 | FeatureError::Reference(SimulationError::Diverged { .. })),
             ) => rejected(error.to_string()),
+            Err(FeatureError::Filter(error)) if error.is_recoverable() => {
+                rejected(error.to_string())
+            }
             Err(error) => Err(BankError::Feature(error).into()),
         }
     }

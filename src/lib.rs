@@ -38,6 +38,8 @@ pub mod progress;
 
 pub mod twin;
 
+pub mod filter;
+
 pub mod feature;
 pub mod network;
 

@@ -6,19 +6,24 @@
 //! |---|---|---|
 //! | [`Ar`] | AR(p) coefficients of each output | twins without input |
 //! | [`Arx`] | ARX(p, q) coefficients of each output, with all inputs | twins with inputs |
+//! | [`Score`] | Newton step and information of a filter's likelihood | twins with equations |
 //! | [`Deviation`] | block means of the output's deviation from a reference run | records that the twin must *track*; starts; misspecified twins |
 
 mod ar;
 mod arx;
 mod deviation;
 mod regression;
+mod score;
 
 pub use ar::Ar;
 pub use arx::Arx;
 pub use deviation::Deviation;
+pub use score::Score;
 
+use crate::filter::FilterError;
 use crate::math::LeastSquaresError;
-use crate::twin::{DigitalTwin, Drive, Signal, SimulationError};
+use crate::twin::{DigitalTwin, Drive, Noise, Record, Signal, SimulationError};
+use nalgebra::DMatrix;
 use std::fmt::Debug;
 use std::sync::Arc;
 
@@ -31,6 +36,32 @@ pub trait FeatureMap: Send + Sync {
 
     /// Features of outputs (N × channels) under `drive`; length [`dim`](Self::dim), all finite.
     fn extract(&self, drive: &Drive, outputs: &Signal) -> Result<Vec<f64>, FeatureError>;
+
+    /// The map centred on one record, for features that are best near a reference and can find it without simulations;
+    /// `None` for all others. `initial` is an estimate at hand, `noise` draws whatever the search needs.
+    ///
+    /// # Errors
+    ///
+    /// A search that cannot work on this record at all.
+    fn centred(
+        &self,
+        _record: &Record,
+        _initial: &[f64],
+        _noise: Noise,
+    ) -> Result<Option<Centred>, FeatureError> {
+        Ok(None)
+    }
+}
+
+/// A map centred on a record, and where the record puts θ.
+#[derive(Clone)]
+pub struct Centred {
+    /// Features about the new reference; as many as before.
+    pub map: Arc<dyn FeatureMap>,
+    /// The reference.
+    pub theta: Vec<f64>,
+    /// Columns: principal axes of θ's uncertainty, one standard deviation long, in parameter units.
+    pub axes: DMatrix<f64>,
 }
 
 /// What study and estimator files hold of a feature map: `{ kind = "ar", order = 5 }`.
@@ -76,6 +107,12 @@ pub enum FeatureError {
     /// The regression failed.
     #[error("the regression of the features failed: {0}")]
     Regression(#[from] LeastSquaresError),
+    /// The filter failed.
+    #[error("the filter of the features failed: {0}")]
+    Filter(#[from] FilterError),
+    /// The information at the reference is no covariance.
+    #[error("the filter's information at the reference is not positive definite")]
+    Information,
     /// The reference run failed.
     #[error("the reference run of the features failed: {0}")]
     Reference(#[from] SimulationError),
@@ -116,6 +153,9 @@ mod testing {
         }
         fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
             y[0] = x[0];
+        }
+        fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+            (process[0], measurement[0]) = (0.02, 0.05);
         }
     }
 }

@@ -1,9 +1,11 @@
 //! Where the cloud of fresh simulations around an estimate is drawn from.
 
+mod eigenbox;
 mod ellipsoid;
 mod hybrid;
 mod sensitivity;
 
+pub use eigenbox::EigenBox;
 pub use ellipsoid::{Ellipsoid, EllipsoidError};
 pub use hybrid::Hybrid;
 pub use sensitivity::Sensitivity;

@@ -52,6 +52,8 @@ pub enum CloudSampler {
     Sensitivity,
     /// The paper's alternation of both.
     Hybrid,
+    /// Uniform in the box of the principal axes, ±1.8·`spread` standard deviations: flat over the region.
+    Box,
 }
 
 /// The cloud of fresh simulations around θ_GN.

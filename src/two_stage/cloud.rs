@@ -4,14 +4,15 @@ use super::estimate::INTERVAL_LEVEL;
 use super::estimator::one_row;
 use super::{Calibration, EstimateError, Estimator, Scaler, Spread};
 use crate::bank::{Draw, Draws, FeatureSimulator};
+use crate::feature::Centred;
 use crate::math::median;
 use crate::network::{History, Network, Training};
 use crate::progress::Progress;
 use crate::refine::Refined;
-use crate::sample::{Ellipsoid, Hybrid, Sampler, Sensitivity};
+use crate::sample::{EigenBox, Ellipsoid, Hybrid, Sampler, Sensitivity};
 use crate::study::{CloudSampler, Settings};
-use crate::twin::{Drive, Interval, Noise};
-use nalgebra::DVector;
+use crate::twin::{Drive, Interval, Noise, ParameterSpace};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use ndarray::{Array2, s};
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -36,18 +37,35 @@ const REDRAWS: usize = 10;
 /// Part of the cloud that is simulated beyond M_FT, to measure the error of the tuned heads.
 const CALIBRATION_SHARE: usize = 5;
 
-/// The cloud: M_FT simulations around θ_GN under the record's own input, and a fifth more for calibration; row i
+/// Where a cloud is drawn.
+pub struct Around<'a> {
+    /// Twin and features.
+    pub simulator: &'a FeatureSimulator,
+    /// The record's input.
+    pub drive: &'a Drive,
+    /// Gauss–Newton's estimate.
+    pub refined: &'a Refined,
+    /// Where the features themselves put θ, if they can tell.
+    pub region: Option<&'a Centred>,
+    /// Settings.
+    pub settings: &'a Settings,
+}
+
+/// The cloud: M_FT simulations around the estimate under the record's own input, and a fifth more for calibration; row i
 /// depends on the seed and i alone.
 pub fn cloud(
-    simulator: &FeatureSimulator,
-    refined: &Refined,
-    drive: &Drive,
-    settings: &Settings,
+    around: &Around<'_>,
     noise: Noise,
     progress: &Progress,
 ) -> Result<Draws, EstimateError> {
+    let Around {
+        simulator,
+        drive,
+        settings,
+        ..
+    } = *around;
     let space = simulator.twin().parameters();
-    let sampler = sampler(&space, refined, settings)?;
+    let sampler = sampler(&space, around)?;
     let size = settings.cloud.size + settings.cloud.size / CALIBRATION_SHARE;
     let stage = progress.stage("cloud", size);
     let draws = simulator.draws(
@@ -84,12 +102,19 @@ fn reflect(theta: &mut [f64], bounds: &[Interval]) {
     }
 }
 
-/// The sampler of the settings around θ_GN.
-fn sampler(
-    space: &crate::twin::ParameterSpace,
-    refined: &Refined,
-    settings: &Settings,
-) -> Result<Box<dyn Sampler>, EstimateError> {
+/// Half-width of the box, in standard deviations of a cloud of spread 1.
+const BOX_REACH: f64 = 1.8;
+
+/// The sampler of the settings around the estimate.
+fn sampler(space: &ParameterSpace, around: &Around<'_>) -> Result<Box<dyn Sampler>, EstimateError> {
+    let Around {
+        refined, settings, ..
+    } = *around;
+    let reach = BOX_REACH * settings.cloud.spread;
+    if let Some(region) = around.region {
+        let centre = DVector::from_column_slice(&region.theta);
+        return Ok(Box::new(EigenBox::new(centre, region.axes.clone(), reach)));
+    }
     let centre = refined.theta.clone();
     let ellipsoid = || {
         let information = &refined.information.matrix / settings.cloud.spread.powi(2);
@@ -106,6 +131,12 @@ fn sampler(
     Ok(match settings.cloud.sampler {
         CloudSampler::Ellipsoid => Box::new(ellipsoid()?),
         CloudSampler::Sensitivity => Box::new(sensitivity()),
+        CloudSampler::Box => {
+            let eigen = SymmetricEigen::new(refined.information.covariance.clone());
+            let lengths = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
+            let axes = eigen.eigenvectors * DMatrix::from_diagonal(&lengths);
+            Box::new(EigenBox::new(centre, axes, reach))
+        }
         CloudSampler::Hybrid => Box::new(Hybrid::new(ellipsoid()?, sensitivity())),
     })
 }

@@ -1,16 +1,16 @@
 //! From a measured record to a calibrated twin.
 
-use super::cloud::{cloud, tune};
+use super::cloud::{Around, cloud, tune};
 use super::{Estimator, Tracking, track};
 use crate::bank::{BankError, FeatureSimulator};
 use crate::feature::FeatureError;
 use crate::gate::{GateError, GateOutcome, GateTest};
 use crate::network::NetworkError;
 use crate::progress::{Cancelled, Progress};
-use crate::refine::{Information, RefineError, Refined, Refinement};
+use crate::refine::{Information, RefineError, RefineSettings, Refined, Refinement};
 use crate::sample::EllipsoidError;
 use crate::study::{PresetName, Settings, SettingsError, StudyError};
-use crate::twin::{Drive, Noise, Record, Role};
+use crate::twin::{Noise, Record, Role};
 use nalgebra::DVector;
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 use std::time::Instant;
@@ -203,7 +203,7 @@ impl Estimator {
         let run = Run {
             estimator: self,
             settings,
-            drive: record.drive(),
+            record,
             observed: &observed,
             noise: Noise::new(options.seed, "estimate", 0),
             seed: options.seed,
@@ -256,7 +256,7 @@ impl Estimator {
 struct Run<'a> {
     estimator: &'a Estimator,
     settings: &'a Settings,
-    drive: &'a Drive,
+    record: &'a Record,
     observed: &'a DVector<f64>,
     noise: Noise,
     seed: u64,
@@ -281,19 +281,24 @@ impl Run<'_> {
     fn gate_test<'a>(&'a self, simulator: &'a FeatureSimulator, purpose: &str) -> GateTest<'a> {
         GateTest {
             simulator,
-            drive: self.drive,
+            drive: self.record.drive(),
             settings: &self.settings.gate,
             noise: self.noise.child(purpose),
             progress: self.progress,
         }
     }
 
-    fn refinement<'a>(&'a self, simulator: &'a FeatureSimulator) -> Refinement<'a> {
+    fn refinement<'a>(
+        &'a self,
+        simulator: &'a FeatureSimulator,
+        observed: &'a DVector<f64>,
+        settings: &'a RefineSettings,
+    ) -> Refinement<'a> {
         Refinement {
             simulator,
-            drive: self.drive,
-            observed: self.observed,
-            settings: &self.settings.refine,
+            drive: self.record.drive(),
+            observed,
+            settings,
             gate: &self.settings.gate,
             noise: self.noise.child("refine"),
             progress: self.progress,
@@ -313,7 +318,10 @@ impl Run<'_> {
             None => vec![f64::NAN; initial.len()],
         };
         // The estimate stands whether or not its directions can be told.
-        let information = match self.refinement(simulator).describe_at(initial) {
+        let information = match self
+            .refinement(simulator, self.observed, &self.settings.refine)
+            .describe_at(initial)
+        {
             Ok(refined) => Some(refined.information),
             Err(RefineError::Cancelled(stop)) => return Err(stop.into()),
             Err(_) => None,
@@ -343,22 +351,39 @@ impl Run<'_> {
     ) -> Result<Outcome, EstimateError> {
         let (settings, progress) = (self.settings, self.progress);
         let lap = Instant::now();
-        let refinement = self.refinement(simulator);
+        // Features that can find the record's neighbourhood by themselves do, and are taken about it from here on.
+        let noise = self.noise.child("centre");
+        let centred = simulator.centred(self.record, initial, noise)?;
+        let (simulator, initial, starts) = match &centred {
+            Some((simulator, centred)) => (simulator, centred.theta.as_slice(), 1),
+            None => (simulator, initial, settings.refine.starts),
+        };
+        let observed = simulator.observe(self.record)?;
+        let refine = RefineSettings {
+            starts,
+            ..settings.refine.clone()
+        };
+        let refinement = self.refinement(simulator, &observed, &refine);
         let refined = refinement.run(initial)?;
         seconds.gauss_newton = Some(lap.elapsed().as_secs_f64());
         let lap = Instant::now();
-        let noise = self.noise.child("cloud");
-        let draws = cloud(simulator, &refined, self.drive, settings, noise, progress)?;
+        let around = Around {
+            simulator,
+            drive: self.record.drive(),
+            refined: &refined,
+            region: centred.as_ref().map(|(_, centred)| centred),
+            settings,
+        };
+        let draws = cloud(&around, self.noise.child("cloud"), progress)?;
         seconds.cloud = Some(lap.elapsed().as_secs_f64());
         let lap = Instant::now();
-        let (observed, seed) = (self.observed, self.seed);
         let tuned = tune(
             self.estimator,
             &draws,
             &refined,
-            observed,
+            &observed,
             settings,
-            seed,
+            self.seed,
             progress,
         )?;
         seconds.tune = Some(lap.elapsed().as_secs_f64());
@@ -403,7 +428,7 @@ impl Run<'_> {
         let after = self.gate_test(simulator, "after").after_refit(
             &outcome.theta,
             &refined.jacobian,
-            self.observed,
+            &observed,
         );
         outcome.after = match after {
             Ok(after) => after,

@@ -15,7 +15,7 @@ mod scaler;
 mod tracking;
 
 pub use calibration::{Calibration, Spread};
-pub use cloud::{Tuned, cloud, tune};
+pub use cloud::{Around, Tuned, cloud, tune};
 pub use estimate::{Estimate, EstimateError, EstimateOptions, INTERVAL_LEVEL, Nuisance, Seconds};
 pub use estimator::Estimator;
 pub use file::EstimatorFileError;

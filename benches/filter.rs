@@ -1,0 +1,49 @@
+//! One pass of a filter over a record: 400 rows of tanks, 300 of van der Pol. `cargo bench --bench filter`.
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use std::hint::black_box;
+use truetwin::filter::{FilterSettings, Kalman, Method, Score};
+use truetwin::twin::{DigitalTwin, Drive, Noise, Record, Signal, StateSpace};
+use truetwin::twins::{CascadedTanks, VanDerPol};
+
+fn passes(c: &mut Criterion) {
+    let levels = Signal::from_shape_fn((400, 1), |(k, _)| ((k / 30) * 7 % 5) as f64 * 0.6);
+    let forced = Drive::new(0.5, levels).expect("the step is positive");
+    let free = Drive::autonomous(0.05, 300).expect("the step is positive");
+    let cases: [(&str, &dyn StateSpace, Drive, &[f64]); 2] = [
+        ("tanks", &CascadedTanks, forced, &[0.6, 0.5, 0.55, 1.0]),
+        ("van der Pol", &VanDerPol, free, &[3.0]),
+    ];
+    for (name, twin, drive, theta) in cases {
+        let outputs =
+            (twin_outputs(name, theta, &drive)).expect("these parameters can be simulated");
+        let record = Record::new(drive, outputs).expect("the outputs are finite");
+        for method in [Method::Points, Method::Extended] {
+            let settings = FilterSettings::default().method(method);
+            let kalman = Kalman::new(twin, &record, &settings).expect("the channels agree");
+            c.bench_function(&format!("{name}, {method:?}, log-likelihood"), |b| {
+                b.iter(|| kalman.log_likelihood(black_box(theta)))
+            });
+            if method == Method::Points {
+                c.bench_function(&format!("{name}, {method:?}, score"), |b| {
+                    b.iter(|| Score::at(&kalman, black_box(theta)))
+                });
+            }
+        }
+    }
+}
+
+fn twin_outputs(
+    name: &str,
+    theta: &[f64],
+    drive: &Drive,
+) -> Result<Signal, Box<dyn std::error::Error>> {
+    let noise = Noise::new(1, "bench", 0);
+    Ok(match name {
+        "tanks" => CascadedTanks.simulate(theta, drive, noise)?,
+        _ => VanDerPol.simulate(theta, drive, noise)?,
+    })
+}
+
+criterion_group!(benches, passes);
+criterion_main!(benches);

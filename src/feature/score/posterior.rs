@@ -1,0 +1,231 @@
+//! Where the likelihood of a record lies: Fisher scoring from several starts, then importance sampling. No simulations.
+
+use crate::filter::{Coordinates, FilterError, Kalman, Score};
+use crate::twin::{Noise, ParameterSpace};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use rayon::prelude::*;
+
+/// Starts: the estimate at hand, the prior's centre, then random ones in the bounds.
+const STARTS: usize = 8;
+/// Scoring iterations a start.
+const ITERATIONS: usize = 25;
+/// Largest step in φ.
+const LARGEST_STEP: f64 = 0.5;
+/// Rounds of importance sampling, and draws in each.
+const ROUNDS: u64 = 3;
+const DRAWS: u64 = 1000;
+/// Half-width of the sampled box, in standard deviations.
+const REACH: f64 = 3.5;
+/// Weights are flattened until so many draws count.
+const EFFECTIVE: f64 = 30.0;
+
+/// Mean and axes of the posterior, uniform in the bounds.
+pub(super) struct Located {
+    /// Mean, θ.
+    pub theta: Vec<f64>,
+    /// Columns: principal axes of the covariance, one standard deviation long, θ units.
+    pub axes: DMatrix<f64>,
+}
+
+/// Mean and covariance in φ.
+type Moments = (DVector<f64>, DMatrix<f64>);
+
+/// Finds the posterior of a record. `None` where the filter works at no start.
+pub(super) fn localise(
+    kalman: &Kalman<'_>,
+    space: &ParameterSpace,
+    coordinates: &Coordinates,
+    initial: &[f64],
+    noise: Noise,
+) -> Result<Option<Located>, FilterError> {
+    let starts: Vec<Vec<f64>> = (0..STARTS as u64)
+        .map(|i| match i {
+            0 => initial.to_vec(),
+            1 => space.centre(),
+            _ => space.draw_bounds(noise.child("starts").sample(i)),
+        })
+        .collect();
+    let climbed: Vec<_> = (starts.par_iter())
+        .map(|start| recoverable(climb(kalman, coordinates, start)))
+        .collect::<Result<_, _>>()?;
+    let best = climbed
+        .into_iter()
+        .flatten()
+        .reduce(|best, other| if other.0 > best.0 { other } else { best });
+    let Some((_, mut centre, information)) = best else {
+        return Ok(None);
+    };
+    let d = centre.len();
+    let mut covariance = (information + DMatrix::identity(d, d))
+        .try_inverse()
+        .unwrap_or_else(|| DMatrix::identity(d, d));
+    for round in 0..ROUNDS {
+        let noise = noise.child("importance").sample(round);
+        match importance(kalman, coordinates, &centre, &covariance, noise)? {
+            Some(found) => (centre, covariance) = found,
+            None => break,
+        }
+    }
+    // From φ to θ at first order.
+    let theta = coordinates.theta(centre.as_slice());
+    let slopes = DMatrix::from_diagonal(&DVector::from_vec(coordinates.slopes(&theta)));
+    let eigen = SymmetricEigen::new(&slopes * covariance * &slopes);
+    let lengths = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
+    Ok(Some(Located {
+        theta,
+        axes: eigen.eigenvectors * DMatrix::from_diagonal(&lengths),
+    }))
+}
+
+/// An error that only rules out one θ is no error of the search.
+fn recoverable<T>(result: Result<T, FilterError>) -> Result<Option<T>, FilterError> {
+    match result {
+        Ok(value) => Ok(Some(value)),
+        Err(error) if error.is_recoverable() => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+/// Log-likelihood, φ and information at the top that one start leads to: damped Fisher scoring within the bounds.
+fn climb(
+    kalman: &Kalman<'_>,
+    coordinates: &Coordinates,
+    start: &[f64],
+) -> Result<(f64, DVector<f64>, DMatrix<f64>), FilterError> {
+    let inside = |phi: DVector<f64>| -> DVector<f64> {
+        let ends = coordinates.lower().iter().zip(coordinates.upper());
+        DVector::from_iterator(
+            phi.len(),
+            phi.iter()
+                .zip(ends)
+                .map(|(v, (low, high))| v.clamp(*low, *high)),
+        )
+    };
+    let at =
+        |phi: &DVector<f64>| Score::within(kalman, &coordinates.theta(phi.as_slice()), coordinates);
+    let mut phi = inside(DVector::from_vec(coordinates.of(start)));
+    let mut score = at(&phi)?;
+    let mut damping: f64 = 1.0;
+    for _ in 0..ITERATIONS {
+        let d = phi.len();
+        let damped = &score.fisher
+            + DMatrix::from_diagonal(&score.fisher.diagonal().map(|v| damping * v + 1.0));
+        let Some(factor) = damped.cholesky() else {
+            break;
+        };
+        let mut step = factor.solve(&score.gradient);
+        let longest = step.amax();
+        if longest > LARGEST_STEP {
+            step *= LARGEST_STEP / longest;
+        }
+        let next = inside(&phi + step);
+        let moved = (&next - &phi).amax();
+        match recoverable(at(&next))? {
+            Some(better) if better.log_likelihood > score.log_likelihood => {
+                let gain = better.log_likelihood - score.log_likelihood;
+                (phi, score) = (next, better);
+                damping = (0.2 * damping).max(1e-6);
+                if gain < 1e-3 * d as f64 {
+                    break;
+                }
+            }
+            _ => damping *= 5.0,
+        }
+        if moved < 1e-7 || damping > 1e6 {
+            break;
+        }
+    }
+    Ok((score.log_likelihood, phi, score.fisher))
+}
+
+/// One round: uniform draws in the eigenbox of the covariance within the bounds, weighted by the likelihood, the weights
+/// tempered to an effective number.
+fn importance(
+    kalman: &Kalman<'_>,
+    coordinates: &Coordinates,
+    centre: &DVector<f64>,
+    covariance: &DMatrix<f64>,
+    noise: Noise,
+) -> Result<Option<Moments>, FilterError> {
+    let eigen = SymmetricEigen::new(covariance.clone());
+    let lengths = eigen.eigenvalues.map(|v| REACH * v.max(1e-18).sqrt());
+    let draw = |i: u64| -> Option<DVector<f64>> {
+        let mut source = noise.sample(i).source("box");
+        let u = lengths.map(|length| length * (2.0 * source.uniform() - 1.0));
+        let phi = centre + &eigen.eigenvectors * u;
+        let ends = coordinates.lower().iter().zip(coordinates.upper());
+        (phi.iter().zip(ends))
+            .all(|(v, (low, high))| (low..=high).contains(&v))
+            .then_some(phi)
+    };
+    let weighed: Vec<Option<(DVector<f64>, f64)>> = (0..DRAWS)
+        .into_par_iter()
+        .map(|i| {
+            let Some(phi) = draw(i) else {
+                return Ok(None);
+            };
+            let value = recoverable(kalman.log_likelihood(&coordinates.theta(phi.as_slice())))?;
+            Ok(value.map(|value| (phi, value)))
+        })
+        .collect::<Result<_, FilterError>>()?;
+    let weighed: Vec<_> = weighed.into_iter().flatten().collect();
+    if weighed.len() < 2 * centre.len() + 2 {
+        return Ok(None);
+    }
+    let weights = tempered(&weighed.iter().map(|w| w.1).collect::<Vec<_>>());
+    let mut mean = DVector::zeros(centre.len());
+    for ((phi, _), weight) in weighed.iter().zip(&weights) {
+        mean += phi * *weight;
+    }
+    let mut spread = DMatrix::zeros(centre.len(), centre.len());
+    for ((phi, _), weight) in weighed.iter().zip(&weights) {
+        let difference = phi - &mean;
+        spread += &difference * difference.transpose() * *weight;
+    }
+    Ok(Some((mean, spread)))
+}
+
+/// Normalised weights exp(β·ℓ), β ≤ 1 the largest for which (Σw)²/Σw² reaches [`EFFECTIVE`].
+fn tempered(log_likelihoods: &[f64]) -> Vec<f64> {
+    let top = log_likelihoods
+        .iter()
+        .copied()
+        .fold(f64::NEG_INFINITY, f64::max);
+    let weights = |beta: f64| -> Vec<f64> {
+        let raw: Vec<f64> = (log_likelihoods.iter())
+            .map(|l| (beta * (l - top)).exp())
+            .collect();
+        let sum: f64 = raw.iter().sum();
+        raw.iter().map(|w| w / sum).collect()
+    };
+    let effective = |beta: f64| 1.0 / weights(beta).iter().map(|w| w * w).sum::<f64>();
+    let goal = EFFECTIVE.min(0.5 * log_likelihoods.len() as f64);
+    if effective(1.0) >= goal {
+        return weights(1.0);
+    }
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if effective(middle) >= goal {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    weights(low)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tempering_reaches_the_effective_number() {
+        let peaked: Vec<f64> = (0..500).map(|i| -f64::from(i)).collect();
+        let weights = tempered(&peaked);
+        let effective = 1.0 / weights.iter().map(|w| w * w).sum::<f64>();
+        assert!((effective - EFFECTIVE).abs() < 0.01, "{effective}");
+        let flat = tempered(&[0.0; 100]);
+        assert!(flat.iter().all(|w| (w - 0.01).abs() < 1e-12));
+    }
+}

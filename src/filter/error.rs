@@ -1,0 +1,82 @@
+//! Why a record could not be filtered.
+
+use crate::math::DifferenceError;
+use crate::optimise::EvaluationError;
+use crate::twin::{ParameterError, RecordError, SimulationError};
+
+/// Why a record could not be filtered. [`Diverged`](Self::Diverged), [`NoSpread`](Self::NoSpread) and a twin that
+/// refuses θ cost this θ alone; the rest ends the work.
+#[derive(Debug, thiserror::Error)]
+pub enum FilterError {
+    /// The record does not fit the twin.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// θ does not fit the twin.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
+    /// The twin cannot be simulated at this θ.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// A mean or variance left the finite numbers.
+    #[error("the filter diverged at t = {at} s; these parameters are not for this record")]
+    Diverged {
+        /// Time in seconds.
+        at: f64,
+    },
+    /// The covariance of an innovation has no inverse.
+    #[error(
+        "the outputs at t = {at} s are predicted without any uncertainty; give one of them measurement noise, \
+         or raise noise_floor"
+    )]
+    NoSpread {
+        /// Time in seconds.
+        at: f64,
+    },
+    /// A setting that cannot be used.
+    #[error("{name} = {value}; {remedy}")]
+    Setting {
+        /// Which.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        remedy: &'static str,
+    },
+    /// An initial covariance of another size, or none at all.
+    #[error(
+        "start_covariance is {rows} × {columns}; give a symmetric, non-negative {states} × {states} matrix"
+    )]
+    StartCovariance {
+        /// Rows that were given.
+        rows: usize,
+        /// Columns that were given.
+        columns: usize,
+        /// States of the twin.
+        states: usize,
+    },
+    /// No differences could be taken around θ.
+    #[error(transparent)]
+    Difference(#[from] DifferenceError),
+}
+
+impl FilterError {
+    /// Whether another θ may do: the search goes on elsewhere.
+    pub fn is_recoverable(&self) -> bool {
+        matches!(
+            self,
+            Self::Diverged { .. }
+                | Self::NoSpread { .. }
+                | Self::Simulation(SimulationError::Diverged { .. })
+        )
+    }
+}
+
+impl From<FilterError> for EvaluationError {
+    fn from(error: FilterError) -> Self {
+        if error.is_recoverable() {
+            Self::rejected(error)
+        } else {
+            Self::fatal(error)
+        }
+    }
+}
