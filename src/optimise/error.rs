@@ -36,17 +36,6 @@ pub enum OptimiseError {
     /// There is no value at the start.
     #[error("the search cannot begin at its start: {0}; start elsewhere")]
     Start(#[source] Box<dyn Error + Send + Sync>),
-    /// No start has a value.
-    #[error(
-        "all {count} starts failed, the first with: {first}; widen the bounds or check the twin"
-    )]
-    AllStarts {
-        /// How many there were.
-        count: usize,
-        /// What the first one said.
-        #[source]
-        first: Box<OptimiseError>,
-    },
     /// The evaluation asked for an end.
     #[error(transparent)]
     Fatal(Box<dyn Error + Send + Sync>),
