@@ -55,6 +55,8 @@ pub mod study;
 
 pub mod two_stage;
 
+pub mod baseline;
+
 pub mod experiment;
 pub mod report;
 

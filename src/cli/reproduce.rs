@@ -50,7 +50,8 @@ pub(super) fn run(
         let methods: Vec<Value> = (scores.iter())
             .map(|s| {
                 json!({
-                    "method": s.method.to_string(), "initialisation": null,
+                    "method": s.method.to_string(),
+                    "initialisation": s.method.initialisation().map(|i| i.to_string()),
                     "mse": finite(s.mse), "median": finite(s.median), "ms": finite(s.milliseconds),
                 })
             })
@@ -61,7 +62,7 @@ pub(super) fn run(
         }))?;
     } else {
         let mut text = format!(
-            "{}, scenario {}, {} runs, preset {}\n{:<8} {:>12} {:>12} {:>10}\n",
+            "{}, scenario {}, {} runs, preset {}\n{:<14} {:>12} {:>12} {:>10}\n",
             study.name(),
             options.scenario,
             options.runs,
@@ -73,8 +74,11 @@ pub(super) fn run(
         );
         for s in &scores {
             text.push_str(&format!(
-                "{:<8} {:>12.3e} {:>12.3e} {:>10.1}\n",
-                s.method.to_string(),
+                "{:<14} {:>12.3e} {:>12.3e} {:>10.1}\n",
+                match s.method.initialisation() {
+                    Some(start) => format!("{} ({start})", s.method),
+                    None => s.method.to_string(),
+                },
                 s.mse,
                 s.median,
                 s.milliseconds

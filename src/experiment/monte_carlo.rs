@@ -1,12 +1,14 @@
 //! Errors of each stage of the estimator over many simulated records.
 
 use super::{Scenario, scenario};
+use crate::baseline::{DualFilter, Initialisation, PredictionError};
 use crate::progress::{Cancelled, Progress};
 use crate::twin::{Noise, Record, RecordError, SimulationError};
-use crate::two_stage::{EstimateError, EstimateOptions, Estimator};
+use crate::two_stage::{Estimate, EstimateError, EstimateOptions, Estimator};
 use std::fmt;
+use std::time::Instant;
 
-/// A stage of the estimator whose error is scored.
+/// What is scored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     /// The pretrained network.
@@ -17,6 +19,28 @@ pub enum Method {
     TsFine,
     /// What the estimator answers: gate, misfit and all.
     Final,
+    /// The prediction-error method, the paper's six steps.
+    PredictionError(Initialisation),
+    /// The dual Kalman filter; of twins with equations only.
+    DualFilter(Initialisation),
+}
+
+impl Method {
+    /// Every row, in the order of a table.
+    pub fn all() -> Vec<Self> {
+        let mut all = vec![Self::TsPre, Self::GaussNewton, Self::TsFine, Self::Final];
+        all.extend(Initialisation::ALL.map(Self::PredictionError));
+        all.extend(Initialisation::ALL.map(Self::DualFilter));
+        all
+    }
+
+    /// Where a baseline starts.
+    pub fn initialisation(self) -> Option<Initialisation> {
+        match self {
+            Self::PredictionError(start) | Self::DualFilter(start) => Some(start),
+            _ => None,
+        }
+    }
 }
 
 impl fmt::Display for Method {
@@ -26,6 +50,8 @@ impl fmt::Display for Method {
             Self::GaussNewton => "GN",
             Self::TsFine => "TS-fine",
             Self::Final => "final",
+            Self::PredictionError(_) => "PEM",
+            Self::DualFilter(_) => "dual-EKF",
         })
     }
 }
@@ -35,7 +61,7 @@ impl fmt::Display for Method {
 pub struct MethodScore {
     /// Method.
     pub method: Method,
-    /// Mean over runs and parameters of the squared error.
+    /// Mean over runs and parameters of the squared error; NaN where the method cannot be used or failed on a run.
     pub mse: f64,
     /// Median over runs of the squared error, averaged over parameters.
     pub median: f64,
@@ -79,10 +105,10 @@ pub enum MonteCarloError {
     Cancelled(#[from] Cancelled),
 }
 
-/// One run: squared error, averaged over parameters, and milliseconds, for each of the four methods.
-type Run = [(f64, f64); 4];
+/// Squared error, averaged over parameters, and milliseconds, of each method.
+type Run = Vec<(f64, f64)>;
 
-/// Scores every stage of `estimator` on simulated records.
+/// Scores every stage of `estimator`, and the baselines, on simulated records.
 pub fn score(
     estimator: &Estimator,
     plan: &MonteCarlo,
@@ -96,13 +122,7 @@ pub fn score(
             Ok(scores)
         })
         .collect::<Result<_, MonteCarloError>>()?;
-    let methods = [
-        Method::TsPre,
-        Method::GaussNewton,
-        Method::TsFine,
-        Method::Final,
-    ];
-    Ok((methods.into_iter().enumerate())
+    Ok((Method::all().into_iter().enumerate())
         .map(|(m, method)| {
             let mean = |of: fn(&(f64, f64)) -> f64| {
                 runs.iter().map(|run| of(&run[m])).sum::<f64>() / runs.len().max(1) as f64
@@ -138,25 +158,59 @@ fn one(estimator: &Estimator, plan: &MonteCarlo, run: usize) -> Result<Run, Mont
                 error: Box::new(error),
             }
         })?;
-    let error = |theta: &[f64]| {
-        let squares = theta.iter().zip(&truth).map(|(a, b)| (a - b).powi(2));
-        squares.sum::<f64>() / truth.len() as f64
+    let twin = study.twin().as_ref();
+    let start = |from: Initialisation| {
+        let noise = noise.child("start");
+        (from.theta(&twin.parameters(), &truth, &estimate.initial, noise)).ok()
     };
-    let of = |theta: &Option<Vec<f64>>| theta.as_deref().map_or(f64::NAN, error);
+    Ok((Method::all().into_iter())
+        .map(|method| {
+            let clock = Instant::now();
+            // A baseline that fails on a record scores NaN: its row says that it cannot be relied on here.
+            let (theta, seconds) = match method {
+                Method::PredictionError(from) => {
+                    let fit = start(from).and_then(|start| {
+                        PredictionError::default().fit(twin, &record, &start).ok()
+                    });
+                    (fit.map(|fit| fit.theta), None)
+                }
+                Method::DualFilter(from) => {
+                    let run = start(from)
+                        .zip(twin.state_space())
+                        .and_then(|(start, equations)| {
+                            DualFilter::default().run(equations, &record, &start).ok()
+                        });
+                    (run.map(|run| run.theta), None)
+                }
+                stage => of_stage(stage, &estimate),
+            };
+            let seconds = seconds.unwrap_or_else(|| clock.elapsed().as_secs_f64());
+            let error = theta.map_or(f64::NAN, |theta| {
+                let squares = theta.iter().zip(&truth).map(|(a, b)| (a - b).powi(2));
+                squares.sum::<f64>() / truth.len() as f64
+            });
+            (error, 1000.0 * seconds)
+        })
+        .collect())
+}
+
+/// Estimate and seconds of one stage of the estimator.
+fn of_stage(method: Method, estimate: &Estimate) -> (Option<Vec<f64>>, Option<f64>) {
     let seconds = &estimate.seconds;
+    let initial = (Some(estimate.initial.clone()), seconds.predict);
     let gauss_newton = seconds.predict + seconds.gate + seconds.gauss_newton.unwrap_or(0.0);
-    let fine = gauss_newton + seconds.cloud.unwrap_or(0.0) + seconds.tune.unwrap_or(0.0);
-    // What would have been answered without being told to refine.
-    let (last, last_time) = if estimate.gate.out_of_distribution {
-        (&estimate.theta, seconds.total)
-    } else {
-        (&estimate.initial, seconds.predict + seconds.gate)
+    let (theta, seconds) = match method {
+        Method::GaussNewton => (estimate.gauss_newton.clone(), gauss_newton),
+        Method::TsFine => {
+            let cloud = seconds.cloud.unwrap_or(0.0) + seconds.tune.unwrap_or(0.0);
+            (estimate.fine.clone(), gauss_newton + cloud)
+        }
+        // What would have been answered without being told to refine.
+        Method::Final if estimate.gate.out_of_distribution => {
+            (Some(estimate.theta.clone()), seconds.total)
+        }
+        Method::Final => (initial.0, seconds.predict + seconds.gate),
+        _ => initial,
     };
-    let milliseconds = 1000.0;
-    Ok([
-        (error(&estimate.initial), seconds.predict * milliseconds),
-        (of(&estimate.gauss_newton), gauss_newton * milliseconds),
-        (of(&estimate.fine), fine * milliseconds),
-        (error(last), last_time * milliseconds),
-    ])
+    (theta, Some(seconds))
 }

@@ -2,6 +2,7 @@
 
 use crate::math::quantile;
 use ndarray::Array2;
+use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Neighbours of a prediction whose errors are taken as its own.
 const NEIGHBOURS: usize = 100;
@@ -24,6 +25,19 @@ pub struct Spread {
     pub low: Vec<f64>,
     /// What to add for the upper end.
     pub high: Vec<f64>,
+}
+
+impl Spread {
+    /// Of a normal error with these standard deviations.
+    pub fn normal(std_error: Vec<f64>, level: f64) -> Self {
+        let reach = Normal::standard().inverse_cdf(0.5 + 0.5 * level);
+        let ends = |sign: f64| std_error.iter().map(|s| sign * reach * s).collect();
+        Self {
+            low: ends(-1.0),
+            high: ends(1.0),
+            std_error,
+        }
+    }
 }
 
 impl Calibration {

@@ -1,7 +1,7 @@
 //! From a measured record to a calibrated twin.
 
 use super::cloud::{Around, cloud, tune};
-use super::{Estimator, Tracking, track};
+use super::{Estimator, Spread, Tracking, track};
 use crate::bank::{BankError, FeatureSimulator};
 use crate::feature::FeatureError;
 use crate::gate::{GateError, GateOutcome, GateTest};
@@ -12,7 +12,7 @@ use crate::sample::EllipsoidError;
 use crate::study::{PresetName, Settings, SettingsError, StudyError};
 use crate::twin::{Noise, Record, Role};
 use nalgebra::DVector;
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::time::Instant;
 
 /// Level of the intervals given with an estimate.
@@ -220,8 +220,10 @@ impl Estimator {
         let twin = simulator.twin();
         // A free run may diverge where noisy runs do not; the estimate stands all the same.
         let follow = |theta: &[f64], record: &Record| track(twin, theta, record).ok();
-        let tracking = follow(&outcome.theta, record);
-        let fitted = tracking.as_ref().map_or(&outcome.theta, |t| &t.theta);
+        let tracking = follow(&outcome.answer.theta, record);
+        let fitted = tracking
+            .as_ref()
+            .map_or(&outcome.answer.theta, |t| &t.theta);
         let validation = (options.validation.as_ref()).and_then(|record| follow(fitted, record));
         let tracking_initial = (outcome.refitted)
             .then(|| follow(&initial, record))
@@ -236,10 +238,10 @@ impl Estimator {
             gate,
             gauss_newton: outcome.gauss_newton,
             fine: outcome.fine,
-            low: space.clamp(&outcome.low),
-            high: space.clamp(&outcome.high),
-            theta: outcome.theta,
-            std_error: outcome.std_error,
+            low: space.clamp(&outcome.answer.low),
+            high: space.clamp(&outcome.answer.high),
+            theta: outcome.answer.theta,
+            std_error: outcome.answer.std_error,
             information: outcome.information,
             after: outcome.after,
             refitted: outcome.refitted,
@@ -265,16 +267,33 @@ struct Run<'a> {
 
 /// What the stages after the gate give.
 struct Outcome {
+    answer: Answer,
     gauss_newton: Option<Vec<f64>>,
     fine: Option<Vec<f64>>,
-    theta: Vec<f64>,
-    std_error: Vec<f64>,
-    low: Vec<f64>,
-    high: Vec<f64>,
     information: Option<Information>,
     after: Option<GateOutcome>,
     refitted: bool,
     redrawn: usize,
+}
+
+/// An estimate with its uncertainty.
+struct Answer {
+    theta: Vec<f64>,
+    std_error: Vec<f64>,
+    low: Vec<f64>,
+    high: Vec<f64>,
+}
+
+impl Answer {
+    fn new(theta: Vec<f64>, spread: Spread) -> Self {
+        let shifted = |by: &[f64]| theta.iter().zip(by).map(|(t, b)| t + b).collect();
+        Self {
+            low: shifted(&spread.low),
+            high: shifted(&spread.high),
+            std_error: spread.std_error,
+            theta,
+        }
+    }
 }
 
 impl Run<'_> {
@@ -313,10 +332,7 @@ impl Run<'_> {
     ) -> Result<Outcome, EstimateError> {
         let space = self.estimator.study.twin().parameters();
         let spread = (self.estimator.calibration).spread(initial, &space.widths(), INTERVAL_LEVEL);
-        let shifted = |by: Option<&Vec<f64>>| match by {
-            Some(by) => initial.iter().zip(by).map(|(t, b)| t + b).collect(),
-            None => vec![f64::NAN; initial.len()],
-        };
+        let unknown = || Spread::normal(vec![f64::NAN; initial.len()], INTERVAL_LEVEL);
         // The estimate stands whether or not its directions can be told.
         let information = match self
             .refinement(simulator, self.observed, &self.settings.refine)
@@ -327,14 +343,9 @@ impl Run<'_> {
             Err(_) => None,
         };
         Ok(Outcome {
+            answer: Answer::new(initial.to_vec(), spread.unwrap_or_else(unknown)),
             gauss_newton: None,
             fine: None,
-            theta: initial.to_vec(),
-            std_error: spread
-                .as_ref()
-                .map_or_else(|| vec![f64::NAN; initial.len()], |s| s.std_error.clone()),
-            low: shifted(spread.as_ref().map(|s| &s.low)),
-            high: shifted(spread.as_ref().map(|s| &s.high)),
             information,
             after: None,
             refitted: false,
@@ -388,56 +399,36 @@ impl Run<'_> {
         )?;
         seconds.tune = Some(lap.elapsed().as_secs_f64());
         let gauss_newton = refined.theta.as_slice().to_vec();
-        let keep = self.keeps(&refinement, &refined, &tuned.theta);
-        let mut outcome = Outcome {
-            theta: gauss_newton.clone(),
-            std_error: refined.information.std_error.clone(),
-            low: vec![],
-            high: vec![],
-            after: None,
-            refitted: true,
-            redrawn: draws.redrawn,
-            fine: Some(tuned.theta.clone()),
-            information: None,
-            gauss_newton: Some(gauss_newton),
-        };
-        let normal = Normal::standard().inverse_cdf(0.5 + 0.5 * INTERVAL_LEVEL);
-        let half: Vec<f64> = outcome.std_error.iter().map(|s| normal * s).collect();
-        outcome.low = outcome
-            .theta
-            .iter()
-            .zip(&half)
-            .map(|(t, h)| t - h)
-            .collect();
-        outcome.high = outcome
-            .theta
-            .iter()
-            .zip(&half)
-            .map(|(t, h)| t + h)
-            .collect();
-        if keep {
-            outcome.theta = tuned.theta;
-            if let Some(spread) = tuned.spread {
-                let shifted = |by: &[f64]| -> Vec<f64> {
-                    outcome.theta.iter().zip(by).map(|(t, b)| t + b).collect()
-                };
-                (outcome.low, outcome.high) = (shifted(&spread.low), shifted(&spread.high));
-                outcome.std_error = spread.std_error;
+        let fine = tuned.theta.clone();
+        let answer = match tuned.spread {
+            Some(spread) if self.keeps(&refinement, &refined, &tuned.theta) => {
+                Answer::new(tuned.theta, spread)
             }
-        }
+            _ => {
+                let spread = Spread::normal(refined.information.std_error.clone(), INTERVAL_LEVEL);
+                Answer::new(gauss_newton.clone(), spread)
+            }
+        };
         let after = self.gate_test(simulator, "after").after_refit(
-            &outcome.theta,
+            &answer.theta,
             &refined.jacobian,
             &observed,
         );
-        outcome.after = match after {
+        let after = match after {
             Ok(after) => after,
             // Simulations at the answer cannot be tested (they diverge, say); the answer stands.
             Err(GateError::Bank(BankError::Hopeless { .. }) | GateError::Whitening(_)) => None,
             Err(error) => return Err(error.into()),
         };
-        outcome.information = Some(refined.information);
-        Ok(outcome)
+        Ok(Outcome {
+            answer,
+            gauss_newton: Some(gauss_newton),
+            fine: Some(fine),
+            information: Some(refined.information),
+            after,
+            refitted: true,
+            redrawn: draws.redrawn,
+        })
     }
 
     /// Whether the tuned estimate stays within the misfit that θ could still explain by chance: the part of its whitened
