@@ -1,6 +1,7 @@
 //! Results: standard output, files that appear whole, folders that appear whole.
 
 use super::Failure;
+use crate::files::folder;
 use serde_json::Value;
 use std::fs;
 use std::io::Write;
@@ -31,7 +32,7 @@ pub(super) fn check_new(path: &Path) -> Result<(), Failure> {
             "{name} exists already; choose another --out, or remove it"
         )));
     }
-    let folder = parent(path);
+    let folder = folder(path);
     if !folder.is_dir() {
         return Err(Failure::user(format!(
             "{name}: the folder {} does not exist; make it first",
@@ -39,12 +40,6 @@ pub(super) fn check_new(path: &Path) -> Result<(), Failure> {
         )));
     }
     Ok(())
-}
-
-fn parent(path: &Path) -> &Path {
-    path.parent()
-        .filter(|p| !p.as_os_str().is_empty())
-        .unwrap_or(Path::new("."))
 }
 
 /// A folder that is filled beside its place and appears there whole.
@@ -59,7 +54,7 @@ impl NewFolder {
         Ok(Self {
             filling: tempfile::Builder::new()
                 .prefix(".truetwin-")
-                .tempdir_in(parent(place))
+                .tempdir_in(folder(place))
                 .map_err(failed)?,
             place: place.into(),
         })

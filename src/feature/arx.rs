@@ -1,6 +1,6 @@
 //! Autoregressive coefficients with inputs.
 
-use super::regression::{coefficients, samples_needed};
+use super::regression::coefficients;
 use super::{FeatureError, FeatureMap, FeatureRecipe};
 use crate::twin::{DigitalTwin, Drive, Signal};
 use serde::{Deserialize, Serialize};
@@ -65,13 +65,6 @@ impl FeatureMap for Bound {
     }
 
     fn extract(&self, drive: &Drive, outputs: &Signal) -> Result<Vec<f64>, FeatureError> {
-        let needed = samples_needed(self.p, self.q, self.inputs);
-        if drive.samples() < needed {
-            return Err(FeatureError::TooShort {
-                samples: drive.samples(),
-                needed,
-            });
-        }
         coefficients(drive.inputs(), outputs, self.p, self.q)
     }
 }

@@ -25,6 +25,11 @@ pub(super) fn coefficients(
     p: usize,
     q: usize,
 ) -> Result<Vec<f64>, FeatureError> {
+    // As many equations as unknowns.
+    let (samples, needed) = (outputs.nrows(), p.max(q) + p + q * inputs.ncols());
+    if samples < needed {
+        return Err(FeatureError::TooShort { samples, needed });
+    }
     check_varies(outputs)?;
     let inputs: Vec<Lagged> = (inputs.columns().into_iter())
         .map(|u| Lagged {
@@ -44,19 +49,10 @@ pub(super) fn coefficients(
     Ok(all)
 }
 
-/// Samples that [`coefficients`] needs: as many equations as unknowns.
-pub(super) fn samples_needed(p: usize, q: usize, inputs: usize) -> usize {
-    p.max(q) + p + q * inputs
-}
-
 /// Regresses the first signal on the lags of all, from sample `start` on.
 fn regress(signals: &[Lagged], start: usize) -> Result<Vec<f64>, FeatureError> {
     let samples = signals[0].values.len();
     let columns: usize = signals.iter().map(|s| s.lags).sum();
-    let needed = start + columns;
-    if samples < needed {
-        return Err(FeatureError::TooShort { samples, needed });
-    }
     let rows = samples - start;
     let mut phi = DMatrix::zeros(rows, columns);
     let lagged = || {

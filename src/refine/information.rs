@@ -1,10 +1,7 @@
 //! What a record tells about θ: information, standard errors, and directions in words.
 
-use crate::twin::{ParameterSpace, Role, combination, oriented};
+use crate::twin::{PRIOR_DEVIATION, ParameterSpace, Role, combination, oriented};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
-
-/// The standard deviation of a uniform prior over its width, 1/√12: a direction known worse than this is weak.
-const PRIOR_DEVIATION: f64 = 0.288_675_134_594_812_9;
 
 /// Fisher information of the features, regularised: G = JᵀJ/(1 + 1/K) + λ·diag(1/width²).
 ///
@@ -31,7 +28,7 @@ pub struct Direction {
     pub direction: Vec<f64>,
     /// Standard deviation along it, in prior widths.
     pub std_error: f64,
-    /// Whether the prior knows it better than the record does.
+    /// Whether the prior knows it better than the record does: worse than [`PRIOR_DEVIATION`].
     pub weak: bool,
     /// In words: `0.58·k1 − 0.58·k2 + 0.57·k4`.
     pub combination: String,

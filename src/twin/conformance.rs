@@ -1,6 +1,8 @@
 //! What is wrong with a new twin, found before any training.
 
-use super::{DigitalTwin, Drive, Noise, Signal, SimulationError, combination, free_run};
+use super::{
+    DigitalTwin, Drive, Noise, PRIOR_DEVIATION, Signal, SimulationError, combination, free_run,
+};
 use nalgebra::DMatrix;
 
 /// How bad a finding is.
@@ -37,8 +39,6 @@ impl Finding {
 
 /// Relative size under which a singular value counts as zero: this direction does not move the free run.
 const FLAT: f64 = 1e-6;
-/// The standard deviation of a uniform prior over its width, 1/√12.
-const PRIOR_DEVIATION: f64 = 0.288_675_134_594_812_9;
 /// Noise draws of nearby parameters must agree to this part of their spread.
 const PAIRED: f64 = 1e-2;
 

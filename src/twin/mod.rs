@@ -42,7 +42,7 @@ pub use free_run::{BLACK_BOX_SEEDS, free_run};
 pub use integrator::{Integrator, Workspace};
 pub use interval::{Interval, IntervalError};
 pub use noise::{Noise, Source};
-pub use parameter::{Parameter, ParameterError, ParameterSpace, Role};
+pub use parameter::{PRIOR_DEVIATION, Parameter, ParameterError, ParameterSpace, Role};
 pub use record::{Record, RecordError};
 pub use record_csv::{
     CsvError, parse_record, read_drive, read_record, record_csv_text, write_record,

@@ -4,6 +4,10 @@ use super::{Interval, Noise};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
+/// The standard deviation of a uniform prior over its width, 1/√12: what is known worse than this is known from the prior
+/// alone.
+pub const PRIOR_DEVIATION: f64 = 0.288_675_134_594_812_9;
+
 /// What a parameter stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
