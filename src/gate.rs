@@ -188,6 +188,46 @@ impl GateTest<'_> {
         })
     }
 
+    /// The test at a θ that was itself read off the record: the simulations that the record is ranked among are read off in
+    /// the same way, and each is compared with the mean at its own estimate,
+    ///
+    /// ```text
+    /// s_k = ‖S^{-1/2}(x_k − μ − ∂f̄/∂θ·(θ̂(x_k) − θ))‖²
+    /// ```
+    ///
+    /// so that what the reader gets wrong on records of the twin itself rejects no record. `jacobian` is ∂f̄/∂θ at θ
+    /// (n × d), `estimate` maps features (rows) to θ̂. The paper's form stays as [`at`](Self::at).
+    ///
+    /// # Errors
+    ///
+    /// As [`at`](Self::at), and those of `estimate`.
+    pub fn at_estimate<E: From<GateError>>(
+        &self,
+        theta: &[f64],
+        jacobian: &DMatrix<f64>,
+        estimate: impl FnOnce(&Array2<f64>) -> Result<Array2<f64>, E>,
+    ) -> Result<Gate, E> {
+        let simulated = self.simulate(theta)?;
+        let whitening =
+            (self.settings.whiten(&simulated.whitening)).map_err(|error| E::from(error.into()))?;
+        let mut ranked = simulated.ranked().clone();
+        if self.settings.form == GateForm::Calibrated {
+            let estimates = estimate(&ranked)?;
+            for (mut row, estimate) in ranked.rows_mut().into_iter().zip(estimates.rows()) {
+                for (i, value) in row.iter_mut().enumerate() {
+                    let moves = estimate.iter().zip(theta).enumerate();
+                    let shift: f64 = moves.map(|(j, (e, t))| jacobian[(i, j)] * (e - t)).sum();
+                    *value -= shift;
+                }
+            }
+        }
+        Ok(Gate {
+            null: whitening.squared_distances(&ranked),
+            whitening,
+            settings: self.settings.clone(),
+        })
+    }
+
     /// The test again after θ was refitted to the record with features x: columns of the Jacobian ∂f̄/∂θ (n × d), which
     /// the refit has used up, are projected out of the record's whitened residual and of the null's alike
     /// (Sargan–Hansen, n − d degrees of freedom). `None` where no degree of freedom is left.

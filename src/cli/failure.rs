@@ -176,7 +176,7 @@ impl From<PretrainError> for Failure {
             PretrainError::Settings(_) => Self::user(error),
             PretrainError::Plan(error) => error.into(),
             PretrainError::Feature(error) => error.into(),
-            PretrainError::TooManyFeatures { .. } => Self {
+            PretrainError::TooManyFeatures { .. } | PretrainError::Standardise(_) => Self {
                 about_study: true,
                 ..Self::user(error)
             },

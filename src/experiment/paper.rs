@@ -34,7 +34,6 @@ fn van_der_pol() -> Result<Study, StudyError> {
     let demo = parse_record(DEMO, Path::new("demo-van-der-pol.csv"))?;
     Ok(Study::new("van-der-pol", VanDerPol, plan)?
         .with_preset(PresetName::Paper, preset(settings))
-        .with_preset(PresetName::Default, preset(Settings::default()))
         .with_demo(demo))
 }
 

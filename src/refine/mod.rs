@@ -36,6 +36,7 @@ use serde::{Deserialize, Serialize};
 /// | `rounds` | 4 | ≥ 1 | times S is simulated again around the best start's end |
 /// | `iterations` | 6 | ≥ 1 | Gauss–Newton iterations a round |
 /// | `seeds` | 64 | ≥ 1 | runs that f̄ averages; adds 1/seeds to the feature variance |
+/// | `centred_seeds` | 16 | ≥ 1 | the same about features that were centred on the record |
 /// | `survey_seeds` | 8 | ≥ 1 | the same while the starts compete |
 /// | `pull` | 1 | ≥ 0 | γ, θ in units of the prior's width |
 /// | `ridge` | 1 | ≥ 0 | λ added to JᵀJ in G, θ in units of the prior's width |
@@ -52,6 +53,8 @@ pub struct RefineSettings {
     pub iterations: u64,
     /// Runs that f̄ averages.
     pub seeds: usize,
+    /// Runs that f̄ averages about features centred on the record.
+    pub centred_seeds: usize,
     /// Runs that f̄ averages while the starts compete.
     pub survey_seeds: usize,
     /// γ.
@@ -71,6 +74,7 @@ impl Default for RefineSettings {
             rounds: 4,
             iterations: 6,
             seeds: 64,
+            centred_seeds: 16,
             survey_seeds: 8,
             pull: 1.0,
             ridge: 1.0,
@@ -89,7 +93,21 @@ pub struct RefineSettingsError {
     remedy: &'static str,
 }
 
+/// Iterations about features that were centred on the record.
+const CENTRED_ITERATIONS: u64 = 3;
+
 impl RefineSettings {
+    /// For features centred on the record: θ starts near its end, and the features are few.
+    pub fn centred(&self) -> Self {
+        Self {
+            starts: 1,
+            rounds: 1,
+            iterations: self.iterations.min(CENTRED_ITERATIONS),
+            seeds: self.centred_seeds.min(self.seeds),
+            ..self.clone()
+        }
+    }
+
     /// Whether each field is in its range.
     pub fn check(&self) -> Result<(), RefineSettingsError> {
         let counts = [
@@ -97,6 +115,7 @@ impl RefineSettings {
             ("rounds", self.rounds),
             ("iterations", self.iterations as usize),
             ("seeds", self.seeds),
+            ("centred_seeds", self.centred_seeds),
             ("survey_seeds", self.survey_seeds),
         ];
         let refuse = |field, value, remedy| {
@@ -245,10 +264,27 @@ impl Refinement<'_> {
             .progress
             .stage("Gauss–Newton", settings.starts + settings.rounds);
         let initial = DVector::from_vec(space.clamp(initial));
+        let (theta, local, failed) = match settings.starts {
+            // Nothing to choose from.
+            1 => (initial.clone(), self.whiten(&initial)?, 0),
+            _ => self.survey(&space, &initial, &stage)?,
+        };
+        let (theta, local) = self.polish(&space, &initial, theta, local, &stage)?;
+        stage.finish();
+        self.describe(&space, &initial, theta, local, failed)
+    }
+
+    /// The best of several starts, and how many failed.
+    fn survey(
+        &self,
+        space: &ParameterSpace,
+        initial: &DVector<f64>,
+        stage: &crate::progress::Stage,
+    ) -> Result<(DVector<f64>, Local, usize), RefineError> {
         let (mut best, mut failed, mut last): (Option<Candidate>, _, _) = (None, 0, String::new());
-        for start in starts(&space, &initial, settings.starts)? {
-            let survey = self.problem(&space, &initial, settings.survey_seeds);
-            match self.climb(survey, &start, &space) {
+        for start in starts(space, initial, self.settings.starts)? {
+            let survey = self.problem(space, initial, self.settings.survey_seeds);
+            match self.climb(survey, &start, space) {
                 Ok(candidate) => {
                     // Ties and equals go to the earlier start: θ_init comes first.
                     if best
@@ -266,13 +302,9 @@ impl Refinement<'_> {
             }
             stage.tick()?;
         }
-        let Some(Candidate { theta, local, .. }) = best else {
-            let starts = settings.starts;
-            return Err(RefineError::NoStart { starts, last });
-        };
-        let (theta, local) = self.polish(&space, &initial, theta, local, &stage)?;
-        stage.finish();
-        self.describe(&space, &initial, theta, local, failed)
+        let starts = self.settings.starts;
+        let Candidate { theta, local, .. } = best.ok_or(RefineError::NoStart { starts, last })?;
+        Ok((theta, local, failed))
     }
 
     /// S^{-1/2}(f̄(θ) − x_obs) with the covariance at θ_GN.
@@ -316,6 +348,14 @@ impl Refinement<'_> {
             lower: side(crate::twin::Interval::low),
             upper: side(crate::twin::Interval::high),
         }
+    }
+
+    /// ∂f̄/∂θ at `theta`, n × d, from few seeds.
+    pub fn jacobian_at(&self, theta: &[f64]) -> Result<DMatrix<f64>, RefineError> {
+        let space = self.simulator.twin().parameters();
+        let theta = DVector::from_vec(space.clamp(theta));
+        let problem = self.problem(&space, &theta, self.settings.centred_seeds);
+        Ok(problem.feature_jacobian(&theta).map_err(not_evaluated)?)
     }
 
     /// What is known around `theta` without a search.

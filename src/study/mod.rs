@@ -6,9 +6,11 @@ mod settings;
 
 pub use file::{Library, RecordTable, StudyFile, StudyFileError};
 pub use plan::{DriveSource, InputPlan, Levels, PlanError, RecordPlan};
-pub use settings::{CloudSampler, CloudSettings, Preset, PresetName, Settings, SettingsError};
+pub use settings::{
+    CloudSampler, CloudSettings, Inputs, Preset, PresetName, Settings, SettingsError,
+};
 
-use crate::feature::{Ar, Arx, FeatureError, FeatureMap, FeatureRecipe};
+use crate::feature::{Ar, Arx, FeatureError, FeatureMap, FeatureRecipe, Score};
 use crate::network::{Architecture, Deep, HeadArchitecture, architecture};
 use crate::twin::conformance::{Finding, Severity};
 use crate::twin::{
@@ -110,8 +112,8 @@ fn check_library(library: &Library) -> Result<(), StudyError> {
 }
 
 impl Study {
-    /// A study of `twin` under `name`. Features are AR(5), or ARX(8, 8) for a twin with inputs, the network is
-    /// [`Deep`], unless said otherwise.
+    /// A study of `twin` under `name`. Unless said otherwise, the network is [`Deep`] and the features are the [`Score`] of a
+    /// twin with equations; of a black box, and in the paper's preset, AR(5), or ARX(8, 8) for a twin with inputs.
     pub fn new(
         name: &str,
         twin: impl DigitalTwin + 'static,
@@ -124,15 +126,19 @@ impl Study {
                 name: name.into(),
                 error,
             })?;
-        let features: Arc<dyn FeatureRecipe> = match base.signals().inputs.len() {
+        let regression: Arc<dyn FeatureRecipe> = match base.signals().inputs.len() {
             0 => Arc::new(Ar { order: 5 }),
             _ => Arc::new(Arx {
                 outputs: 8,
                 inputs: 8,
             }),
         };
-        let preset = |settings| Preset {
-            features: features.clone(),
+        let best = match base.state_space() {
+            Some(_) => Arc::new(Score::default()),
+            None => regression.clone(),
+        };
+        let preset = |features, settings| Preset {
+            features,
             architecture: architecture::<Deep>(),
             settings,
         };
@@ -142,8 +148,8 @@ impl Study {
             base,
             plan,
             presets: BTreeMap::from([
-                (PresetName::Default, preset(Settings::default())),
-                (PresetName::Paper, preset(Settings::paper())),
+                (PresetName::Default, preset(best, Settings::default())),
+                (PresetName::Paper, preset(regression, Settings::paper())),
             ]),
             file: StudyFile {
                 twin: name.into(),

@@ -63,6 +63,7 @@ pub enum CloudSampler {
 /// | `size` | 1000 | ≥ 10 | simulations M_FT |
 /// | `sampler` | ellipsoid | | see [`CloudSampler`] |
 /// | `spread` | 2 | > 0 | standard deviations of the ellipsoid over those of the estimate; 1 in the paper |
+/// | `quadratic` | true | | a quadratic layer beside the tuned heads; not in the paper |
 /// | `rescale` | true | | standardise features and targets anew on the cloud; not in the paper |
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -75,6 +76,8 @@ pub struct CloudSettings {
     pub spread: f64,
     /// Whether features and targets are standardised anew on the cloud.
     pub rescale: bool,
+    /// Whether a quadratic layer stands beside the tuned heads.
+    pub quadratic: bool,
 }
 
 impl Default for CloudSettings {
@@ -84,8 +87,20 @@ impl Default for CloudSettings {
             sampler: CloudSampler::Ellipsoid,
             spread: 2.0,
             rescale: true,
+            quadratic: true,
         }
     }
+}
+
+/// How features become network inputs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Inputs {
+    /// Each to unit deviation, as in the paper.
+    Each,
+    /// To unit covariance along the principal axes of the bank, limited to six standard deviations.
+    #[default]
+    Principal,
 }
 
 /// Every number of the method.
@@ -94,6 +109,8 @@ impl Default for CloudSettings {
 pub struct Settings {
     /// Simulations to train on, m.
     pub bank_size: usize,
+    /// How features become network inputs.
+    pub inputs: Inputs,
     /// Training of trunk and heads.
     pub training: Training,
     /// The out-of-distribution test.
@@ -134,8 +151,10 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             bank_size: 10_000,
+            inputs: Inputs::Principal,
             training: Training {
                 epochs: 100,
+                batch: 128,
                 schedule: crate::network::Schedule::Cosine,
                 patience: 0,
                 ..Training::default()
@@ -144,7 +163,7 @@ impl Default for Settings {
             refine: RefineSettings::default(),
             cloud: CloudSettings::default(),
             tuning: Training {
-                epochs: 150,
+                epochs: 30,
                 schedule: crate::network::Schedule::Cosine,
                 weight_decay: 5e-5,
                 patience: 0,
@@ -162,6 +181,7 @@ impl Settings {
     pub fn paper() -> Self {
         Self {
             bank_size: 10_000,
+            inputs: Inputs::Each,
             training: Training {
                 epochs: 200,
                 holdout: 0.0,
@@ -184,6 +204,7 @@ impl Settings {
                 sampler: CloudSampler::Hybrid,
                 spread: 1.0,
                 rescale: false,
+                quadratic: false,
             },
             tuning: Training {
                 epochs: 200,

@@ -118,6 +118,9 @@ pub fn adapt(
     adaptation: &Adaptation,
     step: f64,
 ) -> Result<Arc<dyn DigitalTwin>, AdaptationError> {
+    if *adaptation == Adaptation::default() {
+        return Ok(base);
+    }
     let Some(equations) = base.state_space() else {
         for (table, used) in [
             ("limits", !adaptation.limits.is_empty()),

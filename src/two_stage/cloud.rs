@@ -1,34 +1,16 @@
-//! The cloud around θ_GN, and heads tuned on it.
+//! The cloud of fresh simulations around θ_GN.
 
-use super::estimate::INTERVAL_LEVEL;
-use super::estimator::one_row;
-use super::{Calibration, EstimateError, Estimator, Scaler, Spread};
+use super::EstimateError;
 use crate::bank::{Draw, Draws, FeatureSimulator};
 use crate::feature::Centred;
 use crate::math::median;
-use crate::network::{History, Network, Training};
 use crate::progress::Progress;
 use crate::refine::Refined;
 use crate::sample::{EigenBox, Ellipsoid, Hybrid, Sampler, Sensitivity};
 use crate::study::{CloudSampler, Settings};
 use crate::twin::{Drive, Interval, Noise, ParameterSpace};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
-use ndarray::{Array2, s};
 use std::borrow::Cow;
-use std::sync::Arc;
-
-/// Heads tuned to one record.
-#[derive(Debug, Clone)]
-pub struct Tuned {
-    /// θ_fine, within the bounds.
-    pub theta: Vec<f64>,
-    /// Errors to expect, measured on a part of the cloud that the heads never saw.
-    pub spread: Option<Spread>,
-    /// Tuned network; its trunk is the pretrained one's.
-    pub network: Arc<dyn Network>,
-    /// Losses.
-    pub history: History,
-}
 
 /// Draws out of bounds before a draw is reflected at them: where the estimate lies in a corner of many dimensions, hardly
 /// any draw falls inside by itself.
@@ -138,64 +120,6 @@ fn sampler(space: &ParameterSpace, around: &Around<'_>) -> Result<Box<dyn Sample
             Box::new(EigenBox::new(centre, axes, reach))
         }
         CloudSampler::Hybrid => Box::new(Hybrid::new(ellipsoid()?, sensitivity())),
-    })
-}
-
-/// Tunes the heads on a cloud, the trunk frozen, and reads the record with them.
-///
-/// Each target's weight is w_j = d·G_jj/Σ G_kk, with G in the units that the targets are standardised in.
-///
-/// Source: Lakshminarayanan, Guerrero & Rojas, section IV-C.
-pub fn tune(
-    estimator: &Estimator,
-    draws: &Draws,
-    refined: &Refined,
-    observed: &DVector<f64>,
-    settings: &Settings,
-    seed: u64,
-    progress: &Progress,
-) -> Result<Tuned, EstimateError> {
-    let size = settings.cloud.size.min(draws.theta.nrows());
-    let rows = |all: &Array2<f64>, from: usize, to: usize| all.slice(s![from..to, ..]).to_owned();
-    let (features, theta) = (rows(&draws.features, 0, size), rows(&draws.theta, 0, size));
-    // On a cloud that is small against the prior, features and targets standardised as in pretraining are all but
-    // constant, and the heads learn little.
-    let (inputs, targets) = if settings.cloud.rescale {
-        (Scaler::fit(&features), Scaler::fit(&theta))
-    } else {
-        (estimator.features.clone(), estimator.targets.clone())
-    };
-    let information: Vec<f64> = (targets.scale.iter().enumerate())
-        .map(|(j, scale)| refined.information.matrix[(j, j)] * scale * scale)
-        .collect();
-    let total: f64 = information.iter().sum();
-    let d = information.len() as f64;
-    let training = Training {
-        target_weights: information.iter().map(|g| d * g / total).collect(),
-        ..settings.tuning.clone()
-    };
-    let (network, history) = estimator.network.tune_heads(
-        &inputs.apply(&features),
-        &targets.apply(&theta),
-        &training,
-        seed,
-        progress,
-    )?;
-    let read = |features: &Array2<f64>| -> Result<Array2<f64>, EstimateError> {
-        Ok(targets.invert(&network.predict(&inputs.apply(features))?))
-    };
-    let space = estimator.study.twin().parameters();
-    let theta = space.clamp(&read(&one_row(observed))?.row(0).to_vec());
-    let end = draws.theta.nrows();
-    let calibration = Calibration {
-        predicted: read(&rows(&draws.features, size, end))?,
-        truth: rows(&draws.theta, size, end),
-    };
-    Ok(Tuned {
-        spread: calibration.spread(&theta, &targets.scale, INTERVAL_LEVEL),
-        theta,
-        network,
-        history,
     })
 }
 

@@ -1,10 +1,11 @@
 //! From a measured record to a calibrated twin.
 
-use super::cloud::{Around, cloud, tune};
+use super::cloud::{Around, cloud};
+use super::tune::tune;
 use super::{Estimator, Spread, Tracking, track};
 use crate::bank::{BankError, FeatureSimulator};
 use crate::feature::FeatureError;
-use crate::gate::{GateError, GateOutcome, GateTest};
+use crate::gate::{GateError, GateForm, GateOutcome, GateTest};
 use crate::network::NetworkError;
 use crate::progress::{Cancelled, Progress};
 use crate::refine::{Information, RefineError, RefineSettings, Refined, Refinement};
@@ -210,7 +211,7 @@ impl Estimator {
             progress,
         };
         let lap = Instant::now();
-        let gate = (run.gate_test(&simulator, "gate").at(&initial)?).test(&observed);
+        let gate = run.gate(&simulator, &initial)?;
         seconds.gate = lap.elapsed().as_secs_f64();
         let outcome = if gate.out_of_distribution || options.always_refine {
             run.refit(&simulator, &initial, &mut seconds)?
@@ -307,6 +308,26 @@ impl Run<'_> {
         }
     }
 
+    /// Whether the record is what the twin makes at the network's estimate.
+    fn gate(
+        &self,
+        simulator: &FeatureSimulator,
+        initial: &[f64],
+    ) -> Result<GateOutcome, EstimateError> {
+        let test = self.gate_test(simulator, "gate");
+        let gate = match self.settings.gate.form {
+            GateForm::Paper => test.at(initial)?,
+            GateForm::Calibrated => {
+                let refinement = self.refinement(simulator, self.observed, &self.settings.refine);
+                let jacobian = refinement.jacobian_at(initial)?;
+                test.at_estimate(initial, &jacobian, |features| {
+                    Ok::<_, EstimateError>(self.estimator.predict(features)?)
+                })?
+            }
+        };
+        Ok(gate.test(self.observed))
+    }
+
     fn refinement<'a>(
         &'a self,
         simulator: &'a FeatureSimulator,
@@ -365,15 +386,14 @@ impl Run<'_> {
         // Features that can find the record's neighbourhood by themselves do, and are taken about it from here on.
         let noise = self.noise.child("centre");
         let centred = simulator.centred(self.record, initial, noise)?;
-        let (simulator, initial, starts) = match &centred {
-            Some((simulator, centred)) => (simulator, centred.theta.as_slice(), 1),
-            None => (simulator, initial, settings.refine.starts),
+        let (simulator, initial, refine) = match &centred {
+            Some((simulator, centred)) => {
+                let refine = settings.refine.centred();
+                (simulator, centred.theta.as_slice(), refine)
+            }
+            None => (simulator, initial, settings.refine.clone()),
         };
         let observed = simulator.observe(self.record)?;
-        let refine = RefineSettings {
-            starts,
-            ..settings.refine.clone()
-        };
         let refinement = self.refinement(simulator, &observed, &refine);
         let refined = refinement.run(initial)?;
         seconds.gauss_newton = Some(lap.elapsed().as_secs_f64());

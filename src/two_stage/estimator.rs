@@ -1,6 +1,6 @@
 //! The pretrained estimator.
 
-use super::{Calibration, Scaler};
+use super::{Calibration, Readout};
 use crate::bank::FeatureSimulator;
 use crate::feature::{FeatureError, FeatureRecipe};
 use crate::network::{Architecture, Network, NetworkError};
@@ -20,9 +20,7 @@ pub struct Estimator {
     pub(super) settings: Settings,
     pub(super) recipe: Arc<dyn FeatureRecipe>,
     pub(super) architecture: Arc<dyn Architecture>,
-    pub(super) network: Arc<dyn Network>,
-    pub(super) features: Scaler,
-    pub(super) targets: Scaler,
+    pub(super) readout: Readout,
     pub(super) calibration: Calibration,
     pub(super) seed: u64,
 }
@@ -55,6 +53,11 @@ impl Estimator {
         &self.settings
     }
 
+    /// scratch
+    pub fn set_settings(&mut self, s: Settings) {
+        self.settings = s;
+    }
+
     /// The seed of bank and training.
     pub fn seed(&self) -> u64 {
         self.seed
@@ -62,7 +65,7 @@ impl Estimator {
 
     /// The trained network.
     pub fn network(&self) -> &Arc<dyn Network> {
-        &self.network
+        self.readout.network()
     }
 
     /// Twin and features, with a call counter of its own.
@@ -77,8 +80,7 @@ impl Estimator {
 
     /// Predictions (rows: samples, columns: parameters) from features, clipped to the physical bounds.
     pub fn predict(&self, features: &Array2<f64>) -> Result<Array2<f64>, NetworkError> {
-        let z = self.network.predict(&self.features.apply(features))?;
-        let mut theta = self.targets.invert(&z);
+        let mut theta = self.readout.predict(features)?;
         let bounds = self.study.twin().parameters().bounds();
         for mut row in theta.rows_mut() {
             for (value, bounds) in row.iter_mut().zip(&bounds) {

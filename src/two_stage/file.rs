@@ -4,7 +4,8 @@
 //! weights; what is not a tensor stands as one JSON text under the metadata key `truetwin`. The SHA-256 of that text
 //! (checksum empty) and of all tensors is checked before anything is used. It holds data only, never code.
 
-use super::{Calibration, Estimator, Scaler};
+use super::readout::Readout;
+use super::{Calibration, Estimator, Scaler, Standardiser};
 use crate::feature::{FeatureError, FeatureRecipe};
 use crate::files::{with_remedy, write_new};
 use crate::network::{NamedTensor, NetworkError};
@@ -18,7 +19,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Layout of the file; raised when it changes.
-const SCHEMA: u32 = 1;
+const SCHEMA: u32 = 2;
 /// Key of the JSON text in the container's metadata.
 const KEY: &str = "truetwin";
 /// Prefix of the network's tensors.
@@ -37,6 +38,8 @@ struct Header {
     settings: Settings,
     inputs: usize,
     outputs: usize,
+    /// Largest network input; none if unlimited.
+    limit: Option<f64>,
     seed: u64,
     sha256: String,
 }
@@ -150,8 +153,9 @@ impl Estimator {
             features: self.recipe.clone(),
             architecture: self.architecture.id().into(),
             settings: self.settings.clone(),
-            inputs: self.network.inputs(),
-            outputs: self.network.outputs(),
+            inputs: self.readout.network.inputs(),
+            outputs: self.readout.network.outputs(),
+            limit: Some(self.readout.inputs.limit).filter(|limit| limit.is_finite()),
             seed: self.seed,
             sha256: String::new(),
         };
@@ -233,18 +237,25 @@ impl Estimator {
             (tensors.get(name).and_then(RawTensor::matrix))
                 .ok_or_else(|| at.foreign(format!("tensor {name} is missing or misshapen")))
         };
-        let scaler = |what: &str, width: usize| -> Result<Scaler, EstimatorFileError> {
-            let row = |part: &str| {
-                let values = matrix(&format!("{what}.{part}"))?;
-                match values.dim() {
-                    (1, n) if n == width => Ok(values.into_iter().collect()),
-                    shape => Err(at.foreign(format!("tensor {what}.{part} is {shape:?}"))),
-                }
-            };
-            Ok(Scaler {
-                mean: row("mean")?,
-                scale: row("scale")?,
-            })
+        let row = |name: &str, width: usize| -> Result<Vec<f64>, EstimatorFileError> {
+            let values = matrix(name)?;
+            match values.dim() {
+                (1, n) if n == width => Ok(values.into_iter().collect()),
+                shape => Err(at.foreign(format!("tensor {name} is {shape:?}"))),
+            }
+        };
+        let features = Standardiser {
+            mean: row("features.mean", header.inputs)?,
+            matrix: matrix("features.matrix")?,
+            limit: header.limit.unwrap_or(f64::INFINITY),
+        };
+        if features.matrix.dim() != (header.inputs, header.inputs) {
+            let shape = features.matrix.dim();
+            return Err(at.foreign(format!("tensor features.matrix is {shape:?}")));
+        }
+        let targets = Scaler {
+            mean: row("targets.mean", header.outputs)?,
+            scale: row("targets.scale", header.outputs)?,
         };
         let calibration = Calibration {
             predicted: matrix("calibration.predicted")?,
@@ -257,15 +268,18 @@ impl Estimator {
             return Err(at.foreign("calibration tensors do not fit each other"));
         }
         Ok(Self {
-            features: scaler("features", header.inputs)?,
-            targets: scaler("targets", header.outputs)?,
+            readout: Readout {
+                inputs: features,
+                targets,
+                layer: None,
+                network,
+            },
             calibration,
             preset: header.preset,
             settings: header.settings,
             recipe: header.features,
             seed: header.seed,
             architecture,
-            network,
             study,
         })
     }
@@ -273,7 +287,7 @@ impl Estimator {
     /// Weights, scalers and calibration by name.
     fn tensors(&self) -> BTreeMap<String, RawTensor> {
         let mut tensors = BTreeMap::new();
-        for tensor in self.network.weights() {
+        for tensor in self.readout.network.weights() {
             tensors.insert(
                 format!("{NETWORK}{}", tensor.name),
                 RawTensor {
@@ -293,10 +307,15 @@ impl Estimator {
                 },
             );
         };
-        for (what, scaler) in [("features", &self.features), ("targets", &self.targets)] {
-            put(&format!("{what}.mean"), 1, scaler.mean.clone());
-            put(&format!("{what}.scale"), 1, scaler.scale.clone());
-        }
+        put("features.mean", 1, self.readout.inputs.mean.clone());
+        let matrix = &self.readout.inputs.matrix;
+        put(
+            "features.matrix",
+            matrix.nrows(),
+            matrix.iter().copied().collect(),
+        );
+        put("targets.mean", 1, self.readout.targets.mean.clone());
+        put("targets.scale", 1, self.readout.targets.scale.clone());
         let Calibration { predicted, truth } = &self.calibration;
         for (what, matrix) in [("predicted", predicted), ("truth", truth)] {
             let values = matrix.iter().copied().collect();

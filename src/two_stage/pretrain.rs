@@ -1,17 +1,21 @@
 //! Bank and training.
 
-use super::{Calibration, Estimator, Scaler};
+use super::readout::Readout;
+use super::{Calibration, Estimator, Scaler, Standardiser};
 use crate::bank::{BankError, Draw, Draws, FeatureSimulator};
 use crate::feature::FeatureError;
+use crate::math::WhiteningError;
 use crate::network::{History, NetworkError};
 use crate::progress::Progress;
-use crate::study::{DriveSource, PlanError, PresetName, SettingsError, Study};
+use crate::study::{DriveSource, Inputs, PlanError, PresetName, SettingsError, Study};
 use crate::twin::Noise;
 use ndarray::Array2;
 use std::borrow::Cow;
 
 /// Simulations apart from the bank, on which the error of the network is measured.
 const CALIBRATION: usize = 1000;
+/// Largest network input, in standard deviations of the bank: far outside, the network should not extrapolate.
+const LIMIT: f64 = 6.0;
 
 /// What may be chosen for a pretraining.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -44,6 +48,9 @@ pub enum PretrainError {
     /// Of the training.
     #[error(transparent)]
     Network(#[from] NetworkError),
+    /// The features of the bank do not vary, or are not finite.
+    #[error("the features of the bank cannot be standardised: {0}")]
+    Standardise(#[from] WhiteningError),
     /// More features than the network takes.
     #[error(
         "the features are {features} numbers, network \"{network}\" takes at most {most}; lower their order or choose a wider network"
@@ -90,10 +97,13 @@ pub fn pretrain(
         |size, purpose: &'static str| simulate(&simulator, &drives, size, seed, purpose, &stage);
     let training = bank(settings.bank_size, "bank")?;
     let calibration = bank(CALIBRATION, "calibration")?;
-    let features = Scaler::fit(&training.features);
+    let inputs = match settings.inputs {
+        Inputs::Each => Standardiser::each(&training.features),
+        Inputs::Principal => Standardiser::principal(&training.features, LIMIT)?,
+    };
     let targets = Scaler::fit(&training.theta);
     let (network, history) = preset.architecture.train(
-        &features.apply(&training.features),
+        &inputs.apply(&training.features),
         &targets.apply(&training.theta),
         &settings.training,
         seed,
@@ -105,9 +115,12 @@ pub fn pretrain(
         settings,
         recipe: preset.features.clone(),
         architecture: preset.architecture.clone(),
-        network,
-        features,
-        targets,
+        readout: Readout {
+            inputs,
+            targets,
+            layer: None,
+            network,
+        },
         calibration: Calibration {
             predicted: Array2::zeros(calibration.theta.dim()),
             truth: calibration.theta,
