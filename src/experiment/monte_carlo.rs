@@ -107,9 +107,10 @@ impl MonteCarlo {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::{Manifest, Origin, reference_studies};
+    use crate::experiment::{Manifest, Origin, reference_studies, score};
     use crate::progress::Listener;
-    use crate::study::PresetName;
+    use crate::study::{PresetName, RecordPlan};
+    use crate::twin::{DigitalTwin, Drive, Noise, Parameter, ParameterSpace, Signal};
     use crate::two_stage::{PretrainOptions, pretrain};
     use std::fs;
     use std::path::Path;
@@ -250,5 +251,52 @@ mod tests {
         let error = plan.run(oscillator(), Some(&store), &progress);
         assert!(matches!(error, Err(MonteCarloError::Cancelled(_))));
         assert_eq!(fs::read_dir(store.file("runs")).unwrap().count(), 0);
+    }
+
+    /// A twin without equations that diverges in the upper half of its bounds.
+    struct Amplifier;
+    impl DigitalTwin for Amplifier {
+        fn parameters(&self) -> ParameterSpace {
+            ParameterSpace::new([Parameter::new("gain", "-", 1.0, 2.0).within(0.0, 6.0)])
+        }
+        fn simulate(
+            &self,
+            theta: &[f64],
+            drive: &Drive,
+            noise: Noise,
+        ) -> Result<Signal, SimulationError> {
+            let mut v = noise.source("sensor");
+            match theta[0] > 3.0 {
+                true => Err(SimulationError::Diverged { at: 0.0 }),
+                false => Ok(drive.inputs().mapv(|u| theta[0] * u + 0.1 * v.normal())),
+            }
+        }
+    }
+
+    #[test]
+    fn a_black_box_is_scored_and_drawn_again_where_it_diverges() {
+        let levels = RecordPlan::levels(0.1, 80, -1.0, 1.0, 5);
+        let study = Study::new("amplifier", Amplifier, levels).unwrap();
+        let (estimator, _) = pretrain(&study, &TRAINING, &Progress::silent()).unwrap();
+        let plan = MonteCarlo {
+            benchmark: Benchmark::of(&study),
+            ..plan(Scenario::Uniform, 6)
+        };
+        let runs = plan.run(&estimator, None, &Progress::silent()).unwrap();
+        assert!(runs.iter().all(|run| run.truth[0] <= 3.0), "{runs:?}");
+        let scores = score(&study, &plan, &runs);
+        let failed: Vec<usize> = scores.methods.iter().map(|s| s.failed).collect();
+        assert_eq!(failed[7..], [6; 3], "a filter needs equations");
+        assert_eq!(failed[6], 6, "the bad start, the upper bound, diverges");
+        assert!(failed[..6].iter().all(|n| *n < 6), "{failed:?}");
+        assert!(scores.methods[8].mse.is_nan() && scores.methods[8].milliseconds.is_nan());
+        let point = MonteCarlo {
+            scenario: Scenario::Second,
+            ..plan
+        };
+        assert!(matches!(
+            point.check(&study),
+            Err(ScenarioError::NoPoint(_))
+        ));
     }
 }
