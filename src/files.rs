@@ -1,7 +1,7 @@
-//! Files that appear whole or not at all, and never in place of another.
+//! Files and folders that appear whole or not at all.
 
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Writes a new file: the bytes go to a temporary file beside it, which is then put in its place.
 ///
@@ -9,6 +9,18 @@ use std::path::Path;
 ///
 /// What the system says; [`io::ErrorKind::AlreadyExists`] where the path is taken.
 pub fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let file = filled(path, bytes)?.persist_noclobber(path);
+    file.map(|_| ()).map_err(|error| error.error)
+}
+
+/// As [`write_new`], but takes the place of a file that is there: for results that are made again.
+pub fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let file = filled(path, bytes)?.persist(path);
+    file.map(|_| ()).map_err(|error| error.error)
+}
+
+/// A temporary file beside `path` with these bytes on the disk.
+fn filled(path: &Path, bytes: &[u8]) -> io::Result<tempfile::NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     #[cfg(unix)]
     {
@@ -19,9 +31,45 @@ pub fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = builder.prefix(".truetwin-").tempfile_in(folder(path))?;
     file.write_all(bytes)?;
     file.as_file().sync_all()?;
-    file.persist_noclobber(path)
-        .map(|_| ())
-        .map_err(|error| error.error)
+    Ok(file)
+}
+
+/// A folder that is filled beside its place and appears there whole.
+#[derive(Debug)]
+pub struct NewFolder {
+    place: PathBuf,
+    filling: tempfile::TempDir,
+}
+
+impl NewFolder {
+    /// A folder that will be at `place`.
+    pub fn new(place: &Path) -> io::Result<Self> {
+        let mut builder = tempfile::Builder::new();
+        Ok(Self {
+            filling: builder.prefix(".truetwin-").tempdir_in(folder(place))?,
+            place: place.into(),
+        })
+    }
+
+    /// Where a file of the folder is written until then.
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.filling.path().join(name)
+    }
+
+    /// Puts the folder in its place.
+    pub fn finish(self) -> io::Result<()> {
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            // A temporary folder is its maker's alone; a result is like any other folder.
+            let mode = std::fs::Permissions::from_mode(0o755);
+            std::fs::set_permissions(self.filling.path(), mode)?;
+        }
+        std::fs::rename(self.filling.path(), &self.place)?;
+        // Moved away: nothing is left to remove.
+        let _ = self.filling.keep();
+        Ok(())
+    }
 }
 
 /// The folder that a path lies in.
@@ -64,9 +112,27 @@ mod tests {
             1,
             "nothing is left over"
         );
+        replace(&path, b"third").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"third");
         let plain = place.path().join("b.txt");
         fs::write(&plain, "").unwrap();
         let mode = |p: &Path| fs::metadata(p).unwrap().permissions();
         assert_eq!(mode(&path), mode(&plain));
+    }
+
+    #[test]
+    fn a_folder_appears_when_it_is_finished() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("out");
+        let dropped = NewFolder::new(&path).unwrap();
+        fs::write(dropped.file("a.txt"), "a").unwrap();
+        drop(dropped);
+        assert_eq!(fs::read_dir(place.path()).unwrap().count(), 0);
+        let folder = NewFolder::new(&path).unwrap();
+        fs::write(folder.file("a.txt"), "a").unwrap();
+        assert!(!path.exists());
+        folder.finish().unwrap();
+        assert_eq!(fs::read(path.join("a.txt")).unwrap(), b"a");
+        assert_eq!(fs::read_dir(place.path()).unwrap().count(), 1);
     }
 }

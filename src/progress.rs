@@ -84,6 +84,11 @@ impl Progress {
         }
     }
 
+    /// For parts of a piece of work that is itself one unit: shows nothing, but ends when the listener asks to stop.
+    pub fn unshown(&self) -> Self {
+        Self::new(Arc::new(Unshown(self.clone())))
+    }
+
     /// Fails where the listener asks to stop.
     pub fn checkpoint(&self) -> Result<(), Cancelled> {
         match &self.0 {
@@ -100,6 +105,16 @@ impl fmt::Debug for Progress {
         } else {
             "Progress(silent)"
         })
+    }
+}
+
+/// A listener that only stops the work.
+struct Unshown(Progress);
+
+impl Listener for Unshown {
+    fn advanced(&self, _: &str, _: u64, _: u64) {}
+    fn cancelled(&self) -> bool {
+        self.0.checkpoint().is_err()
     }
 }
 
@@ -152,6 +167,17 @@ mod tests {
         let stage = progress.stage("work", 10);
         let done = (0..10).take_while(|_| stage.tick().is_ok()).count();
         assert_eq!(done, 2, "the third tick is refused");
+    }
+
+    #[test]
+    fn what_is_not_shown_is_still_stopped() {
+        let progress = Progress::new(Arc::new(StopAfter(2, AtomicU64::new(0))));
+        let inner = progress.unshown();
+        let stage = inner.stage("inner", 3);
+        assert!((0..3).all(|_| stage.tick().is_ok()), "nothing was counted");
+        let outer = progress.stage("outer", 2);
+        assert!(outer.tick().is_ok() && outer.tick().is_err());
+        assert!(inner.checkpoint().is_err());
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The verbs and their options.
 
+use crate::experiment::Scenario;
 use crate::study::PresetName;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::{Path, PathBuf};
@@ -43,7 +44,15 @@ pub(super) enum Command {
     Pretrain(PretrainArguments),
     /// Estimate the parameters behind a measured record.
     Estimate(EstimateArguments),
-    /// Score the estimator's stages on the paper's test points.
+    /// Score every method on simulated records: the paper's table and figures.
+    ///
+    /// Methods: the pretrained network (TS-pre), Gauss–Newton (GN), tuned heads (TS-fine), what `estimate` would answer
+    /// (final), and as baselines the prediction-error method (PEM) and the dual Kalman filter (dual-EKF), each from a good
+    /// start, from TS-pre, and from a bad start. Where the paper has a figure, it stands beside ours. Where records do not
+    /// determine all of θ, a second table has the errors of what they do determine.
+    ///
+    /// Run i depends on the seed and i alone. Records run in parallel, each on its share of the threads: for times of one
+    /// core, say --threads 1.
     Reproduce(ReproduceArguments),
     /// Calibrate a twin to an embedded record, in seconds, to see what it looks like.
     Demo(DemoArguments),
@@ -153,14 +162,51 @@ pub(super) struct EstimateArguments {
     pub out: Option<PathBuf>,
 }
 
+/// Where true parameters come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum ScenarioArgument {
+    /// Drawn from the prior, where the network was trained
+    #[value(name = "0")]
+    Prior,
+    /// The paper's first point outside the prior, that of its table (OOD 1)
+    #[value(name = "1")]
+    First,
+    /// The paper's second point outside the prior, that of its figures (OOD 2)
+    #[value(name = "2")]
+    Second,
+    /// Drawn from the physical bounds
+    #[value(name = "uniform", alias = "3")]
+    Uniform,
+}
+
+impl From<ScenarioArgument> for Scenario {
+    fn from(argument: ScenarioArgument) -> Self {
+        match argument {
+            ScenarioArgument::Prior => Self::InDistribution,
+            ScenarioArgument::First => Self::First,
+            ScenarioArgument::Second => Self::Second,
+            ScenarioArgument::Uniform => Self::Uniform,
+        }
+    }
+}
+
 #[derive(Debug, Args)]
+#[command(after_help = "The paper's table and figures:\n  \
+        truetwin reproduce --twin van-der-pol --preset paper --out vdp-1\n  \
+        truetwin reproduce --twin tanks --preset paper --out tanks-1\n  \
+        truetwin reproduce --twin tanks --preset paper --scenario 2 --out tanks-2\n\
+        A twin of your own, over all of its bounds:\n  \
+        truetwin reproduce --study S.toml --scenario uniform --runs 200 --out study\n\n\
+        DIR holds reproduce.json (as --json), table.txt, trajectories.svg (as in the paper: the truth and the mean\n\
+        predictions; scenarios 1 and 2), first-record.svg, and what it takes to go on: manifest.json, estimator.est,\n\
+        runs/0000.json and so on. Interrupted, the same call goes on where it stopped; another call is refused.")]
 pub(super) struct ReproduceArguments {
     #[command(flatten)]
     pub subject: Subject,
-    /// 1 and 2: the paper's points outside the prior; 0: θ drawn from the prior.
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=2))]
-    pub scenario: u8,
-    /// Simulated records.
+    /// Where the true parameters of the records come from.
+    #[arg(long, value_enum, default_value = "1")]
+    pub scenario: ScenarioArgument,
+    /// Simulated records; the paper has 100.
     #[arg(long, default_value_t = 100, value_parser = at_least_one)]
     pub runs: usize,
     /// Recipe.
@@ -175,6 +221,9 @@ pub(super) struct ReproduceArguments {
     /// Passes over the bank; the preset's unless given.
     #[arg(long)]
     pub epochs: Option<usize>,
+    /// A folder for the results: a new one, or one of this very call to go on with.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
 }
 
 /// A number of runs.

@@ -2,7 +2,7 @@
 
 use crate::bank::BankError;
 use crate::effect::EffectFileError;
-use crate::experiment::MonteCarloError;
+use crate::experiment::{MonteCarloError, ScenarioError, StoreError};
 use crate::feature::FeatureError;
 use crate::gate::GateError;
 use crate::network::NetworkError;
@@ -113,6 +113,7 @@ users!(
     ParameterError,
     RecordError,
     SimulationError,
+    StoreError,
 );
 
 /// Errors that the setting of the study can cause.
@@ -197,11 +198,21 @@ impl From<EstimateError> for Failure {
     }
 }
 
+impl From<ScenarioError> for Failure {
+    fn from(error: ScenarioError) -> Self {
+        match error {
+            ScenarioError::Plan(error) => error.into(),
+            ScenarioError::Drive(error) => error.into(),
+            ScenarioError::NoPoint(_) | ScenarioError::Outside { .. } => Self::user(error),
+        }
+    }
+}
+
 impl From<MonteCarloError> for Failure {
     fn from(error: MonteCarloError) -> Self {
         match error {
-            MonteCarloError::Cancelled(_) => Self::internal(error),
-            MonteCarloError::Estimate { error, .. } => (*error).into(),
+            MonteCarloError::Cancelled(_) | MonteCarloError::Threads(_) => Self::internal(error),
+            MonteCarloError::Scenario(error) => error.into(),
             _ => Self::user(error),
         }
     }

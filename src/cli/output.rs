@@ -1,10 +1,10 @@
 //! Results: standard output, files that appear whole, folders that appear whole.
 
 use super::Failure;
-use crate::files::folder;
+use crate::files::{self, folder, with_remedy};
 use serde_json::Value;
 use std::fs;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// Prints a result; a reader that has gone away (`| head`) is no failure.
@@ -45,44 +45,33 @@ pub(super) fn check_new(path: &Path) -> Result<(), Failure> {
 /// A folder that is filled beside its place and appears there whole.
 pub(super) struct NewFolder {
     place: PathBuf,
-    filling: tempfile::TempDir,
+    filling: files::NewFolder,
 }
 
 impl NewFolder {
     pub fn new(place: &Path) -> Result<Self, Failure> {
-        let failed = |error| Failure::user(format!("{}: {error}", place.display()));
+        let filling = files::NewFolder::new(place);
         Ok(Self {
-            filling: tempfile::Builder::new()
-                .prefix(".truetwin-")
-                .tempdir_in(folder(place))
-                .map_err(failed)?,
+            filling: filling.map_err(|error| failed(place, &error))?,
             place: place.into(),
         })
     }
 
     /// Where a file of the folder is written.
     pub fn file(&self, name: &str) -> PathBuf {
-        self.filling.path().join(name)
+        self.filling.file(name)
     }
 
     pub fn write(&self, name: &str, text: &str) -> Result<(), Failure> {
-        fs::write(self.file(name), text)
-            .map_err(|error| Failure::user(format!("{}/{name}: {error}", self.place.display())))
+        fs::write(self.file(name), text).map_err(|error| failed(&self.place.join(name), &error))
     }
 
     /// Puts the folder in its place.
     pub fn finish(self) -> Result<(), Failure> {
-        let failed = |error| Failure::user(format!("{}: {error}", self.place.display()));
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            // A temporary folder is its maker's alone; a result is like any other folder.
-            fs::set_permissions(self.filling.path(), fs::Permissions::from_mode(0o755))
-                .map_err(failed)?;
-        }
-        fs::rename(self.filling.path(), &self.place).map_err(failed)?;
-        // Moved away: nothing is left to remove.
-        let _ = self.filling.keep();
-        Ok(())
+        (self.filling.finish()).map_err(|error| failed(&self.place, &error))
     }
+}
+
+fn failed(path: &Path, error: &io::Error) -> Failure {
+    Failure::user(format!("{}: {}", path.display(), with_remedy(error)))
 }

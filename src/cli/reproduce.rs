@@ -1,10 +1,14 @@
-//! `reproduce`: errors of the estimator's stages on the paper's test points.
+//! `reproduce`: the paper's table and figures, on any twin.
 
 use super::args::ReproduceArguments;
 use super::{Context, Failure, output};
-use crate::experiment::{MonteCarlo, Scenario, score};
+use crate::experiment::{
+    Benchmark, FreeRuns, Manifest, MeanRuns, MonteCarlo, Origin, Run, Store, score,
+};
+use crate::report::{first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
+use crate::study::Study;
 use crate::two_stage::{Estimator, PretrainOptions, pretrain};
-use serde_json::{Value, json};
+use std::path::Path;
 use std::process::ExitCode;
 
 pub(super) fn run(
@@ -12,79 +16,94 @@ pub(super) fn run(
     options: &ReproduceArguments,
 ) -> Result<ExitCode, Failure> {
     let study = context.study(&options.subject)?;
-    let estimator = match &options.estimator {
-        Some(path) => {
-            let estimator = Estimator::load(path, context.studies)?;
-            let made_for = estimator.study().name();
-            if made_for != study.name() {
-                let asked = study.name();
-                return Err(Failure::user(format!(
-                    "{}: made for twin {made_for}, --twin says {asked}; name the same twin",
-                    path.display()
-                )));
-            }
-            estimator
-        }
-        None => {
-            let settings = PretrainOptions {
-                preset: options.preset.into(),
-                bank_size: options.bank_size,
-                epochs: options.epochs,
-                seed: context.seed,
-            };
-            pretrain(&study, &settings, context.progress)?.0
-        }
+    let given = match &options.estimator {
+        Some(path) => Some((path, load(context, path, &study)?)),
+        None => None,
     };
+    // An estimator carries the setting that it was made for.
+    let study = &(given.as_ref()).map_or(study, |(_, estimator)| estimator.study().clone());
     let plan = MonteCarlo {
-        scenario: match options.scenario {
-            0 => Scenario::InDistribution,
-            1 => Scenario::First,
-            _ => Scenario::Second,
-        },
+        benchmark: Benchmark::of(study),
+        scenario: options.scenario.into(),
         runs: options.runs,
         seed: context.seed,
     };
-    let scores = score(&estimator, &plan, context.progress)?;
-    let finite = |v: f64| Some(v).filter(|v| v.is_finite());
-    if context.json {
-        let methods: Vec<Value> = (scores.iter())
-            .map(|s| {
-                json!({
-                    "method": s.method.to_string(),
-                    "initialisation": s.method.initialisation().map(|i| i.to_string()),
-                    "mse": finite(s.mse), "median": finite(s.median), "ms": finite(s.milliseconds),
-                })
-            })
-            .collect();
-        output::print_json(&json!({
-            "schema": "truetwin.reproduce/1", "twin": study.name(), "scenario": options.scenario,
-            "runs": options.runs, "preset": estimator.preset(), "methods": methods,
-        }))?;
-    } else {
-        let mut text = format!(
-            "{}, scenario {}, {} runs, preset {}\n{:<14} {:>12} {:>12} {:>10}\n",
-            study.name(),
-            options.scenario,
-            options.runs,
-            estimator.preset(),
-            "method",
-            "MSE",
-            "median",
-            "ms"
-        );
-        for s in &scores {
-            text.push_str(&format!(
-                "{:<14} {:>12.3e} {:>12.3e} {:>10.1}\n",
-                match s.method.initialisation() {
-                    Some(start) => format!("{} ({start})", s.method),
-                    None => s.method.to_string(),
-                },
-                s.mse,
-                s.median,
-                s.milliseconds
-            ));
+    plan.check(study)?;
+    let training = PretrainOptions {
+        preset: options.preset.into(),
+        bank_size: options.bank_size,
+        epochs: options.epochs,
+        seed: context.seed,
+    };
+    let store = match &options.out {
+        Some(out) => {
+            let origin = match &given {
+                Some((path, _)) => Origin::File(path),
+                None => Origin::Trained(&training),
+            };
+            Some(Store::open(out, &Manifest::new(study, &plan, origin)?)?)
         }
-        output::print(&text)?;
+        None => None,
+    };
+    let estimator = match (given, &store) {
+        (Some((_, estimator)), _) => estimator,
+        (None, None) => pretrain(study, &training, context.progress)?.0,
+        (None, Some(store)) => kept(context, study, &training, store)?,
+    };
+    let runs = plan.run(&estimator, store.as_ref(), context.progress)?;
+    let scores = score(study, &plan, &runs);
+    let json = reproduce_json(study, &plan, estimator.preset(), &scores);
+    let text = reproduce_text(study, &plan, estimator.preset(), &scores);
+    if let Some(store) = &store {
+        draw(store, study, &plan, &runs)?;
+        store.write("table.txt", &text)?;
+        // Last: where it is, everything is.
+        store.write("reproduce.json", &format!("{json:#}\n"))?;
+    }
+    match context.json {
+        true => output::print_json(&json)?,
+        false => output::print(&text)?,
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The estimator of a file, if it is one of this twin.
+fn load(context: &Context<'_>, path: &Path, study: &Study) -> Result<Estimator, Failure> {
+    let estimator = Estimator::load(path, context.studies)?;
+    let (made_for, asked) = (estimator.study().name(), study.name());
+    if made_for != asked {
+        return Err(Failure::user(format!(
+            "{}: made for twin {made_for}, --twin says {asked}; name the same twin",
+            path.display()
+        )));
+    }
+    Ok(estimator)
+}
+
+/// The folder's estimator: trained once, then read.
+fn kept(
+    context: &Context<'_>,
+    study: &Study,
+    training: &PretrainOptions,
+    store: &Store,
+) -> Result<Estimator, Failure> {
+    let path = store.estimator();
+    if !path.exists() {
+        (pretrain(study, training, context.progress)?.0).save(&path)?;
+    }
+    Ok(Estimator::load(&path, context.studies)?)
+}
+
+/// `trajectories.svg`, where all records have the same truth, and `first-record.svg`.
+fn draw(store: &Store, study: &Study, plan: &MonteCarlo, runs: &[Run]) -> Result<(), Failure> {
+    if let Some(means) = MeanRuns::of(study, plan, runs)?
+        && let Some(svg) = mean_runs_svg(study, &means)
+    {
+        store.write("trajectories.svg", &svg)?;
+    }
+    if let Some(first) = runs.first() {
+        let free = FreeRuns::of(study, plan, first)?;
+        store.write("first-record.svg", &first_run_svg(study, &free))?;
+    }
+    Ok(())
 }

@@ -1,7 +1,34 @@
 //! Studies over many records, and the paper's settings of the reference twins.
+//!
+//! | to … | look at |
+//! |---|---|
+//! | run the estimator and the baselines on many simulated records | [`MonteCarlo::run`], [`Run`] |
+//! | turn the runs into errors and coverage | [`score`], [`Scores`] |
+//! | choose where true parameters come from | [`Scenario`] |
+//! | keep runs in a folder and go on later | [`Store`], [`Manifest`] |
+//! | draw what the answers predict | [`FreeRuns`], [`MeanRuns`] |
+//! | have a twin's test points, invariants, published figures | [`Benchmark`] |
 
+mod crew;
+mod free_runs;
+mod invariant;
+mod manifest;
+mod method;
 mod monte_carlo;
 mod paper;
+mod record;
+mod run;
+mod scenario;
+mod score;
+mod store;
 
-pub use monte_carlo::{Method, MethodScore, MonteCarlo, MonteCarloError, score};
-pub use paper::{Scenario, reference_studies, scenario};
+pub use free_runs::{FreeRuns, MeanRuns};
+pub use invariant::{Invariant, Symmetry};
+pub use manifest::{Manifest, Origin};
+pub use method::Method;
+pub use monte_carlo::{MonteCarlo, MonteCarloError};
+pub use paper::reference_studies;
+pub use run::{Answer, Run};
+pub use scenario::{Benchmark, Published, Scenario, ScenarioError, TestPoint};
+pub use score::{COVERAGE_LEVEL, Coverage, MethodScore, Scores, score};
+pub use store::{Store, StoreError};

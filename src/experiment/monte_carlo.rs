@@ -1,77 +1,19 @@
-//! Errors of each stage of the estimator over many simulated records.
+//! Every method on many simulated records.
 
-use super::{Scenario, scenario};
-use crate::baseline::{DualFilter, Initialisation, PredictionError};
+use super::crew::share_out;
+use super::record::simulated;
+use super::scenario::Draws;
+use super::{Benchmark, Run, Scenario, ScenarioError, Store, StoreError};
 use crate::progress::{Cancelled, Progress};
-use crate::twin::{Noise, Record, RecordError, SimulationError};
-use crate::two_stage::{Estimate, EstimateError, EstimateOptions, Estimator};
-use std::fmt;
-use std::time::Instant;
-
-/// What is scored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Method {
-    /// The pretrained network.
-    TsPre,
-    /// Gauss–Newton, whatever the gate says.
-    GaussNewton,
-    /// Tuned heads, whatever the gate says.
-    TsFine,
-    /// What the estimator answers: gate, misfit and all.
-    Final,
-    /// The prediction-error method, the paper's six steps.
-    PredictionError(Initialisation),
-    /// The dual Kalman filter; of twins with equations only.
-    DualFilter(Initialisation),
-}
-
-impl Method {
-    /// Every row, in the order of a table.
-    pub fn all() -> Vec<Self> {
-        let mut all = vec![Self::TsPre, Self::GaussNewton, Self::TsFine, Self::Final];
-        all.extend(Initialisation::ALL.map(Self::PredictionError));
-        all.extend(Initialisation::ALL.map(Self::DualFilter));
-        all
-    }
-
-    /// Where a baseline starts.
-    pub fn initialisation(self) -> Option<Initialisation> {
-        match self {
-            Self::PredictionError(start) | Self::DualFilter(start) => Some(start),
-            _ => None,
-        }
-    }
-}
-
-impl fmt::Display for Method {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::TsPre => "TS-pre",
-            Self::GaussNewton => "GN",
-            Self::TsFine => "TS-fine",
-            Self::Final => "final",
-            Self::PredictionError(_) => "PEM",
-            Self::DualFilter(_) => "dual-EKF",
-        })
-    }
-}
-
-/// Error of one method.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MethodScore {
-    /// Method.
-    pub method: Method,
-    /// Mean over runs and parameters of the squared error; NaN where the method cannot be used or failed on a run.
-    pub mse: f64,
-    /// Median over runs of the squared error, averaged over parameters.
-    pub median: f64,
-    /// Mean wall-clock time a record, milliseconds.
-    pub milliseconds: f64,
-}
+use crate::study::Study;
+use crate::twin::{RecordError, SimulationError};
+use crate::two_stage::Estimator;
 
 /// What is run.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct MonteCarlo {
+    /// What is known about the twin: [`Benchmark::of`] for the paper's, the default for any other.
+    pub benchmark: Benchmark,
     /// Where θ comes from.
     pub scenario: Scenario,
     /// Number of records.
@@ -83,134 +25,278 @@ pub struct MonteCarlo {
 /// Why there are no scores.
 #[derive(Debug, thiserror::Error)]
 pub enum MonteCarloError {
-    /// The paper has no test points for this twin.
-    #[error("the paper has no test points for twin \"{0}\"; choose van-der-pol or tanks")]
-    NoScenario(String),
+    /// The study does not have such a scenario.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
     /// A record could not be simulated.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
     /// A record could not be made.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// An estimate failed.
-    #[error("run {run}: {error}")]
-    Estimate {
-        /// Run, from 0.
-        run: usize,
-        /// What failed.
-        error: Box<EstimateError>,
-    },
+    /// The estimator failed on every record.
+    #[error("the estimator failed on every record; on the first: {0}")]
+    Hopeless(String),
+    /// The folder of runs.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// No threads.
+    #[error("no threads could be started: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
     /// Stopped from outside.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }
 
-/// Squared error, averaged over parameters, and milliseconds, of each method.
-type Run = Vec<(f64, f64)>;
+impl MonteCarlo {
+    /// Whether the study has this scenario; worth asking before an estimator is trained.
+    pub fn check(&self, study: &Study) -> Result<(), ScenarioError> {
+        self.draws(study).map(|_| ())
+    }
 
-/// Scores every stage of `estimator`, and the baselines, on simulated records.
-pub fn score(
-    estimator: &Estimator,
-    plan: &MonteCarlo,
-    progress: &Progress,
-) -> Result<Vec<MethodScore>, MonteCarloError> {
-    let stage = progress.stage("records", plan.runs);
-    let runs: Vec<Run> = (0..plan.runs)
-        .map(|run| {
-            let scores = one(estimator, plan, run)?;
+    pub(super) fn draws<'a>(&self, study: &'a Study) -> Result<Draws<'a>, ScenarioError> {
+        Draws::new(study, &self.benchmark, self.scenario)
+    }
+
+    /// Runs every stage of `estimator`, and the baselines, on simulated records, in order. Records are independent:
+    /// run i depends on (seed, i) alone, and on no number of threads.
+    ///
+    /// With a `store`, each run is kept there as soon as it is done, and what is there already is not run again.
+    ///
+    /// Records run in parallel, each on its share of the current threads.
+    pub fn run(
+        &self,
+        estimator: &Estimator,
+        store: Option<&Store>,
+        progress: &Progress,
+    ) -> Result<Vec<Run>, MonteCarloError> {
+        let study = estimator.study();
+        let draws = self.draws(study)?;
+        let parameters = study.twin().parameters().len();
+        let stage = progress.stage("records", self.runs);
+        let mut runs = Vec::with_capacity(self.runs);
+        let mut missing = Vec::new();
+        for run in 0..self.runs {
+            match store.map_or(Ok(None), |store| store.load(run, parameters))? {
+                Some(known) => {
+                    runs.push(known);
+                    stage.tick()?;
+                }
+                None => missing.push(run),
+            }
+        }
+        runs.extend(share_out(&missing, |run| {
+            let record = simulated(study, &draws, self.seed, run)?;
+            let done = Run::new(estimator, run, &record, progress)?;
+            if let Some(store) = store {
+                store.keep(&done)?;
+            }
             stage.tick()?;
-            Ok(scores)
-        })
-        .collect::<Result<_, MonteCarloError>>()?;
-    Ok((Method::all().into_iter().enumerate())
-        .map(|(m, method)| {
-            let mean = |of: fn(&(f64, f64)) -> f64| {
-                runs.iter().map(|run| of(&run[m])).sum::<f64>() / runs.len().max(1) as f64
-            };
-            let errors: Vec<f64> = runs.iter().map(|run| run[m].0).collect();
-            MethodScore {
-                method,
-                mse: mean(|run| run.0),
-                median: crate::math::median(&errors).unwrap_or(f64::NAN),
-                milliseconds: mean(|run| run.1),
-            }
-        })
-        .collect())
+            Ok(done)
+        })?);
+        runs.sort_by_key(|run| run.run);
+        match runs.iter().all(|run| run.failure.is_some()) {
+            true => Err(MonteCarloError::Hopeless(
+                (runs.into_iter().find_map(|run| run.failure)).unwrap_or_default(),
+            )),
+            false => Ok(runs),
+        }
+    }
 }
 
-fn one(estimator: &Estimator, plan: &MonteCarlo, run: usize) -> Result<Run, MonteCarloError> {
-    let study = estimator.study();
-    let noise = Noise::new(plan.seed, "record", run as u64);
-    let (truth, drive) = scenario(study, plan.scenario, noise)
-        .ok_or_else(|| MonteCarloError::NoScenario(study.name().into()))?
-        .map_err(RecordError::from)?;
-    let outputs = study.twin().simulate(&truth, &drive, noise)?;
-    let record = Record::new(drive, outputs)?;
-    let options = EstimateOptions {
-        seed: noise.seed().unwrap_or(plan.seed),
-        always_refine: true,
-        ..EstimateOptions::default()
-    };
-    let estimate =
-        (estimator.estimate(&record, &options, &Progress::silent())).map_err(|error| {
-            MonteCarloError::Estimate {
-                run,
-                error: Box::new(error),
-            }
-        })?;
-    let twin = study.twin().as_ref();
-    let start = |from: Initialisation| {
-        let noise = noise.child("start");
-        (from.theta(&twin.parameters(), &truth, &estimate.initial, noise)).ok()
-    };
-    Ok((Method::all().into_iter())
-        .map(|method| {
-            let clock = Instant::now();
-            // A baseline that fails on a record scores NaN: its row says that it cannot be relied on here.
-            let (theta, seconds) = match method {
-                Method::PredictionError(from) => {
-                    let fit = start(from).and_then(|start| {
-                        PredictionError::default().fit(twin, &record, &start).ok()
-                    });
-                    (fit.map(|fit| fit.theta), None)
-                }
-                Method::DualFilter(from) => {
-                    let run = start(from)
-                        .zip(twin.state_space())
-                        .and_then(|(start, equations)| {
-                            DualFilter::default().run(equations, &record, &start).ok()
-                        });
-                    (run.map(|run| run.theta), None)
-                }
-                stage => of_stage(stage, &estimate),
-            };
-            let seconds = seconds.unwrap_or_else(|| clock.elapsed().as_secs_f64());
-            let error = theta.map_or(f64::NAN, |theta| {
-                let squares = theta.iter().zip(&truth).map(|(a, b)| (a - b).powi(2));
-                squares.sum::<f64>() / truth.len() as f64
-            });
-            (error, 1000.0 * seconds)
-        })
-        .collect())
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::{Manifest, Origin, reference_studies, score};
+    use crate::progress::Listener;
+    use crate::study::{PresetName, RecordPlan};
+    use crate::twin::{DigitalTwin, Drive, Noise, Parameter, ParameterSpace, Signal};
+    use crate::two_stage::{PretrainOptions, pretrain};
+    use std::fs;
+    use std::path::Path;
+    use std::sync::{Arc, OnceLock};
 
-/// Estimate and seconds of one stage of the estimator.
-fn of_stage(method: Method, estimate: &Estimate) -> (Option<Vec<f64>>, Option<f64>) {
-    let seconds = &estimate.seconds;
-    let initial = (Some(estimate.initial.clone()), seconds.predict);
-    let gauss_newton = seconds.predict + seconds.gate + seconds.gauss_newton.unwrap_or(0.0);
-    let (theta, seconds) = match method {
-        Method::GaussNewton => (estimate.gauss_newton.clone(), gauss_newton),
-        Method::TsFine => {
-            let cloud = seconds.cloud.unwrap_or(0.0) + seconds.tune.unwrap_or(0.0);
-            (estimate.fine.clone(), gauss_newton + cloud)
-        }
-        // What would have been answered without being told to refine.
-        Method::Final if estimate.gate.out_of_distribution => {
-            (Some(estimate.theta.clone()), seconds.total)
-        }
-        Method::Final => (initial.0, seconds.predict + seconds.gate),
-        _ => initial,
+    const TRAINING: PretrainOptions = PretrainOptions {
+        preset: PresetName::Paper,
+        bank_size: Some(200),
+        epochs: Some(2),
+        seed: 1,
     };
-    (theta, Some(seconds))
+
+    fn oscillator() -> &'static Estimator {
+        static MADE: OnceLock<Estimator> = OnceLock::new();
+        MADE.get_or_init(|| {
+            let study = &reference_studies().unwrap()[0];
+            pretrain(study, &TRAINING, &Progress::silent()).unwrap().0
+        })
+    }
+
+    fn plan(scenario: Scenario, runs: usize) -> MonteCarlo {
+        MonteCarlo {
+            benchmark: Benchmark::of(oscillator().study()),
+            scenario,
+            runs,
+            seed: 3,
+        }
+    }
+
+    fn open(path: &Path, plan: &MonteCarlo) -> Result<Store, StoreError> {
+        let origin = Origin::Trained(&TRAINING);
+        Store::open(path, &Manifest::new(oscillator().study(), plan, origin)?)
+    }
+
+    /// All but the times.
+    fn answers(runs: Vec<Run>) -> Vec<Run> {
+        let timeless = |mut run: Run| {
+            run.answers.iter_mut().for_each(|answer| answer.ms = 0.0);
+            run
+        };
+        runs.into_iter().map(timeless).collect()
+    }
+
+    #[test]
+    fn threads_change_nothing() {
+        let plan = plan(Scenario::Uniform, 3);
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            let runs = || plan.run(oscillator(), None, &Progress::silent()).unwrap();
+            answers(pool.unwrap().install(runs))
+        };
+        let one = on(1);
+        assert_eq!(one, on(2));
+        assert_eq!(one, on(5));
+        assert!(one[0].truth != one[1].truth && one[2].run == 2);
+    }
+
+    #[test]
+    fn a_folder_is_gone_on_with_where_it_stopped() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("study");
+        let plan = plan(Scenario::First, 3);
+        let run = || {
+            let store = open(&path, &plan).unwrap();
+            plan.run(oscillator(), Some(&store), &Progress::silent())
+        };
+        let first = run().unwrap();
+        assert_eq!(
+            first,
+            plan_again(&plan, &first),
+            "kept runs are read as they were"
+        );
+        assert_eq!(first, run().unwrap(), "times included");
+        fs::remove_file(path.join("runs/0001.json")).unwrap();
+        let second = run().unwrap();
+        assert_eq!((&first[0], &first[2]), (&second[0], &second[2]));
+        assert_eq!(answers(first), answers(second));
+        fs::write(path.join("runs/0001.json"), "{ \"run\": 1, ").unwrap();
+        let error = run().unwrap_err().to_string();
+        assert!(
+            error.contains("0001.json") && error.contains("remove it"),
+            "{error}"
+        );
+        fs::copy(path.join("runs/0000.json"), path.join("runs/0001.json")).unwrap();
+        let error = run().unwrap_err().to_string();
+        assert!(error.contains("its number"), "{error}");
+    }
+
+    /// The same study without a folder, with the times of `timed`.
+    fn plan_again(plan: &MonteCarlo, timed: &[Run]) -> Vec<Run> {
+        let mut runs = plan.run(oscillator(), None, &Progress::silent()).unwrap();
+        for (run, timed) in runs.iter_mut().zip(timed) {
+            for (answer, timed) in run.answers.iter_mut().zip(&timed.answers) {
+                answer.ms = timed.ms;
+            }
+        }
+        runs
+    }
+
+    #[test]
+    fn other_folders_are_refused() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("study");
+        open(&path, &plan(Scenario::First, 3)).unwrap();
+        let error = open(&path, &plan(Scenario::First, 4)).unwrap_err();
+        assert!(
+            error.to_string().contains("runs was 3, now it is 4"),
+            "{error}"
+        );
+        let error = open(place.path(), &plan(Scenario::First, 3)).unwrap_err();
+        assert!(
+            error.to_string().contains("no folder of `reproduce`"),
+            "{error}"
+        );
+        let error = open(&place.path().join("a/b"), &plan(Scenario::First, 3)).unwrap_err();
+        assert!(error.to_string().contains("make it first"), "{error}");
+        assert_eq!(
+            fs::read_dir(place.path()).unwrap().count(),
+            1,
+            "nothing is left over"
+        );
+    }
+
+    struct Stopped;
+    impl Listener for Stopped {
+        fn advanced(&self, _: &str, _: u64, _: u64) {}
+        fn cancelled(&self) -> bool {
+            true
+        }
+    }
+
+    #[test]
+    fn a_stop_is_heard_inside_a_run_and_leaves_no_run_behind() {
+        let place = tempfile::tempdir().unwrap();
+        let plan = plan(Scenario::First, 2);
+        let store = open(&place.path().join("study"), &plan).unwrap();
+        let progress = Progress::new(Arc::new(Stopped));
+        let error = plan.run(oscillator(), Some(&store), &progress);
+        assert!(matches!(error, Err(MonteCarloError::Cancelled(_))));
+        assert_eq!(fs::read_dir(store.file("runs")).unwrap().count(), 0);
+    }
+
+    /// A twin without equations that diverges in the upper half of its bounds.
+    struct Amplifier;
+    impl DigitalTwin for Amplifier {
+        fn parameters(&self) -> ParameterSpace {
+            ParameterSpace::new([Parameter::new("gain", "-", 1.0, 2.0).within(0.0, 6.0)])
+        }
+        fn simulate(
+            &self,
+            theta: &[f64],
+            drive: &Drive,
+            noise: Noise,
+        ) -> Result<Signal, SimulationError> {
+            let mut v = noise.source("sensor");
+            match theta[0] > 3.0 {
+                true => Err(SimulationError::Diverged { at: 0.0 }),
+                false => Ok(drive.inputs().mapv(|u| theta[0] * u + 0.1 * v.normal())),
+            }
+        }
+    }
+
+    #[test]
+    fn a_black_box_is_scored_and_drawn_again_where_it_diverges() {
+        let levels = RecordPlan::levels(0.1, 80, -1.0, 1.0, 5);
+        let study = Study::new("amplifier", Amplifier, levels).unwrap();
+        let (estimator, _) = pretrain(&study, &TRAINING, &Progress::silent()).unwrap();
+        let plan = MonteCarlo {
+            benchmark: Benchmark::of(&study),
+            ..plan(Scenario::Uniform, 6)
+        };
+        let runs = plan.run(&estimator, None, &Progress::silent()).unwrap();
+        assert!(runs.iter().all(|run| run.truth[0] <= 3.0), "{runs:?}");
+        let scores = score(&study, &plan, &runs);
+        let failed: Vec<usize> = scores.methods.iter().map(|s| s.failed).collect();
+        assert_eq!(failed[7..], [6; 3], "a filter needs equations");
+        assert_eq!(failed[6], 6, "the bad start, the upper bound, diverges");
+        assert!(failed[..6].iter().all(|n| *n < 6), "{failed:?}");
+        assert!(scores.methods[8].mse.is_nan() && scores.methods[8].milliseconds.is_nan());
+        let point = MonteCarlo {
+            scenario: Scenario::Second,
+            ..plan
+        };
+        assert!(matches!(
+            point.check(&study),
+            Err(ScenarioError::NoPoint(_))
+        ));
+    }
 }

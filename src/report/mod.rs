@@ -5,6 +5,7 @@
 //! | hand an estimate to another program | [`estimate_json`] |
 //! | show an estimate on the terminal | [`estimate_text`] |
 //! | see the twin beside the record | [`overlay_svg`] |
+//! | hand on, print or draw the scores of many records | [`reproduce_json`], [`reproduce_text`], [`mean_runs_svg`], [`first_run_svg`] |
 //! | draw any other lines | [`chart`] |
 
 pub mod chart;
@@ -14,9 +15,18 @@ mod estimate_text;
 #[cfg(test)]
 mod fixture;
 mod overlay;
+mod reproduce_figures;
+mod reproduce_json;
+#[cfg(test)]
+mod reproduce_tests;
+mod reproduce_text;
+mod table;
 mod trajectories;
 
 pub use estimate_json::estimate_json;
 pub use estimate_text::estimate_text;
 pub use overlay::overlay_svg;
+pub use reproduce_figures::{first_run_svg, mean_runs_svg};
+pub use reproduce_json::reproduce_json;
+pub use reproduce_text::reproduce_text;
 pub use trajectories::trajectories_csv;

@@ -1,5 +1,7 @@
 //! The command line as a user meets it: exit codes, one-line messages, JSON, nothing half-written.
 
+mod reproduce;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -198,32 +200,6 @@ fn an_estimate_repeats_fits_its_schema_and_writes_its_folder() {
         ],
         &["exists already"],
     );
-}
-
-/// Every row of the table, in the contract's form, repeating whatever the threads.
-#[test]
-fn reproduce_scores_every_method() {
-    let estimator = at("v.est");
-    let run = |threads: &str| {
-        let call = [
-            "reproduce",
-            "--twin",
-            "van-der-pol",
-            "--estimator",
-            &estimator,
-        ];
-        json(&[&call[..], &["--runs", "2", "--json", "--threads", threads]].concat())
-    };
-    let text = include_str!("contract/reproduce.schema.json");
-    let schema = serde_json::from_str(text).unwrap();
-    let value = run("1");
-    assert!(jsonschema::is_valid(&schema, &value), "{value}");
-    let errors = |value: &serde_json::Value| -> Vec<f64> {
-        let methods = value["methods"].as_array().unwrap().iter();
-        methods.map(|m| m["mse"].as_f64().unwrap()).collect()
-    };
-    assert_eq!(errors(&value).len(), 10);
-    assert_eq!(errors(&value), errors(&run("2")));
 }
 
 #[test]
