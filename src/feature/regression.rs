@@ -1,7 +1,7 @@
 //! Least squares of a signal on its own past and that of other signals.
 
 use super::{FeatureError, check_varies};
-use crate::math::{Lagged, LaggedSignals, LeastSquares};
+use crate::math::{Fit, Lagged, LaggedSignals, LeastSquares, LeastSquaresError};
 use crate::twin::Signal;
 use nalgebra::DMatrix;
 
@@ -37,21 +37,17 @@ pub(super) fn coefficients(
             lags: p,
         }];
         signals.extend(inputs.iter().cloned());
-        all.extend(regress(signals, p.max(q))?);
+        all.extend_from_slice(regress(signals, p.max(q))?.coefficients.as_slice());
     }
     Ok(all)
 }
 
 /// Regresses the first signal on the lags of all, from sample `start` on.
-fn regress(signals: Vec<Lagged>, start: usize) -> Result<Vec<f64>, FeatureError> {
-    let target = DMatrix::from_column_slice(
-        signals[0].values.len() - start,
-        1,
-        &signals[0].values[start..],
-    );
+pub(super) fn regress(signals: Vec<Lagged>, start: usize) -> Result<Fit, LeastSquaresError> {
+    let target = &signals[0].values[start..];
+    let target = DMatrix::from_column_slice(target.len(), 1, target);
     let phi = LaggedSignals::new(signals, start);
-    let fit = LeastSquares::with_gram(&phi, &phi.gram())?.solve(&target)?;
-    Ok(fit.coefficients.as_slice().to_vec())
+    LeastSquares::with_gram(&phi, &phi.gram())?.solve(&target)
 }
 
 #[cfg(test)]
