@@ -1,11 +1,11 @@
 //! The estimate of an ARMAX model of one output.
 
 use crate::feature::regression::regress;
-use crate::math::{Lagged, LeastSquares, LeastSquaresError};
+use crate::math::{Lagged, LaggedSignals, LeastSquares, LeastSquaresError, Regressors};
 use nalgebra::DMatrix;
 
-/// Refinements after the two regressions.
-const PASSES: usize = 3;
+/// Refinements after the two regressions: where noise prevails these start far off, and three are too few.
+const PASSES: usize = 6;
 /// Ridge of a refinement, relative to the unit diagonal: what the data do not tell apart (zeros of A and of C that nearly
 /// cancel) stays near the value that the regressions gave it.
 const RIDGE: f64 = 1e-4;
@@ -71,7 +71,7 @@ pub(super) fn estimate(
     inputs: &[Vec<f64>],
     orders: Orders,
 ) -> Result<Model, LeastSquaresError> {
-    let series = Series { y, inputs, orders };
+    let series = Series::new(y, inputs, orders);
     let mut theta = series.by_regressions()?;
     let mut residuals = series.residuals(&theta);
     for _ in 0..PASSES {
@@ -102,17 +102,29 @@ struct Series<'a> {
     y: &'a [f64],
     inputs: &'a [Vec<f64>],
     orders: Orders,
+    /// Lags of outputs and inputs, as they enter the model.
+    past: LaggedSignals,
 }
 
-impl Series<'_> {
+impl<'a> Series<'a> {
+    fn new(y: &'a [f64], inputs: &'a [Vec<f64>], orders: Orders) -> Self {
+        let past = LaggedSignals::new(lagged(y, orders.p, inputs, orders.q), orders.start());
+        Self {
+            y,
+            inputs,
+            orders,
+            past,
+        }
+    }
+
     /// A long ARX model; then its residuals stand for the innovations in the regression of the ARMAX model.
     fn by_regressions(&self) -> Result<Vec<f64>, LeastSquaresError> {
         let Orders { p, q, r, .. } = self.orders;
         let long = self.orders.long(self.y.len());
-        let fit = regress(self.signals(long, long), long)?;
+        let fit = regress(lagged(self.y, long, self.inputs, long), long)?;
         let mut innovations = vec![0.0; long];
         innovations.extend(fit.residual.iter());
-        let mut signals = self.signals(p, q);
+        let mut signals = lagged(self.y, p, self.inputs, q);
         signals.push(Lagged {
             values: innovations,
             lags: r,
@@ -123,34 +135,17 @@ impl Series<'_> {
         Ok(theta)
     }
 
-    /// Output and inputs with their lags.
-    fn signals(&self, p: usize, q: usize) -> Vec<Lagged> {
-        let lagged = |values: &[f64], lags| Lagged {
-            values: values.to_vec(),
-            lags,
-        };
-        let inputs = self.inputs.iter().map(|u| lagged(u, q));
-        [lagged(self.y, p)].into_iter().chain(inputs).collect()
-    }
-
     /// The innovations that the model leaves, zero before its start.
     fn residuals(&self, theta: &[f64]) -> Vec<f64> {
-        let Orders { p, q, r, .. } = self.orders;
-        let (a, rest) = theta.split_at(p);
-        let (b, c) = rest.split_at(rest.len() - r);
-        let start = self.orders.start();
-        let past = |values: &[f64], t: usize, lags: &[f64]| -> f64 {
-            lags.iter()
-                .zip(values[..t].iter().rev())
-                .map(|(l, v)| l * v)
-                .sum()
-        };
+        let (start, r) = (self.orders.start(), self.orders.r);
+        let (ab, c) = theta.split_at(theta.len() - r);
         let mut residuals = vec![0.0; self.y.len()];
+        let (_, rest) = residuals.split_at_mut(start);
+        self.past.times(ab, rest);
         for t in start..self.y.len() {
-            let driven: f64 = (self.inputs.iter().zip(b.chunks(q.max(1))))
-                .map(|(u, b)| past(u, t, b))
-                .sum();
-            residuals[t] = self.y[t] - past(self.y, t, a) - driven - past(&residuals, t, c);
+            let noise = c.iter().zip(residuals[..t].iter().rev());
+            let noise: f64 = noise.map(|(c, e)| c * e).sum();
+            residuals[t] = self.y[t] - residuals[t] - noise;
         }
         residuals
     }
@@ -158,28 +153,43 @@ impl Series<'_> {
     /// Regression of the residuals on their gradient: regressors filtered by 1/C.
     fn newton_step(&self, theta: &[f64], residuals: &[f64]) -> Result<Vec<f64>, LeastSquaresError> {
         let Orders { p, q, r, .. } = self.orders;
-        let c = &theta[theta.len() - r..];
+        let (c, n) = (&theta[theta.len() - r..], theta.len());
         let start = self.orders.start();
         let rows = self.y.len() - start;
-        let mut psi = DMatrix::zeros(rows, theta.len());
         let inputs = self.inputs.iter().map(|u| (u.as_slice(), q));
-        let signals = [(self.y, p)]
-            .into_iter()
-            .chain(inputs)
-            .chain([(residuals, r)]);
-        let lagged = signals.flat_map(|(x, lags)| (1..=lags).map(move |lag| (x, lag)));
-        for (column, (x, lag)) in psi.as_mut_slice().chunks_exact_mut(rows).zip(lagged) {
-            for t in 0..rows {
-                let past = c.iter().zip(column[..t].iter().rev());
-                let x = (start + t).checked_sub(lag).map_or(0.0, |k| x[k]);
-                column[t] = x - past.map(|(c, v)| c * v).sum::<f64>();
+        let signals = [(self.y, p)].into_iter().chain(inputs);
+        let lagged: Vec<(&[f64], usize)> = (signals.chain([(residuals, r)]))
+            .flat_map(|(x, lags)| (1..=lags).map(move |lag| (x, lag)))
+            .collect();
+        // A column a sample, so that all regressors pass the filter together.
+        let mut psi = DMatrix::zeros(n, rows);
+        for t in 0..rows {
+            let (past, rest) = psi.as_mut_slice().split_at_mut(t * n);
+            let here = &mut rest[..n];
+            for (here, (x, lag)) in here.iter_mut().zip(&lagged) {
+                *here = (start + t).checked_sub(*lag).map_or(0.0, |k| x[k]);
+            }
+            for (c, past) in c.iter().zip(past.rchunks_exact(n)) {
+                for (here, past) in here.iter_mut().zip(past) {
+                    *here -= c * past;
+                }
             }
         }
+        let (gram, psi) = (&psi * psi.transpose(), psi.transpose());
         let target = DMatrix::from_column_slice(rows, 1, &residuals[start..]);
-        let gram = psi.transpose() * &psi;
         let fit = LeastSquares::with_ridge(&psi, &gram, RIDGE)?.solve(&target)?;
         Ok(fit.coefficients.as_slice().to_vec())
     }
+}
+
+/// The output with p lags, each input with q.
+fn lagged(y: &[f64], p: usize, inputs: &[Vec<f64>], q: usize) -> Vec<Lagged> {
+    let lagged = |values: &[f64], lags| Lagged {
+        values: values.to_vec(),
+        lags,
+    };
+    let inputs = inputs.iter().map(|u| lagged(u, q));
+    [lagged(y, p)].into_iter().chain(inputs).collect()
 }
 
 fn sum_of_squares(x: &[f64]) -> f64 {
@@ -215,8 +225,7 @@ fn scale_zeros(c: &[f64], s: f64) -> Vec<f64> {
 /// Whether all zeros of 1 + Σ cᵢ z⁻ⁱ lie inside the unit circle: the Schur–Cohn test by stepping down.
 fn is_invertible(mut c: Vec<f64>) -> bool {
     while let Some(k) = c.pop() {
-        // Also refuses what is no number.
-        if !(k.abs() < 1.0) {
+        if k.is_nan() || k.abs() >= 1.0 {
             return false;
         }
         let n = c.len();
@@ -265,12 +274,7 @@ mod tests {
             .map(|seed| {
                 let (y, u) = record(1000, seed.into());
                 let model = estimate(&y, std::slice::from_ref(&u), orders(2)).unwrap();
-                let series = Series {
-                    y: &y,
-                    inputs: &[u],
-                    orders: orders(0),
-                };
-                let arx = regress(series.signals(2, 2), 2).unwrap().coefficients;
+                let arx = regress(lagged(&y, 2, &[u], 2), 2).unwrap().coefficients;
                 (model, arx)
             })
             .collect();
@@ -305,11 +309,7 @@ mod tests {
         for seed in 0..60 {
             let (y, u) = record(300, seed);
             let inputs = [u];
-            let series = Series {
-                y: &y,
-                inputs: &inputs,
-                orders: orders(2),
-            };
+            let series = Series::new(&y, &inputs, orders(2));
             let error = |c: &[f64]| (c[4] - C[0]).powi(2) + (c[5] - C[1]).powi(2);
             before += error(&series.by_regressions().unwrap());
             after += error(&estimate(&y, &inputs, orders(2)).unwrap().coefficients);

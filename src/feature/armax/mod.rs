@@ -21,9 +21,9 @@ use std::sync::Arc;
 /// noise is. No decision depends on the data, so features are smooth in them, but for zeros of A and C that
 /// nearly cancel; choose orders as low as the system's.
 ///
-/// Estimated by Hannan and Rissanen's regressions (a long ARX model, whose residuals are then regressors) and three
+/// Estimated by Hannan and Rissanen's regressions (a long ARX model, whose residuals are then regressors) and six
 /// Gauss–Newton refinements on regressors filtered by 1/C, in the manner of Kavalieris; zeros of C are held within 0.98.
-/// A record of 300 to 400 samples takes 0.1 to 0.2 ms, ten times as long as ARX of these orders.
+/// A record of 300 to 400 samples takes 0.1 to 0.3 ms, many times as long as ARX of these orders.
 ///
 /// File: `{ kind = "armax", outputs = 2, inputs = 2, noise = 2 }`.
 ///
