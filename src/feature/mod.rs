@@ -6,16 +6,19 @@
 //! |---|---|---|
 //! | [`Ar`] | AR(p) coefficients of each output | twins without input |
 //! | [`Arx`] | ARX(p, q) coefficients of each output, with all inputs | twins with inputs |
+//! | [`Armax`] | ARMAX(p, q, r) coefficients and noise level of each output | coloured noise; black boxes |
 //! | [`Score`] | Newton step and information of a filter's likelihood | twins with equations |
 //! | [`Deviation`] | block means of the output's deviation from a reference run | records that the twin must *track*; starts; misspecified twins |
 
 mod ar;
+mod armax;
 mod arx;
 mod deviation;
 mod regression;
 mod score;
 
 pub use ar::Ar;
+pub use armax::Armax;
 pub use arx::Arx;
 pub use deviation::Deviation;
 pub use score::Score;

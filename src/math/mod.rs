@@ -4,13 +4,16 @@
 //! |---|---|
 //! | [`Whitening`] | distances between features, in units of their own scatter |
 //! | [`solve_truncated`] | a least-squares step that leaves out what the data does not determine |
-//! | [`LeastSquares`] | fast regression on lagged signals, well behaved where they are collinear |
+//! | [`LeastSquares`] | fast regression, well behaved where columns are collinear |
+//! | [`LaggedSignals`] | regressors made of the past of signals, never written out |
 //! | [`Stencil`] | finite-difference Jacobians whose points the caller evaluates, in parallel if it likes |
 //! | [`quantile`], [`median`], [`rank_p_value`] | empirical distributions |
 //! | [`clopper_pearson`], [`binomial_bounds`] | what a count of successes says, and what it may be |
 
+mod cholesky;
 mod clopper_pearson;
 mod difference;
+mod lagged;
 mod least_squares;
 mod quantile;
 mod solve;
@@ -19,7 +22,8 @@ mod whitening;
 
 pub use clopper_pearson::{BinomialError, binomial_bounds, clopper_pearson};
 pub use difference::{DifferenceError, Stencil};
-pub use least_squares::{Fit, LeastSquares, LeastSquaresError};
+pub use lagged::{Lagged, LaggedSignals};
+pub use least_squares::{Fit, LeastSquares, LeastSquaresError, Regressors};
 pub use quantile::{QuantileError, median, quantile, rank_p_value};
 pub(crate) use solve::solve_above;
 pub use solve::{SolveError, TruncatedSolution, solve_truncated};

@@ -1,0 +1,120 @@
+//! Simulations with features a second, on one core, and the price of writing a twin as equations: the tanks beside a loop
+//! by hand. `RAYON_NUM_THREADS=1 cargo bench --bench bank`.
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use std::borrow::Cow;
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::Duration;
+use truetwin::bank::{Draw, FeatureSimulator};
+use truetwin::feature::{Ar, Arx, FeatureRecipe};
+use truetwin::progress::Progress;
+use truetwin::study::RecordPlan;
+use truetwin::twin::{DigitalTwin, Drive, Noise};
+use truetwin::twins::{CascadedTanks, VanDerPol};
+
+/// Simulations an iteration.
+const BANK: usize = 200;
+const THETA: [f64; 4] = [0.6, 0.5, 0.55, 1.0];
+
+/// Name, twin, what records look like, features.
+type Case<'a> = (
+    &'a str,
+    &'a Arc<dyn DigitalTwin>,
+    &'a RecordPlan,
+    &'a dyn FeatureRecipe,
+);
+
+/// Draws from the prior, each with its own input, as pretraining does.
+fn bank(c: &mut Criterion) {
+    let free = RecordPlan::autonomous(0.05, 300);
+    let staircase = RecordPlan::levels(0.5, 400, 0.0, 3.0, 30);
+    let arx = |lags| Arx {
+        outputs: lags,
+        inputs: lags,
+    };
+    let oscillator: Arc<dyn DigitalTwin> = Arc::new(VanDerPol);
+    let tanks: Arc<dyn DigitalTwin> = Arc::new(CascadedTanks);
+    let cases: [Case; 3] = [
+        ("van der Pol, AR(5)", &oscillator, &free, &Ar { order: 5 }),
+        ("tanks, ARX(8, 8)", &tanks, &staircase, &arx(8)),
+        ("tanks, ARX(64, 64)", &tanks, &staircase, &arx(64)),
+    ];
+    let mut group = c.benchmark_group("bank");
+    group
+        .throughput(Throughput::Elements(BANK as u64))
+        .sample_size(20)
+        .warm_up_time(Duration::from_millis(500))
+        .measurement_time(Duration::from_secs(3));
+    for (name, twin, plan, features) in cases {
+        let drives = plan.prepare(&twin.signals()).expect("a plan of this twin");
+        let simulator = FeatureSimulator::new(twin.clone(), features).expect("fits the twin");
+        let space = twin.parameters();
+        let stage = Progress::silent().stage("bank", BANK);
+        group.bench_function(name, |b| {
+            b.iter(|| {
+                simulator.draws(
+                    BANK,
+                    |i| Noise::new(1, "bench", i),
+                    |_, _, noise| {
+                        Ok(Some(Draw {
+                            theta: space.draw_prior(noise),
+                            drive: Cow::Owned(drives.draw(noise).expect("levels are finite")),
+                        }))
+                    },
+                    &stage,
+                )
+            })
+        });
+    }
+    group.finish();
+}
+
+/// The tanks as `StateSpace` runs them, noise and limits included.
+fn by_hand(theta: &[f64; 4], drive: &Drive, noise: Noise) -> Vec<f64> {
+    let [k1, k2, k3, k4] = *theta;
+    let [mut w1, mut w2] = ["process/h1", "process/h2"].map(|name| noise.source(name));
+    let mut v = noise.source("measurement/y");
+    let (dt, inputs) = (drive.dt(), drive.inputs());
+    let (mut h1, mut h2) = (0.0f64, 0.0f64);
+    inputs
+        .iter()
+        .map(|u| {
+            let y = h2 + 0.15 * v.normal();
+            let (upper, lower) = (h1.max(1e-6).sqrt(), h2.max(1e-6).sqrt());
+            h1 = (h1 + dt * (-k1 * upper + k4 * u) + 0.1 * w1.normal()).clamp(0.0, 10.0);
+            h2 = (h2 + dt * (k2 * upper - k3 * lower) + 0.1 * w2.normal()).clamp(0.0, 10.0);
+            y
+        })
+        .collect()
+}
+
+fn simulators(c: &mut Criterion) {
+    let plan = RecordPlan::levels(0.5, 400, 0.0, 3.0, 30);
+    let source = plan.prepare(&CascadedTanks.signals());
+    let drive = (source.expect("a plan of the tanks").draw(Noise::OFF)).expect("levels are finite");
+    let mut group = c.benchmark_group("one tanks record");
+    group
+        .throughput(Throughput::Elements(drive.samples() as u64))
+        .warm_up_time(Duration::from_millis(500))
+        .measurement_time(Duration::from_secs(2));
+    for (noises, noise) in [
+        ("noise", Noise::new(1, "bench", 0)),
+        ("no noise", Noise::OFF),
+    ] {
+        let generic = (CascadedTanks.simulate(&THETA, &drive, noise)).expect("it is stable");
+        let hand = by_hand(&THETA, &drive, noise);
+        let equal = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-9;
+        assert!(generic.iter().zip(&hand).all(equal), "the same equations");
+        group.bench_function(format!("equations, {noises}"), |b| {
+            b.iter(|| CascadedTanks.simulate(black_box(&THETA), &drive, noise))
+        });
+        group.bench_function(format!("by hand, {noises}"), |b| {
+            b.iter(|| by_hand(black_box(&THETA), &drive, noise))
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, bank, simulators);
+criterion_main!(benches);

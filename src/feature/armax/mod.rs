@@ -1,0 +1,234 @@
+//! Coefficients of ARMAX models.
+
+mod hannan_rissanen;
+
+use super::{FeatureError, FeatureMap, FeatureRecipe, check_varies};
+use crate::twin::{DigitalTwin, Drive, Signal};
+use hannan_rissanen::{Model, Orders, estimate};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// ARMAX(p, q, r): a model of each output with coloured noise,
+///
+/// ```text
+/// y(t) = Σᵢ aᵢ·y(t − i) + Σⱼ Σᵢ bⱼᵢ·uⱼ(t − i) + e(t) + Σᵢ cᵢ·e(t − i);
+/// features a₁ … a_p, b₁₁ … b₁_q, b₂₁ …, c₁ … c_r, log std e,   output after output
+/// ```
+///
+/// For twins whose noise is coloured: sensor noise on top of a noisy state is enough, and AR or ARX coefficients then need
+/// many lags to say what few say here. p, r ≥ 1; with q = 0, as for twins without inputs, the model is ARMA(p, r).
+/// a and c have no unit, b those of y/u, log std e that of log y: it is the only feature here that sees how strong the
+/// noise is. No decision depends on the data, so features are smooth in them, but for zeros of A and C that
+/// nearly cancel; choose orders as low as the system's.
+///
+/// Estimated by Hannan and Rissanen's regressions (a long ARX model, whose residuals are then regressors) and six
+/// Gauss–Newton refinements on regressors filtered by 1/C, in the manner of Kavalieris; zeros of C are held within 0.98.
+/// A record of 300 to 400 samples takes 0.1 to 0.3 ms, many times as long as ARX of these orders.
+///
+/// File: `{ kind = "armax", outputs = 2, inputs = 2, noise = 2 }`.
+///
+/// ```
+/// use truetwin::feature::{Armax, FeatureRecipe};
+/// use truetwin::twin::{DigitalTwin, Drive, Noise, Signal};
+/// use truetwin::twins::CascadedTanks;
+///
+/// let twin: std::sync::Arc<dyn DigitalTwin> = std::sync::Arc::new(CascadedTanks);
+/// let drive = Drive::new(0.5, Signal::ones((400, 1)))?;
+/// let y = twin.simulate(&[0.6, 0.5, 0.55, 1.0], &drive, Noise::new(1, "example", 0))?;
+/// let map = Armax { outputs: 2, inputs: 1, noise: 2 }.bind(&twin)?;
+/// assert_eq!(map.extract(&drive, &y)?.len(), 2 + 1 + 2 + 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// Source: Hannan & Rissanen, "Recursive estimation of mixed autoregressive-moving average order", *Biometrika* 69, 1982;
+/// Hannan & Kavalieris, "A method for autoregressive-moving average estimation", *Biometrika* 71, 1984; Ljung, *System
+/// Identification*, 2nd ed., chapter 10.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Armax {
+    /// p ≥ 1: lags of each output.
+    pub outputs: usize,
+    /// q ≥ 0: lags of each input; none unless given.
+    #[serde(default)]
+    pub inputs: usize,
+    /// r ≥ 1: lags of the noise.
+    pub noise: usize,
+}
+
+#[typetag::serde(name = "armax")]
+impl FeatureRecipe for Armax {
+    fn bind(&self, twin: &Arc<dyn DigitalTwin>) -> Result<Arc<dyn FeatureMap>, FeatureError> {
+        let refuse = |problem: String| {
+            let kind = "armax";
+            Err(FeatureError::Setting { kind, problem })
+        };
+        let Self {
+            outputs: p,
+            inputs: q,
+            noise: r,
+        } = *self;
+        if p == 0 || r == 0 {
+            return refuse(format!(
+                "outputs = {p}, noise = {r}; both orders are at least 1, without noise take kind = \"arx\" or \"ar\""
+            ));
+        }
+        let signals = twin.signals();
+        if q > 0 && signals.inputs.is_empty() {
+            return refuse(format!(
+                "inputs = {q}, but the twin has no input; take inputs = 0"
+            ));
+        }
+        let inputs = if q > 0 { signals.inputs.len() } else { 0 };
+        Ok(Arc::new(Bound {
+            orders: Orders { p, q, r, inputs },
+            outputs: signals.outputs.len(),
+        }))
+    }
+}
+
+struct Bound {
+    orders: Orders,
+    outputs: usize,
+}
+
+impl FeatureMap for Bound {
+    fn dim(&self) -> usize {
+        self.outputs * (self.orders.coefficients() + 1)
+    }
+
+    fn extract(&self, drive: &Drive, outputs: &Signal) -> Result<Vec<f64>, FeatureError> {
+        let (samples, needed) = (outputs.nrows(), self.orders.needed());
+        if samples < needed {
+            return Err(FeatureError::TooShort { samples, needed });
+        }
+        check_varies(outputs)?;
+        let inputs: Vec<Vec<f64>> = (drive.inputs().columns().into_iter())
+            .take(self.orders.inputs)
+            .map(|u| u.to_vec())
+            .collect();
+        let mut features = Vec::with_capacity(self.dim());
+        for y in outputs.columns() {
+            let Model {
+                coefficients,
+                innovation,
+            } = estimate(&y.to_vec(), &inputs, self.orders)?;
+            features.extend(coefficients);
+            features.push(innovation.ln());
+        }
+        Ok(features)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::feature::testing::Tank;
+    use crate::twin::Noise;
+
+    const ORDERS: Armax = Armax {
+        outputs: 1,
+        inputs: 1,
+        noise: 1,
+    };
+
+    /// A tank with `inputs` inputs: one state, process and measurement noise, so ARMAX(1, 1, 1) exactly.
+    fn record(inputs: usize, samples: usize) -> (Arc<dyn DigitalTwin>, Drive, Signal) {
+        let twin: Arc<dyn DigitalTwin> = Arc::new(Tank(inputs));
+        let levels = Signal::from_shape_fn((samples, inputs), |(k, _)| f64::from(k / 20 % 2 == 0));
+        let drive = Drive::new(0.1, levels).unwrap();
+        let y = twin
+            .simulate(&[0.5], &drive, Noise::new(4, "armax", 0))
+            .unwrap();
+        (twin, drive, y)
+    }
+
+    fn features(recipe: &Armax, inputs: usize, samples: usize) -> Result<Vec<f64>, FeatureError> {
+        let (twin, drive, y) = record(inputs, samples);
+        recipe.bind(&twin)?.extract(&drive, &y)
+    }
+
+    /// x ← (1 − k·Δt)·x + Δt·u + w, y = x + v: the zero of C follows from the levels of w and v (spectral factorisation).
+    #[test]
+    fn a_noisy_state_seen_through_noise_is_armax() {
+        let x = features(&ORDERS, 1, 20_000).unwrap();
+        let (a, w, v) = (0.95f64, 0.02f64.powi(2), 0.05f64.powi(2));
+        // c + 1/c = −(w + v·(1 + a²))/(a·v), innovation variance −a·v/c.
+        let half = 0.5 * (w + v * (1.0 + a * a)) / (a * v);
+        let c = (half * half - 1.0).sqrt() - half;
+        assert!((x[0] - a).abs() < 0.01, "{x:?}");
+        assert!((x[1] - 0.1).abs() < 0.005, "{x:?}");
+        assert!((x[2] - c).abs() < 0.04, "{c}: {x:?}");
+        assert!((x[3] - 0.5 * (-a * v / c).ln()).abs() < 0.02, "{x:?}");
+    }
+
+    #[test]
+    fn without_inputs_it_is_arma() {
+        let none = Armax {
+            inputs: 0,
+            ..ORDERS
+        };
+        let x = features(&none, 0, 20_000).unwrap();
+        assert_eq!(x.len(), 3);
+        assert!((x[0] - 0.95).abs() < 0.02, "{x:?}");
+        assert_eq!(features(&none, 1, 300).unwrap().len(), 3);
+        let error = features(&ORDERS, 0, 300).unwrap_err().to_string();
+        assert!(error.contains("take inputs = 0"), "{error}");
+    }
+
+    #[test]
+    fn units_of_the_output_scale_b_and_shift_the_noise() {
+        let (twin, drive, y) = record(1, 300);
+        let map = ORDERS.bind(&twin).unwrap();
+        let x = map.extract(&drive, &y).unwrap();
+        assert_eq!(x, map.extract(&drive, &y).unwrap(), "the same bits again");
+        let scaled = map.extract(&drive, &(y * 1000.0)).unwrap();
+        let expected = [x[0], 1000.0 * x[1], x[2], x[3] + 1000f64.ln()];
+        let near = |(a, b): (&f64, &f64)| (a / b - 1.0).abs() < 1e-9;
+        assert!(scaled.iter().zip(&expected).all(near), "{scaled:?}");
+    }
+
+    /// Neither zeros that cancel nor a record without noise break it, and a small change has a small effect.
+    #[test]
+    fn features_are_finite_and_continuous() {
+        let (twin, drive, y) = record(1, 300);
+        let high = Armax {
+            outputs: 4,
+            inputs: 4,
+            noise: 4,
+        };
+        let map = high.bind(&twin).unwrap();
+        let x = map.extract(&drive, &y).unwrap();
+        let near = map
+            .extract(&drive, &y.mapv(|v| v + 1e-9 * v.sin()))
+            .unwrap();
+        let moved = (x.iter().zip(&near)).map(|(a, b)| (a - b).abs());
+        assert!(moved.fold(0.0, f64::max) < 1e-4);
+        let silent = twin.simulate(&[0.5], &drive, Noise::OFF).unwrap();
+        let x = map.extract(&drive, &silent).unwrap();
+        assert!(x.iter().all(|v| v.is_finite()), "{x:?}");
+    }
+
+    #[test]
+    fn what_cannot_be_fitted_is_named() {
+        // A long regression of 2 lags of 2 signals, two equations each.
+        assert!(features(&ORDERS, 1, 10).is_ok());
+        let short = features(&ORDERS, 1, 9).unwrap_err().to_string();
+        assert!(
+            short.contains("9 samples") && short.contains("need 10"),
+            "{short}"
+        );
+        let quiet = Armax { noise: 0, ..ORDERS };
+        let error = features(&quiet, 1, 300).unwrap_err().to_string();
+        assert!(
+            error.contains("noise = 0") && error.contains("arx"),
+            "{error}"
+        );
+        let (twin, drive, y) = record(1, 50);
+        let flat = ORDERS.bind(&twin).unwrap().extract(&drive, &(y * 0.0));
+        assert!(
+            flat.unwrap_err()
+                .to_string()
+                .contains("output 1 is constant")
+        );
+    }
+}
