@@ -67,15 +67,13 @@ fn out_of_distribution_records_are_found_and_mended() {
     assert!(square < 3.4e-4, "{square}");
 }
 
-/// A network this small keeps 46 % of such records (83 of 180, three training seeds, two builds), so which of ten it keeps
-/// hangs on rounding; fewer than two of ten have a probability of 2 %.
 #[test]
-fn in_distribution_records_that_the_gate_keeps_stay_with_the_network() {
+fn in_distribution_most_records_keep_the_network_estimate() {
     let kept: Vec<_> = (0..10)
         .map(|seed| estimate(1.2, seed))
         .filter(|e| !e.gate.out_of_distribution)
         .collect();
-    assert!(kept.len() >= 2, "{} of 10 kept", kept.len());
+    assert!(kept.len() >= 5, "{} of 10 kept", kept.len());
     for estimate in kept {
         assert_eq!(estimate.theta, estimate.initial);
         assert!(estimate.gauss_newton.is_none() && estimate.fine.is_none());
