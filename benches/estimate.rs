@@ -4,11 +4,11 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use std::time::Duration;
 use truetwin::bank::FeatureSimulator;
-use truetwin::experiment::{Scenario, reference_studies, scenario};
+use truetwin::experiment::{Benchmark, MonteCarlo, Scenario, reference_studies};
 use truetwin::gate::GateTest;
 use truetwin::progress::Progress;
 use truetwin::study::PresetName;
-use truetwin::twin::{Noise, Record};
+use truetwin::twin::Noise;
 use truetwin::two_stage::{EstimateOptions, PretrainOptions, pretrain};
 
 fn estimates(c: &mut Criterion) {
@@ -20,13 +20,14 @@ fn estimates(c: &mut Criterion) {
             ..PretrainOptions::default()
         };
         let (estimator, _) = pretrain(&study, &small, &silent).expect("it trains");
-        let noise = Noise::new(1, "bench", 0);
-        let (theta, drive) = scenario(&study, Scenario::First, noise)
-            .expect("a study of the paper")
-            .expect("the paper's input is finite");
+        let plan = MonteCarlo {
+            benchmark: Benchmark::of(&study),
+            scenario: Scenario::First,
+            runs: 1,
+            seed: 1,
+        };
+        let (theta, record) = plan.record(&study, 0).expect("the paper has this point");
         let twin = study.twin();
-        let outputs = (twin.simulate(&theta, &drive, noise)).expect("it is stable");
-        let record = Record::new(drive.clone(), outputs).expect("outputs are finite");
         let preset = study.preset(PresetName::Default);
         let simulator = FeatureSimulator::new(twin.clone(), preset.features.as_ref())
             .expect("the features fit the twin");
@@ -38,9 +39,9 @@ fn estimates(c: &mut Criterion) {
             .measurement_time(Duration::from_secs(4));
         let gate = GateTest {
             simulator: &simulator,
-            drive: &drive,
+            drive: record.drive(),
             settings: &preset.settings.gate,
-            noise,
+            noise: Noise::new(1, "bench", 0),
             progress: &silent,
         };
         group.bench_function("gate", |b| b.iter(|| gate.at(&theta)));

@@ -6,7 +6,7 @@ use super::scenario::Draws;
 use super::{Benchmark, Run, Scenario, ScenarioError, Store, StoreError};
 use crate::progress::{Cancelled, Progress};
 use crate::study::Study;
-use crate::twin::{RecordError, SimulationError};
+use crate::twin::{Record, RecordError, SimulationError};
 use crate::two_stage::Estimator;
 
 /// What is run.
@@ -56,6 +56,16 @@ impl MonteCarlo {
 
     pub(super) fn draws<'a>(&self, study: &'a Study) -> Result<Draws<'a>, ScenarioError> {
         Draws::new(study, &self.benchmark, self.scenario)
+    }
+
+    /// True parameters and record number `run`, from 0.
+    ///
+    /// # Errors
+    ///
+    /// A study without this scenario, a twin that diverges there.
+    pub fn record(&self, study: &Study, run: usize) -> Result<(Vec<f64>, Record), MonteCarloError> {
+        let simulated = simulated(study, &self.draws(study)?, self.seed, run)?;
+        Ok((simulated.truth, simulated.record))
     }
 
     /// Runs every stage of `estimator`, and the baselines, on simulated records, in order. Records are independent:

@@ -35,8 +35,9 @@ impl FeatureRecipe for Score {
         if twin.state_space().is_none() {
             return Err(FeatureError::Setting {
                 kind: "score",
-                problem: "a black-box twin shows no equations to filter with; take ar or arx"
-                    .into(),
+                problem:
+                    "a black-box twin shows no equations to filter with; take ar, arx or armax"
+                        .into(),
             });
         }
         let space = twin.parameters();

@@ -5,8 +5,10 @@ use crate::twin::{Noise, ParameterSpace};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rayon::prelude::*;
 
-/// Starts: the estimate at hand, the prior's centre, then random ones in the bounds.
-const STARTS: usize = 8;
+/// Random points in the bounds whose likelihood is looked at, and how many of the best become starts, beside the estimate at
+/// hand and the prior's centre. A few random starts alone miss narrow tops.
+const SCREENED: u64 = 256;
+const SCREENED_STARTS: usize = 4;
 /// Scoring iterations a start.
 const ITERATIONS: usize = 25;
 /// Largest step in φ.
@@ -38,12 +40,24 @@ pub(super) fn localise(
     initial: &[f64],
     noise: Noise,
 ) -> Result<Option<Located>, FilterError> {
-    let starts: Vec<Vec<f64>> = (0..STARTS as u64)
-        .map(|i| match i {
-            0 => initial.to_vec(),
-            1 => space.centre(),
-            _ => space.draw_bounds(noise.child("starts").sample(i)),
+    let mut screened: Vec<(f64, Vec<f64>)> = (0..SCREENED)
+        .into_par_iter()
+        .map(|i| {
+            let theta = space.draw_bounds(noise.child("starts").sample(i));
+            let value = recoverable(kalman.log_likelihood(&theta))?;
+            Ok(value.map(|value| (value, theta)))
         })
+        .collect::<Result<Vec<_>, FilterError>>()?
+        .into_iter()
+        .flatten()
+        .collect();
+    screened.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let best = screened
+        .into_iter()
+        .take(SCREENED_STARTS)
+        .map(|(_, theta)| theta);
+    let starts: Vec<Vec<f64>> = ([initial.to_vec(), space.centre()].into_iter())
+        .chain(best)
         .collect();
     let climbed: Vec<_> = (starts.par_iter())
         .map(|start| recoverable(climb(kalman, coordinates, start)))
