@@ -17,8 +17,10 @@ const RIDGE: f64 = 1.0;
 /// ```
 #[derive(Debug, Clone)]
 pub struct Readout {
-    pub(super) inputs: Standardiser,
-    pub(super) targets: Scaler,
+    /// Features → network inputs.
+    pub inputs: Standardiser,
+    /// Targets ↔ θ.
+    pub targets: Scaler,
     pub(super) layer: Option<Layer>,
     pub(super) network: Arc<dyn Network>,
 }
