@@ -60,7 +60,8 @@ pub enum CloudSampler {
 ///
 /// | field | default | range | meaning |
 /// |---|---|---|---|
-/// | `size` | 1000 | ≥ 10 | simulations M_FT |
+/// | `size` | 1000 | ≥ 10 | simulations M_FT, at most |
+/// | `per_parameter` | 400 | ≥ 10 | simulations for each parameter, if that is fewer; not in the paper |
 /// | `sampler` | ellipsoid | | see [`CloudSampler`] |
 /// | `spread` | 2 | > 0 | standard deviations of the ellipsoid over those of the estimate; 1 in the paper |
 /// | `quadratic` | true | | a quadratic layer beside the tuned heads; not in the paper |
@@ -68,8 +69,10 @@ pub enum CloudSampler {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CloudSettings {
-    /// Number of simulations.
+    /// Largest number of simulations.
     pub size: usize,
+    /// Simulations for each parameter.
+    pub per_parameter: usize,
     /// Where they are drawn.
     pub sampler: CloudSampler,
     /// Scale of the ellipsoid.
@@ -84,6 +87,7 @@ impl Default for CloudSettings {
     fn default() -> Self {
         Self {
             size: 1000,
+            per_parameter: 400,
             sampler: CloudSampler::Ellipsoid,
             spread: 2.0,
             rescale: true,
@@ -101,6 +105,13 @@ pub enum Inputs {
     /// To unit covariance along the principal axes of the bank, limited to six standard deviations.
     #[default]
     Principal,
+}
+
+impl CloudSettings {
+    /// M_FT for `parameters` parameters.
+    pub fn draws(&self, parameters: usize) -> usize {
+        self.size.min(self.per_parameter.saturating_mul(parameters))
+    }
 }
 
 /// Every number of the method.
@@ -201,6 +212,7 @@ impl Settings {
             },
             cloud: CloudSettings {
                 size: 1000,
+                per_parameter: 1000,
                 sampler: CloudSampler::Hybrid,
                 spread: 1.0,
                 rescale: false,
@@ -241,9 +253,13 @@ impl Settings {
                 "at most 10 million simulations fit into memory",
             );
         }
-        if self.cloud.size < 10 {
-            let value = self.cloud.size as f64;
-            return refuse("cloud size", value, "take at least 10 simulations");
+        for (field, value) in [
+            ("cloud size", self.cloud.size),
+            ("cloud per_parameter", self.cloud.per_parameter),
+        ] {
+            if value < 10 {
+                return refuse(field, value as f64, "take at least 10 simulations");
+            }
         }
         if !(self.cloud.spread > 0.0 && self.cloud.spread.is_finite()) {
             return refuse("cloud spread", self.cloud.spread, "must be positive");

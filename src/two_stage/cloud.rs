@@ -16,8 +16,9 @@ use std::borrow::Cow;
 /// any draw falls inside by itself.
 const REDRAWS: usize = 10;
 
-/// Part of the cloud that is simulated beyond M_FT, to measure the error of the tuned heads.
+/// Part of the cloud that is simulated beyond M_FT, to measure the error of the tuned heads, and its least size.
 const CALIBRATION_SHARE: usize = 5;
+const CALIBRATION: usize = 200;
 
 /// Where a cloud is drawn.
 pub struct Around<'a> {
@@ -33,7 +34,7 @@ pub struct Around<'a> {
     pub settings: &'a Settings,
 }
 
-/// The cloud: M_FT simulations around the estimate under the record's own input, and a fifth more for calibration; row i
+/// The cloud: M_FT simulations around the estimate under the record's own input, and some more for calibration; row i
 /// depends on the seed and i alone.
 pub fn cloud(
     around: &Around<'_>,
@@ -48,7 +49,8 @@ pub fn cloud(
     } = *around;
     let space = simulator.twin().parameters();
     let sampler = sampler(&space, around)?;
-    let size = settings.cloud.size + settings.cloud.size / CALIBRATION_SHARE;
+    let size = settings.cloud.draws(space.len());
+    let size = size + (size / CALIBRATION_SHARE).max(CALIBRATION);
     let stage = progress.stage("cloud", size);
     let draws = simulator.draws(
         size,

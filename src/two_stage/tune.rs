@@ -42,7 +42,7 @@ pub fn tune(
     seed: u64,
     progress: &Progress,
 ) -> Result<Tuned, EstimateError> {
-    let size = settings.cloud.size.min(draws.theta.nrows());
+    let size = (settings.cloud.draws(draws.theta.ncols())).min(draws.theta.nrows());
     let rows = |all: &Array2<f64>, from: usize, to: usize| all.slice(s![from..to, ..]).to_owned();
     let (features, theta) = (rows(&draws.features, 0, size), rows(&draws.theta, 0, size));
     // On a cloud that is small against the prior, features and targets standardised as in pretraining are all but

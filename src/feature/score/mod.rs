@@ -82,6 +82,10 @@ impl FeatureMap for Bound {
     }
 
     fn extract(&self, drive: &Drive, outputs: &Signal) -> Result<Vec<f64>, FeatureError> {
+        let (samples, needed) = (outputs.nrows(), 2 * self.dim() + 4);
+        if samples < needed {
+            return Err(FeatureError::TooShort { samples, needed });
+        }
         super::check_varies(outputs)?;
         let record = Record::new(drive.clone(), outputs.clone())
             .map_err(|error| FeatureError::Filter(error.into()))?;

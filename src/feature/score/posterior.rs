@@ -5,17 +5,19 @@ use crate::twin::{Noise, ParameterSpace};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rayon::prelude::*;
 
-/// Random points in the bounds whose likelihood is looked at, and how many of the best become starts, beside the estimate at
-/// hand and the prior's centre. A few random starts alone miss narrow tops.
-const SCREENED: u64 = 256;
+/// Random points in the bounds whose likelihood is looked at, for each parameter, and how many of the best become starts,
+/// beside the estimate at hand and the prior's centre. A few random starts alone miss narrow tops.
+const SCREENED: u64 = 64;
 const SCREENED_STARTS: usize = 4;
 /// Scoring iterations a start.
 const ITERATIONS: usize = 25;
 /// Largest step in φ.
 const LARGEST_STEP: f64 = 0.5;
-/// Rounds of importance sampling, and draws in each.
+/// Rounds of importance sampling, and draws in each for each parameter.
 const ROUNDS: u64 = 3;
-const DRAWS: u64 = 1000;
+const DRAWS: u64 = 250;
+/// Parameters that are counted for either number.
+const MOST_PARAMETERS: u64 = 8;
 /// Half-width of the sampled box, in standard deviations.
 const REACH: f64 = 3.5;
 /// Weights are flattened until so many draws count.
@@ -40,7 +42,8 @@ pub(super) fn localise(
     initial: &[f64],
     noise: Noise,
 ) -> Result<Option<Located>, FilterError> {
-    let mut screened: Vec<(f64, Vec<f64>)> = (0..SCREENED)
+    let counted = (space.len() as u64).min(MOST_PARAMETERS);
+    let mut screened: Vec<(f64, Vec<f64>)> = (0..SCREENED * counted)
         .into_par_iter()
         .map(|i| {
             let theta = space.draw_bounds(noise.child("starts").sample(i));
@@ -173,7 +176,8 @@ fn importance(
             .all(|(v, (low, high))| (low..=high).contains(&v))
             .then_some(phi)
     };
-    let weighed: Vec<Option<(DVector<f64>, f64)>> = (0..DRAWS)
+    let weighed: Vec<Option<(DVector<f64>, f64)>> = (0..DRAWS
+        * (centre.len() as u64).min(MOST_PARAMETERS))
         .into_par_iter()
         .map(|i| {
             let Some(phi) = draw(i) else {
