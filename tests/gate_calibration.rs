@@ -7,6 +7,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 use truetwin::bank::FeatureSimulator;
 use truetwin::experiment::reference_studies;
+use truetwin::feature::{Ar, Arx, FeatureRecipe};
 use truetwin::gate::{GateForm, GateSettings, GateTest};
 use truetwin::math::binomial_bounds;
 use truetwin::progress::Progress;
@@ -77,9 +78,15 @@ fn five_features_a_thousand_records() {
 /// After θ was refitted to the record, the test must not be surprised by how well it fits: both twins, α = 0.10.
 #[test]
 fn after_a_refit_the_test_is_still_calibrated() {
-    for (name, records) in [("van-der-pol", 200), ("tanks", 50)] {
+    let (ar, arx): (Box<dyn FeatureRecipe>, Box<dyn FeatureRecipe>) = (
+        Box::new(Ar { order: 5 }),
+        Box::new(Arx {
+            outputs: 8,
+            inputs: 8,
+        }),
+    );
+    for (name, features, records) in [("van-der-pol", ar, 200), ("tanks", arx, 50)] {
         let study = study(name);
-        let features = study.preset(PresetName::Default).features.clone();
         let simulator = FeatureSimulator::new(study.twin().clone(), features.as_ref()).unwrap();
         let drives = study.drives().unwrap();
         let space = study.twin().parameters();
