@@ -2,14 +2,20 @@
 
 use super::args::Subject;
 use super::{Context, Failure, output};
-use crate::effect::{applicable, library};
+use crate::effect::{described, library};
 use serde_json::{Value, json};
 use std::process::ExitCode;
 
 pub(super) fn run(context: &Context<'_>, subject: &Subject) -> Result<ExitCode, Failure> {
     let study = context.study(subject)?;
-    let possible = applicable(study.twin().as_ref());
-    let described: Vec<_> = (library().into_iter())
+    let possible = study.candidates();
+    let mut known = library();
+    for effect in &possible {
+        if known.iter().all(|d| d.id != effect.typetag_name()) {
+            known.push(described(effect.as_ref()));
+        }
+    }
+    let described: Vec<_> = (known.into_iter())
         .filter_map(|description| {
             let places: Vec<String> = (possible.iter())
                 .filter(|e| e.typetag_name() == description.id)

@@ -83,6 +83,17 @@ fn members() -> Vec<Member> {
     ]
 }
 
+/// An effect that is not of the library, as far as it describes itself.
+pub fn described(effect: &dyn UnmodelledEffect) -> Description {
+    Description {
+        id: effect.typetag_name(),
+        law: effect.law(),
+        other: None,
+        magnitudes: effect.magnitudes(),
+        formula: "an effect of this program",
+    }
+}
+
 /// Every effect of the library, in the order of its table.
 pub fn library() -> Vec<Description> {
     (members().into_iter())

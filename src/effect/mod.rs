@@ -111,7 +111,7 @@ pub use coulomb_friction::CoulombFriction;
 pub use cross_coupling::CrossCoupling;
 pub use cubic_stiffness::CubicStiffness;
 pub use file::{EffectFileError, parse_effects, read_effects};
-pub use library::{Description, applicable, library};
+pub use library::{Description, applicable, described, library};
 pub use linear_loss::LinearLoss;
 pub use parameter_drift::ParameterDrift;
 pub use parameter_step::ParameterStep;

@@ -14,8 +14,8 @@ use crate::feature::{Ar, Arx, FeatureError, FeatureMap, FeatureRecipe, Score};
 use crate::network::{Architecture, Deep, HeadArchitecture, architecture};
 use crate::twin::conformance::{Finding, Severity};
 use crate::twin::{
-    Adaptation, AdaptationError, CsvError, DigitalTwin, Drive, EffectError, Noise, ParameterError,
-    Record, RecordError, adapt, augment, fix, given_magnitudes,
+    Adaptation, AdaptationError, CsvError, DigitalTwin, Drive, EffectError, Effects, Noise,
+    ParameterError, Record, RecordError, UnmodelledEffect, adapt, augment, fix, given_magnitudes,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -40,6 +40,8 @@ pub struct Study {
     presets: BTreeMap<PresetName, Preset>,
     file: StudyFile,
     demo: Option<Arc<Record>>,
+    /// Beside those of the library.
+    own_effects: Effects,
 }
 
 impl std::fmt::Debug for Study {
@@ -103,14 +105,6 @@ pub enum StudyError {
     Record(#[from] RecordError),
 }
 
-/// Whether `[library]` names effects only, as `id` or `id@target`.
-fn check_library(library: &Library) -> Result<(), StudyError> {
-    let known: Vec<_> = crate::effect::library().into_iter().map(|d| d.id).collect();
-    let unknown = (library.only.iter().chain(&library.without))
-        .find(|name| !known.contains(&name.split('@').next().unwrap_or(name)));
-    unknown.map_or(Ok(()), |name| Err(StudyError::Library(name.clone())))
-}
-
 impl Study {
     /// A study of `twin` under `name`. Unless said otherwise, the network is [`Deep`] and the features are the [`Score`] of a
     /// twin with equations; of a black box, and in the paper's preset, AR(5), or ARX(8, 8) for a twin with inputs.
@@ -156,6 +150,7 @@ impl Study {
                 ..StudyFile::default()
             },
             demo: None,
+            own_effects: Effects::new(),
         })
     }
 
@@ -190,6 +185,15 @@ impl Study {
         self
     }
 
+    /// With effects that the twin may lack and the library does not have, one for each target.
+    pub fn with_effects(
+        mut self,
+        effects: impl IntoIterator<Item = Arc<dyn UnmodelledEffect>>,
+    ) -> Self {
+        self.own_effects.extend(effects);
+        self
+    }
+
     /// With a record to show the program on.
     pub fn with_demo(mut self, record: Record) -> Self {
         self.demo = Some(Arc::new(record));
@@ -219,7 +223,7 @@ impl Study {
                 return Err(StudyError::Contradiction(name.clone()));
             }
         }
-        check_library(&file.library)?;
+        self.check_library(&file.library)?;
         let first = Adaptation {
             prior: part(&file.prior, false),
             bounds: part(&file.bounds, false),
@@ -272,6 +276,33 @@ impl Study {
             }
         }
         Ok(study)
+    }
+
+    /// Whether `[library]` names effects only, as `id` or `id@target`.
+    fn check_library(&self, library: &Library) -> Result<(), StudyError> {
+        let known: Vec<_> = crate::effect::library().into_iter().map(|d| d.id).collect();
+        let own: Vec<_> = self.own_effects.iter().map(|e| e.typetag_name()).collect();
+        let unknown = (library.only.iter().chain(&library.without)).find(|name| {
+            let id = name.split('@').next().unwrap_or(name);
+            !known.contains(&id) && !own.contains(&id)
+        });
+        unknown.map_or(Ok(()), |name| Err(StudyError::Library(name.clone())))
+    }
+
+    /// What the twin may lack, each once for each target, all magnitudes free: the library's effects and the study's own,
+    /// as `[library]` says.
+    pub fn candidates(&self) -> Effects {
+        let Library { only, without } = &self.file.library;
+        let named = |list: &[String], effect: &Arc<dyn UnmodelledEffect>| {
+            let id = effect.typetag_name();
+            (list.iter()).any(|n| n == id || *n == format!("{id}@{}", effect.target()))
+        };
+        let library = crate::effect::applicable(self.twin.as_ref());
+        (library.into_iter())
+            .chain(self.own_effects.iter().cloned())
+            .filter(|effect| only.is_empty() || named(only, effect))
+            .filter(|effect| !named(without, effect))
+            .collect()
     }
 
     /// A record to show the program on.
