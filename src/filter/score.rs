@@ -47,6 +47,9 @@ pub struct Score {
     pub samples: DMatrix<f64>,
 }
 
+/// Steps of one-sided differences over those of central ones.
+const FORWARD: f64 = 1e-2;
+
 /// Of each row: log-density, innovation, covariance.
 struct Rows {
     width: usize,
@@ -71,15 +74,42 @@ impl Score {
     /// As [`Kalman::log_likelihood`], also at the neighbours; [`FilterError::Difference`] for θ outside the bounds.
     pub fn at(kalman: &Kalman<'_>, theta: &[f64]) -> Result<Self, FilterError> {
         kalman.parameters.check_point(theta)?;
-        Self::within(kalman, theta, &Coordinates::new(&kalman.parameters))
+        Self::central(kalman, theta, &Coordinates::new(&kalman.parameters))
     }
 
-    /// As [`at`](Self::at), with coordinates at hand.
+    /// As [`at`](Self::at), by one-sided differences with steps of a hundredth: d + 1 passes over the record instead of
+    /// 2·d + 1, the gradient off by half a step times the information. For searches, and for features.
     ///
     /// # Errors
     ///
     /// As [`at`](Self::at).
-    pub fn within(
+    pub fn forward(
+        kalman: &Kalman<'_>,
+        theta: &[f64],
+        coordinates: &Coordinates,
+    ) -> Result<Self, FilterError> {
+        let (log_likelihood, centre) = rows(kalman, theta)?;
+        let phi = coordinates.of(theta);
+        let mut jacobian = DMatrix::zeros(centre.len(), phi.len());
+        for (j, mut column) in jacobian.column_iter_mut().enumerate() {
+            let mut moved = phi.clone();
+            let step = FORWARD * coordinates.steps()[j];
+            moved[j] += if moved[j] + step <= coordinates.upper()[j] {
+                step
+            } else {
+                -step
+            };
+            // By the distance after rounding.
+            let distance = moved[j] - phi[j];
+            let (_, there) = rows(kalman, &coordinates.theta(&moved))?;
+            column.zip_zip_apply(&there, &centre, |d, there, here| {
+                *d = (there - here) / distance;
+            });
+        }
+        Self::assemble(kalman, log_likelihood, &centre, &jacobian)
+    }
+
+    fn central(
         kalman: &Kalman<'_>,
         theta: &[f64],
         coordinates: &Coordinates,
@@ -88,8 +118,17 @@ impl Score {
         let stencil = Stencil::new(&c.of(theta), c.steps(), c.lower(), c.upper())?;
         let jacobian = stencil.jacobian(|phi| rows(kalman, &c.theta(phi)).map(|(_, rows)| rows))?;
         let (log_likelihood, centre) = rows(kalman, theta)?;
+        Self::assemble(kalman, log_likelihood, &centre, &jacobian)
+    }
+
+    fn assemble(
+        kalman: &Kalman<'_>,
+        log_likelihood: f64,
+        centre: &DVector<f64>,
+        jacobian: &DMatrix<f64>,
+    ) -> Result<Self, FilterError> {
         let (n, p) = (kalman.record.samples(), kalman.record.outputs().ncols());
-        let (d, width) = (theta.len(), 1 + p + p * p);
+        let (d, width) = (jacobian.ncols(), 1 + p + p * p);
         let samples = DMatrix::from_fn(n, d, |k, j| jacobian[(k * width, j)]);
         let fisher = if p == 1 {
             let scale = |k: usize| centre[k * width + 2];

@@ -85,7 +85,7 @@ impl FeatureMap for Bound {
         let record = Record::new(drive.clone(), outputs.clone())
             .map_err(|error| FeatureError::Filter(error.into()))?;
         let score = self.filtered(&record, |kalman| {
-            Gradient::within(kalman, &self.reference, &self.coordinates)
+            Gradient::forward(kalman, &self.reference, &self.coordinates)
         })?;
         let d = self.space.len();
         let information = &score.fisher + DMatrix::identity(d, d) * 4.0;

@@ -102,7 +102,7 @@ fn climb(
         )
     };
     let at =
-        |phi: &DVector<f64>| Score::within(kalman, &coordinates.theta(phi.as_slice()), coordinates);
+        |phi: &DVector<f64>| Score::forward(kalman, &coordinates.theta(phi.as_slice()), coordinates);
     let mut phi = inside(DVector::from_vec(coordinates.of(start)));
     let mut score = at(&phi)?;
     let mut damping: f64 = 1.0;
