@@ -101,8 +101,9 @@ fn climb(
                 .map(|(v, (low, high))| v.clamp(*low, *high)),
         )
     };
-    let at =
-        |phi: &DVector<f64>| Score::forward(kalman, &coordinates.theta(phi.as_slice()), coordinates);
+    let at = |phi: &DVector<f64>| {
+        Score::forward(kalman, &coordinates.theta(phi.as_slice()), coordinates)
+    };
     let mut phi = inside(DVector::from_vec(coordinates.of(start)));
     let mut score = at(&phi)?;
     let mut damping: f64 = 1.0;
