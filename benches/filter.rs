@@ -2,7 +2,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
-use truetwin::filter::{FilterSettings, Kalman, Method, Score};
+use truetwin::filter::{Coordinates, FilterSettings, Kalman, Method, Score};
 use truetwin::twin::{DigitalTwin, Drive, Noise, Record, Signal, StateSpace};
 use truetwin::twins::{CascadedTanks, VanDerPol};
 
@@ -25,6 +25,10 @@ fn passes(c: &mut Criterion) {
                 b.iter(|| kalman.log_likelihood(black_box(theta)))
             });
             if method == Method::Points {
+                let coordinates = Coordinates::new(kalman.parameters());
+                c.bench_function(&format!("{name}, {method:?}, one-sided score"), |b| {
+                    b.iter(|| Score::forward(&kalman, black_box(theta), &coordinates))
+                });
                 c.bench_function(&format!("{name}, {method:?}, score"), |b| {
                     b.iter(|| Score::at(&kalman, black_box(theta)))
                 });

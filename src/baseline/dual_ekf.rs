@@ -3,7 +3,7 @@
 use super::BaselineError;
 use crate::filter::FilterError;
 use crate::math::Stencil;
-use crate::twin::{Advance, Interval, Now, ParameterSpace, Record, Signal, StateSpace, Workspace};
+use crate::twin::{Interval, Now, ParameterSpace, Record, Signal, StateSpace, Workspace};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 

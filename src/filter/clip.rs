@@ -1,9 +1,7 @@
 //! Mean and variance of a normal number that is held in an interval.
 
-use super::gaussian::Gaussian;
+use super::tail::Tail;
 use crate::twin::Interval;
-use statrs::function::erf::erfc;
-use std::f64::consts::{PI, SQRT_2};
 
 /// Beyond this many standard deviations a limit is not felt: its share is below 2e-12.
 const UNFELT: f64 = 7.0;
@@ -29,53 +27,65 @@ pub(super) struct Clipped {
 }
 
 /// Moments of N(`mean`, `variance`) held in `limit`; `None` where the limit is not felt.
+#[inline(always)]
 pub(super) fn clipped(mean: f64, variance: f64, limit: Interval) -> Option<Clipped> {
-    let sd = variance.sqrt();
     let (low, high) = (limit.low() - mean, limit.high() - mean);
-    if low < -UNFELT * sd && high > UNFELT * sd {
+    let reach = UNFELT * UNFELT * variance;
+    if low < 0.0 && low * low > reach && high > 0.0 && high * high > reach {
         return None;
     }
+    Some(held(mean, variance, limit))
+}
+
+fn held(mean: f64, variance: f64, limit: Interval) -> Clipped {
     if variance <= 0.0 {
-        let mean = limit.clamp(mean);
-        return Some(Clipped {
-            mean,
+        return Clipped {
+            mean: limit.clamp(mean),
             variance: 0.0,
             inside: 1.0,
-        });
+        };
     }
-    let (low, high) = (low / sd, high / sd);
+    let sd = variance.sqrt();
+    let per_sd = 1.0 / sd;
+    let (low, high) = (
+        (limit.low() - mean) * per_sd,
+        (limit.high() - mean) * per_sd,
+    );
     // An end that is not felt costs no special functions.
     let end_of = |at: f64| match at > UNFELT {
-        true => (0.0, 0.0),
-        false => (0.5 * erfc(at / SQRT_2), density(at)),
+        true => Tail::NONE,
+        false => Tail::beyond(at),
     };
-    let ((below, left), (above, right)) = (end_of(-low), end_of(high));
-    let inside = (1.0 - below - above).max(0.0);
+    let (below, above) = (end_of(-low), end_of(high));
+    let inside = (1.0 - below.share - above.share).max(0.0);
     // c = m + s·clamp(z, α, β) for a standard normal z; infinite ends weigh nothing.
     let end = |at: f64, share: f64| if at.is_finite() { at * share } else { 0.0 };
-    let first = end(low, below) + end(high, above) + left - right;
-    let second = end(low, low * below) + end(high, high * above) + inside + end(low, left)
-        - end(high, right);
-    Some(Clipped {
+    let first = end(low, below.share) + end(high, above.share) + below.density - above.density;
+    let second = end(low, end(low, below.share) + below.density)
+        + end(high, end(high, above.share) - above.density)
+        + inside;
+    Clipped {
         mean: limit.clamp(mean + sd * first),
         // Chernoff's inequality, lost only to rounding.
         variance: (second - first * first).max(inside * inside) * variance,
         inside,
-    })
+    }
 }
 
-/// φ.
-fn density(z: f64) -> f64 {
-    (-0.5 * z * z).exp() / (2.0 * PI).sqrt()
-}
-
-/// Holds each limited state of `state` in its interval; `scale` gets the factors of the covariances, if any limit
-/// is felt. Non-negative: the result is D·P·D plus what the variances have more than that.
-pub(super) fn clip(state: &mut Gaussian, limits: &[(usize, Interval)], scale: &mut [f64]) -> bool {
-    let n = state.mean.len();
+/// Holds each state in its interval; `scale` gets the factors of the covariances, if any limit is felt. Non-negative:
+/// the result is D·P·D plus what the variances have more than that.
+#[inline(always)]
+pub(super) fn clip(
+    mean: &mut [f64],
+    cov: &mut [f64],
+    limits: &[Interval],
+    scale: &mut [f64],
+) -> bool {
+    let n = mean.len();
+    let (cov, limits, scale) = (&mut cov[..n * n], &limits[..n], &mut scale[..n]);
     let mut felt = false;
-    for &(i, limit) in limits {
-        let Some(held) = clipped(state.mean[i], state.cov[i * n + i], limit) else {
+    for i in 0..n {
+        let Some(held) = clipped(mean[i], cov[i * n + i], limits[i]) else {
             continue;
         };
         if !felt {
@@ -83,12 +93,12 @@ pub(super) fn clip(state: &mut Gaussian, limits: &[(usize, Interval)], scale: &m
             scale.fill(1.0);
         }
         scale[i] = held.inside;
-        state.mean[i] = held.mean;
+        mean[i] = held.mean;
         for j in 0..n {
-            state.cov[i * n + j] *= held.inside;
-            state.cov[j * n + i] *= held.inside;
+            cov[i * n + j] *= held.inside;
+            cov[j * n + i] *= held.inside;
         }
-        state.cov[i * n + i] = held.variance;
+        cov[i * n + i] = held.variance;
     }
     felt
 }
@@ -112,7 +122,7 @@ mod tests {
             let (steps, mut sums) = (400_000, [0.0f64; 4]);
             for k in 0..=steps {
                 let z = -10.0 + 20.0 * f64::from(k) / f64::from(steps);
-                let weight = density(z) * 20.0 / f64::from(steps);
+                let weight = Tail::beyond(z).density * 20.0 / f64::from(steps);
                 let (x, c) = (mean + sd * z, limit.clamp(mean + sd * z));
                 for (sum, value) in sums.iter_mut().zip([1.0, c, c * c, c * (x - mean)]) {
                     *sum += weight * value;
@@ -141,17 +151,14 @@ mod tests {
     #[test]
     fn a_clipped_covariance_matches_draws() {
         let (mean, cov) = ([0.2, 1.0], [0.25, 0.3, 0.3, 1.0]);
-        let mut state = Gaussian {
-            mean: mean.to_vec(),
-            cov: cov.to_vec(),
-        };
-        let limit = Interval::new(0.0, 10.0).unwrap();
-        assert!(clip(&mut state, &[(0, limit)], &mut [0.0; 2]));
+        let (mut held, mut spread) = (mean, cov);
+        let limits = [Interval::new(0.0, 10.0).unwrap(), Interval::EVERYTHING];
+        assert!(clip(&mut held, &mut spread, &limits, &mut [0.0; 2]));
         let mut source = Noise::new(1, "clip", 0).source("z");
         let (n, mut sums) = (200_000, [0.0; 3]);
         for _ in 0..n {
             let (z1, z2) = (source.normal(), source.normal());
-            let x1 = limit.clamp(0.2 + 0.5 * z1) - state.mean[0];
+            let x1 = limits[0].clamp(0.2 + 0.5 * z1) - held[0];
             let x2 = 0.6 * z1 + 0.8 * z2;
             for (sum, value) in sums.iter_mut().zip([x1, x1 * x1, x1 * x2]) {
                 *sum += value / f64::from(n);
@@ -159,7 +166,7 @@ mod tests {
         }
         // Standard errors are below 1.1e-3.
         assert!(sums[0].abs() < 5e-3);
-        assert!((sums[1] - state.cov[0]).abs() < 5e-3);
-        assert!((sums[2] - state.cov[1]).abs() < 5e-3);
+        assert!((sums[1] - spread[0]).abs() < 5e-3);
+        assert!((sums[2] - spread[1]).abs() < 5e-3);
     }
 }

@@ -1,7 +1,7 @@
 //! What a filter says about a record.
 
-use super::gaussian::Gaussian;
-use super::kalman::{Innovation, Sink};
+use super::gaussian::{Belief, Gaussian};
+use super::pass::{Innovation, Sink};
 use crate::twin::Signal;
 use ndarray::{Array3, s};
 
@@ -49,7 +49,7 @@ impl Filtered {
 
 impl Sink for Filtered {
     fn innovation(&mut self, k: usize, of: &Innovation<'_>) {
-        self.log_densities[k] = of.log_density;
+        self.log_densities[k] = of.log_density();
         let p = of.innovation.len();
         for j in 0..p {
             self.innovations[[k, j]] = of.innovation[j];
@@ -60,7 +60,7 @@ impl Sink for Filtered {
         }
     }
 
-    fn filtered(&mut self, k: usize, state: &Gaussian) {
+    fn filtered(&mut self, k: usize, state: Belief<'_>) {
         if let Some(states) = &mut self.states {
             states.set(k, state);
         }
@@ -91,7 +91,7 @@ impl States {
         })
     }
 
-    pub(super) fn map(&mut self, f: impl Fn(&Gaussian) -> Gaussian) {
+    pub(super) fn map(&mut self, f: impl Fn(Gaussian) -> Gaussian) {
         for k in 0..self.means.nrows() {
             let state = Gaussian {
                 mean: self.means.row(k).to_vec(),
@@ -102,16 +102,16 @@ impl States {
                     .copied()
                     .collect(),
             };
-            self.set(k, &f(&state));
+            self.set(k, f(state).as_belief());
         }
     }
 
-    pub(super) fn set(&mut self, k: usize, state: &Gaussian) {
-        for (to, from) in self.means.row_mut(k).iter_mut().zip(&state.mean) {
+    pub(super) fn set(&mut self, k: usize, state: Belief<'_>) {
+        for (to, from) in self.means.row_mut(k).iter_mut().zip(state.mean) {
             *to = *from;
         }
         let mut covariance = self.covariances.slice_mut(s![k, .., ..]);
-        for (to, from) in covariance.iter_mut().zip(&state.cov) {
+        for (to, from) in covariance.iter_mut().zip(state.cov) {
             *to = *from;
         }
     }

@@ -1,5 +1,7 @@
 //! A mean and a covariance that may be singular.
 
+use super::size::Numbers;
+
 /// Pivots below this share of their variance are rounding.
 const RELATIVE_PIVOT: f64 = 1e-15;
 /// Pivots below this share of their squared mean are rounding.
@@ -19,56 +21,127 @@ impl Gaussian {
             cov: vec![0.0; n * n],
         }
     }
+
+    pub fn of(belief: Belief<'_>) -> Self {
+        Self {
+            mean: belief.mean.to_vec(),
+            cov: belief.cov.to_vec(),
+        }
+    }
+
+    pub fn as_belief(&self) -> Belief<'_> {
+        Belief {
+            mean: &self.mean,
+            cov: &self.cov,
+        }
+    }
 }
 
-/// Columns L_j with P = Σ L_j L_jᵀ: Cholesky's, without those whose pivot is zero.
+/// A look at a mean and a covariance.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Belief<'w> {
+    pub mean: &'w [f64],
+    pub cov: &'w [f64],
+}
+
+/// A root of a covariance: columns L_j with P = Σ L_j L_jᵀ, one after the other.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Columns<'w> {
+    pub all: &'w [f64],
+    pub rank: usize,
+}
+
+impl<'w> Columns<'w> {
+    /// As many as states.
+    #[inline(always)]
+    pub fn all(n: usize, all: &'w [f64]) -> Self {
+        Self { all, rank: n }
+    }
+
+    #[inline(always)]
+    pub fn each(self, n: usize) -> std::slice::ChunksExact<'w, f64> {
+        self.all[..self.rank * n].chunks_exact(n)
+    }
+}
+
+/// Cholesky's columns of a covariance (n × n, row-major) whose pivots are all above rounding; whether they are. No
+/// square root waits for another.
+#[inline(always)]
+pub(super) fn regular(mean: &[f64], cov: &[f64], columns: &mut [f64]) -> bool {
+    let n = mean.len();
+    let (cov, columns) = (&cov[..n * n], &mut columns[..n * n]);
+    let mut regular = true;
+    // C·D·Cᵀ: column j of C·D in row j from the pivot on, row j of C before it.
+    for j in 0..n {
+        let variance = cov[j * n + j];
+        for i in j..n {
+            let mut entry = cov[i * n + j];
+            for k in 0..j {
+                entry -= columns[k * n + i] * columns[j * n + k];
+            }
+            columns[j * n + i] = entry;
+            if i > j {
+                columns[i * n + j] = entry / columns[j * n + j];
+            }
+        }
+        // Not so where it is NaN.
+        regular &= columns[j * n + j] > least_pivot(mean[j], variance);
+    }
+    for j in 0..n {
+        let root = columns[j * n + j].sqrt();
+        columns[j * n + j] = root;
+        for i in j + 1..n {
+            columns[j * n + i] = columns[i * n + j] * root;
+            columns[i * n + j] = 0.0;
+        }
+    }
+    regular
+}
+
+#[inline(always)]
+fn least_pivot(mean: f64, variance: f64) -> f64 {
+    RELATIVE_PIVOT * variance + ABSOLUTE_PIVOT * mean * mean
+}
+
+/// Cholesky's columns, without those whose pivot is zero.
 ///
 /// A state known exactly has no column, and so costs no point. Pivots count as zero where they are rounding: far below the
 /// noise floor, so that a state measured without noise keeps what it is known by.
 #[derive(Debug, Clone)]
-pub(super) struct Root {
-    columns: Vec<f64>,
-    /// Row of each column's first entry that is not zero.
-    pivots: Vec<usize>,
+pub(super) struct Root<M = Vec<f64>> {
+    all: M,
+    rank: usize,
 }
 
-impl Root {
+impl<M: Numbers> Root<M> {
     pub fn new(n: usize) -> Self {
         Self {
-            columns: vec![0.0; n * n],
-            pivots: Vec::with_capacity(n),
+            all: M::zeros(n * n),
+            rank: 0,
         }
     }
 
-    /// Number of columns, the rank.
-    #[inline]
-    pub fn rank(&self) -> usize {
-        self.pivots.len()
+    pub fn columns(&self) -> Columns<'_> {
+        Columns {
+            all: self.all.as_ref(),
+            rank: self.rank,
+        }
     }
 
-    /// The columns, one after the other.
-    #[inline(always)]
-    pub fn columns(&self, n: usize) -> std::slice::ChunksExact<'_, f64> {
-        self.columns[..self.rank() * n].chunks_exact(n)
-    }
-
-    /// Factors a covariance.
-    #[inline(always)]
-    pub fn factor(&mut self, n: usize, of: &Gaussian) {
-        let (mean, cov) = (&of.mean[..n], &of.cov[..n * n]);
-        self.pivots.clear();
+    /// Factors a covariance (n × n, row-major).
+    pub fn factor(&mut self, mean: &[f64], cov: &[f64]) {
+        let n = mean.len();
+        self.rank = 0;
         for j in 0..n {
-            let rank = self.pivots.len();
-            let (done, rest) = self.columns.split_at_mut(rank * n);
+            let (done, rest) = self.all.as_mut().split_at_mut(self.rank * n);
             let column = &mut rest[..n];
             let variance = cov[j * n + j];
             let mut pivot = variance;
             for before in done.chunks_exact(n) {
                 pivot -= before[j] * before[j];
             }
-            let floor = RELATIVE_PIVOT * variance + ABSOLUTE_PIVOT * mean[j] * mean[j];
             // Also where it is NaN: that shows in the innovation.
-            if pivot.is_nan() || pivot <= floor {
+            if pivot.is_nan() || pivot <= least_pivot(mean[j], variance) {
                 continue;
             }
             let inverse = 1.0 / pivot.sqrt();
@@ -80,7 +153,7 @@ impl Root {
                 }
                 column[i] = entry * inverse;
             }
-            self.pivots.push(j);
+            self.rank += 1;
         }
     }
 
@@ -88,26 +161,31 @@ impl Root {
     pub fn solve(&self, b: &mut [f64]) {
         let n = b.len();
         let mut forward = [0.0; 64];
-        let mut heap = vec![0.0; if self.rank() > 64 { self.rank() } else { 0 }];
+        let mut heap = vec![0.0; if self.rank > 64 { self.rank } else { 0 }];
         let z = if heap.is_empty() {
-            &mut forward[..self.rank()]
+            &mut forward[..self.rank]
         } else {
             &mut heap[..]
         };
-        for (c, column) in self.columns(n).enumerate() {
-            let pivot = self.pivots[c];
+        for (c, column) in self.columns().each(n).enumerate() {
+            let pivot = pivot_of(column);
             z[c] = b[pivot] / column[pivot];
             for i in pivot..n {
                 b[i] -= z[c] * column[i];
             }
         }
         b.fill(0.0);
-        for (c, column) in self.columns(n).enumerate().rev() {
-            let pivot = self.pivots[c];
+        for (c, column) in self.columns().each(n).enumerate().rev() {
+            let pivot = pivot_of(column);
             let known: f64 = (pivot + 1..n).map(|i| column[i] * b[i]).sum();
             b[pivot] = (z[c] - known) / column[pivot];
         }
     }
+}
+
+/// Row of a column's first entry that is not zero.
+fn pivot_of(column: &[f64]) -> usize {
+    column.iter().position(|l| *l != 0.0).unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -116,7 +194,7 @@ mod tests {
 
     fn product(root: &Root, n: usize) -> Vec<f64> {
         let mut all = vec![0.0; n * n];
-        for column in root.columns(n) {
+        for column in root.columns().each(n) {
             for i in 0..n {
                 for j in 0..n {
                     all[i * n + j] += column[i] * column[j];
@@ -124,6 +202,20 @@ mod tests {
             }
         }
         all
+    }
+
+    /// Both ways give the same columns where all pivots count.
+    #[test]
+    fn a_regular_covariance_has_the_same_columns_either_way() {
+        let (mean, cov) = ([1.0; 3], [4.0, 1.0, 0.5, 1.0, 3.0, -1.0, 0.5, -1.0, 2.0]);
+        let mut root = <Root>::new(3);
+        root.factor(&mean, &cov);
+        let mut columns = [7.0; 9];
+        assert!(regular(&mean, &cov, &mut columns));
+        for (a, b) in columns.iter().zip(root.columns().all) {
+            assert!((a - b).abs() < 1e-15);
+        }
+        assert!(!regular(&mean, &[1.0; 9], &mut columns));
     }
 
     /// Rank two in three states, one of them known.
@@ -137,9 +229,9 @@ mod tests {
                 state.cov[i * 3 + j] = a[i] * a[j] + b[i] * b[j];
             }
         }
-        let mut root = Root::new(3);
-        root.factor(3, &state);
-        assert_eq!(root.rank(), 2);
+        let mut root = <Root>::new(3);
+        root.factor(&state.mean, &state.cov);
+        assert_eq!(root.rank, 2);
         for (made, given) in product(&root, 3).iter().zip(&state.cov) {
             assert!((made - given).abs() < 1e-15);
         }

@@ -1,11 +1,11 @@
 //! A filter bound to one twin and one record.
 
 use super::clip::clip;
-use super::gaussian::{Gaussian, Root};
-use super::moments::Moments;
-use super::update::{Measured, Update};
+use super::gaussian::Gaussian;
+use super::pass::{Pass, Sink};
+use super::size::{Any, Fixed};
 use super::{FilterError, FilterSettings, Filtered, Method};
-use crate::twin::{Interval, Now, ParameterError, ParameterSpace, Record, StateSpace};
+use crate::twin::{Interval, ParameterError, ParameterSpace, Record, StateSpace};
 
 /// A filter for many θ on one record: what does not depend on θ is prepared once.
 ///
@@ -44,34 +44,15 @@ pub struct Kalman<'a> {
     pub(super) settings: &'a FilterSettings,
     pub(super) parameters: ParameterSpace,
     pub(super) states: usize,
-    outputs: Vec<f64>,
+    pub(super) outputs: Vec<f64>,
     channels: usize,
-    limits: Vec<(usize, Interval)>,
-    floor: Vec<f64>,
-    start_covariance: Option<Vec<f64>>,
+    /// Limits of the states.
+    limits: Vec<Interval>,
+    /// Limits of the points that are carried through the equations; those of a derivative have none.
+    pub(super) point_limits: Vec<Interval>,
+    pub(super) floor: Vec<f64>,
+    pub(super) start_covariance: Option<Vec<f64>>,
 }
-
-/// What one row told.
-pub(super) struct Innovation<'w> {
-    pub log_density: f64,
-    pub innovation: &'w [f64],
-    /// p × p.
-    pub covariance: &'w [f64],
-    pub standardised: &'w [f64],
-}
-
-/// Who listens to a run. What is not needed is not computed.
-pub(super) trait Sink {
-    /// Whether [`carried`](Self::carried) is wanted.
-    const CARRIED: bool = false;
-    fn innovation(&mut self, _k: usize, _of: &Innovation<'_>) {}
-    /// State given rows up to k.
-    fn filtered(&mut self, _k: usize, _state: &Gaussian) {}
-    /// State of row k + 1 given rows up to k, and cov(x_k, x_{k+1}).
-    fn carried(&mut self, _k: usize, _next: &Gaussian, _cross: &[f64]) {}
-}
-
-impl Sink for () {}
 
 impl<'a> Kalman<'a> {
     /// Prepares a record.
@@ -91,9 +72,11 @@ impl<'a> Kalman<'a> {
             inputs: outline.inputs,
             outputs: outline.outputs,
         })?;
-        let limits = (twin.limits().into_iter().enumerate())
-            .filter(|(_, limit)| *limit != Interval::EVERYTHING)
-            .collect();
+        let limits = twin.limits();
+        let point_limits = match settings.method {
+            Method::Points => limits.clone(),
+            Method::Extended => vec![Interval::EVERYTHING; states],
+        };
         let floor = (record.outputs().columns().into_iter())
             .map(|y| settings.noise_floor * scale(y.iter().copied()))
             .collect();
@@ -106,6 +89,7 @@ impl<'a> Kalman<'a> {
             outputs: record.outputs().iter().copied().collect(),
             channels: record.outputs().ncols(),
             limits,
+            point_limits,
             floor,
             start_covariance: (settings.start_covariance.as_ref())
                 .map(|p| p.transpose().as_slice().to_vec()),
@@ -141,143 +125,56 @@ impl<'a> Kalman<'a> {
         Ok(filtered)
     }
 
-    /// The pass over the record; compiled once for each usual size, so that its loops have known ends.
-    pub(super) fn run<S: Sink>(&self, theta: &[f64], sink: &mut S) -> Result<f64, FilterError> {
+    /// One pass over the record; the log-likelihood.
+    pub(super) fn run<K: Sink>(&self, theta: &[f64], sink: &mut K) -> Result<f64, FilterError> {
         match (self.states, self.channels) {
-            (1, 1) => self.pass::<S, 1, 1>(theta, sink),
-            (2, 1) => self.pass::<S, 2, 1>(theta, sink),
-            (3, 1) => self.pass::<S, 3, 1>(theta, sink),
-            (4, 1) => self.pass::<S, 4, 1>(theta, sink),
-            _ => self.pass::<S, 0, 0>(theta, sink),
+            (1, 1) => Pass::new(Fixed::<1>, self, theta)?.run(sink),
+            (2, 1) => Pass::new(Fixed::<2>, self, theta)?.run(sink),
+            (3, 1) => Pass::new(Fixed::<3>, self, theta)?.run(sink),
+            (4, 1) => Pass::new(Fixed::<4>, self, theta)?.run(sink),
+            (states, outputs) => Pass::new(Any { states, outputs }, self, theta)?.run(sink),
         }
     }
 
-    /// The pass for N states and P outputs; 0: any number.
-    fn pass<S: Sink, const N: usize, const P: usize>(
-        &self,
-        theta: &[f64],
-        sink: &mut S,
-    ) -> Result<f64, FilterError> {
-        let drive = self.record.drive();
-        let n = if N == 0 { self.states } else { N };
-        let p = if P == 0 { self.channels } else { P };
-        if theta.len() != self.parameters.len() {
-            return Err(ParameterError::Length {
-                given: theta.len(),
-                expected: self.parameters.len(),
-                names: self.parameters.names().join(", "),
-            }
-            .into());
+    /// Whether θ has the twin's length.
+    pub(super) fn check(&self, theta: &[f64]) -> Result<(), ParameterError> {
+        if theta.len() == self.parameters.len() {
+            return Ok(());
         }
-        self.twin.admit(theta, drive.dt())?;
-        let mut now = Now {
-            t: 0.0,
-            dt: drive.dt(),
-            u: drive.input(0),
-            theta,
-        };
-        let mut moments = Moments::new(self.twin, self.settings.method, &self.limits, n, p);
-        let mut update = Update::new(n, p);
-        let (mut state, mut next) = (Gaussian::zero(n), Gaussian::zero(n));
-        let mut root = Root::new(n);
-        let (mut q, mut r) = (vec![0.0; n], vec![0.0; p]);
-        let (mut predicted, mut scale) = (vec![0.0; p], vec![1.0; n]);
-        let mut cross = vec![0.0; if S::CARRIED { n * n } else { 0 }];
-        self.twin.start(&now, &mut state.mean);
-        if let Some(covariance) = &self.start_covariance {
-            state.cov.copy_from_slice(covariance);
-            self.hold(&mut state, &mut scale);
-        }
-        let mut log_likelihood = 0.0;
-        let samples = drive.samples();
-        for (k, y) in self.outputs.chunks_exact(p).enumerate() {
-            (now.t, now.u) = (drive.time(k), drive.input(k));
-            q.fill(0.0);
-            r.fill(0.0);
-            self.twin.noise(&now, &mut q, &mut r);
-            root.factor(n, &state);
-            let seen = moments.observe((n, p), &now, &state.mean, &root, &mut predicted);
-            let row = Measured {
-                y,
-                predicted: &predicted,
-                noise: &r,
-                floor: &self.floor,
-            };
-            let log_density = (update.apply((n, p), (self.twin, &now), &row, seen, &mut state))
-                .ok_or_else(|| self.lost(&state, &update, now.t))?;
-            if !log_density.is_finite() {
-                return Err(FilterError::Diverged { at: now.t });
-            }
-            log_likelihood += log_density;
-            self.clamp_mean(&mut state);
-            sink.innovation(
-                k,
-                &Innovation {
-                    log_density,
-                    innovation: &update.innovation,
-                    covariance: &update.covariance,
-                    standardised: &update.standardised,
-                },
-            );
-            sink.filtered(k, &state);
-            if k + 1 == samples {
-                break;
-            }
-            root.factor(n, &state);
-            moments.predict(n, &now, &q, &state.mean, &root, &mut next);
-            let felt = self.hold(&mut next, &mut scale);
-            if S::CARRIED {
-                moments.cross(n, &root, &mut cross);
-                if felt {
-                    for row in cross.chunks_exact_mut(n) {
-                        for (c, scale) in row.iter_mut().zip(&scale) {
-                            *c *= scale;
-                        }
-                    }
-                }
-                sink.carried(k, &next, &cross);
-            }
-            std::mem::swap(&mut state, &mut next);
-        }
-        Ok(log_likelihood)
+        Err(ParameterError::Length {
+            given: theta.len(),
+            expected: self.parameters.len(),
+            names: self.parameters.names().join(", "),
+        })
     }
 
     /// Holds the states in their limits; whether covariances were scaled.
-    #[inline]
-    fn hold(&self, state: &mut Gaussian, scale: &mut [f64]) -> bool {
+    #[inline(always)]
+    pub(super) fn hold(&self, mean: &mut [f64], cov: &mut [f64], scale: &mut [f64]) -> bool {
         match self.settings.method {
-            Method::Points => clip(state, &self.limits, scale),
+            Method::Points => clip(mean, cov, &self.limits, scale),
             Method::Extended => {
-                self.clamp_mean(state);
+                self.clamp_mean(mean);
                 false
             }
         }
     }
 
     /// After a row, only the linear filter holds its mean; the points of the other are held when they are carried on.
-    #[inline]
-    fn clamp_mean(&self, state: &mut Gaussian) {
+    #[inline(always)]
+    pub(super) fn clamp_mean(&self, mean: &mut [f64]) {
         if self.settings.method == Method::Extended {
-            for &(i, limit) in &self.limits {
-                state.mean[i] = limit.clamp(state.mean[i]);
+            for (mean, limit) in mean.iter_mut().zip(&self.limits) {
+                *mean = limit.clamp(*mean);
             }
         }
     }
 
     /// A state as it is told to people: within its limits.
-    pub(super) fn told(&self, state: &Gaussian) -> Gaussian {
-        let mut told = state.clone();
-        self.hold(&mut told, &mut vec![1.0; self.states]);
-        told
-    }
-
-    fn lost(&self, state: &Gaussian, update: &Update, at: f64) -> FilterError {
-        let finite = (state.mean.iter().chain(&update.covariance)).all(|v| v.is_finite());
-        if finite {
-            FilterError::NoSpread { at }
-        } else {
-            FilterError::Diverged { at }
-        }
+    pub(super) fn told(&self, mut state: Gaussian) -> Gaussian {
+        let mut scale = vec![1.0; self.states];
+        self.hold(&mut state.mean, &mut state.cov, &mut scale);
+        state
     }
 }
 

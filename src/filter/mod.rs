@@ -40,10 +40,15 @@ mod error;
 mod filtered;
 mod gaussian;
 mod kalman;
+mod likelihood;
+mod linearised;
 mod moments;
+mod pass;
 mod score;
 mod settings;
+mod size;
 mod smooth;
+mod tail;
 mod update;
 
 #[cfg(test)]

@@ -14,148 +14,143 @@
 //! direction. Source: Nørgaard, Poulsen & Ravn, "New developments in state estimation for nonlinear systems",
 //! *Automatica* 36 (2000), with h² = 3.
 
-use super::Method;
-use super::gaussian::{Gaussian, Root};
-use crate::twin::{Advance, Interval, Now, StateSpace, Workspace};
+use super::gaussian::Columns;
+use super::size::{Numbers, Size};
+use super::{Method, linearised};
+use crate::twin::{Interval, Now, Points, StateSpace, Workspace};
 use std::f64::consts::SQRT_2;
 
 /// √3: points of the three-point Gauss–Hermite rule, in standard deviations.
 const REACH: f64 = 1.732_050_807_568_877_2;
-/// Step of a central difference, relative to the scale of what is varied.
-const DIFFERENCE: f64 = 6e-6;
 
 /// Buffers of one filter run: n states, p outputs.
-pub(super) struct Moments<'a> {
+pub(super) struct Moments<'a, S: Size> {
+    size: S,
     twin: &'a dyn StateSpace,
     method: Method,
-    limits: &'a [(usize, Interval)],
+    limits: &'a [Interval],
     work: Workspace,
-    /// The mean, one step on, before its noise.
-    moved: Vec<f64>,
-    /// Image of the mean.
-    centre: Vec<f64>,
-    /// Images of two points along each direction; later its slope and its bend, with P' = Σ D Dᵀ over both. Those
-    /// of the root's columns first, then those of the noises.
-    images: Vec<f64>,
-    point: Vec<f64>,
-    value: Vec<f64>,
-    /// Jacobians, one column after the other.
-    slopes: Vec<f64>,
+    /// Standard deviation of each noise, in the reach of its points.
+    shifts: S::Vector,
+    /// The mean, then two points for each direction (columns of the root, then noises); their images; then in the place of each
+    /// pair its slope and its bend.
+    points: S::Points,
+    outputs: S::Points,
+    derivatives: S::Matrix,
+    /// The mean, for calls that would take it out of its registers.
+    at: S::Vector,
 }
 
-/// Slopes and bends of states and outputs along each column of the root: Σ X Yᵀ is their covariance.
-pub(super) struct Seen<'w> {
-    pub states: &'w mut [f64],
-    pub outputs: &'w mut [f64],
-}
-
-impl<'a> Moments<'a> {
-    pub fn new(
-        twin: &'a dyn StateSpace,
-        method: Method,
-        limits: &'a [(usize, Interval)],
-        n: usize,
-        p: usize,
-    ) -> Self {
+impl<'a, S: Size> Moments<'a, S> {
+    /// With `limits` for the points, by state.
+    pub fn new(size: S, twin: &'a dyn StateSpace, method: Method, limits: &'a [Interval]) -> Self {
+        let (n, p) = (size.states(), size.outputs());
         Self {
+            size,
             twin,
             method,
             limits,
             work: Workspace::new(n),
-            moved: vec![0.0; n],
-            centre: vec![0.0; n.max(p)],
-            images: vec![0.0; 4 * n * n + 2 * n * p],
-            point: vec![0.0; n],
-            value: vec![0.0; n.max(p)],
-            slopes: vec![0.0; n * n.max(p)],
+            shifts: S::Vector::zeros(n),
+            points: S::Points::zeros((1 + 4 * n) * n),
+            outputs: S::Points::zeros((1 + 2 * n) * p),
+            derivatives: S::Matrix::zeros(n * n.max(p)),
+            at: S::Vector::zeros(n),
         }
     }
 
-    /// Mean and covariance after one step with process noise of standard deviation `q`, constraints included, limits not.
+    /// `mean` and `cov` after one step with process noise of standard deviation `q`, constraints included, limits not.
     ///
     /// Points are put into the limits before they move, since no real state is outside. The noise is added after the
     /// motion, so that the mean moves only once.
     #[inline(always)]
     pub fn predict(
         &mut self,
-        n: usize,
         now: &Now<'_>,
         q: &[f64],
-        mean: &[f64],
-        root: &Root,
-        next: &mut Gaussian,
+        root: Columns<'_>,
+        (mean, cov): (&mut [f64], &mut [f64]),
     ) {
-        let (twin, limits, q, mean) = (self.twin, self.limits, &q[..n], &mean[..n]);
-        let noises = q.iter().filter(|q| **q != 0.0).count();
-        let count = 2 * (root.rank() + noises);
-        let (moved, centre) = (&mut self.moved[..n], &mut self.centre[..n]);
-        moved.copy_from_slice(mean);
-        hold(moved, limits);
-        twin.advance(now, moved, &mut self.work);
-        centre.copy_from_slice(moved);
-        twin.constrain(now, centre);
-        let (along, noisy) = self.images[..count * n].split_at_mut(2 * root.rank() * n);
+        let n = self.size.states();
+        let (mean, q, shifts) = (&mut mean[..n], &q[..n], &mut self.shifts.as_mut()[..n]);
+        let pairs = match self.method {
+            Method::Points => root.rank,
+            Method::Extended => n,
+        };
+        let (moving, shifted) = self.points.as_mut().split_at_mut((1 + 2 * pairs) * n);
+        let shifted = &mut shifted[..2 * n * n];
         match self.method {
             Method::Points => {
-                let work = &mut self.work;
-                let pairs = along.chunks_exact_mut(2 * n);
-                for (column, pair) in root.columns(n).zip(pairs) {
-                    for (image, reach) in pair.chunks_exact_mut(n).zip([REACH, -REACH]) {
-                        for ((to, m), l) in image.iter_mut().zip(mean).zip(column) {
-                            *to = m + reach * l;
-                        }
-                        hold(image, limits);
-                        twin.advance(now, image, work);
-                        twin.constrain(now, image);
-                    }
+                spread(mean, root, moving);
+                for (shift, q) in shifts.iter_mut().zip(q) {
+                    *shift = REACH * q;
                 }
             }
             Method::Extended => {
-                let work = &mut self.work;
-                let jacobian = Jacobian {
-                    point: &mut self.point,
-                    value: &mut self.value[..n],
-                    slopes: &mut self.slopes,
-                };
-                jacobian.apply(mean, root, along, |x, next| {
-                    next.copy_from_slice(x);
-                    twin.advance(now, next, work);
-                    twin.constrain(now, next);
-                });
-            }
-        }
-        let noises = q.iter().enumerate().filter(|(_, q)| **q != 0.0);
-        for ((i, q), pair) in noises.zip(noisy.chunks_exact_mut(2 * n)) {
-            let reach = match self.method {
-                Method::Points => REACH * q,
-                Method::Extended => DIFFERENCE * moved[i].abs().max(q.abs()),
-            };
-            for (image, sign) in pair.chunks_exact_mut(n).zip([1.0, -1.0]) {
-                image.copy_from_slice(moved);
-                image[i] += sign * reach;
-                twin.constrain(now, image);
-            }
-            if self.method == Method::Extended {
-                let distance = (moved[i] + reach) - (moved[i] - reach);
-                let (plus, minus) = pair.split_at_mut(n);
-                for (plus, minus) in plus.iter_mut().zip(minus) {
-                    (*plus, *minus) = ((*plus - *minus) * q / distance, 0.0);
+                let at = &mut self.at.as_mut()[..n];
+                at.copy_from_slice(mean);
+                linearised::points(at, root, moving);
+                for ((shift, q), x) in shifts.iter_mut().zip(q).zip(&*mean) {
+                    *shift = if *q == 0.0 {
+                        0.0
+                    } else {
+                        linearised::step(*x, q.abs())
+                    };
                 }
             }
         }
-        let mean = &mut next.mean[..n];
-        mean.copy_from_slice(centre);
-        let images = &mut self.images[..count * n];
-        if self.method == Method::Points {
-            differences(images, centre, mean);
+        let points = Points {
+            moving,
+            limits: self.limits,
+            shifted,
+            shifts,
+        };
+        let bent = self.twin.advance_each(now, points, &mut self.work);
+        if self.method == Method::Extended {
+            linearised::slopes(
+                &self.at.as_ref()[..n],
+                root,
+                n,
+                moving,
+                self.derivatives.as_mut(),
+            );
         }
-        outer(images, n, &mut next.cov);
+        let (centre, pairs) = moving.split_at_mut(n);
+        mean.copy_from_slice(centre);
+        let pairs = &mut pairs[..2 * root.rank * n];
+        if self.method == Method::Points {
+            differences(pairs, centre, mean);
+        }
+        outer(pairs, n, cov);
+        if bent {
+            let pairs = (shifted.chunks_exact_mut(2 * n).zip(q.iter().zip(&*shifts)))
+                .filter(|(_, (q, _))| **q != 0.0);
+            for (pair, (q, shift)) in pairs {
+                match self.method {
+                    Method::Points => differences(pair, centre, mean),
+                    Method::Extended => {
+                        let (plus, minus) = pair.split_at_mut(n);
+                        for (plus, minus) in plus.iter_mut().zip(minus) {
+                            (*plus, *minus) = ((*plus - *minus) * (0.5 * q / shift), 0.0);
+                        }
+                    }
+                }
+                add_outer(pair, n, cov);
+            }
+        } else {
+            // Straight: the slope is q along the state, the bend zero.
+            for (i, q) in q.iter().enumerate() {
+                cov[i * n + i] += q * q;
+            }
+        }
     }
 
     /// cov(x_k, x_{k+1}) of the last [`predict`](Self::predict) from the same root (n × n, row-major).
-    pub fn cross(&self, n: usize, root: &Root, cross: &mut [f64]) {
+    pub fn cross(&self, root: Columns<'_>, cross: &mut [f64]) {
+        let n = self.size.states();
         cross.fill(0.0);
-        for (column, pair) in root.columns(n).zip(self.images.chunks_exact(2 * n)) {
+        let pairs = self.points.as_ref()[n..].chunks_exact(2 * n);
+        for (column, pair) in root.each(n).zip(pairs) {
             let slopes = &pair[..n];
             for (i, l) in column.iter().enumerate() {
                 for (to, slope) in cross[i * n..(i + 1) * n].iter_mut().zip(slopes) {
@@ -165,103 +160,62 @@ impl<'a> Moments<'a> {
         }
     }
 
-    /// Mean of the outputs without noise, and slopes and bends of states and outputs.
+    /// Mean of the outputs without noise; returns their slope and bend along each column of the root.
     #[inline(always)]
     pub fn observe(
         &mut self,
-        (n, p): (usize, usize),
         now: &Now<'_>,
         mean: &[f64],
-        root: &Root,
+        root: Columns<'_>,
         y: &mut [f64],
-    ) -> Seen<'_> {
-        let (mean, y, rank) = (&mean[..n], &mut y[..p], root.rank());
-        let (states, outputs) = self.images.split_at_mut(2 * n * n);
-        let (states, outputs) = (&mut states[..2 * rank * n], &mut outputs[..2 * rank * p]);
-        self.twin.observe(now, mean, y);
+    ) -> &mut [f64] {
+        let (n, p) = (self.size.states(), self.size.outputs());
+        let (mean, y) = (&mean[..n], &mut y[..p]);
+        let pairs = match self.method {
+            Method::Points => root.rank,
+            Method::Extended => n,
+        };
+        let points = &mut self.points.as_mut()[..(1 + 2 * pairs) * n];
+        let outputs = &mut self.outputs.as_mut()[..(1 + 2 * pairs) * p];
         match self.method {
-            Method::Points => {
-                let point = &mut self.point[..n];
-                let pairs = outputs.chunks_exact_mut(2 * p);
-                for (column, pair) in root.columns(n).zip(pairs) {
-                    for (image, reach) in pair.chunks_exact_mut(p).zip([REACH, -REACH]) {
-                        for ((to, m), l) in point.iter_mut().zip(mean).zip(column) {
-                            *to = m + reach * l;
-                        }
-                        self.twin.observe(now, point, image);
-                    }
-                }
-                let centre = &mut self.centre[..p];
-                centre.copy_from_slice(y);
-                differences(outputs, centre, y);
-            }
+            Method::Points => spread(mean, root, points),
             Method::Extended => {
-                let twin = self.twin;
-                let jacobian = Jacobian {
-                    point: &mut self.point,
-                    value: &mut self.value[..p],
-                    slopes: &mut self.slopes,
-                };
-                jacobian.apply(mean, root, outputs, |x, y| twin.observe(now, x, y));
+                let at = &mut self.at.as_mut()[..n];
+                at.copy_from_slice(mean);
+                linearised::points(at, root, points);
             }
         }
-        for (pair, column) in states.chunks_exact_mut(2 * n).zip(root.columns(n)) {
-            pair[..n].copy_from_slice(column);
-            pair[n..].fill(0.0);
+        self.twin.observe_each(now, (n, p), points, outputs);
+        if self.method == Method::Extended {
+            linearised::slopes(
+                &self.at.as_ref()[..n],
+                root,
+                p,
+                outputs,
+                self.derivatives.as_mut(),
+            );
         }
-        Seen { states, outputs }
+        let (centre, pairs) = outputs.split_at_mut(p);
+        y.copy_from_slice(centre);
+        let pairs = &mut pairs[..2 * root.rank * p];
+        if self.method == Method::Points {
+            differences(pairs, centre, y);
+        }
+        pairs
     }
 }
 
-/// Puts a point into the limits.
+/// The mean, then two points on each column of the root.
 #[inline(always)]
-fn hold(x: &mut [f64], limits: &[(usize, Interval)]) {
-    for &(i, limit) in limits {
-        x[i] = limit.clamp(x[i]);
-    }
-}
-
-/// Buffers of central differences.
-struct Jacobian<'w> {
-    point: &'w mut [f64],
-    value: &'w mut [f64],
-    slopes: &'w mut [f64],
-}
-
-impl Jacobian<'_> {
-    /// Slopes F·L_j, where F is the Jacobian of `f` at `mean`; no bends.
-    fn apply(
-        self,
-        mean: &[f64],
-        root: &Root,
-        images: &mut [f64],
-        mut f: impl FnMut(&[f64], &mut [f64]),
-    ) {
-        let (n, m) = (mean.len(), self.value.len());
-        self.point.copy_from_slice(mean);
-        for (i, slope) in self.slopes.chunks_exact_mut(m).take(n).enumerate() {
-            slope.fill(0.0);
-            let sd = root.columns(n).fold(0.0f64, |sum, l| sum.hypot(l[i]));
-            if sd == 0.0 {
-                continue;
-            }
-            let h = DIFFERENCE * mean[i].abs().max(sd);
-            let (high, low) = (mean[i] + h, mean[i] - h);
-            for (at, weight) in [(high, 1.0), (low, -1.0)] {
-                self.point[i] = at;
-                f(self.point, self.value);
-                for (to, value) in slope.iter_mut().zip(self.value.iter()) {
-                    *to += weight / (high - low) * value;
-                }
-            }
-            self.point[i] = mean[i];
-        }
-        for (pair, column) in images.chunks_exact_mut(2 * m).zip(root.columns(n)) {
-            let (plus, minus) = pair.split_at_mut(m);
-            for (k, (plus, minus)) in plus.iter_mut().zip(minus).enumerate() {
-                let sum: f64 = (0..n).map(|i| self.slopes[i * m + k] * column[i]).sum();
-                (*plus, *minus) = (sum, 0.0);
-            }
+fn spread(mean: &[f64], root: Columns<'_>, points: &mut [f64]) {
+    let n = mean.len();
+    let (centre, pairs) = points.split_at_mut(n);
+    centre.copy_from_slice(mean);
+    for (column, pair) in root.each(n).zip(pairs.chunks_exact_mut(2 * n)) {
+        let (plus, minus) = pair.split_at_mut(n);
+        for i in 0..n {
+            let away = REACH * column[i];
+            (plus[i], minus[i]) = (mean[i] + away, mean[i] - away);
         }
     }
 }
@@ -284,35 +238,21 @@ fn differences(images: &mut [f64], centre: &[f64], mean: &mut [f64]) {
 /// Σ D Dᵀ, both triangles.
 #[inline(always)]
 pub(super) fn outer(deviations: &[f64], n: usize, sum: &mut [f64]) {
-    let sum = &mut sum[..n * n];
-    // A small sum stays in registers.
-    let mut small = [0.0; 16];
-    let lower = match n {
-        ..=4 => &mut small[..n * n],
-        _ => {
-            sum.fill(0.0);
-            &mut *sum
-        }
-    };
-    for d in deviations.chunks_exact(n) {
-        for i in 0..n {
-            for j in 0..=i {
-                lower[i * n + j] += d[i] * d[j];
-            }
-        }
-    }
-    if n <= 4 {
-        sum.copy_from_slice(&small[..n * n]);
-    }
-    mirror(n, sum);
+    sum[..n * n].fill(0.0);
+    add_outer(deviations, n, sum);
 }
 
-/// Copies the lower triangle to the upper one.
+/// Adds Σ D Dᵀ, both triangles, to a symmetric matrix.
 #[inline(always)]
-pub(super) fn mirror(n: usize, matrix: &mut [f64]) {
+pub(super) fn add_outer(deviations: &[f64], n: usize, sum: &mut [f64]) {
+    let sum = &mut sum[..n * n];
     for i in 0..n {
-        for j in 0..i {
-            matrix[j * n + i] = matrix[i * n + j];
+        for j in 0..=i {
+            let mut entry = sum[i * n + j];
+            for d in deviations.chunks_exact(n) {
+                entry += d[i] * d[j];
+            }
+            (sum[i * n + j], sum[j * n + i]) = (entry, entry);
         }
     }
 }

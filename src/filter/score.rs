@@ -1,6 +1,6 @@
 //! The gradient of the log-likelihood.
 
-use super::kalman::{Innovation, Sink};
+use super::pass::{Innovation, Sink};
 use super::{Coordinates, FilterError, Kalman};
 use crate::math::Stencil;
 use nalgebra::{DMatrix, DMatrixView, DVector};
@@ -56,11 +56,22 @@ struct Rows {
     values: DVector<f64>,
 }
 
+impl Rows {
+    fn new(kalman: &Kalman<'_>) -> Self {
+        let p = kalman.record.outputs().ncols();
+        let width = 1 + p + p * p;
+        Self {
+            width,
+            values: DVector::zeros(kalman.record.samples() * width),
+        }
+    }
+}
+
 impl Sink for Rows {
     fn innovation(&mut self, k: usize, of: &Innovation<'_>) {
         let p = of.innovation.len();
         let row = &mut self.values.as_mut_slice()[k * self.width..(k + 1) * self.width];
-        row[0] = of.log_density;
+        row[0] = of.log_density();
         row[1..=p].copy_from_slice(of.innovation);
         row[p + 1..].copy_from_slice(of.covariance);
     }
@@ -185,12 +196,7 @@ fn add_information(
 }
 
 fn rows(kalman: &Kalman<'_>, theta: &[f64]) -> Result<(f64, DVector<f64>), FilterError> {
-    let p = kalman.record.outputs().ncols();
-    let width = 1 + p + p * p;
-    let mut rows = Rows {
-        width,
-        values: DVector::zeros(kalman.record.samples() * width),
-    };
+    let mut rows = Rows::new(kalman);
     let log_likelihood = kalman.run(theta, &mut rows)?;
     Ok((log_likelihood, rows.values))
 }

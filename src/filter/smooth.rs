@@ -1,7 +1,7 @@
 //! States given the whole record.
 
-use super::gaussian::{Gaussian, Root};
-use super::kalman::{Innovation, Sink};
+use super::gaussian::{Belief, Gaussian, Root};
+use super::pass::Sink;
 use super::{FilterError, Kalman, States};
 
 /// States given the whole record, by the backward pass of Rauch, Tung & Striebel:
@@ -29,12 +29,11 @@ struct Tape {
 
 impl Sink for Tape {
     const CARRIED: bool = true;
-    fn innovation(&mut self, _: usize, _: &Innovation<'_>) {}
-    fn filtered(&mut self, _: usize, state: &Gaussian) {
-        self.filtered.push(state.clone());
+    fn filtered(&mut self, _: usize, state: Belief<'_>) {
+        self.filtered.push(Gaussian::of(state));
     }
-    fn carried(&mut self, _: usize, next: &Gaussian, cross: &[f64]) {
-        self.carried.push((next.clone(), cross.to_vec()));
+    fn carried(&mut self, _: usize, next: Belief<'_>, cross: &[f64]) {
+        self.carried.push((Gaussian::of(next), cross.to_vec()));
     }
 }
 
@@ -53,14 +52,14 @@ impl Kalman<'_> {
         let log_likelihood = self.run(theta, &mut tape)?;
         let n = self.states;
         let mut states = States::new(samples, n);
-        let mut root = Root::new(n);
+        let mut root = <Root>::new(n);
         let mut later = Gaussian::zero(n);
         let mut change = vec![0.0; n * n];
         let mut left = vec![0.0; n * n];
         for k in (0..samples).rev() {
             let mut state = tape.filtered[k].clone();
             if let Some((next, gain)) = tape.carried.get_mut(k) {
-                root.factor(n, next);
+                root.factor(&next.mean, &next.cov);
                 for row in gain.chunks_exact_mut(n) {
                     root.solve(row);
                 }
@@ -81,7 +80,7 @@ impl Kalman<'_> {
                     }
                 }
             }
-            states.set(k, &self.told(&state));
+            states.set(k, self.told(state.clone()).as_belief());
             later = state;
         }
         Ok(Smoothed {

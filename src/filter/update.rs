@@ -1,7 +1,9 @@
 //! What a measurement says about the state.
 
-use super::gaussian::Gaussian;
-use super::moments::{Seen, mirror, outer};
+use super::gaussian::Columns;
+use super::likelihood::LogLikelihood;
+use super::moments::{add_outer, outer};
+use super::size::{Numbers, Size};
 use crate::twin::{Now, StateSpace};
 
 /// Nodes and weights of the Gauss–Hermite rule with five points, for a standard normal.
@@ -13,34 +15,37 @@ const NODES: [(f64, f64); 5] = [
     (0.0, 8.0 / 15.0),
 ];
 
-/// log 2π.
-const LOG_TWO_PI: f64 = 1.837_877_066_409_345_3;
-
 /// Innovation, gain and likelihood of one row; p outputs, n states.
 ///
 /// ```text
-/// S = Σ Y Yᵀ + R,   K = Σ X Yᵀ S⁻¹
+/// S = Σ Y Yᵀ + Σ Z Zᵀ + R,   K = Σ X Yᵀ S⁻¹               X, Y: slopes of states and outputs, Z: bends of outputs
 /// m ← m + K·(y − ȳ)
-/// P ← Σ (X − K·Y)(X − K·Y)ᵀ + K·R·Kᵀ
+/// P ← Σ (X − K·Y)(X − K·Y)ᵀ + K·(Σ Z Zᵀ + R)·Kᵀ
 /// ```
 ///
 /// The last form (Joseph's) is non-negative whatever the rounding, also where R is far below P.
-pub(super) struct Update {
+pub(super) struct Update<S: Size> {
+    size: S,
     /// Variance of the measurement noise and of what the readout hides, by output.
-    noise: Vec<f64>,
+    noise: S::Vector,
+    /// Σ Z Zᵀ + R (p × p).
+    beside: S::Matrix,
     /// y − ȳ.
-    pub innovation: Vec<f64>,
+    pub innovation: S::Vector,
     /// S (p × p).
-    pub covariance: Vec<f64>,
+    pub covariance: S::Matrix,
     /// C⁻¹·(y − ȳ), with S = C·Cᵀ.
-    pub standardised: Vec<f64>,
+    pub standardised: S::Vector,
+    /// Squares of C's diagonal: variance of each output given those before it.
+    pub pivots: S::Vector,
     /// C, row-major, lower.
-    factor: Vec<f64>,
+    factor: S::Matrix,
     /// K (n × p).
-    gain: Vec<f64>,
-    /// Standard deviation of each output, and what its readout makes of the nodes.
-    sd: Vec<f64>,
-    read: [Vec<f64>; 5],
+    gain: S::Matrix,
+    /// X − K·Y.
+    rest: S::Matrix,
+    /// What the readout makes of the nodes of each output (5 × p).
+    read: S::Points,
 }
 
 /// One row of a record, and how well it could be measured.
@@ -55,149 +60,174 @@ pub(super) struct Measured<'w> {
     pub floor: &'w [f64],
 }
 
-impl Update {
-    pub fn new(n: usize, p: usize) -> Self {
+impl<S: Size> Update<S> {
+    pub fn new(size: S) -> Self {
+        let (n, p) = (size.states(), size.outputs());
         Self {
-            noise: vec![0.0; p],
-            innovation: vec![0.0; p],
-            covariance: vec![0.0; p * p],
-            standardised: vec![0.0; p],
-            factor: vec![0.0; p * p],
-            gain: vec![0.0; n * p],
-            sd: vec![0.0; p],
-            read: std::array::from_fn(|_| vec![0.0; p]),
+            size,
+            noise: S::Vector::zeros(p),
+            beside: S::Matrix::zeros(p * p),
+            innovation: S::Vector::zeros(p),
+            covariance: S::Matrix::zeros(p * p),
+            standardised: S::Vector::zeros(p),
+            pivots: S::Vector::zeros(p),
+            factor: S::Matrix::zeros(p * p),
+            gain: S::Matrix::zeros(n * p),
+            rest: S::Matrix::zeros(n * n),
+            read: S::Points::zeros(NODES.len() * p),
         }
     }
 
-    /// Puts a row into the state and returns its log-density given the past; `None` where S has no inverse.
+    /// Puts a row into the state and its density into `likelihood`; `None` where S has no inverse or is not finite.
     #[inline(always)]
     pub fn apply(
         &mut self,
-        (n, p): (usize, usize),
         (twin, now): (&dyn StateSpace, &Now<'_>),
         row: &Measured<'_>,
-        seen: Seen<'_>,
-        state: &mut Gaussian,
-    ) -> Option<f64> {
+        root: Columns<'_>,
+        outputs: &mut [f64],
+        (mean, cov): (&mut [f64], &mut [f64]),
+        likelihood: &mut LogLikelihood,
+    ) -> Option<()> {
+        let p = self.size.outputs();
+        let (noise, innovation) = (self.noise.as_mut(), self.innovation.as_mut());
         for j in 0..p {
-            self.noise[j] = (row.noise[j] * row.noise[j]).max(row.floor[j]);
-            self.innovation[j] = row.y[j] - row.predicted[j];
+            noise[j] = (row.noise[j] * row.noise[j]).max(row.floor[j]);
+            innovation[j] = row.y[j] - row.predicted[j];
         }
-        self.spread(p, seen.outputs);
-        if self.readout(p, twin, now, row, seen.outputs) {
-            self.spread(p, seen.outputs);
+        self.spread(outputs);
+        if self.reads(twin, now, row) {
+            self.bend(row, outputs);
+            self.spread(outputs);
         }
-        let log_determinant = self.factor(p)?;
-        let mut square = 0.0;
+        self.factor()?;
+        let (factor, pivots) = (self.factor.as_ref(), self.pivots.as_ref());
+        let (innovation, standardised) = (self.innovation.as_ref(), self.standardised.as_mut());
         for i in 0..p {
-            let row = &self.factor[i * p..=i * p + i];
-            let mut rest = self.innovation[i];
-            for (c, e) in row.iter().zip(&self.standardised[..i]) {
+            let mut rest = innovation[i];
+            for (c, e) in factor[i * p..i * p + i].iter().zip(&standardised[..i]) {
                 rest -= c * e;
             }
-            self.standardised[i] = rest / row[i];
-            square += self.standardised[i] * self.standardised[i];
+            standardised[i] = rest / factor[i * p + i];
+            likelihood.add(pivots[i], rest * rest / pivots[i]);
         }
-        self.correct((n, p), seen, state);
-        Some(-0.5 * (p as f64 * LOG_TWO_PI + log_determinant + square))
+        self.correct(root, outputs, (mean, cov));
+        Some(())
     }
 
     /// S.
     #[inline(always)]
-    fn spread(&mut self, p: usize, outputs: &[f64]) {
-        outer(outputs, p, &mut self.covariance);
-        for j in 0..p {
-            self.covariance[j * p + j] += self.noise[j];
+    fn spread(&mut self, outputs: &[f64]) {
+        let p = self.size.outputs();
+        let (beside, covariance) = (self.beside.as_mut(), self.covariance.as_mut());
+        beside[..p * p].fill(0.0);
+        for (j, noise) in self.noise.as_ref()[..p].iter().enumerate() {
+            beside[j * p + j] = *noise;
+        }
+        for bend in outputs.chunks_exact(p).skip(1).step_by(2) {
+            add_outer(bend, p, beside);
+        }
+        covariance[..p * p].copy_from_slice(&beside[..p * p]);
+        for slope in outputs.chunks_exact(p).step_by(2) {
+            add_outer(slope, p, covariance);
         }
     }
 
     /// A sensor that bends its signal after the noise (saturation, quantisation) is replaced by the line that is best
     /// for N(ȳ, S); what the line misses joins the noise. The noise itself is never taken off: a saturated sensor
-    /// says little, but not with certainty. Returns whether anything was bent.
+    /// says little, but not with certainty. Returns whether anything is bent.
     #[inline(always)]
-    fn readout(
-        &mut self,
-        p: usize,
-        twin: &dyn StateSpace,
-        now: &Now<'_>,
-        row: &Measured<'_>,
-        outputs: &mut [f64],
-    ) -> bool {
-        let sd = &mut self.sd[..p];
-        for (j, sd) in sd.iter_mut().enumerate() {
-            *sd = self.covariance[j * p + j].sqrt();
-        }
-        let mut bent = false;
-        // The outermost first: where they are not bent, nothing between them is.
-        for (at, (read, (node, _))) in self.read.iter_mut().zip(NODES).enumerate() {
-            if at == 2 && !bent {
-                return false;
-            }
-            let at_node = |j: usize| row.predicted[j] + node * sd[j];
-            let read = &mut read[..p];
+    fn reads(&mut self, twin: &dyn StateSpace, now: &Now<'_>, row: &Measured<'_>) -> bool {
+        let p = self.size.outputs();
+        let covariance = self.covariance.as_ref();
+        let read = &mut self.read.as_mut()[..NODES.len() * p];
+        let (outermost, inner) = read.split_at_mut(2 * p);
+        let place = |read: &mut [f64], (node, _): (f64, f64)| {
             for (j, read) in read.iter_mut().enumerate() {
-                *read = at_node(j);
+                *read = row.predicted[j] + node * covariance[j * p + j].sqrt();
             }
-            twin.readout(now, read);
-            bent |= (read.iter().enumerate()).any(|(j, read)| *read != at_node(j));
+        };
+        for (read, node) in outermost.chunks_exact_mut(p).zip(NODES) {
+            place(read, node);
         }
-        self.bend(row, outputs);
+        // Where the outermost are not bent, nothing between them is.
+        if !twin.readout_each(now, p, outermost) {
+            return false;
+        }
+        for (read, node) in inner.chunks_exact_mut(p).zip(&NODES[2..]) {
+            place(read, *node);
+        }
+        twin.readout_each(now, p, inner);
         true
     }
 
     #[cold]
     fn bend(&mut self, row: &Measured<'_>, outputs: &mut [f64]) {
-        let p = row.y.len();
+        let p = self.size.outputs();
+        let (read, covariance) = (self.read.as_ref(), self.covariance.as_ref());
+        let (noise, innovation) = (self.noise.as_mut(), self.innovation.as_mut());
         for j in 0..p {
-            let values = || self.read.iter().map(|read| read[j]).zip(NODES);
+            let values = || read[j..].iter().step_by(p).zip(NODES);
             let mean: f64 = values().map(|(v, (_, weight))| weight * v).sum();
             let slope: f64 = values().map(|(v, (node, weight))| weight * node * v).sum();
             let variance: f64 = values()
                 .map(|(v, (_, weight))| weight * (v - mean).powi(2))
                 .sum();
             let missed = (variance - slope * slope).max(0.0);
-            let slope = slope / self.sd[j];
-            self.noise[j] += missed;
-            self.innovation[j] = row.y[j] - mean;
+            let slope = slope / covariance[j * p + j].sqrt();
+            noise[j] += missed;
+            innovation[j] = row.y[j] - mean;
             for output in outputs.iter_mut().skip(j).step_by(p) {
                 *output *= slope;
             }
         }
     }
 
-    /// C, and log det S.
+    /// C.
     #[inline(always)]
-    fn factor(&mut self, p: usize) -> Option<f64> {
-        let mut log_determinant = 0.0;
+    fn factor(&mut self) -> Option<()> {
+        let p = self.size.outputs();
+        let (covariance, factor) = (self.covariance.as_ref(), self.factor.as_mut());
+        let pivots = self.pivots.as_mut();
         for i in 0..p {
             for j in 0..=i {
-                let mut entry = self.covariance[i * p + j];
+                let mut entry = covariance[i * p + j];
                 for k in 0..j {
-                    entry -= self.factor[i * p + k] * self.factor[j * p + k];
+                    entry -= factor[i * p + k] * factor[j * p + k];
                 }
                 if i == j {
-                    if entry.is_nan() || entry <= 0.0 {
+                    // Also where it is NaN.
+                    if !(entry > 0.0 && entry < f64::INFINITY) {
                         return None;
                     }
-                    log_determinant += entry.ln();
-                    self.factor[i * p + i] = entry.sqrt();
+                    pivots[i] = entry;
+                    factor[i * p + i] = entry.sqrt();
                 } else {
-                    self.factor[i * p + j] = entry / self.factor[j * p + j];
+                    factor[i * p + j] = entry / factor[j * p + j];
                 }
             }
         }
-        Some(log_determinant)
+        Some(())
     }
 
     /// K, then mean and covariance.
     #[inline(always)]
-    fn correct(&mut self, (n, p): (usize, usize), seen: Seen<'_>, state: &mut Gaussian) {
-        let (gain, factor) = (&mut self.gain[..n * p], &self.factor[..p * p]);
-        let (mean, cov) = (&mut state.mean[..n], &mut state.cov[..n * n]);
-        let (noise, standardised) = (&self.noise[..p], &self.standardised[..p]);
-        let Seen { states, outputs } = seen;
+    fn correct(
+        &mut self,
+        root: Columns<'_>,
+        outputs: &[f64],
+        (mean, cov): (&mut [f64], &mut [f64]),
+    ) {
+        let (n, p) = (self.size.states(), self.size.outputs());
+        let (gain, factor) = (
+            &mut self.gain.as_mut()[..n * p],
+            &self.factor.as_ref()[..p * p],
+        );
+        let (beside, pivots) = (&self.beside.as_ref()[..p * p], self.pivots.as_ref());
+        let (innovation, standardised) = (self.innovation.as_ref(), self.standardised.as_ref());
+        let slopes = || outputs.chunks_exact(p).step_by(2);
         gain.fill(0.0);
-        for (x, y) in states.chunks_exact(n).zip(outputs.chunks_exact(p)) {
+        for (x, y) in root.each(n).zip(slopes()) {
             for i in 0..n {
                 for j in 0..p {
                     gain[i * p + j] += x[i] * y[j];
@@ -205,6 +235,11 @@ impl Update {
             }
         }
         for (gain, mean) in gain.chunks_exact_mut(p).zip(mean) {
+            if p == 1 {
+                gain[0] /= pivots[0];
+                *mean += gain[0] * innovation[0];
+                continue;
+            }
             for i in 0..p {
                 for k in 0..i {
                     gain[i] -= factor[i * p + k] * gain[k];
@@ -219,22 +254,26 @@ impl Update {
                 gain[i] /= factor[i * p + i];
             }
         }
-        // What the gain does to the deviations takes their place; they are not needed again.
-        for (x, y) in (states.chunks_exact_mut(n)).zip(outputs.chunks_exact(p)) {
+        let rest = &mut self.rest.as_mut()[..root.rank * n];
+        for ((rest, x), y) in (rest.chunks_exact_mut(n).zip(root.each(n))).zip(slopes()) {
             for i in 0..n {
+                rest[i] = x[i];
                 for j in 0..p {
-                    x[i] -= gain[i * p + j] * y[j];
+                    rest[i] -= gain[i * p + j] * y[j];
                 }
             }
         }
-        outer(states, n, cov);
+        outer(rest, n, cov);
         for i in 0..n {
             for j in 0..=i {
+                let mut entry = cov[i * n + j];
                 for k in 0..p {
-                    cov[i * n + j] += gain[i * p + k] * noise[k] * gain[j * p + k];
+                    for l in 0..p {
+                        entry += gain[i * p + k] * beside[k * p + l] * gain[j * p + l];
+                    }
                 }
+                (cov[i * n + j], cov[j * n + i]) = (entry, entry);
             }
         }
-        mirror(n, cov);
     }
 }

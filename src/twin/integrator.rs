@@ -34,6 +34,7 @@ impl Workspace {
 
 impl Integrator {
     /// One step in place: `x(t)` becomes `x(t + Δt)` under `drift(now, x, dx)`.
+    #[inline]
     pub fn step(
         self,
         now: &Now<'_>,
@@ -44,7 +45,12 @@ impl Integrator {
         let dt = now.dt;
         match self {
             Self::Euler => {
-                let slope = &mut work.slopes[0];
+                // Few numbers stay in registers where the drift is compiled into this.
+                let mut few = [0.0; 4];
+                let slope = match x.len() {
+                    n @ ..=4 => &mut few[..n],
+                    n => &mut work.slopes[0][..n],
+                };
                 drift(now, x, slope);
                 for (x, d) in x.iter_mut().zip(slope) {
                     *x += dt * *d;

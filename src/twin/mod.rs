@@ -12,6 +12,7 @@
 //! | find out what is wrong with a new twin | [`conformance`] |
 
 mod adapt;
+mod advance;
 mod augment;
 pub mod conformance;
 mod digital_twin;
@@ -29,6 +30,7 @@ mod record_csv;
 mod state_space;
 
 pub use adapt::{Adaptation, AdaptationError, Level, adapt};
+pub use advance::{Advance, Points};
 pub use augment::{augment, given_magnitudes};
 pub use digital_twin::{DigitalTwin, Quantity, Signals, SimulationError};
 pub use direction::{combination, oriented};
@@ -47,4 +49,4 @@ pub use record::{Record, RecordError};
 pub use record_csv::{
     CsvError, parse_record, read_drive, read_record, record_csv_text, write_record,
 };
-pub use state_space::{Advance, Now, Outline, StateSpace};
+pub use state_space::{Now, Outline, StateSpace};

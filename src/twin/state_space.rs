@@ -1,7 +1,7 @@
 //! Twins that can show their equations, and the loop that simulates them.
 
 use super::{
-    DigitalTwin, Drive, Integrator, Interval, Noise, ParameterSpace, Quantity, Signal,
+    Advance, DigitalTwin, Drive, Integrator, Interval, Noise, ParameterSpace, Quantity, Signal,
     SimulationError, Workspace,
 };
 
@@ -46,7 +46,7 @@ use super::{
 /// assert_eq!(y.column(0).to_vec(), [0.0, 0.1, 0.195]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub trait StateSpace: Send + Sync {
+pub trait StateSpace: Advance + Send + Sync {
     /// Parameters, states, inputs and outputs with names and units.
     fn outline(&self) -> Outline;
 
@@ -92,19 +92,6 @@ pub trait StateSpace: Send + Sync {
         Integrator::Euler
     }
 }
-
-/// One step of any equations. Not a part of [`StateSpace`], so that no twin can have a step of its own which twins made of
-/// it would not know.
-pub trait Advance: StateSpace {
-    /// One step without noise and limits: memories, then motion.
-    fn advance(&self, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
-        self.update(now, x);
-        self.integrator()
-            .step(now, x, work, |now, x, dx| self.drift(now, x, dx));
-    }
-}
-
-impl<T: StateSpace + ?Sized> Advance for T {}
 
 /// Where the equations are evaluated.
 #[derive(Debug, Clone, Copy)]

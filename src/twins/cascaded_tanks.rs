@@ -38,6 +38,7 @@ impl StateSpace for CascadedTanks {
         }
     }
 
+    #[inline]
     fn drift(&self, now: &Now<'_>, h: &[f64], dh: &mut [f64]) {
         let &[k1, k2, k3, k4] = now.theta else {
             unreachable!("the outline declares four parameters")
@@ -48,10 +49,12 @@ impl StateSpace for CascadedTanks {
         dh[1] = k2 * upper - k3 * lower;
     }
 
+    #[inline]
     fn observe(&self, _: &Now<'_>, h: &[f64], y: &mut [f64]) {
         y[0] = h[1];
     }
 
+    #[inline]
     fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
         process.fill(0.1);
         measurement[0] = 0.15;

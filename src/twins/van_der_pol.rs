@@ -25,11 +25,13 @@ impl StateSpace for VanDerPol {
         }
     }
 
+    #[inline]
     fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
         dx[0] = x[1];
         dx[1] = now.theta[0] * (1.0 - x[0] * x[0]) * x[1] - x[0];
     }
 
+    #[inline]
     fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
         y[0] = x[0];
     }
@@ -38,6 +40,7 @@ impl StateSpace for VanDerPol {
         x.copy_from_slice(&[1.0, 0.0]);
     }
 
+    #[inline]
     fn noise(&self, now: &Now<'_>, process: &mut [f64], _: &mut [f64]) {
         process[1] = now.dt * 0.02f64.sqrt();
     }

@@ -1,0 +1,305 @@
+//! One pass of the filter over its record, row by row.
+
+use super::gaussian::{Belief, Columns, Root, regular};
+use super::likelihood::{LOG_TWO_PI, LogLikelihood};
+use super::moments::Moments;
+use super::size::{Numbers, Size};
+use super::update::{Measured, Update};
+use super::{FilterError, Kalman};
+use crate::twin::Now;
+
+/// What one row told.
+pub(super) struct Innovation<'w> {
+    pub innovation: &'w [f64],
+    /// p × p.
+    pub covariance: &'w [f64],
+    pub standardised: &'w [f64],
+    /// Variance of each output given those before it.
+    pivots: &'w [f64],
+}
+
+impl Innovation<'_> {
+    /// log p(y_k | y_0 … y_{k−1}), in nats.
+    pub fn log_density(&self) -> f64 {
+        let values = self.standardised.iter().zip(self.pivots);
+        let sum: f64 = values
+            .map(|(e, pivot)| LOG_TWO_PI + pivot.ln() + e * e)
+            .sum();
+        -0.5 * sum
+    }
+}
+
+/// Who listens to a pass. What is not needed is not computed.
+pub(super) trait Sink {
+    /// Whether [`carried`](Self::carried) is wanted.
+    const CARRIED: bool = false;
+    fn innovation(&mut self, _k: usize, _of: &Innovation<'_>) {}
+    /// State given rows up to k.
+    fn filtered(&mut self, _k: usize, _state: Belief<'_>) {}
+    /// State of row k + 1 given rows up to k, and cov(x_k, x_{k+1}).
+    fn carried(&mut self, _k: usize, _next: Belief<'_>, _cross: &[f64]) {}
+}
+
+impl Sink for () {}
+
+/// The state given the rows so far; apart from the buffers, of which calls to the twin see some, so that it can stay in
+/// registers.
+struct State<S: Size> {
+    mean: S::Vector,
+    cov: S::Matrix,
+}
+
+impl<S: Size> State<S> {
+    #[inline(always)]
+    fn zero(n: usize) -> Self {
+        Self {
+            mean: S::Vector::zeros(n),
+            cov: S::Matrix::zeros(n * n),
+        }
+    }
+
+    #[inline(always)]
+    fn slices(&mut self, n: usize) -> (&mut [f64], &mut [f64]) {
+        (
+            &mut self.mean.as_mut()[..n],
+            &mut self.cov.as_mut()[..n * n],
+        )
+    }
+
+    #[inline(always)]
+    fn set(&mut self, to: Belief<'_>) {
+        let (mean, cov) = self.slices(to.mean.len());
+        mean.copy_from_slice(to.mean);
+        cov.copy_from_slice(to.cov);
+    }
+
+    #[inline(always)]
+    fn belief(&self, n: usize) -> Belief<'_> {
+        Belief {
+            mean: &self.mean.as_ref()[..n],
+            cov: &self.cov.as_ref()[..n * n],
+        }
+    }
+}
+
+/// The filter at one θ: buffers, and the likelihood of the rows so far.
+pub(super) struct Pass<'k, S: Size> {
+    size: S,
+    kalman: &'k Kalman<'k>,
+    now: Now<'k>,
+    root: Root<S::Matrix>,
+    moments: Moments<'k, S>,
+    update: Update<S>,
+    /// Standard deviations of process and measurement noise.
+    q: S::Vector,
+    r: S::Vector,
+    predicted: S::Vector,
+    scale: S::Vector,
+    copy: State<S>,
+    likelihood: LogLikelihood,
+}
+
+impl<'k, S: Size> Pass<'k, S> {
+    pub fn new(size: S, kalman: &'k Kalman<'k>, theta: &'k [f64]) -> Result<Self, FilterError> {
+        kalman.check(theta)?;
+        let drive = kalman.record.drive();
+        kalman.twin.admit(theta, drive.dt())?;
+        let (n, p) = (size.states(), size.outputs());
+        let now = Now {
+            t: 0.0,
+            dt: drive.dt(),
+            u: drive.input(0),
+            theta,
+        };
+        let (twin, method) = (kalman.twin, kalman.settings.method);
+        Ok(Self {
+            size,
+            kalman,
+            now,
+            root: Root::new(n),
+            copy: State::zero(n),
+            moments: Moments::new(size, twin, method, &kalman.point_limits),
+            update: Update::new(size),
+            q: S::Vector::zeros(n),
+            r: S::Vector::zeros(p),
+            predicted: S::Vector::zeros(p),
+            scale: S::Vector::zeros(n),
+            likelihood: LogLikelihood::NONE,
+        })
+    }
+
+    /// Over the whole record; the log-likelihood.
+    pub fn run<K: Sink>(mut self, sink: &mut K) -> Result<f64, FilterError> {
+        let n = self.size.states();
+        self.start();
+        let mut state = State::zero(n);
+        state.set(self.copy.belief(n));
+        let last = self.kalman.record.samples() - 1;
+        for k in 0..last {
+            self.measure(k, &mut state, sink)?;
+            self.carry(k, &mut state, sink);
+        }
+        self.measure(last, &mut state, sink)?;
+        Ok(self.likelihood.total())
+    }
+
+    /// The first state, into the copy.
+    fn start(&mut self) {
+        let (mean, cov) = self.copy.slices(self.size.states());
+        self.kalman.twin.start(&self.now, mean);
+        if let Some(covariance) = &self.kalman.start_covariance {
+            cov.copy_from_slice(covariance);
+            self.kalman.hold(mean, cov, self.scale.as_mut());
+        }
+    }
+
+    /// Puts row k into the state.
+    #[inline(always)]
+    fn measure<K: Sink>(
+        &mut self,
+        k: usize,
+        state: &mut State<S>,
+        sink: &mut K,
+    ) -> Result<(), FilterError> {
+        let (n, p) = (self.size.states(), self.size.outputs());
+        let drive = self.kalman.record.drive();
+        (self.now.t, self.now.u) = (drive.time(k), drive.input(k));
+        let (q, r) = (&mut self.q.as_mut()[..n], &mut self.r.as_mut()[..p]);
+        q.fill(0.0);
+        r.fill(0.0);
+        self.kalman.twin.noise(&self.now, q, r);
+        let told = match self.regular(state) {
+            Some(columns) => self.tell(k, state, Columns::all(n, columns.as_ref())),
+            None => {
+                let root = self.singular(state);
+                let told = self.tell(k, state, root.columns());
+                self.root = root;
+                told
+            }
+        };
+        if told.is_none() {
+            return Err(self.lost(state));
+        }
+        if !self.likelihood.is_finite() {
+            return Err(FilterError::Diverged { at: self.now.t });
+        }
+        self.kalman.clamp_mean(state.slices(n).0);
+        sink.innovation(
+            k,
+            &Innovation {
+                innovation: &self.update.innovation.as_ref()[..p],
+                covariance: &self.update.covariance.as_ref()[..p * p],
+                standardised: &self.update.standardised.as_ref()[..p],
+                pivots: &self.update.pivots.as_ref()[..p],
+            },
+        );
+        sink.filtered(k, state.belief(n));
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn tell(&mut self, k: usize, state: &mut State<S>, root: Columns<'_>) -> Option<()> {
+        let (n, p) = (self.size.states(), self.size.outputs());
+        let (mean, cov) = state.slices(n);
+        let predicted = &mut self.predicted.as_mut()[..p];
+        let outputs = (self.moments).observe(&self.now, mean, root, predicted);
+        let row = Measured {
+            y: &self.kalman.outputs[k * p..(k + 1) * p],
+            predicted,
+            noise: &self.r.as_ref()[..p],
+            floor: &self.kalman.floor[..p],
+        };
+        self.update.apply(
+            (self.kalman.twin, &self.now),
+            &row,
+            root,
+            outputs,
+            (mean, cov),
+            &mut self.likelihood,
+        )
+    }
+
+    /// Carries the state from row k to the next.
+    #[inline(always)]
+    fn carry<K: Sink>(&mut self, k: usize, state: &mut State<S>, sink: &mut K) {
+        match self.regular(state) {
+            Some(columns) => {
+                let all = Columns::all(self.size.states(), columns.as_ref());
+                self.predict(k, state, all, sink);
+            }
+            None => {
+                let root = self.singular(state);
+                self.predict(k, state, root.columns(), sink);
+                self.root = root;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn predict<K: Sink>(
+        &mut self,
+        k: usize,
+        state: &mut State<S>,
+        root: Columns<'_>,
+        sink: &mut K,
+    ) {
+        let n = self.size.states();
+        let (mean, cov) = state.slices(n);
+        (self.moments).predict(&self.now, self.q.as_ref(), root, (mean, cov));
+        let scale = &mut self.scale.as_mut()[..n];
+        let felt = self.kalman.hold(mean, cov, scale);
+        if K::CARRIED {
+            let mut cross = vec![0.0; n * n];
+            self.moments.cross(root, &mut cross);
+            if felt {
+                for row in cross.chunks_exact_mut(n) {
+                    for (c, scale) in row.iter_mut().zip(&*scale) {
+                        *c *= scale;
+                    }
+                }
+            }
+            sink.carried(k, state.belief(n), &cross);
+        }
+    }
+
+    /// Cholesky's columns of the covariance where all its pivots count, as they mostly do. What follows is compiled for
+    /// this rank apart, and finds the columns in registers.
+    #[inline(always)]
+    fn regular(&self, state: &State<S>) -> Option<S::Matrix> {
+        let n = self.size.states();
+        if !S::KNOWN {
+            return None;
+        }
+        let mut columns = S::Matrix::zeros(n * n);
+        let Belief { mean, cov } = state.belief(n);
+        regular(mean, cov, columns.as_mut()).then_some(columns)
+    }
+
+    /// The root of any covariance; to be put back.
+    #[inline(always)]
+    fn singular(&mut self, state: &State<S>) -> Root<S::Matrix> {
+        let n = self.size.states();
+        // Of a copy: what a call has seen leaves the registers.
+        self.copy.set(state.belief(n));
+        let Belief { mean, cov } = self.copy.belief(n);
+        let mut root = std::mem::replace(&mut self.root, Root::new(0));
+        root.factor(mean, cov);
+        root
+    }
+
+    #[inline(always)]
+    fn lost(&self, state: &State<S>) -> FilterError {
+        let at = self.now.t;
+        let (n, p) = (self.size.states(), self.size.outputs());
+        let covariance = &self.update.covariance.as_ref()[..p * p];
+        let mut finite = covariance.iter().all(|v| v.is_finite());
+        for v in state.belief(n).mean {
+            finite &= v.is_finite();
+        }
+        if finite {
+            FilterError::NoSpread { at }
+        } else {
+            FilterError::Diverged { at }
+        }
+    }
+}

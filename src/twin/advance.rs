@@ -1,0 +1,142 @@
+//! One step of any equations: of one state, or of all points of a filter at once.
+
+use super::{Interval, Now, StateSpace, Workspace};
+
+/// What every twin with equations can do, and none in its own way: the step.
+///
+/// It is implemented for all of them at once and can be for no single one, so a step that twins made of others would
+/// not know cannot exist. As a supertrait of [`StateSpace`] it is compiled once for each twin, the equations inline:
+/// a filter that holds a `dyn StateSpace` then pays one call for all its points.
+pub trait Advance {
+    /// One step without noise and limits: memories, then motion.
+    fn advance(&self, now: &Now<'_>, x: &mut [f64], work: &mut Workspace);
+
+    /// Carries points over a step; see [`Points`]. Returns whether a constraint acted on any that matters to the noise.
+    #[doc(hidden)]
+    fn advance_each(&self, now: &Now<'_>, points: Points<'_>, work: &mut Workspace) -> bool;
+
+    /// Outputs, `p` each, of points, `n` each.
+    #[doc(hidden)]
+    fn observe_each(&self, now: &Now<'_>, sizes: (usize, usize), points: &[f64], y: &mut [f64]);
+
+    /// Puts outputs, `p` each, through the readout; returns whether it changed any.
+    #[doc(hidden)]
+    fn readout_each(&self, now: &Now<'_>, p: usize, y: &mut [f64]) -> bool;
+}
+
+/// Points that a filter carries over a step; n states each, one point after the other.
+#[doc(hidden)]
+#[derive(Debug)]
+pub struct Points<'w> {
+    /// Put into the limits, advanced, constrained; the first is the centre.
+    pub moving: &'w mut [f64],
+    /// Limits by state.
+    pub limits: &'w [Interval],
+    /// Two for each state: the centre after its motion, with that state shifted up and down; constrained. Those of a
+    /// state without shift are left alone.
+    pub shifted: &'w mut [f64],
+    /// Shift of each state.
+    pub shifts: &'w [f64],
+}
+
+impl<T: StateSpace> Advance for T {
+    #[inline]
+    fn advance(&self, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
+        self.update(now, x);
+        self.integrator()
+            .step(now, x, work, |now, x, dx| self.drift(now, x, dx));
+    }
+
+    fn advance_each(&self, now: &Now<'_>, points: Points<'_>, work: &mut Workspace) -> bool {
+        // Loops of known length, for the sizes of most twins.
+        match points.shifts.len() {
+            1 => advance_each(self, 1, now, points, work),
+            2 => advance_each(self, 2, now, points, work),
+            3 => advance_each(self, 3, now, points, work),
+            n => advance_each(self, n, now, points, work),
+        }
+    }
+
+    fn observe_each(&self, now: &Now<'_>, (n, p): (usize, usize), points: &[f64], y: &mut [f64]) {
+        for (x, y) in points.chunks_exact(n).zip(y.chunks_exact_mut(p)) {
+            self.observe(now, x, y);
+        }
+    }
+
+    fn readout_each(&self, now: &Now<'_>, p: usize, y: &mut [f64]) -> bool {
+        match p {
+            1 => readout_each(self, 1, now, y),
+            p => readout_each(self, p, now, y),
+        }
+    }
+}
+
+#[inline(always)]
+fn readout_each<T: StateSpace>(twin: &T, p: usize, now: &Now<'_>, y: &mut [f64]) -> bool {
+    let mut changed = false;
+    for y in y.chunks_exact_mut(p) {
+        changed |= changes(y, |y| twin.readout(now, y));
+    }
+    changed
+}
+
+#[inline(always)]
+fn advance_each<T: StateSpace>(
+    twin: &T,
+    n: usize,
+    now: &Now<'_>,
+    points: Points<'_>,
+    work: &mut Workspace,
+) -> bool {
+    let Points {
+        moving,
+        limits,
+        shifted,
+        shifts,
+    } = points;
+    let (limits, shifts) = (&limits[..n], &shifts[..n]);
+    for x in moving.chunks_exact_mut(n) {
+        for (x, limit) in x.iter_mut().zip(limits) {
+            *x = limit.clamp(*x);
+        }
+        twin.advance(now, x, work);
+    }
+    let (centre, around) = moving.split_at_mut(n);
+    let mut bent = false;
+    for ((i, &shift), pair) in (shifts.iter().enumerate()).zip(shifted.chunks_exact_mut(2 * n)) {
+        if shift == 0.0 {
+            continue;
+        }
+        for (x, shift) in pair.chunks_exact_mut(n).zip([shift, -shift]) {
+            for (j, (x, centre)) in x.iter_mut().zip(&*centre).enumerate() {
+                *x = centre + if j == i { shift } else { 0.0 };
+            }
+            bent |= changes(x, |x| twin.constrain(now, x));
+        }
+    }
+    // The centre last: the shifts start from it as it is before.
+    for x in around.chunks_exact_mut(n) {
+        twin.constrain(now, x);
+    }
+    bent | changes(centre, |x| twin.constrain(now, x))
+}
+
+/// Whether `with` changes `values`. Nothing is left of this for a `with` that does nothing.
+#[inline(always)]
+fn changes(values: &mut [f64], with: impl FnOnce(&mut [f64])) -> bool {
+    let (mut few, many);
+    let before = if values.len() <= 4 {
+        few = [0.0; 4];
+        few[..values.len()].copy_from_slice(values);
+        &few[..values.len()]
+    } else {
+        many = values.to_vec();
+        &many
+    };
+    with(values);
+    let mut changed = false;
+    for (value, before) in values.iter().zip(before) {
+        changed |= value.to_bits() != before.to_bits();
+    }
+    changed
+}
