@@ -150,9 +150,9 @@ impl RefineSettings {
 pub struct Refined {
     /// θ_GN.
     pub theta: DVector<f64>,
-    /// μ and S^{-1/2} at θ_GN.
+    /// μ and S^{-1/2} where the last round began.
     pub whitening: Whitening,
-    /// Whitened distances ‖S^{-1/2}(x_k − μ)‖ of the simulations at θ_GN.
+    /// Whitened distances ‖S^{-1/2}(x_k − μ)‖ of the simulations there.
     pub spread: Vec<f64>,
     /// ∂f̄/∂θ at θ_GN, n × d, features over parameters.
     pub jacobian: DMatrix<f64>,
@@ -350,12 +350,12 @@ impl Refinement<'_> {
         }
     }
 
-    /// ∂f̄/∂θ at `theta`, n × d, from few seeds.
+    /// ∂f̄/∂θ at `theta`, n × d, from few seeds: the median of each seed's own.
     pub fn jacobian_at(&self, theta: &[f64]) -> Result<DMatrix<f64>, RefineError> {
         let space = self.simulator.twin().parameters();
         let theta = DVector::from_vec(space.clamp(theta));
         let problem = self.problem(&space, &theta, self.settings.centred_seeds);
-        Ok(problem.feature_jacobian(&theta).map_err(not_evaluated)?)
+        Ok(problem.median_jacobian(&theta).map_err(not_evaluated)?)
     }
 
     /// What is known around `theta` without a search.
@@ -427,7 +427,10 @@ impl Refinement<'_> {
         stage: &crate::progress::Stage,
     ) -> Result<(DVector<f64>, Local), RefineError> {
         let mut problem = self.problem(space, initial, self.settings.seeds);
-        for _ in 0..self.settings.rounds {
+        for round in 0..self.settings.rounds {
+            if round > 0 {
+                local = self.whiten(&theta)?;
+            }
             problem.whitening = Some(local.whitening.clone());
             let minimum =
                 self.minimiser()
@@ -436,7 +439,6 @@ impl Refinement<'_> {
                 .component_div(&problem.widths)
                 .amax();
             theta = minimum.theta;
-            local = self.whiten(&theta)?;
             stage.tick()?;
             if moved < 1e-3 {
                 break;

@@ -174,7 +174,7 @@ impl Default for Settings {
             refine: RefineSettings::default(),
             cloud: CloudSettings::default(),
             tuning: Training {
-                epochs: 30,
+                epochs: 15,
                 schedule: crate::network::Schedule::Cosine,
                 weight_decay: 5e-5,
                 patience: 0,

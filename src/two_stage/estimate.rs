@@ -318,9 +318,14 @@ impl Run<'_> {
         let gate = match self.settings.gate.form {
             GateForm::Paper => test.at(initial)?,
             GateForm::Calibrated => {
+                // The hypothesis is a θ in the prior; the network extrapolates, and errs, beyond.
+                let space = self.estimator.study.twin().parameters();
+                let initial: Vec<f64> = (space.iter().zip(initial))
+                    .map(|(p, v)| p.prior.clamp(*v))
+                    .collect();
                 let refinement = self.refinement(simulator, self.observed, &self.settings.refine);
-                let jacobian = refinement.jacobian_at(initial)?;
-                test.at_estimate(initial, &jacobian, |features| {
+                let jacobian = refinement.jacobian_at(&initial)?;
+                test.at_estimate(&initial, &jacobian, |features| {
                     Ok::<_, EstimateError>(self.estimator.predict(features)?)
                 })?
             }

@@ -9,8 +9,12 @@ use rayon::prelude::*;
 /// beside the estimate at hand and the prior's centre. A few random starts alone miss narrow tops.
 const SCREENED: u64 = 64;
 const SCREENED_STARTS: usize = 4;
-/// Scoring iterations a start.
-const ITERATIONS: usize = 25;
+/// Scoring iterations of every start, how many of the best go on, and iterations of these.
+const SURVEY: usize = 5;
+const LEADING: usize = 2;
+const ITERATIONS: usize = 20;
+/// Gain of an iteration, in nats a parameter, below which importance sampling takes over.
+const LEAST_GAIN: f64 = 0.02;
 /// Largest step in φ.
 const LARGEST_STEP: f64 = 0.5;
 /// Rounds of importance sampling, and draws in each for each parameter.
@@ -62,16 +66,39 @@ pub(super) fn localise(
     let starts: Vec<Vec<f64>> = ([initial.to_vec(), space.centre()].into_iter())
         .chain(best)
         .collect();
-    let climbed: Vec<_> = (starts.par_iter())
-        .map(|start| recoverable(climb(kalman, coordinates, start)))
-        .collect::<Result<_, _>>()?;
-    let best = climbed
+    let on = |mut climb: Climb, iterations| {
+        climb.on(kalman, coordinates, iterations)?;
+        Ok::<_, FilterError>(climb)
+    };
+    let first: Vec<Option<Climb>> = (starts.par_iter())
+        .map(|start| {
+            let climb = recoverable(Climb::from(kalman, coordinates, start))?;
+            climb.map(|climb| on(climb, SURVEY)).transpose()
+        })
+        .collect::<Result<_, FilterError>>()?;
+    let mut leading: Vec<Climb> = first.into_iter().flatten().collect();
+    leading.sort_by(|a, b| b.score.log_likelihood.total_cmp(&a.score.log_likelihood));
+    leading.truncate(LEADING);
+    let best = (leading.into_par_iter())
+        .map(|climb| on(climb, ITERATIONS))
+        .collect::<Result<Vec<_>, _>>()?
         .into_iter()
-        .flatten()
-        .reduce(|best, other| if other.0 > best.0 { other } else { best });
-    let Some((_, mut centre, information)) = best else {
+        .reduce(|best, other| {
+            if other.score.log_likelihood > best.score.log_likelihood {
+                other
+            } else {
+                best
+            }
+        });
+    let Some(Climb {
+        phi: mut centre,
+        score,
+        ..
+    }) = best
+    else {
         return Ok(None);
     };
+    let information = score.fisher;
     let d = centre.len();
     let mut covariance = (information + DMatrix::identity(d, d))
         .try_inverse()
@@ -103,57 +130,75 @@ fn recoverable<T>(result: Result<T, FilterError>) -> Result<Option<T>, FilterErr
     }
 }
 
-/// Log-likelihood, φ and information at the top that one start leads to: damped Fisher scoring within the bounds.
-fn climb(
-    kalman: &Kalman<'_>,
-    coordinates: &Coordinates,
-    start: &[f64],
-) -> Result<(f64, DVector<f64>, DMatrix<f64>), FilterError> {
-    let inside = |phi: DVector<f64>| -> DVector<f64> {
-        let ends = coordinates.lower().iter().zip(coordinates.upper());
-        DVector::from_iterator(
-            phi.len(),
-            phi.iter()
-                .zip(ends)
-                .map(|(v, (low, high))| v.clamp(*low, *high)),
-        )
-    };
-    let at = |phi: &DVector<f64>| {
-        Score::forward(kalman, &coordinates.theta(phi.as_slice()), coordinates)
-    };
-    let mut phi = inside(DVector::from_vec(coordinates.of(start)));
-    let mut score = at(&phi)?;
-    let mut damping: f64 = 1.0;
-    for _ in 0..ITERATIONS {
-        let d = phi.len();
-        let damped = &score.fisher
-            + DMatrix::from_diagonal(&score.fisher.diagonal().map(|v| damping * v + 1.0));
-        let Some(factor) = damped.cholesky() else {
-            break;
-        };
-        let mut step = factor.solve(&score.gradient);
-        let longest = step.amax();
-        if longest > LARGEST_STEP {
-            step *= LARGEST_STEP / longest;
-        }
-        let next = inside(&phi + step);
-        let moved = (&next - &phi).amax();
-        match recoverable(at(&next))? {
-            Some(better) if better.log_likelihood > score.log_likelihood => {
-                let gain = better.log_likelihood - score.log_likelihood;
-                (phi, score) = (next, better);
-                damping = (0.2 * damping).max(1e-6);
-                if gain < 1e-3 * d as f64 {
-                    break;
-                }
-            }
-            _ => damping *= 5.0,
-        }
-        if moved < 1e-7 || damping > 1e6 {
-            break;
-        }
+/// Damped Fisher scoring within the bounds.
+struct Climb {
+    phi: DVector<f64>,
+    score: Score,
+    damping: f64,
+    done: bool,
+}
+
+impl Climb {
+    fn from(
+        kalman: &Kalman<'_>,
+        coordinates: &Coordinates,
+        start: &[f64],
+    ) -> Result<Self, FilterError> {
+        let phi = inside(coordinates, DVector::from_vec(coordinates.of(start)));
+        Ok(Self {
+            score: Score::forward(kalman, &coordinates.theta(phi.as_slice()), coordinates)?,
+            phi,
+            damping: 1.0,
+            done: false,
+        })
     }
-    Ok((score.log_likelihood, phi, score.fisher))
+
+    /// Goes on for at most so many iterations.
+    fn on(
+        &mut self,
+        kalman: &Kalman<'_>,
+        coordinates: &Coordinates,
+        iterations: usize,
+    ) -> Result<(), FilterError> {
+        for _ in 0..iterations {
+            if self.done {
+                break;
+            }
+            let fisher = &self.score.fisher;
+            let damped =
+                fisher + DMatrix::from_diagonal(&fisher.diagonal().map(|v| self.damping * v + 1.0));
+            let Some(factor) = damped.cholesky() else {
+                self.done = true;
+                break;
+            };
+            let mut step = factor.solve(&self.score.gradient);
+            let longest = step.amax();
+            if longest > LARGEST_STEP {
+                step *= LARGEST_STEP / longest;
+            }
+            let next = inside(coordinates, &self.phi + step);
+            let moved = (&next - &self.phi).amax();
+            let theta = coordinates.theta(next.as_slice());
+            match recoverable(Score::forward(kalman, &theta, coordinates))? {
+                Some(better) if better.log_likelihood > self.score.log_likelihood => {
+                    let gain = better.log_likelihood - self.score.log_likelihood;
+                    (self.phi, self.score) = (next, better);
+                    self.damping = (0.2 * self.damping).max(1e-6);
+                    self.done |= gain < LEAST_GAIN * self.phi.len() as f64;
+                }
+                _ => self.damping *= 5.0,
+            }
+            self.done |= moved < 1e-7 || self.damping > 1e6;
+        }
+        Ok(())
+    }
+}
+
+/// φ within its bounds.
+fn inside(coordinates: &Coordinates, phi: DVector<f64>) -> DVector<f64> {
+    let ends = coordinates.lower().iter().zip(coordinates.upper());
+    let held = (phi.iter().zip(ends)).map(|(v, (low, high))| v.clamp(*low, *high));
+    DVector::from_iterator(phi.len(), held)
 }
 
 /// One round: uniform draws in the eigenbox of the covariance within the bounds, weighted by the likelihood, the weights
