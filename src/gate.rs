@@ -11,11 +11,11 @@
 //! Source: Lakshminarayanan, Guerrero & Rojas, section IV-A.
 
 use crate::bank::{BankError, FeatureSimulator};
-use crate::math::{Whitening, WhiteningError, rank_p_value};
+use crate::math::{Whitening, WhiteningError, median, rank_p_value};
 use crate::progress::Progress;
 use crate::twin::{Drive, Noise};
 use nalgebra::{DMatrix, DVector};
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView1};
 use serde::{Deserialize, Serialize};
 
 /// Which form of the test.
@@ -195,8 +195,10 @@ impl GateTest<'_> {
     /// s_k = ‖S^{-1/2}(x_k − μ − ∂f̄/∂θ·(θ̂(x_k) − θ))‖²
     /// ```
     ///
-    /// so that what the reader gets wrong on records of the twin itself rejects no record. `jacobian` is ∂f̄/∂θ at θ
-    /// (n × d), `estimate` maps features (rows) to θ̂. The paper's form stays as [`at`](Self::at).
+    /// so that what the reader gets wrong on records of the twin itself rejects no record. `jacobians` are ∂f/∂θ at θ
+    /// (n × d) of several seeds; their median in whitened features is taken, since far from their reference features have
+    /// heavy tails, and one such run would spoil a mean. `estimate` maps features (rows) to θ̂. The paper's form stays as
+    /// [`at`](Self::at).
     ///
     /// # Errors
     ///
@@ -204,25 +206,30 @@ impl GateTest<'_> {
     pub fn at_estimate<E: From<GateError>>(
         &self,
         theta: &[f64],
-        jacobian: &DMatrix<f64>,
+        jacobians: &[DMatrix<f64>],
         estimate: impl FnOnce(&Array2<f64>) -> Result<Array2<f64>, E>,
     ) -> Result<Gate, E> {
         let simulated = self.simulate(theta)?;
         let whitening =
             (self.settings.whiten(&simulated.whitening)).map_err(|error| E::from(error.into()))?;
-        let mut ranked = simulated.ranked().clone();
-        if self.settings.form == GateForm::Calibrated {
-            let estimates = estimate(&ranked)?;
-            for (mut row, estimate) in ranked.rows_mut().into_iter().zip(estimates.rows()) {
-                for (i, value) in row.iter_mut().enumerate() {
-                    let moves = estimate.iter().zip(theta).enumerate();
-                    let shift: f64 = moves.map(|(j, (e, t))| jacobian[(i, j)] * (e - t)).sum();
-                    *value -= shift;
-                }
+        let ranked = simulated.ranked();
+        let null = match self.settings.form {
+            GateForm::Paper => whitening.squared_distances(ranked),
+            GateForm::Calibrated => {
+                let jacobian = whitened_median(&whitening, jacobians);
+                let estimates = estimate(ranked)?;
+                let distance = |(row, estimate): (ArrayView1<'_, f64>, ArrayView1<'_, f64>)| {
+                    let moved = DVector::from_fn(theta.len(), |j, _| estimate[j] - theta[j]);
+                    let x = DVector::from_iterator(row.len(), row.iter().copied());
+                    (whitening.residual(&x) - &jacobian * moved).norm_squared()
+                };
+                (ranked.rows().into_iter().zip(estimates.rows()))
+                    .map(distance)
+                    .collect()
             }
-        }
+        };
         Ok(Gate {
-            null: whitening.squared_distances(&ranked),
+            null,
             whitening,
             settings: self.settings.clone(),
         })
@@ -326,6 +333,18 @@ impl Gate {
             out_of_distribution,
         }
     }
+}
+
+/// Medians, entry by entry, of whitened Jacobians.
+fn whitened_median(whitening: &Whitening, jacobians: &[DMatrix<f64>]) -> DMatrix<f64> {
+    let whitened: Vec<DMatrix<f64>> = (jacobians.iter())
+        .map(|jacobian| whitening.apply_columns(jacobian))
+        .collect();
+    let parameters = whitened.first().map_or(0, DMatrix::ncols);
+    DMatrix::from_fn(whitening.rank(), parameters, |i, j| {
+        let entries: Vec<f64> = whitened.iter().map(|jacobian| jacobian[(i, j)]).collect();
+        median(&entries).unwrap_or(0.0)
+    })
 }
 
 /// Orthonormal basis of the columns of `matrix`.

@@ -350,12 +350,12 @@ impl Refinement<'_> {
         }
     }
 
-    /// ∂f̄/∂θ at `theta`, n × d, from few seeds: the median of each seed's own.
-    pub fn jacobian_at(&self, theta: &[f64]) -> Result<DMatrix<f64>, RefineError> {
+    /// ∂f/∂θ at `theta`, n × d, of a few seeds, each by itself.
+    pub fn jacobians_at(&self, theta: &[f64]) -> Result<Vec<DMatrix<f64>>, RefineError> {
         let space = self.simulator.twin().parameters();
         let theta = DVector::from_vec(space.clamp(theta));
         let problem = self.problem(&space, &theta, self.settings.centred_seeds);
-        Ok(problem.median_jacobian(&theta).map_err(not_evaluated)?)
+        Ok(problem.jacobians(&theta).map_err(not_evaluated)?)
     }
 
     /// What is known around `theta` without a search.

@@ -1,7 +1,7 @@
 //! The residual that Gauss–Newton makes small, and its Jacobian by paired differences.
 
 use crate::bank::{BankError, DrawError, FeatureSimulator};
-use crate::math::{DifferenceError, Stencil, Whitening, median};
+use crate::math::{DifferenceError, Stencil, Whitening};
 use crate::optimise::{EvaluationError, ResidualProblem};
 use crate::progress::Progress;
 use crate::twin::{Drive, Noise};
@@ -52,27 +52,18 @@ impl FeatureResidual<'_> {
         Ok(mean)
     }
 
-    /// Medians over seeds, entry by entry, of each seed's own ∂f/∂θ: features may have heavy tails far from their reference,
-    /// and one such run would spoil a mean.
-    pub fn median_jacobian(&self, theta: &DVector<f64>) -> Result<DMatrix<f64>, EvaluationError> {
+    /// ∂f/∂θ of each seed by itself.
+    pub fn jacobians(&self, theta: &DVector<f64>) -> Result<Vec<DMatrix<f64>>, EvaluationError> {
         let stencil = Stencil::new(theta.as_slice(), &self.steps, &self.lower, &self.upper)?;
-        let one = |seed: u64| -> Result<DMatrix<f64>, EvaluationError> {
+        let one = |seed: u64| {
             self.progress.checkpoint().map_err(EvaluationError::fatal)?;
             stencil.jacobian(|point| {
                 let noise = self.noise.sample(seed);
                 let features = self.simulator.features(point, self.drive, noise)?;
-                Ok(DVector::from_vec(features))
+                Ok::<_, EvaluationError>(DVector::from_vec(features))
             })
         };
-        let all: Vec<DMatrix<f64>> = (0..self.seeds as u64)
-            .into_par_iter()
-            .map(one)
-            .collect::<Result<_, _>>()?;
-        let (n, d) = (self.simulator.dim(), theta.len());
-        Ok(DMatrix::from_fn(n, d, |i, j| {
-            let entries: Vec<f64> = all.iter().map(|jacobian| jacobian[(i, j)]).collect();
-            median(&entries).unwrap_or(0.0)
-        }))
+        (0..self.seeds as u64).into_par_iter().map(one).collect()
     }
 
     /// ∂f̄/∂θ: the same seeds on both sides of θ.

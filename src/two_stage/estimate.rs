@@ -324,8 +324,8 @@ impl Run<'_> {
                     .map(|(p, v)| p.prior.clamp(*v))
                     .collect();
                 let refinement = self.refinement(simulator, self.observed, &self.settings.refine);
-                let jacobian = refinement.jacobian_at(&initial)?;
-                test.at_estimate(&initial, &jacobian, |features| {
+                let jacobians = refinement.jacobians_at(&initial)?;
+                test.at_estimate(&initial, &jacobians, |features| {
                     Ok::<_, EstimateError>(self.estimator.predict(features)?)
                 })?
             }
