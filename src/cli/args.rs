@@ -46,7 +46,7 @@ pub(super) enum Command {
     Estimate(EstimateArguments),
     /// Learn what the twin lacks: whether parameters can explain the record, where not, which effect, how far it closes the gap.
     ///
-    /// Needs no training; the twin must show its equations. DIR holds report.json.
+    /// Needs no training; the twin must show its equations. DIR holds report.json and report.html.
     Diagnose(DiagnoseArguments),
     /// Score every method on simulated records: the paper's table and figures.
     ///
@@ -183,7 +183,7 @@ pub(super) struct DiagnoseArguments {
     /// Effects that are not to be named.
     #[arg(long, value_name = "ID[@TARGET],..", value_delimiter = ',')]
     pub without: Vec<String>,
-    /// A new folder for report.json.
+    /// A new folder for report.json and report.html.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }

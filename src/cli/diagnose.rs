@@ -3,7 +3,7 @@
 use super::args::DiagnoseArguments;
 use super::{Context, Failure, output};
 use crate::diagnose::{DiagnoseSettings, diagnose};
-use crate::report::{gap_json, gap_text};
+use crate::report::{gap_html, gap_json, gap_text};
 use crate::study::Study;
 use crate::twin::{Record, read_record};
 use crate::two_stage::Estimator;
@@ -49,6 +49,7 @@ pub(super) fn run(context: &Context<'_>, options: &DiagnoseArguments) -> Result<
         let folder = output::NewFolder::new(out)?;
         let text = serde_json::to_string_pretty(&json).map_err(Failure::internal)?;
         folder.write("report.json", &text)?;
+        folder.write("report.html", &gap_html(&found))?;
         folder.finish()?;
     }
     if context.json {

@@ -4,8 +4,10 @@ use super::DiagnoseError;
 use super::candidate::Addition;
 use super::dictionary::{Dictionary, Point, Variant};
 use super::fit::{Fitted, climb, fit};
+use super::frequency::peaks;
 use super::null::{Bench, Look};
 use super::problem::Problem;
+use super::scan::{Gain, Reference};
 use crate::filter::FilterError;
 use crate::progress::Stage;
 use crate::twin::Record;
@@ -14,6 +16,9 @@ use rayon::prelude::*;
 /// Points of the dictionary that a fit starts from, per candidate; thresholds have more.
 const STARTS: usize = 2;
 const THRESHOLD_STARTS: usize = 4;
+/// Explanations that are fitted once more, from the θ of so many of the best.
+const SECOND_ROUND: usize = 10;
+const SECOND_STARTS: usize = 2;
 /// Iterations of a fit.
 const ITERATIONS: usize = 15;
 /// Numbers that a catch-all counts for: strength and memory.
@@ -71,6 +76,7 @@ pub(super) fn explanations(
         }
         None => None,
     };
+    let reference = Reference::new(&bench.problem, &bench.fitted.theta)?;
     let tasks: Vec<usize> = match only {
         Some(list) => list.to_vec(),
         None => (0..bench.dictionary.candidates.len()).collect(),
@@ -78,7 +84,12 @@ pub(super) fn explanations(
     let mut found: Vec<Explanation> = tasks
         .into_par_iter()
         .map(|candidate| {
-            let explained = explain(bench, look, candidate, validation, base_validation)?;
+            let mut starts = match &reference {
+                Some(reference) => peaks(bench, reference, candidate)?,
+                None => vec![],
+            };
+            starts.extend(best_points(&bench.dictionary, look, candidate));
+            let explained = explain(bench, &starts, candidate, validation, base_validation)?;
             stage.tick()?;
             Ok(explained)
         })
@@ -86,13 +97,56 @@ pub(super) fn explanations(
         .into_iter()
         .flatten()
         .collect();
-    found.sort_by(|a, b| b.score().total_cmp(&a.score()));
+    let order = |found: &mut Vec<Explanation>| {
+        found.sort_by(|a, b| b.score().total_cmp(&a.score()));
+    };
+    order(&mut found);
+    // Once more from where the best ended: a poor θ leads to poor fits.
+    if only.is_none() {
+        let d = bench.problem.twin.parameters().len();
+        let thetas: Vec<Vec<f64>> = (found.iter().take(SECOND_STARTS))
+            .map(|e| bench.explained(e).of_record(0, &e.fitted.theta)[..d].to_vec())
+            .collect();
+        let again: Vec<usize> = (0..found.len())
+            .filter(|&i| bench.dictionary.candidates[found[i].candidate].is_listed() || i < 3)
+            .take(SECOND_ROUND)
+            .collect();
+        let better: Vec<Option<Fitted>> = again
+            .par_iter()
+            .map(|&i| {
+                let e = &found[i];
+                let variant = &bench.dictionary.variants[e.variant];
+                let problem = variant.problem(&bench.problem);
+                let own = problem.of_record(0, &e.fitted.theta);
+                let starts: Vec<Vec<f64>> = (thetas.iter())
+                    .filter(|theta| theta[..] != own[..d])
+                    .map(|theta| problem.full(&variant.theta(theta, &own[d..])))
+                    .collect();
+                let fitted = fit(&problem, &starts, ITERATIONS)?;
+                Ok(fitted.filter(|f| f.objective > e.fitted.objective + 0.1))
+            })
+            .collect::<Result<_, DiagnoseError>>()?;
+        for (i, fitted) in again.into_iter().zip(better) {
+            if let Some(fitted) = fitted {
+                let (candidate, variant) = (found[i].candidate, found[i].variant);
+                found[i] = scored(
+                    bench,
+                    candidate,
+                    variant,
+                    fitted,
+                    validation,
+                    base_validation,
+                )?;
+            }
+        }
+        order(&mut found);
+    }
     Ok(found)
 }
 
-/// The best points of a candidate: (point, gain's multiple), best first, of different magnitudes.
-fn best_points(dictionary: &Dictionary, look: &Look, candidate: usize) -> Vec<(Point, f64)> {
-    let mut points: Vec<(&Point, super::scan::Gain)> = (dictionary.points.iter())
+/// The best points of a candidate: (variant, magnitudes as the secant says), best first.
+fn best_points(dictionary: &Dictionary, look: &Look, candidate: usize) -> Vec<(usize, Vec<f64>)> {
+    let mut points: Vec<(&Point, Gain)> = (dictionary.points.iter())
         .zip(look.points.iter().copied())
         .filter(|(p, _)| dictionary.variants[p.variant].candidate == candidate)
         .collect();
@@ -104,33 +158,33 @@ fn best_points(dictionary: &Dictionary, look: &Look, candidate: usize) -> Vec<(P
     });
     let most = if threshold { THRESHOLD_STARTS } else { STARTS };
     (points.into_iter().take(most))
-        .map(|(p, g)| (p.clone(), g.alpha))
+        .map(|(point, gain)| {
+            let axis = &dictionary.variants[point.variant].axes[0];
+            let mut m = point.m.clone();
+            if point.linear && gain.alpha != 0.0 {
+                // A noise's square is what adds up.
+                m[0] *= match axis.bounds.low() > 0.0 {
+                    true => gain.alpha.clamp(0.01, 100.0).sqrt(),
+                    false => gain.alpha,
+                };
+            }
+            (point.variant, m)
+        })
         .collect()
 }
 
 fn explain(
     bench: &Bench<'_>,
-    look: &Look,
+    points: &[(usize, Vec<f64>)],
     candidate: usize,
     validation: Option<&[Record]>,
     base_validation: Option<f64>,
 ) -> Result<Option<Explanation>, DiagnoseError> {
     let dictionary = &bench.dictionary;
     let mut best: Option<(usize, Fitted)> = None;
-    for (n, (point, alpha)) in best_points(dictionary, look, candidate)
-        .into_iter()
-        .enumerate()
-    {
-        let variant = &dictionary.variants[point.variant];
+    for (n, (v, m)) in points.iter().enumerate() {
+        let variant = &dictionary.variants[*v];
         let problem = variant.problem(&bench.problem);
-        let mut m = point.m.clone();
-        if point.linear && alpha != 0.0 {
-            // Where the secant says; a noise's square is what adds up.
-            m[0] *= match variant.axes[0].bounds.low() > 0.0 {
-                true => alpha.clamp(0.01, 100.0).sqrt(),
-                false => alpha,
-            };
-        }
         let start = |theta: &[f64], m: &[f64]| -> Vec<f64> {
             let mut full = problem.full(&variant.theta(&bench.problem.of_record(0, theta), m));
             for r in 1..problem.records.len() {
@@ -139,9 +193,9 @@ fn explain(
             }
             problem.clamp(&full)
         };
-        let mut starts = vec![start(&bench.fitted.theta, &m)];
+        let mut starts = vec![start(&bench.fitted.theta, m)];
         if n == 0 {
-            starts.push(start(&bench.problem.centre(), &m));
+            starts.push(start(&bench.problem.centre(), m));
         }
         let Some(mut fitted) = fit(&problem, &starts, ITERATIONS)? else {
             continue;
@@ -153,12 +207,32 @@ fn explain(
             .as_ref()
             .is_none_or(|(_, b)| fitted.objective > b.objective)
         {
-            best = Some((point.variant, fitted));
+            best = Some((*v, fitted));
         }
     }
     let Some((v, fitted)) = best else {
         return Ok(None);
     };
+    Ok(Some(scored(
+        bench,
+        candidate,
+        v,
+        fitted,
+        validation,
+        base_validation,
+    )?))
+}
+
+/// A fit with its scores.
+fn scored(
+    bench: &Bench<'_>,
+    candidate: usize,
+    v: usize,
+    fitted: Fitted,
+    validation: Option<&[Record]>,
+    base_validation: Option<f64>,
+) -> Result<Explanation, DiagnoseError> {
+    let dictionary = &bench.dictionary;
     let variant = &dictionary.variants[v];
     let numbers = if dictionary.candidates[candidate].is_listed() {
         variant.free.len() as f64
@@ -186,7 +260,7 @@ fn explain(
         // A fit that does not even filter the validation record is no explanation.
         explanation.validation = Some(there.map_or(-1e3, |there| there - base));
     }
-    Ok(Some(explanation))
+    Ok(explanation)
 }
 
 /// Moves a magnitude without a derivative by halved steps, the rest refitted.
@@ -235,6 +309,7 @@ impl Bench<'_> {
             super::candidate::Kind::Listed(effect) => Some(Addition {
                 effect: effect.clone(),
                 held: self.dictionary.variants[explanation.variant].held.clone(),
+                kept: self.dictionary.variants[explanation.variant].kept,
             }),
             super::candidate::Kind::CatchAll(..) => None,
         }

@@ -65,6 +65,8 @@ impl Candidate {
 pub(super) struct Addition {
     pub effect: Arc<dyn UnmodelledEffect>,
     pub held: BTreeMap<String, f64>,
+    /// Memory values that filters keep of a delay.
+    pub kept: Option<usize>,
 }
 
 /// The twin with some effects, for filters: delays are cut short.
@@ -74,12 +76,19 @@ pub(super) fn with(
 ) -> Result<Arc<dyn DigitalTwin>, DiagnoseError> {
     let effects: Effects = additions.iter().map(|a| a.effect.clone()).collect();
     let mut held = BTreeMap::new();
-    for Addition { effect, held: of } in additions {
+    let mut short = vec![];
+    for Addition {
+        effect,
+        held: of,
+        kept,
+    } in additions
+    {
         let (id, target) = (effect.typetag_name(), effect.target());
+        short.extend(kept.map(|kept| (format!("{id}@{target}"), kept)));
         held.extend((of.iter()).map(|(name, v)| (format!("{id}@{target}.{name}"), *v)));
     }
     let twin = augment(base.clone(), effects)?;
-    Ok(shorten(fix(twin, &held)?))
+    Ok(shorten(fix(twin, &held)?, &short))
 }
 
 /// The twin with a catch-all on top.

@@ -7,6 +7,7 @@ use super::null::{Bench, Look};
 use super::problem::Problem;
 use super::result::Decision;
 use super::scan::Reference;
+use super::shrink::{Runner, closed};
 use super::{DiagnoseError, DiagnoseSettings, Setting};
 use crate::progress::Stage;
 use crate::twin::{Noise, Signal};
@@ -17,7 +18,9 @@ const UNEXPLAINED: f64 = 0.02;
 const WORTH_A_PAIR: f64 = 3.0;
 /// First effects, and second effects for each, that pairs are made of.
 const FIRSTS: usize = 2;
-const SECONDS: usize = 6;
+const SECONDS: usize = 8;
+/// Least share of the free-run error that effects must take off where something is left unexplained.
+const GOOD_PART: f64 = 0.1;
 
 /// What was decided, and with which fits.
 pub(super) struct Answer {
@@ -222,7 +225,7 @@ pub(super) fn decide<'a>(
         {
             let p = nulls.test().p_value;
             unexplained = Some(p);
-            if p > UNEXPLAINED {
+            if p > UNEXPLAINED || improves(setting, bench, &pair, noise)? {
                 let keys: Vec<String> = pair.accepted.iter().map(Accepted::key).collect();
                 let answer = Answer {
                     decision: Decision::Named,
@@ -235,7 +238,41 @@ pub(super) fn decide<'a>(
             }
         }
     }
+    // A single effect that leaves something, but follows a record never seen much better.
+    if let Some(step) = grown(setting, bench, &[], first)?
+        && improves(setting, bench, &step, noise)?
+    {
+        let answer = Answer {
+            decision: Decision::Named,
+            accepted: step.accepted.clone(),
+            class: step.accepted.iter().map(Accepted::key).collect(),
+            unexplained,
+            catch_all: None,
+        };
+        return Ok((answer, Some(step)));
+    }
     Ok((nothing(unexplained), None))
+}
+
+/// Of a twin whose free run is to follow the record: whether it follows the validation record better by a good part, beyond
+/// chance. A real system is never explained to the last bit, and without process noise nothing else would be accepted.
+fn improves(
+    setting: &Setting<'_>,
+    bench: &Bench<'_>,
+    step: &Step<'_>,
+    noise: Noise,
+) -> Result<bool, DiagnoseError> {
+    let Some(records) = setting.validation.filter(|_| setting.follows) else {
+        return Ok(false);
+    };
+    let additions: Vec<Addition> = step.accepted.iter().map(|a| a.addition.clone()).collect();
+    let theta = |bench: &Bench<'_>| bench.problem.of_record(0, &bench.fitted.theta);
+    let before = Runner::new(setting.twin, &[], theta(bench))?.errors(&records[0], 0);
+    let after = Runner::new(setting.twin, &additions, theta(&step.bench))?.errors(&records[0], 0);
+    Ok(before.zip(after).is_some_and(|(before, after)| {
+        let (_, interval) = closed(&before, &after, 0.0, noise.child("improves"));
+        interval.is_some_and(|[low, _]| low > GOOD_PART)
+    }))
 }
 
 /// The best second effect beside a first one, if it beats a catch-all beside the first.

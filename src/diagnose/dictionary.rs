@@ -6,7 +6,7 @@ use super::catch_all::Place;
 use super::fit::recoverable;
 use super::problem::{Axis, Problem};
 use super::scan::{Gain, Reference};
-use super::shorten::KEPT;
+use super::shorten::LONG;
 use crate::filter::FilterError;
 use crate::math::quantile;
 use crate::twin::{DigitalTwin, Interval, Law, Magnitude, Record, Signal};
@@ -19,9 +19,12 @@ use std::sync::Arc;
 const VISIBLE: f64 = 10.0;
 /// d·d beyond which a secant is shortened.
 const COARSE: f64 = 400.0;
-/// Frequencies and times that are looked at.
-const FREQUENCIES: usize = 8;
-const TIMES: usize = 8;
+/// Frequencies, times and levels that are looked at, and how many where it is enough to see that something is left.
+const FREQUENCIES: [usize; 2] = [8, 4];
+const TIMES: [usize; 2] = [8, 4];
+/// Delays in steps, each with a register that just holds it: the shorter the register, the faster the filter.
+const DELAYS: [&[f64]; 3] = [&[0.5, 1.5], &[3.0], &[5.5]];
+const REGISTERS: [usize; 3] = [3, 5, 8];
 
 /// A candidate with those of its thresholds that are in use, as a twin.
 pub(super) struct Variant {
@@ -31,6 +34,8 @@ pub(super) struct Variant {
     /// Free magnitudes in the order of θ; the others are held at their off values.
     pub free: Vec<Magnitude>,
     pub held: BTreeMap<String, f64>,
+    /// Memory values that filters keep of a delay.
+    pub kept: Option<usize>,
     /// Axes of the free magnitudes.
     pub axes: Vec<Axis>,
     /// Free magnitudes without a derivative (the time of a jump).
@@ -126,9 +131,13 @@ impl Dictionary {
         reference: &Reference,
         scales: &Scales<'_>,
     ) -> Result<Self, DiagnoseError> {
+        // With effects added, it is enough to see that something is left.
+        let coarse = !accepted.is_empty();
         let mut plans = Vec::new();
         for (index, candidate) in candidates.iter().enumerate() {
-            plans.extend(plan(study, accepted, candidate, index, problem, scales)?);
+            plans.extend(plan(
+                study, accepted, candidate, index, problem, scales, coarse,
+            )?);
         }
         let combinations: Vec<(usize, Lead, Vec<f64>)> = (plans.iter().enumerate())
             .flat_map(|(v, plan)| {
@@ -232,13 +241,15 @@ impl Variant {
         };
         if unit > 0.0 && first.width.is_nan() {
             let limits = self.free[0].limits;
-            let reach = 300.0 * unit;
+            // A twin without measurement noise sees what is a millionth of any start.
+            let start = first.longest;
+            let reach = (300.0 * unit).max(3.0 * start);
             let low = limits.low().max(-reach);
             first.bounds = Interval::unchecked(low, limits.high().min(reach));
             first.centre = first.bounds.clamp(0.0);
             first.deviation = reach;
             first.width = unit;
-            first.longest = 20.0 * unit;
+            first.longest = (20.0 * unit).max(0.3 * start);
         } else if unit > 0.0 && first.bounds.low().is_nan() {
             first.bounds = Interval::unchecked(1e-3 * unit, 1e3 * unit);
             first.centre = unit;
@@ -294,6 +305,7 @@ fn plan(
     index: usize,
     problem: &Problem<'_>,
     scales: &Scales<'_>,
+    coarse: bool,
 ) -> Result<Vec<Plan>, DiagnoseError> {
     let unset = f64::NAN;
     let log_axis = |low: f64, high: f64, centre: f64| Axis {
@@ -317,6 +329,7 @@ fn plan(
                 twin: with_disturbance(&problem.twin, *place, *memory),
                 free: candidate.magnitudes(),
                 held: BTreeMap::new(),
+                kept: None,
                 axes: vec![log_axis(unset, unset, unset)],
                 jumps: vec![],
             };
@@ -346,12 +359,17 @@ fn plan(
         .filter(|&i| infinite(&magnitudes[i]))
         .collect();
     // One threshold at a time.
-    let choices: Vec<Option<usize>> = match thresholds.len() {
-        0 | 1 => vec![None],
-        _ => thresholds.iter().copied().map(Some).collect(),
+    let choices: Vec<(Option<usize>, Option<usize>)> = match thresholds.len() {
+        0 | 1 if effect.memory() > LONG => {
+            // The delays of a state need its covariances with the past; those of an input cost less.
+            let registers = if law == Law::Actuator { 3 } else { 2 };
+            (0..registers).map(|i| (None, Some(i))).collect()
+        }
+        0 | 1 => vec![(None, None)],
+        _ => thresholds.iter().map(|&i| (Some(i), None)).collect(),
     };
     let mut plans = Vec::new();
-    for choice in choices {
+    for (choice, register) in choices {
         let held: BTreeMap<String, f64> = (thresholds.iter())
             .filter(|&&i| choice.is_some_and(|c| c != i))
             .map(|&i| {
@@ -376,10 +394,13 @@ fn plan(
             let (low, high) = ends(&values);
             let span = (high - low).max(1e-9);
             let shares = match first.off {
-                Some(off) if off > 0.0 => [0.97, 0.9, 0.75, 0.5],
-                _ => [0.03, 0.1, 0.25, 0.5],
+                Some(off) if off > 0.0 => [0.9, 0.5, 0.97, 0.75],
+                _ => [0.1, 0.5, 0.03, 0.25],
             };
-            let levels = shares.iter().filter_map(|p| quantile(&values, *p).ok());
+            let count = if coarse { 2 } else { 4 };
+            let levels = shares[..count]
+                .iter()
+                .filter_map(|p| quantile(&values, *p).ok());
             let axis = Axis {
                 bounds: Interval::unchecked(low - 0.3 * span, high + 0.3 * span),
                 centre: low + 0.5 * span,
@@ -394,10 +415,12 @@ fn plan(
             let leads = starts.map(|v| Lead::At(in_unit(v))).collect();
             let axis = log_axis(1e-3 * greatest, 1e2 * greatest, greatest);
             (leads, axis, (0.0, 1.5))
-        } else if first.unit == "s" && effect.memory() > KEPT {
-            let leads = starts.map(|v| Lead::Shrink(in_unit(v))).collect();
+        } else if let (Some(register), "s") = (register, first.unit) {
+            let leads = (DELAYS[register].iter())
+                .map(|v| Lead::Shrink(v * dt))
+                .collect();
             let axis = Axis {
-                bounds: Interval::unchecked(0.0, (KEPT - 1) as f64 * dt),
+                bounds: Interval::unchecked(0.0, (REGISTERS[register] - 1) as f64 * dt),
                 centre: dt,
                 deviation: 10.0 * dt,
                 width: 0.1 * dt,
@@ -439,7 +462,7 @@ fn plan(
                 centre: 0.0,
                 deviation: 1.0,
                 width: unset,
-                longest: 1.0,
+                longest: greatest,
                 counts: false,
                 held: false,
             };
@@ -450,7 +473,7 @@ fn plan(
         let mut shapes = Vec::new();
         let mut jumps = Vec::new();
         for (i, shape) in free.iter().enumerate().skip(1) {
-            let (values, axis) = shape_axis(shape, dt, duration);
+            let (values, axis) = shape_axis(shape, dt, duration, coarse);
             if shape.unit == "s" {
                 jumps.push(i);
             }
@@ -460,6 +483,7 @@ fn plan(
         let addition = Addition {
             effect: effect.clone(),
             held: held.clone(),
+            kept: register.map(|i| REGISTERS[i]),
         };
         let additions: Vec<Addition> = accepted.iter().cloned().chain([addition]).collect();
         plans.push(Plan {
@@ -468,6 +492,7 @@ fn plan(
                 twin: with(study, &additions)?,
                 free,
                 held,
+                kept: register.map(|i| REGISTERS[i]),
                 axes,
                 jumps,
             },
@@ -480,7 +505,7 @@ fn plan(
 }
 
 /// Values of a shape to look at, and how it moves in a fit.
-fn shape_axis(shape: &Magnitude, dt: f64, duration: f64) -> (Vec<f64>, Axis) {
+fn shape_axis(shape: &Magnitude, dt: f64, duration: f64, coarse: bool) -> (Vec<f64>, Axis) {
     let linear = |low: f64, high: f64, width: f64, longest: f64| Axis {
         bounds: Interval::unchecked(low, high),
         centre: 0.5 * (low + high),
@@ -493,18 +518,20 @@ fn shape_axis(shape: &Magnitude, dt: f64, duration: f64) -> (Vec<f64>, Axis) {
     match shape.unit {
         "Hz" => {
             let (low, high): (f64, f64) = (1.5 / duration, 0.15 / dt);
-            let at = |i: usize| low * (high / low).powf(i as f64 / (FREQUENCIES - 1) as f64);
+            let count = FREQUENCIES[usize::from(coarse)];
+            let at = |i: usize| low * (high / low).powf(i as f64 / (count - 1) as f64);
             let axis = Axis {
                 deviation: 3.0,
                 centre: (low * high).sqrt(),
                 longest: 0.3,
                 ..linear(0.5 / duration, 0.5 / dt, 1.0, 0.3)
             };
-            ((0..FREQUENCIES).map(at).collect(), axis)
+            ((0..count).map(at).collect(), axis)
         }
         "rad" => (vec![0.0, FRAC_PI_2], linear(-TAU, TAU, 1.0, 1.0)),
         "s" => {
-            let times = (1..=TIMES).map(|i| duration * i as f64 / (TIMES + 1) as f64);
+            let count = TIMES[usize::from(coarse)];
+            let times = (1..=count).map(|i| duration * i as f64 / (count + 1) as f64);
             let axis = Axis {
                 held: true,
                 ..linear(0.0, duration, duration, 1.0)
@@ -521,6 +548,9 @@ fn shape_axis(shape: &Magnitude, dt: f64, duration: f64) -> (Vec<f64>, Axis) {
             let mut values = shape.starts.to_vec();
             if shape.limits.is_finite() && values.len() == 3 && span <= 1.0 {
                 values.remove(1);
+            }
+            if coarse {
+                values = vec![values[values.len() / 2]];
             }
             (values, linear(low, high, 0.1 * span, 0.3 * span))
         }

@@ -7,7 +7,7 @@
 //! | are the innovations white? | `omnibus.rs` |
 //! | what all of that is where nothing is wrong | `null.rs` |
 //! | what a validation record says | `evalue.rs` |
-//! | fit the explanations, order them, accept, abstain | `attribute.rs`, `decide.rs` |
+//! | fit the explanations, order them, accept, abstain | `frequency.rs`, `attribute.rs`, `decide.rs` |
 //! | where, in the equations, in time, in the states | `localise.rs` |
 //! | how far, on held-out data | `shrink.rs` |
 //! | the kinds of gap | `verdict.rs` |
@@ -21,6 +21,7 @@ mod decide;
 mod dictionary;
 mod evalue;
 mod fit;
+mod frequency;
 mod localise;
 mod null;
 mod omnibus;
@@ -156,4 +157,7 @@ pub enum DiagnoseError {
 struct Setting<'a> {
     twin: &'a Arc<dyn DigitalTwin>,
     validation: Option<&'a [Record]>,
+    /// Whether the twin has no process noise: its free run is to follow the record, and neither noise nor a disturbance
+    /// is a rival: either would explain anything.
+    follows: bool,
 }

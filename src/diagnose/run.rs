@@ -15,7 +15,9 @@ use super::{DiagnoseError, DiagnoseSettings, Setting};
 use crate::filter::FilterError;
 use crate::progress::Progress;
 use crate::study::Study;
-use crate::twin::{Drive, Noise, PRIOR_DEVIATION, Parameter, Record, Role, Signal, StateSpace};
+use crate::twin::{
+    Drive, Noise, Now, PRIOR_DEVIATION, Parameter, Record, Role, Signal, StateSpace,
+};
 use ndarray::s;
 use rayon::prelude::*;
 use std::time::Instant;
@@ -73,8 +75,12 @@ pub fn diagnose(
     let noise = Noise::new(settings.seed, "diagnose", 0);
     let validation: Option<Vec<Record>> = validation.map(|v| vec![v.clone()]);
     let validation = validation.as_deref();
-    let setting = Setting { twin, validation };
     let space = twin.parameters();
+    let setting = Setting {
+        twin,
+        validation,
+        follows: without_process_noise(equations, &records[0]),
+    };
 
     // θ, and how the record looks at it.
     let axes: Vec<Axis> = space.iter().map(Axis::of).collect();
@@ -82,7 +88,10 @@ pub fn diagnose(
     let stage = progress.stage("fit", 1);
     let fitted = base_fit(&problem, settings, noise)?.ok_or(DiagnoseError::NoFit)?;
     stage.tick()?;
-    let all = candidates(study, &settings.without)?;
+    let mut all = candidates(study, &settings.without)?;
+    if setting.follows {
+        all.retain(|c| c.is_listed() && !c.is_noise());
+    }
     let bench =
         (setting.bench(problem.clone(), fitted.clone(), &[], all)?).ok_or(DiagnoseError::NoFit)?;
 
@@ -261,6 +270,23 @@ fn check(
         );
     }
     Ok(())
+}
+
+/// Whether no state of the twin is noisy, with any noise level that the study leaves open.
+fn without_process_noise(twin: &dyn StateSpace, record: &Record) -> bool {
+    let outline = twin.outline();
+    let theta = outline.parameters.centre();
+    let drive = record.drive();
+    let now = Now {
+        t: 0.0,
+        dt: drive.dt(),
+        u: drive.input(0),
+        theta: &theta,
+    };
+    let mut process = vec![0.0; outline.states.len()];
+    let mut measurement = vec![0.0; outline.outputs.len()];
+    twin.noise(&now, &mut process, &mut measurement);
+    process.iter().all(|q| *q == 0.0)
 }
 
 /// The best θ of all starts: the prior's centre, the estimator's, and the best of random ones.

@@ -6,22 +6,29 @@ use crate::twin::{
 use smallvec::SmallVec;
 use std::sync::Arc;
 
-/// Memory values that are kept of each effect.
-pub(super) const KEPT: usize = 8;
+/// Effects with more memory values than this are delays, whose registers are cut.
+pub(super) const LONG: usize = 8;
 
-/// The twin with at most [`KEPT`] memory values an effect, for filters: a delay keeps 64 past samples, and a filter's cost
-/// grows with the square of the states. Delays of up to KEPT − 1 steps are exact.
+/// The twin with at most `kept` memory values of each effect (`id@target`), for filters: a delay keeps 64 past samples, and
+/// a filter's cost grows with the square of the states. Delays of up to kept − 1 steps are exact.
 ///
 /// Memories are the states named `id@target/k`, newest first.
-pub(super) fn shorten(twin: Arc<dyn DigitalTwin>) -> Arc<dyn DigitalTwin> {
+pub(super) fn shorten(
+    twin: Arc<dyn DigitalTwin>,
+    kept: &[(String, usize)],
+) -> Arc<dyn DigitalTwin> {
     let Some(outline) = twin.state_space().map(StateSpace::outline) else {
         return twin;
     };
-    let index = |name: &str| -> Option<usize> { name.rsplit_once('/')?.1.parse().ok() };
+    let most = |effect: &str| kept.iter().find(|(key, _)| key == effect).map(|(_, k)| *k);
+    let beyond = |name: &str| -> Option<bool> {
+        let (effect, index) = name.rsplit_once('/')?;
+        Some(index.parse::<usize>().ok()? >= most(effect)?)
+    };
     let kept: Vec<usize> = (0..outline.states.len())
         .filter(|&i| {
             let name = &outline.states[i].name;
-            !(name.contains('@') && index(name).is_some_and(|k| k >= KEPT))
+            !beyond(name).unwrap_or(false)
         })
         .collect();
     if kept.len() == outline.states.len() {
@@ -132,10 +139,10 @@ mod tests {
     fn short_delays_are_exact() {
         let text = "[[effect]]\nid = 'sensor-delay'\ntarget = 'sensor'\n";
         let long = augment(Arc::new(CascadedTanks), parse_effects(text).unwrap()).unwrap();
-        let short = shorten(long.clone());
+        let short = shorten(long.clone(), &[("sensor-delay@sensor".into(), 5)]);
         let states =
             |twin: &Arc<dyn DigitalTwin>| twin.state_space().unwrap().outline().states.len();
-        assert_eq!((states(&long), states(&short)), (2 + 64, 2 + KEPT));
+        assert_eq!((states(&long), states(&short)), (2 + 64, 2 + 5));
         let u = Signal::from_shape_fn((80, 1), |(k, _)| (k % 17) as f64 / 6.0);
         let drive = Drive::new(0.5, u).unwrap();
         for delay in [0.0, 0.7, 3.5] {
