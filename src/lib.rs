@@ -17,6 +17,7 @@
 //! | train, save, load, estimate | [`two_stage::pretrain`], [`two_stage::Estimator`] |
 //! | compress records otherwise | [`feature::FeatureMap`], [`feature::FeatureRecipe`] |
 //! | shape the network | [`network::HeadArchitecture`] |
+//! | learn what a twin lacks | [`diagnose::diagnose`] |
 //! | add an effect that a twin lacks | [`effect`], [`twin::augment`] |
 //! | give a twin the whole command line | [`cli::run`] |
 //!
@@ -56,6 +57,7 @@ pub mod study;
 pub mod two_stage;
 
 pub mod baseline;
+pub mod diagnose;
 
 pub mod experiment;
 pub mod report;

@@ -11,7 +11,7 @@ const LAYERS: [&[&str]; 6] = [
     &[
         "twins", "effect", "bank", "gate", "refine", "sample", "study",
     ],
-    &["two_stage", "baseline", "gap"],
+    &["two_stage", "baseline", "diagnose"],
     &["experiment", "report"],
     &["cli"],
 ];

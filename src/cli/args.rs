@@ -44,6 +44,10 @@ pub(super) enum Command {
     Pretrain(PretrainArguments),
     /// Estimate the parameters behind a measured record.
     Estimate(EstimateArguments),
+    /// Learn what the twin lacks: whether parameters can explain the record, where not, which effect, how far it closes the gap.
+    ///
+    /// Needs no training; the twin must show its equations. DIR holds report.json and report.html.
+    Diagnose(DiagnoseArguments),
     /// Score every method on simulated records: the paper's table and figures.
     ///
     /// Methods: the pretrained network (TS-pre), Gauss–Newton (GN), tuned heads (TS-fine), what `estimate` would answer
@@ -66,6 +70,7 @@ impl Command {
             Self::Effects(subject) | Self::Check(subject) => subject,
             Self::Simulate(options) => &options.subject,
             Self::Pretrain(options) => &options.subject,
+            Self::Diagnose(options) => &options.subject,
             Self::Reproduce(options) => &options.subject,
         };
         subject.study.as_deref()
@@ -158,6 +163,27 @@ pub(super) struct EstimateArguments {
     #[arg(long)]
     pub always_refine: bool,
     /// A new folder for estimate.json, overlay.svg and trajectories.csv.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct DiagnoseArguments {
+    /// Measured records of one system; they share θ, but for unknown starts.
+    #[arg(value_name = "R.csv", required = true)]
+    pub records: Vec<PathBuf>,
+    #[command(flatten)]
+    pub subject: Subject,
+    /// An estimator of the same twin, whose first estimate is a start of the fit.
+    #[arg(long, value_name = "EST")]
+    pub estimator: Option<PathBuf>,
+    /// A record that no fit sees: sharper test and ranking, and the share of the gap that closes.
+    #[arg(long, value_name = "V.csv")]
+    pub validation: Option<PathBuf>,
+    /// Effects that are not to be named.
+    #[arg(long, value_name = "ID[@TARGET],..", value_delimiter = ',')]
+    pub without: Vec<String>,
+    /// A new folder for report.json and report.html.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }

@@ -1,6 +1,7 @@
 //! From any error to one line and an exit code.
 
 use crate::bank::BankError;
+use crate::diagnose::DiagnoseError;
 use crate::effect::EffectFileError;
 use crate::experiment::{MonteCarloError, ScenarioError, StoreError};
 use crate::feature::FeatureError;
@@ -193,6 +194,15 @@ impl From<EstimateError> for Failure {
             EstimateError::Refine(error) => error.into(),
             EstimateError::Network(error) => error.into(),
             EstimateError::Cancelled(_) | EstimateError::Ellipsoid(_) => Self::internal(error),
+            _ => Self::user(error),
+        }
+    }
+}
+
+impl From<DiagnoseError> for Failure {
+    fn from(error: DiagnoseError) -> Self {
+        match error {
+            DiagnoseError::Cancelled(_) => Self::internal(error),
             _ => Self::user(error),
         }
     }

@@ -19,6 +19,7 @@
 mod args;
 mod check;
 mod demo;
+mod diagnose;
 mod effects;
 mod estimate;
 mod failure;
@@ -102,6 +103,7 @@ fn dispatch(arguments: &Arguments, studies: &[Study]) -> Result<ExitCode, Failur
         Command::Simulate(options) => simulate::run(&context, options),
         Command::Pretrain(options) => pretrain::run(&context, options),
         Command::Estimate(options) => estimate::run(&context, options),
+        Command::Diagnose(options) => diagnose::run(&context, options),
         Command::Reproduce(options) => reproduce::run(&context, options),
         Command::Demo(options) => demo::run(&context, options),
     };

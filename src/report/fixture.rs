@@ -1,5 +1,6 @@
 //! Estimates that the tests of this module render: a small estimator of the oscillator, really trained.
 
+use crate::diagnose::{DiagnoseSettings, Diagnosis, diagnose};
 use crate::progress::Progress;
 use crate::study::{RecordPlan, Study, StudyFile};
 use crate::twin::{Noise, Record};
@@ -38,6 +39,38 @@ pub(super) fn simulated(study: &Study, theta: &[f64], sample: u64) -> Record {
     let drive = study.drives().unwrap().draw(noise).unwrap();
     let outputs = study.twin().simulate(theta, &drive, noise).unwrap();
     Record::new(drive, outputs).unwrap()
+}
+
+/// Diagnoses without a gap, with a named effect and a validation record, with a parameter gap.
+pub(super) fn diagnoses() -> &'static [Diagnosis] {
+    static MADE: OnceLock<Vec<Diagnosis>> = OnceLock::new();
+    MADE.get_or_init(|| {
+        let plan = RecordPlan::autonomous(0.05, 300);
+        let study = Study::new("van-der-pol", VanDerPol, plan).unwrap();
+        let effects = "[[effect]]\nid = 'cubic-stiffness'\ntarget = 'x2'\nfrom = 'x1'\n";
+        let effects = crate::effect::parse_effects(effects).unwrap();
+        let stiff = crate::twin::augment(study.twin().clone(), effects).unwrap();
+        let stiff_record = |sample| {
+            let noise = Noise::new(7, "report", sample);
+            let drive = study.drives().unwrap().draw(noise).unwrap();
+            let outputs = stiff.simulate(&[1.5, 0.15], &drive, noise).unwrap();
+            Record::new(drive, outputs).unwrap()
+        };
+        let settings = DiagnoseSettings {
+            replicates: 30,
+            unexplained: 50,
+            ..DiagnoseSettings::default()
+        };
+        let found = |record: Record, validation: Option<Record>| {
+            let silent = Progress::silent();
+            diagnose(&study, &[record], validation.as_ref(), &settings, &silent).unwrap()
+        };
+        vec![
+            found(simulated(&study, &[1.5], 1), None),
+            found(stiff_record(2), Some(stiff_record(3))),
+            found(simulated(&study, &[4.0], 4), None),
+        ]
+    })
 }
 
 fn make() -> Estimates {

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | hand an estimate to another program | [`estimate_json`] |
 //! | show an estimate on the terminal | [`estimate_text`] |
+//! | hand on, or show, what a twin lacks | [`gap_json`], [`gap_text`], [`gap_html`] |
 //! | see the twin beside the record | [`overlay_svg`] |
 //! | hand on, print or draw the scores of many records | [`reproduce_json`], [`reproduce_text`], [`mean_runs_svg`], [`first_run_svg`] |
 //! | draw any other lines | [`chart`] |
@@ -14,6 +15,9 @@ mod estimate_json;
 mod estimate_text;
 #[cfg(test)]
 mod fixture;
+mod gap_html;
+mod gap_json;
+mod gap_text;
 mod overlay;
 mod reproduce_figures;
 mod reproduce_json;
@@ -25,6 +29,9 @@ mod trajectories;
 
 pub use estimate_json::estimate_json;
 pub use estimate_text::estimate_text;
+pub use gap_html::gap_html;
+pub use gap_json::gap_json;
+pub use gap_text::{gap_text, verdict_sentence};
 pub use overlay::overlay_svg;
 pub use reproduce_figures::{first_run_svg, mean_runs_svg};
 pub use reproduce_json::reproduce_json;

@@ -1,5 +1,6 @@
 //! The command line as a user meets it: exit codes, one-line messages, JSON, nothing half-written.
 
+mod diagnose;
 mod reproduce;
 
 use std::fs;

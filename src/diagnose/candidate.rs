@@ -1,0 +1,165 @@
+//! What a twin may lack: listed effects, and disturbances for everything else.
+
+use super::DiagnoseError;
+use super::catch_all::{Place, disturbed};
+use super::shorten::shorten;
+use crate::effect::{applicable, library};
+use crate::study::{Library, Study};
+use crate::twin::{
+    DigitalTwin, Effects, Law, Magnitude, Outline, Role, UnmodelledEffect, augment, fix,
+};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Memories a of the disturbances.
+const MEMORIES: [f64; 3] = [1.0, 0.95, 0.8];
+
+/// A listed effect, or a catch-all.
+#[derive(Debug, Clone)]
+pub(super) enum Kind {
+    Listed(Arc<dyn UnmodelledEffect>),
+    CatchAll(Place, f64),
+}
+
+/// One explanation of a gap.
+#[derive(Debug, Clone)]
+pub(super) struct Candidate {
+    /// Id of the effect; of a catch-all, `disturbance`.
+    pub id: String,
+    /// Sensor, actuator, state or parameter.
+    pub target: String,
+    pub kind: Kind,
+}
+
+impl Candidate {
+    /// `id@target`.
+    pub fn key(&self) -> String {
+        format!("{}@{}", self.id, self.target)
+    }
+
+    pub fn is_listed(&self) -> bool {
+        matches!(self.kind, Kind::Listed(_))
+    }
+
+    /// Whether only the noise is changed, so that no free run moves.
+    pub fn is_noise(&self) -> bool {
+        match &self.kind {
+            Kind::Listed(effect) => {
+                matches!(effect.law(), Law::MeasurementNoise | Law::ProcessNoise)
+            }
+            Kind::CatchAll(..) => true,
+        }
+    }
+
+    /// The numbers of the law; of a catch-all, its strength.
+    pub fn magnitudes(&self) -> Vec<Magnitude> {
+        match &self.kind {
+            Kind::Listed(effect) => effect.magnitudes(),
+            Kind::CatchAll(..) => vec![Magnitude::positive("std", "", &[0.05])],
+        }
+    }
+}
+
+/// An effect with those of its magnitudes that are held at their off value.
+#[derive(Debug, Clone)]
+pub(super) struct Addition {
+    pub effect: Arc<dyn UnmodelledEffect>,
+    pub held: BTreeMap<String, f64>,
+    /// Memory values that filters keep of a delay.
+    pub kept: Option<usize>,
+}
+
+/// The twin with some effects, for filters: delays are cut short.
+pub(super) fn with(
+    base: &Arc<dyn DigitalTwin>,
+    additions: &[Addition],
+) -> Result<Arc<dyn DigitalTwin>, DiagnoseError> {
+    let effects: Effects = additions.iter().map(|a| a.effect.clone()).collect();
+    let mut held = BTreeMap::new();
+    let mut short = vec![];
+    for Addition {
+        effect,
+        held: of,
+        kept,
+    } in additions
+    {
+        let (id, target) = (effect.typetag_name(), effect.target());
+        short.extend(kept.map(|kept| (format!("{id}@{target}"), kept)));
+        held.extend((of.iter()).map(|(name, v)| (format!("{id}@{target}.{name}"), *v)));
+    }
+    let twin = augment(base.clone(), effects)?;
+    Ok(shorten(fix(twin, &held)?, &short))
+}
+
+/// The twin with a catch-all on top.
+pub(super) fn with_disturbance(
+    base: &Arc<dyn DigitalTwin>,
+    place: Place,
+    memory: f64,
+) -> Arc<dyn DigitalTwin> {
+    disturbed(base.clone(), place, memory)
+}
+
+/// Every listed effect that the study lets a diagnosis name, but for outliers, which no filter models; then a catch-all for
+/// each state, sensor and own parameter.
+pub(super) fn candidates(
+    study: &Study,
+    without: &[String],
+) -> Result<Vec<Candidate>, DiagnoseError> {
+    let ids: Vec<_> = library().into_iter().map(|d| d.id).collect();
+    for name in without {
+        let id = name.split('@').next().unwrap_or(name);
+        if !ids.contains(&id) {
+            return Err(DiagnoseError::Without(name.clone()));
+        }
+    }
+    let twin = study.twin();
+    let Library { only, without: not } = &study.file().library;
+    let named = |list: &[String], id: &str, target: &str| {
+        let full = format!("{id}@{target}");
+        list.iter().any(|name| name == id || *name == full)
+    };
+    let already: Vec<String> = (study.file().effect.iter())
+        .map(|e| format!("{}@{}", e.typetag_name(), e.target()))
+        .collect();
+    let mut all: Vec<Candidate> = applicable(twin.as_ref())
+        .into_iter()
+        .filter(|e| e.law() != Law::Outliers)
+        .map(|effect| Candidate {
+            id: effect.typetag_name().into(),
+            target: effect.target().into(),
+            kind: Kind::Listed(effect),
+        })
+        .filter(|c| only.is_empty() || named(only, &c.id, &c.target))
+        .filter(|c| !named(not, &c.id, &c.target) && !named(without, &c.id, &c.target))
+        .filter(|c| !already.contains(&c.key()))
+        .collect();
+    let outline = twin.state_space().map(|t| t.outline());
+    all.extend(outline.iter().flat_map(catch_alls));
+    Ok(all)
+}
+
+fn catch_alls(outline: &Outline) -> Vec<Candidate> {
+    let states = (outline.states.iter().enumerate())
+        .filter(|(_, s)| !s.name.contains('/'))
+        .map(|(i, s)| (Place::State(i), s.name.clone()));
+    let sensors = (0..outline.outputs.len()).map(|j| {
+        let name = match outline.outputs.len() {
+            1 => "sensor".into(),
+            _ => format!("sensor{}", j + 1),
+        };
+        (Place::Sensor(j), name)
+    });
+    let parameters = (outline.parameters.iter().enumerate())
+        .filter(|(_, p)| p.role == Role::Physical)
+        .map(|(i, p)| (Place::Parameter(i), p.name.clone()));
+    (states.chain(sensors).chain(parameters))
+        .flat_map(|(place, target)| {
+            MEMORIES.map(|memory| Candidate {
+                id: "disturbance".into(),
+                target: target.clone(),
+                kind: Kind::CatchAll(place, memory),
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,307 @@
+//! From fitted explanations to an answer: named, a class of rivals, a pair, or none of these.
+
+use super::attribute::{Explanation, RIVALS, explanations};
+use super::candidate::{Addition, Candidate};
+use super::dictionary::{Dictionary, Scales};
+use super::null::{Bench, Look};
+use super::problem::Problem;
+use super::result::Decision;
+use super::scan::Reference;
+use super::shrink::{Runner, closed};
+use super::{DiagnoseError, DiagnoseSettings, Setting};
+use crate::progress::Stage;
+use crate::twin::{Noise, Signal};
+
+/// The structural test with the effect added: what is left below this is unexplained.
+const UNEXPLAINED: f64 = 0.02;
+/// Nats that a second effect must add beyond what it costs.
+const WORTH_A_PAIR: f64 = 3.0;
+/// First effects, and second effects for each, that pairs are made of.
+const FIRSTS: usize = 2;
+const SECONDS: usize = 8;
+/// Least share of the free-run error that effects must take off where something is left unexplained.
+const GOOD_PART: f64 = 0.1;
+
+/// What was decided, and with which fits.
+pub(super) struct Answer {
+    pub decision: Decision,
+    /// Accepted fits with their benches' own numbering already resolved.
+    pub accepted: Vec<Accepted>,
+    pub class: Vec<String>,
+    pub unexplained: Option<f64>,
+    pub catch_all: Option<String>,
+}
+
+/// One accepted effect.
+#[derive(Clone)]
+pub(super) struct Accepted {
+    pub addition: Addition,
+    pub id: String,
+    pub target: String,
+    pub magnitudes: Vec<(String, f64)>,
+    /// Nats that it adds.
+    pub gain: f64,
+}
+
+impl Accepted {
+    pub fn key(&self) -> String {
+        format!("{}@{}", self.id, self.target)
+    }
+}
+
+/// A twin with accepted effects, fitted.
+pub(super) struct Step<'a> {
+    pub bench: Bench<'a>,
+    pub accepted: Vec<Accepted>,
+    /// Score over the twin alone.
+    pub score: f64,
+}
+
+/// The bench of a twin with effects, whose fit is `explanation` on `bench`.
+pub(super) fn grown<'a>(
+    setting: &Setting<'a>,
+    bench: &Bench<'a>,
+    accepted: &[Accepted],
+    explanation: &Explanation,
+) -> Result<Option<Step<'a>>, DiagnoseError> {
+    let Some(addition) = bench.addition(explanation) else {
+        return Ok(None);
+    };
+    let variant = &bench.dictionary.variants[explanation.variant];
+    let candidate = &bench.dictionary.candidates[explanation.candidate];
+    let mut all = accepted.to_vec();
+    all.push(Accepted {
+        addition,
+        id: candidate.id.clone(),
+        target: candidate.target.clone(),
+        magnitudes: magnitudes(bench, explanation),
+        gain: explanation.gain + explanation.validation.unwrap_or(0.0),
+    });
+    let additions: Vec<Addition> = all.iter().map(|a| a.addition.clone()).collect();
+    let left: Vec<Candidate> = (bench.dictionary.candidates.iter())
+        .filter(|c| !c.is_listed() || !all.iter().any(|a| a.key() == c.key()))
+        .cloned()
+        .collect();
+    let problem = variant.problem(&bench.problem);
+    let Some(bench) = setting.bench(problem, explanation.fitted.clone(), &additions, left)? else {
+        return Ok(None);
+    };
+    Ok(Some(Step {
+        bench,
+        accepted: all,
+        score: explanation.score(),
+    }))
+}
+
+impl<'a> Setting<'a> {
+    /// Everything that is needed to look at a fitted twin; `None` where it cannot be filtered around the fit.
+    pub fn bench(
+        &self,
+        problem: Problem<'a>,
+        fitted: super::fit::Fitted,
+        additions: &[Addition],
+        candidates: Vec<Candidate>,
+    ) -> Result<Option<Bench<'a>>, DiagnoseError> {
+        let states = problem.states(&fitted.theta)?;
+        let outline =
+            (problem.twin.state_space().map(|t| t.outline())).ok_or(DiagnoseError::NoEquations)?;
+        let bins = super::localise::Bins::new(&outline, &states, problem.records);
+        let Some(reference) = Reference::new(&problem, &fitted.theta)? else {
+            return Ok(None);
+        };
+        let means: Vec<Signal> = states.into_iter().map(|(_, s)| s).collect();
+        let scales = Scales {
+            records: problem.records,
+            states: &means,
+        };
+        let dictionary = Dictionary::new(
+            self.twin,
+            additions,
+            candidates,
+            &problem,
+            &fitted.theta,
+            &reference,
+            &scales,
+        )?;
+        Ok(Some(Bench {
+            problem,
+            fitted,
+            dictionary: std::sync::Arc::new(dictionary),
+            bins,
+        }))
+    }
+}
+
+/// Names and values of an explanation's magnitudes, those held at their off values included.
+pub(super) fn magnitudes(bench: &Bench<'_>, explanation: &Explanation) -> Vec<(String, f64)> {
+    let candidate = &bench.dictionary.candidates[explanation.candidate];
+    let variant = &bench.dictionary.variants[explanation.variant];
+    let problem = variant.problem(&bench.problem);
+    let theta = problem.of_record(0, &explanation.fitted.theta);
+    let mut free = theta[theta.len() - variant.free.len()..].iter();
+    (candidate.magnitudes().into_iter())
+        .map(|m| {
+            let value = (variant.held.get(m.name).copied())
+                .unwrap_or_else(|| free.next().copied().unwrap_or(f64::NAN));
+            (m.name.to_owned(), value)
+        })
+        .collect()
+}
+
+/// Decides about a structural gap.
+pub(super) fn decide<'a>(
+    setting: &Setting<'a>,
+    bench: &Bench<'a>,
+    found: &[Explanation],
+    settings: &DiagnoseSettings,
+    noise: Noise,
+    stage: &Stage,
+) -> Result<(Answer, Option<Step<'a>>), DiagnoseError> {
+    let candidates = &bench.dictionary.candidates;
+    let listed: Vec<&Explanation> = (found.iter())
+        .filter(|e| candidates[e.candidate].is_listed())
+        .collect();
+    let catch_all = found.iter().find(|e| !candidates[e.candidate].is_listed());
+    let catch_score = catch_all.map_or(f64::NEG_INFINITY, Explanation::score);
+    let catch_name = catch_all.map(|e| candidates[e.candidate].target.clone());
+    let nothing = |unexplained| Answer {
+        decision: Decision::NoneOfThese,
+        accepted: vec![],
+        class: vec![],
+        unexplained,
+        catch_all: catch_name.clone(),
+    };
+    let Some(&first) = listed.first() else {
+        return Ok((nothing(None), None));
+    };
+    // The best listed effect alone.
+    let mut unexplained = None;
+    let step = grown(setting, bench, &[], first)?;
+    let mut first_look: Option<Look> = None;
+    if let Some(step) = step {
+        if let Some(nulls) =
+            (step.bench).nulls(settings.unexplained, noise.child("unexplained"), stage)?
+        {
+            let p = nulls.test().p_value;
+            unexplained = Some(p);
+            first_look = Some(nulls.own);
+            if p > UNEXPLAINED && first.score() >= catch_score {
+                let class: Vec<String> = (listed.iter())
+                    .filter(|e| e.score() >= first.score() - RIVALS)
+                    .map(|e| candidates[e.candidate].key())
+                    .collect();
+                let answer = Answer {
+                    decision: match class.len() {
+                        1 => Decision::Named,
+                        _ => Decision::Class,
+                    },
+                    accepted: step.accepted.clone(),
+                    class,
+                    unexplained: Some(p),
+                    catch_all: None,
+                };
+                return Ok((answer, Some(step)));
+            }
+        }
+        // Two together.
+        let mut pairs: Vec<Step<'a>> = Vec::new();
+        let mut seconds = vec![(step, first_look)];
+        for other in listed.iter().skip(1).take(FIRSTS - 1) {
+            if let Some(step) = grown(setting, bench, &[], other)? {
+                let look = step.bench.own_look()?;
+                seconds.push((step, look));
+            }
+        }
+        for (step, look) in &seconds {
+            let Some(look) = look else { continue };
+            pairs.extend(best_pair(setting, step, look, stage)?);
+        }
+        pairs.sort_by(|a, b| b.score.total_cmp(&a.score));
+        if let Some(pair) = pairs.into_iter().next()
+            && pair.score > first.score() + WORTH_A_PAIR
+            && pair.score >= catch_score
+            && let Some(nulls) =
+                (pair.bench).nulls(settings.unexplained, noise.child("pair"), stage)?
+        {
+            let p = nulls.test().p_value;
+            unexplained = Some(p);
+            if p > UNEXPLAINED || improves(setting, bench, &pair, noise)? {
+                let keys: Vec<String> = pair.accepted.iter().map(Accepted::key).collect();
+                let answer = Answer {
+                    decision: Decision::Named,
+                    accepted: pair.accepted.clone(),
+                    class: keys,
+                    unexplained,
+                    catch_all: None,
+                };
+                return Ok((answer, Some(pair)));
+            }
+        }
+    }
+    // A single effect that leaves something, but follows a record never seen much better.
+    if let Some(step) = grown(setting, bench, &[], first)?
+        && improves(setting, bench, &step, noise)?
+    {
+        let answer = Answer {
+            decision: Decision::Named,
+            accepted: step.accepted.clone(),
+            class: step.accepted.iter().map(Accepted::key).collect(),
+            unexplained,
+            catch_all: None,
+        };
+        return Ok((answer, Some(step)));
+    }
+    Ok((nothing(unexplained), None))
+}
+
+/// Of a twin whose free run is to follow the record: whether it follows the validation record better by a good part, beyond
+/// chance. A real system is never explained to the last bit, and without process noise nothing else would be accepted.
+fn improves(
+    setting: &Setting<'_>,
+    bench: &Bench<'_>,
+    step: &Step<'_>,
+    noise: Noise,
+) -> Result<bool, DiagnoseError> {
+    let Some(records) = setting.validation.filter(|_| setting.follows) else {
+        return Ok(false);
+    };
+    let additions: Vec<Addition> = step.accepted.iter().map(|a| a.addition.clone()).collect();
+    let theta = |bench: &Bench<'_>| bench.problem.of_record(0, &bench.fitted.theta);
+    let before = Runner::new(setting.twin, &[], theta(bench))?.errors(&records[0], 0);
+    let after = Runner::new(setting.twin, &additions, theta(&step.bench))?.errors(&records[0], 0);
+    Ok(before.zip(after).is_some_and(|(before, after)| {
+        let (_, interval) = closed(&before, &after, 0.0, noise.child("improves"));
+        interval.is_some_and(|[low, _]| low > GOOD_PART)
+    }))
+}
+
+/// The best second effect beside a first one, if it beats a catch-all beside the first.
+fn best_pair<'a>(
+    setting: &Setting<'a>,
+    step: &Step<'a>,
+    look: &Look,
+    stage: &Stage,
+) -> Result<Option<Step<'a>>, DiagnoseError> {
+    let bench = &step.bench;
+    let candidates = &bench.dictionary.candidates;
+    let mut order: Vec<usize> = (0..candidates.len()).collect();
+    order.sort_by(|&a, &b| look.gains[b].total_cmp(&look.gains[a]));
+    let mut tried: Vec<usize> = (order.iter().copied())
+        .filter(|&c| candidates[c].is_listed())
+        .take(SECONDS)
+        .collect();
+    // And the catch-all that promises most.
+    tried.extend(order.iter().copied().find(|&c| !candidates[c].is_listed()));
+    let found = explanations(bench, look, setting.validation, Some(&tried), stage)?;
+    let Some(best) = found
+        .first()
+        .filter(|e| candidates[e.candidate].is_listed())
+    else {
+        return Ok(None);
+    };
+    let pair = grown(setting, bench, &step.accepted, best)?;
+    Ok(pair.map(|mut pair| {
+        pair.score += step.score;
+        pair
+    }))
+}

@@ -1,0 +1,163 @@
+//! Whether a twin explains a record, and if not, where, by which effect, and how far it closes the gap.
+//!
+//! | step | file |
+//! |---|---|
+//! | fit θ with a weak prior | `fit.rs`, `problem.rs` |
+//! | what each listed effect and each catch-all would gain | `candidate.rs`, `catch_all.rs`, `dictionary.rs`, `scan.rs` |
+//! | are the innovations white? | `omnibus.rs` |
+//! | what all of that is where nothing is wrong | `null.rs` |
+//! | what a validation record says | `evalue.rs` |
+//! | fit the explanations, order them, accept, abstain | `frequency.rs`, `attribute.rs`, `decide.rs` |
+//! | where, in the equations, in time, in the states | `localise.rs` |
+//! | how far, on held-out data | `shrink.rs` |
+//! | the kinds of gap | `verdict.rs` |
+//!
+//! See docs/diagnosing-a-gap.md for the mathematics and how to read the answer.
+
+mod attribute;
+mod candidate;
+mod catch_all;
+mod decide;
+mod dictionary;
+mod evalue;
+mod fit;
+mod frequency;
+mod localise;
+mod null;
+mod omnibus;
+mod problem;
+mod result;
+mod run;
+mod scan;
+mod shorten;
+mod shrink;
+mod verdict;
+
+pub use result::{
+    Decision, Detection, Diagnosis, EffectFit, FittedNuisance, FittedParameter, FreeRuns, Region,
+    TargetShare, Verdict, Where, Which, Window,
+};
+pub use run::diagnose;
+pub use shrink::Shrinkage;
+
+use crate::filter::FilterError;
+use crate::progress::Cancelled;
+use crate::twin::{DigitalTwin, EffectError, ParameterError, Record, RecordError, SimulationError};
+use std::sync::Arc;
+
+/// Settings of a diagnosis.
+///
+/// | setting | default | range | meaning |
+/// |---|---|---|---|
+/// | `alpha` | 0.05 | (0, 1) | level of every test |
+/// | `replicates` | 60 | ≥ 1/alpha | simulations of the structural test |
+/// | `unexplained` | 99 | ≥ 50 | simulations of the test that a named effect must pass |
+/// | `seed` | 1 | | of everything random |
+/// | `without` | none | ids, or `id@target` | effects that are not to be named |
+/// | `initial` | none | | θ that an estimator gave, a start of the fit |
+#[derive(Debug, Clone, PartialEq)]
+pub struct DiagnoseSettings {
+    /// Level of every test.
+    pub alpha: f64,
+    /// Simulations of the structural test.
+    pub replicates: usize,
+    /// Simulations of the test with the effect added.
+    pub unexplained: usize,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Effects that are not to be named: `id` or `id@target`.
+    pub without: Vec<String>,
+    /// θ from an estimator.
+    pub initial: Option<Vec<f64>>,
+}
+
+impl Default for DiagnoseSettings {
+    fn default() -> Self {
+        Self {
+            alpha: 0.05,
+            replicates: 60,
+            unexplained: 99,
+            seed: 1,
+            without: vec![],
+            initial: None,
+        }
+    }
+}
+
+/// Why there is no diagnosis.
+#[derive(Debug, thiserror::Error)]
+pub enum DiagnoseError {
+    /// A black box.
+    #[error(
+        "diagnose needs equations, which this twin does not show; implement StateSpace for it, or use `estimate`, whose gate needs none"
+    )]
+    NoEquations,
+    /// No record.
+    #[error("no record was given; give at least one")]
+    NoRecord,
+    /// Records of different steps.
+    #[error("record {index} has a step of {given} s, the first one {expected} s; resample it")]
+    Steps {
+        /// From 1.
+        index: usize,
+        /// Its step.
+        given: f64,
+        /// That of the first.
+        expected: f64,
+    },
+    /// Too short to say anything.
+    #[error("record {index} has {samples} samples; at least {least} are needed")]
+    TooShort {
+        /// From 1.
+        index: usize,
+        /// Its samples.
+        samples: usize,
+        /// What is needed.
+        least: usize,
+    },
+    /// A setting that cannot be used.
+    #[error("{name} = {value}; {remedy}")]
+    Setting {
+        /// Which.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it must be.
+        remedy: &'static str,
+    },
+    /// An effect to leave out that there is not.
+    #[error("--without names {0}, which is no effect; `truetwin effects --twin T` lists them")]
+    Without(String),
+    /// The filter works nowhere.
+    #[error(
+        "the twin can be fitted to the record from no start; check units and step of the record, and the prior"
+    )]
+    NoFit,
+    /// Of a record and the twin.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// Of a filter.
+    #[error(transparent)]
+    Filter(#[from] FilterError),
+    /// Of an effect.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+    /// Of parameters.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
+    /// Of a simulation.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// Stopped.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// What all steps share.
+struct Setting<'a> {
+    twin: &'a Arc<dyn DigitalTwin>,
+    validation: Option<&'a [Record]>,
+    /// Whether the twin has no process noise: its free run is to follow the record, and neither noise nor a disturbance
+    /// is a rival: either would explain anything.
+    follows: bool,
+}

@@ -1,0 +1,237 @@
+//! What the statistics are where nothing is wrong: the twin itself simulated, refitted and looked at in the same way.
+
+use super::DiagnoseError;
+use super::dictionary::Dictionary;
+use super::fit::{Fitted, climb};
+use super::localise::{Bins, local};
+use super::omnibus::omnibus;
+use super::problem::Problem;
+use super::scan::{Gain, Reference};
+use crate::filter::FilterError;
+use crate::math::rank_p_value;
+use crate::progress::Stage;
+use crate::twin::{Noise, Record, SimulationError};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Iterations of a refit that starts where the simulation was made.
+const WARM: usize = 6;
+/// Least standard deviation of a statistic over the simulations: one that never moves cannot alarm by a hair.
+const LEAST: f64 = 0.1;
+
+/// Simulations at a time, and how many as extreme as the record are enough to say that it is not: p is then no smaller than
+/// 8 in the number asked for, and no further simulation makes it significant. Source: Besag & Clifford, "Sequential Monte
+/// Carlo p-values", *Biometrika* 78 (1991).
+const BATCH: usize = 20;
+const ENOUGH: usize = 8;
+
+/// A fitted twin and everything that its records are looked at with.
+pub(super) struct Bench<'a> {
+    pub problem: Problem<'a>,
+    pub fitted: Fitted,
+    pub dictionary: Arc<Dictionary>,
+    pub bins: Bins,
+}
+
+/// All statistics of one set of records, larger where less was expected.
+#[derive(Debug, Clone)]
+pub(super) struct Look {
+    /// √(2·gain) of each candidate.
+    pub gains: Vec<f64>,
+    pub omnibus: Vec<f64>,
+    /// By window and region.
+    pub local: Vec<f64>,
+    /// Gains of the points.
+    pub points: Vec<Gain>,
+}
+
+/// The record's statistics and those of simulations; `None`: a simulation that could not be filtered.
+pub(super) struct Nulls {
+    pub own: Look,
+    pub others: Vec<Option<Look>>,
+}
+
+/// What a test says.
+#[derive(Debug, Clone)]
+pub(super) struct Test {
+    pub p_value: f64,
+    /// Standard deviations above what the twin itself shows.
+    pub statistic: f64,
+    /// Simulations that are as extreme as the record.
+    pub as_extreme: usize,
+    /// Family-wise p-value of each candidate.
+    pub candidates: Vec<f64>,
+    /// Family-wise p-value of each window and region.
+    pub local: Vec<f64>,
+}
+
+impl<'a> Bench<'a> {
+    /// The same candidates beside another fit of the same twin.
+    pub fn with_problem<R>(
+        &self,
+        problem: Problem<'a>,
+        fitted: Fitted,
+        f: impl FnOnce(&Bench<'a>) -> R,
+    ) -> R {
+        f(&Self {
+            problem,
+            fitted,
+            dictionary: self.dictionary.clone(),
+            bins: self.bins.clone(),
+        })
+    }
+
+    /// How the records themselves look.
+    pub fn own_look(&self) -> Result<Option<Look>, FilterError> {
+        self.look(&self.problem, &self.fitted.theta)
+    }
+
+    /// Looks at records of `problem`, fitted at θ.
+    fn look(&self, problem: &Problem<'_>, theta: &[f64]) -> Result<Option<Look>, FilterError> {
+        let Some(reference) = Reference::new(problem, theta)? else {
+            return Ok(None);
+        };
+        let points = self.dictionary.scan(problem, theta, &reference)?;
+        let gains = self.dictionary.best(&points);
+        let states = problem.states(theta)?;
+        Ok(Some(Look {
+            gains: gains.iter().map(|g| (2.0 * g).sqrt()).collect(),
+            omnibus: omnibus(&reference.filtered, problem.records),
+            local: local(&states, problem.records, &self.bins),
+            points,
+        }))
+    }
+
+    /// One simulation of the fitted twin, refitted and looked at.
+    fn replicate(&self, noise: Noise) -> Result<Option<Look>, DiagnoseError> {
+        let mut records = Vec::new();
+        for (r, record) in self.problem.records.iter().enumerate() {
+            let theta = self.problem.of_record(r, &self.fitted.theta);
+            let drive = record.drive();
+            let noise = noise.child("record").sample(r as u64);
+            match self.problem.twin.simulate(&theta, drive, noise) {
+                Ok(outputs) => records.push(Record::new(drive.clone(), outputs)?),
+                Err(SimulationError::Diverged { .. }) => return Ok(None),
+                Err(error) => return Err(error.into()),
+            }
+        }
+        let problem = self.problem.on(&records);
+        let Some(fitted) = climb(&problem, &self.fitted.theta, WARM)? else {
+            return Ok(None);
+        };
+        match self.look(&problem, &fitted.theta) {
+            Ok(look) => Ok(look),
+            Err(error) if error.is_recoverable() => Ok(None),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// The record's statistics beside those of as many simulations; `None` where the record cannot be looked at.
+    pub fn nulls(
+        &self,
+        replicates: usize,
+        noise: Noise,
+        stage: &Stage,
+    ) -> Result<Option<Nulls>, DiagnoseError> {
+        let Some(own) = self.look(&self.problem, &self.fitted.theta)? else {
+            return Ok(None);
+        };
+        let mut nulls = Nulls {
+            own,
+            others: vec![],
+        };
+        while nulls.others.len() < replicates {
+            let from = nulls.others.len();
+            let to = (from + BATCH).min(replicates);
+            let batch = (from as u64..to as u64)
+                .into_par_iter()
+                .map(|i| {
+                    let look = self.replicate(noise.child("replicate").sample(i))?;
+                    stage.tick()?;
+                    Ok(look)
+                })
+                .collect::<Result<Vec<_>, DiagnoseError>>()?;
+            nulls.others.extend(batch);
+            if nulls.test().as_extreme >= ENOUGH {
+                break;
+            }
+        }
+        stage.finish();
+        Ok(Some(nulls))
+    }
+}
+
+impl Nulls {
+    /// The test that all of it comes from the twin.
+    ///
+    /// Each statistic is expressed in standard deviations over *all others*, simulations and record alike; the largest of
+    /// the candidates' and the largest of the omnibus' are expressed so once more, and the larger of the two is ranked. As
+    /// the record is treated as any simulation is, the rank is exact where the simulations are as the record.
+    pub fn test(&self) -> Test {
+        let pool: Vec<&Look> = std::iter::once(&self.own)
+            .chain(self.others.iter().flatten())
+            .collect();
+        let failed = self.others.iter().filter(|o| o.is_none()).count();
+        let of = |take: fn(&Look) -> &Vec<f64>| -> Vec<Vec<f64>> {
+            standardised(&pool.iter().map(|look| take(look)).collect::<Vec<_>>())
+        };
+        let largest = |rows: &[Vec<f64>]| -> Vec<f64> {
+            (rows.iter())
+                .map(|row| row.iter().fold(f64::NEG_INFINITY, |a, v| a.max(*v)))
+                .map(|v| if v.is_finite() { v } else { 0.0 })
+                .collect()
+        };
+        let ranked = |all: &[f64], own: f64| {
+            let mut null = all[1..].to_vec();
+            null.extend(std::iter::repeat_n(f64::NAN, failed));
+            rank_p_value(&null, own)
+        };
+        let (gains, omnibus, local) = (of(|l| &l.gains), of(|l| &l.omnibus), of(|l| &l.local));
+        let (top_gain, top_omnibus) = (largest(&gains), largest(&omnibus));
+        let both: Vec<Vec<f64>> = (top_gain.iter().zip(&top_omnibus))
+            .map(|(a, b)| vec![*a, *b])
+            .collect();
+        let both = largest(&standardised(&both.iter().collect::<Vec<_>>()));
+        let top_local = largest(&local);
+        Test {
+            p_value: ranked(&both, both[0]),
+            statistic: both[0],
+            as_extreme: failed + both[1..].iter().filter(|z| **z >= both[0]).count(),
+            candidates: gains[0].iter().map(|z| ranked(&top_gain, *z)).collect(),
+            local: local[0].iter().map(|z| ranked(&top_local, *z)).collect(),
+        }
+    }
+}
+
+/// Each entry less the mean of its column over all *other* rows, in their standard deviations.
+fn standardised(rows: &[&Vec<f64>]) -> Vec<Vec<f64>> {
+    let n = rows.len() as f64;
+    let width = rows.first().map_or(0, |r| r.len());
+    let mut z: Vec<Vec<f64>> = rows.iter().map(|_| vec![0.0; width]).collect();
+    for j in 0..width {
+        let sum: f64 = rows.iter().map(|r| r[j]).sum();
+        let centre = sum / n;
+        let square: f64 = rows.iter().map(|r| (r[j] - centre).powi(2)).sum();
+        for (row, z) in rows.iter().zip(&mut z) {
+            let own = row[j] - centre;
+            let mean = -own / (n - 1.0);
+            let variance = (square - own * own) / (n - 1.0) - mean * mean;
+            z[j] = (own - mean) / variance.max(LEAST * LEAST).sqrt();
+        }
+    }
+    z
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_outlier_is_measured_by_the_others() {
+        let rows: Vec<Vec<f64>> = [50.0, 1.0, 2.0, 3.0].map(|v| vec![v]).to_vec();
+        let z = standardised(&rows.iter().collect::<Vec<_>>());
+        // Mean 2, standard deviation √(2/3).
+        assert!((z[0][0] - 48.0 / (2.0f64 / 3.0).sqrt()).abs() < 1e-9);
+        assert!(z[1][0] < 0.0);
+    }
+}

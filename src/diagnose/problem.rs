@@ -1,0 +1,329 @@
+//! A twin with equations and the records that it is fitted to.
+
+use crate::filter::{Coordinates, FilterError, FilterSettings, Filtered, Kalman, Score};
+use crate::twin::{
+    DigitalTwin, Interval, Parameter, ParameterSpace, Record, Role, Signal, StateSpace,
+};
+use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
+
+/// Standard deviation of the weak log-prior of a positive parameter.
+const LOG_DEVIATION: f64 = 0.6;
+/// A positive parameter stays within this factor of the prior's centre, and within the prior.
+const FACTOR: f64 = 4.0;
+/// Longest step of a fit in a logarithm; otherwise, as a share of the width.
+const LONGEST: f64 = 0.5;
+
+/// How one entry of θ moves in a fit.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Axis {
+    /// What it may be; a logarithm is taken where the lower end is positive.
+    pub bounds: Interval,
+    /// Centre of the weak prior, in θ.
+    pub centre: f64,
+    /// Standard deviation of the weak prior in φ; infinite for none.
+    pub deviation: f64,
+    /// Scale of differences, in θ; of no meaning for a logarithm.
+    pub width: f64,
+    /// Longest step of a fit in φ.
+    pub longest: f64,
+    /// Whether the prior counts in comparisons: that of the twin's own parameters does.
+    pub counts: bool,
+    /// Whether a fit leaves it where it starts.
+    pub held: bool,
+}
+
+impl Axis {
+    /// Of a parameter of the twin itself, an unknown start or noise level.
+    pub fn of(p: &Parameter) -> Self {
+        let (prior, bounds) = (p.prior, p.bounds);
+        let centre = prior.centre();
+        if bounds.low() > 0.0 {
+            let span = (prior.high() / prior.low()).ln() / 12f64.sqrt();
+            let within = match p.role {
+                Role::Physical => Interval::unchecked(
+                    bounds.low().max((centre / FACTOR).min(prior.low())),
+                    bounds.high().min((FACTOR * centre).max(prior.high())),
+                ),
+                _ => bounds,
+            };
+            Self {
+                bounds: within,
+                centre,
+                deviation: LOG_DEVIATION.max(span),
+                width: 1.0,
+                longest: LONGEST,
+                counts: true,
+                held: false,
+            }
+        } else {
+            Self {
+                bounds,
+                centre,
+                deviation: prior.width(),
+                width: prior.width(),
+                longest: LONGEST * prior.width(),
+                counts: true,
+                held: false,
+            }
+        }
+    }
+
+    /// The same axis, held in the prior box of its parameter.
+    pub fn inside(mut self, prior: Interval) -> Self {
+        let low = self.bounds.low().max(prior.low());
+        let high = self.bounds.high().min(prior.high());
+        if low < high {
+            self.bounds = Interval::unchecked(low, high);
+        }
+        self
+    }
+}
+
+/// A twin and records, with one θ for all of them but for unknown starts, of which each record has its own.
+///
+/// The full θ is the twin's, then the starts of the second record, and so on.
+#[derive(Clone)]
+pub(super) struct Problem<'a> {
+    pub twin: Arc<dyn DigitalTwin>,
+    pub records: &'a [Record],
+    /// For each record, where the twin's parameters stand in the full θ.
+    places: Vec<Vec<usize>>,
+    pub axes: Vec<Axis>,
+    pub coordinates: Coordinates,
+    of_record: Vec<Coordinates>,
+    filter: FilterSettings,
+}
+
+/// Gradient and information of all records and the weak prior, in φ.
+pub(super) struct Slope {
+    pub log_likelihood: f64,
+    /// Log-density of the weak priors, all of them, up to a constant.
+    pub log_prior: f64,
+    pub gradient: DVector<f64>,
+    pub information: DMatrix<f64>,
+}
+
+impl Slope {
+    pub fn objective(&self) -> f64 {
+        self.log_likelihood + self.log_prior
+    }
+}
+
+impl<'a> Problem<'a> {
+    /// `axes` belong to the parameters of the twin; the twin must show its equations.
+    pub fn new(twin: Arc<dyn DigitalTwin>, axes: Vec<Axis>, records: &'a [Record]) -> Self {
+        let space = twin.parameters();
+        let mut all = axes;
+        let mut places = Vec::new();
+        for r in 0..records.len() {
+            let mut of_record = Vec::new();
+            for (j, p) in space.iter().enumerate() {
+                if r > 0 && p.role == Role::Start {
+                    all.push(all[j].clone());
+                    of_record.push(all.len() - 1);
+                } else {
+                    of_record.push(j);
+                }
+            }
+            places.push(of_record);
+        }
+        let coordinates = |axes: &mut dyn Iterator<Item = &Axis>| {
+            Coordinates::new(&ParameterSpace::new(axes.map(|axis| {
+                let mut p = Parameter::new("", "", 0.0, axis.width);
+                p.bounds = axis.bounds;
+                p
+            })))
+        };
+        Self {
+            coordinates: coordinates(&mut all.iter()),
+            of_record: places
+                .iter()
+                .map(|place| coordinates(&mut place.iter().map(|&j| &all[j])))
+                .collect(),
+            places,
+            axes: all,
+            twin,
+            records,
+            filter: FilterSettings::default(),
+        }
+    }
+
+    /// The same twin on other records.
+    pub fn on<'b>(&self, records: &'b [Record]) -> Problem<'b> {
+        let d = self.twin.parameters().len();
+        Problem::new(self.twin.clone(), self.axes[..d].to_vec(), records)
+    }
+
+    /// The same problem with all but the unknown starts held.
+    pub fn starts_only(&self) -> Option<Self> {
+        let space = self.twin.parameters();
+        let d = space.len();
+        let free = |j: usize| j >= d || space[j].role == Role::Start;
+        let mut problem = self.clone();
+        for (j, axis) in problem.axes.iter_mut().enumerate() {
+            axis.held = !free(j);
+        }
+        (0..self.dimension()).any(free).then_some(problem)
+    }
+
+    fn equations(&self) -> &dyn StateSpace {
+        self.twin
+            .state_space()
+            .expect("twins without equations are refused before")
+    }
+
+    /// Number of samples of all records.
+    pub fn samples(&self) -> usize {
+        self.records.iter().map(Record::samples).sum()
+    }
+
+    /// Dimension of the full θ.
+    pub fn dimension(&self) -> usize {
+        self.axes.len()
+    }
+
+    /// θ of one record.
+    pub fn of_record(&self, r: usize, theta: &[f64]) -> Vec<f64> {
+        self.places[r].iter().map(|&j| theta[j]).collect()
+    }
+
+    /// Full θ from that of one record: all records start alike.
+    pub fn full(&self, theta: &[f64]) -> Vec<f64> {
+        let mut full = vec![0.0; self.dimension()];
+        for r in 0..self.places.len() {
+            self.place(r, theta, &mut full);
+        }
+        full
+    }
+
+    /// Puts θ of one record into the full θ.
+    pub fn place(&self, r: usize, theta: &[f64], full: &mut [f64]) {
+        for (&j, value) in self.places[r].iter().zip(theta) {
+            full[j] = *value;
+        }
+    }
+
+    /// The nearest θ within the bounds.
+    pub fn clamp(&self, theta: &[f64]) -> Vec<f64> {
+        let axes = self.axes.iter().zip(theta);
+        axes.map(|(axis, v)| axis.bounds.clamp(*v)).collect()
+    }
+
+    /// The prior's centre.
+    pub fn centre(&self) -> Vec<f64> {
+        self.axes.iter().map(|a| a.bounds.clamp(a.centre)).collect()
+    }
+
+    /// Log-density of the priors, up to a constant: of all axes, or of those that count.
+    pub fn log_prior(&self, theta: &[f64], all: bool) -> f64 {
+        let phi = self.coordinates.of(theta);
+        self.prior_terms()
+            .enumerate()
+            .filter(|(j, _)| all || self.axes[*j].counts)
+            .map(|(j, (centre, precision))| -0.5 * precision * (phi[j] - centre).powi(2))
+            .sum()
+    }
+
+    /// Centre and precision of the priors in φ.
+    pub fn prior_terms(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        let logs = self.coordinates.is_log().iter();
+        self.axes.iter().zip(logs).map(|(axis, log)| {
+            let centre = if *log { axis.centre.ln() } else { axis.centre };
+            (centre, axis.deviation.powi(-2))
+        })
+    }
+
+    pub fn log_likelihood(&self, theta: &[f64]) -> Result<f64, FilterError> {
+        let mut sum = 0.0;
+        for (r, record) in self.records.iter().enumerate() {
+            let kalman = Kalman::new(self.equations(), record, &self.filter)?;
+            sum += kalman.log_likelihood(&self.of_record(r, theta))?;
+        }
+        Ok(sum)
+    }
+
+    /// Innovations of each record.
+    pub fn filtered(&self, theta: &[f64]) -> Result<Vec<Filtered>, FilterError> {
+        self.filtered_by(theta, &self.filter)
+    }
+
+    /// Innovations and filtered states of each record.
+    pub fn states(&self, theta: &[f64]) -> Result<Vec<(Filtered, Signal)>, FilterError> {
+        let keep = FilterSettings {
+            keep_states: true,
+            ..self.filter.clone()
+        };
+        let all = self.filtered_by(theta, &keep)?;
+        Ok((all.into_iter())
+            .map(|mut f| {
+                let states = f
+                    .states
+                    .take()
+                    .map_or_else(|| Signal::zeros((0, 0)), |s| s.means);
+                (f, states)
+            })
+            .collect())
+    }
+
+    fn filtered_by(
+        &self,
+        theta: &[f64],
+        settings: &FilterSettings,
+    ) -> Result<Vec<Filtered>, FilterError> {
+        (self.records.iter().enumerate())
+            .map(|(r, record)| {
+                Kalman::new(self.equations(), record, settings)?.filter(&self.of_record(r, theta))
+            })
+            .collect()
+    }
+
+    /// Gradient and information at θ.
+    pub fn slope(&self, theta: &[f64]) -> Result<Slope, FilterError> {
+        let d = self.dimension();
+        let mut slope = Slope {
+            log_likelihood: 0.0,
+            log_prior: self.log_prior(theta, true),
+            gradient: DVector::zeros(d),
+            information: DMatrix::zeros(d, d),
+        };
+        for (r, record) in self.records.iter().enumerate() {
+            let kalman = Kalman::new(self.equations(), record, &self.filter)?;
+            let place = &self.places[r];
+            let score = Score::forward(&kalman, &self.of_record(r, theta), &self.of_record[r])?;
+            slope.log_likelihood += score.log_likelihood;
+            for (a, &i) in place.iter().enumerate() {
+                slope.gradient[i] += score.gradient[a];
+                for (b, &j) in place.iter().enumerate() {
+                    slope.information[(i, j)] += score.fisher[(a, b)];
+                }
+            }
+        }
+        let phi = self.coordinates.of(theta);
+        for (j, (centre, precision)) in self.prior_terms().enumerate() {
+            slope.gradient[j] -= precision * (phi[j] - centre);
+            slope.information[(j, j)] += precision;
+        }
+        Ok(slope)
+    }
+
+    /// Points around θ whose innovations tell their derivatives: (index in θ, moved θ, distance in φ).
+    pub fn neighbours(&self, theta: &[f64]) -> Vec<(Vec<f64>, f64)> {
+        const SHARE: f64 = 0.1;
+        let c = &self.coordinates;
+        let phi = c.of(theta);
+        (0..phi.len())
+            .map(|j| {
+                let step = SHARE * c.steps()[j];
+                let mut moved = phi.clone();
+                moved[j] += if moved[j] + step <= c.upper()[j] {
+                    step
+                } else {
+                    -step
+                };
+                let distance = moved[j] - phi[j];
+                (c.theta(&moved), distance)
+            })
+            .collect()
+    }
+}

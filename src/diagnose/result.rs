@@ -1,0 +1,238 @@
+//! What a diagnosis says.
+
+use super::shrink::Shrinkage;
+use crate::twin::{Interval, Signal};
+
+/// Which kind of gap there is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// The twin explains the record with parameters within the prior.
+    NoGap,
+    /// It does with parameters outside of the prior.
+    ParameterGap,
+    /// No parameters explain the record.
+    StructuralGap,
+}
+
+impl Verdict {
+    /// As in reports.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::NoGap => "no-gap",
+            Self::ParameterGap => "parameter-gap",
+            Self::StructuralGap => "structural-gap",
+        }
+    }
+}
+
+/// What is said about causes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Decision {
+    /// One effect, or an accepted pair.
+    Named,
+    /// Rivals that the data cannot tell apart.
+    Class,
+    /// No listed effect, nor a pair of them, explains the record.
+    NoneOfThese,
+    /// Parameters outside of the prior explain the record, and so does a listed effect with parameters inside.
+    Absorbed,
+    /// Nothing needs a cause.
+    NotNeeded,
+}
+
+impl Decision {
+    /// As in reports.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::Named => "named",
+            Self::Class => "class",
+            Self::NoneOfThese => "none-of-these",
+            Self::Absorbed => "absorbed",
+            Self::NotNeeded => "not-needed",
+        }
+    }
+}
+
+/// Whether the twin, refitted, can have made the record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Detection {
+    /// p-value of the structural test; with a validation record, of rank and e-value together.
+    pub p_value: f64,
+    /// Level of the test.
+    pub alpha: f64,
+    /// How far the record stands out of simulations, in their standard deviations.
+    pub statistic: f64,
+    /// p-value by the record alone.
+    pub rank_p_value: f64,
+    /// log E of the validation record.
+    pub log_e: Option<f64>,
+}
+
+/// One parameter of the twin.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedParameter {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// The estimator's first estimate.
+    pub initial: Option<f64>,
+    /// Refitted, beside accepted effects.
+    pub refitted: f64,
+    /// Standard deviation by information and weak prior.
+    pub std_error: f64,
+    /// Whether the record knows it better than the prior.
+    pub identified: bool,
+    /// The prior box.
+    pub prior: Interval,
+}
+
+/// An unknown start, noise level or magnitude that the study itself estimates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedNuisance {
+    /// State, output or magnitude.
+    pub name: String,
+    /// `start`, `noise` or `effect`.
+    pub role: &'static str,
+    /// Value.
+    pub value: f64,
+    /// Standard deviation.
+    pub std_error: f64,
+}
+
+/// A target, and how much speaks for it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TargetShare {
+    /// State, `sensor`, `actuator` or parameter.
+    pub target: String,
+    /// Family-wise over all candidates.
+    pub p_value: f64,
+    /// Probability of the explanations there.
+    pub share: f64,
+}
+
+/// A stretch of time in which the twin does not follow.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Window {
+    /// Which record, from 0.
+    pub record: usize,
+    /// First instant, in seconds.
+    pub start: f64,
+    /// Last instant, in seconds.
+    pub end: f64,
+    /// Output.
+    pub channel: String,
+    /// Family-wise over windows and regions.
+    pub p_value: f64,
+    /// Share in what the best explanation gains.
+    pub share: f64,
+}
+
+/// A range of a state or input in which the twin does not follow.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Region {
+    /// State or input.
+    pub variable: String,
+    /// From.
+    pub low: f64,
+    /// To.
+    pub high: f64,
+    /// Family-wise over windows and regions.
+    pub p_value: f64,
+    /// Share in what the best explanation gains, over all regions of the same variable.
+    pub share: f64,
+}
+
+/// Where the gap is.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Where {
+    /// The most probable place of a structural gap.
+    pub target: Option<String>,
+    /// All places, most probable first.
+    pub targets: Vec<TargetShare>,
+    /// Windows that stand out, clearest first.
+    pub windows: Vec<Window>,
+    /// Regions that stand out, clearest first.
+    pub regions: Vec<Region>,
+}
+
+/// One listed effect, fitted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EffectFit {
+    /// Id of the effect.
+    pub id: String,
+    /// Its target.
+    pub target: String,
+    /// Among listed effects and catch-alls.
+    pub probability: f64,
+    /// Names and values, those held at an infinite off value included.
+    pub magnitudes: Vec<(String, f64)>,
+    /// Nats over the twin, on the record and, if there is one, the validation record.
+    pub log_score_gain: f64,
+    /// Of its scan, family-wise.
+    pub p_value: Option<f64>,
+}
+
+impl EffectFit {
+    /// `id@target`.
+    pub fn key(&self) -> String {
+        format!("{}@{}", self.id, self.target)
+    }
+}
+
+/// Which effect the twin lacks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Which {
+    /// What is decided.
+    pub decision: Decision,
+    /// Best first.
+    pub effects: Vec<EffectFit>,
+    /// What was added to the twin.
+    pub accepted: Vec<String>,
+    /// Rivals that the data cannot tell apart, the accepted among them.
+    pub class: Vec<String>,
+    /// p-value of the structural test with the accepted, or else the best, effect added.
+    pub unexplained_p_value: Option<f64>,
+    /// The catch-all that beats every listed effect.
+    pub catch_all: Option<String>,
+}
+
+/// Free runs beside a record, for pictures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreeRuns {
+    /// Instants, in seconds.
+    pub times: Vec<f64>,
+    /// Measured outputs.
+    pub measured: Signal,
+    /// Of the twin, refitted.
+    pub before: Option<Signal>,
+    /// With the accepted effects.
+    pub after: Option<Signal>,
+}
+
+/// Everything that a diagnosis found.
+#[derive(Debug, Clone)]
+pub struct Diagnosis {
+    /// Name of the twin.
+    pub twin: String,
+    /// Which kind of gap.
+    pub verdict: Verdict,
+    /// The test.
+    pub detection: Detection,
+    /// The twin's own parameters.
+    pub parameters: Vec<FittedParameter>,
+    /// Everything else that was estimated.
+    pub nuisance: Vec<FittedNuisance>,
+    /// Where.
+    pub place: Where,
+    /// Which.
+    pub which: Which,
+    /// How far; none without held-out data.
+    pub shrinkage: Option<Shrinkage>,
+    /// Free runs beside the first record.
+    pub free_runs: FreeRuns,
+    /// Explanations that were looked at: listed effects and catch-alls.
+    pub candidates: usize,
+    /// Wall-clock seconds.
+    pub seconds: f64,
+}

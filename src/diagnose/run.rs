@@ -1,0 +1,699 @@
+//! The way of one diagnosis.
+
+use super::attribute::{Explanation, explanations, probabilities};
+use super::candidate::{Addition, candidates};
+use super::decide::{Accepted, Answer, Step, decide, magnitudes};
+use super::evalue::{combined, log_e};
+use super::fit::{Fitted, fit, recoverable};
+use super::localise::{Cell, shares};
+use super::null::{Bench, Test};
+use super::problem::{Axis, Problem};
+use super::result::*;
+use super::shrink::{Runner, Shrinkage, closed, root};
+use super::verdict::{absorbing, left_the_prior, verdict};
+use super::{DiagnoseError, DiagnoseSettings, Setting};
+use crate::filter::FilterError;
+use crate::progress::Progress;
+use crate::study::Study;
+use crate::twin::{
+    Drive, Noise, Now, PRIOR_DEVIATION, Parameter, Record, Role, Signal, StateSpace,
+};
+use ndarray::s;
+use rayon::prelude::*;
+use std::time::Instant;
+
+/// Shortest record.
+const LEAST: usize = 50;
+/// Shortest record whose last third is held out.
+const SPLIT: usize = 300;
+/// Random points whose likelihood is looked at, and how many become starts.
+const SCREENED: u64 = 48;
+const SCREENED_STARTS: usize = 3;
+/// Iterations of the base fit.
+const ITERATIONS: usize = 25;
+/// Explanations that are reported.
+const REPORTED: usize = 12;
+/// Windows and regions are reported below this p-value.
+const NOTABLE: f64 = 0.1;
+
+/// Diagnoses the gap between a twin and records of one real system.
+///
+/// All records share θ, but for unknown starts. A validation record is used for the test, the order of explanations, and
+/// the share closed. The same seed gives the same bits on any number of threads.
+///
+/// ```
+/// use truetwin::diagnose::{DiagnoseSettings, Verdict, diagnose};
+/// use truetwin::progress::Progress;
+/// use truetwin::study::{RecordPlan, Study};
+/// use truetwin::twin::*;
+/// use truetwin::twins::VanDerPol;
+///
+/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 300))?;
+/// let drive = Drive::autonomous(0.05, 300)?;
+/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
+/// let record = Record::new(drive, outputs)?;
+/// let found = diagnose(&study, &[record], None, &DiagnoseSettings::default(), &Progress::silent())?;
+/// assert_eq!(found.verdict, Verdict::NoGap);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+///
+/// [`DiagnoseError`]: a black box, records that do not fit the twin or each other, settings that cannot be used, a twin that
+/// no start fits, and cancellation.
+pub fn diagnose(
+    study: &Study,
+    records: &[Record],
+    validation: Option<&Record>,
+    settings: &DiagnoseSettings,
+    progress: &Progress,
+) -> Result<Diagnosis, DiagnoseError> {
+    let clock = Instant::now();
+    let twin = study.twin();
+    let equations = twin.state_space().ok_or(DiagnoseError::NoEquations)?;
+    check(study, records, validation, settings)?;
+    let noise = Noise::new(settings.seed, "diagnose", 0);
+    let validation: Option<Vec<Record>> = validation.map(|v| vec![v.clone()]);
+    let validation = validation.as_deref();
+    let space = twin.parameters();
+    let setting = Setting {
+        twin,
+        validation,
+        follows: without_process_noise(equations, &records[0]),
+    };
+
+    // θ, and how the record looks at it.
+    let axes: Vec<Axis> = space.iter().map(Axis::of).collect();
+    let problem = Problem::new(twin.clone(), axes, records);
+    let stage = progress.stage("fit", 1);
+    let fitted = base_fit(&problem, settings, noise)?.ok_or(DiagnoseError::NoFit)?;
+    stage.tick()?;
+    let mut all = candidates(study, &settings.without)?;
+    if setting.follows {
+        all.retain(|c| c.is_listed() && !c.is_noise());
+    }
+    let bench =
+        (setting.bench(problem.clone(), fitted.clone(), &[], all)?).ok_or(DiagnoseError::NoFit)?;
+
+    // Is it what the twin makes?
+    let stage = progress.stage("test", settings.replicates);
+    let nulls = (bench.nulls(settings.replicates, noise.child("null"), &stage)?)
+        .ok_or(DiagnoseError::NoFit)?;
+    let test = nulls.test();
+    let fit_all = || {
+        let stage = progress.stage("explain", bench.dictionary.candidates.len());
+        explanations(&bench, &nulls.own, validation, None, &stage)
+    };
+    let mut found: Option<Vec<Explanation>> = None;
+    let mut e_value = None;
+    if let Some(records) = validation {
+        let list = fit_all()?;
+        e_value = against(&problem, &fitted, records, &list)?;
+        found = Some(list);
+    }
+    let p_value = combined(test.p_value, e_value);
+    let (outside, within) = left_the_prior(&problem, &fitted, settings.alpha)?;
+    let verdict = verdict(p_value, outside, settings.alpha);
+
+    // Which effect?
+    let mut answer = Answer {
+        decision: Decision::NotNeeded,
+        accepted: vec![],
+        class: vec![],
+        unexplained: None,
+        catch_all: None,
+    };
+    let mut step: Option<Step<'_>> = None;
+    let mut effects = vec![];
+    if verdict == Verdict::StructuralGap {
+        let list = match found.take() {
+            Some(list) => list,
+            None => fit_all()?,
+        };
+        let stage = progress.stage("accept", 2 * settings.unexplained);
+        (answer, step) = decide(&setting, &bench, &list, settings, noise, &stage)?;
+        stage.finish();
+        effects = reported(&bench, &list, &test, &answer);
+        found = Some(list);
+    } else if verdict == Verdict::ParameterGap
+        && let Some(within) = within
+    {
+        let stage = progress.stage("explain", bench.dictionary.candidates.len());
+        let list = absorbing(&bench, &nulls.own, within, &stage)?;
+        stage.finish();
+        if !list.is_empty() {
+            answer.decision = Decision::Absorbed;
+            answer.class = (list.iter())
+                .map(|e| bench.dictionary.candidates[e.candidate].key())
+                .collect();
+        }
+        effects = reported(&bench, &list, &test, &answer);
+    }
+
+    // Where, and how far?
+    let place = match verdict {
+        Verdict::StructuralGap => locate(
+            &bench,
+            found.as_deref().unwrap_or(&[]),
+            &test,
+            &answer,
+            equations,
+        )?,
+        _ => Where::default(),
+    };
+    let last = step.as_ref().map_or(&bench, |step| &step.bench);
+    let (parameters, nuisance) =
+        fitted_parameters(&space.iter().collect::<Vec<_>>(), last, settings);
+    progress.checkpoint()?;
+    let additions: Vec<Addition> = answer.accepted.iter().map(|a| a.addition.clone()).collect();
+    let shrinkage = shrinkage(
+        &setting,
+        &bench,
+        step.as_ref(),
+        &answer,
+        found.as_deref(),
+        settings,
+        noise,
+    )?;
+    let before = Runner::new(twin, &[], problem.of_record(0, &fitted.theta))?.run(&records[0]);
+    let after = match additions.is_empty() {
+        true => None,
+        false => {
+            let theta = last.problem.of_record(0, &last.fitted.theta);
+            Runner::new(twin, &additions, theta)?.run(&records[0])
+        }
+    };
+    let drive = records[0].drive();
+    Ok(Diagnosis {
+        twin: study.name().into(),
+        verdict,
+        detection: Detection {
+            p_value,
+            alpha: settings.alpha,
+            statistic: test.statistic,
+            rank_p_value: test.p_value,
+            log_e: e_value,
+        },
+        parameters,
+        nuisance,
+        place,
+        which: Which {
+            decision: answer.decision,
+            effects,
+            accepted: answer.accepted.iter().map(Accepted::key).collect(),
+            class: answer.class,
+            unexplained_p_value: answer.unexplained,
+            catch_all: answer.catch_all,
+        },
+        shrinkage,
+        free_runs: FreeRuns {
+            times: (0..drive.samples()).map(|k| drive.time(k)).collect(),
+            measured: records[0].outputs().clone(),
+            before: before.map(|run| run.outputs),
+            after: after.map(|run| run.outputs),
+        },
+        candidates: bench.dictionary.candidates.len(),
+        seconds: clock.elapsed().as_secs_f64(),
+    })
+}
+
+fn check(
+    study: &Study,
+    records: &[Record],
+    validation: Option<&Record>,
+    settings: &DiagnoseSettings,
+) -> Result<(), DiagnoseError> {
+    let first = records.first().ok_or(DiagnoseError::NoRecord)?;
+    let expected = first.drive().dt();
+    for (i, record) in records.iter().chain(validation).enumerate() {
+        let index = i + 1;
+        record.check_channels(&study.twin().signals())?;
+        let given = record.drive().dt();
+        if (given - expected).abs() > 1e-3 * expected {
+            return Err(DiagnoseError::Steps {
+                index,
+                given,
+                expected,
+            });
+        }
+        if record.samples() < LEAST {
+            return Err(DiagnoseError::TooShort {
+                index,
+                samples: record.samples(),
+                least: LEAST,
+            });
+        }
+    }
+    let setting = |name, value, remedy| {
+        Err(DiagnoseError::Setting {
+            name,
+            value,
+            remedy,
+        })
+    };
+    let (alpha, replicates) = (settings.alpha, settings.replicates as f64);
+    if !(alpha > 0.0 && alpha < 1.0) {
+        return setting(
+            "alpha",
+            alpha,
+            "choose a level between 0 and 1, such as 0.05",
+        );
+    }
+    if (replicates + 1.0) * alpha <= 1.0 {
+        return setting("replicates", replicates, "take more than 1/alpha");
+    }
+    if settings.unexplained < 50 {
+        return setting(
+            "unexplained",
+            settings.unexplained as f64,
+            "take at least 50",
+        );
+    }
+    Ok(())
+}
+
+/// Whether no state of the twin is noisy, with any noise level that the study leaves open.
+fn without_process_noise(twin: &dyn StateSpace, record: &Record) -> bool {
+    let outline = twin.outline();
+    let theta = outline.parameters.centre();
+    let drive = record.drive();
+    let now = Now {
+        t: 0.0,
+        dt: drive.dt(),
+        u: drive.input(0),
+        theta: &theta,
+    };
+    let mut process = vec![0.0; outline.states.len()];
+    let mut measurement = vec![0.0; outline.outputs.len()];
+    twin.noise(&now, &mut process, &mut measurement);
+    process.iter().all(|q| *q == 0.0)
+}
+
+/// The best θ of all starts: the prior's centre, the estimator's, and the best of random ones.
+fn base_fit(
+    problem: &Problem<'_>,
+    settings: &DiagnoseSettings,
+    noise: Noise,
+) -> Result<Option<Fitted>, FilterError> {
+    let space = problem.twin.parameters();
+    let mut screened: Vec<(f64, Vec<f64>)> = (0..SCREENED)
+        .into_par_iter()
+        .map(|i| {
+            let noise = noise.child("starts").sample(i);
+            let theta = match i % 2 {
+                0 => space.draw_prior(noise),
+                _ => space.draw_bounds(noise),
+            };
+            let theta = problem.clamp(&problem.full(&theta));
+            let value = recoverable(problem.log_likelihood(&theta))?;
+            Ok(value.map(|v| (v + problem.log_prior(&theta, true), theta)))
+        })
+        .collect::<Result<Vec<_>, FilterError>>()?
+        .into_iter()
+        .flatten()
+        .collect();
+    screened.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let starts: Vec<Vec<f64>> = [problem.centre()]
+        .into_iter()
+        .chain(
+            settings
+                .initial
+                .as_ref()
+                .map(|theta| problem.clamp(&problem.full(theta))),
+        )
+        .chain(
+            screened
+                .into_iter()
+                .take(SCREENED_STARTS)
+                .map(|(_, theta)| theta),
+        )
+        .collect();
+    let fits: Vec<Option<Fitted>> = (starts.par_iter())
+        .map(|start| fit(problem, std::slice::from_ref(start), ITERATIONS))
+        .collect::<Result<_, _>>()?;
+    Ok((fits.into_iter().flatten()).reduce(|best, other| {
+        if other.objective > best.objective {
+            other
+        } else {
+            best
+        }
+    }))
+}
+
+/// log E of the validation record against the twin refitted on it.
+fn against(
+    problem: &Problem<'_>,
+    fitted: &Fitted,
+    records: &[Record],
+    found: &[Explanation],
+) -> Result<Option<f64>, DiagnoseError> {
+    let there = problem.on(records);
+    let space = problem.twin.parameters();
+    let starts = space.iter().filter(|p| p.role == Role::Start).count();
+    let begin = there.full(&problem.of_record(0, &fitted.theta));
+    let refitted = fit(&there, &[begin, there.centre()], ITERATIONS)?;
+    Ok(refitted.and_then(|f| log_e(found, f.log_likelihood, starts, there.samples())))
+}
+
+/// Explanations as they are reported: the accepted ones first.
+fn reported(
+    bench: &Bench<'_>,
+    found: &[Explanation],
+    test: &Test,
+    answer: &Answer,
+) -> Vec<EffectFit> {
+    let chances = probabilities(found);
+    let mut all: Vec<EffectFit> = (found.iter().zip(chances))
+        .filter(|(e, _)| bench.dictionary.candidates[e.candidate].is_listed())
+        .map(|(e, probability)| {
+            let candidate = &bench.dictionary.candidates[e.candidate];
+            EffectFit {
+                id: candidate.id.clone(),
+                target: candidate.target.clone(),
+                probability,
+                magnitudes: magnitudes(bench, e),
+                log_score_gain: e.gain + e.validation.unwrap_or(0.0),
+                p_value: test.candidates.get(e.candidate).copied(),
+            }
+        })
+        .collect();
+    // A pair's magnitudes and gains are those of the two together.
+    if answer.accepted.len() > 1 {
+        for accepted in answer.accepted.iter().rev() {
+            let at = all.iter().position(|e| e.key() == accepted.key());
+            let mut effect = match at {
+                Some(at) => all.remove(at),
+                None => continue,
+            };
+            effect.magnitudes = accepted.magnitudes.clone();
+            effect.log_score_gain = accepted.gain;
+            all.insert(0, effect);
+        }
+    }
+    all.truncate(REPORTED);
+    all
+}
+
+fn locate(
+    bench: &Bench<'_>,
+    found: &[Explanation],
+    test: &Test,
+    answer: &Answer,
+    equations: &dyn StateSpace,
+) -> Result<Where, DiagnoseError> {
+    let candidates = &bench.dictionary.candidates;
+    let chances = probabilities(found);
+    let mut targets: Vec<TargetShare> = vec![];
+    for (e, chance) in found.iter().zip(&chances) {
+        let candidate = &candidates[e.candidate];
+        let p_value = test.candidates.get(e.candidate).copied().unwrap_or(1.0);
+        match targets.iter_mut().find(|t| t.target == candidate.target) {
+            Some(known) => {
+                known.share += chance;
+                known.p_value = known.p_value.min(p_value);
+            }
+            None => targets.push(TargetShare {
+                target: candidate.target.clone(),
+                p_value,
+                share: *chance,
+            }),
+        }
+    }
+    targets.sort_by(|a, b| b.share.total_cmp(&a.share));
+    let target = match answer.accepted.first() {
+        Some(accepted) => Some(accepted.target.clone()),
+        None => answer
+            .catch_all
+            .clone()
+            .or_else(|| targets.first().map(|t| t.target.clone())),
+    };
+    // The best explanation, whatever it is, says when it helps.
+    let states = bench.problem.states(&bench.fitted.theta)?;
+    let means: Vec<Signal> = states.iter().map(|(_, s)| s.clone()).collect();
+    let before: Vec<_> = states.into_iter().map(|(f, _)| f).collect();
+    let after = match found.first() {
+        Some(best) => recoverable(bench.explained(best).filtered(&best.fitted.theta))?,
+        None => None,
+    };
+    let records = bench.problem.records;
+    let shares = shares(&bench.bins, &means, records, &before, after.as_deref());
+    let outline = equations.outline();
+    let (mut windows, mut regions) = (vec![], vec![]);
+    for ((cell, p), share) in bench.bins.cells.iter().zip(&test.local).zip(shares) {
+        if *p > NOTABLE {
+            continue;
+        }
+        match cell {
+            Cell::Window {
+                record,
+                channel,
+                from,
+                to,
+            } => windows.push(Window {
+                record: *record,
+                start: records[*record].drive().time(*from),
+                end: records[*record].drive().time(to - 1),
+                channel: outline.outputs[*channel].name.clone(),
+                p_value: *p,
+                share,
+            }),
+            Cell::Region {
+                variable,
+                low,
+                high,
+            } => regions.push(Region {
+                variable: bench.bins.variables[*variable].clone(),
+                low: *low,
+                high: *high,
+                p_value: *p,
+                share,
+            }),
+        }
+    }
+    // Shares of all channels and variables add up to one.
+    let channels = outline.outputs.len() as f64;
+    windows.iter_mut().for_each(|w| w.share /= channels);
+    let variables = bench.bins.variables.len().max(1) as f64;
+    regions.iter_mut().for_each(|r| r.share /= variables);
+    windows.sort_by(|a, b| {
+        b.share
+            .total_cmp(&a.share)
+            .then(a.p_value.total_cmp(&b.p_value))
+    });
+    regions.sort_by(|a, b| {
+        b.share
+            .total_cmp(&a.share)
+            .then(a.p_value.total_cmp(&b.p_value))
+    });
+    Ok(Where {
+        target,
+        targets,
+        windows,
+        regions,
+    })
+}
+
+/// The twin's own parameters, and everything else that the study estimates.
+fn fitted_parameters(
+    space: &[&Parameter],
+    bench: &Bench<'_>,
+    settings: &DiagnoseSettings,
+) -> (Vec<FittedParameter>, Vec<FittedNuisance>) {
+    let errors = bench.fitted.std_errors(&bench.problem);
+    let theta = &bench.fitted.theta;
+    let (mut own, mut nuisance) = (vec![], vec![]);
+    for (j, p) in space.iter().enumerate() {
+        if p.role == Role::Physical {
+            own.push(FittedParameter {
+                name: p.name.clone(),
+                unit: p.unit.clone(),
+                initial: settings.initial.as_ref().and_then(|i| i.get(j).copied()),
+                refitted: theta[j],
+                std_error: errors[j],
+                identified: errors[j] < PRIOR_DEVIATION * p.prior.width(),
+                prior: p.prior,
+            });
+        } else {
+            let role = match p.role {
+                Role::Start => "start",
+                Role::Noise => "noise",
+                _ => "effect",
+            };
+            let name = p.name.split_once('.').filter(|_| role != "effect");
+            nuisance.push(FittedNuisance {
+                name: name.map_or(p.name.as_str(), |(_, name)| name).to_owned(),
+                role,
+                value: theta[j],
+                std_error: errors[j],
+            });
+        }
+    }
+    // Starts of further records stand behind everything else.
+    let starts: Vec<&&Parameter> = space.iter().filter(|p| p.role == Role::Start).collect();
+    let d = bench.problem.twin.parameters().len();
+    for (i, j) in (d..theta.len()).enumerate() {
+        let (record, which) = (i / starts.len().max(1) + 2, i % starts.len().max(1));
+        let name = starts[which].name.trim_start_matches("start.");
+        nuisance.push(FittedNuisance {
+            name: format!("{name} (record {record})"),
+            role: "start",
+            value: theta[j],
+            std_error: errors[j],
+        });
+    }
+    (own, nuisance)
+}
+
+/// How far the accepted effects close the gap on held-out data.
+fn shrinkage(
+    setting: &Setting<'_>,
+    bench: &Bench<'_>,
+    step: Option<&Step<'_>>,
+    answer: &Answer,
+    found: Option<&[Explanation]>,
+    settings: &DiagnoseSettings,
+    noise: Noise,
+) -> Result<Option<Shrinkage>, DiagnoseError> {
+    let twin = setting.twin;
+    let additions: Vec<Addition> = answer.accepted.iter().map(|a| a.addition.clone()).collect();
+    let whole = &bench.problem.records[0];
+    // The held-out record, its first sample that counts, and θ fitted without it.
+    let short: Vec<Record>;
+    let (record, from, base, grown, held_out) = match setting.validation {
+        Some(records) => {
+            let base = bench.problem.of_record(0, &bench.fitted.theta);
+            let grown = step.map(|s| s.bench.problem.of_record(0, &s.bench.fitted.theta));
+            (&records[0], 0, Some(base), grown, "validation record")
+        }
+        None if whole.samples() >= SPLIT => {
+            let split = 2 * whole.samples() / 3;
+            short = vec![first_part(whole, split)?];
+            let refit = |problem: &Problem<'_>, theta: &[f64]| -> Result<_, FilterError> {
+                let problem = problem.on(&short);
+                Ok(fit(&problem, &[problem.full(theta)], 10)?.map(|f| f.theta))
+            };
+            let base = bench.problem.of_record(0, &bench.fitted.theta);
+            let base = refit(&bench.problem, &base)?;
+            let grown = match step {
+                Some(s) => refit(
+                    &s.bench.problem,
+                    &s.bench.problem.of_record(0, &s.bench.fitted.theta),
+                )?,
+                None => None,
+            };
+            (whole, split, base, grown, "last third of the record")
+        }
+        None => return Ok(None),
+    };
+    let Some(base) = base else { return Ok(None) };
+    let runner = Runner::new(twin, &[], base.clone())?;
+    let Some(before) = runner.errors(record, from) else {
+        return Ok(None);
+    };
+    let unfitted = settings
+        .initial
+        .clone()
+        .unwrap_or_else(|| twin.parameters().centre());
+    let unfitted = Runner::new(twin, &[], unfitted)?.errors(record, from);
+    let noisy = !answer.accepted.is_empty()
+        && (answer.accepted.iter()).all(|a| {
+            use crate::twin::Law;
+            matches!(
+                a.addition.effect.law(),
+                Law::MeasurementNoise | Law::ProcessNoise
+            )
+        });
+    let mut result = Shrinkage {
+        metric: "free-run NRMSE",
+        before: root(&before),
+        after: None,
+        floor: None,
+        closed: None,
+        interval: None,
+        held_out,
+        unfitted: unfitted.map(|e| root(&e)),
+        placebo: None,
+    };
+    let Some(grown) = grown.filter(|_| !additions.is_empty()) else {
+        result.floor = runner.floor(record, from, noise.child("floor"));
+        return Ok(Some(result));
+    };
+    if noisy && let Some(step) = step {
+        // No free run moves: the density of what was held out does.
+        result.metric = "held-out log score";
+        let records = std::slice::from_ref(record);
+        let score = |problem: &Problem<'_>, theta: &[f64]| -> Result<Option<f64>, FilterError> {
+            let problem = problem.on(records);
+            let all = recoverable(problem.filtered(&problem.full(theta)))?;
+            Ok(all.map(|all| {
+                let d = &all[0].log_densities[from..];
+                d.iter().sum::<f64>() / d.len() as f64
+            }))
+        };
+        let Some(before) = score(&bench.problem, &base)? else {
+            return Ok(None);
+        };
+        result.before = before;
+        result.after = score(&step.bench.problem, &grown)?;
+        (result.unfitted, result.placebo) = (None, None);
+        return Ok(Some(result));
+    }
+    let accepted = Runner::new(twin, &additions, grown)?;
+    let after = accepted.errors(record, from);
+    // Noise levels are those of the twin alone, so that a wider noise is no smaller gap.
+    let space = twin.parameters();
+    let mut quiet = accepted.theta.clone();
+    for (j, p) in space.iter().enumerate() {
+        if p.role == Role::Noise {
+            quiet[j] = base[j];
+        }
+    }
+    let floor = Runner {
+        twin: accepted.twin.clone(),
+        theta: quiet,
+    }
+    .floor(record, from, noise.child("floor"));
+    result.after = after.as_deref().map(root);
+    result.floor = floor;
+    if let (Some(after), Some(floor)) = (&after, floor) {
+        (result.closed, result.interval) = closed(&before, after, floor, noise.child("bootstrap"));
+    }
+    result.placebo = placebo(setting, bench, found, answer, record, from)?;
+    Ok(Some(result))
+}
+
+/// The error with the listed effect that explains least, fitted as the accepted one was.
+fn placebo(
+    setting: &Setting<'_>,
+    bench: &Bench<'_>,
+    found: Option<&[Explanation]>,
+    answer: &Answer,
+    record: &Record,
+    from: usize,
+) -> Result<Option<f64>, DiagnoseError> {
+    let candidates = &bench.dictionary.candidates;
+    let last = found.and_then(|list| {
+        list.iter().rev().find(|e| {
+            let candidate = &candidates[e.candidate];
+            candidate.is_listed()
+                && !candidate.is_noise()
+                && !answer.class.contains(&candidate.key())
+        })
+    });
+    let Some(last) = last else { return Ok(None) };
+    let Some(addition) = bench.addition(last) else {
+        return Ok(None);
+    };
+    let theta = bench.explained(last).of_record(0, &last.fitted.theta);
+    let runner = Runner::new(setting.twin, &[addition], theta)?;
+    Ok(runner.errors(record, from).map(|e| root(&e)))
+}
+
+/// The first samples of a record.
+fn first_part(record: &Record, samples: usize) -> Result<Record, DiagnoseError> {
+    let drive = record.drive();
+    let inputs = drive.inputs().slice(s![..samples, ..]).to_owned();
+    let drive = Drive::new(drive.dt(), inputs).map_err(crate::twin::RecordError::from)?;
+    let outputs = record.outputs().slice(s![..samples, ..]).to_owned();
+    Ok(Record::new(drive, outputs)?)
+}

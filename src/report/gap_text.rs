@@ -1,0 +1,167 @@
+//! A diagnosis on the terminal.
+
+use super::digits::{error, probability, short, unit_suffix};
+use crate::diagnose::{Decision, Diagnosis, EffectFit, Verdict};
+
+/// Most lines of the text.
+const LINES: usize = 15;
+/// Explanations that are shown.
+const SHOWN: usize = 4;
+
+/// The diagnosis in at most fifteen lines: the verdict, what it rests on, where, which, how far.
+pub fn gap_text(found: &Diagnosis) -> String {
+    let mut lines = vec![verdict_sentence(found)];
+    let d = &found.detection;
+    let mut test = format!(
+        "Structural test of {}, refitted: {} (level {}).",
+        found.twin,
+        probability(d.p_value),
+        d.alpha
+    );
+    if let Some(log_e) = d.log_e {
+        test = test.trim_end_matches('.').to_owned();
+        test.push_str(&format!(
+            "; log E on the validation record {}.",
+            short(log_e)
+        ));
+    }
+    lines.push(test);
+    let parameters: Vec<String> = (found.parameters.iter())
+        .map(|p| {
+            let known = if p.identified {
+                ""
+            } else {
+                " (not identified)"
+            };
+            let unit = unit_suffix(&p.unit);
+            format!(
+                "{} = {} ± {}{unit}{known}",
+                p.name,
+                short(p.refitted),
+                error(p.std_error)
+            )
+        })
+        .collect();
+    lines.push(parameters.join(", "));
+    if let Some(target) = &found.place.target {
+        let windows = found.place.windows.iter().take(2);
+        let when: Vec<String> = windows
+            .map(|w| format!("{} to {} s", short(w.start), short(w.end)))
+            .collect();
+        let regions: Vec<String> = (found.place.regions.iter().take(2))
+            .map(|r| format!("{} in {} … {}", r.variable, short(r.low), short(r.high)))
+            .collect();
+        let mut line = format!("Where: {target}");
+        for (what, list) in [("clearest", when), ("at", regions)] {
+            if !list.is_empty() {
+                line.push_str(&format!("; {what} {}", list.join(", ")));
+            }
+        }
+        lines.push(line + ".");
+    }
+    if !found.which.effects.is_empty() {
+        lines.push("  probability   gain   effect".into());
+        for effect in found.which.effects.iter().take(SHOWN) {
+            lines.push(format!(
+                "  {:>10.2} {:>7}   {}",
+                effect.probability,
+                short(effect.log_score_gain),
+                with_magnitudes(effect)
+            ));
+        }
+    }
+    if let Some(p) = found.which.unexplained_p_value {
+        lines.push(format!(
+            "What the best explanation leaves: {}.",
+            probability(p)
+        ));
+    }
+    if let Some(s) = &found.shrinkage {
+        let mut line = format!("{} on the {}: {}", s.metric, s.held_out, short(s.before));
+        if let Some(after) = s.after {
+            line.push_str(&format!(" → {}", short(after)));
+        }
+        if let Some(floor) = s.floor {
+            line.push_str(&format!(", noise alone {}", short(floor)));
+        }
+        if let (Some(closed), Some([low, high])) = (s.closed, s.interval) {
+            line.push_str(&format!(
+                "; {:.0} % of the gap closed ({:.0} to {:.0})",
+                100.0 * closed,
+                100.0 * low,
+                100.0 * high
+            ));
+        }
+        lines.push(line + ".");
+    } else {
+        lines.push("No held-out data: give --validation, or a longer record, to learn how far the gap closes.".into());
+    }
+    lines.push(format!(
+        "{} explanations, {} s.",
+        found.candidates,
+        short(found.seconds)
+    ));
+    lines.truncate(LINES);
+    lines.join("\n") + "\n"
+}
+
+/// The answer in one sentence.
+pub fn verdict_sentence(found: &Diagnosis) -> String {
+    let listed = |keys: &[String]| keys.join(" and ");
+    match (found.verdict, found.which.decision) {
+        (Verdict::NoGap, _) => "No gap: the twin explains the record within its prior.".into(),
+        (Verdict::ParameterGap, Decision::Absorbed) => format!(
+            "Parameter gap: parameters outside the prior explain the record; so would {} with parameters inside.",
+            found.which.class.first().cloned().unwrap_or_default()
+        ),
+        (Verdict::ParameterGap, _) => {
+            "Parameter gap: the twin explains the record with parameters outside its prior.".into()
+        }
+        (_, Decision::Named) => {
+            format!(
+                "Structural gap: the twin lacks {}.",
+                listed(&found.which.accepted)
+            )
+        }
+        (_, Decision::Class) => format!(
+            "Structural gap: the twin lacks {}, or a rival that these data cannot tell apart ({}).",
+            listed(&found.which.accepted),
+            found.which.class[1..].join(", ")
+        ),
+        _ => match &found.place.target {
+            Some(target) => format!(
+                "Structural gap that no listed effect explains; what is missing acts on {target}."
+            ),
+            None => "Structural gap that no listed effect explains.".into(),
+        },
+    }
+}
+
+/// `id@target (name value, …)`.
+fn with_magnitudes(effect: &EffectFit) -> String {
+    let values: Vec<String> = (effect.magnitudes.iter())
+        .filter(|(_, v)| v.is_finite())
+        .map(|(name, v)| format!("{name} {}", short(*v)))
+        .collect();
+    format!("{} ({})", effect.key(), values.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::fixture::diagnoses;
+
+    #[test]
+    fn fifteen_lines_say_it_all() {
+        for found in diagnoses() {
+            let text = gap_text(found);
+            assert!(text.lines().count() <= LINES, "{text}");
+        }
+        let named = gap_text(&diagnoses()[1]);
+        assert!(
+            named.starts_with("Structural gap: the twin lacks"),
+            "{named}"
+        );
+        assert!(named.contains("Where: "), "{named}");
+    }
+}
