@@ -3,8 +3,7 @@
 use super::DiagnoseError;
 use super::catch_all::{Place, disturbed};
 use super::shorten::shorten;
-use crate::effect::{applicable, library};
-use crate::study::{Library, Study};
+use crate::study::Study;
 use crate::twin::{
     DigitalTwin, Effects, Law, Magnitude, Outline, Role, UnmodelledEffect, augment, fix,
 };
@@ -106,32 +105,25 @@ pub(super) fn candidates(
     study: &Study,
     without: &[String],
 ) -> Result<Vec<Candidate>, DiagnoseError> {
-    let ids: Vec<_> = library().into_iter().map(|d| d.id).collect();
-    for name in without {
-        let id = name.split('@').next().unwrap_or(name);
-        if !ids.contains(&id) {
-            return Err(DiagnoseError::Without(name.clone()));
-        }
+    if let Some(name) = without.iter().find(|name| !study.knows_effect(name)) {
+        return Err(DiagnoseError::Without(name.clone()));
     }
     let twin = study.twin();
-    let Library { only, without: not } = &study.file().library;
-    let named = |list: &[String], id: &str, target: &str| {
+    let named = |id: &str, target: &str| {
         let full = format!("{id}@{target}");
-        list.iter().any(|name| name == id || *name == full)
+        without.iter().any(|name| name == id || *name == full)
     };
     let already: Vec<String> = (study.file().effect.iter())
         .map(|e| format!("{}@{}", e.typetag_name(), e.target()))
         .collect();
-    let mut all: Vec<Candidate> = applicable(twin.as_ref())
-        .into_iter()
+    let mut all: Vec<Candidate> = (study.candidates().into_iter())
         .filter(|e| e.law() != Law::Outliers)
         .map(|effect| Candidate {
             id: effect.typetag_name().into(),
             target: effect.target().into(),
             kind: Kind::Listed(effect),
         })
-        .filter(|c| only.is_empty() || named(only, &c.id, &c.target))
-        .filter(|c| !named(not, &c.id, &c.target) && !named(without, &c.id, &c.target))
+        .filter(|c| !named(&c.id, &c.target))
         .filter(|c| !already.contains(&c.key()))
         .collect();
     let outline = twin.state_space().map(|t| t.outline());

@@ -278,14 +278,16 @@ impl Study {
         Ok(study)
     }
 
-    /// Whether `[library]` names effects only, as `id` or `id@target`.
+    /// Whether a name, `id` or `id@target`, is that of an effect: the library's or the study's own.
+    pub fn knows_effect(&self, name: &str) -> bool {
+        let id = name.split('@').next().unwrap_or(name);
+        crate::effect::library().iter().any(|d| d.id == id)
+            || self.own_effects.iter().any(|e| e.typetag_name() == id)
+    }
+
     fn check_library(&self, library: &Library) -> Result<(), StudyError> {
-        let known: Vec<_> = crate::effect::library().into_iter().map(|d| d.id).collect();
-        let own: Vec<_> = self.own_effects.iter().map(|e| e.typetag_name()).collect();
-        let unknown = (library.only.iter().chain(&library.without)).find(|name| {
-            let id = name.split('@').next().unwrap_or(name);
-            !known.contains(&id) && !own.contains(&id)
-        });
+        let mut named = library.only.iter().chain(&library.without);
+        let unknown = named.find(|name| !self.knows_effect(name));
         unknown.map_or(Ok(()), |name| Err(StudyError::Library(name.clone())))
     }
 
