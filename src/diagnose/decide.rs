@@ -10,7 +10,7 @@ use super::scan::Reference;
 use super::shrink::{Runner, closed};
 use super::{DiagnoseError, DiagnoseSettings, Setting};
 use crate::progress::Stage;
-use crate::twin::{Noise, Signal};
+use crate::twin::{Law, Noise, Signal};
 
 /// The structural test with the effect added: what is left below this is unexplained.
 const UNEXPLAINED: f64 = 0.02;
@@ -46,6 +46,14 @@ pub(super) struct Accepted {
 impl Accepted {
     pub fn key(&self) -> String {
         format!("{}@{}", self.id, self.target)
+    }
+
+    /// Whether only the noise is changed, so that no free run moves.
+    pub fn is_noise(&self) -> bool {
+        matches!(
+            self.addition.effect.law(),
+            Law::MeasurementNoise | Law::ProcessNoise
+        )
     }
 }
 
@@ -164,6 +172,9 @@ pub(super) fn decide<'a>(
     let catch_all = found.iter().find(|e| !candidates[e.candidate].is_listed());
     let catch_score = catch_all.map_or(f64::NEG_INFINITY, Explanation::score);
     let catch_name = catch_all.map(|e| candidates[e.candidate].target.clone());
+    // A noise is nothing but a disturbance without memory: it must do better without the memory's price.
+    let price = 0.5 * (bench.problem.samples() as f64).ln();
+    let beaten = |score: f64, noisy: bool| score < catch_score + if noisy { price } else { 0.0 };
     let nothing = |unexplained| Answer {
         decision: Decision::NoneOfThese,
         accepted: vec![],
@@ -185,7 +196,7 @@ pub(super) fn decide<'a>(
             let p = nulls.test().p_value;
             unexplained = Some(p);
             first_look = Some(nulls.own);
-            if p > UNEXPLAINED && first.score() >= catch_score {
+            if p > UNEXPLAINED && !beaten(first.score(), candidates[first.candidate].is_noise()) {
                 let class: Vec<String> = (listed.iter())
                     .filter(|e| e.score() >= first.score() - RIVALS)
                     .map(|e| candidates[e.candidate].key())
@@ -219,7 +230,7 @@ pub(super) fn decide<'a>(
         pairs.sort_by(|a, b| b.score.total_cmp(&a.score));
         if let Some(pair) = pairs.into_iter().next()
             && pair.score > first.score() + WORTH_A_PAIR
-            && pair.score >= catch_score
+            && !beaten(pair.score, pair.accepted.iter().any(|a| a.is_noise()))
             && let Some(nulls) =
                 (pair.bench).nulls(settings.unexplained, noise.child("pair"), stage)?
         {

@@ -251,7 +251,9 @@ impl Variant {
             first.width = unit;
             first.longest = (20.0 * unit).max(0.3 * start);
         } else if unit > 0.0 && first.bounds.low().is_nan() {
-            first.bounds = Interval::unchecked(1e-3 * unit, 1e3 * unit);
+            // Up to there from what is visible, however little that is.
+            let most = (1e3 * unit).max(10.0 * first.centre);
+            first.bounds = Interval::unchecked(1e-3 * unit, most);
             first.centre = unit;
         } else if first.width.is_nan() || first.bounds.low().is_nan() {
             first.bounds = Interval::unchecked(0.0, 1.0);
@@ -330,7 +332,7 @@ fn plan(
                 free: candidate.magnitudes(),
                 held: BTreeMap::new(),
                 kept: None,
-                axes: vec![log_axis(unset, unset, unset)],
+                axes: vec![log_axis(unset, unset, guess)],
                 jumps: vec![],
             };
             let lead = Lead::Visible {
@@ -339,7 +341,11 @@ fn plan(
             };
             return Ok(vec![Plan {
                 variant,
-                leads: vec![lead],
+                leads: if coarse {
+                    vec![lead]
+                } else {
+                    vec![lead, Lead::At(guess)]
+                },
                 shapes: vec![],
                 range: (0.0, 1e4),
             }]);
@@ -441,7 +447,9 @@ fn plan(
                 guess: greatest,
                 linear: true,
             };
-            (vec![lead], log_axis(unset, unset, unset), (0.0, 1e4))
+            let fixed = starts.filter(|_| !coarse).map(|v| Lead::At(in_unit(v)));
+            let leads = [lead].into_iter().chain(fixed).collect();
+            (leads, log_axis(unset, unset, greatest), (0.0, 1e4))
         } else if positive && first.unit == "signal" {
             let visible = Lead::Visible {
                 guess: greatest,

@@ -595,14 +595,7 @@ fn shrinkage(
         .clone()
         .unwrap_or_else(|| twin.parameters().centre());
     let unfitted = Runner::new(twin, &[], unfitted)?.errors(record, from);
-    let noisy = !answer.accepted.is_empty()
-        && (answer.accepted.iter()).all(|a| {
-            use crate::twin::Law;
-            matches!(
-                a.addition.effect.law(),
-                Law::MeasurementNoise | Law::ProcessNoise
-            )
-        });
+    let noisy = !answer.accepted.is_empty() && answer.accepted.iter().all(Accepted::is_noise);
     let mut result = Shrinkage {
         metric: "free-run NRMSE",
         before: root(&before),
