@@ -145,7 +145,7 @@ mod tests {
         assert_eq!((states(&long), states(&short)), (2 + 64, 2 + 5));
         let u = Signal::from_shape_fn((80, 1), |(k, _)| (k % 17) as f64 / 6.0);
         let drive = Drive::new(0.5, u).unwrap();
-        for delay in [0.0, 0.7, 3.5] {
+        for delay in [0.0, 0.7, 2.0] {
             let theta = [0.6, 0.5, 0.55, 1.0, delay];
             let noise = Noise::new(1, "t", 0);
             let run = |twin: &Arc<dyn DigitalTwin>| twin.simulate(&theta, &drive, noise).unwrap();
