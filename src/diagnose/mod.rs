@@ -15,6 +15,7 @@
 //! See docs/diagnosing-a-gap.md for the mathematics and how to read the answer.
 
 mod attribute;
+mod base_fit;
 mod candidate;
 mod catch_all;
 mod decide;
@@ -22,9 +23,11 @@ mod dictionary;
 mod evalue;
 mod fit;
 mod frequency;
+mod held_out;
 mod localise;
 mod null;
 mod omnibus;
+mod place;
 mod problem;
 mod result;
 mod run;

@@ -1,40 +1,28 @@
 //! The way of one diagnosis.
 
 use super::attribute::{Explanation, explanations, probabilities};
+use super::base_fit::{ITERATIONS, base_fit};
 use super::candidate::{Addition, candidates};
 use super::decide::{Accepted, Answer, Step, decide, magnitudes};
 use super::evalue::{combined, log_e};
-use super::fit::{Fitted, fit, recoverable};
-use super::localise::{Cell, shares};
+use super::fit::{Fitted, fit};
+use super::held_out::shrinkage;
 use super::null::{Bench, Test};
+use super::place::locate;
 use super::problem::{Axis, Problem};
 use super::result::*;
-use super::shrink::{Runner, Shrinkage, closed, root};
+use super::shrink::Runner;
 use super::verdict::{absorbing, left_the_prior, verdict};
 use super::{DiagnoseError, DiagnoseSettings, Setting};
-use crate::filter::FilterError;
 use crate::progress::Progress;
 use crate::study::Study;
-use crate::twin::{
-    Drive, Noise, Now, PRIOR_DEVIATION, Parameter, Record, Role, Signal, StateSpace,
-};
-use ndarray::s;
-use rayon::prelude::*;
+use crate::twin::{Noise, Now, PRIOR_DEVIATION, Parameter, Record, Role, StateSpace};
 use std::time::Instant;
 
 /// Shortest record.
 const LEAST: usize = 50;
-/// Shortest record whose last third is held out.
-const SPLIT: usize = 300;
-/// Random points whose likelihood is looked at, and how many become starts.
-const SCREENED: u64 = 48;
-const SCREENED_STARTS: usize = 3;
-/// Iterations of the base fit.
-const ITERATIONS: usize = 25;
 /// Explanations that are reported.
 const REPORTED: usize = 12;
-/// Windows and regions are reported below this p-value.
-const NOTABLE: f64 = 0.1;
 
 /// Diagnoses the gap between a twin and records of one real system.
 ///
@@ -289,57 +277,6 @@ fn without_process_noise(twin: &dyn StateSpace, record: &Record) -> bool {
     process.iter().all(|q| *q == 0.0)
 }
 
-/// The best θ of all starts: the prior's centre, the estimator's, and the best of random ones.
-fn base_fit(
-    problem: &Problem<'_>,
-    settings: &DiagnoseSettings,
-    noise: Noise,
-) -> Result<Option<Fitted>, FilterError> {
-    let space = problem.twin.parameters();
-    let mut screened: Vec<(f64, Vec<f64>)> = (0..SCREENED)
-        .into_par_iter()
-        .map(|i| {
-            let noise = noise.child("starts").sample(i);
-            let theta = match i % 2 {
-                0 => space.draw_prior(noise),
-                _ => space.draw_bounds(noise),
-            };
-            let theta = problem.clamp(&problem.full(&theta));
-            let value = recoverable(problem.log_likelihood(&theta))?;
-            Ok(value.map(|v| (v + problem.log_prior(&theta, true), theta)))
-        })
-        .collect::<Result<Vec<_>, FilterError>>()?
-        .into_iter()
-        .flatten()
-        .collect();
-    screened.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let starts: Vec<Vec<f64>> = [problem.centre()]
-        .into_iter()
-        .chain(
-            settings
-                .initial
-                .as_ref()
-                .map(|theta| problem.clamp(&problem.full(theta))),
-        )
-        .chain(
-            screened
-                .into_iter()
-                .take(SCREENED_STARTS)
-                .map(|(_, theta)| theta),
-        )
-        .collect();
-    let fits: Vec<Option<Fitted>> = (starts.par_iter())
-        .map(|start| fit(problem, std::slice::from_ref(start), ITERATIONS))
-        .collect::<Result<_, _>>()?;
-    Ok((fits.into_iter().flatten()).reduce(|best, other| {
-        if other.objective > best.objective {
-            other
-        } else {
-            best
-        }
-    }))
-}
-
 /// log E of the validation record against the twin refitted on it.
 fn against(
     problem: &Problem<'_>,
@@ -394,105 +331,6 @@ fn reported(
     all
 }
 
-fn locate(
-    bench: &Bench<'_>,
-    found: &[Explanation],
-    test: &Test,
-    answer: &Answer,
-    equations: &dyn StateSpace,
-) -> Result<Where, DiagnoseError> {
-    let candidates = &bench.dictionary.candidates;
-    let chances = probabilities(found);
-    let mut targets: Vec<TargetShare> = vec![];
-    for (e, chance) in found.iter().zip(&chances) {
-        let candidate = &candidates[e.candidate];
-        let p_value = test.candidates.get(e.candidate).copied().unwrap_or(1.0);
-        match targets.iter_mut().find(|t| t.target == candidate.target) {
-            Some(known) => {
-                known.share += chance;
-                known.p_value = known.p_value.min(p_value);
-            }
-            None => targets.push(TargetShare {
-                target: candidate.target.clone(),
-                p_value,
-                share: *chance,
-            }),
-        }
-    }
-    targets.sort_by(|a, b| b.share.total_cmp(&a.share));
-    let target = match answer.accepted.first() {
-        Some(accepted) => Some(accepted.target.clone()),
-        None => answer
-            .catch_all
-            .clone()
-            .or_else(|| targets.first().map(|t| t.target.clone())),
-    };
-    // The best explanation, whatever it is, says when it helps.
-    let states = bench.problem.states(&bench.fitted.theta)?;
-    let means: Vec<Signal> = states.iter().map(|(_, s)| s.clone()).collect();
-    let before: Vec<_> = states.into_iter().map(|(f, _)| f).collect();
-    let after = match found.first() {
-        Some(best) => recoverable(bench.explained(best).filtered(&best.fitted.theta))?,
-        None => None,
-    };
-    let records = bench.problem.records;
-    let shares = shares(&bench.bins, &means, records, &before, after.as_deref());
-    let outline = equations.outline();
-    let (mut windows, mut regions) = (vec![], vec![]);
-    for ((cell, p), share) in bench.bins.cells.iter().zip(&test.local).zip(shares) {
-        if *p > NOTABLE {
-            continue;
-        }
-        match cell {
-            Cell::Window {
-                record,
-                channel,
-                from,
-                to,
-            } => windows.push(Window {
-                record: *record,
-                start: records[*record].drive().time(*from),
-                end: records[*record].drive().time(to - 1),
-                channel: outline.outputs[*channel].name.clone(),
-                p_value: *p,
-                share,
-            }),
-            Cell::Region {
-                variable,
-                low,
-                high,
-            } => regions.push(Region {
-                variable: bench.bins.variables[*variable].clone(),
-                low: *low,
-                high: *high,
-                p_value: *p,
-                share,
-            }),
-        }
-    }
-    // Shares of all channels and variables add up to one.
-    let channels = outline.outputs.len() as f64;
-    windows.iter_mut().for_each(|w| w.share /= channels);
-    let variables = bench.bins.variables.len().max(1) as f64;
-    regions.iter_mut().for_each(|r| r.share /= variables);
-    windows.sort_by(|a, b| {
-        b.share
-            .total_cmp(&a.share)
-            .then(a.p_value.total_cmp(&b.p_value))
-    });
-    regions.sort_by(|a, b| {
-        b.share
-            .total_cmp(&a.share)
-            .then(a.p_value.total_cmp(&b.p_value))
-    });
-    Ok(Where {
-        target,
-        targets,
-        windows,
-        regions,
-    })
-}
-
 /// The twin's own parameters, and everything else that the study estimates.
 fn fitted_parameters(
     space: &[&Parameter],
@@ -542,151 +380,4 @@ fn fitted_parameters(
         });
     }
     (own, nuisance)
-}
-
-/// How far the accepted effects close the gap on held-out data.
-fn shrinkage(
-    setting: &Setting<'_>,
-    bench: &Bench<'_>,
-    step: Option<&Step<'_>>,
-    answer: &Answer,
-    found: Option<&[Explanation]>,
-    settings: &DiagnoseSettings,
-    noise: Noise,
-) -> Result<Option<Shrinkage>, DiagnoseError> {
-    let twin = setting.twin;
-    let additions: Vec<Addition> = answer.accepted.iter().map(|a| a.addition.clone()).collect();
-    let whole = &bench.problem.records[0];
-    // The held-out record, its first sample that counts, and θ fitted without it.
-    let short: Vec<Record>;
-    let (record, from, base, grown, held_out) = match setting.validation {
-        Some(records) => {
-            let base = bench.problem.of_record(0, &bench.fitted.theta);
-            let grown = step.map(|s| s.bench.problem.of_record(0, &s.bench.fitted.theta));
-            (&records[0], 0, Some(base), grown, "validation record")
-        }
-        None if whole.samples() >= SPLIT => {
-            let split = 2 * whole.samples() / 3;
-            short = vec![first_part(whole, split)?];
-            let refit = |problem: &Problem<'_>, theta: &[f64]| -> Result<_, FilterError> {
-                let problem = problem.on(&short);
-                Ok(fit(&problem, &[problem.full(theta)], 10)?.map(|f| f.theta))
-            };
-            let base = bench.problem.of_record(0, &bench.fitted.theta);
-            let base = refit(&bench.problem, &base)?;
-            let grown = match step {
-                Some(s) => refit(
-                    &s.bench.problem,
-                    &s.bench.problem.of_record(0, &s.bench.fitted.theta),
-                )?,
-                None => None,
-            };
-            (whole, split, base, grown, "last third of the record")
-        }
-        None => return Ok(None),
-    };
-    let Some(base) = base else { return Ok(None) };
-    let runner = Runner::new(twin, &[], base.clone())?;
-    let Some(before) = runner.errors(record, from) else {
-        return Ok(None);
-    };
-    let unfitted = settings
-        .initial
-        .clone()
-        .unwrap_or_else(|| twin.parameters().centre());
-    let unfitted = Runner::new(twin, &[], unfitted)?.errors(record, from);
-    let noisy = !answer.accepted.is_empty() && answer.accepted.iter().all(Accepted::is_noise);
-    let mut result = Shrinkage {
-        metric: "free-run NRMSE",
-        before: root(&before),
-        after: None,
-        floor: None,
-        closed: None,
-        interval: None,
-        held_out,
-        unfitted: unfitted.map(|e| root(&e)),
-        placebo: None,
-    };
-    let Some(grown) = grown.filter(|_| !additions.is_empty()) else {
-        result.floor = runner.floor(record, from, noise.child("floor"));
-        return Ok(Some(result));
-    };
-    if noisy && let Some(step) = step {
-        // No free run moves: the density of what was held out does.
-        result.metric = "held-out log score";
-        let records = std::slice::from_ref(record);
-        let score = |problem: &Problem<'_>, theta: &[f64]| -> Result<Option<f64>, FilterError> {
-            let problem = problem.on(records);
-            let all = recoverable(problem.filtered(&problem.full(theta)))?;
-            Ok(all.map(|all| {
-                let d = &all[0].log_densities[from..];
-                d.iter().sum::<f64>() / d.len() as f64
-            }))
-        };
-        let Some(before) = score(&bench.problem, &base)? else {
-            return Ok(None);
-        };
-        result.before = before;
-        result.after = score(&step.bench.problem, &grown)?;
-        (result.unfitted, result.placebo) = (None, None);
-        return Ok(Some(result));
-    }
-    let accepted = Runner::new(twin, &additions, grown)?;
-    let after = accepted.errors(record, from);
-    // Noise levels are those of the twin alone, so that a wider noise is no smaller gap.
-    let space = twin.parameters();
-    let mut quiet = accepted.theta.clone();
-    for (j, p) in space.iter().enumerate() {
-        if p.role == Role::Noise {
-            quiet[j] = base[j];
-        }
-    }
-    let floor = Runner {
-        twin: accepted.twin.clone(),
-        theta: quiet,
-    }
-    .floor(record, from, noise.child("floor"));
-    result.after = after.as_deref().map(root);
-    result.floor = floor;
-    if let (Some(after), Some(floor)) = (&after, floor) {
-        (result.closed, result.interval) = closed(&before, after, floor, noise.child("bootstrap"));
-    }
-    result.placebo = placebo(setting, bench, found, answer, record, from)?;
-    Ok(Some(result))
-}
-
-/// The error with the listed effect that explains least, fitted as the accepted one was.
-fn placebo(
-    setting: &Setting<'_>,
-    bench: &Bench<'_>,
-    found: Option<&[Explanation]>,
-    answer: &Answer,
-    record: &Record,
-    from: usize,
-) -> Result<Option<f64>, DiagnoseError> {
-    let candidates = &bench.dictionary.candidates;
-    let last = found.and_then(|list| {
-        list.iter().rev().find(|e| {
-            let candidate = &candidates[e.candidate];
-            candidate.is_listed()
-                && !candidate.is_noise()
-                && !answer.class.contains(&candidate.key())
-        })
-    });
-    let Some(last) = last else { return Ok(None) };
-    let Some(addition) = bench.addition(last) else {
-        return Ok(None);
-    };
-    let theta = bench.explained(last).of_record(0, &last.fitted.theta);
-    let runner = Runner::new(setting.twin, &[addition], theta)?;
-    Ok(runner.errors(record, from).map(|e| root(&e)))
-}
-
-/// The first samples of a record.
-fn first_part(record: &Record, samples: usize) -> Result<Record, DiagnoseError> {
-    let drive = record.drive();
-    let inputs = drive.inputs().slice(s![..samples, ..]).to_owned();
-    let drive = Drive::new(drive.dt(), inputs).map_err(crate::twin::RecordError::from)?;
-    let outputs = record.outputs().slice(s![..samples, ..]).to_owned();
-    Ok(Record::new(drive, outputs)?)
 }

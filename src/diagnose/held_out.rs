@@ -1,0 +1,163 @@
+//! Which data are held out, and what is measured on them.
+
+use super::attribute::Explanation;
+use super::candidate::Addition;
+use super::decide::{Accepted, Answer, Step};
+use super::fit::{fit, recoverable};
+use super::null::Bench;
+use super::problem::Problem;
+use super::shrink::{Runner, Shrinkage, closed, root};
+use super::{DiagnoseError, DiagnoseSettings, Setting};
+use crate::filter::FilterError;
+use crate::twin::{Drive, Noise, Record, RecordError, Role};
+use ndarray::s;
+
+/// Shortest record whose last third is held out.
+const SPLIT: usize = 300;
+
+/// How far the accepted effects close the gap on held-out data.
+pub(super) fn shrinkage(
+    setting: &Setting<'_>,
+    bench: &Bench<'_>,
+    step: Option<&Step<'_>>,
+    answer: &Answer,
+    found: Option<&[Explanation]>,
+    settings: &DiagnoseSettings,
+    noise: Noise,
+) -> Result<Option<Shrinkage>, DiagnoseError> {
+    let twin = setting.twin;
+    let additions: Vec<Addition> = answer.accepted.iter().map(|a| a.addition.clone()).collect();
+    let whole = &bench.problem.records[0];
+    // The held-out record, its first sample that counts, and θ fitted without it.
+    let short: Vec<Record>;
+    let (record, from, base, grown, held_out) = match setting.validation {
+        Some(records) => {
+            let base = bench.problem.of_record(0, &bench.fitted.theta);
+            let grown = step.map(|s| s.bench.problem.of_record(0, &s.bench.fitted.theta));
+            (&records[0], 0, Some(base), grown, "validation record")
+        }
+        None if whole.samples() >= SPLIT => {
+            let split = 2 * whole.samples() / 3;
+            short = vec![first_part(whole, split)?];
+            let refit = |problem: &Problem<'_>, theta: &[f64]| -> Result<_, FilterError> {
+                let problem = problem.on(&short);
+                Ok(fit(&problem, &[problem.full(theta)], 10)?.map(|f| f.theta))
+            };
+            let base = bench.problem.of_record(0, &bench.fitted.theta);
+            let base = refit(&bench.problem, &base)?;
+            let grown = match step {
+                Some(s) => refit(
+                    &s.bench.problem,
+                    &s.bench.problem.of_record(0, &s.bench.fitted.theta),
+                )?,
+                None => None,
+            };
+            (whole, split, base, grown, "last third of the record")
+        }
+        None => return Ok(None),
+    };
+    let Some(base) = base else { return Ok(None) };
+    let runner = Runner::new(twin, &[], base.clone())?;
+    let Some(before) = runner.errors(record, from) else {
+        return Ok(None);
+    };
+    let unfitted = settings
+        .initial
+        .clone()
+        .unwrap_or_else(|| twin.parameters().centre());
+    let unfitted = Runner::new(twin, &[], unfitted)?.errors(record, from);
+    let noisy = !answer.accepted.is_empty() && answer.accepted.iter().all(Accepted::is_noise);
+    let mut result = Shrinkage {
+        metric: "free-run NRMSE",
+        before: root(&before),
+        after: None,
+        floor: None,
+        closed: None,
+        interval: None,
+        held_out,
+        unfitted: unfitted.map(|e| root(&e)),
+        placebo: None,
+    };
+    let Some(grown) = grown.filter(|_| !additions.is_empty()) else {
+        result.floor = runner.floor(record, from, noise.child("floor"));
+        return Ok(Some(result));
+    };
+    if noisy && let Some(step) = step {
+        // No free run moves: the density of what was held out does.
+        result.metric = "held-out log score";
+        let records = std::slice::from_ref(record);
+        let score = |problem: &Problem<'_>, theta: &[f64]| -> Result<Option<f64>, FilterError> {
+            let problem = problem.on(records);
+            let all = recoverable(problem.filtered(&problem.full(theta)))?;
+            Ok(all.map(|all| {
+                let d = &all[0].log_densities[from..];
+                d.iter().sum::<f64>() / d.len() as f64
+            }))
+        };
+        let Some(before) = score(&bench.problem, &base)? else {
+            return Ok(None);
+        };
+        result.before = before;
+        result.after = score(&step.bench.problem, &grown)?;
+        (result.unfitted, result.placebo) = (None, None);
+        return Ok(Some(result));
+    }
+    let accepted = Runner::new(twin, &additions, grown)?;
+    let after = accepted.errors(record, from);
+    // Noise levels are those of the twin alone, so that a wider noise is no smaller gap.
+    let space = twin.parameters();
+    let mut quiet = accepted.theta.clone();
+    for (j, p) in space.iter().enumerate() {
+        if p.role == Role::Noise {
+            quiet[j] = base[j];
+        }
+    }
+    let floor = Runner {
+        twin: accepted.twin.clone(),
+        theta: quiet,
+    }
+    .floor(record, from, noise.child("floor"));
+    result.after = after.as_deref().map(root);
+    result.floor = floor;
+    if let (Some(after), Some(floor)) = (&after, floor) {
+        (result.closed, result.interval) = closed(&before, after, floor, noise.child("bootstrap"));
+    }
+    result.placebo = placebo(setting, bench, found, answer, record, from)?;
+    Ok(Some(result))
+}
+
+/// The error with the listed effect that explains least, fitted as the accepted one was.
+fn placebo(
+    setting: &Setting<'_>,
+    bench: &Bench<'_>,
+    found: Option<&[Explanation]>,
+    answer: &Answer,
+    record: &Record,
+    from: usize,
+) -> Result<Option<f64>, DiagnoseError> {
+    let candidates = &bench.dictionary.candidates;
+    let last = found.and_then(|list| {
+        list.iter().rev().find(|e| {
+            let candidate = &candidates[e.candidate];
+            candidate.is_listed()
+                && !candidate.is_noise()
+                && !answer.class.contains(&candidate.key())
+        })
+    });
+    let Some(last) = last else { return Ok(None) };
+    let Some(addition) = bench.addition(last) else {
+        return Ok(None);
+    };
+    let theta = bench.explained(last).of_record(0, &last.fitted.theta);
+    let runner = Runner::new(setting.twin, &[addition], theta)?;
+    Ok(runner.errors(record, from).map(|e| root(&e)))
+}
+
+/// The first samples of a record.
+fn first_part(record: &Record, samples: usize) -> Result<Record, DiagnoseError> {
+    let drive = record.drive();
+    let inputs = drive.inputs().slice(s![..samples, ..]).to_owned();
+    let drive = Drive::new(drive.dt(), inputs).map_err(RecordError::from)?;
+    let outputs = record.outputs().slice(s![..samples, ..]).to_owned();
+    Ok(Record::new(drive, outputs)?)
+}
