@@ -150,7 +150,7 @@ impl RefineSettings {
 pub struct Refined {
     /// θ_GN.
     pub theta: DVector<f64>,
-    /// μ and S^{-1/2} where the last round began.
+    /// μ and S^{-1/2} at θ_GN; after a single round, where it began.
     pub whitening: Whitening,
     /// Whitened distances ‖S^{-1/2}(x_k − μ)‖ of the simulations there.
     pub spread: Vec<f64>,
@@ -264,9 +264,9 @@ impl Refinement<'_> {
             .progress
             .stage("Gauss–Newton", settings.starts + settings.rounds);
         let initial = DVector::from_vec(space.clamp(initial));
-        let (theta, local, failed) = match settings.starts {
-            // Nothing to choose from.
-            1 => (initial.clone(), self.whiten(&initial)?, 0),
+        let (theta, local, failed) = match (settings.starts, settings.rounds) {
+            // Nothing to choose from, and little way to go.
+            (1, 1) => (initial.clone(), self.whiten(&initial)?, 0),
             _ => self.survey(&space, &initial, &stage)?,
         };
         let (theta, local) = self.polish(&space, &initial, theta, local, &stage)?;
@@ -427,10 +427,7 @@ impl Refinement<'_> {
         stage: &crate::progress::Stage,
     ) -> Result<(DVector<f64>, Local), RefineError> {
         let mut problem = self.problem(space, initial, self.settings.seeds);
-        for round in 0..self.settings.rounds {
-            if round > 0 {
-                local = self.whiten(&theta)?;
-            }
+        for _ in 0..self.settings.rounds {
             problem.whitening = Some(local.whitening.clone());
             let minimum =
                 self.minimiser()
@@ -439,6 +436,10 @@ impl Refinement<'_> {
                 .component_div(&problem.widths)
                 .amax();
             theta = minimum.theta;
+            // A single round stays so near that S does.
+            if self.settings.rounds > 1 {
+                local = self.whiten(&theta)?;
+            }
             stage.tick()?;
             if moved < 1e-3 {
                 break;
