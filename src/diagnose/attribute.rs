@@ -2,13 +2,14 @@
 
 use super::DiagnoseError;
 use super::candidate::Addition;
-use super::dictionary::{Dictionary, Point, Variant};
+use super::dictionary::{Dictionary, Point};
 use super::fit::{Fitted, climb, fit};
 use super::frequency::peaks;
 use super::null::{Bench, Look};
 use super::problem::Problem;
 use super::scan::{Gain, Reference};
-use crate::filter::FilterError;
+use super::variant::Variant;
+use crate::filter::{FilterError, recoverable};
 use crate::progress::Stage;
 use crate::twin::Record;
 use rayon::prelude::*;
@@ -57,7 +58,7 @@ pub(super) fn elsewhere(problem: &Problem<'_>, theta: &[f64]) -> Result<Option<f
     let full = problem.full(theta);
     match problem.starts_only() {
         Some(starts) => Ok(climb(&starts, &full, ITERATIONS)?.map(|f| f.log_likelihood)),
-        None => super::fit::recoverable(problem.log_likelihood(&full)),
+        None => recoverable(problem.log_likelihood(&full)),
     }
 }
 
@@ -181,7 +182,8 @@ fn explain(
     base_validation: Option<f64>,
 ) -> Result<Option<Explanation>, DiagnoseError> {
     let dictionary = &bench.dictionary;
-    let mut best: Option<(usize, Fitted)> = None;
+    let mut best: Option<(f64, usize, Fitted)> = None;
+    let price = 0.5 * (bench.problem.samples() as f64).ln();
     for (n, (v, m)) in points.iter().enumerate() {
         let variant = &dictionary.variants[*v];
         let problem = variant.problem(&bench.problem);
@@ -203,14 +205,12 @@ fn explain(
         if !variant.jumps.is_empty() {
             fitted = jump(&problem, variant, fitted)?;
         }
-        if best
-            .as_ref()
-            .is_none_or(|(_, b)| fitted.objective > b.objective)
-        {
-            best = Some((*v, fitted));
+        let value = fitted.objective - price * variant.free.len() as f64;
+        if best.as_ref().is_none_or(|(b, ..)| value > *b) {
+            best = Some((value, *v, fitted));
         }
     }
-    let Some((v, fitted)) = best else {
+    let Some((_, v, fitted)) = best else {
         return Ok(None);
     };
     Ok(Some(scored(

@@ -1,9 +1,9 @@
 //! The first fit of the twin as it is.
 
 use super::DiagnoseSettings;
-use super::fit::{Fitted, fit, recoverable};
+use super::fit::{Fitted, fit};
 use super::problem::Problem;
-use crate::filter::FilterError;
+use crate::filter::{FilterError, recoverable};
 use crate::twin::Noise;
 use rayon::prelude::*;
 

@@ -2,10 +2,11 @@
 
 use super::attribute::{Explanation, RIVALS, explanations};
 use super::candidate::{Addition, Candidate};
-use super::dictionary::{Dictionary, Scales};
+use super::dictionary::Dictionary;
 use super::null::{Bench, Look};
 use super::problem::Problem;
 use super::result::Decision;
+use super::scales::Scales;
 use super::scan::Reference;
 use super::shrink::{Runner, closed};
 use super::{DiagnoseError, DiagnoseSettings, Setting};

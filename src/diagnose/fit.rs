@@ -1,7 +1,7 @@
 //! The most probable θ of a twin, given its records and a weak prior.
 
 use super::problem::{Problem, Slope};
-use crate::filter::FilterError;
+use crate::filter::{FilterError, recoverable};
 use nalgebra::{DMatrix, DVector};
 
 /// Gain at which a fit is called done, in nats.
@@ -39,15 +39,6 @@ impl Fitted {
     }
 }
 
-/// An error that only rules out one θ is no error of the search.
-pub(super) fn recoverable<T>(result: Result<T, FilterError>) -> Result<Option<T>, FilterError> {
-    match result {
-        Ok(value) => Ok(Some(value)),
-        Err(error) if error.is_recoverable() => Ok(None),
-        Err(error) => Err(error),
-    }
-}
-
 /// Damped Fisher scoring from one start, within the bounds; `None` where the filter does not work at the start.
 ///
 /// ```text
@@ -62,13 +53,8 @@ pub(super) fn climb(
     iterations: usize,
 ) -> Result<Option<Fitted>, FilterError> {
     let c = &problem.coordinates;
-    let inside = |phi: DVector<f64>| -> DVector<f64> {
-        let ends = c.lower().iter().zip(c.upper());
-        let clamped = phi.iter().zip(ends).map(|(v, (l, h))| v.clamp(*l, *h));
-        DVector::from_iterator(phi.len(), clamped)
-    };
     let at = |phi: &DVector<f64>| recoverable(problem.slope(&c.theta(phi.as_slice())));
-    let mut phi = inside(DVector::from_vec(c.of(&problem.clamp(start))));
+    let mut phi = c.clamp(&DVector::from_vec(c.of(&problem.clamp(start))));
     let Some(mut slope) = at(&phi)?.filter(|s| s.objective().is_finite()) else {
         return Ok(None);
     };
@@ -79,7 +65,7 @@ pub(super) fn climb(
         let Some(step) = step(problem, &slope, &phi, damping) else {
             break;
         };
-        let next = inside(&phi + &step);
+        let next = c.clamp(&(&phi + &step));
         let moved = (&next - &phi).amax();
         // Not worth a look: the gain that the step promises is nothing.
         if moved < 1e-9 || slope.gradient.dot(&step) < 0.2 * DONE {

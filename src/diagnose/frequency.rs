@@ -1,9 +1,8 @@
 //! Where a periodic effect is fitted from: the likelihood has a narrow top at each frequency, far narrower than a dictionary.
 
-use super::fit::recoverable;
 use super::null::Bench;
 use super::scan::Reference;
-use crate::filter::FilterError;
+use crate::filter::{FilterError, recoverable};
 
 /// Frequencies a cycle of the record.
 const FINENESS: f64 = 2.0;
@@ -74,7 +73,7 @@ pub(super) fn peaks(
 }
 
 /// Amplitude, frequency, phase.
-fn is_periodic(variant: &super::dictionary::Variant) -> bool {
+fn is_periodic(variant: &super::variant::Variant) -> bool {
     let units: Vec<&str> = variant.free.iter().map(|m| m.unit).collect();
     matches!(units[..], [_, "Hz", "rad"])
 }

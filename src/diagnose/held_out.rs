@@ -3,12 +3,12 @@
 use super::attribute::Explanation;
 use super::candidate::Addition;
 use super::decide::{Accepted, Answer, Step};
-use super::fit::{fit, recoverable};
+use super::fit::fit;
 use super::null::Bench;
 use super::problem::Problem;
 use super::shrink::{Runner, Shrinkage, closed, root};
 use super::{DiagnoseError, DiagnoseSettings, Setting};
-use crate::filter::FilterError;
+use crate::filter::{FilterError, recoverable};
 use crate::twin::{Drive, Noise, Record, RecordError, Role};
 use ndarray::s;
 

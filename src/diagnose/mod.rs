@@ -3,7 +3,7 @@
 //! | step | file |
 //! |---|---|
 //! | fit θ with a weak prior | `fit.rs`, `problem.rs` |
-//! | what each listed effect and each catch-all would gain | `candidate.rs`, `catch_all.rs`, `dictionary.rs`, `scan.rs` |
+//! | what each listed effect and each catch-all would gain | `candidate.rs`, `catch_all.rs`, `plan.rs`, `scales.rs`, `variant.rs`, `dictionary.rs`, `scan.rs` |
 //! | are the innovations white? | `omnibus.rs` |
 //! | what all of that is where nothing is wrong | `null.rs` |
 //! | what a validation record says | `evalue.rs` |
@@ -28,12 +28,15 @@ mod localise;
 mod null;
 mod omnibus;
 mod place;
+mod plan;
 mod problem;
 mod result;
 mod run;
+mod scales;
 mod scan;
 mod shorten;
 mod shrink;
+mod variant;
 mod verdict;
 
 pub use result::{

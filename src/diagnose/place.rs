@@ -3,10 +3,10 @@
 use super::DiagnoseError;
 use super::attribute::{Explanation, probabilities};
 use super::decide::Answer;
-use super::fit::recoverable;
 use super::localise::{Cell, shares};
 use super::null::{Bench, Test};
 use super::result::*;
+use crate::filter::recoverable;
 use crate::twin::{Signal, StateSpace};
 
 /// Windows and regions are reported below this p-value.

@@ -307,22 +307,14 @@ impl<'a> Problem<'a> {
         Ok(slope)
     }
 
-    /// Points around θ whose innovations tell their derivatives: (index in θ, moved θ, distance in φ).
+    /// Points around θ whose innovations tell their derivatives: (moved θ, distance in φ), one for each entry.
     pub fn neighbours(&self, theta: &[f64]) -> Vec<(Vec<f64>, f64)> {
         const SHARE: f64 = 0.1;
-        let c = &self.coordinates;
-        let phi = c.of(theta);
+        let phi = self.coordinates.of(theta);
         (0..phi.len())
             .map(|j| {
-                let step = SHARE * c.steps()[j];
-                let mut moved = phi.clone();
-                moved[j] += if moved[j] + step <= c.upper()[j] {
-                    step
-                } else {
-                    -step
-                };
-                let distance = moved[j] - phi[j];
-                (c.theta(&moved), distance)
+                let (moved, distance) = self.coordinates.beside(&phi, j, SHARE);
+                (self.coordinates.theta(&moved), distance)
             })
             .collect()
     }

@@ -11,7 +11,7 @@
 //! gain = ½·(r·d⊥)²/(d⊥·d⊥), in nats. Δ is a secant to a point of a dictionary, so thresholds have one too.
 
 use super::problem::Problem;
-use crate::filter::{FilterError, Filtered};
+use crate::filter::{FilterError, Filtered, recoverable};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// A direction that θ imitates up to this share of its square is no direction of its own.
@@ -65,7 +65,7 @@ impl Reference {
             answer: DVector::zeros(d),
         };
         for (j, (moved, distance)) in problem.neighbours(theta).into_iter().enumerate() {
-            let Some(there) = super::fit::recoverable(problem.filtered(&moved))? else {
+            let Some(there) = recoverable(problem.filtered(&moved))? else {
                 return Ok(None);
             };
             let direction = reference.direction(&there) / distance;

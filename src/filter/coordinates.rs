@@ -1,6 +1,7 @@
 //! Coordinates in which parameters are alike.
 
 use crate::twin::ParameterSpace;
+use nalgebra::DVector;
 
 /// Step of a difference in log θ.
 const LOG_STEP: f64 = 1e-3;
@@ -62,6 +63,25 @@ impl Coordinates {
                 value.clamp(self.theta_lower[j], self.theta_upper[j])
             })
             .collect()
+    }
+
+    /// The nearest φ within the bounds.
+    pub fn clamp(&self, phi: &DVector<f64>) -> DVector<f64> {
+        DVector::from_fn(phi.len(), |j, _| phi[j].clamp(self.lower[j], self.upper[j]))
+    }
+
+    /// φ with entry j moved by `share` of its step, downwards where the upper bound is nearer; and how far it moved, rounding
+    /// included.
+    pub(crate) fn beside(&self, phi: &[f64], j: usize, share: f64) -> (Vec<f64>, f64) {
+        let step = share * self.steps[j];
+        let mut moved = phi.to_vec();
+        moved[j] += if moved[j] + step <= self.upper[j] {
+            step
+        } else {
+            -step
+        };
+        let distance = moved[j] - phi[j];
+        (moved, distance)
     }
 
     /// ∂θ/∂φ at θ.

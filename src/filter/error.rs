@@ -71,6 +71,15 @@ impl FilterError {
     }
 }
 
+/// An error that only rules out one θ is no error of a search: `None`.
+pub(crate) fn recoverable<T>(result: Result<T, FilterError>) -> Result<Option<T>, FilterError> {
+    match result {
+        Ok(value) => Ok(Some(value)),
+        Err(error) if error.is_recoverable() => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
 impl From<FilterError> for EvaluationError {
     fn from(error: FilterError) -> Self {
         if error.is_recoverable() {

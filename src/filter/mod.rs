@@ -56,6 +56,7 @@ mod linear;
 
 pub use coordinates::Coordinates;
 pub use error::FilterError;
+pub(crate) use error::recoverable;
 pub use filtered::{Filtered, States};
 pub use kalman::Kalman;
 pub use score::Score;

@@ -85,7 +85,11 @@ impl Score {
     /// As [`Kalman::log_likelihood`], also at the neighbours; [`FilterError::Difference`] for θ outside the bounds.
     pub fn at(kalman: &Kalman<'_>, theta: &[f64]) -> Result<Self, FilterError> {
         kalman.parameters.check_point(theta)?;
-        Self::central(kalman, theta, &Coordinates::new(&kalman.parameters))
+        let c = Coordinates::new(&kalman.parameters);
+        let stencil = Stencil::new(&c.of(theta), c.steps(), c.lower(), c.upper())?;
+        let jacobian = stencil.jacobian(|phi| rows(kalman, &c.theta(phi)).map(|(_, rows)| rows))?;
+        let (log_likelihood, centre) = rows(kalman, theta)?;
+        Self::assemble(kalman, log_likelihood, &centre, &jacobian)
     }
 
     /// As [`at`](Self::at), by one-sided differences with steps of a hundredth: d + 1 passes over the record instead of
@@ -103,32 +107,12 @@ impl Score {
         let phi = coordinates.of(theta);
         let mut jacobian = DMatrix::zeros(centre.len(), phi.len());
         for (j, mut column) in jacobian.column_iter_mut().enumerate() {
-            let mut moved = phi.clone();
-            let step = FORWARD * coordinates.steps()[j];
-            moved[j] += if moved[j] + step <= coordinates.upper()[j] {
-                step
-            } else {
-                -step
-            };
-            // By the distance after rounding.
-            let distance = moved[j] - phi[j];
+            let (moved, distance) = coordinates.beside(&phi, j, FORWARD);
             let (_, there) = rows(kalman, &coordinates.theta(&moved))?;
             column.zip_zip_apply(&there, &centre, |d, there, here| {
                 *d = (there - here) / distance;
             });
         }
-        Self::assemble(kalman, log_likelihood, &centre, &jacobian)
-    }
-
-    fn central(
-        kalman: &Kalman<'_>,
-        theta: &[f64],
-        coordinates: &Coordinates,
-    ) -> Result<Self, FilterError> {
-        let c = coordinates;
-        let stencil = Stencil::new(&c.of(theta), c.steps(), c.lower(), c.upper())?;
-        let jacobian = stencil.jacobian(|phi| rows(kalman, &c.theta(phi)).map(|(_, rows)| rows))?;
-        let (log_likelihood, centre) = rows(kalman, theta)?;
         Self::assemble(kalman, log_likelihood, &centre, &jacobian)
     }
 

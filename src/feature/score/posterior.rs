@@ -1,6 +1,6 @@
 //! Where the likelihood of a record lies: Fisher scoring from several starts, then importance sampling. No simulations.
 
-use crate::filter::{Coordinates, FilterError, Kalman, Score};
+use crate::filter::{Coordinates, FilterError, Kalman, Score, recoverable};
 use crate::twin::{Noise, ParameterSpace};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rayon::prelude::*;
@@ -38,6 +38,11 @@ pub(super) struct Located {
 /// Mean and covariance in φ.
 type Moments = (DVector<f64>, DMatrix<f64>);
 
+/// Parameters that draws are made for.
+fn counted(parameters: usize) -> u64 {
+    (parameters as u64).min(MOST_PARAMETERS)
+}
+
 /// Finds the posterior of a record. `None` where the filter works at no start.
 pub(super) fn localise(
     kalman: &Kalman<'_>,
@@ -46,8 +51,7 @@ pub(super) fn localise(
     initial: &[f64],
     noise: Noise,
 ) -> Result<Option<Located>, FilterError> {
-    let counted = (space.len() as u64).min(MOST_PARAMETERS);
-    let mut screened: Vec<(f64, Vec<f64>)> = (0..SCREENED * counted)
+    let mut screened: Vec<(f64, Vec<f64>)> = (0..SCREENED * counted(space.len()))
         .into_par_iter()
         .map(|i| {
             let theta = space.draw_bounds(noise.child("starts").sample(i));
@@ -121,15 +125,6 @@ pub(super) fn localise(
     }))
 }
 
-/// An error that only rules out one θ is no error of the search.
-fn recoverable<T>(result: Result<T, FilterError>) -> Result<Option<T>, FilterError> {
-    match result {
-        Ok(value) => Ok(Some(value)),
-        Err(error) if error.is_recoverable() => Ok(None),
-        Err(error) => Err(error),
-    }
-}
-
 /// Damped Fisher scoring within the bounds.
 struct Climb {
     phi: DVector<f64>,
@@ -144,7 +139,7 @@ impl Climb {
         coordinates: &Coordinates,
         start: &[f64],
     ) -> Result<Self, FilterError> {
-        let phi = inside(coordinates, DVector::from_vec(coordinates.of(start)));
+        let phi = coordinates.clamp(&DVector::from_vec(coordinates.of(start)));
         Ok(Self {
             score: Score::forward(kalman, &coordinates.theta(phi.as_slice()), coordinates)?,
             phi,
@@ -176,7 +171,7 @@ impl Climb {
             if longest > LARGEST_STEP {
                 step *= LARGEST_STEP / longest;
             }
-            let next = inside(coordinates, &self.phi + step);
+            let next = coordinates.clamp(&(&self.phi + step));
             let moved = (&next - &self.phi).amax();
             let theta = coordinates.theta(next.as_slice());
             match recoverable(Score::forward(kalman, &theta, coordinates))? {
@@ -192,13 +187,6 @@ impl Climb {
         }
         Ok(())
     }
-}
-
-/// φ within its bounds.
-fn inside(coordinates: &Coordinates, phi: DVector<f64>) -> DVector<f64> {
-    let ends = coordinates.lower().iter().zip(coordinates.upper());
-    let held = (phi.iter().zip(ends)).map(|(v, (low, high))| v.clamp(*low, *high));
-    DVector::from_iterator(phi.len(), held)
 }
 
 /// One round: uniform draws in the eigenbox of the covariance within the bounds, weighted by the likelihood, the weights
@@ -221,8 +209,7 @@ fn importance(
             .all(|(v, (low, high))| (low..=high).contains(&v))
             .then_some(phi)
     };
-    let weighed: Vec<Option<(DVector<f64>, f64)>> = (0..DRAWS
-        * (centre.len() as u64).min(MOST_PARAMETERS))
+    let weighed: Vec<Option<(DVector<f64>, f64)>> = (0..DRAWS * counted(centre.len()))
         .into_par_iter()
         .map(|i| {
             let Some(phi) = draw(i) else {

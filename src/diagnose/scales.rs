@@ -1,0 +1,65 @@
+//! What a record's units are: sizes of its signals and states.
+
+use crate::twin::{Law, Record, Signal};
+
+/// What the dictionary's units are taken from.
+pub(super) struct Scales<'a> {
+    pub records: &'a [Record],
+    /// Filtered states of each record at θ̂.
+    pub states: &'a [Signal],
+}
+
+impl Scales<'_> {
+    /// Values of a sensor, actuator or state, of all records.
+    pub fn columns(&self, law: Law, target: usize) -> Vec<f64> {
+        let column = |signal: &Signal| -> Vec<f64> {
+            if target < signal.ncols() {
+                signal.column(target).to_vec()
+            } else {
+                vec![]
+            }
+        };
+        let all: Vec<Vec<f64>> = match law {
+            Law::Sensor | Law::MeasurementNoise | Law::Outliers => {
+                self.records.iter().map(|r| column(r.outputs())).collect()
+            }
+            Law::Actuator => (self.records.iter())
+                .map(|r| column(r.drive().inputs()))
+                .collect(),
+            _ => self.states.iter().map(column).collect(),
+        };
+        all.concat()
+    }
+
+    /// Step in seconds.
+    pub fn dt(&self) -> f64 {
+        self.records[0].drive().dt()
+    }
+
+    /// Length of the longest record in seconds.
+    pub fn duration(&self) -> f64 {
+        let longest = self.records.iter().map(Record::samples).max().unwrap_or(1);
+        longest as f64 * self.dt()
+    }
+}
+
+/// Standard deviation.
+pub(super) fn deviation(values: &[f64]) -> f64 {
+    let n = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
+}
+
+/// Largest absolute value.
+pub(super) fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |a: f64, v| a.max(v.abs()))
+}
+
+/// Least and largest value.
+pub(super) fn ends(values: &[f64]) -> (f64, f64) {
+    values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+            (low.min(*v), high.max(*v))
+        })
+}
