@@ -48,8 +48,9 @@ impl StateSpace for Silverbox {
         let half = 0.5 * now.dt;
         y[0] = x[0] + half * x[1] + 0.5 * half * half * Self::acceleration(now, x) + now.theta[3];
     }
-    fn noise(&self, _: &Now, process: &mut [f64], measurement: &mut [f64]) {
-        (process[1], measurement[0]) = (0.5, 0.001);
+    /// The converter's noise alone: what the twin lacks is not to pass for process noise.
+    fn noise(&self, _: &Now, _: &mut [f64], measurement: &mut [f64]) {
+        measurement[0] = 0.001;
     }
     fn integrator(&self) -> Integrator {
         Integrator::RungeKutta4

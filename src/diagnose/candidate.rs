@@ -2,10 +2,9 @@
 
 use super::DiagnoseError;
 use super::catch_all::{Place, disturbed};
-use super::shorten::shorten;
 use crate::study::Study;
 use crate::twin::{
-    DigitalTwin, Effects, Law, Magnitude, Outline, Role, UnmodelledEffect, augment, fix,
+    DigitalTwin, Law, Magnitude, Outline, Role, UnmodelledEffect, augment_short, fix,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -73,21 +72,15 @@ pub(super) fn with(
     base: &Arc<dyn DigitalTwin>,
     additions: &[Addition],
 ) -> Result<Arc<dyn DigitalTwin>, DiagnoseError> {
-    let effects: Effects = additions.iter().map(|a| a.effect.clone()).collect();
+    let mut effects = vec![];
     let mut held = BTreeMap::new();
-    let mut short = vec![];
-    for Addition {
-        effect,
-        held: of,
-        kept,
-    } in additions
-    {
+    for addition in additions {
+        let effect = &addition.effect;
         let (id, target) = (effect.typetag_name(), effect.target());
-        short.extend(kept.map(|kept| (format!("{id}@{target}"), kept)));
-        held.extend((of.iter()).map(|(name, v)| (format!("{id}@{target}.{name}"), *v)));
+        effects.push((effect.clone(), addition.kept.unwrap_or(effect.memory())));
+        held.extend((addition.held.iter()).map(|(name, v)| (format!("{id}@{target}.{name}"), *v)));
     }
-    let twin = augment(base.clone(), effects)?;
-    Ok(shorten(fix(twin, &held)?, &short))
+    Ok(fix(augment_short(base.clone(), effects)?, &held)?)
 }
 
 /// The twin with a catch-all on top.

@@ -64,11 +64,12 @@ impl Disturbed {
     }
 
     fn with<R>(&self, now: &Now<'_>, d: f64, f: impl FnOnce(&dyn StateSpace, &Now<'_>) -> R) -> R {
-        let mut theta: SmallVec<[f64; 16]> =
-            SmallVec::from_slice(&now.theta[..now.theta.len() - 1]);
-        if let Place::Parameter(i) = self.place {
-            theta[i] *= d.clamp(-5.0, 5.0).exp();
-        }
+        let own = &now.theta[..now.theta.len() - 1];
+        let Place::Parameter(i) = self.place else {
+            return f(self.inner(), &Now { theta: own, ..*now });
+        };
+        let mut theta: SmallVec<[f64; 16]> = SmallVec::from_slice(own);
+        theta[i] *= d.clamp(-5.0, 5.0).exp();
         let now = Now {
             theta: &theta,
             ..*now

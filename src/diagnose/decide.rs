@@ -3,7 +3,7 @@
 use super::attribute::{Explanation, RIVALS, explanations};
 use super::candidate::{Addition, Candidate};
 use super::dictionary::Dictionary;
-use super::null::{Bench, Look};
+use super::null::{Bench, Look, Nulls};
 use super::problem::Problem;
 use super::result::Decision;
 use super::scales::Scales;
@@ -191,9 +191,7 @@ pub(super) fn decide<'a>(
     let step = grown(setting, bench, &[], first)?;
     let mut first_look: Option<Look> = None;
     if let Some(step) = step {
-        if let Some(nulls) =
-            (step.bench).nulls(settings.unexplained, noise.child("unexplained"), stage)?
-        {
+        if let Some(nulls) = left_over(&step.bench, settings, noise.child("unexplained"), stage)? {
             let p = nulls.test().p_value;
             unexplained = Some(p);
             first_look = Some(nulls.own);
@@ -232,8 +230,7 @@ pub(super) fn decide<'a>(
         if let Some(pair) = pairs.into_iter().next()
             && pair.score > first.score() + WORTH_A_PAIR
             && !beaten(pair.score, pair.accepted.iter().any(|a| a.is_noise()))
-            && let Some(nulls) =
-                (pair.bench).nulls(settings.unexplained, noise.child("pair"), stage)?
+            && let Some(nulls) = left_over(&pair.bench, settings, noise.child("pair"), stage)?
         {
             let p = nulls.test().p_value;
             unexplained = Some(p);
@@ -264,6 +261,16 @@ pub(super) fn decide<'a>(
         return Ok((answer, Some(step)));
     }
     Ok((nothing(unexplained), None))
+}
+
+/// The structural test of a twin with effects.
+fn left_over(
+    bench: &Bench<'_>,
+    settings: &DiagnoseSettings,
+    noise: Noise,
+    stage: &Stage,
+) -> Result<Option<Nulls>, DiagnoseError> {
+    bench.nulls(settings.unexplained, UNEXPLAINED, noise, stage)
 }
 
 /// Of a twin whose free run is to follow the record: whether it follows the validation record better by a good part, beyond

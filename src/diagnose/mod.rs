@@ -34,7 +34,6 @@ mod result;
 mod run;
 mod scales;
 mod scan;
-mod shorten;
 mod shrink;
 mod variant;
 mod verdict;

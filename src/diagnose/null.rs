@@ -24,6 +24,8 @@ const LEAST: f64 = 0.1;
 /// Carlo p-values", *Biometrika* 78 (1991).
 const BATCH: usize = 20;
 const ENOUGH: usize = 8;
+/// Standard deviations above all simulations from which on no more of them are made than the level asks for.
+const OVERWHELMING: f64 = 12.0;
 
 /// A fitted twin and everything that its records are looked at with.
 pub(super) struct Bench<'a> {
@@ -126,10 +128,12 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// The record's statistics beside those of as many simulations; `None` where the record cannot be looked at.
+    /// The record's statistics beside those of as many simulations, or of fewer once it is clear whether p ≤ `level`;
+    /// `None` where the record cannot be looked at.
     pub fn nulls(
         &self,
         replicates: usize,
+        level: f64,
         noise: Noise,
         stage: &Stage,
     ) -> Result<Option<Nulls>, DiagnoseError> {
@@ -152,7 +156,9 @@ impl<'a> Bench<'a> {
                 })
                 .collect::<Result<Vec<_>, DiagnoseError>>()?;
             nulls.others.extend(batch);
-            if nulls.test().as_extreme >= ENOUGH {
+            let test = nulls.test();
+            let overwhelming = test.statistic > OVERWHELMING && test.p_value <= level;
+            if overwhelming || test.as_extreme >= ENOUGH {
                 break;
             }
         }

@@ -5,7 +5,6 @@ use super::candidate::{Addition, Candidate, Kind, with, with_disturbance};
 use super::catch_all::Place;
 use super::problem::{Axis, Problem};
 use super::scales::{Scales, deviation, ends, largest};
-use super::shorten::LONG;
 use super::variant::Variant;
 use crate::math::quantile;
 use crate::twin::{DigitalTwin, Interval, Law, Magnitude, UnmodelledEffect};
@@ -341,7 +340,7 @@ fn choices(effect: &dyn UnmodelledEffect) -> Vec<Choice> {
         register,
     };
     match thresholds.len() {
-        0 | 1 if effect.memory() > LONG => {
+        0 | 1 if effect.least_memory() < effect.memory() => {
             // The delays of a state need its covariances with the past; those of an input cost less.
             let registers = match effect.law() {
                 Law::Actuator => REGISTERS.len(),

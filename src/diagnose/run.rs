@@ -85,8 +85,15 @@ pub fn diagnose(
 
     // Is it what the twin makes?
     let stage = progress.stage("test", settings.replicates);
-    let nulls = (bench.nulls(settings.replicates, noise.child("null"), &stage)?)
-        .ok_or(DiagnoseError::NoFit)?;
+    // With a validation record, p is twice the rank's; and without one it is not to end at the edge of the level.
+    let level = 0.5 * settings.alpha;
+    let nulls = (bench.nulls(
+        settings.replicates,
+        0.999 * level,
+        noise.child("null"),
+        &stage,
+    )?)
+    .ok_or(DiagnoseError::NoFit)?;
     let test = nulls.test();
     let fit_all = || {
         let stage = progress.stage("explain", bench.dictionary.candidates.len());

@@ -5,6 +5,11 @@ use crate::twin::{DigitalTwin, Interval, Magnitude};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+/// How far a magnitude may go, and go in one step, in multiples of what is just visible: gaps of long records are thousands
+/// of standard deviations.
+const REACH: f64 = 1e4;
+const LONGEST: f64 = 40.0;
+
 /// A candidate with those of its thresholds that are in use, as a twin.
 pub(super) struct Variant {
     /// Index among the candidates.
@@ -43,13 +48,13 @@ impl Variant {
             let limits = self.free[0].limits;
             // A twin without measurement noise sees what is a millionth of any start.
             let start = first.longest;
-            let reach = (300.0 * unit).max(3.0 * start);
+            let reach = (REACH * unit).max(3.0 * start);
             let low = limits.low().max(-reach);
             first.bounds = Interval::unchecked(low, limits.high().min(reach));
             first.centre = first.bounds.clamp(0.0);
             first.deviation = reach;
             first.width = unit;
-            first.longest = (20.0 * unit).max(0.3 * start);
+            first.longest = (LONGEST * unit).max(0.3 * start);
         } else if unit > 0.0 && first.bounds.low().is_nan() {
             // Up to there from what is visible, however little that is.
             let most = (1e3 * unit).max(10.0 * first.centre);

@@ -41,6 +41,10 @@ impl UnmodelledEffect for ActuatorDelay {
         DELAY_SAMPLES
     }
 
+    fn least_memory(&self) -> usize {
+        2
+    }
+
     fn signal(&self, m: &[f64], now: Instant, memory: &mut [f64], u: f64) -> f64 {
         delay(m[0], now.dt, memory, u)
     }

@@ -167,6 +167,12 @@ pub trait UnmodelledEffect: Debug + Send + Sync {
         0
     }
 
+    /// Memory values that are enough where the magnitudes are small, as for a short delay. With fewer than
+    /// [`memory`](Self::memory), a filter has fewer states. The law must then not reach beyond the memory it is given.
+    fn least_memory(&self) -> usize {
+        self.memory()
+    }
+
     /// Fills the memory before the first sample, whose value is `first`.
     fn begin(&self, _m: &[f64], memory: &mut [f64], first: f64) {
         memory.fill(first);

@@ -31,6 +31,7 @@ mod state_space;
 
 pub use adapt::{Adaptation, AdaptationError, Level, adapt};
 pub use advance::{Advance, Points};
+pub(crate) use augment::augment_short;
 pub use augment::{augment, given_magnitudes};
 pub use digital_twin::{DigitalTwin, Quantity, Signals, SimulationError};
 pub use direction::{combination, oriented};

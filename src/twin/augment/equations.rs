@@ -54,7 +54,7 @@ impl AugmentedEquations {
             let mut placed = Vec::new();
             for slot in slots.with(law).cloned() {
                 let from = outline.states.len();
-                for k in 0..slot.effect.memory() {
+                for k in 0..slot.memory {
                     let (id, target) = (slot.effect.typetag_name(), slot.effect.target());
                     outline.states.push(hidden(format!("{id}@{target}/{k}")));
                 }
@@ -83,31 +83,37 @@ impl AugmentedEquations {
         }
     }
 
-    /// The base twin's parameters at this time.
-    fn base_theta(&self, now: &Now<'_>) -> Short {
-        let mut theta = Short::from_slice(&now.theta[..self.slots.base]);
+    /// Calls `with` with the base twin and its own `Now`: its part of θ, bent by the parameter effects, and inputs `u`.
+    #[inline]
+    fn inner<R>(
+        &self,
+        now: &Now<'_>,
+        u: &[f64],
+        with: impl FnOnce(&dyn StateSpace, &Now<'_>) -> R,
+    ) -> R {
+        let own = &now.theta[..self.slots.base];
+        let base = equations(&self.base);
+        if self.parameters.is_empty() {
+            return with(
+                base,
+                &Now {
+                    u,
+                    theta: own,
+                    ..*now
+                },
+            );
+        }
+        let mut theta = Short::from_slice(own);
         for slot in &self.parameters {
             let value = &mut theta[slot.target];
             *value = slot.effect.parameter(slot.m(now.theta), now.t, *value);
         }
-        theta
-    }
-
-    /// Calls `with` with the base twin, its own `Now` under the inputs `u`, and the base part of the state.
-    fn inner<'x, R>(
-        &self,
-        now: &Now<'_>,
-        u: &[f64],
-        x: &'x [f64],
-        with: impl FnOnce(&dyn StateSpace, &Now<'_>, &'x [f64]) -> R,
-    ) -> R {
-        let theta = self.base_theta(now);
         let now = Now {
             u,
             theta: &theta,
             ..*now
         };
-        with(equations(&self.base), &now, &x[..self.states])
+        with(base, &now)
     }
 
     /// The inputs of this sample behind the actuator effects; advances their memories in `x`.
@@ -164,7 +170,7 @@ impl StateSpace for AugmentedEquations {
         } else {
             &x[self.held.clone()]
         };
-        self.inner(now, u, x, |twin, now, x| twin.drift(now, x, base));
+        self.inner(now, u, |twin, now| twin.drift(now, &x[..self.states], base));
         for slot in &self.forces {
             let other = slot.other.map_or(0.0, |j| x[j]);
             base[slot.target] += slot
@@ -174,20 +180,19 @@ impl StateSpace for AugmentedEquations {
     }
 
     fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
+        let own = &x[..self.states];
+        if self.actuators.is_empty() && self.sensors.is_empty() {
+            return self.inner(now, now.u, |twin, now| twin.observe(now, own, y));
+        }
         // Memories advance in `update`, once a sample; looking changes nothing.
         let mut scratch = Short::from_slice(x);
         let u = self.actuate(now, &mut scratch);
-        self.inner(now, &u, x, |twin, now, x| twin.observe(now, x, y));
+        self.inner(now, &u, |twin, now| twin.observe(now, own, y));
         self.sense(now, &mut scratch, y, false);
     }
 
     fn readout(&self, now: &Now<'_>, y: &mut [f64]) {
-        let theta = self.base_theta(now);
-        let inner = Now {
-            theta: &theta,
-            ..*now
-        };
-        equations(&self.base).readout(&inner, y);
+        self.inner(now, now.u, |twin, now| twin.readout(now, y));
         self.sense(now, &mut [], y, true);
     }
 
@@ -207,15 +212,12 @@ impl StateSpace for AugmentedEquations {
         if !self.held.is_empty() {
             x[self.held.clone()].copy_from_slice(&u);
         }
-        let theta = self.base_theta(now);
-        let inner = Now {
-            u: &u,
-            theta: &theta,
-            ..*now
-        };
-        equations(&self.base).start(&inner, &mut x[..self.states]);
         let mut y = Short::from_elem(0.0, self.outline.outputs.len());
-        equations(&self.base).observe(&inner, &x[..self.states], &mut y);
+        self.inner(now, &u, |twin, now| {
+            let x = &mut x[..self.states];
+            twin.start(now, x);
+            twin.observe(now, x, &mut y);
+        });
         for Signal { slot, memory } in &self.sensors {
             let (m, value) = (slot.m(now.theta), &mut y[slot.target]);
             slot.effect.begin(m, &mut x[memory.clone()], *value);
@@ -225,31 +227,29 @@ impl StateSpace for AugmentedEquations {
     }
 
     fn update(&self, now: &Now<'_>, x: &mut [f64]) {
+        if self.actuators.is_empty() && self.sensors.is_empty() {
+            return self.inner(now, now.u, |twin, now| {
+                twin.update(now, &mut x[..self.states]);
+            });
+        }
         let u = self.actuate(now, x);
         if !self.held.is_empty() {
             x[self.held.clone()].copy_from_slice(&u);
         }
         if !self.sensors.is_empty() {
             let mut y = Short::from_elem(0.0, self.outline.outputs.len());
-            self.inner(now, &u, x, |twin, now, x| twin.observe(now, x, &mut y));
+            self.inner(now, &u, |twin, now| {
+                twin.observe(now, &x[..self.states], &mut y);
+            });
             self.sense(now, x, &mut y, false);
         }
-        let theta = self.base_theta(now);
-        let inner = Now {
-            u: &u,
-            theta: &theta,
-            ..*now
-        };
-        equations(&self.base).update(&inner, &mut x[..self.states]);
+        self.inner(now, &u, |twin, now| twin.update(now, &mut x[..self.states]));
     }
 
     fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
-        let theta = self.base_theta(now);
-        let inner = Now {
-            theta: &theta,
-            ..*now
-        };
-        equations(&self.base).noise(&inner, &mut process[..self.states], measurement);
+        self.inner(now, now.u, |twin, now| {
+            twin.noise(now, &mut process[..self.states], measurement);
+        });
         for (slots, levels) in [(&self.process, process), (&self.measurement, measurement)] {
             for slot in slots {
                 let level = &mut levels[slot.target];
@@ -276,12 +276,9 @@ impl StateSpace for AugmentedEquations {
             slot.effect.limit(m, &mut value, j.map(|j| &mut x[j]));
             x[i] = value;
         }
-        let theta = self.base_theta(now);
-        let inner = Now {
-            theta: &theta,
-            ..*now
-        };
-        equations(&self.base).constrain(&inner, &mut x[..self.states]);
+        self.inner(now, now.u, |twin, now| {
+            twin.constrain(now, &mut x[..self.states]);
+        });
     }
 
     fn integrator(&self) -> Integrator {

@@ -28,12 +28,24 @@ pub fn augment(
     base: Arc<dyn DigitalTwin>,
     effects: Effects,
 ) -> Result<Arc<dyn DigitalTwin>, EffectError> {
+    let whole = effects.iter().map(|e| (e.clone(), e.memory())).collect();
+    augment_short(base, whole)
+}
+
+/// [`augment`], with so many memory values for each effect; no fewer than [`UnmodelledEffect::least_memory`], no more than it has.
+///
+/// A filter's cost grows with the square of the states, and a delay's register is longer than most delays.
+pub(crate) fn augment_short(
+    base: Arc<dyn DigitalTwin>,
+    effects: Vec<(Arc<dyn UnmodelledEffect>, usize)>,
+) -> Result<Arc<dyn DigitalTwin>, EffectError> {
     if effects.is_empty() {
         return Ok(base);
     }
     let outline = base.state_space().map(|twin| twin.outline());
-    check_effects(&effects, outline.as_ref(), &base.signals())?;
-    let slots = Slots::of(&base, effects);
+    let (all, memories): (Effects, Vec<usize>) = effects.into_iter().unzip();
+    check_effects(&all, outline.as_ref(), &base.signals())?;
+    let slots = Slots::of(&base, all, &memories);
     if outline.is_none() {
         return Ok(Arc::new(AugmentedBlackBox::new(base, slots)));
     }
@@ -66,6 +78,8 @@ struct Slot {
     target: usize,
     /// Index of the other state.
     other: Option<usize>,
+    /// Memory values.
+    memory: usize,
 }
 
 impl Slot {
@@ -85,13 +99,13 @@ struct Slots {
 
 impl Slots {
     /// Targets must have been checked.
-    fn of(base: &Arc<dyn DigitalTwin>, effects: Effects) -> Self {
+    fn of(base: &Arc<dyn DigitalTwin>, effects: Effects, memories: &[usize]) -> Self {
         let outline = base.state_space().map(|twin| twin.outline());
         let signals = base.signals();
         let base = base.parameters().len();
         let mut parameters = Vec::new();
         let mut all: Vec<Slot> = Vec::new();
-        for effect in effects {
+        for (effect, &memory) in effects.into_iter().zip(memories) {
             let known = super::effect::targets(effect.law(), outline.as_ref(), &signals);
             let index = |name: &str| known.iter().position(|k| k == name);
             let from = base + parameters.len();
@@ -100,6 +114,7 @@ impl Slots {
                 magnitudes: from..base + parameters.len(),
                 target: index(effect.target()).unwrap_or(0),
                 other: effect.other().and_then(index),
+                memory: memory.clamp(effect.least_memory().min(effect.memory()), effect.memory()),
                 effect,
             });
         }
@@ -161,4 +176,32 @@ fn magnitude_parameters(effect: &dyn UnmodelledEffect) -> Vec<Parameter> {
             }
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::parse_effects;
+    use crate::twin::{Drive, Noise, Signal};
+    use crate::twins::CascadedTanks;
+
+    #[test]
+    fn delays_that_fit_a_short_register_are_exact() {
+        let text = "[[effect]]\nid = 'sensor-delay'\ntarget = 'sensor'\n";
+        let delay = parse_effects(text).unwrap().remove(0);
+        let base: Arc<dyn DigitalTwin> = Arc::new(CascadedTanks);
+        let long = augment(base.clone(), vec![delay.clone()]).unwrap();
+        let short = augment_short(base, vec![(delay, 5)]).unwrap();
+        let states =
+            |twin: &Arc<dyn DigitalTwin>| twin.state_space().unwrap().outline().states.len();
+        assert_eq!((states(&long), states(&short)), (2 + 64, 2 + 5));
+        let u = Signal::from_shape_fn((80, 1), |(k, _)| (k % 17) as f64 / 6.0);
+        let drive = Drive::new(0.5, u).unwrap();
+        for delay in [0.0, 0.7, 2.0] {
+            let theta = [0.6, 0.5, 0.55, 1.0, delay];
+            let noise = Noise::new(1, "t", 0);
+            let run = |twin: &Arc<dyn DigitalTwin>| twin.simulate(&theta, &drive, noise).unwrap();
+            assert_eq!(run(&long), run(&short));
+        }
+    }
 }
