@@ -49,3 +49,33 @@ impl UnmodelledEffect for SensorDelay {
         delay(m[0], now.dt, memory, s)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::twin::{DigitalTwin, Drive, Noise, Signal, augment, augment_short};
+    use crate::twins::CascadedTanks;
+    use std::sync::Arc;
+
+    #[test]
+    fn delays_that_fit_a_short_register_are_exact() {
+        let delay: Arc<dyn UnmodelledEffect> = Arc::new(SensorDelay {
+            target: "sensor".into(),
+            magnitudes: Given::default(),
+        });
+        let base: Arc<dyn DigitalTwin> = Arc::new(CascadedTanks);
+        let long = augment(base.clone(), vec![delay.clone()]).unwrap();
+        let short = augment_short(base, vec![(delay, 5)]).unwrap();
+        let states =
+            |twin: &Arc<dyn DigitalTwin>| twin.state_space().unwrap().outline().states.len();
+        assert_eq!((states(&long), states(&short)), (2 + 64, 2 + 5));
+        let u = Signal::from_shape_fn((80, 1), |(k, _)| (k % 17) as f64 / 6.0);
+        let drive = Drive::new(0.5, u).unwrap();
+        for delay in [0.0, 0.7, 2.0] {
+            let theta = [0.6, 0.5, 0.55, 1.0, delay];
+            let noise = Noise::new(1, "t", 0);
+            let run = |twin: &Arc<dyn DigitalTwin>| twin.simulate(&theta, &drive, noise).unwrap();
+            assert_eq!(run(&long), run(&short));
+        }
+    }
+}
