@@ -1,9 +1,11 @@
 //! From fitted explanations to an answer: named, a class of rivals, a pair, or none of these.
 
 use super::attribute::{Explanation, RIVALS, explanations};
+use super::base_fit::ITERATIONS;
 use super::candidate::{Addition, Candidate};
 use super::dictionary::Dictionary;
-use super::null::{Bench, Look, Nulls};
+use super::fit::fit;
+use super::null::{Bench, Look};
 use super::problem::Problem;
 use super::result::Decision;
 use super::scales::Scales;
@@ -17,6 +19,8 @@ use crate::twin::{Law, Noise, Signal};
 const UNEXPLAINED: f64 = 0.02;
 /// Nats that a second effect must add beyond what it costs.
 const WORTH_A_PAIR: f64 = 3.0;
+/// Nats that two effects must be ahead of a catch-all: so many pairs are tried that some imitate anything a little better.
+const PAIR_OVER_ANYTHING: f64 = 10.0;
 /// First effects, and second effects for each, that pairs are made of.
 const FIRSTS: usize = 2;
 const SECONDS: usize = 8;
@@ -191,10 +195,10 @@ pub(super) fn decide<'a>(
     let step = grown(setting, bench, &[], first)?;
     let mut first_look: Option<Look> = None;
     if let Some(step) = step {
-        if let Some(nulls) = left_over(&step.bench, settings, noise.child("unexplained"), stage)? {
-            let p = nulls.test().p_value;
+        let noise = noise.child("unexplained");
+        if let Some((p, look)) = left_over(setting, &step.bench, settings, noise, stage)? {
             unexplained = Some(p);
-            first_look = Some(nulls.own);
+            first_look = Some(look);
             if p > UNEXPLAINED && !beaten(first.score(), candidates[first.candidate].is_noise()) {
                 let class: Vec<String> = (listed.iter())
                     .filter(|e| e.score() >= first.score() - RIVALS)
@@ -229,10 +233,13 @@ pub(super) fn decide<'a>(
         pairs.sort_by(|a, b| b.score.total_cmp(&a.score));
         if let Some(pair) = pairs.into_iter().next()
             && pair.score > first.score() + WORTH_A_PAIR
-            && !beaten(pair.score, pair.accepted.iter().any(|a| a.is_noise()))
-            && let Some(nulls) = left_over(&pair.bench, settings, noise.child("pair"), stage)?
+            && !beaten(
+                pair.score - PAIR_OVER_ANYTHING,
+                pair.accepted.iter().any(|a| a.is_noise()),
+            )
+            && let Some((p, _)) =
+                left_over(setting, &pair.bench, settings, noise.child("pair"), stage)?
         {
-            let p = nulls.test().p_value;
             unexplained = Some(p);
             if p > UNEXPLAINED || improves(setting, bench, &pair, noise)? {
                 let keys: Vec<String> = pair.accepted.iter().map(Accepted::key).collect();
@@ -263,14 +270,37 @@ pub(super) fn decide<'a>(
     Ok((nothing(unexplained), None))
 }
 
-/// The structural test of a twin with effects.
-fn left_over(
-    bench: &Bench<'_>,
+/// The structural test of a twin with effects, on the records and, where nothing is left there, on these and the validation
+/// record together: the smaller p-value, and how the records look.
+fn left_over<'a>(
+    setting: &Setting<'a>,
+    bench: &Bench<'a>,
     settings: &DiagnoseSettings,
     noise: Noise,
     stage: &Stage,
-) -> Result<Option<Nulls>, DiagnoseError> {
-    bench.nulls(settings.unexplained, UNEXPLAINED, noise, stage)
+) -> Result<Option<(f64, Look)>, DiagnoseError> {
+    let count = settings.unexplained;
+    let Some(nulls) = bench.nulls(count, UNEXPLAINED, noise.child("records"), stage)? else {
+        return Ok(None);
+    };
+    let p = nulls.test().p_value;
+    let Some(records) = setting.together.filter(|_| p > UNEXPLAINED) else {
+        return Ok(Some((p, nulls.own)));
+    };
+    let there = bench.problem.on(records);
+    let mut start = there.full(&bench.problem.of_record(0, &bench.fitted.theta));
+    for r in 0..bench.problem.records.len() {
+        let own = bench.problem.of_record(r, &bench.fitted.theta);
+        there.place(r, &own, &mut start);
+    }
+    let Some(fitted) = fit(&there, &[start], ITERATIONS)? else {
+        return Ok(Some((p, nulls.own)));
+    };
+    let seen = bench.with_problem(there, fitted, |bench| {
+        bench.nulls(count, UNEXPLAINED, noise.child("together"), stage)
+    })?;
+    let also = seen.map_or(1.0, |nulls| nulls.test().p_value);
+    Ok(Some((p.min(also), nulls.own)))
 }
 
 /// Of a twin whose free run is to follow the record: whether it follows the validation record better by a good part, beyond

@@ -32,7 +32,8 @@ pub(super) struct Bins {
     pub cells: Vec<Cell>,
     /// Names of states and inputs.
     pub variables: Vec<String>,
-    states: usize,
+    /// How many of them are states.
+    pub states: usize,
 }
 
 impl Bins {

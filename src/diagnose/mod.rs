@@ -162,6 +162,8 @@ pub enum DiagnoseError {
 struct Setting<'a> {
     twin: &'a Arc<dyn DigitalTwin>,
     validation: Option<&'a [Record]>,
+    /// The records and the validation record.
+    together: Option<&'a [Record]>,
     /// Whether the twin has no process noise: its free run is to follow the record, and neither noise nor a disturbance
     /// is a rival: either would explain anything.
     follows: bool,

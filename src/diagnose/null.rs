@@ -98,7 +98,7 @@ impl<'a> Bench<'a> {
         let states = problem.states(theta)?;
         Ok(Some(Look {
             gains: gains.iter().map(|g| (2.0 * g).sqrt()).collect(),
-            omnibus: omnibus(&reference.filtered, problem.records),
+            omnibus: omnibus(&states, problem.records, self.bins.states),
             local: local(&states, problem.records, &self.bins),
             points,
         }))

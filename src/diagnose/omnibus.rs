@@ -1,7 +1,7 @@
 //! Whether innovations look like white noise: what sees gaps that no candidate imitates.
 
 use crate::filter::Filtered;
-use crate::twin::Record;
+use crate::twin::{Record, Signal};
 
 /// Lags of innovations, of their squares, and of inputs.
 const LAGS: usize = 20;
@@ -16,13 +16,14 @@ const FREQUENCIES: usize = 60;
 /// each is compared with simulations of the twin.
 ///
 /// For each output: the mean square, kurtosis, correlations of v and of v² over several lags, of v and v² with the predicted
-/// output, of v with past inputs, means in windows, the largest line of the periodogram.
-pub(super) fn omnibus(filtered: &[Filtered], records: &[Record]) -> Vec<f64> {
-    let channels = filtered.first().map_or(0, |f| f.standardised.ncols());
+/// output, of v with past inputs and with products of states and inputs, means in windows, the largest line of the
+/// periodogram. Of the filtered states, the first `own` are the twin's.
+pub(super) fn omnibus(states: &[(Filtered, Signal)], records: &[Record], own: usize) -> Vec<f64> {
+    let channels = (states.first()).map_or(0, |(f, _)| f.standardised.ncols());
     let mut all = Vec::new();
     for j in 0..channels {
         let mut sums: Vec<f64> = Vec::new();
-        for (f, record) in filtered.iter().zip(records) {
+        for ((f, states), record) in states.iter().zip(records) {
             let v: Vec<f64> = f.standardised.column(j).to_vec();
             let predicted: Vec<f64> = (record.outputs().column(j).iter())
                 .zip(f.innovations.column(j))
@@ -31,7 +32,8 @@ pub(super) fn omnibus(filtered: &[Filtered], records: &[Record]) -> Vec<f64> {
             let inputs: Vec<Vec<f64>> = (record.drive().inputs().columns().into_iter())
                 .map(|u| u.to_vec())
                 .collect();
-            let one = of_channel(&v, &predicted, &inputs);
+            let mut one = of_channel(&v, &predicted, &inputs);
+            one.extend(products(&v, states, record.drive().inputs(), own));
             if sums.is_empty() {
                 sums = one;
             } else {
@@ -88,6 +90,25 @@ fn of_channel(v: &[f64], predicted: &[f64], inputs: &[Vec<f64>]) -> Vec<f64> {
         squares_max = squares_max.max(0.5 * m * excess * excess);
     }
     all.extend([means, squares_max, line(&v0)]);
+    all
+}
+
+/// Correlations of v with the products of two states, or of a state and an input, one step before: what an interaction that
+/// nobody listed leaves.
+fn products(v: &[f64], states: &Signal, inputs: &Signal, own: usize) -> Vec<f64> {
+    let n = v.len() as f64;
+    let v = centred(v);
+    let factors: Vec<Vec<f64>> = (states.columns().into_iter().take(own))
+        .chain(inputs.columns())
+        .map(|column| centred(&column.to_vec()))
+        .collect();
+    let mut all = Vec::new();
+    for (i, a) in factors.iter().enumerate().take(own) {
+        for b in &factors[i + 1..] {
+            let product: Vec<f64> = a.iter().zip(b).map(|(a, b)| a * b).collect();
+            all.push(n * correlation(&v, &centred(&product), 1).powi(2));
+        }
+    }
     all
 }
 

@@ -295,7 +295,7 @@ impl Planner<'_> {
                 let at = |i: usize| low * (high / low).powf(i as f64 / (count - 1) as f64);
                 let axis = Axis {
                     longest: 0.3,
-                    ..log_axis(0.5 / duration, 0.5 / dt, (low * high).sqrt())
+                    ..log_axis(1.0 / duration, 0.5 / dt, (low * high).sqrt())
                 };
                 ((0..count).map(at).collect(), axis)
             }

@@ -63,10 +63,12 @@ pub fn diagnose(
     let noise = Noise::new(settings.seed, "diagnose", 0);
     let validation: Option<Vec<Record>> = validation.map(|v| vec![v.clone()]);
     let validation = validation.as_deref();
+    let together = validation.map(|v| [records, v].concat());
     let space = twin.parameters();
     let setting = Setting {
         twin,
         validation,
+        together: together.as_deref(),
         follows: without_process_noise(equations, &records[0]),
     };
 
