@@ -38,7 +38,7 @@ pub(super) struct Explanation {
     pub fitted: Fitted,
     /// Nats over the bench's own twin, on the record.
     pub gain: f64,
-    /// gain − ½·k·log N.
+    /// gain − ½·k·log N, and what a mark on the outputs is worth.
     pub penalised: f64,
     /// Nats over the bench's own twin on the validation record, unknown starts refitted there.
     pub validation: Option<f64>,
@@ -245,7 +245,7 @@ fn scored(
         candidate,
         variant: v,
         gain,
-        penalised: gain - 0.5 * numbers * samples.ln(),
+        penalised: gain - 0.5 * numbers * samples.ln() + variant.mark,
         validation: None,
         validation_likelihood: None,
         fitted,

@@ -7,7 +7,7 @@ use super::problem::{Axis, Problem};
 use super::scales::{Scales, deviation, ends, largest};
 use super::variant::Variant;
 use crate::math::quantile;
-use crate::twin::{DigitalTwin, Interval, Law, Magnitude, UnmodelledEffect};
+use crate::twin::{DigitalTwin, Interval, Law, Magnitude, Mark, UnmodelledEffect};
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
@@ -16,6 +16,9 @@ use std::sync::Arc;
 const FREQUENCIES: [usize; 2] = [8, 4];
 const TIMES: [usize; 2] = [8, 4];
 const LEVELS: [usize; 2] = [4, 2];
+/// Nats for a mark that outputs bear, and against an effect that would have left one: other sensors have noise behind them.
+const PRESENT: f64 = 12.0;
+const ABSENT: f64 = -5.0;
 /// Delays in steps, each with a register that just holds it: the shorter the register, the faster the filter.
 const DELAYS: [&[f64]; 3] = [&[0.5, 1.5], &[3.0], &[5.5]];
 const REGISTERS: [usize; 3] = [3, 5, 8];
@@ -53,8 +56,8 @@ pub(super) struct Planner<'a> {
 
 /// Which of an effect's magnitudes are in use.
 struct Choice {
-    /// Index among the thresholds of the only one in use; `None`: all are.
-    threshold: Option<usize>,
+    /// Magnitudes that are off.
+    off: Vec<usize>,
     /// Index of the register of a delay.
     register: Option<usize>,
 }
@@ -96,9 +99,17 @@ impl Planner<'_> {
                 let free = candidate.magnitudes();
                 Ok(vec![self.disturbance(index, free, *place, *memory)])
             }
-            Kind::Listed(effect) => (choices(effect.as_ref()).iter())
-                .filter_map(|choice| self.listed(index, effect, choice).transpose())
-                .collect(),
+            Kind::Listed(effect) => {
+                let values = self.values(effect.as_ref());
+                let mark = match effect.law() {
+                    Law::Sensor => effect.mark(&values),
+                    _ => Mark::Unmarked,
+                };
+                let plan = |choice: &Choice| self.listed(index, effect, &values, &mark, choice);
+                (choices(effect.as_ref(), &mark).iter())
+                    .filter_map(|choice| plan(choice).transpose())
+                    .collect()
+            }
         }
     }
 
@@ -124,6 +135,7 @@ impl Planner<'_> {
                 free,
                 held: BTreeMap::new(),
                 kept: None,
+                mark: 0.0,
                 axes: vec![unset_log_axis(guess)],
                 jumps: vec![],
             },
@@ -146,14 +158,14 @@ impl Planner<'_> {
         &self,
         index: usize,
         effect: &Arc<dyn UnmodelledEffect>,
+        values: &[f64],
+        mark: &Mark,
         choice: &Choice,
     ) -> Result<Option<Plan>, DiagnoseError> {
         let magnitudes = effect.magnitudes();
-        let thresholds = (0..magnitudes.len()).filter(|&i| is_threshold(&magnitudes[i]));
-        let held: BTreeMap<String, f64> = thresholds
-            .filter(|&i| choice.threshold.is_some_and(|c| c != i))
-            .map(|i| (&magnitudes[i], magnitudes[i].off.unwrap_or(0.0)))
-            .map(|(m, off)| (m.name.to_owned(), off))
+        let held: BTreeMap<String, f64> = (magnitudes.iter().enumerate())
+            .filter(|(i, _)| choice.off.contains(i))
+            .map(|(_, m)| (m.name.to_owned(), m.off.unwrap_or(0.0)))
             .collect();
         let free: Vec<Magnitude> = (magnitudes.into_iter())
             .filter(|m| !held.contains_key(m.name))
@@ -161,18 +173,28 @@ impl Planner<'_> {
         let Some(first) = free.first() else {
             return Ok(None);
         };
-        let values = self.values(effect.as_ref());
-        let (leads, axis, range) = self.first(first, effect.law(), &values, choice.register);
+        let (mut leads, axis, range) = self.first(first, effect.law(), values, choice.register);
         let mut axes = vec![axis];
         let mut shapes = Vec::new();
         let mut jumps = Vec::new();
         for (i, shape) in free.iter().enumerate().skip(1) {
-            let (tried, axis) = self.shape(shape, &values);
+            let (tried, axis) = self.shape(shape, values);
             if shape.unit == "s" {
                 jumps.push(i);
             }
             shapes.push(tried);
             axes.push(axis);
+        }
+        if let Mark::Present(m) = mark {
+            // What the outputs show is not to be fitted.
+            let mut shown = (m.iter().enumerate()).filter(|(i, _)| !choice.off.contains(i));
+            leads = shown
+                .next()
+                .map(|(_, v)| Lead::At(*v))
+                .into_iter()
+                .collect();
+            shapes = shown.map(|(_, v)| vec![*v]).collect();
+            axes.iter_mut().for_each(|axis| axis.held = true);
         }
         let kept = choice.register.map(|i| REGISTERS[i]);
         let addition = Addition {
@@ -188,6 +210,11 @@ impl Planner<'_> {
                 free,
                 held,
                 kept,
+                mark: match mark {
+                    Mark::Unmarked => 0.0,
+                    Mark::Absent => ABSENT,
+                    Mark::Present(_) => PRESENT,
+                },
                 axes,
                 jumps,
             },
@@ -329,16 +356,17 @@ impl Planner<'_> {
     }
 }
 
-/// The ways to use an effect: one threshold or all of them, and delays by length.
-fn choices(effect: &dyn UnmodelledEffect) -> Vec<Choice> {
+/// The ways to use an effect: as its mark says; one threshold, or all of them; delays by length.
+fn choices(effect: &dyn UnmodelledEffect, mark: &Mark) -> Vec<Choice> {
     let magnitudes = effect.magnitudes();
     let thresholds: Vec<usize> = (0..magnitudes.len())
         .filter(|&i| is_threshold(&magnitudes[i]))
         .collect();
-    let choice = |threshold, register| Choice {
-        threshold,
-        register,
-    };
+    let choice = |off, register| Choice { off, register };
+    if let Mark::Present(m) = mark {
+        let off = (0..m.len()).filter(|&i| m[i].is_infinite()).collect();
+        return vec![choice(off, None)];
+    }
     match thresholds.len() {
         0 | 1 if effect.least_memory() < effect.memory() => {
             // The delays of a state need its covariances with the past; those of an input cost less.
@@ -346,12 +374,15 @@ fn choices(effect: &dyn UnmodelledEffect) -> Vec<Choice> {
                 Law::Actuator => REGISTERS.len(),
                 _ => REGISTERS.len() - 1,
             };
-            (0..registers).map(|i| choice(None, Some(i))).collect()
+            (0..registers).map(|i| choice(vec![], Some(i))).collect()
         }
-        0 | 1 => vec![choice(None, None)],
-        _ => (thresholds.iter().map(|&i| Some(i)).chain([None]))
-            .map(|threshold| choice(threshold, None))
-            .collect(),
+        0 | 1 => vec![choice(vec![], None)],
+        _ => {
+            let others = |i: &usize| thresholds.iter().copied().filter(|j| j != i).collect();
+            (thresholds.iter().map(others).chain([vec![]]))
+                .map(|off| choice(off, None))
+                .collect()
+        }
     }
 }
 

@@ -20,6 +20,8 @@ pub(super) struct Variant {
     pub held: BTreeMap<String, f64>,
     /// Memory values that filters keep of a delay.
     pub kept: Option<usize>,
+    /// Nats that the effect's mark on the outputs, or its absence, is worth.
+    pub mark: f64,
     /// Axes of the free magnitudes.
     pub axes: Vec<Axis>,
     /// Free magnitudes without a derivative (the time of a jump).

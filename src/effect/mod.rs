@@ -80,6 +80,7 @@ mod file;
 mod laws;
 mod library;
 mod linear_loss;
+mod marks;
 mod parameter_drift;
 mod parameter_step;
 mod periodic_disturbance;

@@ -1,6 +1,7 @@
 //! A sensor with coarse digits.
 
-use crate::twin::{Given, Instant, Law, Magnitude, UnmodelledEffect};
+use super::marks::rounded;
+use crate::twin::{Given, Instant, Law, Magnitude, Mark, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// Rounding to a multiple of the step, halves upwards: step·⌊s/step + ½⌋.
@@ -30,6 +31,10 @@ impl UnmodelledEffect for SensorQuantization {
 
     fn order(&self) -> u32 {
         90
+    }
+
+    fn mark(&self, outputs: &[f64]) -> Mark {
+        rounded(outputs)
     }
 
     fn signal(&self, m: &[f64], _now: Instant, _memory: &mut [f64], s: f64) -> f64 {

@@ -1,7 +1,8 @@
 //! A sensor with a limited range.
 
 use super::laws::{HIGH, LOW, clamp};
-use crate::twin::{Given, Instant, Law, Magnitude, UnmodelledEffect};
+use super::marks::clipped;
+use crate::twin::{Given, Instant, Law, Magnitude, Mark, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// A limited range, after the noise: clamp(s, low, high).
@@ -31,6 +32,10 @@ impl UnmodelledEffect for SensorSaturation {
 
     fn order(&self) -> u32 {
         80
+    }
+
+    fn mark(&self, outputs: &[f64]) -> Mark {
+        clipped(outputs)
     }
 
     fn signal(&self, m: &[f64], _now: Instant, _memory: &mut [f64], s: f64) -> f64 {

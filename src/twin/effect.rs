@@ -116,6 +116,17 @@ impl Law {
     }
 }
 
+/// What outputs themselves show of an effect, whatever the twin: values that pile up where it would pile them up.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Mark {
+    /// The effect leaves none.
+    Unmarked,
+    /// It would leave one, and there is none.
+    Absent,
+    /// There is one, of these magnitudes.
+    Present(Vec<f64>),
+}
+
 /// Time of a sample, and the step, in seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Instant {
@@ -171,6 +182,11 @@ pub trait UnmodelledEffect: Debug + Send + Sync {
     /// [`memory`](Self::memory), a filter has fewer states. The law must then not reach beyond the memory it is given.
     fn least_memory(&self) -> usize {
         self.memory()
+    }
+
+    /// The effect's mark on measured outputs of its target; a signal that is clipped or rounded after the noise bears one.
+    fn mark(&self, _outputs: &[f64]) -> Mark {
+        Mark::Unmarked
     }
 
     /// Fills the memory before the first sample, whose value is `first`.

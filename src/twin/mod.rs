@@ -37,7 +37,7 @@ pub use digital_twin::{DigitalTwin, Quantity, Signals, SimulationError};
 pub use direction::{combination, oriented};
 pub use drive::{Drive, DriveError, Signal};
 pub use effect::{
-    EffectError, Effects, Given, Instant, Law, Magnitude, NOISE_ENTERS, UnmodelledEffect,
+    EffectError, Effects, Given, Instant, Law, Magnitude, Mark, NOISE_ENTERS, UnmodelledEffect,
     check_effects, targets,
 };
 pub use fix::fix;

@@ -1,0 +1,105 @@
+//! Marks that signal effects leave on measured outputs.
+
+use crate::twin::Mark;
+
+/// Equal values at an end that noise does not bring about, and how many times more often than a usual value they come.
+const TIES: usize = 4;
+const OFTEN: usize = 3;
+/// Samples for each distinct value, at least, where outputs are rounded coarsely.
+const REPEATS: usize = 4;
+/// How far from a multiple of the step a rounded value may lie, in steps.
+const TOLERANCE: f64 = 0.01;
+
+/// Distinct values and how often each comes, ascending.
+fn distinct(outputs: &[f64]) -> Vec<(f64, usize)> {
+    let mut sorted: Vec<f64> = (outputs.iter().copied())
+        .filter(|v| v.is_finite())
+        .collect();
+    sorted.sort_by(f64::total_cmp);
+    let span = match (sorted.first(), sorted.last()) {
+        (Some(low), Some(high)) => high - low,
+        _ => 0.0,
+    };
+    let mut values: Vec<(f64, usize)> = Vec::new();
+    for v in sorted {
+        match values.last_mut() {
+            Some((last, count)) if v - *last <= 1e-9 * span => *count += 1,
+            _ => values.push((v, 1)),
+        }
+    }
+    values
+}
+
+/// Of a limited range, as (low, high): many samples exactly at the least or the greatest value.
+pub(super) fn clipped(outputs: &[f64]) -> Mark {
+    let values = distinct(outputs);
+    if values.len() < 3 {
+        return Mark::Absent;
+    }
+    let mut counts: Vec<usize> = values.iter().map(|(_, count)| *count).collect();
+    counts.sort_unstable();
+    let least = TIES.max(OFTEN * counts[counts.len() / 2]);
+    let at = |(value, count): (f64, usize), off: f64| if count >= least { value } else { off };
+    let low = at(values[0], f64::NEG_INFINITY);
+    let high = at(values[values.len() - 1], f64::INFINITY);
+    match low.is_finite() || high.is_finite() {
+        true => Mark::Present(vec![low, high]),
+        false => Mark::Absent,
+    }
+}
+
+/// Of rounding, as its step: few distinct values, all multiples of the least distance between two.
+pub(super) fn rounded(outputs: &[f64]) -> Mark {
+    let values = distinct(outputs);
+    if values.len() < 2 || values.len() * REPEATS > outputs.len() {
+        return Mark::Absent;
+    }
+    let step = (values.windows(2))
+        .map(|w| w[1].0 - w[0].0)
+        .fold(f64::INFINITY, f64::min);
+    let off = |v: f64| (v / step - (v / step).round()).abs();
+    match values.iter().all(|(v, _)| off(*v) <= TOLERANCE) {
+        true => Mark::Present(vec![step]),
+        false => Mark::Absent,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    fn noise() -> Vec<f64> {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        (0..300).map(|_| rng.gen_range(-1.0..1.0)).collect()
+    }
+
+    #[test]
+    fn what_is_neither_clipped_nor_rounded_is_not_marked() {
+        assert_eq!(clipped(&noise()), Mark::Absent);
+        assert_eq!(rounded(&noise()), Mark::Absent);
+        // Nor are the digits of a file.
+        let digits: Vec<f64> = noise()
+            .iter()
+            .map(|v| (v * 100.0).round() / 100.0)
+            .collect();
+        assert_eq!(clipped(&digits), Mark::Absent);
+        assert_eq!(rounded(&digits), Mark::Absent);
+        assert_eq!(clipped(&[]), Mark::Absent);
+        assert_eq!(rounded(&[1.0; 50]), Mark::Absent);
+    }
+
+    #[test]
+    fn ends_and_steps_are_found() {
+        let high: Vec<f64> = noise().iter().map(|v| v.min(0.8)).collect();
+        assert_eq!(clipped(&high), Mark::Present(vec![f64::NEG_INFINITY, 0.8]));
+        let coarse: Vec<f64> = noise().iter().map(|v| (v / 0.3).round() * 0.3).collect();
+        let Mark::Present(m) = rounded(&coarse) else {
+            panic!("no step");
+        };
+        assert!((m[0] - 0.3).abs() < 1e-9);
+        // Rounded values pile up everywhere, not at the ends.
+        assert_eq!(clipped(&coarse), Mark::Absent);
+    }
+}
