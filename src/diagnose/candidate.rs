@@ -43,7 +43,10 @@ impl Candidate {
     pub fn is_noise(&self) -> bool {
         match &self.kind {
             Kind::Listed(effect) => {
-                matches!(effect.law(), Law::MeasurementNoise | Law::ProcessNoise)
+                matches!(
+                    effect.law(),
+                    Law::MeasurementNoise | Law::ProcessNoise | Law::Outliers
+                )
             }
             Kind::CatchAll(..) => true,
         }
@@ -92,8 +95,15 @@ pub(super) fn with_disturbance(
     disturbed(base.clone(), place, memory)
 }
 
-/// Every listed effect that the study lets a diagnosis name, but for outliers, which no filter models; then a catch-all for
-/// each state, sensor and own parameter.
+/// Magnitudes that a fit may start from.
+fn first_starts(effect: &dyn UnmodelledEffect) -> Vec<f64> {
+    (effect.magnitudes().iter())
+        .map(|m| m.starts.first().copied().unwrap_or(0.0))
+        .collect()
+}
+
+/// Every listed effect that the study lets a diagnosis name and a filter knows; then a catch-all for each state, sensor and
+/// own parameter.
 pub(super) fn candidates(
     study: &Study,
     without: &[String],
@@ -110,7 +120,7 @@ pub(super) fn candidates(
         .map(|e| format!("{}@{}", e.typetag_name(), e.target()))
         .collect();
     let mut all: Vec<Candidate> = (study.candidates().into_iter())
-        .filter(|e| e.law() != Law::Outliers)
+        .filter(|e| e.law() != Law::Outliers || e.outliers(&first_starts(e.as_ref())).is_some())
         .map(|effect| Candidate {
             id: effect.typetag_name().into(),
             target: effect.target().into(),

@@ -1,8 +1,8 @@
 //! Disturbances that stand for whatever is not in the library.
 
 use crate::twin::{
-    DigitalTwin, Integrator, Interval, Now, Outline, Parameter, ParameterSpace, Quantity, Role,
-    Signal, SimulationError, StateSpace,
+    DigitalTwin, Integrator, Interval, Now, Outliers, Outline, Parameter, ParameterSpace, Quantity,
+    Role, Signal, SimulationError, StateSpace,
 };
 use smallvec::SmallVec;
 use std::sync::Arc;
@@ -137,6 +137,9 @@ impl StateSpace for Disturbed {
     }
     fn admit(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {
         self.inner().admit(&theta[..theta.len() - 1], dt)
+    }
+    fn outliers(&self, theta: &[f64]) -> Vec<Outliers> {
+        self.inner().outliers(&theta[..theta.len() - 1])
     }
     fn strike(&self, theta: &[f64], noise: crate::twin::Noise, outputs: &mut Signal) {
         self.inner()

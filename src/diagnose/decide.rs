@@ -57,7 +57,7 @@ impl Accepted {
     pub fn is_noise(&self) -> bool {
         matches!(
             self.addition.effect.law(),
-            Law::MeasurementNoise | Law::ProcessNoise
+            Law::MeasurementNoise | Law::ProcessNoise | Law::Outliers
         )
     }
 }

@@ -253,6 +253,9 @@ impl Planner<'_> {
             let leads = starts.map(|v| Lead::Shrink(in_unit(v))).collect();
             let axis = log_axis(0.05 * dt, 0.5 * duration, 2.0 * dt);
             (leads, axis, (0.0, 3.0))
+        } else if law == Law::Outliers {
+            let leads = starts.map(Lead::At).collect();
+            (leads, log_axis(1e-4, 0.5, 0.02), (0.0, 2.0))
         } else if matches!(law, Law::MeasurementNoise | Law::ProcessNoise) {
             let visible = Lead::Visible {
                 guess: greatest,
@@ -338,12 +341,18 @@ impl Planner<'_> {
             }
             _ => {
                 let ends = |limit: f64, other: f64| if limit.is_finite() { limit } else { other };
-                let largest = shape.starts.iter().fold(0.0, |a: f64, v| a.max(v.abs()));
+                let size = unit(shape.unit, deviation(values), dt);
+                let starts: Vec<f64> = shape.starts.iter().map(|v| v * size).collect();
+                let largest = starts.iter().fold(0.0, |a: f64, v| a.max(v.abs()));
+                if shape.limits.low() == 0.0 && !shape.limits.is_finite() && largest > 0.0 {
+                    let axis = log_axis(1e-2 * largest, 10.0 * largest, starts[0]);
+                    return (starts, axis);
+                }
                 let low = ends(shape.limits.low(), -3.0 * largest);
                 let high = ends(shape.limits.high(), 3.0 * largest);
                 let span = high - low;
                 // First and last of three, and all of the others.
-                let mut values = shape.starts.to_vec();
+                let mut values = starts;
                 if shape.limits.is_finite() && values.len() == 3 && span <= 1.0 {
                     values.remove(1);
                 }

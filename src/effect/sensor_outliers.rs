@@ -1,6 +1,6 @@
 //! A sensor that is now and then wrong.
 
-use crate::twin::{Given, Law, Magnitude, Source, UnmodelledEffect};
+use crate::twin::{Given, Law, Magnitude, Outliers, Source, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// Rare large errors after everything else: with the probability, N(0, scale²) is added to a sample.
@@ -33,6 +33,13 @@ impl UnmodelledEffect for SensorOutliers {
 
     fn order(&self) -> u32 {
         100
+    }
+
+    fn outliers(&self, m: &[f64]) -> Option<Outliers> {
+        Some(Outliers {
+            probability: m[0],
+            scale: m[1],
+        })
     }
 
     fn outlier(&self, m: &[f64], source: &mut Source) -> f64 {

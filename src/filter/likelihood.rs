@@ -35,6 +35,12 @@ impl LogLikelihood {
         }
     }
 
+    /// Adds nats.
+    #[inline(always)]
+    pub fn shift(&mut self, nats: f64) {
+        self.squares -= 2.0 * nats;
+    }
+
     /// Whether it is a number so far.
     #[inline(always)]
     pub fn is_finite(&self) -> bool {

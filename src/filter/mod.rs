@@ -32,7 +32,8 @@
 //! # Limits
 //!
 //! The state is described by a mean and a covariance: distributions with two humps are not. Noise levels must not
-//! depend on the state. Outliers ([`StateSpace::strike`]) are not modelled.
+//! depend on the state. Outliers ([`StateSpace::outliers`]) make the density of a row a mixture; what follows from it for the
+//! state is again a mean and a covariance.
 
 mod clip;
 mod coordinates;

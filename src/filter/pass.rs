@@ -6,7 +6,7 @@ use super::moments::Moments;
 use super::size::{Numbers, Size};
 use super::update::{Measured, Update};
 use super::{FilterError, Kalman};
-use crate::twin::Now;
+use crate::twin::{Now, Outliers};
 
 /// What one row told.
 pub(super) struct Innovation<'w> {
@@ -16,6 +16,8 @@ pub(super) struct Innovation<'w> {
     pub standardised: &'w [f64],
     /// Variance of each output given those before it.
     pivots: &'w [f64],
+    /// Nats by which the density exceeds a normal one.
+    excess: f64,
 }
 
 impl Innovation<'_> {
@@ -25,7 +27,7 @@ impl Innovation<'_> {
         let sum: f64 = values
             .map(|(e, pivot)| LOG_TWO_PI + pivot.ln() + e * e)
             .sum();
-        -0.5 * sum
+        self.excess - 0.5 * sum
     }
 }
 
@@ -96,6 +98,7 @@ pub(super) struct Pass<'k, S: Size> {
     predicted: S::Vector,
     scale: S::Vector,
     copy: State<S>,
+    outliers: Vec<Outliers>,
     likelihood: LogLikelihood,
 }
 
@@ -124,6 +127,7 @@ impl<'k, S: Size> Pass<'k, S> {
             r: S::Vector::zeros(p),
             predicted: S::Vector::zeros(p),
             scale: S::Vector::zeros(n),
+            outliers: twin.outliers(theta),
             likelihood: LogLikelihood::NONE,
         })
     }
@@ -191,6 +195,7 @@ impl<'k, S: Size> Pass<'k, S> {
                 covariance: &self.update.covariance.as_ref()[..p * p],
                 standardised: &self.update.standardised.as_ref()[..p],
                 pivots: &self.update.pivots.as_ref()[..p],
+                excess: self.update.excess,
             },
         );
         sink.filtered(k, state.belief(n));
@@ -208,6 +213,7 @@ impl<'k, S: Size> Pass<'k, S> {
             predicted,
             noise: &self.r.as_ref()[..p],
             floor: &self.kalman.floor[..p],
+            outliers: &self.outliers,
         };
         self.update.apply(
             (self.kalman.twin, &self.now),

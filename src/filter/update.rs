@@ -4,7 +4,7 @@ use super::gaussian::Columns;
 use super::likelihood::LogLikelihood;
 use super::moments::{add_outer, outer};
 use super::size::{Numbers, Size};
-use crate::twin::{Now, StateSpace};
+use crate::twin::{Now, Outliers, StateSpace};
 
 /// Nodes and weights of the Gauss–Hermite rule with five points, for a standard normal.
 const NODES: [(f64, f64); 5] = [
@@ -38,6 +38,8 @@ pub(super) struct Update<S: Size> {
     pub standardised: S::Vector,
     /// Squares of C's diagonal: variance of each output given those before it.
     pub pivots: S::Vector,
+    /// Nats by which the density of the row exceeds that of N(ȳ, S): outliers make it a mixture.
+    pub excess: f64,
     /// C, row-major, lower.
     factor: S::Matrix,
     /// K (n × p).
@@ -58,6 +60,8 @@ pub(super) struct Measured<'w> {
     pub noise: &'w [f64],
     /// Least variances.
     pub floor: &'w [f64],
+    /// By output; empty for none.
+    pub outliers: &'w [Outliers],
 }
 
 impl<S: Size> Update<S> {
@@ -71,6 +75,7 @@ impl<S: Size> Update<S> {
             covariance: S::Matrix::zeros(p * p),
             standardised: S::Vector::zeros(p),
             pivots: S::Vector::zeros(p),
+            excess: 0.0,
             factor: S::Matrix::zeros(p * p),
             gain: S::Matrix::zeros(n * p),
             rest: S::Matrix::zeros(n * n),
@@ -99,6 +104,10 @@ impl<S: Size> Update<S> {
         if self.reads(twin, now, row) {
             self.bend(row, outputs);
             self.spread(outputs);
+        }
+        if !row.outliers.is_empty() {
+            self.struck(row.outliers);
+            likelihood.shift(self.excess);
         }
         self.factor()?;
         let (factor, pivots) = (self.factor.as_ref(), self.pivots.as_ref());
@@ -180,6 +189,40 @@ impl<S: Size> Update<S> {
             for output in outputs.iter_mut().skip(j).step_by(p) {
                 *output *= slope;
             }
+        }
+    }
+
+    /// Where an output may be an outlier, its density is a mixture, and so is what it says about the state. The noise is
+    /// widened such that the gain is the mixture's:
+    ///
+    /// ```text
+    /// w = P(outlier | e),   1/S ← (1 − w)/S + w/(S + scale²)
+    /// ```
+    ///
+    /// Exact in density and mean for one output; for several, each is taken for itself.
+    #[cold]
+    fn struck(&mut self, outliers: &[Outliers]) {
+        let p = self.size.outputs();
+        let (beside, covariance) = (self.beside.as_mut(), self.covariance.as_mut());
+        self.excess = 0.0;
+        for (j, outlier) in outliers.iter().enumerate() {
+            // Off, no bit changes.
+            if outlier.probability <= 0.0 {
+                continue;
+            }
+            let s = covariance[j * p + j];
+            let wide = s + outlier.scale * outlier.scale;
+            let square = self.innovation.as_ref()[j].powi(2);
+            let log = |variance: f64| -0.5 * (variance.ln() + square / variance);
+            let probability = outlier.probability.min(1.0);
+            let plain = (1.0 - probability).ln() + log(s);
+            let struck = probability.ln() + log(wide);
+            let density = plain.max(struck) + (-(plain - struck).abs()).exp().ln_1p();
+            let w = (struck - density).exp();
+            let seen = ((1.0 - w) / s + w / wide).recip();
+            self.excess += density - log(seen);
+            beside[j * p + j] += seen - s;
+            covariance[j * p + j] = seen;
         }
     }
 

@@ -1,8 +1,8 @@
 //! A twin in another setting: prior, bounds, limits, noise and start changed from outside.
 
 use super::{
-    DigitalTwin, Drive, Integrator, Interval, Noise, Now, Outline, Parameter, ParameterError,
-    ParameterSpace, Role, Signal, Signals, SimulationError, StateSpace,
+    DigitalTwin, Drive, Integrator, Interval, Noise, Now, Outliers, Outline, Parameter,
+    ParameterError, ParameterSpace, Role, Signal, Signals, SimulationError, StateSpace,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -347,6 +347,9 @@ impl StateSpace for AdaptedEquations {
     }
     fn admit(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {
         self.inner().admit(&theta[..self.own], dt)
+    }
+    fn outliers(&self, theta: &[f64]) -> Vec<Outliers> {
+        self.inner().outliers(&theta[..self.own])
     }
     fn strike(&self, theta: &[f64], noise: Noise, outputs: &mut Signal) {
         self.inner().strike(&theta[..self.own], noise, outputs);

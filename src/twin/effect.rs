@@ -1,6 +1,6 @@
 //! What a twin may lack: the trait of an unmodelled effect.
 
-use super::{Interval, Outline, Signals, Source};
+use super::{Interval, Outliers, Outline, Signals, Source};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Debug;
@@ -220,6 +220,12 @@ pub trait UnmodelledEffect: Debug + Send + Sync {
     /// [`Law::Outliers`]: what is added to a sample, drawn from the effect's own source.
     fn outlier(&self, _m: &[f64], _source: &mut Source) -> f64 {
         0.0
+    }
+
+    /// [`Law::Outliers`]: how often and how large, for filters. An effect that does not say so cannot be named by a
+    /// diagnosis.
+    fn outliers(&self, _m: &[f64]) -> Option<Outliers> {
+        None
     }
 }
 

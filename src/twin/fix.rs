@@ -2,8 +2,8 @@
 
 use super::state_space::check_parameters;
 use super::{
-    DigitalTwin, Drive, Integrator, Interval, Noise, Now, Outline, ParameterError, ParameterSpace,
-    Signal, Signals, SimulationError, StateSpace,
+    DigitalTwin, Drive, Integrator, Interval, Noise, Now, Outliers, Outline, ParameterError,
+    ParameterSpace, Signal, Signals, SimulationError, StateSpace,
 };
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
@@ -143,6 +143,9 @@ impl StateSpace for FixedEquations {
     }
     fn admit(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {
         self.equations().admit(&self.map.complete(theta), dt)
+    }
+    fn outliers(&self, theta: &[f64]) -> Vec<Outliers> {
+        self.equations().outliers(&self.map.complete(theta))
     }
     fn strike(&self, theta: &[f64], noise: Noise, outputs: &mut Signal) {
         self.equations()

@@ -50,4 +50,4 @@ pub use record::{Record, RecordError};
 pub use record_csv::{
     CsvError, parse_record, read_drive, read_record, record_csv_text, write_record,
 };
-pub use state_space::{Now, Outline, StateSpace};
+pub use state_space::{Now, Outliers, Outline, StateSpace};

@@ -87,10 +87,24 @@ pub trait StateSpace: Advance + Send + Sync {
     /// What befalls the finished outputs of a run (outliers); nothing unless said otherwise.
     fn strike(&self, _theta: &[f64], _noise: Noise, _outputs: &mut Signal) {}
 
+    /// How often [`strike`](Self::strike) hits each output and how hard, for filters; empty for never.
+    fn outliers(&self, _theta: &[f64]) -> Vec<Outliers> {
+        vec![]
+    }
+
     /// How the drift is carried over a step.
     fn integrator(&self) -> Integrator {
         Integrator::Euler
     }
+}
+
+/// Rare large errors: with this probability, N(0, scale²) is added to a sample.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Outliers {
+    /// Probability of each sample.
+    pub probability: f64,
+    /// Standard deviation, in the unit of the signal.
+    pub scale: f64,
 }
 
 /// Where the equations are evaluated.

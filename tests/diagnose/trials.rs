@@ -84,6 +84,10 @@ pub fn clear(name: &str) -> Vec<(&'static str, &'static str)> {
                 "id='sensor-noise'\ntarget='sensor'\nmagnitudes={std=0.3}",
             ),
             (
+                "sensor-outliers@sensor",
+                "id='sensor-outliers'\ntarget='sensor'\nmagnitudes={probability=0.04,scale=1.5}",
+            ),
+            (
                 "sensor-bias@sensor",
                 "id='sensor-bias'\ntarget='sensor'\nmagnitudes={offset=0.8}",
             ),

@@ -4,7 +4,7 @@ use crate::{maximum_likelihood, mean, particle, record};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use truetwin::effect::{ActuatorLag, SensorLag, StateCeiling};
+use truetwin::effect::{ActuatorLag, SensorLag, SensorOutliers, StateCeiling};
 use truetwin::filter::{FilterSettings, Kalman, Method, Score, filter, log_likelihood, smooth};
 use truetwin::twin::*;
 use truetwin::twins::CascadedTanks;
@@ -190,6 +190,40 @@ fn effects_that_are_off_leave_the_likelihood() {
     let known = log_likelihood(equations, &theta, &spilled, &settings).unwrap();
     let unknown = log_likelihood(&CascadedTanks, &CENTRE, &spilled, &settings).unwrap();
     assert!(known > unknown + 10.0, "{known} {unknown}");
+}
+
+/// Outliers make rows a mixture: the score at the truth has mean zero, and off they change no bit.
+#[test]
+fn outliers_are_a_mixture() {
+    let effects: Effects = vec![Arc::new(SensorOutliers {
+        target: "sensor".into(),
+        magnitudes: Given::default(),
+    })];
+    let twin = augment(Arc::new(CascadedTanks), effects).unwrap();
+    let equations = twin.state_space().unwrap();
+    let settings = FilterSettings::default();
+    let with = |m: [f64; 2]| [&CENTRE[..], &m].concat();
+    let truth = with([0.05, 1.5]);
+    let scores: Vec<[f64; 2]> = (0..40)
+        .into_par_iter()
+        .map(|run| {
+            let record = record(twin.as_ref(), &truth, levels(run), run);
+            let kalman = Kalman::new(equations, &record, &settings).unwrap();
+            let plain = kalman.log_likelihood(&with([0.0, 1.5])).unwrap();
+            let base = log_likelihood(&CascadedTanks, &CENTRE, &record, &settings).unwrap();
+            assert_eq!(plain, base);
+            assert!(kalman.log_likelihood(&truth).unwrap() > plain + 50.0);
+            let score = Score::at(&kalman, &truth).unwrap();
+            std::array::from_fn(|j| score.gradient[4 + j])
+        })
+        .collect();
+    for j in 0..2 {
+        let own: Vec<f64> = scores.iter().map(|s| s[j]).collect();
+        let square: f64 = own.iter().map(|g| g * g).sum();
+        let z = own.iter().sum::<f64>() / square.sqrt();
+        println!("score of magnitude {j}: {z:.2}");
+        assert!(z.abs() < 4.5, "{z}");
+    }
 }
 
 /// Smoothed levels are within the limits, closer to the truth than filtered ones, and cover it.

@@ -3,8 +3,8 @@
 use super::outliers::strike;
 use super::{Slot, Slots};
 use crate::twin::{
-    DigitalTwin, Instant, Integrator, Interval, Law, NOISE_ENTERS, Noise, Now, Outline, Quantity,
-    Signal as Record, SimulationError, StateSpace,
+    DigitalTwin, Instant, Integrator, Interval, Law, NOISE_ENTERS, Noise, Now, Outliers, Outline,
+    Quantity, Signal as Record, SimulationError, StateSpace,
 };
 use smallvec::SmallVec;
 use std::ops::Range;
@@ -288,6 +288,21 @@ impl StateSpace for AugmentedEquations {
     fn admit(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {
         equations(&self.base).admit(&theta[..self.slots.base], dt)?;
         self.slots.check(theta, dt)
+    }
+
+    fn outliers(&self, theta: &[f64]) -> Vec<Outliers> {
+        let mut all = equations(&self.base).outliers(&theta[..self.slots.base]);
+        for slot in self.slots.with(Law::Outliers) {
+            let Some(own) = slot.effect.outliers(slot.m(theta)) else {
+                continue;
+            };
+            all.resize(self.outline.outputs.len(), Outliers::default());
+            let there = &mut all[slot.target];
+            // Both are rare: their probabilities add up, and the larger ones are seen.
+            there.probability += own.probability;
+            there.scale = there.scale.max(own.scale);
+        }
+        all
     }
 
     fn strike(&self, theta: &[f64], noise: Noise, outputs: &mut Record) {
