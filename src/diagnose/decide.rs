@@ -1,11 +1,12 @@
 //! From fitted explanations to an answer: named, a class of rivals, a pair, or none of these.
 
-use super::attribute::{Explanation, RIVALS, explanations};
+use super::attribute::{Explanation, RIVALS};
 use super::base_fit::ITERATIONS;
 use super::candidate::{Addition, Candidate};
 use super::dictionary::Dictionary;
 use super::fit::fit;
 use super::null::{Bench, Look};
+use super::pairs::best_pair;
 use super::problem::Problem;
 use super::result::Decision;
 use super::scales::Scales;
@@ -21,9 +22,6 @@ const UNEXPLAINED: f64 = 0.02;
 const WORTH_A_PAIR: f64 = 3.0;
 /// Nats that two effects must be ahead of a catch-all: so many pairs are tried that some imitate anything a little better.
 const PAIR_OVER_ANYTHING: f64 = 10.0;
-/// First effects, and second effects for each, that pairs are made of.
-const FIRSTS: usize = 2;
-const SECONDS: usize = 8;
 /// Least share of the free-run error that effects must take off where something is left unexplained.
 const GOOD_PART: f64 = 0.1;
 
@@ -217,21 +215,7 @@ pub(super) fn decide<'a>(
                 return Ok((answer, Some(step)));
             }
         }
-        // Two together.
-        let mut pairs: Vec<Step<'a>> = Vec::new();
-        let mut seconds = vec![(step, first_look)];
-        for other in listed.iter().skip(1).take(FIRSTS - 1) {
-            if let Some(step) = grown(setting, bench, &[], other)? {
-                let look = step.bench.own_look()?;
-                seconds.push((step, look));
-            }
-        }
-        for (step, look) in &seconds {
-            let Some(look) = look else { continue };
-            pairs.extend(best_pair(setting, step, look, stage)?);
-        }
-        pairs.sort_by(|a, b| b.score.total_cmp(&a.score));
-        if let Some(pair) = pairs.into_iter().next()
+        if let Some(pair) = best_pair(setting, bench, &listed, (step, first_look), stage)?
             && pair.score > first.score() + WORTH_A_PAIR
             && !beaten(
                 pair.score - PAIR_OVER_ANYTHING,
@@ -321,36 +305,5 @@ fn improves(
     Ok(before.zip(after).is_some_and(|(before, after)| {
         let (_, interval) = closed(&before, &after, 0.0, noise.child("improves"));
         interval.is_some_and(|[low, _]| low > GOOD_PART)
-    }))
-}
-
-/// The best second effect beside a first one, if it beats a catch-all beside the first.
-fn best_pair<'a>(
-    setting: &Setting<'a>,
-    step: &Step<'a>,
-    look: &Look,
-    stage: &Stage,
-) -> Result<Option<Step<'a>>, DiagnoseError> {
-    let bench = &step.bench;
-    let candidates = &bench.dictionary.candidates;
-    let mut order: Vec<usize> = (0..candidates.len()).collect();
-    order.sort_by(|&a, &b| look.gains[b].total_cmp(&look.gains[a]));
-    let mut tried: Vec<usize> = (order.iter().copied())
-        .filter(|&c| candidates[c].is_listed())
-        .take(SECONDS)
-        .collect();
-    // And the catch-all that promises most.
-    tried.extend(order.iter().copied().find(|&c| !candidates[c].is_listed()));
-    let found = explanations(bench, look, setting.validation, Some(&tried), stage)?;
-    let Some(best) = found
-        .first()
-        .filter(|e| candidates[e.candidate].is_listed())
-    else {
-        return Ok(None);
-    };
-    let pair = grown(setting, bench, &step.accepted, best)?;
-    Ok(pair.map(|mut pair| {
-        pair.score += step.score;
-        pair
     }))
 }

@@ -7,7 +7,7 @@
 //! | are the innovations white? | `omnibus.rs` |
 //! | what all of that is where nothing is wrong | `null.rs` |
 //! | what a validation record says | `evalue.rs` |
-//! | fit the explanations, order them, accept, abstain | `frequency.rs`, `attribute.rs`, `decide.rs` |
+//! | fit the explanations, order them, accept, abstain | `frequency.rs`, `attribute.rs`, `decide.rs`, `pairs.rs` |
 //! | where, in the equations, in time, in the states | `localise.rs` |
 //! | how far, on held-out data | `shrink.rs` |
 //! | the kinds of gap | `verdict.rs` |
@@ -27,6 +27,7 @@ mod held_out;
 mod localise;
 mod null;
 mod omnibus;
+mod pairs;
 mod place;
 mod plan;
 mod problem;
