@@ -250,3 +250,22 @@ fn trial(row: &Row) -> String {
     ];
     row_of(&cells, 5)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::fixture::scorecards;
+
+    #[test]
+    fn the_page_stands_alone() {
+        let [full, empty] = scorecards();
+        for card in [&full, &empty] {
+            let page = scorecard_html(card);
+            assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>\n"));
+            assert!(!page.contains("src=") && !page.contains("href="));
+        }
+        let page = scorecard_html(&full);
+        assert!(page.matches("<svg").count() == 2 && page.contains("<td class=\"y\">1</td>"));
+        assert!(page.contains("<td>failed</td>"));
+    }
+}

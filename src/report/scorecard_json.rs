@@ -91,3 +91,20 @@ fn row(row: &Row) -> Value {
         "seconds": row.seconds,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::fixture::{scorecards, validator};
+
+    #[test]
+    fn full_and_empty_scorecards_keep_to_the_contract() {
+        for card in scorecards() {
+            let read: Value = serde_json::from_str(&scorecard_json(&card).to_string()).unwrap();
+            let complaints: Vec<String> = (validator("scorecard").iter_errors(&read))
+                .map(|error| format!("{}: {error}", error.instance_path))
+                .collect();
+            assert!(complaints.is_empty(), "{complaints:?}");
+        }
+    }
+}

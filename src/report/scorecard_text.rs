@@ -91,3 +91,18 @@ pub(super) fn rule(kind: Kind) -> &'static str {
         Kind::Absorbed => "no structural gap: parameters stand in for it",
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::fixture::scorecards;
+
+    #[test]
+    fn scores_stand_beside_their_intervals() {
+        let [full, empty] = scorecards();
+        let text = scorecard_text(&full);
+        assert!(text.contains("true effect on top"), "{text}");
+        assert!(text.contains("3 … 100 %"), "{text}");
+        assert!(scorecard_text(&empty).contains("0 withheld trials"));
+    }
+}

@@ -136,10 +136,8 @@ impl Row {
     /// The share closed that the answer states with an interval, beside that of the true system, where the answer is right.
     pub fn interval(&self) -> Option<([f64; 2], f64)> {
         let interval = self.outcome.as_ref()?.interval?;
-        (self.is_right() && !self.must_abstain())
-            .then_some(())
-            .and(self.share)
-            .map(|share| (interval, share))
+        let named = self.is_right() && !self.must_abstain();
+        Some((interval, self.share.filter(|_| named)?))
     }
 
     /// What was said, in one word or as `id@target`.
