@@ -137,7 +137,11 @@ impl<'a> Urn<'a> {
             return Ok(None);
         };
         let mut source = noise.source("truth");
-        let substeps = self.world.substeps[index(&mut source, self.world.substeps.len())];
+        let substeps = match kind {
+            // Far from the prior levels run low, where √h is steep and another step another system.
+            Kind::Outside => 1,
+            _ => self.world.substeps[index(&mut source, self.world.substeps.len())],
+        };
         let mut truth = Truth {
             trial,
             kind,

@@ -17,7 +17,7 @@ fn root(level: f64) -> f64 {
 
 /// ḣ₁ = −k₁√h₁ + k₄u, ḣ₂ = k₂√h₁ − k₃√h₂; each level takes N(0, 0.1²) a sample, y = h₂ + N(0, 0.15²), levels in [0, 10].
 ///
-/// Five steps a sample differ from one by less than the noise shows, so either may be drawn.
+/// With θ in the prior, five steps a sample differ from one by less than the noise shows, so either may be drawn.
 pub(super) const WORLD: World = World {
     twin: "tanks",
     state_names: ["h1", "h2"],
