@@ -1,5 +1,6 @@
 //! Files and folders that appear whole or not at all.
 
+use sha2::{Digest, Sha256};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -70,6 +71,12 @@ impl NewFolder {
         let _ = self.filling.keep();
         Ok(())
     }
+}
+
+/// SHA-256 of some bytes, in hexadecimal digits.
+pub fn sha256(bytes: &[u8]) -> String {
+    let digest = Sha256::digest(bytes);
+    digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// The folder that a path lies in.

@@ -18,6 +18,7 @@
 //! | compress records otherwise | [`feature::FeatureMap`], [`feature::FeatureRecipe`] |
 //! | shape the network | [`network::HeadArchitecture`] |
 //! | learn what a twin lacks | [`diagnose::diagnose`] |
+//! | try a diagnosis where the truth is sealed | [`withheld::Withheld`] |
 //! | add an effect that a twin lacks | [`effect`], [`twin::augment`] |
 //! | give a twin the whole command line | [`cli::run`] |
 //!
@@ -60,6 +61,8 @@ pub mod baseline;
 pub mod diagnose;
 
 pub mod experiment;
+pub mod withheld;
+
 pub mod report;
 
 pub mod cli;

@@ -12,7 +12,7 @@ const LAYERS: [&[&str]; 6] = [
         "twins", "effect", "bank", "gate", "refine", "sample", "study",
     ],
     &["two_stage", "baseline", "diagnose"],
-    &["experiment", "report"],
+    &["experiment", "withheld", "report"],
     &["cli"],
 ];
 

@@ -2,6 +2,7 @@
 
 use crate::experiment::Scenario;
 use crate::study::PresetName;
+use crate::withheld::Kind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::{Path, PathBuf};
 
@@ -58,6 +59,11 @@ pub(super) enum Command {
     /// Run i depends on the seed and i alone. Records run in parallel, each on its share of the threads: for times of one
     /// core, say --threads 1.
     Reproduce(ReproduceArguments),
+    /// Score `diagnose` on trials whose truth is sealed: false alarms, detection, which effect, where, when to abstain.
+    ///
+    /// Records come from simulators written apart from the twins. The SHA-256 of the key file is printed before the first
+    /// diagnosis; keys are read once every answer is there. What each score means: docs/withheld.md.
+    Withheld(WithheldArguments),
     /// Calibrate a twin to an embedded record, in seconds, to see what it looks like.
     Demo(DemoArguments),
 }
@@ -72,6 +78,7 @@ impl Command {
             Self::Pretrain(options) => &options.subject,
             Self::Diagnose(options) => &options.subject,
             Self::Reproduce(options) => &options.subject,
+            Self::Withheld(options) => &options.subject,
         };
         subject.study.as_deref()
     }
@@ -250,6 +257,37 @@ pub(super) struct ReproduceArguments {
     /// A folder for the results: a new one, or one of this very call to go on with.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "DIR holds scorecard.json (as --json), scorecard.html, and what it takes to go on: manifest.json, seal.txt,\n\
+        keys.json, records, answers. Interrupted, the same call goes on where it stopped; another call is refused."
+)]
+pub(super) struct WithheldArguments {
+    #[command(flatten)]
+    pub subject: Subject,
+    /// Records.
+    #[arg(long, value_parser = at_least_one)]
+    pub trials: usize,
+    /// A folder for the trials: a new one, or one of this very call to go on with.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Kinds of truth; all unless given.
+    #[arg(long, value_name = "KIND,..", value_delimiter = ',', value_parser = kind)]
+    pub kinds: Option<Vec<Kind>>,
+    /// Take the true effects out of the library: where there is one, the right answer is to abstain.
+    #[arg(long)]
+    pub without: bool,
+    /// Give each diagnosis a second record.
+    #[arg(long)]
+    pub validation: bool,
+}
+
+/// A kind of truth.
+fn kind(text: &str) -> Result<Kind, String> {
+    let known = || Kind::ALL.map(Kind::id).join(", ");
+    Kind::named(text).ok_or_else(|| format!("kinds are {}", known()))
 }
 
 /// A number of runs.

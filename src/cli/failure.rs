@@ -14,6 +14,7 @@ use crate::twin::{
     SimulationError,
 };
 use crate::two_stage::{EstimateError, EstimatorFileError, PretrainError};
+use crate::withheld::WithheldError;
 use std::fmt::Display;
 use std::path::Path;
 use std::process::ExitCode;
@@ -128,6 +129,23 @@ macro_rules! studies {
     };
 }
 studies!(FeatureError, PlanError, StudyError);
+
+impl From<WithheldError> for Failure {
+    fn from(error: WithheldError) -> Self {
+        match error {
+            WithheldError::Diagnose(error) => error.into(),
+            WithheldError::Threads(_) | WithheldError::Cancelled(_) => Self::internal(error),
+            WithheldError::Changed(_)
+            | WithheldError::NoEffect(_)
+            | WithheldError::Runaway(_)
+            | WithheldError::Plan(_) => Self {
+                about_study: true,
+                ..Self::user(error)
+            },
+            _ => Self::user(error),
+        }
+    }
+}
 
 impl From<NetworkError> for Failure {
     fn from(error: NetworkError) -> Self {

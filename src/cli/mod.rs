@@ -29,6 +29,7 @@ mod progress;
 mod reproduce;
 mod simulate;
 mod twins;
+mod withheld;
 
 use crate::progress::Progress;
 use crate::study::{Study, StudyError, StudyFile};
@@ -105,6 +106,7 @@ fn dispatch(arguments: &Arguments, studies: &[Study]) -> Result<ExitCode, Failur
         Command::Estimate(options) => estimate::run(&context, options),
         Command::Diagnose(options) => diagnose::run(&context, options),
         Command::Reproduce(options) => reproduce::run(&context, options),
+        Command::Withheld(options) => withheld::run(&context, options),
         Command::Demo(options) => demo::run(&context, options),
     };
     result.map_err(|failure| failure.of_study(arguments.command.study()))

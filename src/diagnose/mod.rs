@@ -11,6 +11,7 @@
 //! | where, in the equations, in time, in the states | `localise.rs` |
 //! | how far, on held-out data | `shrink.rs` |
 //! | the kinds of gap | `verdict.rs` |
+//! | what a known effect would gain, for trials | `gain.rs` |
 //!
 //! See docs/diagnosing-a-gap.md for the mathematics and how to read the answer.
 
@@ -23,6 +24,7 @@ mod dictionary;
 mod evalue;
 mod fit;
 mod frequency;
+mod gain;
 mod held_out;
 mod localise;
 mod null;
@@ -39,6 +41,7 @@ mod shrink;
 mod variant;
 mod verdict;
 
+pub use gain::gain_of;
 pub use result::{
     Decision, Detection, Diagnosis, EffectFit, FittedNuisance, FittedParameter, FreeRuns, Region,
     TargetShare, Verdict, Where, Which, Window,

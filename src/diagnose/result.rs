@@ -2,9 +2,11 @@
 
 use super::shrink::Shrinkage;
 use crate::twin::{Interval, Signal};
+use serde::{Deserialize, Serialize};
 
 /// Which kind of gap there is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// The twin explains the record with parameters within the prior.
     NoGap,
@@ -26,7 +28,8 @@ impl Verdict {
 }
 
 /// What is said about causes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Decision {
     /// One effect, or an accepted pair.
     Named,

@@ -214,7 +214,7 @@ pub fn diagnose(
     })
 }
 
-fn check(
+pub(super) fn check(
     study: &Study,
     records: &[Record],
     validation: Option<&Record>,
@@ -270,7 +270,7 @@ fn check(
 }
 
 /// Whether no state of the twin is noisy, with any noise level that the study leaves open.
-fn without_process_noise(twin: &dyn StateSpace, record: &Record) -> bool {
+pub(super) fn without_process_noise(twin: &dyn StateSpace, record: &Record) -> bool {
     let outline = twin.outline();
     let theta = outline.parameters.centre();
     let drive = record.drive();

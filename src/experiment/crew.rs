@@ -1,7 +1,6 @@
 //! Pieces of work on all cores, each with cores of its own.
 
-use super::MonteCarloError;
-use rayon::ThreadPoolBuilder;
+use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Does `work` on every item, in parallel; the results are in no order.
@@ -9,10 +8,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// The current pool's threads are shared out to workers, each a pool of its own: work that is itself parallel neither
 /// waits for nor takes up another item, so that its wall-clock time is its own. The first error stops the others at
 /// their next item.
-pub(super) fn share_out<T: Send>(
+pub(crate) fn share_out<T: Send, E: Send + From<ThreadPoolBuildError>>(
     items: &[usize],
-    work: impl Fn(usize) -> Result<T, MonteCarloError> + Sync,
-) -> Result<Vec<T>, MonteCarloError> {
+    work: impl Fn(usize) -> Result<T, E> + Sync,
+) -> Result<Vec<T>, E> {
     let threads = rayon::current_num_threads();
     let workers = threads.min(items.len());
     let next = AtomicUsize::new(0);
@@ -52,6 +51,7 @@ pub(super) fn share_out<T: Send>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiment::MonteCarloError;
     use crate::progress::Cancelled;
 
     #[test]
@@ -59,7 +59,10 @@ mod tests {
         for threads in [1, 3, 16] {
             let pool = ThreadPoolBuilder::new().num_threads(threads).build();
             let mut done = pool.unwrap().install(|| {
-                share_out(&[4, 5, 6, 7, 8], |i| Ok((i, rayon::current_num_threads()))).unwrap()
+                share_out(&[4, 5, 6, 7, 8], |i| {
+                    Ok::<_, MonteCarloError>((i, rayon::current_num_threads()))
+                })
+                .unwrap()
             });
             done.sort_unstable();
             let items: Vec<usize> = done.iter().map(|d| d.0).collect();
@@ -67,14 +70,14 @@ mod tests {
             let most = threads.div_ceil(threads.min(5));
             assert!(done.iter().all(|d| (1..=most).contains(&d.1)), "{done:?}");
         }
-        assert!(share_out(&[], Ok).unwrap().is_empty());
+        assert!(share_out(&[], Ok::<_, MonteCarloError>).unwrap().is_empty());
     }
 
     #[test]
     fn an_error_ends_the_work() {
         let begun = AtomicUsize::new(0);
         let items: Vec<usize> = (0..1000).collect();
-        let result = share_out(&items, |_| -> Result<(), _> {
+        let result = share_out(&items, |_| -> Result<(), MonteCarloError> {
             begun.fetch_add(1, Ordering::Relaxed);
             Err(Cancelled.into())
         });

@@ -1,10 +1,10 @@
 //! What a folder of runs is about: what another call must say to go on with it.
 
 use super::{MonteCarlo, StoreError};
+use crate::files::sha256;
 use crate::study::{InputPlan, Study};
 use crate::two_stage::PretrainOptions;
 use serde_json::{Map, Value, json};
-use sha2::{Digest, Sha256};
 use std::path::Path;
 
 /// Layout of the folder; raised when it changes.
@@ -78,17 +78,22 @@ impl Manifest {
 
     /// What `found` says otherwise, in words; `None` where both say the same.
     pub(super) fn differs(&self, found: &Self) -> Option<String> {
-        let keys = self.0.keys().chain(found.0.keys());
-        keys.map(|key| (key, found.0.get(key), self.0.get(key)))
-            .find(|(_, there, here)| there != here)
-            .map(|(key, there, here)| {
-                let (there, here) = (shown(there), shown(here));
-                match there.chars().count().max(here.chars().count()) <= SHORT {
-                    true => format!("{key} was {there}, now it is {here}"),
-                    false => format!("{key} was another"),
-                }
-            })
+        difference(&self.0, &found.0)
     }
+}
+
+/// The first thing that `there` says otherwise than `here`, in words; `None` where both say the same.
+pub(crate) fn difference(here: &Map<String, Value>, there: &Map<String, Value>) -> Option<String> {
+    let keys = here.keys().chain(there.keys());
+    keys.map(|key| (key, there.get(key), here.get(key)))
+        .find(|(_, there, here)| there != here)
+        .map(|(key, there, here)| {
+            let (there, here) = (shown(there), shown(here));
+            match there.chars().count().max(here.chars().count()) <= SHORT {
+                true => format!("{key} was {there}, now it is {here}"),
+                false => format!("{key} was another"),
+            }
+        })
 }
 
 /// Also where the layout is another version's.
@@ -108,8 +113,7 @@ fn shown(value: Option<&Value>) -> String {
 /// SHA-256 of a file, in hexadecimal digits.
 fn checksum(path: &Path) -> Result<String, StoreError> {
     let bytes = std::fs::read(path).map_err(|error| StoreError::io(path, error))?;
-    let digest = Sha256::digest(&bytes);
-    Ok(digest.iter().map(|byte| format!("{byte:02x}")).collect())
+    Ok(sha256(&bytes))
 }
 
 #[cfg(test)]

@@ -9,10 +9,10 @@
 //! | draw what the answers predict | [`FreeRuns`], [`MeanRuns`] |
 //! | have a twin's test points, invariants, published figures | [`Benchmark`] |
 
-mod crew;
+pub(crate) mod crew;
 mod free_runs;
 mod invariant;
-mod manifest;
+pub(crate) mod manifest;
 mod method;
 mod monte_carlo;
 mod paper;

@@ -102,7 +102,7 @@ impl MonteCarlo {
                 store.keep(&done)?;
             }
             stage.tick()?;
-            Ok(done)
+            Ok::<_, MonteCarloError>(done)
         })?);
         runs.sort_by_key(|run| run.run);
         match runs.iter().all(|run| run.failure.is_some()) {

@@ -24,7 +24,8 @@ mod text;
 mod ticks;
 
 use axes::{Axes, Frame};
-use text::{BOLD, clipped, escaped, text, width};
+pub(super) use text::escaped;
+use text::{BOLD, clipped, text, width};
 use ticks::{Ticks, padded};
 
 /// Width in user units: narrow, so that text is still legible on a phone.

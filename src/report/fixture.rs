@@ -1,11 +1,12 @@
 //! Estimates that the tests of this module render: a small estimator of the oscillator, really trained.
 
-use crate::diagnose::{DiagnoseSettings, Diagnosis, diagnose};
+use crate::diagnose::{Decision, DiagnoseSettings, Diagnosis, Verdict, diagnose};
 use crate::progress::Progress;
 use crate::study::{RecordPlan, Study, StudyFile};
 use crate::twin::{Noise, Record};
 use crate::twins::VanDerPol;
 use crate::two_stage::{Estimate, EstimateOptions, PretrainOptions, pretrain};
+use crate::withheld::{Kind, Named, Outcome, Row, Scorecard};
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -117,4 +118,53 @@ fn make() -> Estimates {
         kept,
         refined,
     }
+}
+
+/// A scorecard with a right answer and a failure, and one of no trials.
+pub(super) fn scorecards() -> [Scorecard; 2] {
+    let named = Row {
+        trial: 0,
+        kind: Kind::Listed,
+        truth: "sensor-lag@sensor".into(),
+        right: vec!["sensor-lag@sensor".into()],
+        effects: vec!["sensor-lag@sensor".into()],
+        targets: vec!["sensor".into()],
+        strength: Some(0.7),
+        gain: Some(30.0),
+        share: Some(0.9),
+        outcome: Some(Outcome {
+            verdict: Verdict::StructuralGap,
+            p_value: 0.02,
+            decision: Decision::Named,
+            target: Some("sensor".into()),
+            effects: vec![Named {
+                key: "sensor-lag@sensor".into(),
+                probability: 0.9,
+                gain: 30.0,
+            }],
+            accepted: vec!["sensor-lag@sensor".into()],
+            class: vec!["sensor-lag@sensor".into()],
+            before: Some(0.5),
+            floor: Some(0.1),
+            closed: Some(0.9),
+            interval: Some([0.8, 1.0]),
+        }),
+        failure: None,
+        seconds: 1.5,
+    };
+    let failed = Row {
+        trial: 1,
+        kind: Kind::None,
+        truth: "none".into(),
+        right: vec![],
+        effects: vec![],
+        targets: vec![],
+        strength: None,
+        gain: None,
+        share: None,
+        outcome: None,
+        failure: Some("no fit".into()),
+        ..named.clone()
+    };
+    [vec![named, failed], vec![]].map(|rows| Scorecard::new("tanks", 1, 0.05, "abc", rows))
 }

@@ -7,6 +7,7 @@
 //! | hand on, or show, what a twin lacks | [`gap_json`], [`gap_text`], [`gap_html`] |
 //! | see the twin beside the record | [`overlay_svg`] |
 //! | hand on, print or draw the scores of many records | [`reproduce_json`], [`reproduce_text`], [`mean_runs_svg`], [`first_run_svg`] |
+//! | hand on, print or show the scores of withheld trials | [`scorecard_json`], [`scorecard_text`], [`scorecard_html`] |
 //! | draw any other lines | [`chart`] |
 
 pub mod chart;
@@ -24,6 +25,9 @@ mod reproduce_json;
 #[cfg(test)]
 mod reproduce_tests;
 mod reproduce_text;
+mod scorecard_html;
+mod scorecard_json;
+mod scorecard_text;
 mod table;
 mod trajectories;
 
@@ -36,4 +40,7 @@ pub use overlay::overlay_svg;
 pub use reproduce_figures::{first_run_svg, mean_runs_svg};
 pub use reproduce_json::reproduce_json;
 pub use reproduce_text::reproduce_text;
+pub use scorecard_html::scorecard_html;
+pub use scorecard_json::scorecard_json;
+pub use scorecard_text::scorecard_text;
 pub use trajectories::trajectories_csv;

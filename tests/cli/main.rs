@@ -2,6 +2,7 @@
 
 mod diagnose;
 mod reproduce;
+mod withheld;
 
 use std::fs;
 use std::path::{Path, PathBuf};

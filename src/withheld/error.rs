@@ -1,0 +1,113 @@
+//! Why there is no scorecard.
+
+use super::world::World;
+use crate::diagnose::DiagnoseError;
+use crate::files::{folder, with_remedy};
+use crate::progress::Cancelled;
+use crate::study::PlanError;
+use crate::twin::{CsvError, DriveError, RecordError};
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why there is no scorecard.
+#[derive(Debug, thiserror::Error)]
+pub enum WithheldError {
+    /// There is no world of this twin.
+    #[error(
+        "withheld trials need a world written apart from the twin, and there is none of {0}; choose {known}",
+        known = World::known().join(" or ")
+    )]
+    NoWorld(String),
+    /// The study has changed the twin.
+    #[error(
+        "withheld trials are of the twin as it is, and the study changes {0}; keep to [record], [prior], [bounds] and [library]"
+    )]
+    Changed(&'static str),
+    /// No trials, or no kinds.
+    #[error("no {0}; ask for at least one")]
+    Nothing(&'static str),
+    /// A kind that needs effects, in a study without.
+    #[error(
+        "kind {0}: [library] leaves none of the effects that such trials need; allow more effects, or choose other --kinds"
+    )]
+    NoEffect(&'static str),
+    /// No truth could be drawn whose record does not run away.
+    #[error(
+        "trial {0}: no record could be made that does not run away; narrow [prior] and [bounds]"
+    )]
+    Runaway(usize),
+    /// Something cannot be read or written.
+    #[error("{}: {}", path.display(), with_remedy(error))]
+    Io {
+        /// File or folder.
+        path: PathBuf,
+        /// What the system said.
+        error: io::Error,
+    },
+    /// There is no place for the folder.
+    #[error("{}: the folder {} does not exist; make it first", path.display(), folder(path).display())]
+    Place {
+        /// Folder.
+        path: PathBuf,
+    },
+    /// The path is taken by something else.
+    #[error(
+        "{} exists already and is no folder of `withheld`; choose another --out, or remove it",
+        path.display()
+    )]
+    Foreign {
+        /// Folder.
+        path: PathBuf,
+    },
+    /// The folder is of another call.
+    #[error(
+        "{} holds trials of another call: {difference}; repeat that call to go on with it, or choose another --out",
+        path.display()
+    )]
+    Other {
+        /// Folder.
+        path: PathBuf,
+        /// What is different.
+        difference: String,
+    },
+    /// A file of the folder that this program did not write.
+    #[error("{}: cannot be used ({reason}); {remedy}", path.display())]
+    Damaged {
+        /// File.
+        path: PathBuf,
+        /// What does not fit.
+        reason: String,
+        /// What can be done.
+        remedy: &'static str,
+    },
+    /// Of the input.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// Of the input.
+    #[error(transparent)]
+    Drive(#[from] DriveError),
+    /// Of a record.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// Of a record's file.
+    #[error(transparent)]
+    Csv(#[from] CsvError),
+    /// Of a diagnosis that no trial can have.
+    #[error(transparent)]
+    Diagnose(#[from] DiagnoseError),
+    /// No threads.
+    #[error("no threads could be started: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+    /// Stopped from outside.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl WithheldError {
+    pub(super) fn io(path: &Path, error: io::Error) -> Self {
+        Self::Io {
+            path: path.into(),
+            error,
+        }
+    }
+}

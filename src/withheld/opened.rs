@@ -1,0 +1,87 @@
+//! What the opened key adds to a trial: how clear the true effect is, and how far it closes the gap.
+
+use super::WithheldError;
+use super::answer::Outcome;
+use super::truth::{Truth, Urn};
+use crate::diagnose::{DiagnoseError, DiagnoseSettings, gain_of};
+use crate::progress::Progress;
+use crate::twin::{Noise, Record};
+use serde::{Deserialize, Serialize};
+
+/// The true effect on the trial's record.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Opened {
+    pub trial: usize,
+    /// Nats that the true effects gain when the diagnoser fits them; none where they are not listed or cannot be fitted.
+    pub gain: Option<f64>,
+    /// (before − after)/(before − floor) of the held-out data, `after` being the free run of the world itself; none where
+    /// the diagnosis gave no share.
+    pub share: Option<f64>,
+}
+
+impl Opened {
+    /// Fits the true effects to the records, and runs the world without noise beside the held-out one.
+    pub fn of(
+        urn: &Urn<'_>,
+        truth: &Truth,
+        outcome: Option<&Outcome>,
+        record: Record,
+        validation: Option<&Record>,
+        settings: &DiagnoseSettings,
+        progress: &Progress,
+    ) -> Result<Self, WithheldError> {
+        let share = match outcome {
+            Some(outcome) => share(urn, truth, outcome, &record, validation)?,
+            None => None,
+        };
+        let gain = match truth.kind.is_structural() && !truth.effects.is_empty() {
+            true => match gain_of(
+                urn.study(),
+                &[record],
+                validation,
+                &truth.effects,
+                settings,
+                progress,
+            ) {
+                Ok(gain) => gain,
+                Err(error @ DiagnoseError::Cancelled(_)) => return Err(error.into()),
+                // Said of the answer already.
+                Err(_) => None,
+            },
+            false => None,
+        };
+        Ok(Self {
+            trial: truth.trial,
+            gain,
+            share,
+        })
+    }
+}
+
+/// The share that the world's own free run closes, on the data that the diagnosis held out.
+fn share(
+    urn: &Urn<'_>,
+    truth: &Truth,
+    outcome: &Outcome,
+    record: &Record,
+    validation: Option<&Record>,
+) -> Result<Option<f64>, WithheldError> {
+    let (Some(before), Some(floor), Some(_)) = (outcome.before, outcome.floor, outcome.interval)
+    else {
+        return Ok(None);
+    };
+    let (held_out, from) = match validation {
+        Some(record) => (record, 0),
+        None => (record, 2 * record.samples() / 3),
+    };
+    let free = urn.record(truth, held_out.drive().clone(), Noise::OFF)?;
+    Ok(free.map(|free| {
+        let (y, free) = (held_out.outputs(), free.outputs());
+        let squares: f64 = (from..y.nrows())
+            .map(|k| (y[[k, 0]] - free[[k, 0]]).powi(2))
+            .sum();
+        let after = (squares / (y.nrows() - from) as f64).sqrt() / y.std(0.0);
+        (before - after) / (before - floor)
+    }))
+}

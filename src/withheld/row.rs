@@ -1,0 +1,152 @@
+//! One trial with its key opened: what was there, what was said, and whether that is right.
+
+use super::Kind;
+use super::answer::{Answer, Outcome};
+use super::opened::Opened;
+use super::truth::Truth;
+
+/// Nats from which on an effect is clear: it cannot be overlooked by chance.
+const CLEAR: f64 = 12.0;
+
+/// One trial with its key opened.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// From 0.
+    pub trial: usize,
+    /// Kind of truth.
+    pub kind: Kind,
+    /// What was there: `none`, `id@target`, two of them, or the name of something unlisted.
+    pub truth: String,
+    /// Listed effects that are right answers; none where the right answer is to abstain, or that nothing is wrong.
+    pub right: Vec<String>,
+    /// Effects that all have to be accepted.
+    pub effects: Vec<String>,
+    /// Where the twin is wrong.
+    pub targets: Vec<String>,
+    /// From 0, hardly visible, to 1, obvious; of a pair, that of the weaker effect.
+    pub strength: Option<f64>,
+    /// Nats that the true effects gain when the diagnoser fits them.
+    pub gain: Option<f64>,
+    /// The share of the gap that the true system closes on the held-out data.
+    pub share: Option<f64>,
+    /// What was said; none where the diagnosis failed.
+    pub outcome: Option<Outcome>,
+    /// Why there is nothing.
+    pub failure: Option<String>,
+    /// Wall-clock seconds of the diagnosis.
+    pub seconds: f64,
+}
+
+impl Row {
+    /// Of a truth, an answer and what the key added; `without`: the true effects were not in the library.
+    pub(super) fn new(truth: &Truth, answer: &Answer, opened: &Opened, without: bool) -> Self {
+        let right = match truth.kind.is_structural() {
+            true => (truth.right.iter())
+                .filter(|key| !(without && truth.effects.contains(key)))
+                .cloned()
+                .collect(),
+            false => vec![],
+        };
+        let named = match &truth.unlisted {
+            Some(name) => format!("{name}@{}", truth.targets.join(" + ")),
+            None => truth.effects.join(" + "),
+        };
+        Self {
+            trial: truth.trial,
+            kind: truth.kind,
+            truth: match named.is_empty() {
+                true => truth.kind.id().into(),
+                false => named,
+            },
+            right,
+            effects: truth.effects.clone(),
+            targets: truth.targets.clone(),
+            strength: truth.strength,
+            gain: opened.gain,
+            share: opened.share,
+            outcome: answer.outcome.clone(),
+            failure: answer.failure.clone(),
+            seconds: answer.seconds,
+        }
+    }
+
+    /// Whether a structural gap was found.
+    pub fn called(&self) -> bool {
+        self.outcome.as_ref().is_some_and(Outcome::is_structural)
+    }
+
+    /// Whether a structural gap was found, and none of the listed effects.
+    pub fn abstained(&self) -> bool {
+        self.outcome.as_ref().is_some_and(Outcome::abstains)
+    }
+
+    /// Whether the truth is a gap that no effect of the trial's library describes.
+    pub fn must_abstain(&self) -> bool {
+        self.kind.is_structural() && self.right.is_empty()
+    }
+
+    /// Whether the truth is one effect that the trial's library has, and no double of it counts.
+    pub fn is_single(&self) -> bool {
+        matches!(self.kind, Kind::Listed | Kind::Parametrised) && !self.right.is_empty()
+    }
+
+    /// Whether the true effects gain more than chance could.
+    pub fn is_clear(&self) -> bool {
+        self.gain.is_some_and(|gain| gain > CLEAR)
+    }
+
+    /// Whether the effect on top is a true one.
+    pub fn top_is_right(&self) -> bool {
+        let top = self.outcome.as_ref().and_then(Outcome::top);
+        top.is_some_and(|top| self.right.contains(&top.key))
+    }
+
+    /// Whether the true effect is in the class.
+    pub fn class_is_right(&self) -> bool {
+        let class = self.outcome.as_ref().map(|o| &o.class);
+        class.is_some_and(|class| self.right.iter().any(|key| class.contains(key)))
+    }
+
+    /// Whether the place that is named is the true one.
+    pub fn place_is_right(&self) -> bool {
+        let target = self.outcome.as_ref().and_then(|o| o.target.as_ref());
+        target.is_some_and(|target| self.targets.contains(target))
+    }
+
+    /// Whether every true effect, and nothing else, was accepted.
+    pub fn accepted_are_right(&self) -> bool {
+        let accepted = self.outcome.as_ref().map(|o| &o.accepted);
+        accepted.is_some_and(|accepted| {
+            accepted.len() == self.effects.len()
+                && self.effects.iter().all(|key| accepted.contains(key))
+        })
+    }
+
+    /// Whether the answer is right by the rule of its kind.
+    pub fn is_right(&self) -> bool {
+        match self.kind {
+            Kind::None | Kind::Outside | Kind::Absorbed => self.outcome.is_some() && !self.called(),
+            _ if self.must_abstain() => self.abstained(),
+            Kind::Pair => self.accepted_are_right(),
+            Kind::Confounded => self.class_is_right(),
+            _ => self.called() && !self.abstained() && self.top_is_right(),
+        }
+    }
+
+    /// The share closed that the answer states with an interval, beside that of the true system, where the answer is right.
+    pub fn interval(&self) -> Option<([f64; 2], f64)> {
+        let interval = self.outcome.as_ref()?.interval?;
+        let named = self.is_right() && !self.must_abstain();
+        Some((interval, self.share.filter(|_| named)?))
+    }
+
+    /// What was said, in one word or as `id@target`.
+    pub fn answer(&self) -> String {
+        match &self.outcome {
+            None => "failed".into(),
+            Some(o) if !o.is_structural() => o.verdict.id().into(),
+            Some(o) if o.accepted.is_empty() => o.decision.id().into(),
+            Some(o) => o.accepted.join(" + "),
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! `withheld` as a user meets it.
+
+use super::{done, json, refused};
+use std::fs;
+use std::path::Path;
+
+#[test]
+fn a_few_sealed_trials_are_scored_kept_and_refused_to_another_call() {
+    let name = format!("withheld-{}", std::process::id());
+    let place = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    fs::create_dir_all(&place).unwrap();
+    let out = place.join("trials").display().to_string();
+    let call = |seed: &'static str| {
+        [
+            "withheld",
+            "--twin",
+            "van-der-pol",
+            "--trials",
+            "2",
+            "--kinds",
+            "none,outside",
+            "--out",
+            &out,
+        ]
+        .map(str::to_owned)
+        .into_iter()
+        .chain(["--seed".to_owned(), seed.to_owned()])
+        .collect::<Vec<String>>()
+    };
+    fn words(call: &[String]) -> Vec<&str> {
+        call.iter().map(String::as_str).collect()
+    }
+    let (first, other) = (call("5"), call("6"));
+    let text = done(&words(&first));
+    assert!(
+        text.contains("2 withheld trials") && text.contains("false alarms"),
+        "{text}"
+    );
+    let path = place.join("trials/scorecard.json");
+    let written = fs::read_to_string(&path).unwrap();
+    let printed = json(&[&words(&first)[..], &["--json", "--threads", "1"]].concat());
+    assert_eq!(
+        printed,
+        serde_json::from_str::<serde_json::Value>(&written).unwrap()
+    );
+    assert_eq!(
+        fs::read_to_string(&path).unwrap(),
+        written,
+        "kept trials give the same bytes"
+    );
+    assert_eq!(printed["schema"], "truetwin.scorecard/1");
+    assert_eq!(printed["false_alarms"]["of"], 2);
+    let seal = fs::read_to_string(place.join("trials/seal.txt")).unwrap();
+    assert_eq!(printed["seal"], seal.trim());
+    assert!(place.join("trials/scorecard.html").exists());
+    refused(
+        &words(&other),
+        &["seed was 5, now it is 6", "choose another --out"],
+    );
+    let strange = [
+        "withheld",
+        "--twin",
+        "van-der-pol",
+        "--trials",
+        "2",
+        "--out",
+        &out,
+    ];
+    refused(
+        &[&strange[..], &["--kinds", "odd"]].concat(),
+        &["kinds are none, outside"],
+    );
+    refused(
+        &[
+            "withheld",
+            "--twin",
+            "van-der-pol",
+            "--trials",
+            "0",
+            "--out",
+            &out,
+        ],
+        &["at least 1"],
+    );
+    fs::remove_dir_all(place).unwrap();
+}
