@@ -44,6 +44,7 @@ pub fn gain_of(
     let setting = Setting {
         twin,
         validation: validation.as_deref(),
+        together: None,
         follows: without_process_noise(equations, &records[0]),
     };
     let axes: Vec<Axis> = twin.parameters().iter().map(Axis::of).collect();
