@@ -5,8 +5,8 @@ use crate::twin::Mark;
 /// Equal values at an end that noise does not bring about, and how many times more often than a usual value they come.
 const TIES: usize = 4;
 const OFTEN: usize = 3;
-/// Samples for each distinct value, at least, where outputs are rounded coarsely.
-const REPEATS: usize = 4;
+/// Samples for each multiple of the step within the signal's range, at least, where outputs are rounded coarsely.
+const REPEATS: f64 = 2.0;
 /// How far from a multiple of the step a rounded value may lie, in steps.
 const TOLERANCE: f64 = 0.01;
 
@@ -51,12 +51,16 @@ pub(super) fn clipped(outputs: &[f64]) -> Mark {
 /// Of rounding, as its step: few distinct values, all multiples of the least distance between two.
 pub(super) fn rounded(outputs: &[f64]) -> Mark {
     let values = distinct(outputs);
-    if values.len() < 2 || values.len() * REPEATS > outputs.len() {
+    if values.len() < 2 {
         return Mark::Absent;
     }
     let step = (values.windows(2))
         .map(|w| w[1].0 - w[0].0)
         .fold(f64::INFINITY, f64::min);
+    let steps = (values[values.len() - 1].0 - values[0].0) / step;
+    if REPEATS * steps > outputs.len() as f64 {
+        return Mark::Absent;
+    }
     let off = |v: f64| (v / step - (v / step).round()).abs();
     match values.iter().all(|(v, _)| off(*v) <= TOLERANCE) {
         true => Mark::Present(vec![step]),

@@ -182,10 +182,14 @@ impl<S: Size> Update<S> {
             let variance: f64 = values()
                 .map(|(v, (_, weight))| weight * (v - mean).powi(2))
                 .sum();
-            let missed = (variance - slope * slope).max(0.0);
-            let slope = slope / covariance[j * p + j].sqrt();
-            noise[j] += missed;
             innovation[j] = row.y[j] - mean;
+            if variance == 0.0 && innovation[j] != 0.0 {
+                // A step wider than what was expected, and another one was read: the signal is beside an edge.
+                noise[j] += innovation[j] * innovation[j];
+                continue;
+            }
+            noise[j] += (variance - slope * slope).max(0.0);
+            let slope = slope / covariance[j * p + j].sqrt();
             for output in outputs.iter_mut().skip(j).step_by(p) {
                 *output *= slope;
             }
