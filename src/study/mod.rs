@@ -291,17 +291,22 @@ impl Study {
         unknown.map_or(Ok(()), |name| Err(StudyError::Library(name.clone())))
     }
 
-    /// What the twin may lack, each once for each target, all magnitudes free: the library's effects and the study's own,
-    /// as `[library]` says.
+    /// The library's effects and the study's own, each once for each target of this twin, all magnitudes free.
+    pub fn effects(&self) -> Effects {
+        let library = crate::effect::applicable(self.twin.as_ref());
+        (library.into_iter())
+            .chain(self.own_effects.iter().cloned())
+            .collect()
+    }
+
+    /// What the twin may lack: those of [`Study::effects`] that `[library]` lets through.
     pub fn candidates(&self) -> Effects {
         let Library { only, without } = &self.file.library;
         let named = |list: &[String], effect: &Arc<dyn UnmodelledEffect>| {
             let id = effect.typetag_name();
             (list.iter()).any(|n| n == id || *n == format!("{id}@{}", effect.target()))
         };
-        let library = crate::effect::applicable(self.twin.as_ref());
-        (library.into_iter())
-            .chain(self.own_effects.iter().cloned())
+        (self.effects().into_iter())
             .filter(|effect| only.is_empty() || named(only, effect))
             .filter(|effect| !named(without, effect))
             .collect()

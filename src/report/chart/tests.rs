@@ -1,3 +1,4 @@
+use super::text::BOLD;
 use super::*;
 
 fn chart(panels: usize, lines: usize, samples: usize) -> Chart {

@@ -42,7 +42,7 @@ pub(super) fn clipped(text: &str, size: f64, room: f64) -> String {
 }
 
 /// Text that XML reads as text; characters that XML has no place for are left out.
-pub(super) fn escaped(text: &str) -> String {
+pub(in crate::report) fn escaped(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
