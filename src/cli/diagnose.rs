@@ -40,7 +40,7 @@ pub(super) fn run(context: &Context<'_>, options: &DiagnoseArguments) -> Result<
         let path = match error.record() {
             Some(GivenRecord::Validation) => options.validation.as_ref(),
             Some(GivenRecord::Measured(index)) => options.records.get(index),
-            None => options.records.first(),
+            None => None,
         };
         let failure = Failure::from(error);
         match path {

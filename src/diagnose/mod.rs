@@ -133,7 +133,9 @@ pub enum DiagnoseError {
         remedy: &'static str,
     },
     /// An effect to leave out that there is not.
-    #[error("--without names {0}, which is no effect; `truetwin effects --twin T` lists them")]
+    #[error(
+        "--without names {0}, which is no effect of this twin; `truetwin effects --twin T` lists them"
+    )]
     Without(String),
     /// The filter works nowhere.
     #[error(
@@ -141,7 +143,7 @@ pub enum DiagnoseError {
     )]
     NoFit,
     /// Channels that are not the twin's.
-    #[error("{record}: {error}")]
+    #[error("{record} is not of this twin: {error}")]
     Channels {
         /// Which.
         record: GivenRecord,
@@ -175,6 +177,7 @@ impl DiagnoseError {
             Self::Steps { record, .. }
             | Self::TooShort { record, .. }
             | Self::Channels { record, .. } => Some(*record),
+            Self::NoFit => Some(GivenRecord::Measured(0)),
             _ => None,
         }
     }

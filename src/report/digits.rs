@@ -93,7 +93,7 @@ pub(super) fn percent(share: f64) -> String {
 /// The probability of one of many explanations, two places.
 pub(super) fn chance(p: f64) -> String {
     match p {
-        p if p > 0.0 && p < 0.005 => "< 0.01".into(),
+        p if p < 0.005 => "< 0.01".into(),
         p => format!("{p:.2}"),
     }
 }

@@ -101,7 +101,7 @@ pub fn gap_targets_svg(found: &Diagnosis) -> Option<String> {
             first.target,
             percent(first.share)
         ),
-        groups: vec![group("", None, bars)],
+        groups: vec![group("", Some(1.0), bars)],
     };
     Some(chart.svg())
 }
@@ -145,21 +145,20 @@ pub fn gap_regions_svg(study: &Study, found: &Diagnosis) -> Option<String> {
     Some(chart.svg())
 }
 
-/// Listed effects by probability; `None` where none was fitted.
+/// Listed effects by probability, then everything else together; `None` where none was fitted.
 pub fn gap_which_svg(found: &Diagnosis) -> Option<String> {
     let which = &found.which;
     let first = which.effects.first()?;
-    let bars = (which.effects.iter().take(SHOWN))
+    let mut bars: Vec<Bar> = (which.effects.iter().take(SHOWN))
         .map(|effect| {
-            let key = effect.key();
-            let note = format!(
-                "{}, {} nats",
-                chance(effect.probability),
-                short(effect.log_score_gain)
-            );
+            let (key, gain) = (effect.key(), short(effect.log_score_gain));
+            let note = format!("{}, {gain} nats", chance(effect.probability));
             Bar::new(&key, effect.probability, &note).clear(which.accepted.contains(&key))
         })
         .collect();
+    let listed: f64 = bars.iter().map(|bar| bar.value).sum();
+    let rest = (1.0 - listed).max(0.0);
+    bars.push(Bar::new("all others, unlisted too", rest, &chance(rest)));
     let chart = BarChart {
         title: "Explanations by probability".into(),
         description: format!(
@@ -167,7 +166,7 @@ pub fn gap_which_svg(found: &Diagnosis) -> Option<String> {
             first.key(),
             chance(first.probability)
         ),
-        groups: vec![group("", None, bars)],
+        groups: vec![group("", Some(1.0), bars)],
     };
     Some(chart.svg())
 }
@@ -180,11 +179,11 @@ pub fn gap_shrinkage_svg(found: &Diagnosis) -> Option<String> {
         return None;
     }
     let errors = [
-        ("parameters not refitted", s.unfitted, false),
-        ("before: parameters refitted", Some(s.before), false),
+        ("not refitted", s.unfitted, false),
+        ("before, refitted", Some(s.before), false),
         ("a wrong effect instead", s.placebo, false),
-        ("after: with effects", s.after, true),
-        ("floor: noise alone", s.floor, false),
+        ("after, with effects", s.after, true),
+        ("floor, noise alone", s.floor, false),
     ];
     let bars = (errors.into_iter())
         .filter_map(|(label, value, clear)| {
@@ -206,7 +205,10 @@ pub fn gap_shrinkage_svg(found: &Diagnosis) -> Option<String> {
         .after
         .map_or(String::new(), |after| format!(", {} after", short(after)));
     let chart = BarChart {
-        title: "How far the gap closes".into(),
+        title: match s.after {
+            Some(_) => "How far the gap closes".into(),
+            None => "Errors of free runs".into(),
+        },
         description: format!("Errors of free runs: {} before{after}.", short(s.before)),
         groups,
     };

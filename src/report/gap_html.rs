@@ -78,7 +78,7 @@ fn runs(study: &Study, found: &Diagnosis) -> String {
     if let Some(svg) = gap_runs_svg(study, found, true) {
         body.push_str(&figure(
             &svg,
-            "The same on the validation record: of it, only unknown starts are fitted.",
+            "The same on the validation record; no parameter is fitted to it.",
         ));
     }
     section("runs", "Measured and twin", &body)

@@ -78,7 +78,9 @@ pub enum StudyError {
     #[error("{0} stands in [fixed] and in [prior] or [bounds]; remove one of them")]
     Contradiction(String),
     /// `[library]` names an effect that there is not.
-    #[error("[library] names {0}, which is no effect; `truetwin effects --twin T` lists them")]
+    #[error(
+        "[library] names {0}, which is no effect of this twin; `truetwin effects --twin T` lists them"
+    )]
     Library(String),
     /// Of fixed parameters.
     #[error("[fixed]: {0}")]
@@ -278,11 +280,17 @@ impl Study {
         Ok(study)
     }
 
-    /// Whether a name, `id` or `id@target`, is that of an effect: the library's or the study's own.
+    /// Whether a name is that of an effect: an `id` of the library or of the study's own, or an `id@target` of this twin.
     pub fn knows_effect(&self, name: &str) -> bool {
-        let id = name.split('@').next().unwrap_or(name);
-        crate::effect::library().iter().any(|d| d.id == id)
-            || self.own_effects.iter().any(|e| e.typetag_name() == id)
+        match name.split_once('@') {
+            Some((id, target)) => {
+                (self.effects().iter()).any(|e| e.typetag_name() == id && e.target() == target)
+            }
+            None => {
+                crate::effect::library().iter().any(|d| d.id == name)
+                    || self.own_effects.iter().any(|e| e.typetag_name() == name)
+            }
+        }
     }
 
     fn check_library(&self, library: &Library) -> Result<(), StudyError> {

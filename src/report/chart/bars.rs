@@ -11,7 +11,7 @@ const BAR: f64 = 15.0;
 /// Between name, bar and number.
 const GAP: f64 = 8.0;
 /// Most room for names.
-const NAMES: f64 = 0.42 * ROOM;
+const NAMES: f64 = 0.46 * ROOM;
 
 /// Groups of bars. Scales begin at zero.
 ///

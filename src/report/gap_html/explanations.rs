@@ -17,8 +17,8 @@ fn body(units: &Units, found: &Diagnosis) -> String {
     if let Some(svg) = gap_which_svg(found) {
         body.push_str(&figure(
             &svg,
-            "Probability among all listed effects and unlisted disturbances, and gain over the twin alone. Filled bars and bold \
-             names: accepted.",
+            "Probability among all listed effects and unlisted disturbances, and gain in log density over the twin alone. Filled \
+             bars and bold names: accepted.",
         ));
         let rows: Vec<Vec<String>> = which.effects.iter().map(|e| row(units, found, e)).collect();
         let head = [
@@ -49,7 +49,8 @@ fn decision(found: &Diagnosis) -> String {
     let which = &found.which;
     match which.decision {
         Decision::Named if which.accepted.len() > 1 => {
-            "A pair of effects is accepted; the gain of each is what it adds to the other.".into()
+            "A pair of effects is accepted. Probabilities are of each alone; the gain of the second is what it adds to the first."
+                .into()
         }
         Decision::Named => "One effect is accepted, and no other comes near it.".into(),
         Decision::Class => format!(
