@@ -14,6 +14,7 @@ use super::result::*;
 use super::shrink::{Runner, free_runs};
 use super::verdict::{absorbing, left_the_prior, verdict};
 use super::{DiagnoseError, DiagnoseSettings, GivenRecord, Setting};
+use crate::math::six_digits;
 use crate::progress::Progress;
 use crate::study::Study;
 use crate::twin::{Noise, Now, PRIOR_DEVIATION, Parameter, Record, Role, StateSpace};
@@ -236,8 +237,8 @@ fn check(
         if (given - expected).abs() > 1e-3 * expected {
             return Err(DiagnoseError::Steps {
                 record: which,
-                given,
-                expected,
+                given: six_digits(given),
+                expected: six_digits(expected),
             });
         }
         if record.samples() < LEAST {

@@ -2,6 +2,7 @@
 
 use super::page::{escaped, list, paragraph, section};
 use crate::diagnose::{Decision, Diagnosis, EffectFit, Verdict};
+use crate::math::six_digits;
 use crate::report::digits::short;
 use crate::report::units::Units;
 use crate::twin::Law;
@@ -107,7 +108,7 @@ fn study_table(units: &Units, fit: &EffectFit) -> Option<String> {
     });
     let finite = fit.magnitudes.iter().filter(|(_, value)| value.is_finite());
     let values: Vec<String> = finite
-        .map(|(name, value)| format!("{name} = {}", toml_number(*value)))
+        .map(|(name, value)| format!("{name} = {:?}", six_digits(*value)))
         .collect();
     Some(format!(
         "[[effect]]\nid = \"{}\"\ntarget = \"{}\"\n{other}magnitudes = {{ {} }}\n",
@@ -115,11 +116,4 @@ fn study_table(units: &Units, fit: &EffectFit) -> Option<String> {
         fit.target,
         values.join(", ")
     ))
-}
-
-/// Six digits, as TOML reads them.
-fn toml_number(value: f64) -> String {
-    format!("{value:.5e}")
-        .parse::<f64>()
-        .map_or_else(|_| value.to_string(), |v| format!("{v:?}"))
 }

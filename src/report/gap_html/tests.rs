@@ -156,7 +156,7 @@ fn each_answer_says_what_to_do_with_it() {
     for (found, expected) in cases().iter().zip([
         "Use the twin with the refitted parameters",
         "Add cubic-stiffness@x2 to the twin",
-        "widen the prior",
+        "Take the refitted parameters",
         "Tell the rivals apart (cubic-stiffness@x2, power-law@x2)",
         "examples/own_effect.rs",
         "Too short to hold anything back: no share",
