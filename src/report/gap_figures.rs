@@ -3,7 +3,7 @@
 use super::chart::{Bar, BarChart, BarGroup, Chart, Panel, Series, Span, Style, roomy};
 use super::digits::{chance, named, percent, probability, short, unit_suffix};
 use super::units::Units;
-use crate::diagnose::{Diagnosis, FreeRuns, Shrinkage};
+use crate::diagnose::{Decision, Diagnosis, FreeRuns, Shrinkage};
 use crate::study::Study;
 
 /// Explanations that are drawn.
@@ -156,9 +156,12 @@ pub fn gap_which_svg(found: &Diagnosis) -> Option<String> {
             Bar::new(&key, effect.probability, &note).clear(which.accepted.contains(&key))
         })
         .collect();
-    let listed: f64 = bars.iter().map(|bar| bar.value).sum();
-    let rest = (1.0 - listed).max(0.0);
-    bars.push(Bar::new("all others, unlisted too", rest, &chance(rest)));
+    // What absorbs a parameter gap is compared with no others.
+    if which.decision != Decision::Absorbed {
+        let listed: f64 = bars.iter().map(|bar| bar.value).sum();
+        let rest = (1.0 - listed).max(0.0);
+        bars.push(Bar::new("all others, unlisted too", rest, &chance(rest)));
+    }
     let chart = BarChart {
         title: "Explanations by probability".into(),
         description: format!(

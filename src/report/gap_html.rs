@@ -69,7 +69,7 @@ fn runs(study: &Study, found: &Diagnosis) -> String {
         ),
     };
     let caption = format!(
-        "The twin starts as the record does and then sees its inputs alone, without noise. Parameters are fitted to this record.{marked}"
+        "The twin sees the inputs of the record alone and runs without noise. Its parameters are fitted to this record.{marked}"
     );
     let mut body = String::new();
     if let Some(svg) = gap_runs_svg(study, found, false) {

@@ -15,11 +15,16 @@ fn body(units: &Units, found: &Diagnosis) -> String {
     let which = &found.which;
     let mut body = paragraph(&decision(found));
     if let Some(svg) = gap_which_svg(found) {
-        body.push_str(&figure(
-            &svg,
-            "Probability among all listed effects and unlisted disturbances, and gain in log density over the twin alone. Filled \
-             bars and bold names: accepted.",
-        ));
+        let caption = match which.decision {
+            Decision::Absorbed => {
+                "Probability among these effects, and gain in log density over the twin with parameters inside the prior."
+            }
+            _ => {
+                "Probability among all listed effects and unlisted disturbances, and gain in log density over the twin alone. \
+                 Filled bars and bold names: accepted."
+            }
+        };
+        body.push_str(&figure(&svg, caption));
         let rows: Vec<Vec<String>> = which.effects.iter().map(|e| row(units, found, e)).collect();
         let head = [
             ("effect", Text),

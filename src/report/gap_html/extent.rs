@@ -22,11 +22,12 @@ fn body(found: &Diagnosis) -> String {
         ));
     }
     if let Some(svg) = gap_shrinkage_svg(found) {
-        body.push_str(&figure(
-            &svg,
-            "Errors of free runs over the standard deviation of the output. The floor is what noise alone leaves of the accepted \
-             twin; a wrong effect, fitted alike, shows what any extra number gains.",
-        ));
+        let wrong = match s.placebo {
+            Some(_) => " A wrong effect, fitted alike, shows what any extra number gains.",
+            None => "",
+        };
+        let caption = "Errors of free runs over the standard deviation of the output. The floor is what noise alone leaves.";
+        body.push_str(&figure(&svg, &format!("{caption}{wrong}")));
     }
     if s.closed.is_none()
         && let (Some(after), Some(floor)) = (s.after, s.floor)

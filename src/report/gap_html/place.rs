@@ -15,7 +15,7 @@ fn body(study: &Study, found: &Diagnosis) -> String {
         return paragraph("There is no structural gap to locate.");
     }
     let mut body = match &found.place.target {
-        Some(target) => paragraph(&format!("The gap acts on {target}.")),
+        Some(target) => paragraph(&format!("What is missing acts on {target}.")),
         None => String::new(),
     };
     let filled = format!("Filled bars and bold names: p < {}.", found.detection.alpha);

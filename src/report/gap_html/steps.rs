@@ -7,9 +7,6 @@ use crate::report::digits::short;
 use crate::report::units::Units;
 use crate::twin::Law;
 
-/// Below this, what the accepted effects leave is called something.
-const LEFT: f64 = 0.05;
-
 pub(super) fn section_of(units: &Units, found: &Diagnosis) -> String {
     let mut body = list(&steps(found));
     let accepted = &found.which.accepted;
@@ -48,7 +45,10 @@ fn steps(found: &Diagnosis) -> Vec<String> {
         )),
         _ => steps.extend(none_of_these(found)),
     }
-    if which.unexplained_p_value.is_some_and(|p| p < LEFT) && !which.accepted.is_empty() {
+    let left = which
+        .unexplained_p_value
+        .is_some_and(|p| p < found.detection.alpha);
+    if left && which.decision == Decision::Named {
         steps.push("Something is left beside what was accepted: diagnose again with it added to the study.".into());
     }
     let vague: Vec<&str> = (found.parameters.iter())

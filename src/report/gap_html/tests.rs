@@ -6,25 +6,28 @@ use crate::report::gap_json;
 /// Elements that have no end tag.
 const VOID: [&str; 1] = ["meta"];
 
-/// Each diagnosis of the fixture, and those that it does not have: a class, a structural gap without a listed cause, and
-/// nothing held back.
+/// No gap, a named effect, and what is made of them: a parameter gap, a class, a gap without a listed cause, nothing held back;
+/// then the rest of the fixture.
 fn cases() -> Vec<Diagnosis> {
-    let mut cases = diagnoses().to_vec();
-    let named = cases[1].clone();
+    let [no_gap, named, rest @ ..] = diagnoses() else {
+        panic!("the fixture has at least two diagnoses");
+    };
+    let mut parameter = no_gap.clone();
+    parameter.verdict = Verdict::ParameterGap;
     let mut class = named.clone();
     class.which.decision = Decision::Class;
-    class.which.class.push("power-law@x2".into());
+    class.which.class = vec!["cubic-stiffness@x2".into(), "power-law@x2".into()];
     let mut none = named.clone();
     none.which.decision = Decision::NoneOfThese;
     none.which.accepted.clear();
     none.which.class.clear();
     none.which.catch_all = Some("x2".into());
-    let mut short = named;
+    let mut short = named.clone();
     short.shrinkage = None;
     short.validation_runs = None;
     short.free_runs.times.truncate(100);
-    cases.extend([class, none, short]);
-    cases
+    let made = [no_gap.clone(), named.clone(), parameter, class, none, short];
+    [&made, rest].concat()
 }
 
 /// Fails at the first tag that is not closed in order; returns the names of all elements.
