@@ -41,6 +41,12 @@ pub(super) fn list(items: &[String]) -> String {
     format!("<ul>\n{items}</ul>\n")
 }
 
+/// Text for copying, line by line.
+pub(super) fn preformatted(text: &str) -> String {
+    let lines: Vec<String> = text.lines().map(escaped).collect();
+    format!("<pre>{}</pre>\n", lines.join("\n"))
+}
+
 /// A picture; the caption is plain text.
 pub(super) fn figure(svg: &str, caption: &str) -> String {
     format!(

@@ -1,6 +1,6 @@
 //! What to do next.
 
-use super::page::{escaped, list, paragraph, section};
+use super::page::{list, paragraph, preformatted, section};
 use crate::diagnose::{Decision, Diagnosis, EffectFit, Verdict};
 use crate::math::six_digits;
 use crate::report::digits::short;
@@ -18,7 +18,7 @@ pub(super) fn section_of(units: &Units, found: &Diagnosis) -> String {
         body.push_str(&paragraph(
             "For the study file; without magnitudes, they are estimated:",
         ));
-        body.push_str(&format!("<pre>{}</pre>\n", escaped(&tables.join("\n"))));
+        body.push_str(&preformatted(&tables.join("\n")));
     }
     section("next", "What to do next", &body)
 }
