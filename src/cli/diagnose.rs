@@ -2,7 +2,7 @@
 
 use super::args::DiagnoseArguments;
 use super::{Context, Failure, output};
-use crate::diagnose::{DiagnoseSettings, diagnose};
+use crate::diagnose::{DiagnoseSettings, GivenRecord, diagnose};
 use crate::report::{gap_html, gap_json, gap_text};
 use crate::study::Study;
 use crate::twin::{Record, read_record};
@@ -15,17 +15,10 @@ pub(super) fn run(context: &Context<'_>, options: &DiagnoseArguments) -> Result<
         output::check_new(out)?;
     }
     let study = context.study(&options.subject)?;
-    let signals = study.twin().signals();
-    let read = |path: &Path| -> Result<Record, Failure> {
-        let record = read_record(path)?;
-        let checked = record.check_channels(&signals);
-        checked.map_err(|error| Failure::from(error).within(path))?;
-        Ok(record)
-    };
     let records: Vec<Record> = (options.records.iter())
-        .map(|path| read(path))
+        .map(|path| read_record(path))
         .collect::<Result<_, _>>()?;
-    let validation = options.validation.as_deref().map(read).transpose()?;
+    let validation = options.validation.as_deref().map(read_record).transpose()?;
     let initial = match &options.estimator {
         Some(path) => Some(first_estimate(context, &study, path, &records[0])?),
         None => None,
@@ -43,13 +36,24 @@ pub(super) fn run(context: &Context<'_>, options: &DiagnoseArguments) -> Result<
         &settings,
         context.progress,
     )
-    .map_err(|error| Failure::from(error).within(&options.records[0]))?;
+    .map_err(|error| {
+        let path = match error.record() {
+            Some(GivenRecord::Validation) => options.validation.as_ref(),
+            Some(GivenRecord::Measured(index)) => options.records.get(index),
+            None => None,
+        };
+        let failure = Failure::from(error);
+        match path {
+            Some(path) => failure.within(path),
+            None => failure,
+        }
+    })?;
     let json = gap_json(&found);
     if let Some(out) = &options.out {
         let folder = output::NewFolder::new(out)?;
         let text = serde_json::to_string_pretty(&json).map_err(Failure::internal)?;
         folder.write("report.json", &text)?;
-        folder.write("report.html", &gap_html(&found))?;
+        folder.write("report.html", &gap_html(&study, &found))?;
         folder.finish()?;
     }
     if context.json {

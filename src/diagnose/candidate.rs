@@ -116,9 +116,7 @@ pub(super) fn candidates(
         let full = format!("{id}@{target}");
         without.iter().any(|name| name == id || *name == full)
     };
-    let already: Vec<String> = (study.file().effect.iter())
-        .map(|e| format!("{}@{}", e.typetag_name(), e.target()))
-        .collect();
+    let already = already(study);
     let mut all: Vec<Candidate> = (study.candidates().into_iter())
         .filter(|e| e.law() != Law::Outliers || e.outliers(&first_starts(e.as_ref())).is_some())
         .map(|effect| Candidate {
@@ -132,6 +130,28 @@ pub(super) fn candidates(
     let outline = twin.state_space().map(|t| t.outline());
     all.extend(outline.iter().flat_map(catch_alls));
     Ok(all)
+}
+
+/// What the twin may lack beside these and its own effects.
+pub(super) fn not_tested(study: &Study, candidates: &[Candidate]) -> Vec<String> {
+    let known: Vec<String> = candidates
+        .iter()
+        .map(Candidate::key)
+        .chain(already(study))
+        .collect();
+    let mut keys: Vec<String> = (study.effects().iter())
+        .map(|e| format!("{}@{}", e.typetag_name(), e.target()))
+        .filter(|key| !known.contains(key))
+        .collect();
+    keys.dedup();
+    keys
+}
+
+/// Effects that the study has added to its twin.
+fn already(study: &Study) -> Vec<String> {
+    (study.file().effect.iter())
+        .map(|e| format!("{}@{}", e.typetag_name(), e.target()))
+        .collect()
 }
 
 fn catch_alls(outline: &Outline) -> Vec<Candidate> {

@@ -12,8 +12,8 @@ use crate::filter::{FilterError, recoverable};
 use crate::twin::{Drive, Noise, Record, RecordError, Role};
 use ndarray::s;
 
-/// Shortest record whose last third is held out.
-const SPLIT: usize = 300;
+/// Samples of the shortest record whose last third is held out.
+pub const SHORTEST_SPLIT: usize = 300;
 
 /// How far the accepted effects close the gap on held-out data.
 pub(super) fn shrinkage(
@@ -36,7 +36,7 @@ pub(super) fn shrinkage(
             let grown = step.map(|s| s.bench.problem.of_record(0, &s.bench.fitted.theta));
             (&records[0], 0, Some(base), grown, "validation record")
         }
-        None if whole.samples() >= SPLIT => {
+        None if whole.samples() >= SHORTEST_SPLIT => {
             let split = 2 * whole.samples() / 3;
             short = vec![first_part(whole, split)?];
             let refit = |problem: &Problem<'_>, theta: &[f64]| -> Result<_, FilterError> {
@@ -68,7 +68,7 @@ pub(super) fn shrinkage(
     let unfitted = Runner::new(twin, &[], unfitted)?.errors(record, from);
     let noisy = !answer.accepted.is_empty() && answer.accepted.iter().all(Accepted::is_noise);
     let mut result = Shrinkage {
-        metric: "free-run NRMSE",
+        metric: Shrinkage::FREE_RUN,
         before: root(&before),
         after: None,
         floor: None,
@@ -84,7 +84,7 @@ pub(super) fn shrinkage(
     };
     if noisy && let Some(step) = step {
         // No free run moves: the density of what was held out does.
-        result.metric = "held-out log score";
+        result.metric = Shrinkage::LOG_SCORE;
         let records = std::slice::from_ref(record);
         let score = |problem: &Problem<'_>, theta: &[f64]| -> Result<Option<f64>, FilterError> {
             let problem = problem.on(records);

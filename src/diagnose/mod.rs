@@ -42,6 +42,7 @@ mod variant;
 mod verdict;
 
 pub use gain::gain_of;
+pub use held_out::SHORTEST_SPLIT;
 pub use result::{
     Decision, Detection, Diagnosis, EffectFit, FittedNuisance, FittedParameter, FreeRuns, Region,
     TargetShare, Verdict, Where, Which, Window,
@@ -52,6 +53,7 @@ pub use shrink::Shrinkage;
 use crate::filter::FilterError;
 use crate::progress::Cancelled;
 use crate::twin::{DigitalTwin, EffectError, ParameterError, Record, RecordError, SimulationError};
+use std::fmt;
 use std::sync::Arc;
 
 /// Settings of a diagnosis.
@@ -105,20 +107,20 @@ pub enum DiagnoseError {
     #[error("no record was given; give at least one")]
     NoRecord,
     /// Records of different steps.
-    #[error("record {index} has a step of {given} s, the first one {expected} s; resample it")]
+    #[error("{record} has a step of {given} s, the first record {expected} s; resample it")]
     Steps {
-        /// From 1.
-        index: usize,
+        /// Which.
+        record: GivenRecord,
         /// Its step.
         given: f64,
         /// That of the first.
         expected: f64,
     },
     /// Too short to say anything.
-    #[error("record {index} has {samples} samples; at least {least} are needed")]
+    #[error("{record} has {samples} samples; at least {least} are needed, measure longer")]
     TooShort {
-        /// From 1.
-        index: usize,
+        /// Which.
+        record: GivenRecord,
         /// Its samples.
         samples: usize,
         /// What is needed.
@@ -135,14 +137,24 @@ pub enum DiagnoseError {
         remedy: &'static str,
     },
     /// An effect to leave out that there is not.
-    #[error("--without names {0}, which is no effect; `truetwin effects --twin T` lists them")]
+    #[error(
+        "--without names {0}, which is no effect of this twin; `truetwin effects --twin T` lists them"
+    )]
     Without(String),
     /// The filter works nowhere.
     #[error(
         "the twin can be fitted to the record from no start; check units and step of the record, and the prior"
     )]
     NoFit,
-    /// Of a record and the twin.
+    /// Channels that are not the twin's.
+    #[error("{record} is not of this twin: {error}")]
+    Channels {
+        /// Which.
+        record: GivenRecord,
+        /// What is wrong.
+        error: RecordError,
+    },
+    /// Of a part of a record.
     #[error(transparent)]
     Record(#[from] RecordError),
     /// Of a filter.
@@ -160,6 +172,37 @@ pub enum DiagnoseError {
     /// Stopped.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl DiagnoseError {
+    /// The record that is to blame, where one is.
+    pub fn record(&self) -> Option<GivenRecord> {
+        match self {
+            Self::Steps { record, .. }
+            | Self::TooShort { record, .. }
+            | Self::Channels { record, .. } => Some(*record),
+            Self::NoFit => Some(GivenRecord::Measured(0)),
+            _ => None,
+        }
+    }
+}
+
+/// One of the records that a diagnosis was given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GivenRecord {
+    /// Its place among the records, from 0.
+    Measured(usize),
+    /// The one that is held out.
+    Validation,
+}
+
+impl fmt::Display for GivenRecord {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Measured(index) => write!(f, "record {}", index + 1),
+            Self::Validation => f.write_str("the validation record"),
+        }
+    }
 }
 
 /// What all steps share.

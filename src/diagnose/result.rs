@@ -234,6 +234,10 @@ pub struct Diagnosis {
     pub shrinkage: Option<Shrinkage>,
     /// Free runs beside the first record.
     pub free_runs: FreeRuns,
+    /// Free runs beside the validation record.
+    pub validation_runs: Option<FreeRuns>,
+    /// Effects that this twin may lack and that were not looked at, as `id@target`.
+    pub not_tested: Vec<String>,
     /// Explanations that were looked at: listed effects and catch-alls.
     pub candidates: usize,
     /// Wall-clock seconds.

@@ -2,7 +2,7 @@
 
 use super::attribute::{Explanation, explanations, probabilities};
 use super::base_fit::{ITERATIONS, base_fit};
-use super::candidate::{Addition, candidates};
+use super::candidate::{Addition, candidates, not_tested};
 use super::decide::{Accepted, Answer, Step, decide, magnitudes};
 use super::evalue::{combined, log_e};
 use super::fit::{Fitted, fit};
@@ -11,9 +11,10 @@ use super::null::{Bench, Test};
 use super::place::locate;
 use super::problem::{Axis, Problem};
 use super::result::*;
-use super::shrink::Runner;
+use super::shrink::{Runner, free_runs};
 use super::verdict::{absorbing, left_the_prior, verdict};
-use super::{DiagnoseError, DiagnoseSettings, Setting};
+use super::{DiagnoseError, DiagnoseSettings, GivenRecord, Setting};
+use crate::math::six_digits;
 use crate::progress::Progress;
 use crate::study::Study;
 use crate::twin::{Noise, Now, PRIOR_DEVIATION, Parameter, Record, Role, StateSpace};
@@ -82,6 +83,7 @@ pub fn diagnose(
     if setting.follows {
         all.retain(|c| c.is_listed() && !c.is_noise());
     }
+    let not_tested = not_tested(study, &all);
     let bench =
         (setting.bench(problem.clone(), fitted.clone(), &[], all)?).ok_or(DiagnoseError::NoFit)?;
 
@@ -172,15 +174,17 @@ pub fn diagnose(
         settings,
         noise,
     )?;
-    let before = Runner::new(twin, &[], problem.of_record(0, &fitted.theta))?.run(&records[0]);
-    let after = match additions.is_empty() {
-        true => None,
-        false => {
-            let theta = last.problem.of_record(0, &last.fitted.theta);
-            Runner::new(twin, &additions, theta)?.run(&records[0])
-        }
+    let runs = |record: &Record| -> Result<FreeRuns, DiagnoseError> {
+        let base = Runner::new(twin, &[], problem.of_record(0, &fitted.theta))?;
+        let grown = match additions.is_empty() {
+            true => None,
+            false => {
+                let theta = last.problem.of_record(0, &last.fitted.theta);
+                Some(Runner::new(twin, &additions, theta)?)
+            }
+        };
+        Ok(free_runs(record, &base, grown.as_ref()))
     };
-    let drive = records[0].drive();
     Ok(Diagnosis {
         twin: study.name().into(),
         verdict,
@@ -203,12 +207,9 @@ pub fn diagnose(
             catch_all: answer.catch_all,
         },
         shrinkage,
-        free_runs: FreeRuns {
-            times: (0..drive.samples()).map(|k| drive.time(k)).collect(),
-            measured: records[0].outputs().clone(),
-            before: before.map(|run| run.outputs),
-            after: after.map(|run| run.outputs),
-        },
+        free_runs: runs(&records[0])?,
+        validation_runs: validation.map(|v| runs(&v[0])).transpose()?,
+        not_tested,
         candidates: bench.dictionary.candidates.len(),
         seconds: clock.elapsed().as_secs_f64(),
     })
@@ -222,20 +223,27 @@ pub(super) fn check(
 ) -> Result<(), DiagnoseError> {
     let first = records.first().ok_or(DiagnoseError::NoRecord)?;
     let expected = first.drive().dt();
-    for (i, record) in records.iter().chain(validation).enumerate() {
-        let index = i + 1;
-        record.check_channels(&study.twin().signals())?;
+    let measured =
+        (records.iter().enumerate()).map(|(i, record)| (GivenRecord::Measured(i), record));
+    let validation = validation.map(|record| (GivenRecord::Validation, record));
+    for (which, record) in measured.chain(validation) {
+        (record.check_channels(&study.twin().signals())).map_err(|error| {
+            DiagnoseError::Channels {
+                record: which,
+                error,
+            }
+        })?;
         let given = record.drive().dt();
         if (given - expected).abs() > 1e-3 * expected {
             return Err(DiagnoseError::Steps {
-                index,
-                given,
-                expected,
+                record: which,
+                given: six_digits(given),
+                expected: six_digits(expected),
             });
         }
         if record.samples() < LEAST {
             return Err(DiagnoseError::TooShort {
-                index,
+                record: which,
                 samples: record.samples(),
                 least: LEAST,
             });

@@ -2,9 +2,10 @@
 
 use super::DiagnoseError;
 use super::candidate::{Addition, with};
+use super::result::FreeRuns;
 use crate::math::{median, quantile};
 use crate::twin::{DigitalTwin, Noise, Record, Signal};
-use crate::two_stage::{Tracking, track};
+use crate::two_stage::track;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -19,7 +20,7 @@ const LEVEL: f64 = 0.9;
 /// Free-run errors before and after, on held-out data.
 #[derive(Debug, Clone)]
 pub struct Shrinkage {
-    /// What is measured: `free-run NRMSE` or `held-out log score`.
+    /// What is measured: [`Shrinkage::FREE_RUN`] or [`Shrinkage::LOG_SCORE`].
     pub metric: &'static str,
     /// Of the twin alone, θ refitted.
     pub before: f64,
@@ -37,6 +38,13 @@ pub struct Shrinkage {
     pub unfitted: Option<f64>,
     /// The same error with an effect that was not chosen, fitted alike: what any extra number gains.
     pub placebo: Option<f64>,
+}
+
+impl Shrinkage {
+    /// Root mean square of a free run's error over the standard deviation of the output.
+    pub const FREE_RUN: &str = "free-run NRMSE";
+    /// Mean log density of a sample, for effects that move no free run.
+    pub const LOG_SCORE: &str = "held-out log score";
 }
 
 /// A twin and θ to run free.
@@ -59,13 +67,14 @@ impl Runner {
 
     /// Squared errors of the free run over the variance of y, mean over channels, by sample from `from` on.
     pub fn errors(&self, record: &Record, from: usize) -> Option<Vec<f64>> {
-        let run = track(self.twin.as_ref(), &self.theta, record).ok()?;
-        Some(squares(record.outputs(), &run.outputs, from))
+        let outputs = self.outputs(record)?;
+        Some(squares(record.outputs(), &outputs, from))
     }
 
-    /// The record with its free run.
-    pub fn run(&self, record: &Record) -> Option<Tracking> {
-        track(self.twin.as_ref(), &self.theta, record).ok()
+    /// The free run beside the record.
+    pub fn outputs(&self, record: &Record) -> Option<Signal> {
+        let run = track(self.twin.as_ref(), &self.theta, record).ok()?;
+        Some(run.outputs)
     }
 
     /// Median error of records simulated at θ against their own free run.
@@ -85,6 +94,17 @@ impl Runner {
             })
             .collect();
         median(&errors).ok()
+    }
+}
+
+/// Free runs beside a record.
+pub(super) fn free_runs(record: &Record, base: &Runner, grown: Option<&Runner>) -> FreeRuns {
+    let drive = record.drive();
+    FreeRuns {
+        times: (0..drive.samples()).map(|k| drive.time(k)).collect(),
+        measured: record.outputs().clone(),
+        before: base.outputs(record),
+        after: grown.and_then(|grown| grown.outputs(record)),
     }
 }
 

@@ -75,7 +75,9 @@ fn parse(text: &str, path: &Path) -> Result<Effects, EffectFileError> {
             line: 1 + text.bytes().take(at).filter(|b| *b == b'\n').count(),
             problem: (lines.filter(|line| !line.is_empty()))
                 .collect::<Vec<_>>()
-                .join(", "),
+                .join(", ")
+                // The only variants here are ids.
+                .replace("unknown variant", "unknown id"),
         }
     };
     let file: EffectFile =

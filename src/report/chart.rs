@@ -1,4 +1,4 @@
-//! Line charts as SVG.
+//! Line charts and bars as SVG.
 //!
 //! We draw them ourselves: plotters asks for a bundled TrueType font even where it writes SVG, and an axis, a legend
 //! and a line need none. Text is text in the reader's own font; colours are told apart by colour-blind people (Okabe &
@@ -19,13 +19,21 @@
 //! ```
 
 mod axes;
+mod bars;
 mod decimate;
+mod picture;
+mod strip;
 mod text;
 mod ticks;
 
-use axes::{Axes, Frame};
+pub use bars::{Bar, BarChart, BarGroup};
+pub use strip::Span;
 pub(super) use text::escaped;
-use text::{BOLD, clipped, text, width};
+
+use axes::{Axes, Frame};
+use picture::Picture;
+use std::ops::RangeInclusive;
+use text::{clipped, text, width};
 use ticks::{Ticks, padded};
 
 /// Width in user units: narrow, so that text is still legible on a phone.
@@ -65,6 +73,8 @@ pub struct Panel {
     pub height: f64,
     /// Lines, the first at the back.
     pub series: Vec<Series>,
+    /// Stretches of the x axis, marked below it.
+    pub spans: Vec<Span>,
 }
 
 impl Panel {
@@ -74,7 +84,13 @@ impl Panel {
             y: y.into(),
             height: 190.0,
             series,
+            spans: vec![],
         }
+    }
+
+    /// With marked stretches of the x axis.
+    pub fn spans(self, spans: Vec<Span>) -> Self {
+        Self { spans, ..self }
     }
 
     /// With another height in user units.
@@ -103,6 +119,22 @@ impl Series {
             points: points.into_iter().collect(),
         }
     }
+
+    /// Broken off where it leaves `range`: one line that runs away would leave no room for the others.
+    pub fn within(mut self, range: RangeInclusive<f64>) -> Self {
+        for (_, y) in &mut self.points {
+            if !range.contains(y) {
+                *y = f64::NAN;
+            }
+        }
+        self
+    }
+}
+
+/// The range of some values, wider by half of itself on either side.
+pub(super) fn roomy(values: impl Iterator<Item = f64>) -> RangeInclusive<f64> {
+    let (low, high) = padded(values, 0.5);
+    low..=high
 }
 
 /// How a line is drawn.
@@ -175,47 +207,22 @@ impl Chart {
             ticks,
             columns: (POINTS / 2 / lines.max(1)).clamp(1, WIDTH as usize),
         };
-        let mut body = String::new();
-        let mut y = EDGE + TITLE;
-        text(
-            &mut body,
-            (EDGE, y),
-            "start",
-            TITLE,
-            true,
-            &clipped(&self.title, TITLE * BOLD, ROOM),
-        );
-        y += 4.0;
+        let mut picture = Picture::new(&self.title, &self.description);
+        let mut y = picture.top();
         for (i, axes) in panels.iter().enumerate() {
-            y = axes.draw(&mut body, &frame, y + 4.0, i + 1 == panels.len());
+            y = axes.draw(picture.body(), &frame, y + 4.0, i + 1 == panels.len());
         }
         y += 2.0 * LINE - 2.0;
         let middle = 0.5 * (frame.left + frame.right);
         text(
-            &mut body,
+            picture.body(),
             (middle, y),
             "middle",
             TEXT,
             false,
             &clipped(&self.x, TEXT, ROOM),
         );
-        let height = y + EDGE;
-        format!(
-            concat!(
-                r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height:.0}" width="100%" "#,
-                r#"style="max-width:{largest}px;height:auto" role="img" font-family="system-ui, sans-serif" fill="{ink}">"#,
-                "\n<title>{title}</title>\n<desc>{description}</desc>\n",
-                r##"<rect width="{width}" height="{height:.0}" fill="#ffffff"/>"##,
-                "\n{body}</svg>\n"
-            ),
-            width = WIDTH,
-            height = height,
-            largest = LARGEST,
-            ink = "#222222",
-            title = escaped(&self.title),
-            description = escaped(&self.description),
-            body = body,
-        )
+        picture.svg(y + EDGE)
     }
 }
 

@@ -1,5 +1,7 @@
 //! Numbers for people: as many digits as they are worth.
 
+use crate::twin::Quantity;
+
 /// Significant digits of a standard error, and of a number without one.
 const OF_ERROR: i32 = 2;
 const OF_NUMBER: i32 = 3;
@@ -80,6 +82,30 @@ pub(super) fn short(value: f64) -> String {
     Digits::significant(value, OF_NUMBER).write(value)
 }
 
+/// A share in percent; three digits where it is absurd.
+pub(super) fn percent(share: f64) -> String {
+    match 100.0 * share {
+        p if p.abs() < 1000.0 => format!("{} %", Digits::Fixed(0).write(p)),
+        p => format!("{} %", short(p)),
+    }
+}
+
+/// The probability of one of many explanations, two places.
+pub(super) fn chance(p: f64) -> String {
+    match p {
+        p if p < 0.005 => "< 0.01".into(),
+        p => format!("{p:.2}"),
+    }
+}
+
+/// `y in V`.
+pub(super) fn named(quantity: &Quantity) -> String {
+    match unit_suffix(&quantity.unit) {
+        unit if unit.is_empty() => quantity.name.clone(),
+        unit => format!("{} in{unit}", quantity.name),
+    }
+}
+
 /// " V", or nothing where a quantity has no unit.
 pub(super) fn unit_suffix(unit: &str) -> String {
     match unit {
@@ -128,7 +154,15 @@ mod tests {
     }
 
     #[test]
+    fn shares_are_short_however_large() {
+        assert_eq!(percent(0.634), "63 %");
+        assert_eq!(percent(-0.2), "−20 %");
+        assert_eq!(percent(-3e9), "−3.00e11 %");
+    }
+
+    #[test]
     fn probabilities_never_read_zero() {
+        assert_eq!(chance(1e-9), "< 0.01");
         assert_eq!(probability(0.0001), "p < 0.001");
         assert_eq!(probability(0.005), "p = 0.005");
     }

@@ -42,12 +42,16 @@ pub(super) fn simulated(study: &Study, theta: &[f64], sample: u64) -> Record {
     Record::new(drive, outputs).unwrap()
 }
 
+/// The study of [`diagnoses`].
+pub(super) fn oscillator() -> Study {
+    Study::new("van-der-pol", VanDerPol, RecordPlan::autonomous(0.05, 300)).unwrap()
+}
+
 /// Diagnoses without a gap, with a named effect and a validation record, with a parameter gap.
 pub(super) fn diagnoses() -> &'static [Diagnosis] {
     static MADE: OnceLock<Vec<Diagnosis>> = OnceLock::new();
     MADE.get_or_init(|| {
-        let plan = RecordPlan::autonomous(0.05, 300);
-        let study = Study::new("van-der-pol", VanDerPol, plan).unwrap();
+        let study = oscillator();
         let effects = "[[effect]]\nid = 'cubic-stiffness'\ntarget = 'x2'\nfrom = 'x1'\n";
         let effects = crate::effect::parse_effects(effects).unwrap();
         let stiff = crate::twin::augment(study.twin().clone(), effects).unwrap();

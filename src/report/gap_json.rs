@@ -14,7 +14,7 @@ use serde_json::{Map, Value, json};
 /// | `shrinkage` | free-run errors on held-out data |
 ///
 /// Beyond the contract: `detection.rank_p_value` and `.log_e`, `which.catch_all`, `parameters[].prior`,
-/// `windows[].record`, `shrinkage.controls`, `candidates`, `seconds`.
+/// `windows[].record`, `shrinkage.controls`, `candidates`, `not_tested`, `seconds`.
 ///
 /// All keys are always there; what was skipped is null, and so are numbers that are not finite.
 pub fn gap_json(found: &Diagnosis) -> Value {
@@ -77,6 +77,7 @@ pub fn gap_json(found: &Diagnosis) -> Value {
         },
         "shrinkage": found.shrinkage.as_ref().map(shrinkage),
         "candidates": found.candidates,
+        "not_tested": found.not_tested,
         "seconds": found.seconds,
     })
 }

@@ -1,7 +1,7 @@
 //! A diagnosis on the terminal.
 
-use super::digits::{error, probability, short, unit_suffix};
-use crate::diagnose::{Decision, Diagnosis, EffectFit, Verdict};
+use super::digits::{chance, error, percent, probability, short, unit_suffix};
+use crate::diagnose::{Decision, Diagnosis, EffectFit, SHORTEST_SPLIT, Shrinkage, Verdict};
 
 /// Most lines of the text.
 const LINES: usize = 15;
@@ -63,8 +63,8 @@ pub fn gap_text(found: &Diagnosis) -> String {
         lines.push("  probability   gain   effect".into());
         for effect in found.which.effects.iter().take(SHOWN) {
             lines.push(format!(
-                "  {:>10.2} {:>7}   {}",
-                effect.probability,
+                "  {:>11} {:>6}   {}",
+                chance(effect.probability),
                 short(effect.log_score_gain),
                 with_magnitudes(effect)
             ));
@@ -76,26 +76,10 @@ pub fn gap_text(found: &Diagnosis) -> String {
             probability(p)
         ));
     }
-    if let Some(s) = &found.shrinkage {
-        let mut line = format!("{} on the {}: {}", s.metric, s.held_out, short(s.before));
-        if let Some(after) = s.after {
-            line.push_str(&format!(" → {}", short(after)));
-        }
-        if let Some(floor) = s.floor {
-            line.push_str(&format!(", noise alone {}", short(floor)));
-        }
-        if let (Some(closed), Some([low, high])) = (s.closed, s.interval) {
-            line.push_str(&format!(
-                "; {:.0} % of the gap closed ({:.0} to {:.0})",
-                100.0 * closed,
-                100.0 * low,
-                100.0 * high
-            ));
-        }
-        lines.push(line + ".");
-    } else {
-        lines.push("No held-out data: give --validation, or a longer record, to learn how far the gap closes.".into());
-    }
+    lines.push(match &found.shrinkage {
+        Some(s) => closed_sentence(s),
+        None => no_share(found),
+    });
     lines.push(format!(
         "{} explanations, {} s.",
         found.candidates,
@@ -135,6 +119,32 @@ pub fn verdict_sentence(found: &Diagnosis) -> String {
             None => "Structural gap that no listed effect explains.".into(),
         },
     }
+}
+
+/// Errors on held-out data before and after, and the share of the gap that closed.
+pub(super) fn closed_sentence(s: &Shrinkage) -> String {
+    let mut text = format!("{} on the {}: {}", s.metric, s.held_out, short(s.before));
+    if let Some(after) = s.after {
+        text.push_str(&format!(" → {}", short(after)));
+    }
+    if let Some(floor) = s.floor {
+        text.push_str(&format!(", noise alone {}", short(floor)));
+    }
+    if let (Some(closed), Some(ends)) = (s.closed, s.interval) {
+        let (closed, [low, high]) = (percent(closed), ends.map(percent));
+        text.push_str(&format!("; {closed} of the gap closed ({low} to {high})"));
+    }
+    text + "."
+}
+
+/// Why there are no errors on held-out data.
+pub(super) fn no_share(found: &Diagnosis) -> String {
+    if found.validation_runs.is_none() && found.free_runs.times.len() < SHORTEST_SPLIT {
+        return format!(
+            "Too short to hold anything back: no share. Give --validation, or a record of at least {SHORTEST_SPLIT} samples."
+        );
+    }
+    "The twin does not run through the held-out data: no share.".into()
 }
 
 /// `id@target (name value, …)`.

@@ -5,6 +5,7 @@
 //! | hand an estimate to another program | [`estimate_json`] |
 //! | show an estimate on the terminal | [`estimate_text`] |
 //! | hand on, or show, what a twin lacks | [`gap_json`], [`gap_text`], [`gap_html`] |
+//! | draw parts of what a twin lacks | [`gap_runs_svg`], [`gap_targets_svg`], [`gap_regions_svg`], [`gap_which_svg`], [`gap_shrinkage_svg`] |
 //! | see the twin beside the record | [`overlay_svg`] |
 //! | hand on, print or draw the scores of many records | [`reproduce_json`], [`reproduce_text`], [`mean_runs_svg`], [`first_run_svg`] |
 //! | hand on, print or show the scores of withheld trials | [`scorecard_json`], [`scorecard_text`], [`scorecard_html`] |
@@ -16,6 +17,7 @@ mod estimate_json;
 mod estimate_text;
 #[cfg(test)]
 mod fixture;
+mod gap_figures;
 mod gap_html;
 mod gap_json;
 mod gap_text;
@@ -30,9 +32,13 @@ mod scorecard_json;
 mod scorecard_text;
 mod table;
 mod trajectories;
+mod units;
 
 pub use estimate_json::estimate_json;
 pub use estimate_text::estimate_text;
+pub use gap_figures::{
+    gap_regions_svg, gap_runs_svg, gap_shrinkage_svg, gap_targets_svg, gap_which_svg,
+};
 pub use gap_html::gap_html;
 pub use gap_json::gap_json;
 pub use gap_text::{gap_text, verdict_sentence};

@@ -1,17 +1,14 @@
 //! The paper's trajectory figures: what the twin shows at each method's answer.
 
-use super::chart::{Chart, Panel, Series, Style};
-use super::digits::unit_suffix;
+use super::chart::{Chart, Panel, Series, Style, roomy};
+use super::digits::named;
 use crate::baseline::Initialisation::Bad;
 use crate::experiment::{FreeRuns, MeanRuns, Method};
 use crate::study::Study;
-use crate::twin::{Quantity, Signal};
+use crate::twin::Signal;
 
 /// Which methods a panel shows.
 type Belongs = fn(Method) -> bool;
-
-/// Beyond the range of the truth by more than this share of it, a line is broken off.
-const BEYOND: f64 = 0.5;
 
 /// The paper's trajectory figure: noise-free runs of the twin at the truth and, as means over the records, at the
 /// answers of each family of methods. `None` where the twin diverges at the truth.
@@ -114,30 +111,12 @@ fn lines(
 
 /// One output over time, `back` behind the others.
 fn panel(title: &str, times: &[f64], channel: usize, back: &Line<'_>, lines: &[Line<'_>]) -> Panel {
-    let (low, high) = range(back.2.column(channel).iter().copied());
-    let beyond = BEYOND * (high - low);
-    let shown = (low - beyond)..=(high + beyond);
+    let shown = roomy(back.2.column(channel).iter().copied());
     let series = std::iter::once(back)
         .chain(lines)
         .map(|Line(label, style, signal)| {
-            let points = times.iter().zip(signal.column(channel));
-            // One twin that runs away would leave no room for the others.
-            let points = points.map(|(&t, &y)| (t, if shown.contains(&y) { y } else { f64::NAN }));
-            Series::new(label, *style, points)
+            let points = times.iter().copied().zip(signal.column(channel).to_vec());
+            Series::new(label, *style, points).within(shown.clone())
         });
     Panel::new(title, series.collect()).height(150.0)
-}
-
-fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-        (low.min(v), high.max(v))
-    })
-}
-
-/// `y in V`.
-fn named(quantity: &Quantity) -> String {
-    match unit_suffix(&quantity.unit) {
-        unit if unit.is_empty() => quantity.name.clone(),
-        unit => format!("{} in{unit}", quantity.name),
-    }
 }

@@ -78,7 +78,9 @@ pub enum StudyError {
     #[error("{0} stands in [fixed] and in [prior] or [bounds]; remove one of them")]
     Contradiction(String),
     /// `[library]` names an effect that there is not.
-    #[error("[library] names {0}, which is no effect; `truetwin effects --twin T` lists them")]
+    #[error(
+        "[library] names {0}, which is no effect of this twin; `truetwin effects --twin T` lists them"
+    )]
     Library(String),
     /// Of fixed parameters.
     #[error("[fixed]: {0}")]
@@ -278,11 +280,17 @@ impl Study {
         Ok(study)
     }
 
-    /// Whether a name, `id` or `id@target`, is that of an effect: the library's or the study's own.
+    /// Whether a name is that of an effect: an `id` of the library or of the study's own, or an `id@target` of this twin.
     pub fn knows_effect(&self, name: &str) -> bool {
-        let id = name.split('@').next().unwrap_or(name);
-        crate::effect::library().iter().any(|d| d.id == id)
-            || self.own_effects.iter().any(|e| e.typetag_name() == id)
+        match name.split_once('@') {
+            Some((id, target)) => {
+                (self.effects().iter()).any(|e| e.typetag_name() == id && e.target() == target)
+            }
+            None => {
+                crate::effect::library().iter().any(|d| d.id == name)
+                    || self.own_effects.iter().any(|e| e.typetag_name() == name)
+            }
+        }
     }
 
     fn check_library(&self, library: &Library) -> Result<(), StudyError> {
@@ -291,17 +299,22 @@ impl Study {
         unknown.map_or(Ok(()), |name| Err(StudyError::Library(name.clone())))
     }
 
-    /// What the twin may lack, each once for each target, all magnitudes free: the library's effects and the study's own,
-    /// as `[library]` says.
+    /// The library's effects and the study's own, each once for each target of this twin, all magnitudes free.
+    pub fn effects(&self) -> Effects {
+        let library = crate::effect::applicable(self.twin.as_ref());
+        (library.into_iter())
+            .chain(self.own_effects.iter().cloned())
+            .collect()
+    }
+
+    /// What the twin may lack: those of [`Study::effects`] that `[library]` lets through.
     pub fn candidates(&self) -> Effects {
         let Library { only, without } = &self.file.library;
         let named = |list: &[String], effect: &Arc<dyn UnmodelledEffect>| {
             let id = effect.typetag_name();
             (list.iter()).any(|n| n == id || *n == format!("{id}@{}", effect.target()))
         };
-        let library = crate::effect::applicable(self.twin.as_ref());
-        (library.into_iter())
-            .chain(self.own_effects.iter().cloned())
+        (self.effects().into_iter())
             .filter(|effect| only.is_empty() || named(only, effect))
             .filter(|effect| !named(without, effect))
             .collect()

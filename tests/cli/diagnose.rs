@@ -61,20 +61,133 @@ fn a_lacking_spring_is_reported_and_bad_calls_are_refused() {
         .unwrap();
     assert!((magnitude - 0.15).abs() < 0.03, "{magnitude}");
     assert_eq!(report["shrinkage"]["held_out"], "validation record");
-    assert!(place.join("out/report.html").exists());
+    let page = fs::read_to_string(place.join("out/report.html")).unwrap();
+    assert!(page.contains("Structural gap: the twin lacks cubic-stiffness@x2"));
 
     refused(&[&call[..], &twin].concat(), &["exists already"]);
+}
+
+/// A record of the oscillator, so long, with its path.
+fn oscillation(name: &str, samples: usize, step: f64) -> String {
+    let place = place();
+    let clock = place.join(format!("clock-{name}"));
+    let times: String = (0..samples)
+        .map(|k| format!("{}\n", k as f64 * step))
+        .collect();
+    fs::write(&clock, format!("t\n{times}")).unwrap();
+    let out = place.join(name).display().to_string();
+    let clock = clock.display().to_string();
+    done(&[
+        "simulate",
+        "--twin",
+        "van-der-pol",
+        "--theta",
+        "nu=1.4",
+        "--seed",
+        "5",
+        "--input",
+        &clock,
+        "--out",
+        &out,
+    ]);
+    out
+}
+
+#[test]
+fn wrong_calls_are_refused_in_one_line_that_names_what_and_where() {
+    let record = oscillation("whole.csv", 300, 0.05);
+    let twin = ["--twin", "van-der-pol"];
+    let refuses = |arguments: &[&str], parts: &[&str]| {
+        refused(&[&["diagnose"], arguments, &twin].concat(), parts);
+    };
+    let tanks = tanks_record();
+    refuses(&["none.csv"], &["none.csv"]);
+    refuses(&[&tanks], &["of-tanks.csv", "record 1", "inputs"]);
+    refuses(
+        &[&record, "--without", "cubic"],
+        &["error: --without names cubic", "truetwin effects"],
+    );
+    refuses(
+        &[&record, "--without", "cubic-stiffness@h7"],
+        &["cubic-stiffness@h7", "truetwin effects"],
+    );
+    refuses(
+        &[&record, "--out", "no/such/folder"],
+        &["no/such", "make it first"],
+    );
+
+    let other = [&record, "--validation", &tanks];
+    refuses(
+        &other,
+        &["of-tanks.csv: the validation record", "the twin has 0"],
+    );
+    let slow = oscillation("slow.csv", 300, 0.1);
+    let remedy = "step of 0.1 s, the first record 0.05 s; resample it";
+    refuses(
+        &[&record, "--validation", &slow],
+        &["slow.csv: the validation record", remedy],
+    );
+    refuses(&[&record, &slow], &["slow.csv: record 2", remedy]);
+    let brief = oscillation("brief.csv", 49, 0.05);
+    refuses(
+        &[&brief],
+        &["brief.csv: record 1 has 49 samples", "at least 50"],
+    );
+    refuses(
+        &[&record, "--validation", &brief],
+        &["brief.csv: the validation record has 49 samples"],
+    );
+}
+
+fn tanks_record() -> String {
+    let out = place().join("of-tanks.csv").display().to_string();
+    let theta = "k1=0.6,k2=0.6,k3=0.6,k4=1.0";
+    done(&[
+        "simulate", "--twin", "tanks", "--theta", theta, "--out", &out,
+    ]);
+    out
+}
+
+#[test]
+fn an_unknown_effect_is_answered_with_the_known_ones() {
+    let place = place();
+    let at = |name: &str| place.join(name).display().to_string();
+    let effect = "[[effect]]\nid = 'cubic-stifness'\ntarget = 'x2'\n";
+    fs::write(place.join("typo.toml"), effect).unwrap();
+    fs::write(
+        place.join("study.toml"),
+        format!("twin = 'van-der-pol'\n{effect}"),
+    )
+    .unwrap();
+    let record = oscillation("known.csv", 60, 0.05);
+    let known = ["cubic-stifness", "`cubic-stiffness`", "`state-ceiling`"];
+    let simulate = [
+        "simulate",
+        "--twin",
+        "van-der-pol",
+        "--theta",
+        "nu=1",
+        "--effect",
+    ];
     refused(
-        &["diagnose", &at("none.csv"), "--twin", "van-der-pol"],
-        &["none.csv"],
+        &[&simulate[..], &[&at("typo.toml")]].concat(),
+        &[&known[..], &["unknown id", "typo.toml, line 1"]].concat(),
     );
     refused(
-        &["diagnose", &record, "--twin", "tanks"],
-        &["r.csv", "inputs"],
+        &["diagnose", &record, "--study", &at("study.toml")],
+        &[&known[..], &["study.toml, line 3"]].concat(),
     );
-    let without = ["diagnose", &record, "--without", "cubic"];
-    refused(
-        &[&without[..], &twin].concat(),
-        &["cubic", "truetwin effects"],
-    );
+}
+
+#[test]
+fn a_record_too_short_to_hold_anything_back_is_diagnosed_without_a_share() {
+    let record = oscillation("short.csv", 120, 0.05);
+    let out = place().join("short").display().to_string();
+    let text = done(&["diagnose", &record, "--twin", "van-der-pol", "--out", &out]);
+    let says = "Too short to hold anything back: no share";
+    assert!(text.contains(says), "{text}");
+    let read = |name: &str| fs::read_to_string(Path::new(&out).join(name)).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&read("report.json")).unwrap();
+    assert!(report["shrinkage"].is_null());
+    assert!(read("report.html").contains(says));
 }

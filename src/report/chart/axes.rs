@@ -1,6 +1,7 @@
 //! One panel: axes, ticks, legend, lines.
 
 use super::decimate::decimate;
+use super::strip;
 use super::text::{BOLD, clipped, text, width};
 use super::ticks::{Ticks, padded};
 use super::{EDGE, LINE, Panel, ROOM, Series, TEXT, WIDTH, widest};
@@ -23,7 +24,7 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    fn x(&self, value: f64) -> f64 {
+    pub(super) fn x(&self, value: f64) -> f64 {
         let share = (value - self.x.0) / (self.x.1 - self.x.0);
         self.left + share * (self.right - self.left)
     }
@@ -63,6 +64,7 @@ impl<'a> Axes<'a> {
             bottom - (value - self.range.0) / (self.range.1 - self.range.0) * self.panel.height
         };
         let (left, right) = (frame.left, frame.right);
+        let end = bottom + strip::height(&self.panel.spans);
         for (value, label) in frame.ticks.labelled() {
             let x = frame.x(value);
             let _ = writeln!(
@@ -70,7 +72,7 @@ impl<'a> Axes<'a> {
                 r##"<path d="M{x:.1} {top:.1}V{bottom:.1}" stroke="#e4e4e4"/>"##
             );
             if last {
-                text(out, (x, bottom + LINE - 3.0), "middle", TEXT, false, &label);
+                text(out, (x, end + LINE - 3.0), "middle", TEXT, false, &label);
             }
         }
         for (value, label) in self.ticks.labelled() {
@@ -110,7 +112,8 @@ impl<'a> Axes<'a> {
                 r#"<path d="{path}" fill="none" {stroke} stroke-linejoin="round"/>"#
             );
         }
-        bottom
+        strip::draw(out, frame, &self.panel.spans, bottom);
+        end
     }
 
     /// The quantity, then lines with their labels: beside it, or below in as many rows as they need. Returns the last

@@ -1,3 +1,4 @@
+use super::text::BOLD;
 use super::*;
 
 fn chart(panels: usize, lines: usize, samples: usize) -> Chart {
@@ -51,8 +52,75 @@ fn everything_is_inside_the_picture() {
             .iter_mut()
             .for_each(|p| p.1 = 1e6 + 1e-2 * p.1);
     }
-    let svg = wide.svg();
-    let size: Vec<f64> = (attributes(&svg, "viewBox").next().unwrap().split(' '))
+    wide.panels[1].spans = spans();
+    assert_inside(&wide.svg());
+}
+
+/// Two stretches, the second too narrow for its label.
+fn spans() -> Vec<Span> {
+    let span = |from: f64, to: f64, clear: bool| Span {
+        from,
+        to,
+        label: "40 %".into(),
+        weight: 0.4,
+        clear,
+    };
+    vec![span(0.0, 2.0, true), span(2.0, 2.1, false)]
+}
+
+#[test]
+fn stretches_are_told_apart_by_their_frames() {
+    let mut marked = chart(1, 1, 100);
+    let bare = marked.svg();
+    marked.panels[0].spans = spans();
+    let svg = marked.svg();
+    assert_eq!(svg.matches("fill-opacity").count(), 2);
+    assert_eq!(svg.matches(r#"stroke-dasharray="3 3""#).count(), 1);
+    assert_eq!(
+        svg.matches(">40 %<").count(),
+        1,
+        "the narrow one has no room"
+    );
+    let height = |svg: &str| {
+        attributes(svg, "viewBox")
+            .next()
+            .map(|v| v.split(' ').next_back().unwrap().to_owned())
+    };
+    assert_ne!(height(&svg), height(&bare));
+}
+
+#[test]
+fn bars_keep_inside_and_name_what_they_cannot_draw() {
+    let bars = [3e9, 0.5, f64::NAN, -1.0, 0.0].map(|value| {
+        let label = "a name that takes far more than its share of the row";
+        Bar::new(label, value, "3.00e9 (−1.00e12 to 9.99e15)").interval(Some([-1e12, 1e16]))
+    });
+    let groups = [None, Some(1.0)].map(|full| BarGroup {
+        label: "a & b".into(),
+        full,
+        bars: bars.to_vec(),
+    });
+    let chart = |groups: Vec<BarGroup>| BarChart {
+        title: "bars".into(),
+        description: "of any length".into(),
+        groups,
+    };
+    let svg = chart(groups.to_vec()).svg();
+    assert_inside(&svg);
+    assert!(!svg.contains("NaN") && !svg.contains("inf"));
+    assert_eq!(
+        svg.matches("3.00e9").count(),
+        10,
+        "every bar has its number"
+    );
+    // One rectangle is the paper; two bars of each group are positive.
+    assert_eq!(svg.matches("<rect").count(), 1 + 2 * 2);
+    assert!(chart(vec![]).svg().ends_with("</svg>\n"));
+}
+
+/// Fails where a text reaches beyond the picture.
+fn assert_inside(svg: &str) {
+    let size: Vec<f64> = (attributes(svg, "viewBox").next().unwrap().split(' '))
         .map(|v| v.parse().unwrap())
         .collect();
     let texts = svg.split("<text").skip(1).map(|t| {

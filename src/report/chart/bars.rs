@@ -1,0 +1,183 @@
+//! Horizontal bars with their names on the left and their numbers on the right.
+
+use super::picture::Picture;
+use super::text::{BOLD, clipped, text, width};
+use super::{EDGE, LINE, ROOM, TEXT, WIDTH};
+use std::fmt::Write;
+
+/// Height of a row and of the bar inside it.
+const ROW: f64 = 25.0;
+const BAR: f64 = 15.0;
+/// Between name, bar and number.
+const GAP: f64 = 8.0;
+/// Most room for names.
+const NAMES: f64 = 0.46 * ROOM;
+
+/// Groups of bars. Scales begin at zero.
+///
+/// ```
+/// use truetwin::report::chart::{Bar, BarChart, BarGroup};
+/// let chart = BarChart {
+///     title: "Error".into(),
+///     description: "0.3 before, 0.1 after.".into(),
+///     groups: vec![BarGroup {
+///         label: "free run".into(),
+///         full: None,
+///         bars: vec![Bar::new("before", 0.3, "0.300"), Bar::new("after", 0.1, "0.100").clear(true)],
+///     }],
+/// };
+/// assert!(chart.svg().contains(">0.300<"));
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct BarChart {
+    /// Heading, also for screen readers.
+    pub title: String,
+    /// What the picture shows, for those who cannot see it.
+    pub description: String,
+    /// From top to bottom.
+    pub groups: Vec<BarGroup>,
+}
+
+/// Bars under a heading.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BarGroup {
+    /// Heading; empty for none.
+    pub label: String,
+    /// The value that takes all the room; if none, the largest of all groups without.
+    pub full: Option<f64>,
+    /// From top to bottom.
+    pub bars: Vec<Bar>,
+}
+
+/// One bar.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bar {
+    /// Name.
+    pub label: String,
+    /// Length; nothing is drawn of what is negative or not finite.
+    pub value: f64,
+    /// The number in words.
+    pub note: String,
+    /// Filled, and named in bold; otherwise hollow.
+    pub clear: bool,
+    /// Ends of an interval around the value.
+    pub interval: Option<[f64; 2]>,
+}
+
+impl Bar {
+    /// A hollow bar without an interval.
+    pub fn new(label: &str, value: f64, note: &str) -> Self {
+        Self {
+            label: label.into(),
+            value,
+            note: note.into(),
+            clear: false,
+            interval: None,
+        }
+    }
+
+    /// Filled or hollow.
+    pub fn clear(self, clear: bool) -> Self {
+        Self { clear, ..self }
+    }
+
+    /// With an interval.
+    pub fn interval(self, interval: Option<[f64; 2]>) -> Self {
+        Self { interval, ..self }
+    }
+}
+
+impl BarChart {
+    /// The picture, to stand in a file or inside a page.
+    pub fn svg(&self) -> String {
+        let bars = || self.groups.iter().flat_map(|group| &group.bars);
+        let widest = |needs: fn(&Bar) -> f64| bars().map(needs).fold(0.0, f64::max);
+        let names = widest(|bar| width(&bar.label, TEXT * BOLD)).min(NAMES);
+        let notes = widest(|bar| width(&bar.note, TEXT));
+        let left = EDGE + names + GAP;
+        let right = (WIDTH - EDGE - notes - GAP).max(left + ROW);
+        let shared = (self.groups.iter())
+            .filter(|group| group.full.is_none())
+            .flat_map(|group| &group.bars)
+            .map(|bar| bar.value)
+            .filter(|value| value.is_finite())
+            .fold(0.0, f64::max);
+        let mut picture = Picture::new(&self.title, &self.description);
+        let mut y = picture.top() + 4.0;
+        for group in &self.groups {
+            if !group.label.is_empty() {
+                y += LINE;
+                let label = clipped(&group.label, TEXT * BOLD, ROOM);
+                text(picture.body(), (EDGE, y), "start", TEXT, true, &label);
+                y += 4.0;
+            }
+            let full = group.full.unwrap_or(shared);
+            let per_unit = if full > 0.0 {
+                (right - left) / full
+            } else {
+                0.0
+            };
+            let scale = Scale {
+                left,
+                right,
+                per_unit,
+            };
+            for bar in &group.bars {
+                bar.draw(picture.body(), &scale, names, y);
+                y += ROW;
+            }
+        }
+        picture.svg(y + EDGE)
+    }
+}
+
+/// From values to places.
+struct Scale {
+    left: f64,
+    right: f64,
+    per_unit: f64,
+}
+
+impl Scale {
+    fn x(&self, value: f64) -> f64 {
+        (self.left + value * self.per_unit).clamp(self.left, self.right)
+    }
+}
+
+impl Bar {
+    /// Draws the row that begins at `top`.
+    fn draw(&self, out: &mut String, scale: &Scale, names: f64, top: f64) {
+        let middle = top + 0.5 * ROW;
+        let baseline = middle + 0.35 * TEXT;
+        let label = clipped(&self.label, TEXT * BOLD, names);
+        let at = (scale.left - GAP, baseline);
+        text(out, at, "end", TEXT, self.clear, &label);
+        let (left, mut end) = (scale.left, scale.left);
+        if self.value.is_finite() && self.value > 0.0 {
+            end = scale.x(self.value);
+            let fill = if self.clear { "#0072b2" } else { "#ffffff" };
+            let _ = writeln!(
+                out,
+                r##"<rect x="{left:.1}" y="{:.1}" width="{:.1}" height="{BAR}" fill="{fill}" stroke="#0072b2"/>"##,
+                middle - 0.5 * BAR,
+                end - left,
+            );
+        }
+        if let Some([low, high]) = self
+            .interval
+            .filter(|ends| ends.iter().all(|v| v.is_finite()))
+        {
+            let (low, high) = (scale.x(low), scale.x(high));
+            let (up, down) = (middle - 5.0, middle + 5.0);
+            // White below black: it is seen on a filled bar and beyond it.
+            for (colour, width) in [("#ffffff", 4.0), ("#222222", 1.5)] {
+                let _ = writeln!(
+                    out,
+                    r#"<path d="M{low:.1} {up:.1}V{down:.1}M{low:.1} {middle:.1}H{high:.1}M{high:.1} {up:.1}V{down:.1}" fill="none" stroke="{colour}" stroke-width="{width}"/>"#
+                );
+            }
+            end = end.max(high);
+        }
+        text(out, (end + GAP, baseline), "start", TEXT, false, &self.note);
+    }
+}
