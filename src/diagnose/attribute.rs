@@ -11,7 +11,7 @@ use super::scan::{Gain, Reference};
 use super::variant::Variant;
 use crate::filter::{FilterError, recoverable};
 use crate::progress::Stage;
-use crate::twin::Record;
+use crate::twin::{Noise, Record};
 use rayon::prelude::*;
 
 /// Points of the dictionary that a fit starts from, per candidate; thresholds have more.
@@ -20,6 +20,8 @@ const THRESHOLD_STARTS: usize = 4;
 /// Explanations that are fitted once more, from the θ of so many of the best.
 const SECOND_ROUND: usize = 10;
 const SECOND_STARTS: usize = 2;
+/// And from so many draws of θ from the prior: where much is missing, the twin's own best θ may be anywhere.
+const SECOND_DRAWS: u64 = 3;
 /// Iterations of a fit.
 const ITERATIONS: usize = 15;
 /// Numbers that a catch-all counts for: strength and memory.
@@ -105,8 +107,11 @@ pub(super) fn explanations(
     // Once more from where the best ended: a poor θ leads to poor fits.
     if only.is_none() {
         let d = bench.problem.twin.parameters().len();
+        let space = bench.problem.twin.parameters();
+        let anywhere = Noise::new(0, "second round", 0);
         let thetas: Vec<Vec<f64>> = (found.iter().take(SECOND_STARTS))
             .map(|e| bench.explained(e).of_record(0, &e.fitted.theta)[..d].to_vec())
+            .chain((0..SECOND_DRAWS).map(|i| space.draw_prior(anywhere.sample(i))))
             .collect();
         let again: Vec<usize> = (0..found.len())
             .filter(|&i| bench.dictionary.candidates[found[i].candidate].is_listed() || i < 3)

@@ -57,7 +57,10 @@ pub(super) fn rounded(outputs: &[f64]) -> Mark {
     let step = (values.windows(2))
         .map(|w| w[1].0 - w[0].0)
         .fold(f64::INFINITY, f64::min);
-    let steps = (values[values.len() - 1].0 - values[0].0) / step;
+    let span = values[values.len() - 1].0 - values[0].0;
+    let steps = (span / step).round();
+    // All of them know the step better than two.
+    let step = span / steps;
     if REPEATS * steps > outputs.len() as f64 {
         return Mark::Absent;
     }

@@ -46,8 +46,9 @@ pub(super) struct Update<S: Size> {
     gain: S::Matrix,
     /// X − K·Y.
     rest: S::Matrix,
-    /// What the readout makes of the nodes of each output (5 × p).
+    /// What the readout makes of the nodes of each output (5 × p), and of the row itself.
     read: S::Points,
+    again: S::Vector,
 }
 
 /// One row of a record, and how well it could be measured.
@@ -80,6 +81,7 @@ impl<S: Size> Update<S> {
             gain: S::Matrix::zeros(n * p),
             rest: S::Matrix::zeros(n * n),
             read: S::Points::zeros(NODES.len() * p),
+            again: S::Vector::zeros(p),
         }
     }
 
@@ -102,7 +104,7 @@ impl<S: Size> Update<S> {
         }
         self.spread(outputs);
         if self.reads(twin, now, row) {
-            self.bend(row, outputs);
+            self.bend((twin, now), row, outputs);
             self.spread(outputs);
         }
         if !row.outliers.is_empty() {
@@ -171,23 +173,40 @@ impl<S: Size> Update<S> {
     }
 
     #[cold]
-    fn bend(&mut self, row: &Measured<'_>, outputs: &mut [f64]) {
+    fn bend(
+        &mut self,
+        (twin, now): (&dyn StateSpace, &Now<'_>),
+        row: &Measured<'_>,
+        outputs: &mut [f64],
+    ) {
         let p = self.size.outputs();
+        let again = &mut self.again.as_mut()[..p];
+        again.copy_from_slice(row.y);
+        twin.readout(now, again);
+        let again = &*again;
         let (read, covariance) = (self.read.as_ref(), self.covariance.as_ref());
         let (noise, innovation) = (self.noise.as_mut(), self.innovation.as_mut());
         for j in 0..p {
-            let values = || read[j..].iter().step_by(p).zip(NODES);
+            let nodes = || read[j..].iter().step_by(p).take(NODES.len());
+            let miss = row.y[j] - read[j];
+            let near = |a: f64, b: f64| (a - b) * (a - b) <= noise[j];
+            if nodes().all(|v| *v == read[j])
+                && !near(row.y[j], read[j])
+                && near(again[j], row.y[j])
+            {
+                // A step wider than what was expected, and another one was read: the signal is beside an edge. What the
+                // sensor cannot read is not excused so.
+                innovation[j] = miss;
+                noise[j] += miss * miss;
+                continue;
+            }
+            let values = || nodes().zip(NODES);
             let mean: f64 = values().map(|(v, (_, weight))| weight * v).sum();
             let slope: f64 = values().map(|(v, (node, weight))| weight * node * v).sum();
             let variance: f64 = values()
                 .map(|(v, (_, weight))| weight * (v - mean).powi(2))
                 .sum();
             innovation[j] = row.y[j] - mean;
-            if variance == 0.0 && innovation[j] != 0.0 {
-                // A step wider than what was expected, and another one was read: the signal is beside an edge.
-                noise[j] += innovation[j] * innovation[j];
-                continue;
-            }
             noise[j] += (variance - slope * slope).max(0.0);
             let slope = slope / covariance[j * p + j].sqrt();
             for output in outputs.iter_mut().skip(j).step_by(p) {
