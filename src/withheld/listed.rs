@@ -73,7 +73,7 @@ impl World {
                 let bent = draw.signal(law, range, source)?;
                 // Noise enters between the two.
                 Some(match law {
-                    "saturation" | "quantization" => Bend::Reading(bent),
+                    "saturation" | "quantization" | "outliers" => Bend::Reading(bent),
                     _ => Bend::Sensor(bent),
                 })
             }
@@ -148,6 +148,11 @@ impl Draw<'_> {
             "quantization" => SignalLaw::Quantization {
                 step: amount,
                 half_way: self.other(),
+            },
+            "outliers" => SignalLaw::Outliers {
+                probability: amount,
+                scale: span * (0.2 + 0.4 * source.uniform()),
+                alike: self.other(),
             },
             "dead-zone" => SignalLaw::DeadZone {
                 width: amount,
@@ -298,8 +303,10 @@ mod tests {
                 let (listed, other) = (run(&[bend(Form::Listed)]), run(&[bend(Form::Other)]));
                 let (moved, apart) = (distance(&listed, &plain), distance(&listed, &other));
                 assert!(moved > 0.0, "{} of {name} shows nothing", lack.id);
-                // Noise of another distribution and levels half-way between are other draws altogether.
-                let redrawn = lack.id.ends_with("noise") || lack.id.ends_with("quantization");
+                // Noise and outliers of another distribution and levels half-way between are other draws altogether.
+                let redrawn = ["noise", "quantization", "outliers"]
+                    .iter()
+                    .any(|law| lack.id.ends_with(law));
                 assert!(
                     redrawn || apart < 0.8 * moved,
                     "{}@{}: {apart} of {moved}",

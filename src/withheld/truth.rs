@@ -139,7 +139,7 @@ impl<'a> Urn<'a> {
         let mut source = noise.source("truth");
         let substeps = match kind {
             // Far from the prior levels run low, where √h is steep and another step another system.
-            Kind::Outside => 1,
+            Kind::Outside | Kind::Absorbed => 1,
             _ => self.world.substeps[index(&mut source, self.world.substeps.len())],
         };
         let mut truth = Truth {

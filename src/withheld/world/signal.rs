@@ -36,6 +36,12 @@ pub(in crate::withheld) enum SignalLaw {
     },
     /// Levels at multiples of the step, or half-way between them.
     Quantization { step: f64, half_way: bool },
+    /// With this probability a value is off by N(0, scale²), or by ±scale.
+    Outliers {
+        probability: f64,
+        scale: f64,
+        alike: bool,
+    },
     /// No answer around zero.
     DeadZone { width: f64, knee: f64 },
     /// Play between two gears.
@@ -103,6 +109,20 @@ impl SignalLaw {
                     (levels + 0.5).floor()
                 }
             }),
+            Self::Outliers {
+                probability,
+                scale,
+                alike,
+            } => {
+                let mut source = noise.source("rare errors");
+                s.iter()
+                    .map(|v| {
+                        let (hit, size) = (source.happens(probability), source.normal());
+                        let size = if alike { size.signum() } else { size };
+                        if hit { v + scale * size } else { *v }
+                    })
+                    .collect()
+            }
             Self::DeadZone { width, knee } => {
                 each(&|_, v| above(v - 0.5 * width, knee) - above(-v - 0.5 * width, knee))
             }

@@ -45,6 +45,7 @@ pub(super) const WORLD: World = World {
         lack("sensor-saturation", "sensor", 0.05, 0.6),
         lack("sensor-quantization", "sensor", 0.3, 2.0),
         lack("sensor-noise", "sensor", 0.06, 0.6),
+        lack("sensor-outliers", "sensor", 0.005, 0.08),
         lack("actuator-bias", "actuator", 0.1, 1.0),
         lack("actuator-dead-zone", "actuator", 0.2, 2.5),
         lack("actuator-backlash", "actuator", 0.2, 2.0),
@@ -85,7 +86,7 @@ pub(super) const WORLD: World = World {
     ],
     absorbed: &[
         lack("actuator-gain", "actuator", 0.05, 0.5),
-        lack("sensor-gain", "sensor", 0.05, 0.3),
+        // Not the sensor's gain: levels scale with it, but their noise does not.
         lack("parameter-step", "k1", 0.05, 0.5),
         lack("parameter-step", "k2", 0.05, 0.5),
         lack("parameter-step", "k3", 0.05, 0.5),

@@ -35,6 +35,7 @@ pub(super) const WORLD: World = World {
         lack("sensor-delay", "sensor", 0.01, 0.3),
         lack("sensor-rectification", "sensor", 0.01, 0.6),
         lack("sensor-noise", "sensor", 0.0005, 0.03),
+        lack("sensor-outliers", "sensor", 0.005, 0.08),
         lack("sensor-saturation", "sensor", 0.02, 0.5),
         lack("sensor-quantization", "sensor", 0.005, 0.3),
         lack("constant-forcing", "x1", 0.01, 0.4),
