@@ -8,7 +8,7 @@ use truetwin::report::{
     gap_regions_svg, gap_runs_svg, gap_shrinkage_svg, gap_targets_svg, gap_which_svg,
 };
 use truetwin::study::{Study, StudyFile};
-use truetwin::twin::{Signal, read_record};
+use truetwin::twin::{Record, Signal, read_record};
 use truetwin::two_stage::{EstimateOptions, PretrainOptions, pretrain};
 
 fn data(name: &str) -> Option<PathBuf> {
@@ -36,13 +36,19 @@ fn tanks() -> Study {
     tanks.configure(&file).unwrap()
 }
 
+/// The record to fit and the one to validate, where the data are at hand.
+fn tanks_records() -> Option<(Record, Record)> {
+    let read = |name| data(name).map(|path| read_record(&path).unwrap());
+    Some((
+        read("cascaded-tanks-estimation.csv")?,
+        read("cascaded-tanks-validation.csv")?,
+    ))
+}
+
 /// Four k and two start levels cannot explain these tanks, which overflow; but they can follow them to 0.69 V.
 #[test]
 fn the_cascaded_tanks_are_followed_on_a_record_never_seen() {
-    let (Some(measured), Some(validation)) = (
-        data("cascaded-tanks-estimation.csv"),
-        data("cascaded-tanks-validation.csv"),
-    ) else {
+    let Some((record, validation)) = tanks_records() else {
         return;
     };
     let study = tanks();
@@ -54,10 +60,9 @@ fn the_cascaded_tanks_are_followed_on_a_record_never_seen() {
     };
     let (estimator, _) = pretrain(&study, &options, &Progress::silent()).unwrap();
     let options = EstimateOptions {
-        validation: Some(read_record(&validation).unwrap()),
+        validation: Some(validation),
         ..EstimateOptions::default()
     };
-    let record = read_record(&measured).unwrap();
     let estimate = estimator
         .estimate(&record, &options, &Progress::silent())
         .unwrap();
@@ -83,17 +88,10 @@ fn the_cascaded_tanks_are_followed_on_a_record_never_seen() {
 /// With `TRUETWIN_PICTURES=docs/pictures` the pictures of docs/diagnosing-a-gap.md are drawn anew.
 #[test]
 fn the_cascaded_tanks_lack_their_overflow() {
-    let (Some(measured), Some(validation)) = (
-        data("cascaded-tanks-estimation.csv"),
-        data("cascaded-tanks-validation.csv"),
-    ) else {
+    let Some((record, validation)) = tanks_records() else {
         return;
     };
     let study = tanks();
-    let (record, validation) = (
-        read_record(&measured).unwrap(),
-        read_record(&validation).unwrap(),
-    );
     let settings = DiagnoseSettings::default();
     let silent = Progress::silent();
     let mut found = diagnose(&study, &[record], Some(&validation), &settings, &silent).unwrap();

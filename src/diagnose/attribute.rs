@@ -106,8 +106,8 @@ pub(super) fn explanations(
     order(&mut found);
     // Once more from where the best ended: a poor θ leads to poor fits.
     if only.is_none() {
-        let d = bench.problem.twin.parameters().len();
         let space = bench.problem.twin.parameters();
+        let d = space.len();
         let anywhere = Noise::new(0, "second round", 0);
         let thetas: Vec<Vec<f64>> = (found.iter().take(SECOND_STARTS))
             .map(|e| bench.explained(e).of_record(0, &e.fitted.theta)[..d].to_vec())

@@ -35,6 +35,19 @@ pub(super) struct Answer {
     pub catch_all: Option<String>,
 }
 
+impl Answer {
+    /// The effects of a step, all of them and nothing else.
+    fn named(step: &Step<'_>, unexplained: Option<f64>) -> Self {
+        Self {
+            decision: Decision::Named,
+            accepted: step.accepted.clone(),
+            class: step.accepted.iter().map(Accepted::key).collect(),
+            unexplained,
+            catch_all: None,
+        }
+    }
+}
+
 /// One accepted effect.
 #[derive(Clone)]
 pub(super) struct Accepted {
@@ -190,66 +203,48 @@ pub(super) fn decide<'a>(
     };
     // The best listed effect alone.
     let mut unexplained = None;
-    let step = grown(setting, bench, &[], first)?;
+    let Some(step) = grown(setting, bench, &[], first)? else {
+        return Ok((nothing(None), None));
+    };
+    let single = noise.child("unexplained");
     let mut first_look: Option<Look> = None;
-    if let Some(step) = step {
-        let noise = noise.child("unexplained");
-        if let Some((p, look)) = left_over(setting, &step.bench, settings, noise, stage)? {
-            unexplained = Some(p);
-            first_look = Some(look);
-            if p > UNEXPLAINED && !beaten(first.score(), candidates[first.candidate].is_noise()) {
-                let class: Vec<String> = (listed.iter())
-                    .filter(|e| e.score() >= first.score() - RIVALS)
-                    .map(|e| candidates[e.candidate].key())
-                    .collect();
-                let answer = Answer {
-                    decision: match class.len() {
-                        1 => Decision::Named,
-                        _ => Decision::Class,
-                    },
-                    accepted: step.accepted.clone(),
-                    class,
-                    unexplained: Some(p),
-                    catch_all: None,
-                };
-                return Ok((answer, Some(step)));
-            }
+    if let Some((p, look)) = left_over(setting, &step.bench, settings, single, stage)? {
+        unexplained = Some(p);
+        first_look = Some(look);
+        if p > UNEXPLAINED && !beaten(first.score(), candidates[first.candidate].is_noise()) {
+            let class: Vec<String> = (listed.iter())
+                .filter(|e| e.score() >= first.score() - RIVALS)
+                .map(|e| candidates[e.candidate].key())
+                .collect();
+            let decision = match class.len() {
+                1 => Decision::Named,
+                _ => Decision::Class,
+            };
+            let answer = Answer {
+                decision,
+                class,
+                ..Answer::named(&step, unexplained)
+            };
+            return Ok((answer, Some(step)));
         }
-        if let Some(pair) = best_pair(setting, bench, &listed, (step, first_look), stage)?
-            && pair.score > first.score() + WORTH_A_PAIR
-            && !beaten(
-                pair.score - PAIR_OVER_ANYTHING,
-                pair.accepted.iter().any(|a| a.is_noise()),
-            )
-            && let Some((p, _)) =
-                left_over(setting, &pair.bench, settings, noise.child("pair"), stage)?
-        {
-            unexplained = Some(p);
-            if p > UNEXPLAINED || improves(setting, bench, &pair, noise)? {
-                let keys: Vec<String> = pair.accepted.iter().map(Accepted::key).collect();
-                let answer = Answer {
-                    decision: Decision::Named,
-                    accepted: pair.accepted.clone(),
-                    class: keys,
-                    unexplained,
-                    catch_all: None,
-                };
-                return Ok((answer, Some(pair)));
-            }
+    }
+    if let Some(pair) = best_pair(setting, bench, &listed, (&step, first_look.as_ref()), stage)?
+        && pair.score > first.score() + WORTH_A_PAIR
+        && !beaten(
+            pair.score - PAIR_OVER_ANYTHING,
+            pair.accepted.iter().any(|a| a.is_noise()),
+        )
+        && let Some((p, _)) =
+            left_over(setting, &pair.bench, settings, single.child("pair"), stage)?
+    {
+        unexplained = Some(p);
+        if p > UNEXPLAINED || improves(setting, bench, &pair, single)? {
+            return Ok((Answer::named(&pair, unexplained), Some(pair)));
         }
     }
     // A single effect that leaves something, but follows a record never seen much better.
-    if let Some(step) = grown(setting, bench, &[], first)?
-        && improves(setting, bench, &step, noise)?
-    {
-        let answer = Answer {
-            decision: Decision::Named,
-            accepted: step.accepted.clone(),
-            class: step.accepted.iter().map(Accepted::key).collect(),
-            unexplained,
-            catch_all: None,
-        };
-        return Ok((answer, Some(step)));
+    if improves(setting, bench, &step, noise)? {
+        return Ok((Answer::named(&step, unexplained), Some(step)));
     }
     Ok((nothing(unexplained), None))
 }

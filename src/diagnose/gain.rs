@@ -4,7 +4,7 @@ use super::attribute::explanations;
 use super::base_fit::base_fit;
 use super::candidate::{Candidate, candidates};
 use super::decide::grown;
-use super::problem::{Axis, Problem};
+use super::problem::Problem;
 use super::run::{check, without_process_noise};
 use super::{DiagnoseError, DiagnoseSettings, Setting};
 use crate::progress::Progress;
@@ -47,8 +47,7 @@ pub fn gain_of(
         together: None,
         follows: without_process_noise(equations, &records[0]),
     };
-    let axes: Vec<Axis> = twin.parameters().iter().map(Axis::of).collect();
-    let problem = Problem::new(twin.clone(), axes, records);
+    let problem = Problem::of_twin(twin, records);
     let noise = Noise::new(settings.seed, "diagnose", 0);
     let Some(fitted) = base_fit(&problem, settings, noise)? else {
         return Ok(None);

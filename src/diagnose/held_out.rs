@@ -15,6 +15,11 @@ use ndarray::s;
 /// Samples of the shortest record whose last third is held out.
 pub const SHORTEST_SPLIT: usize = 300;
 
+/// The first sample that is held out of a record without another to validate.
+pub(crate) fn held_out_from(samples: usize) -> usize {
+    2 * samples / 3
+}
+
 /// How far the accepted effects close the gap on held-out data.
 pub(super) fn shrinkage(
     setting: &Setting<'_>,
@@ -37,7 +42,7 @@ pub(super) fn shrinkage(
             (&records[0], 0, Some(base), grown, "validation record")
         }
         None if whole.samples() >= SHORTEST_SPLIT => {
-            let split = 2 * whole.samples() / 3;
+            let split = held_out_from(whole.samples());
             short = vec![first_part(whole, split)?];
             let refit = |problem: &Problem<'_>, theta: &[f64]| -> Result<_, FilterError> {
                 let problem = problem.on(&short);

@@ -43,6 +43,7 @@ mod verdict;
 
 pub use gain::gain_of;
 pub use held_out::SHORTEST_SPLIT;
+pub(crate) use held_out::held_out_from;
 pub use result::{
     Decision, Detection, Diagnosis, EffectFit, FittedNuisance, FittedParameter, FreeRuns, Region,
     TargetShare, Verdict, Where, Which, Window,

@@ -13,17 +13,18 @@ const SECONDS: usize = 12;
 const EXCHANGES: usize = 3;
 
 /// The best two of the `listed` explanations: the best beside each of the first few, then the best beside the partner that
-/// was found, and so on. Neither of two effects need be much by itself. `first` is the first one, grown, and its look.
+/// was found, and so on. Neither of two effects need be much by itself. `first` is the first one, grown; `look`, how the
+/// records look with it.
 pub(super) fn best_pair<'a>(
     setting: &Setting<'a>,
     bench: &Bench<'a>,
     listed: &[&Explanation],
-    first: (Step<'a>, Option<Look>),
+    (first, look): (&Step<'a>, Option<&Look>),
     stage: &Stage,
 ) -> Result<Option<Step<'a>>, DiagnoseError> {
-    let mut tried = vec![first.0.accepted[0].key()];
-    let mut best = match &first.1 {
-        Some(look) => beside(setting, &first.0, look, stage)?,
+    let mut tried = vec![first.accepted[0].key()];
+    let mut best = match look {
+        Some(look) => beside(setting, first, look, stage)?,
         None => None,
     };
     let mut take = |key: String, explanation: &Explanation| -> Result<_, DiagnoseError> {

@@ -149,6 +149,12 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// A twin with the weak priors of its own parameters.
+    pub fn of_twin(twin: &Arc<dyn DigitalTwin>, records: &'a [Record]) -> Self {
+        let axes = twin.parameters().iter().map(Axis::of).collect();
+        Self::new(twin.clone(), axes, records)
+    }
+
     /// The same twin on other records.
     pub fn on<'b>(&self, records: &'b [Record]) -> Problem<'b> {
         let d = self.twin.parameters().len();

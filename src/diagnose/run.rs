@@ -9,7 +9,7 @@ use super::fit::{Fitted, fit};
 use super::held_out::shrinkage;
 use super::null::{Bench, Test};
 use super::place::locate;
-use super::problem::{Axis, Problem};
+use super::problem::Problem;
 use super::result::*;
 use super::shrink::{Runner, free_runs};
 use super::verdict::{absorbing, left_the_prior, verdict};
@@ -74,8 +74,7 @@ pub fn diagnose(
     };
 
     // θ, and how the record looks at it.
-    let axes: Vec<Axis> = space.iter().map(Axis::of).collect();
-    let problem = Problem::new(twin.clone(), axes, records);
+    let problem = Problem::of_twin(twin, records);
     let stage = progress.stage("fit", 1);
     let fitted = base_fit(&problem, settings, noise)?.ok_or(DiagnoseError::NoFit)?;
     stage.tick()?;

@@ -3,7 +3,7 @@
 use super::WithheldError;
 use super::answer::Outcome;
 use super::truth::{Truth, Urn};
-use crate::diagnose::{DiagnoseError, DiagnoseSettings, gain_of};
+use crate::diagnose::{DiagnoseError, DiagnoseSettings, gain_of, held_out_from};
 use crate::progress::Progress;
 use crate::twin::{Noise, Record};
 use serde::{Deserialize, Serialize};
@@ -73,7 +73,7 @@ fn share(
     };
     let (held_out, from) = match validation {
         Some(record) => (record, 0),
-        None => (record, 2 * record.samples() / 3),
+        None => (record, held_out_from(record.samples())),
     };
     let free = urn.record(truth, held_out.drive().clone(), Noise::OFF)?;
     Ok(free.map(|free| {
