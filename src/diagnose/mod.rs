@@ -27,6 +27,7 @@ mod frequency;
 mod gain;
 mod held_out;
 mod localise;
+mod map;
 mod null;
 mod omnibus;
 mod pairs;
@@ -44,9 +45,10 @@ mod verdict;
 pub use gain::gain_of;
 pub use held_out::SHORTEST_SPLIT;
 pub(crate) use held_out::held_out_from;
+pub use map::{Band, Cell, Channel, Equation, Lag, Maps, Onset, Region, TermRange, Where, Window};
 pub use result::{
-    Decision, Detection, Diagnosis, EffectFit, FittedNuisance, FittedParameter, FreeRuns, Region,
-    TargetShare, Verdict, Where, Which, Window,
+    Decision, Detection, Diagnosis, Discovery, EffectFit, FittedNuisance, FittedParameter,
+    FreeRuns, NextInput, TargetShare, Term, Verdict, Visible, Which,
 };
 pub use run::diagnose;
 pub use shrink::Shrinkage;

@@ -1,25 +1,21 @@
-//! Where the gap lies: targets, windows, regions.
+//! Where the gap lies: targets, and what simulations say of each cut.
 
 use super::DiagnoseError;
 use super::attribute::{Explanation, probabilities};
 use super::decide::Answer;
-use super::localise::{Cell, shares};
+use super::localise::{Cut, Past, shares};
+use super::map::{Band, Cell, Channel, Lag, Maps, Onset, Region, Where, Window};
 use super::null::{Bench, Test};
-use super::result::*;
-use crate::filter::recoverable;
-use crate::twin::{Signal, StateSpace};
+use super::result::TargetShare;
+use crate::filter::{Filtered, recoverable};
 
-/// Windows and regions are reported below this p-value.
-const NOTABLE: f64 = 0.1;
-
-/// `where` of the report, from what explains the record and from what the simulations say of each cell.
-pub(super) fn locate(
+/// Targets by what explains the record there, and the one that is named.
+pub(super) fn targets(
     bench: &Bench<'_>,
     found: &[Explanation],
     test: &Test,
     answer: &Answer,
-    equations: &dyn StateSpace,
-) -> Result<Where, DiagnoseError> {
+) -> Where {
     let candidates = &bench.dictionary.candidates;
     let chances = probabilities(found);
     let mut targets: Vec<TargetShare> = vec![];
@@ -46,68 +42,114 @@ pub(super) fn locate(
             .clone()
             .or_else(|| targets.first().map(|t| t.target.clone())),
     };
-    // The best explanation, whatever it is, says when it helps.
+    Where {
+        target,
+        targets,
+        ..Where::default()
+    }
+}
+
+/// How the records differ from what the bench's twin makes, cut in all ways. `best`, where there is one, says when it helps.
+pub(super) fn maps(
+    bench: &Bench<'_>,
+    test: &Test,
+    best: Option<&Explanation>,
+    alpha: f64,
+) -> Result<Maps, DiagnoseError> {
     let states = bench.problem.states(&bench.fitted.theta)?;
-    let means: Vec<Signal> = states.iter().map(|(_, s)| s.clone()).collect();
-    let before: Vec<_> = states.into_iter().map(|(f, _)| f).collect();
-    let after = match found.first() {
+    let after: Option<Vec<Filtered>> = match best {
         Some(best) => recoverable(bench.explained(best).filtered(&best.fitted.theta))?,
         None => None,
     };
     let records = bench.problem.records;
-    let shares = shares(&bench.bins, &means, records, &before, after.as_deref());
-    let outline = equations.outline();
-    let (mut windows, mut regions) = (vec![], vec![]);
-    for ((cell, p), share) in bench.bins.cells.iter().zip(&test.local).zip(shares) {
-        if *p > NOTABLE {
-            continue;
-        }
-        match cell {
-            Cell::Window {
+    let shares = shares(&bench.bins, &states, records, after.as_deref());
+    let signals = bench.problem.twin.signals();
+    let output = |channel: usize| signals.outputs[channel].name.clone();
+    let dt = records[0].drive().dt();
+    let mut maps = Maps::default();
+    let mut first: Option<(usize, usize)> = None;
+    for ((cut, &p_value), share) in bench.bins.cuts.iter().zip(&test.local).zip(shares) {
+        match *cut {
+            Cut::Window {
                 record,
                 channel,
                 from,
                 to,
-            } => windows.push(Window {
-                record: *record,
-                start: records[*record].drive().time(*from),
-                end: records[*record].drive().time(to - 1),
-                channel: outline.outputs[*channel].name.clone(),
-                p_value: *p,
+            } => maps.windows.push(Window {
+                record,
+                start: records[record].drive().time(from),
+                end: records[record].drive().time(to - 1),
+                channel: output(channel),
+                p_value,
                 share,
             }),
-            Cell::Region {
+            Cut::Stretch {
+                record,
+                channel,
+                from,
+                ..
+            } => {
+                if p_value <= alpha && first.is_none_or(|first| (record, from) < first) {
+                    first = Some((record, from));
+                    maps.onset = Some(Onset {
+                        record,
+                        time: records[record].drive().time(from),
+                        channel: output(channel),
+                        p_value,
+                    });
+                }
+            }
+            Cut::Region {
                 variable,
                 low,
                 high,
-            } => regions.push(Region {
-                variable: bench.bins.variables[*variable].clone(),
-                low: *low,
-                high: *high,
-                p_value: *p,
+            } => maps.regions.push(Region {
+                variable: bench.bins.variables[variable].clone(),
+                low,
+                high,
+                p_value,
+                share,
+            }),
+            Cut::Channel { channel } => maps.channels.push(Channel {
+                channel: output(channel),
+                p_value,
+                share,
+            }),
+            Cut::Lag {
+                channel,
+                past,
+                from,
+                to,
+            } => maps.lags.push(Lag {
+                channel: output(channel),
+                signal: match past {
+                    Past::Output(j) => output(j),
+                    Past::Input(i) => signals.inputs[i].name.clone(),
+                },
+                from: from as f64 * dt,
+                to: to as f64 * dt,
+                p_value,
+                share,
+            }),
+            Cut::Band { channel, low, high } => maps.bands.push(Band {
+                channel: output(channel),
+                low: low / dt,
+                high: high / dt,
+                p_value,
                 share,
             }),
         }
     }
-    // Shares of all channels and variables add up to one.
-    let channels = outline.outputs.len() as f64;
-    windows.iter_mut().for_each(|w| w.share /= channels);
-    let variables = bench.bins.variables.len().max(1) as f64;
-    regions.iter_mut().for_each(|r| r.share /= variables);
-    windows.sort_by(|a, b| {
-        b.share
-            .total_cmp(&a.share)
-            .then(a.p_value.total_cmp(&b.p_value))
+    clearest_first(&mut maps.windows);
+    clearest_first(&mut maps.regions);
+    clearest_first(&mut maps.channels);
+    clearest_first(&mut maps.lags);
+    clearest_first(&mut maps.bands);
+    Ok(maps)
+}
+
+fn clearest_first<C: Cell>(cells: &mut [C]) {
+    cells.sort_by(|a, b| {
+        (b.share().total_cmp(&a.share())).then(a.p_value().total_cmp(&b.p_value()))
     });
-    regions.sort_by(|a, b| {
-        b.share
-            .total_cmp(&a.share)
-            .then(a.p_value.total_cmp(&b.p_value))
-    });
-    Ok(Where {
-        target,
-        targets,
-        windows,
-        regions,
-    })
 }

@@ -1,7 +1,8 @@
 //! What a diagnosis says.
 
+use super::map::Where;
 use super::shrink::Shrinkage;
-use crate::twin::{Interval, Signal};
+use crate::twin::{Drive, Interval, Signal};
 use serde::{Deserialize, Serialize};
 
 /// Which kind of gap there is.
@@ -114,51 +115,6 @@ pub struct TargetShare {
     pub share: f64,
 }
 
-/// A stretch of time in which the twin does not follow.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Window {
-    /// Which record, from 0.
-    pub record: usize,
-    /// First instant, in seconds.
-    pub start: f64,
-    /// Last instant, in seconds.
-    pub end: f64,
-    /// Output.
-    pub channel: String,
-    /// Family-wise over windows and regions.
-    pub p_value: f64,
-    /// Share in what the best explanation gains.
-    pub share: f64,
-}
-
-/// A range of a state or input in which the twin does not follow.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Region {
-    /// State or input.
-    pub variable: String,
-    /// From.
-    pub low: f64,
-    /// To.
-    pub high: f64,
-    /// Family-wise over windows and regions.
-    pub p_value: f64,
-    /// Share in what the best explanation gains, over all regions of the same variable.
-    pub share: f64,
-}
-
-/// Where the gap is.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Where {
-    /// The most probable place of a structural gap.
-    pub target: Option<String>,
-    /// All places, most probable first.
-    pub targets: Vec<TargetShare>,
-    /// Windows that stand out, clearest first.
-    pub windows: Vec<Window>,
-    /// Regions that stand out, clearest first.
-    pub regions: Vec<Region>,
-}
-
 /// One listed effect, fitted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectFit {
@@ -198,6 +154,68 @@ pub struct Which {
     pub unexplained_p_value: Option<f64>,
     /// The catch-all that beats every listed effect.
     pub catch_all: Option<String>,
+    /// A record that would split the class; none where there is no class, or no input splits it.
+    pub next_input: Option<NextInput>,
+}
+
+/// A record to measure next, so that rivals are told apart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NextInput {
+    /// Inputs and length of it.
+    pub drive: Drive,
+    /// What kind of input it is.
+    pub kind: String,
+    /// The rivals, as `id@target`.
+    pub rivals: Vec<String>,
+    /// Of how many simulated pairs of the present record and such a next one the rival that made them stood out.
+    pub split: [u64; 2],
+    /// The same with the present inputs measured once more.
+    pub again: [u64; 2],
+}
+
+/// What a regression of the missing term found: exploratory, not a test.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Discovery {
+    /// The equation that lacks the term: a state or an output.
+    pub equation: String,
+    /// Terms by how often resampled records include them.
+    pub terms: Vec<Term>,
+    /// Share of the variance of the smoothed missing term that the terms explain.
+    pub explained: f64,
+    /// Instants of the first record, in seconds.
+    pub times: Vec<f64>,
+    /// The smoothed missing term there.
+    pub missing: Vec<f64>,
+    /// Its standard deviation.
+    pub std_error: Vec<f64>,
+    /// What the regression says there.
+    pub fitted: Vec<f64>,
+}
+
+/// One term of a regression.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Term {
+    /// Such as `h1²` or `u`.
+    pub name: String,
+    /// Its factor, in the unit of the equation.
+    pub coefficient: f64,
+    /// 90 % of the coefficients of resampled records that include it.
+    pub interval: [f64; 2],
+    /// Share of resampled records that include it.
+    pub inclusion: f64,
+}
+
+/// The smallest magnitude of a listed effect that records like these reveal in 80 of 100 cases.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Visible {
+    /// Id of the effect.
+    pub id: String,
+    /// Its target.
+    pub target: String,
+    /// Name of the magnitude that is meant.
+    pub magnitude: String,
+    /// Its value; none where no magnitude in reach would be seen.
+    pub value: Option<f64>,
 }
 
 /// Free runs beside a record, for pictures.
@@ -232,6 +250,10 @@ pub struct Diagnosis {
     pub which: Which,
     /// How far; none without held-out data.
     pub shrinkage: Option<Shrinkage>,
+    /// What the missing term depends on, where no listed effect is accepted.
+    pub discovery: Option<Discovery>,
+    /// What each listed effect would have had to be to be seen.
+    pub power: Vec<Visible>,
     /// Free runs beside the first record.
     pub free_runs: FreeRuns,
     /// Free runs beside the validation record.

@@ -7,8 +7,9 @@ use super::decide::{Accepted, Answer, Step, decide, magnitudes};
 use super::evalue::{combined, log_e};
 use super::fit::{Fitted, fit};
 use super::held_out::shrinkage;
+use super::map::Where;
 use super::null::{Bench, Test};
-use super::place::locate;
+use super::place::{maps, targets};
 use super::problem::Problem;
 use super::result::*;
 use super::shrink::{Runner, free_runs};
@@ -150,13 +151,13 @@ pub fn diagnose(
 
     // Where, and how far?
     let place = match verdict {
-        Verdict::StructuralGap => locate(
-            &bench,
-            found.as_deref().unwrap_or(&[]),
-            &test,
-            &answer,
-            equations,
-        )?,
+        Verdict::StructuralGap => {
+            let found = found.as_deref().unwrap_or(&[]);
+            Where {
+                maps: maps(&bench, &test, found.first(), settings.alpha)?,
+                ..targets(&bench, found, &test, &answer)
+            }
+        }
         _ => Where::default(),
     };
     let last = step.as_ref().map_or(&bench, |step| &step.bench);
@@ -204,8 +205,11 @@ pub fn diagnose(
             class: answer.class,
             unexplained_p_value: answer.unexplained,
             catch_all: answer.catch_all,
+            next_input: None,
         },
         shrinkage,
+        discovery: None,
+        power: vec![],
         free_runs: runs(&records[0])?,
         validation_runs: validation.map(|v| runs(&v[0])).transpose()?,
         not_tested,

@@ -69,7 +69,8 @@ fn series(runs: &FreeRuns, channel: usize) -> Vec<Series> {
 
 /// Windows of the first record.
 fn windows(found: &Diagnosis, channel: &str) -> Vec<Span> {
-    let own = (found.place.windows.iter()).filter(|w| w.record == 0 && w.channel == channel);
+    let notable = found.place.maps.notable().windows;
+    let own = (notable.iter()).filter(|w| w.record == 0 && w.channel == channel);
     let mut spans: Vec<Span> = own
         .map(|w| Span {
             from: w.start,
@@ -109,7 +110,7 @@ pub fn gap_targets_svg(found: &Diagnosis) -> Option<String> {
 /// Ranges of states and inputs that stand out; `None` where none does.
 pub fn gap_regions_svg(study: &Study, found: &Diagnosis) -> Option<String> {
     let units = Units::of(study);
-    let regions = &found.place.regions;
+    let regions = found.place.maps.notable().regions;
     let clearest = regions.first()?;
     let mut variables: Vec<&str> = regions.iter().map(|r| r.variable.as_str()).collect();
     variables.sort_unstable();

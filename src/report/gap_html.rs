@@ -60,7 +60,7 @@ fn test(found: &Diagnosis) -> String {
 
 /// Measured and twin.
 fn runs(study: &Study, found: &Diagnosis) -> String {
-    let marked = match found.place.windows.is_empty() {
+    let marked = match found.place.maps.notable().windows.is_empty() {
         true => String::new(),
         false => format!(
             " The strip below the axis marks windows in which the twin does not follow, with their shares of the gap: unbroken \

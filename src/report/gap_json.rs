@@ -1,7 +1,12 @@
 //! A diagnosis as JSON, `truetwin.gap/1`.
 
-use crate::diagnose::{Diagnosis, EffectFit, Shrinkage};
+use crate::diagnose::{
+    Diagnosis, Discovery, EffectFit, Maps, NextInput, Shrinkage, Visible, Where,
+};
 use serde_json::{Map, Value, json};
+
+/// File of the record to measure next, beside the report.
+pub const NEXT_INPUT: &str = "next-input.csv";
 
 /// The diagnosis as one JSON object, `truetwin.gap/1`.
 ///
@@ -13,8 +18,9 @@ use serde_json::{Map, Value, json};
 /// | `which` | effects best first, what was accepted, rivals |
 /// | `shrinkage` | free-run errors on held-out data |
 ///
-/// Beyond the contract: `detection.rank_p_value` and `.log_e`, `which.catch_all`, `parameters[].prior`,
-/// `windows[].record`, `shrinkage.controls`, `candidates`, `not_tested`, `seconds`.
+/// Beyond the contract: `detection.rank_p_value` and `.log_e`, `which.catch_all`, `parameters[].prior`, of `where` all but
+/// target, targets, windows and regions, `windows[].record`, `shrinkage.controls`, `discovery`, `power`, `candidates`,
+/// `not_tested`, `seconds`.
 ///
 /// All keys are always there; what was skipped is null, and so are numbers that are not finite.
 pub fn gap_json(found: &Diagnosis) -> Value {
@@ -33,22 +39,6 @@ pub fn gap_json(found: &Diagnosis) -> Value {
     let targets: Vec<Value> = (place.targets.iter())
         .map(|t| json!({ "target": t.target, "p_value": t.p_value, "share": t.share }))
         .collect();
-    let windows: Vec<Value> = (place.windows.iter())
-        .map(|w| {
-            json!({
-                "start": w.start, "end": w.end, "channel": w.channel, "p_value": w.p_value,
-                "share": w.share, "record": w.record,
-            })
-        })
-        .collect();
-    let regions: Vec<Value> = (place.regions.iter())
-        .map(|r| {
-            json!({
-                "variable": r.variable, "low": r.low, "high": r.high, "p_value": r.p_value,
-                "share": r.share,
-            })
-        })
-        .collect();
     let which = &found.which;
     json!({
         "schema": "truetwin.gap/1",
@@ -63,22 +53,132 @@ pub fn gap_json(found: &Diagnosis) -> Value {
         },
         "parameters": parameters,
         "nuisance": nuisance,
-        "where": {
-            "target": place.target, "targets": targets, "windows": windows, "regions": regions,
-        },
+        "where": place_json(place, targets),
         "which": {
             "decision": which.decision.id(),
             "effects": which.effects.iter().map(effect).collect::<Vec<_>>(),
             "accepted": which.accepted,
             "class": which.class,
             "unexplained_p_value": which.unexplained_p_value,
-            "next_input": null,
+            "next_input": which.next_input.as_ref().map(next_input),
             "catch_all": which.catch_all,
         },
         "shrinkage": found.shrinkage.as_ref().map(shrinkage),
+        "discovery": found.discovery.as_ref().map(discovery),
+        "power": found.power.iter().map(visible).collect::<Vec<_>>(),
         "candidates": found.candidates,
         "not_tested": found.not_tested,
         "seconds": found.seconds,
+    })
+}
+
+/// The contract's `where`: targets, and the notable cells of all maps beside them.
+fn place_json(place: &Where, targets: Vec<Value>) -> Value {
+    let equations: Vec<Value> = (place.equations.iter())
+        .map(|e| {
+            let term: Vec<Value> = (e.term.iter())
+                .map(|t| {
+                    json!({
+                        "variable": t.variable, "low": t.low, "high": t.high, "mean": t.mean,
+                        "std_error": t.std_error,
+                    })
+                })
+                .collect();
+            json!({ "equation": e.equation, "p_value": e.p_value, "share": e.share, "term": term })
+        })
+        .collect();
+    let mut all = maps(&place.maps);
+    all.insert("target".into(), json!(place.target));
+    all.insert("targets".into(), json!(targets));
+    all.insert("equations".into(), json!(equations));
+    all.insert("after".into(), json!(place.after.as_ref().map(maps)));
+    Value::Object(all)
+}
+
+/// What stands out.
+fn maps(maps: &Maps) -> Map<String, Value> {
+    let notable = maps.notable();
+    let windows: Vec<Value> = (notable.windows.iter())
+        .map(|w| {
+            json!({
+                "start": w.start, "end": w.end, "channel": w.channel, "p_value": w.p_value,
+                "share": w.share, "record": w.record,
+            })
+        })
+        .collect();
+    let regions: Vec<Value> = (notable.regions.iter())
+        .map(|r| {
+            json!({
+                "variable": r.variable, "low": r.low, "high": r.high, "p_value": r.p_value,
+                "share": r.share,
+            })
+        })
+        .collect();
+    let channels: Vec<Value> = (notable.channels.iter())
+        .map(|c| json!({ "channel": c.channel, "p_value": c.p_value, "share": c.share }))
+        .collect();
+    let lags: Vec<Value> = (notable.lags.iter())
+        .map(|l| {
+            json!({
+                "channel": l.channel, "signal": l.signal, "from": l.from, "to": l.to,
+                "p_value": l.p_value, "share": l.share,
+            })
+        })
+        .collect();
+    let bands: Vec<Value> = (notable.bands.iter())
+        .map(|b| {
+            json!({
+                "channel": b.channel, "low": b.low, "high": b.high, "p_value": b.p_value,
+                "share": b.share,
+            })
+        })
+        .collect();
+    let onset = notable.onset.as_ref().map(|o| {
+        json!({ "record": o.record, "time": o.time, "channel": o.channel, "p_value": o.p_value })
+    });
+    let lists = [
+        ("onset", json!(onset)),
+        ("windows", json!(windows)),
+        ("regions", json!(regions)),
+        ("channels", json!(channels)),
+        ("lags", json!(lags)),
+        ("bands", json!(bands)),
+    ];
+    lists
+        .map(|(name, list)| (name.to_owned(), list))
+        .into_iter()
+        .collect()
+}
+
+/// The record to measure next; its inputs stand in `next-input.csv` beside the report.
+fn next_input(next: &NextInput) -> Value {
+    let count = |[count, of]: [u64; 2]| json!({ "count": count, "of": of });
+    json!({
+        "file": NEXT_INPUT, "kind": next.kind, "rivals": next.rivals,
+        "samples": next.drive.samples(), "step": next.drive.dt(),
+        "split": count(next.split), "again": count(next.again),
+    })
+}
+
+fn discovery(found: &Discovery) -> Value {
+    let terms: Vec<Value> = (found.terms.iter())
+        .map(|t| {
+            json!({
+                "name": t.name, "coefficient": t.coefficient, "interval": t.interval,
+                "inclusion": t.inclusion,
+            })
+        })
+        .collect();
+    json!({
+        "exploratory": true, "equation": found.equation, "terms": terms,
+        "explained": found.explained,
+    })
+}
+
+fn visible(visible: &Visible) -> Value {
+    json!({
+        "id": visible.id, "target": visible.target, "magnitude": visible.magnitude,
+        "value": visible.value,
     })
 }
 

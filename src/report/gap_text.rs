@@ -44,11 +44,12 @@ pub fn gap_text(found: &Diagnosis) -> String {
         .collect();
     lines.push(parameters.join(", "));
     if let Some(target) = &found.place.target {
-        let windows = found.place.windows.iter().take(2);
+        let maps = found.place.maps.notable();
+        let windows = maps.windows.iter().take(2);
         let when: Vec<String> = windows
             .map(|w| format!("{} to {} s", short(w.start), short(w.end)))
             .collect();
-        let regions: Vec<String> = (found.place.regions.iter().take(2))
+        let regions: Vec<String> = (maps.regions.iter().take(2))
             .map(|r| format!("{} in {} … {}", r.variable, short(r.low), short(r.high)))
             .collect();
         let mut line = format!("Where: {target}");

@@ -34,7 +34,7 @@ fn body(study: &Study, found: &Diagnosis) -> String {
             ),
         ));
     }
-    let further: Vec<String> = (found.place.windows.iter())
+    let further: Vec<String> = (found.place.maps.notable().windows.iter())
         .filter(|w| w.record > 0)
         .map(|w| {
             let (start, end) = (short(w.start), short(w.end));

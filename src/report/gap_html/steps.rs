@@ -70,12 +70,12 @@ fn steps(found: &Diagnosis) -> Vec<String> {
 
 /// Where to look for a law that is not listed.
 fn none_of_these(found: &Diagnosis) -> Vec<String> {
-    let place = &found.place;
+    let (place, maps) = (&found.place, found.place.maps.notable());
     let mut look = match &place.target {
         Some(target) => format!("Look at {target}"),
         None => "Look at the twin".into(),
     };
-    if let Some(r) = place.regions.first() {
+    if let Some(r) = maps.regions.first() {
         look.push_str(&format!(
             ", above all where {} is {} … {}",
             r.variable,
@@ -83,7 +83,7 @@ fn none_of_these(found: &Diagnosis) -> Vec<String> {
             short(r.high)
         ));
     }
-    if let Some(w) = place.windows.first() {
+    if let Some(w) = maps.windows.first() {
         look.push_str(&format!(
             ", and at {} to {} s",
             short(w.start),
