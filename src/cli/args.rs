@@ -282,6 +282,9 @@ pub(super) struct WithheldArguments {
     /// Give each diagnosis a second record.
     #[arg(long)]
     pub validation: bool,
+    /// End each diagnosis with its verdict: false alarms and detection, in a third of the time.
+    #[arg(long)]
+    pub detection_only: bool,
 }
 
 /// A kind of truth.

@@ -14,6 +14,7 @@ pub(super) fn run(context: &Context<'_>, options: &WithheldArguments) -> Result<
         kinds: options.kinds.clone().unwrap_or(Kind::ALL.to_vec()),
         without: options.without,
         validation: options.validation,
+        detection_only: options.detection_only,
     };
     let sealed = Withheld::new(&study, settings)?.seal(&options.out, context.progress)?;
     // Published before the first diagnosis.

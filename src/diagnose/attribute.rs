@@ -2,6 +2,7 @@
 
 use super::DiagnoseError;
 use super::candidate::Addition;
+use super::decide::Accepted;
 use super::dictionary::{Dictionary, Point};
 use super::fit::{Fitted, climb, fit};
 use super::frequency::peaks;
@@ -72,13 +73,7 @@ pub(super) fn explanations(
     only: Option<&[usize]>,
     stage: &Stage,
 ) -> Result<Vec<Explanation>, DiagnoseError> {
-    let base_validation = match validation {
-        Some(records) => {
-            let theta = bench.problem.of_record(0, &bench.fitted.theta);
-            elsewhere(&bench.problem.on(records), &theta)?
-        }
-        None => None,
-    };
+    let base_validation = base_validation(bench, validation)?;
     let reference = Reference::new(&bench.problem, &bench.fitted.theta)?;
     let tasks: Vec<usize> = match only {
         Some(list) => list.to_vec(),
@@ -226,6 +221,47 @@ fn explain(
         validation,
         base_validation,
     )?))
+}
+
+/// An accepted effect alone, fitted from a θ of the twin and its own magnitudes; `None` where it cannot be.
+pub(super) fn refitted(
+    bench: &Bench<'_>,
+    accepted: &Accepted,
+    own: &[f64],
+    validation: Option<&[Record]>,
+) -> Result<Option<Explanation>, DiagnoseError> {
+    let dictionary = &bench.dictionary;
+    let (key, addition) = (accepted.key(), &accepted.addition);
+    let found = dictionary.variants.iter().position(|v| {
+        dictionary.candidates[v.candidate].key() == key
+            && v.held == addition.held
+            && v.kept == addition.kept
+    });
+    let Some(index) = found else { return Ok(None) };
+    let variant = &dictionary.variants[index];
+    let free: Vec<f64> = (accepted.magnitudes.iter())
+        .filter(|(name, _)| !variant.held.contains_key(name))
+        .map(|(_, value)| *value)
+        .collect();
+    let problem = variant.problem(&bench.problem);
+    let start = problem.clamp(&problem.full(&variant.theta(own, &free)));
+    let Some(fitted) = fit(&problem, &[start], ITERATIONS)? else {
+        return Ok(None);
+    };
+    let base = base_validation(bench, validation)?;
+    scored(bench, variant.candidate, index, fitted, validation, base).map(Some)
+}
+
+/// The likelihood of the validation record under the bench's own twin.
+fn base_validation(
+    bench: &Bench<'_>,
+    validation: Option<&[Record]>,
+) -> Result<Option<f64>, FilterError> {
+    let Some(records) = validation else {
+        return Ok(None);
+    };
+    let theta = bench.problem.of_record(0, &bench.fitted.theta);
+    elsewhere(&bench.problem.on(records), &theta)
 }
 
 /// A fit with its scores.

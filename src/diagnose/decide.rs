@@ -1,16 +1,16 @@
 //! From fitted explanations to an answer: named, a class of rivals, a pair, or none of these.
 
-use super::attribute::{Explanation, RIVALS};
+use super::attribute::{Explanation, RIVALS, probabilities};
 use super::base_fit::ITERATIONS;
 use super::candidate::{Addition, Candidate};
 use super::dictionary::Dictionary;
 use super::fit::fit;
-use super::null::{Bench, Look};
-use super::pairs::best_pair;
+use super::null::{Bench, Look, Test};
 use super::problem::Problem;
 use super::result::Decision;
 use super::scales::Scales;
 use super::scan::Reference;
+use super::several::{promises, several};
 use super::shrink::{Runner, closed};
 use super::{DiagnoseError, DiagnoseSettings, Setting};
 use crate::progress::Stage;
@@ -18,10 +18,11 @@ use crate::twin::{Law, Noise, Signal};
 
 /// The structural test with the effect added: what is left below this is unexplained.
 const UNEXPLAINED: f64 = 0.02;
-/// Nats that a second effect must add beyond what it costs.
-const WORTH_A_PAIR: f64 = 3.0;
-/// Nats that two effects must be ahead of a catch-all: so many pairs are tried that some imitate anything a little better.
-const PAIR_OVER_ANYTHING: f64 = 10.0;
+/// Nats that another effect must add beyond what it costs, and beside an effect that leaves nothing unexplained.
+pub(super) const WORTH_ANOTHER: f64 = 3.0;
+const WORTH_BESIDE_A_GOOD_ONE: f64 = 8.0;
+/// Nats that several effects must be ahead of a catch-all: so many are tried that some imitate anything a little better.
+const SEVERAL_OVER_ANYTHING: f64 = 10.0;
 /// Least share of the free-run error that effects must take off where something is left unexplained.
 const GOOD_PART: f64 = 0.1;
 
@@ -35,15 +36,58 @@ pub(super) struct Answer {
     pub catch_all: Option<String>,
 }
 
-impl Answer {
+/// An answer, and the twins that it rests on.
+pub(super) struct Decided<'a> {
+    pub answer: Answer,
+    /// The twin with the accepted effects.
+    pub step: Option<Step<'a>>,
+    /// Where none is accepted: the twin with the best listed effect.
+    pub best: Option<Step<'a>>,
+    /// What the one or the other leaves.
+    pub left: Option<Left>,
+}
+
+/// What a twin with effects leaves unexplained.
+pub(super) struct Left {
+    /// On the records, and on these and the validation record together: the smaller one.
+    pub p_value: f64,
+    /// On the records.
+    pub test: Test,
+    /// How the records look.
+    pub look: Look,
+}
+
+impl<'a> Decided<'a> {
+    /// The effects of a step; of a single one also its rivals among the listed effects with their scores.
+    fn among(listed: &[(String, f64)], step: Step<'a>, left: Option<Left>) -> Self {
+        let score = step.score;
+        let mut decided = Self::named(step, left);
+        let answer = &mut decided.answer;
+        if let [only] = &answer.class[..] {
+            let rivals = (listed.iter())
+                .filter(|(key, s)| key != only && *s >= score - RIVALS)
+                .map(|(key, _)| key.clone());
+            answer.class = [only.clone()].into_iter().chain(rivals).collect();
+            if answer.class.len() > 1 {
+                answer.decision = Decision::Class;
+            }
+        }
+        decided
+    }
+
     /// The effects of a step, all of them and nothing else.
-    fn named(step: &Step<'_>, unexplained: Option<f64>) -> Self {
+    fn named(step: Step<'a>, left: Option<Left>) -> Self {
         Self {
-            decision: Decision::Named,
-            accepted: step.accepted.clone(),
-            class: step.accepted.iter().map(Accepted::key).collect(),
-            unexplained,
-            catch_all: None,
+            answer: Answer {
+                decision: Decision::Named,
+                accepted: step.accepted.clone(),
+                class: step.accepted.iter().map(Accepted::key).collect(),
+                unexplained: left.as_ref().map(|left| left.p_value),
+                catch_all: None,
+            },
+            step: Some(step),
+            best: None,
+            left,
         }
     }
 }
@@ -57,6 +101,8 @@ pub(super) struct Accepted {
     pub magnitudes: Vec<(String, f64)>,
     /// Nats that it adds.
     pub gain: f64,
+    /// Among all that was tried in its place.
+    pub probability: f64,
 }
 
 impl Accepted {
@@ -81,12 +127,13 @@ pub(super) struct Step<'a> {
     pub score: f64,
 }
 
-/// The bench of a twin with effects, whose fit is `explanation` on `bench`.
+/// The bench of a twin with effects, whose fit is `explanation` on `bench`, with its probability there.
 pub(super) fn grown<'a>(
     setting: &Setting<'a>,
     bench: &Bench<'a>,
     accepted: &[Accepted],
     explanation: &Explanation,
+    probability: f64,
 ) -> Result<Option<Step<'a>>, DiagnoseError> {
     let Some(addition) = bench.addition(explanation) else {
         return Ok(None);
@@ -100,6 +147,7 @@ pub(super) fn grown<'a>(
         target: candidate.target.clone(),
         magnitudes: magnitudes(bench, explanation),
         gain: explanation.gain + explanation.validation.unwrap_or(0.0),
+        probability,
     });
     let additions: Vec<Addition> = all.iter().map(|a| a.addition.clone()).collect();
     let left: Vec<Candidate> = (bench.dictionary.candidates.iter())
@@ -172,7 +220,7 @@ pub(super) fn magnitudes(bench: &Bench<'_>, explanation: &Explanation) -> Vec<(S
         .collect()
 }
 
-/// Decides about a structural gap.
+/// Decides about a structural gap: the best single effect, more beside it where the data ask for them, or none.
 pub(super) fn decide<'a>(
     setting: &Setting<'a>,
     bench: &Bench<'a>,
@@ -180,7 +228,7 @@ pub(super) fn decide<'a>(
     settings: &DiagnoseSettings,
     noise: Noise,
     stage: &Stage,
-) -> Result<(Answer, Option<Step<'a>>), DiagnoseError> {
+) -> Result<Decided<'a>, DiagnoseError> {
     let candidates = &bench.dictionary.candidates;
     let listed: Vec<&Explanation> = (found.iter())
         .filter(|e| candidates[e.candidate].is_listed())
@@ -191,95 +239,109 @@ pub(super) fn decide<'a>(
     // A noise is nothing but a disturbance without memory: it must do better without the memory's price.
     let price = 0.5 * (bench.problem.samples() as f64).ln();
     let beaten = |score: f64, noisy: bool| score < catch_score + if noisy { price } else { 0.0 };
-    let nothing = |unexplained| Answer {
-        decision: Decision::NoneOfThese,
-        accepted: vec![],
-        class: vec![],
-        unexplained,
-        catch_all: catch_name.clone(),
+    let nothing = |left: Option<Left>, step| Decided {
+        answer: Answer {
+            decision: Decision::NoneOfThese,
+            accepted: vec![],
+            class: vec![],
+            unexplained: left.as_ref().map(|left| left.p_value),
+            catch_all: catch_name.clone(),
+        },
+        step: None,
+        best: step,
+        left,
     };
     let Some(&first) = listed.first() else {
-        return Ok((nothing(None), None));
+        return Ok(nothing(None, None));
     };
-    // The best listed effect alone.
-    let mut unexplained = None;
-    let Some(step) = grown(setting, bench, &[], first)? else {
-        return Ok((nothing(None), None));
+    let keys: Vec<(String, f64)> = (listed.iter())
+        .map(|e| (candidates[e.candidate].key(), e.score()))
+        .collect();
+    let chances = probabilities(found);
+    let chance = (found.iter().zip(&chances))
+        .find(|(e, _)| e.candidate == first.candidate)
+        .map_or(f64::NAN, |(_, chance)| *chance);
+    let Some(single) = grown(setting, bench, &[], first, chance)? else {
+        return Ok(nothing(None, None));
     };
-    let single = noise.child("unexplained");
-    let mut first_look: Option<Look> = None;
-    if let Some((p, look)) = left_over(setting, &step.bench, settings, single, stage)? {
-        unexplained = Some(p);
-        first_look = Some(look);
-        if p > UNEXPLAINED && !beaten(first.score(), candidates[first.candidate].is_noise()) {
-            let class: Vec<String> = (listed.iter())
-                .filter(|e| e.score() >= first.score() - RIVALS)
-                .map(|e| candidates[e.candidate].key())
-                .collect();
-            let decision = match class.len() {
-                1 => Decision::Named,
-                _ => Decision::Class,
-            };
-            let answer = Answer {
-                decision,
-                class,
-                ..Answer::named(&step, unexplained)
-            };
-            return Ok((answer, Some(step)));
+    let tests = noise.child("unexplained");
+    let Some(left) = left_over(setting, &single.bench, settings, tests, stage)? else {
+        return Ok(nothing(None, None));
+    };
+    let passes = left.p_value > UNEXPLAINED
+        && !beaten(first.score(), candidates[first.candidate].is_noise());
+    // More than one, where one is not enough, or where a second one promises much.
+    if !passes || promises(&single, &left.look) {
+        let margin = if passes {
+            WORTH_BESIDE_A_GOOD_ONE
+        } else {
+            WORTH_ANOTHER
+        };
+        let several = several(
+            setting,
+            bench,
+            &listed,
+            (&single, &left.look),
+            margin,
+            stage,
+        )?;
+        if let Some(step) = several
+            && !beaten(
+                step.score - SEVERAL_OVER_ANYTHING,
+                step.accepted.iter().any(Accepted::is_noise),
+            )
+        {
+            let tests = tests.child("several");
+            if let Some(rest) = left_over(setting, &step.bench, settings, tests, stage)?
+                && (rest.p_value > UNEXPLAINED
+                    || (!passes && improves(setting, bench, &step, noise)?))
+            {
+                return Ok(Decided::among(&keys, step, Some(rest)));
+            }
         }
     }
-    if let Some(pair) = best_pair(setting, bench, &listed, (&step, first_look.as_ref()), stage)?
-        && pair.score > first.score() + WORTH_A_PAIR
-        && !beaten(
-            pair.score - PAIR_OVER_ANYTHING,
-            pair.accepted.iter().any(|a| a.is_noise()),
-        )
-        && let Some((p, _)) =
-            left_over(setting, &pair.bench, settings, single.child("pair"), stage)?
-    {
-        unexplained = Some(p);
-        if p > UNEXPLAINED || improves(setting, bench, &pair, single)? {
-            return Ok((Answer::named(&pair, unexplained), Some(pair)));
-        }
+    if passes {
+        return Ok(Decided::among(&keys, single, Some(left)));
     }
     // A single effect that leaves something, but follows a record never seen much better.
-    if improves(setting, bench, &step, noise)? {
-        return Ok((Answer::named(&step, unexplained), Some(step)));
+    if improves(setting, bench, &single, noise)? {
+        return Ok(Decided::named(single, Some(left)));
     }
-    Ok((nothing(unexplained), None))
+    Ok(nothing(Some(left), Some(single)))
 }
 
 /// The structural test of a twin with effects, on the records and, where nothing is left there, on these and the validation
-/// record together: the smaller p-value, and how the records look.
+/// record together.
 fn left_over<'a>(
     setting: &Setting<'a>,
     bench: &Bench<'a>,
     settings: &DiagnoseSettings,
     noise: Noise,
     stage: &Stage,
-) -> Result<Option<(f64, Look)>, DiagnoseError> {
+) -> Result<Option<Left>, DiagnoseError> {
     let count = settings.unexplained;
     let Some(nulls) = bench.nulls(count, UNEXPLAINED, noise.child("records"), stage)? else {
         return Ok(None);
     };
-    let p = nulls.test().p_value;
-    let Some(records) = setting.together.filter(|_| p > UNEXPLAINED) else {
-        return Ok(Some((p, nulls.own)));
+    let test = nulls.test();
+    let left = |also: f64| {
+        Some(Left {
+            p_value: test.p_value.min(also),
+            test: test.clone(),
+            look: nulls.own,
+        })
     };
-    let there = bench.problem.on(records);
-    let mut start = there.full(&bench.problem.of_record(0, &bench.fitted.theta));
-    for r in 0..bench.problem.records.len() {
-        let own = bench.problem.of_record(r, &bench.fitted.theta);
-        there.place(r, &own, &mut start);
-    }
+    let Some(records) = setting.together.filter(|_| test.p_value > UNEXPLAINED) else {
+        return Ok(left(1.0));
+    };
+    let (there, start) = bench.on(records);
     let Some(fitted) = fit(&there, &[start], ITERATIONS)? else {
-        return Ok(Some((p, nulls.own)));
+        return Ok(left(1.0));
     };
     let seen = bench.with_problem(there, fitted, |bench| {
         bench.nulls(count, UNEXPLAINED, noise.child("together"), stage)
     })?;
-    let also = seen.map_or(1.0, |nulls| nulls.test().p_value);
-    Ok(Some((p.min(also), nulls.own)))
+    Ok(left(seen.map_or(1.0, |nulls| nulls.test().p_value)))
 }
 
 /// Of a twin whose free run is to follow the record: whether it follows the validation record better by a good part, beyond

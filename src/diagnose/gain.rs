@@ -68,7 +68,7 @@ pub fn gain_of(
         };
         gain += best.gain + best.validation.unwrap_or(0.0);
         if left > 0 {
-            let Some(step) = grown(&setting, &bench, &accepted, best)? else {
+            let Some(step) = grown(&setting, &bench, &accepted, best, 1.0)? else {
                 return Ok(None);
             };
             (bench, accepted) = (step.bench, step.accepted);

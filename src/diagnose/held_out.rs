@@ -3,14 +3,19 @@
 use super::attribute::Explanation;
 use super::candidate::Addition;
 use super::decide::{Accepted, Answer, Step};
-use super::fit::fit;
+use super::fit::{Fitted, fit};
 use super::null::Bench;
 use super::problem::Problem;
-use super::shrink::{Runner, Shrinkage, closed, root};
+use super::shrink::{Runner, Shrinkage, closed, interval, root};
 use super::{DiagnoseError, DiagnoseSettings, Setting};
 use crate::filter::{FilterError, recoverable};
 use crate::twin::{Drive, Noise, Record, RecordError, Role};
+use nalgebra::DVector;
 use ndarray::s;
+use rayon::prelude::*;
+
+/// Draws of θ for the interval of a share.
+const DRAWS: usize = 100;
 
 /// Samples of the shortest record whose last third is held out.
 pub const SHORTEST_SPLIT: usize = 300;
@@ -127,8 +132,55 @@ pub(super) fn shrinkage(
     if let (Some(after), Some(floor)) = (&after, floor) {
         (result.closed, result.interval) = closed(&before, after, floor, noise.child("bootstrap"));
     }
+    if let (Some(closed), Some(floor), Some(step)) = (result.closed, floor, step) {
+        let all = all_data(setting, step)?;
+        let (problem, fitted) = match &all {
+            Some((problem, fitted)) => (problem, fitted),
+            None => (&step.bench.problem, &step.bench.fitted),
+        };
+        let draws = posterior(problem, fitted, noise.child("posterior"));
+        let afters: Vec<f64> = (draws.into_par_iter())
+            .map(|theta| Ok(Runner::new(twin, &additions, theta)?.errors(record, from)))
+            .collect::<Result<Vec<_>, DiagnoseError>>()?
+            .into_iter()
+            .flatten()
+            .map(|errors| root(&errors))
+            .collect();
+        result.interval = interval(result.before, closed, floor, &afters).or(result.interval);
+    }
     result.placebo = placebo(setting, bench, found, answer, record, from)?;
     Ok(Some(result))
+}
+
+/// The accepted twin fitted to the records and the validation record together; `None` where there is none.
+fn all_data<'a>(
+    setting: &Setting<'a>,
+    step: &Step<'_>,
+) -> Result<Option<(Problem<'a>, Fitted)>, DiagnoseError> {
+    let Some(records) = setting.together else {
+        return Ok(None);
+    };
+    let (problem, start) = step.bench.on(records);
+    Ok(fit(&problem, &[start], 10)?.map(|fitted| (problem, fitted)))
+}
+
+/// Draws of θ from N(θ̂, F⁻¹) in φ, within the bounds.
+fn posterior(problem: &Problem<'_>, fitted: &Fitted, noise: Noise) -> Vec<Vec<f64>> {
+    let c = &problem.coordinates;
+    let centre = DVector::from_vec(c.of(&fitted.theta));
+    let Some(root) = fitted.information.clone().cholesky() else {
+        return vec![];
+    };
+    let mut source = noise.source("draws");
+    (0..DRAWS)
+        .filter_map(|_| {
+            let z = DVector::from_fn(centre.len(), |_, _| source.normal());
+            // F = L·Lᵀ: L⁻ᵀz has the covariance F⁻¹.
+            let step = root.l().tr_solve_lower_triangular(&z)?;
+            let theta = c.theta(c.clamp(&(&centre + step)).as_slice());
+            Some(problem.of_record(0, &theta))
+        })
+        .collect()
 }
 
 /// The error with the listed effect that explains least, fitted as the accepted one was.

@@ -7,10 +7,11 @@
 //! | are the innovations white? | `omnibus.rs` |
 //! | what all of that is where nothing is wrong | `null.rs` |
 //! | what a validation record says | `evalue.rs` |
-//! | fit the explanations, order them, accept, abstain | `frequency.rs`, `attribute.rs`, `decide.rs`, `pairs.rs` |
-//! | where, in the equations, in time, in the states | `localise.rs` |
+//! | fit the explanations, order them, accept, abstain | `frequency.rs`, `attribute.rs`, `decide.rs`, `several.rs` |
+//! | where, in the equations, in time, in the states | `localise/`, `map.rs`, `place.rs` |
 //! | how far, on held-out data | `shrink.rs` |
 //! | the kinds of gap | `verdict.rs` |
+//! | what is reported of all that | `summary.rs`, `result.rs` |
 //! | what a known effect would gain, for trials | `gain.rs` |
 //!
 //! See docs/diagnosing-a-gap.md for the mathematics and how to read the answer.
@@ -30,7 +31,6 @@ mod localise;
 mod map;
 mod null;
 mod omnibus;
-mod pairs;
 mod place;
 mod plan;
 mod problem;
@@ -38,7 +38,9 @@ mod result;
 mod run;
 mod scales;
 mod scan;
+mod several;
 mod shrink;
+mod summary;
 mod variant;
 mod verdict;
 
@@ -69,6 +71,7 @@ use std::sync::Arc;
 /// | `seed` | 1 | | of everything random |
 /// | `without` | none | ids, or `id@target` | effects that are not to be named |
 /// | `initial` | none | | θ that an estimator gave, a start of the fit |
+/// | `detection_only` | no | | stop after the verdict: neither where, nor which, nor how far |
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiagnoseSettings {
     /// Level of every test.
@@ -83,6 +86,8 @@ pub struct DiagnoseSettings {
     pub without: Vec<String>,
     /// θ from an estimator.
     pub initial: Option<Vec<f64>>,
+    /// Stop after the verdict.
+    pub detection_only: bool,
 }
 
 impl Default for DiagnoseSettings {
@@ -94,6 +99,7 @@ impl Default for DiagnoseSettings {
             seed: 1,
             without: vec![],
             initial: None,
+            detection_only: false,
         }
     }
 }

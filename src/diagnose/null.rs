@@ -83,6 +83,17 @@ impl<'a> Bench<'a> {
         })
     }
 
+    /// The bench's twin on other records, the first of which are its own, and θ to start a fit from.
+    pub fn on<'b>(&self, records: &'b [Record]) -> (Problem<'b>, Vec<f64>) {
+        let problem = self.problem.on(records);
+        let mut start = problem.full(&self.problem.of_record(0, &self.fitted.theta));
+        for r in 0..self.problem.records.len() {
+            let own = self.problem.of_record(r, &self.fitted.theta);
+            problem.place(r, &own, &mut start);
+        }
+        (problem, start)
+    }
+
     /// How the records themselves look.
     pub fn own_look(&self) -> Result<Option<Look>, FilterError> {
         self.look(&self.problem, &self.fitted.theta)

@@ -1,30 +1,28 @@
 //! The way of one diagnosis.
 
-use super::attribute::{Explanation, explanations, probabilities};
+use super::attribute::{Explanation, explanations};
 use super::base_fit::{ITERATIONS, base_fit};
 use super::candidate::{Addition, candidates, not_tested};
-use super::decide::{Accepted, Answer, Step, decide, magnitudes};
+use super::decide::{Accepted, Answer, Step, decide};
 use super::evalue::{combined, log_e};
 use super::fit::{Fitted, fit};
 use super::held_out::shrinkage;
 use super::map::Where;
-use super::null::{Bench, Test};
 use super::place::{maps, targets};
 use super::problem::Problem;
 use super::result::*;
 use super::shrink::{Runner, free_runs};
+use super::summary::{fitted_parameters, reported};
 use super::verdict::{absorbing, left_the_prior, verdict};
 use super::{DiagnoseError, DiagnoseSettings, GivenRecord, Setting};
 use crate::math::six_digits;
 use crate::progress::Progress;
 use crate::study::Study;
-use crate::twin::{Noise, Now, PRIOR_DEVIATION, Parameter, Record, Role, StateSpace};
+use crate::twin::{Noise, Now, Record, Role, StateSpace};
 use std::time::Instant;
 
 /// Shortest record.
 const LEAST: usize = 50;
-/// Explanations that are reported.
-const REPORTED: usize = 12;
 
 /// Diagnoses the gap between a twin and records of one real system.
 ///
@@ -123,15 +121,24 @@ pub fn diagnose(
         catch_all: None,
     };
     let mut step: Option<Step<'_>> = None;
+    let mut after = None;
     let mut effects = vec![];
-    if verdict == Verdict::StructuralGap {
+    if settings.detection_only {
+        // The verdict is all.
+    } else if verdict == Verdict::StructuralGap {
         let list = match found.take() {
             Some(list) => list,
             None => fit_all()?,
         };
         let stage = progress.stage("accept", 2 * settings.unexplained);
-        (answer, step) = decide(&setting, &bench, &list, settings, noise, &stage)?;
+        let decided = decide(&setting, &bench, &list, settings, noise, &stage)?;
         stage.finish();
+        // The same maps once more with what was accepted, or else came nearest.
+        let added = decided.step.as_ref().or(decided.best.as_ref());
+        if let (Some(added), Some(left)) = (added, &decided.left) {
+            after = Some(maps(&added.bench, &left.test, None, settings.alpha)?);
+        }
+        (answer, step) = (decided.answer, decided.step);
         effects = reported(&bench, &list, &test, &answer);
         found = Some(list);
     } else if verdict == Verdict::ParameterGap
@@ -151,10 +158,11 @@ pub fn diagnose(
 
     // Where, and how far?
     let place = match verdict {
-        Verdict::StructuralGap => {
+        Verdict::StructuralGap if !settings.detection_only => {
             let found = found.as_deref().unwrap_or(&[]);
             Where {
                 maps: maps(&bench, &test, found.first(), settings.alpha)?,
+                after,
                 ..targets(&bench, found, &test, &answer)
             }
         }
@@ -165,15 +173,18 @@ pub fn diagnose(
         fitted_parameters(&space.iter().collect::<Vec<_>>(), last, settings);
     progress.checkpoint()?;
     let additions: Vec<Addition> = answer.accepted.iter().map(|a| a.addition.clone()).collect();
-    let shrinkage = shrinkage(
-        &setting,
-        &bench,
-        step.as_ref(),
-        &answer,
-        found.as_deref(),
-        settings,
-        noise,
-    )?;
+    let shrinkage = match settings.detection_only {
+        true => None,
+        false => shrinkage(
+            &setting,
+            &bench,
+            step.as_ref(),
+            &answer,
+            found.as_deref(),
+            settings,
+            noise,
+        )?,
+    };
     let runs = |record: &Record| -> Result<FreeRuns, DiagnoseError> {
         let base = Runner::new(twin, &[], problem.of_record(0, &fitted.theta))?;
         let grown = match additions.is_empty() {
@@ -310,94 +321,4 @@ fn against(
     let begin = there.full(&problem.of_record(0, &fitted.theta));
     let refitted = fit(&there, &[begin, there.centre()], ITERATIONS)?;
     Ok(refitted.and_then(|f| log_e(found, f.log_likelihood, starts, there.samples())))
-}
-
-/// Explanations as they are reported: the accepted ones first.
-fn reported(
-    bench: &Bench<'_>,
-    found: &[Explanation],
-    test: &Test,
-    answer: &Answer,
-) -> Vec<EffectFit> {
-    let chances = probabilities(found);
-    let mut all: Vec<EffectFit> = (found.iter().zip(chances))
-        .filter(|(e, _)| bench.dictionary.candidates[e.candidate].is_listed())
-        .map(|(e, probability)| {
-            let candidate = &bench.dictionary.candidates[e.candidate];
-            EffectFit {
-                id: candidate.id.clone(),
-                target: candidate.target.clone(),
-                probability,
-                magnitudes: magnitudes(bench, e),
-                log_score_gain: e.gain + e.validation.unwrap_or(0.0),
-                p_value: test.candidates.get(e.candidate).copied(),
-            }
-        })
-        .collect();
-    // A pair's magnitudes and gains are those of the two together.
-    if answer.accepted.len() > 1 {
-        for accepted in answer.accepted.iter().rev() {
-            let at = all.iter().position(|e| e.key() == accepted.key());
-            let mut effect = match at {
-                Some(at) => all.remove(at),
-                None => continue,
-            };
-            effect.magnitudes = accepted.magnitudes.clone();
-            effect.log_score_gain = accepted.gain;
-            all.insert(0, effect);
-        }
-    }
-    all.truncate(REPORTED);
-    all
-}
-
-/// The twin's own parameters, and everything else that the study estimates.
-fn fitted_parameters(
-    space: &[&Parameter],
-    bench: &Bench<'_>,
-    settings: &DiagnoseSettings,
-) -> (Vec<FittedParameter>, Vec<FittedNuisance>) {
-    let errors = bench.fitted.std_errors(&bench.problem);
-    let theta = &bench.fitted.theta;
-    let (mut own, mut nuisance) = (vec![], vec![]);
-    for (j, p) in space.iter().enumerate() {
-        if p.role == Role::Physical {
-            own.push(FittedParameter {
-                name: p.name.clone(),
-                unit: p.unit.clone(),
-                initial: settings.initial.as_ref().and_then(|i| i.get(j).copied()),
-                refitted: theta[j],
-                std_error: errors[j],
-                identified: errors[j] < PRIOR_DEVIATION * p.prior.width(),
-                prior: p.prior,
-            });
-        } else {
-            let role = match p.role {
-                Role::Start => "start",
-                Role::Noise => "noise",
-                _ => "effect",
-            };
-            let name = p.name.split_once('.').filter(|_| role != "effect");
-            nuisance.push(FittedNuisance {
-                name: name.map_or(p.name.as_str(), |(_, name)| name).to_owned(),
-                role,
-                value: theta[j],
-                std_error: errors[j],
-            });
-        }
-    }
-    // Starts of further records stand behind everything else.
-    let starts: Vec<&&Parameter> = space.iter().filter(|p| p.role == Role::Start).collect();
-    let d = bench.problem.twin.parameters().len();
-    for (i, j) in (d..theta.len()).enumerate() {
-        let (record, which) = (i / starts.len().max(1) + 2, i % starts.len().max(1));
-        let name = starts[which].name.trim_start_matches("start.");
-        nuisance.push(FittedNuisance {
-            name: format!("{name} (record {record})"),
-            role: "start",
-            value: theta[j],
-            std_error: errors[j],
-        });
-    }
-    (own, nuisance)
 }

@@ -30,7 +30,7 @@ pub struct Shrinkage {
     pub floor: Option<f64>,
     /// (before − after)/(before − floor); none where the gap's own interval touches zero.
     pub closed: Option<f64>,
-    /// 90 % interval of `closed`, from resampled blocks of the record.
+    /// 90 % of what draws of θ given all data close: the uncertainty of the share that the true effects close.
     pub interval: Option<[f64; 2]>,
     /// Which data: `validation record` or `last third of the record`.
     pub held_out: &'static str,
@@ -166,6 +166,18 @@ pub(super) fn closed(
     }
     let ends = [tail, 1.0 - tail].map(|p| quantile(&shares, p).unwrap_or(f64::NAN));
     (Some(share(root(before), root(after))), Some(ends))
+}
+
+/// 90 % of the shares that draws of θ, given all data, close; the share that was reached lies within.
+///
+/// The true system is one such draw, where the accepted effects are the true ones.
+pub(super) fn interval(before: f64, closed: f64, floor: f64, afters: &[f64]) -> Option<[f64; 2]> {
+    let shares: Vec<f64> = (afters.iter())
+        .map(|after| (before - after) / (before - floor))
+        .collect();
+    let tail = 0.5 * (1.0 - LEVEL);
+    let end = |p: f64| quantile(&shares, p).ok();
+    Some([end(tail)?.min(closed), end(1.0 - tail)?.max(closed)])
 }
 
 #[cfg(test)]

@@ -5,8 +5,11 @@ use crate::twin::Mark;
 /// Equal values at an end that noise does not bring about, and how many times more often than a usual value they come.
 const TIES: usize = 4;
 const OFTEN: usize = 3;
-/// Samples for each multiple of the step within the signal's range, at least, where outputs are rounded coarsely.
+/// Samples for each multiple of the step within the signal's range, at least, where the step is one of digits: files round,
+/// too.
 const REPEATS: f64 = 2.0;
+/// Distinct values that tell a step from chance.
+const DISTINCT: usize = 8;
 /// How far from a multiple of the step a rounded value may lie, in steps.
 const TOLERANCE: f64 = 0.01;
 
@@ -48,7 +51,8 @@ pub(super) fn clipped(outputs: &[f64]) -> Mark {
     }
 }
 
-/// Of rounding, as its step: few distinct values, all multiples of the least distance between two.
+/// Of rounding, as its step: all distances are multiples of the least one, and there are few values or the step is none of
+/// digits.
 pub(super) fn rounded(outputs: &[f64]) -> Mark {
     let values = distinct(outputs);
     if values.len() < 2 {
@@ -61,14 +65,28 @@ pub(super) fn rounded(outputs: &[f64]) -> Mark {
     let steps = (span / step).round();
     // All of them know the step better than two.
     let step = span / steps;
-    if REPEATS * steps > outputs.len() as f64 {
+    let fine = REPEATS * steps > outputs.len() as f64;
+    if fine && (values.len() < DISTINCT || is_of_digits(step)) {
         return Mark::Absent;
     }
-    let off = |v: f64| (v / step - (v / step).round()).abs();
+    let low = values[0].0;
+    let off = |v: f64| {
+        let level = (v - low) / step;
+        (level - level.round()).abs()
+    };
     match values.iter().all(|(v, _)| off(*v) <= TOLERANCE) {
         true => Mark::Present(vec![step]),
         false => Mark::Absent,
     }
+}
+
+/// Whether the step is one that numbers have in files and machines: a power of ten or of two, or ten over two, four, five.
+fn is_of_digits(step: f64) -> bool {
+    let whole = |v: f64| (v - v.round()).abs() < 1e-4;
+    [1.0, 2.0, 2.5, 5.0]
+        .iter()
+        .any(|first| whole((step / first).log10()))
+        || whole(step.log2())
 }
 
 #[cfg(test)]
@@ -106,6 +124,14 @@ mod tests {
             panic!("no step");
         };
         assert!((m[0] - 0.3).abs() < 1e-9);
+        // Fine steps, half-way between multiples.
+        let fine: Vec<f64> = (noise().iter())
+            .map(|v| ((v / 0.0031).floor() + 0.5) * 0.0031)
+            .collect();
+        let Mark::Present(m) = rounded(&fine) else {
+            panic!("no fine step");
+        };
+        assert!((m[0] - 0.0031).abs() < 1e-6);
         // Rounded values pile up everywhere, not at the ends.
         assert_eq!(clipped(&coarse), Mark::Absent);
     }

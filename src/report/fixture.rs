@@ -135,6 +135,7 @@ pub(super) fn scorecards() -> [Scorecard; 2] {
         targets: vec!["sensor".into()],
         strength: Some(0.7),
         gain: Some(30.0),
+        added: None,
         share: Some(0.9),
         outcome: Some(Outcome {
             verdict: Verdict::StructuralGap,

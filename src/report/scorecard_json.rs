@@ -8,7 +8,8 @@ use serde_json::{Value, json};
 /// Each score is `{ count, of, interval }`, the interval Clopper–Pearson's at `interval_level`. What each is of stands in
 /// docs/withheld.md.
 ///
-/// Beyond the contract: `interval`, `interval_level`, `clear_top1`, `clear_in_class`, `clear_where`, `abstained_rightly`
+/// Beyond the contract: `interval`, `interval_level`, `clear_top1`, `clear_in_class`, `clear_where`, `unlisted_where`,
+/// `clear_pairs_accepted`, `abstained_rightly`
 /// (the precision of abstaining), `failed`, `by_kind`, `by_strength`, `by_gain`, `confusion`, `list` (every trial).
 ///
 /// All keys are always there; numbers that are not finite are null.
@@ -41,10 +42,12 @@ pub fn scorecard_json(card: &Scorecard) -> Value {
         "mean_class_size": card.mean_class_size,
         "where": count(card.place),
         "clear_where": count(card.clear_place),
+        "unlisted_where": count(card.unlisted_place),
         "abstained": count(card.abstained),
         "abstained_rightly": count(card.abstained_rightly),
         "wrongly_abstained": count(card.wrongly_abstained),
         "pairs_accepted": count(card.pairs_accepted),
+        "clear_pairs_accepted": count(card.clear_pairs_accepted),
         "interval_covers": count(card.interval_covers),
         "reliability": reliability,
         "seconds_per_record": card.seconds_per_record,

@@ -53,10 +53,12 @@ pub(super) fn named_scores(card: &Scorecard) -> Vec<(&'static str, Count)> {
         ("clear ones in the class", card.clear_in_class),
         ("place right", card.place),
         ("place of clear ones right", card.clear_place),
+        ("place of unlisted ones right", card.unlisted_place),
         ("unlisted, abstained", card.abstained),
         ("abstained, unlisted", card.abstained_rightly),
         ("listed, abstained", card.wrongly_abstained),
         ("pairs accepted", card.pairs_accepted),
+        ("clear pairs accepted", card.clear_pairs_accepted),
         ("intervals that cover", card.interval_covers),
         ("failed", card.failed),
     ]

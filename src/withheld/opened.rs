@@ -15,6 +15,8 @@ pub(super) struct Opened {
     pub trial: usize,
     /// Nats that the true effects gain when the diagnoser fits them; none where they are not listed or cannot be fitted.
     pub gain: Option<f64>,
+    /// Of a pair: nats that the weaker effect adds to the other one.
+    pub added: Option<f64>,
     /// (before − after)/(before − floor) of the held-out data, `after` being the free run of the world itself; none where
     /// the diagnosis gave no share.
     pub share: Option<f64>,
@@ -35,25 +37,37 @@ impl Opened {
             Some(outcome) => share(urn, truth, outcome, &record, validation)?,
             None => None,
         };
-        let gain = match truth.kind.is_structural() && !truth.effects.is_empty() {
-            true => match gain_of(
-                urn.study(),
-                &[record],
-                validation,
-                &truth.effects,
-                settings,
-                progress,
-            ) {
-                Ok(gain) => gain,
-                Err(error @ DiagnoseError::Cancelled(_)) => return Err(error.into()),
-                // Said of the answer already.
-                Err(_) => None,
-            },
-            false => None,
+        let records = [record];
+        let gain_of = |effects: &[String]| match gain_of(
+            urn.study(),
+            &records,
+            validation,
+            effects,
+            settings,
+            progress,
+        ) {
+            Ok(gain) => Ok(gain),
+            Err(error @ DiagnoseError::Cancelled(_)) => Err(WithheldError::from(error)),
+            // Said of the answer already.
+            Err(_) => Ok(None),
         };
+        let mut gain = None;
+        let mut added = None;
+        if truth.kind.is_structural() && !truth.effects.is_empty() {
+            gain = gain_of(&truth.effects)?;
+            if let ([_, _], Some(both)) = (&truth.effects[..], gain) {
+                let mut alone = f64::NEG_INFINITY;
+                for effect in &truth.effects {
+                    let one = gain_of(std::slice::from_ref(effect))?;
+                    alone = alone.max(one.unwrap_or(f64::NEG_INFINITY));
+                }
+                added = Some(both - alone).filter(|v| v.is_finite());
+            }
+        }
         Ok(Self {
             trial: truth.trial,
             gain,
+            added,
             share,
         })
     }

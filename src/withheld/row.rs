@@ -27,6 +27,8 @@ pub struct Row {
     pub strength: Option<f64>,
     /// Nats that the true effects gain when the diagnoser fits them.
     pub gain: Option<f64>,
+    /// Of a pair: nats that the weaker effect adds to the other one.
+    pub added: Option<f64>,
     /// The share of the gap that the true system closes on the held-out data.
     pub share: Option<f64>,
     /// What was said; none where the diagnosis failed.
@@ -63,6 +65,7 @@ impl Row {
             targets: truth.targets.clone(),
             strength: truth.strength,
             gain: opened.gain,
+            added: opened.added,
             share: opened.share,
             outcome: answer.outcome.clone(),
             failure: answer.failure.clone(),
@@ -93,6 +96,11 @@ impl Row {
     /// Whether the true effects gain more than chance could.
     pub fn is_clear(&self) -> bool {
         self.gain.is_some_and(|gain| gain > CLEAR)
+    }
+
+    /// Whether each effect of a pair gains more than chance could beside the other one.
+    pub fn is_clear_pair(&self) -> bool {
+        self.kind == Kind::Pair && self.added.is_some_and(|added| added > CLEAR)
     }
 
     /// Whether the effect on top is a true one.

@@ -15,7 +15,7 @@ use serde_json::{Map, Value, json};
 use std::path::Path;
 
 /// Layout of the folder; raised when it changes.
-const SCHEMA: &str = "truetwin.withheld-folder/1";
+const SCHEMA: &str = "truetwin.withheld-folder/2";
 
 /// What is tried.
 ///
@@ -26,6 +26,7 @@ const SCHEMA: &str = "truetwin.withheld-folder/1";
 /// | `kinds` | all | kinds of truth, dealt in the proportions of docs/withheld.md |
 /// | `without` | no | whether the true effects are taken out of the library: then every trial with one must abstain |
 /// | `validation` | no | whether each trial has a second record |
+/// | `detection_only` | no | whether a diagnosis ends with its verdict: for false alarms over many trials |
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// Records.
@@ -38,6 +39,8 @@ pub struct Settings {
     pub without: bool,
     /// Whether each trial has a validation record.
     pub validation: bool,
+    /// Whether a diagnosis ends with its verdict.
+    pub detection_only: bool,
 }
 
 impl Default for Settings {
@@ -48,6 +51,7 @@ impl Default for Settings {
             kinds: Kind::ALL.to_vec(),
             without: false,
             validation: false,
+            detection_only: false,
         }
     }
 }
@@ -153,6 +157,7 @@ impl<'a> Withheld<'a> {
             ("kinds", json!(kinds)),
             ("without", settings.without.into()),
             ("validation", settings.validation.into()),
+            ("detection_only", settings.detection_only.into()),
             // A file that was read can be written.
             (
                 "study",
@@ -296,6 +301,7 @@ impl Sealed<'_> {
         DiagnoseSettings {
             seed: noise.seed().unwrap_or_default(),
             without,
+            detection_only: self.trials.settings.detection_only,
             ..DiagnoseSettings::default()
         }
     }

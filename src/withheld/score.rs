@@ -122,6 +122,8 @@ pub struct Scorecard {
     pub place: Count,
     /// The same, of the clear ones.
     pub clear_place: Count,
+    /// The place is right, of detected gaps that no effect of the library describes.
+    pub unlisted_place: Count,
     /// None of the listed effects, of detected ones that have none: recall.
     pub abstained: Count,
     /// None of the listed effects, of detected ones that have one.
@@ -130,6 +132,8 @@ pub struct Scorecard {
     pub abstained_rightly: Count,
     /// Both effects accepted, of detected pairs.
     pub pairs_accepted: Count,
+    /// The same, of pairs whose weaker effect adds over 12 nats to the other one.
+    pub clear_pairs_accepted: Count,
     /// Intervals of the share closed that hold the true system's share, of right answers with an interval.
     pub interval_covers: Count,
     /// Stated probability of the effect on top against how often it is true, where an effect was accepted.
@@ -188,6 +192,10 @@ impl Scorecard {
             mean_class_size: mean(&sizes),
             place: over(&single, &Row::place_is_right),
             clear_place: over(&clear_single, &Row::place_is_right),
+            unlisted_place: over(
+                &|row| row.called() && row.must_abstain(),
+                &Row::place_is_right,
+            ),
             abstained: over(&|row| row.called() && row.must_abstain(), &Row::abstained),
             wrongly_abstained: over(
                 &|row| row.called() && !row.right.is_empty(),
@@ -196,6 +204,10 @@ impl Scorecard {
             abstained_rightly: over(&Row::abstained, &Row::must_abstain),
             pairs_accepted: over(
                 &|row| row.called() && row.kind == Kind::Pair && !row.right.is_empty(),
+                &Row::accepted_are_right,
+            ),
+            clear_pairs_accepted: over(
+                &|row| row.called() && row.is_clear_pair() && !row.right.is_empty(),
                 &Row::accepted_are_right,
             ),
             interval_covers: over(&|row| row.interval().is_some(), &|row| {

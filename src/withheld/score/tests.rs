@@ -17,6 +17,7 @@ fn row(kind: Kind, truth: &[&str], accepted: &[&str], probability: f64) -> Row {
         targets: truth.iter().map(target).collect(),
         strength: Some(0.5),
         gain: listed.then_some(20.0),
+        added: None,
         share: Some(0.8),
         outcome: Some(Outcome {
             verdict: match called {

@@ -1,0 +1,191 @@
+//! Several effects together.
+//!
+//! Effects are added one by one, each the best beside those before it; partners are exchanged, so that two are found of which
+//! neither helps much alone; and each is left out once more, so that none stays that only mended a poor fit of another.
+
+use super::attribute::{Explanation, explanations, probabilities, refitted};
+use super::decide::{Accepted, Step, WORTH_ANOTHER, grown};
+use super::null::{Bench, Look};
+use super::{DiagnoseError, Setting};
+use crate::progress::Stage;
+
+/// Most effects together.
+const MOST: usize = 3;
+/// First effects, and second effects for each, that pairs are made of.
+const FIRSTS: usize = 2;
+const SECONDS: usize = 12;
+/// How often a partner of the best pair is kept and the other one looked for anew.
+const EXCHANGES: usize = 3;
+/// Nats beyond its price that the scan must promise for an effect beside others that leave nothing unexplained.
+const PROMISE: f64 = 5.0;
+
+/// Whether the scan beside a step's effects promises another one.
+pub(super) fn promises(step: &Step<'_>, look: &Look) -> bool {
+    let price = 0.5 * (step.bench.problem.samples() as f64).ln();
+    let candidates = &step.bench.dictionary.candidates;
+    (candidates.iter().zip(&look.gains))
+        .filter(|(candidate, _)| candidate.is_listed())
+        .any(|(_, root)| 0.5 * root * root > price + PROMISE)
+}
+
+/// The best two of the `listed` explanations, or three: `None` where no second effect adds more than `margin` to the
+/// `first`, whose records look like `look`.
+pub(super) fn several<'a>(
+    setting: &Setting<'a>,
+    bench: &Bench<'a>,
+    listed: &[&Explanation],
+    (first, look): (&Step<'a>, &Look),
+    margin: f64,
+    stage: &Stage,
+) -> Result<Option<Step<'a>>, DiagnoseError> {
+    let pair = best_pair(setting, bench, listed, (first, look), stage)?;
+    let Some(mut step) = pair.filter(|pair| pair.score > first.score + margin) else {
+        return Ok(None);
+    };
+    // One that only helped another one out of a poor fit.
+    for left_out in 0..step.accepted.len() {
+        if let Some(alone) = without(setting, bench, &step, left_out)?
+            && alone.score > step.score - margin
+        {
+            return Ok((alone.accepted[0].key() != first.accepted[0].key()
+                || alone.score > first.score + WORTH_ANOTHER)
+                .then_some(alone));
+        }
+    }
+    while step.accepted.len() < MOST {
+        let Some(look) = step.bench.own_look()? else {
+            break;
+        };
+        if !promises(&step, &look) {
+            break;
+        }
+        match beside(setting, &step, &look, stage)?.best {
+            Some(next) if next.score > step.score + WORTH_ANOTHER + PROMISE => step = next,
+            _ => break,
+        }
+    }
+    Ok(Some(step))
+}
+
+/// The best pair: the best beside each of the first few, then the best beside the partner that was found, and so on. Neither of
+/// two effects need be much by itself.
+fn best_pair<'a>(
+    setting: &Setting<'a>,
+    bench: &Bench<'a>,
+    listed: &[&Explanation],
+    (first, look): (&Step<'a>, &Look),
+    stage: &Stage,
+) -> Result<Option<Step<'a>>, DiagnoseError> {
+    let key = |e: &Explanation| bench.dictionary.candidates[e.candidate].key();
+    let chances = probabilities(&listed.iter().map(|e| (*e).clone()).collect::<Vec<_>>());
+    let mut tried = vec![first.accepted[0].key()];
+    let mut best = beside(setting, first, look, stage)?.best;
+    let better = |best: &mut Option<Step<'a>>, pair: Option<Step<'a>>| {
+        let gains =
+            (pair.as_ref()).is_some_and(|p| best.as_ref().is_none_or(|b| p.score > b.score));
+        if gains {
+            *best = pair;
+        }
+        gains
+    };
+    let mut take = |index: usize| -> Result<Option<Beside<'a>>, DiagnoseError> {
+        let name = key(listed[index]);
+        if tried.contains(&name) {
+            return Ok(None);
+        }
+        tried.push(name);
+        let Some(step) = grown(setting, bench, &[], listed[index], chances[index])? else {
+            return Ok(None);
+        };
+        match step.bench.own_look()? {
+            Some(look) => beside(setting, &step, &look, stage).map(Some),
+            None => Ok(None),
+        }
+    };
+    for index in 1..listed.len().min(FIRSTS) {
+        let pair = take(index)?.and_then(|found| found.best);
+        better(&mut best, pair);
+    }
+    for _ in 0..EXCHANGES {
+        let Some(pair) = &mut best else { break };
+        let partner = pair.accepted[1].key();
+        let Some(index) = listed.iter().position(|e| key(e) == partner) else {
+            break;
+        };
+        let Some(found) = take(index)? else { break };
+        // How probable the first one is beside the second.
+        let first = pair.accepted[0].key();
+        if let Some((_, chance)) = found.chances.iter().find(|(key, _)| *key == first) {
+            pair.accepted[0].probability = *chance;
+        }
+        if !better(&mut best, found.best) {
+            break;
+        }
+    }
+    Ok(best)
+}
+
+/// What stands beside accepted effects.
+struct Beside<'a> {
+    /// The best listed effect, if it beats a catch-all there.
+    best: Option<Step<'a>>,
+    /// Probabilities of all that was tried.
+    chances: Vec<(String, f64)>,
+}
+
+/// The best effect beside those of a step.
+fn beside<'a>(
+    setting: &Setting<'a>,
+    step: &Step<'a>,
+    look: &Look,
+    stage: &Stage,
+) -> Result<Beside<'a>, DiagnoseError> {
+    let bench = &step.bench;
+    let candidates = &bench.dictionary.candidates;
+    let mut order: Vec<usize> = (0..candidates.len()).collect();
+    order.sort_by(|&a, &b| look.gains[b].total_cmp(&look.gains[a]));
+    let mut tried: Vec<usize> = (order.iter().copied())
+        .filter(|&c| candidates[c].is_listed())
+        .take(SECONDS)
+        .collect();
+    // And the catch-all that promises most.
+    tried.extend(order.iter().copied().find(|&c| !candidates[c].is_listed()));
+    let found = explanations(bench, look, setting.validation, Some(&tried), stage)?;
+    let chances = probabilities(&found);
+    let best = match found.first() {
+        Some(best) if candidates[best.candidate].is_listed() => {
+            let next = grown(setting, bench, &step.accepted, best, chances[0])?;
+            next.map(|mut next| {
+                next.score += step.score;
+                next
+            })
+        }
+        _ => None,
+    };
+    let keys = found.iter().map(|e| candidates[e.candidate].key());
+    Ok(Beside {
+        best,
+        chances: keys.zip(chances).collect(),
+    })
+}
+
+/// A pair without one of its effects, the other one fitted alone from where it stands beside it.
+fn without<'a>(
+    setting: &Setting<'a>,
+    bench: &Bench<'a>,
+    pair: &Step<'a>,
+    left_out: usize,
+) -> Result<Option<Step<'a>>, DiagnoseError> {
+    let kept: Vec<&Accepted> = (pair.accepted.iter().enumerate())
+        .filter(|(i, _)| *i != left_out)
+        .map(|(_, accepted)| accepted)
+        .collect();
+    let [kept] = kept[..] else { return Ok(None) };
+    let theta = pair.bench.problem.of_record(0, &pair.bench.fitted.theta);
+    let own = &theta[..bench.problem.twin.parameters().len()];
+    let explanation = refitted(bench, kept, own, setting.validation)?;
+    match explanation {
+        Some(explanation) => grown(setting, bench, &[], &explanation, kept.probability),
+        None => Ok(None),
+    }
+}

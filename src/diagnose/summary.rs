@@ -1,0 +1,102 @@
+//! What was found, in the words of a report.
+
+use super::DiagnoseSettings;
+use super::attribute::{Explanation, probabilities};
+use super::decide::{Answer, magnitudes};
+use super::null::{Bench, Test};
+use super::result::{EffectFit, FittedNuisance, FittedParameter};
+use crate::twin::{PRIOR_DEVIATION, Parameter, Role};
+
+/// Explanations that are reported.
+const REPORTED: usize = 12;
+
+/// Explanations as they are reported: the accepted ones first.
+pub(super) fn reported(
+    bench: &Bench<'_>,
+    found: &[Explanation],
+    test: &Test,
+    answer: &Answer,
+) -> Vec<EffectFit> {
+    let chances = probabilities(found);
+    let mut all: Vec<EffectFit> = (found.iter().zip(chances))
+        .filter(|(e, _)| bench.dictionary.candidates[e.candidate].is_listed())
+        .map(|(e, probability)| {
+            let candidate = &bench.dictionary.candidates[e.candidate];
+            EffectFit {
+                id: candidate.id.clone(),
+                target: candidate.target.clone(),
+                probability,
+                magnitudes: magnitudes(bench, e),
+                log_score_gain: e.gain + e.validation.unwrap_or(0.0),
+                p_value: test.candidates.get(e.candidate).copied(),
+            }
+        })
+        .collect();
+    // A pair's magnitudes and gains are those of the two together.
+    if answer.accepted.len() > 1 {
+        for accepted in answer.accepted.iter().rev() {
+            let at = all.iter().position(|e| e.key() == accepted.key());
+            let mut effect = match at {
+                Some(at) => all.remove(at),
+                None => continue,
+            };
+            effect.magnitudes = accepted.magnitudes.clone();
+            effect.log_score_gain = accepted.gain;
+            effect.probability = accepted.probability;
+            all.insert(0, effect);
+        }
+    }
+    all.truncate(REPORTED);
+    all
+}
+
+/// The twin's own parameters, and everything else that the study estimates.
+pub(super) fn fitted_parameters(
+    space: &[&Parameter],
+    bench: &Bench<'_>,
+    settings: &DiagnoseSettings,
+) -> (Vec<FittedParameter>, Vec<FittedNuisance>) {
+    let errors = bench.fitted.std_errors(&bench.problem);
+    let theta = &bench.fitted.theta;
+    let (mut own, mut nuisance) = (vec![], vec![]);
+    for (j, p) in space.iter().enumerate() {
+        if p.role == Role::Physical {
+            own.push(FittedParameter {
+                name: p.name.clone(),
+                unit: p.unit.clone(),
+                initial: settings.initial.as_ref().and_then(|i| i.get(j).copied()),
+                refitted: theta[j],
+                std_error: errors[j],
+                identified: errors[j] < PRIOR_DEVIATION * p.prior.width(),
+                prior: p.prior,
+            });
+        } else {
+            let role = match p.role {
+                Role::Start => "start",
+                Role::Noise => "noise",
+                _ => "effect",
+            };
+            let name = p.name.split_once('.').filter(|_| role != "effect");
+            nuisance.push(FittedNuisance {
+                name: name.map_or(p.name.as_str(), |(_, name)| name).to_owned(),
+                role,
+                value: theta[j],
+                std_error: errors[j],
+            });
+        }
+    }
+    // Starts of further records stand behind everything else.
+    let starts: Vec<&&Parameter> = space.iter().filter(|p| p.role == Role::Start).collect();
+    let d = bench.problem.twin.parameters().len();
+    for (i, j) in (d..theta.len()).enumerate() {
+        let (record, which) = (i / starts.len().max(1) + 2, i % starts.len().max(1));
+        let name = starts[which].name.trim_start_matches("start.");
+        nuisance.push(FittedNuisance {
+            name: format!("{name} (record {record})"),
+            role: "start",
+            value: theta[j],
+            std_error: errors[j],
+        });
+    }
+    (own, nuisance)
+}
