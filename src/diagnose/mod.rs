@@ -9,8 +9,11 @@
 //! | what a validation record says | `evalue.rs` |
 //! | fit the explanations, order them, accept, abstain | `frequency.rs`, `attribute.rs`, `decide.rs`, `several.rs` |
 //! | where, in the equations, in time, in the states | `localise/`, `map.rs`, `place.rs` |
+//! | what the missing term depends on, where no listed effect fits | `missing_term.rs`, `discover.rs` |
 //! | how far, on held-out data | `shrink.rs` |
 //! | the kinds of gap | `verdict.rs` |
+//! | which effects the record could have revealed | `power.rs` |
+//! | which record would tell rivals apart | `next_input.rs` |
 //! | what is reported of all that | `summary.rs`, `result.rs` |
 //! | what a known effect would gain, for trials | `gain.rs` |
 //!
@@ -22,6 +25,7 @@ mod candidate;
 mod catch_all;
 mod decide;
 mod dictionary;
+mod discover;
 mod evalue;
 mod fit;
 mod frequency;
@@ -29,10 +33,13 @@ mod gain;
 mod held_out;
 mod localise;
 mod map;
+mod missing_term;
+mod next_input;
 mod null;
 mod omnibus;
 mod place;
 mod plan;
+mod power;
 mod problem;
 mod result;
 mod run;

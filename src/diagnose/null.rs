@@ -8,7 +8,7 @@ use super::omnibus::omnibus;
 use super::problem::Problem;
 use super::scan::{Gain, Reference};
 use crate::filter::FilterError;
-use crate::math::rank_p_value;
+use crate::math::{quantile, rank_p_value};
 use crate::progress::Stage;
 use crate::twin::{Noise, Record, SimulationError};
 use rayon::prelude::*;
@@ -179,6 +179,29 @@ impl<'a> Bench<'a> {
 }
 
 impl Nulls {
+    /// For each candidate, the root √(2·gain) from which on it alone would make the test alarm at `level`.
+    pub fn roots_needed(&self, level: f64) -> Vec<f64> {
+        let others: Vec<&Look> = self.others.iter().flatten().collect();
+        let rows =
+            |take: fn(&Look) -> &Vec<f64>| others.iter().map(|l| take(l)).collect::<Vec<_>>();
+        let gains = rows(|l| &l.gains);
+        let top_gain = largest(&standardised(&gains));
+        let top_omnibus = largest(&standardised(&rows(|l| &l.omnibus)));
+        let both: Vec<Vec<f64>> = (top_gain.iter().zip(&top_omnibus))
+            .map(|(a, b)| vec![*a, *b])
+            .collect();
+        let both = largest(&standardised(&both.iter().collect::<Vec<_>>()));
+        let alarm = quantile(&both, 1.0 - level).unwrap_or(f64::INFINITY);
+        let (centre, spread) = moments(top_gain.iter().copied());
+        let top = centre + alarm * spread;
+        (0..gains.first().map_or(0, |g| g.len()))
+            .map(|c| {
+                let (centre, spread) = moments(gains.iter().map(|g| g[c]));
+                centre + top * spread
+            })
+            .collect()
+    }
+
     /// The test that all of it comes from the twin.
     ///
     /// Each statistic is expressed in standard deviations over *all others*, simulations and record alike; the largest of
@@ -191,12 +214,6 @@ impl Nulls {
         let failed = self.others.iter().filter(|o| o.is_none()).count();
         let of = |take: fn(&Look) -> &Vec<f64>| -> Vec<Vec<f64>> {
             standardised(&pool.iter().map(|look| take(look)).collect::<Vec<_>>())
-        };
-        let largest = |rows: &[Vec<f64>]| -> Vec<f64> {
-            (rows.iter())
-                .map(|row| row.iter().fold(f64::NEG_INFINITY, |a, v| a.max(*v)))
-                .map(|v| if v.is_finite() { v } else { 0.0 })
-                .collect()
         };
         let ranked = |all: &[f64], own: f64| {
             let mut null = all[1..].to_vec();
@@ -218,6 +235,23 @@ impl Nulls {
             local: local[0].iter().map(|z| ranked(&top_local, *z)).collect(),
         }
     }
+}
+
+/// The largest entry of each row.
+fn largest(rows: &[Vec<f64>]) -> Vec<f64> {
+    (rows.iter())
+        .map(|row| row.iter().fold(f64::NEG_INFINITY, |a, v| a.max(*v)))
+        .map(|v| if v.is_finite() { v } else { 0.0 })
+        .collect()
+}
+
+/// Mean and standard deviation, the latter as wide as a test takes it.
+fn moments(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let values: Vec<f64> = values.collect();
+    let n = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
+    (mean, variance.max(LEAST * LEAST).sqrt())
 }
 
 /// Each entry less the mean of its column over all *other* rows, in their standard deviations.

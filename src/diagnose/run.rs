@@ -4,11 +4,16 @@ use super::attribute::{Explanation, explanations};
 use super::base_fit::{ITERATIONS, base_fit};
 use super::candidate::{Addition, candidates, not_tested};
 use super::decide::{Accepted, Answer, Step, decide};
+use super::discover::discover;
 use super::evalue::{combined, log_e};
 use super::fit::{Fitted, fit};
 use super::held_out::shrinkage;
 use super::map::Where;
+use super::missing_term::{disturbances, equations, missing_term};
+use super::next_input::next_input;
+use super::null::Bench;
 use super::place::{maps, targets};
+use super::power::power;
 use super::problem::Problem;
 use super::result::*;
 use super::shrink::{Runner, free_runs};
@@ -58,7 +63,7 @@ pub fn diagnose(
 ) -> Result<Diagnosis, DiagnoseError> {
     let clock = Instant::now();
     let twin = study.twin();
-    let equations = twin.state_space().ok_or(DiagnoseError::NoEquations)?;
+    let shown = twin.state_space().ok_or(DiagnoseError::NoEquations)?;
     check(study, records, validation, settings)?;
     let noise = Noise::new(settings.seed, "diagnose", 0);
     let validation: Option<Vec<Record>> = validation.map(|v| vec![v.clone()]);
@@ -69,7 +74,7 @@ pub fn diagnose(
         twin,
         validation,
         together: together.as_deref(),
-        follows: without_process_noise(equations, &records[0]),
+        follows: without_process_noise(shown, &records[0]),
     };
 
     // θ, and how the record looks at it.
@@ -163,10 +168,30 @@ pub fn diagnose(
             Where {
                 maps: maps(&bench, &test, found.first(), settings.alpha)?,
                 after,
+                equations: equations(&bench, found, &test)?,
                 ..targets(&bench, found, &test, &answer)
             }
         }
         _ => Where::default(),
+    };
+    let next_input = match (answer.decision, &found) {
+        (Decision::Class, Some(found)) => {
+            next_input(&bench, found, &answer.class, noise.child("next"))?
+        }
+        _ => None,
+    };
+    let power = match settings.detection_only {
+        true => vec![],
+        false => power(&bench, &nulls, settings.alpha)?,
+    };
+    let discovery = match (answer.decision, &found) {
+        (Decision::NoneOfThese, Some(found)) => regressed(
+            &bench,
+            found,
+            place.target.as_deref(),
+            noise.child("discover"),
+        )?,
+        _ => None,
     };
     let last = step.as_ref().map_or(&bench, |step| &step.bench);
     let (parameters, nuisance) =
@@ -216,11 +241,11 @@ pub fn diagnose(
             class: answer.class,
             unexplained_p_value: answer.unexplained,
             catch_all: answer.catch_all,
-            next_input: None,
+            next_input,
         },
         shrinkage,
-        discovery: None,
-        power: vec![],
+        discovery,
+        power,
         free_runs: runs(&records[0])?,
         validation_runs: validation.map(|v| runs(&v[0])).transpose()?,
         not_tested,
@@ -289,6 +314,23 @@ pub(super) fn check(
         );
     }
     Ok(())
+}
+
+/// What the missing term depends on, in the equation of the named target, or else in the most probable one.
+fn regressed(
+    bench: &Bench<'_>,
+    found: &[Explanation],
+    target: Option<&str>,
+    noise: Noise,
+) -> Result<Option<Discovery>, DiagnoseError> {
+    let all = disturbances(bench, found);
+    let name = |e: &Explanation| &bench.dictionary.candidates[e.candidate].target;
+    let named = all.iter().find(|(e, _)| Some(name(e).as_str()) == target);
+    let Some((explanation, _)) = named.or(all.first()) else {
+        return Ok(None);
+    };
+    let term = missing_term(bench, explanation)?;
+    Ok(term.and_then(|term| discover(&term, bench.problem.records, noise)))
 }
 
 /// Whether no state of the twin is noisy, with any noise level that the study leaves open.

@@ -112,14 +112,24 @@ impl Reference {
         direction
     }
 
-    /// The gain along a direction whose multiple must lie in `low..=high`.
-    pub fn gain(&self, direction: &DVector<f64>, (low, high): (f64, f64)) -> Gain {
+    /// d⊥·d⊥: what θ cannot imitate of a direction; 0 where it imitates it all.
+    pub fn own(&self, direction: &DVector<f64>) -> f64 {
         let square = direction.norm_squared();
         let with_theta = self.directions.tr_mul(direction);
         let own = square - with_theta.dot(&self.factor.solve(&with_theta));
-        if !(own > COLLINEAR * square && own.is_finite()) {
+        match own > COLLINEAR * square && own.is_finite() {
+            true => own,
+            false => 0.0,
+        }
+    }
+
+    /// The gain along a direction whose multiple must lie in `low..=high`.
+    pub fn gain(&self, direction: &DVector<f64>, (low, high): (f64, f64)) -> Gain {
+        let own = self.own(direction);
+        if own == 0.0 {
             return Gain::default();
         }
+        let with_theta = self.directions.tr_mul(direction);
         let score = self.r.dot(direction) - with_theta.dot(&self.answer);
         let alpha = (score / own).clamp(low, high);
         Gain {

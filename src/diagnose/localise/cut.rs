@@ -192,7 +192,7 @@ impl Bins {
 }
 
 /// Ends of ranges with equal numbers of values.
-pub(super) fn edges(values: &[f64]) -> Vec<f64> {
+pub(in crate::diagnose) fn edges(values: &[f64]) -> Vec<f64> {
     let mut edges: Vec<f64> = (0..=BINS)
         .filter_map(|i| quantile(values, i as f64 / BINS as f64).ok())
         .collect();

@@ -10,6 +10,6 @@ mod cut;
 mod look;
 mod shares;
 
-pub(super) use cut::{Bins, Cut, Past};
+pub(super) use cut::{Bins, Cut, Past, edges};
 pub(super) use look::local;
 pub(super) use shares::shares;

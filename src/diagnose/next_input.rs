@@ -1,0 +1,291 @@
+//! The record to measure next, so that rivals are told apart.
+//!
+//! Inputs of several kinds, within the range of those that were applied, are tried on the fitted rivals: simulate one, filter
+//! with all; the mean log-likelihood ratio of the closest two says what an input is worth at fixed θ. The best few are then
+//! tried in earnest: each rival is fitted anew to the present records and the simulated next one together, and a record counts
+//! as telling when the rival that made it leads all others by more than a class is wide.
+//!
+//! Source of the criterion: Hunter & Reiner, "Designs for discriminating between two rival models" (1965).
+
+use super::DiagnoseError;
+use super::attribute::{Explanation, RIVALS};
+use super::fit::climb;
+use super::null::Bench;
+use super::problem::Problem;
+use super::result::NextInput;
+use crate::filter::recoverable;
+use crate::twin::{Drive, Noise, Record, Signal, SimulationError};
+use rayon::prelude::*;
+
+/// Rivals that are looked at.
+const MOST: usize = 3;
+/// Simulations of each rival in the first look, of the best few inputs, and of the one that is proposed.
+const LOOKS: u64 = 2;
+const TRIALS: u64 = 8;
+const PROOF: u64 = 20;
+/// Inputs that are tried in earnest.
+const FINALISTS: usize = 3;
+/// Iterations of a refit.
+const WARM: usize = 6;
+/// Parts of a record that levels are held for.
+const HOLDS: [usize; 4] = [80, 27, 10, 4];
+/// Levels of a staircase.
+const STAIRS: usize = 8;
+
+/// One input that could be applied.
+struct Proposal {
+    kind: String,
+    drive: Drive,
+}
+
+/// A rival: a twin with an effect, and θ.
+struct Rival<'a> {
+    key: String,
+    problem: Problem<'a>,
+    theta: Vec<f64>,
+    numbers: f64,
+}
+
+/// The input that tells the members of a class apart best; `None` where none does better than the present one once more.
+pub(super) fn next_input(
+    bench: &Bench<'_>,
+    found: &[Explanation],
+    class: &[String],
+    noise: Noise,
+) -> Result<Option<NextInput>, DiagnoseError> {
+    let candidates = &bench.dictionary.candidates;
+    let rivals: Vec<Rival<'_>> = (found.iter())
+        .filter(|e| class.contains(&candidates[e.candidate].key()))
+        .take(MOST)
+        .map(|e| Rival {
+            key: candidates[e.candidate].key(),
+            problem: bench.explained(e),
+            theta: e.fitted.theta.clone(),
+            numbers: bench.dictionary.variants[e.variant].free.len() as f64,
+        })
+        .collect();
+    if rivals.len() < 2 {
+        return Ok(None);
+    }
+    let records = bench.problem.records;
+    let mut ranked: Vec<(f64, Proposal)> = proposals(&records[0], noise)?
+        .into_par_iter()
+        .map(|proposal| Ok((first_look(&rivals, &proposal.drive, noise)?, proposal)))
+        .collect::<Result<Vec<_>, DiagnoseError>>()?;
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut best: Option<(u64, Proposal)> = None;
+    for (_, proposal) in ranked.into_iter().take(FINALISTS) {
+        let [told, _] = told_apart(
+            &rivals,
+            records,
+            &proposal.drive,
+            TRIALS,
+            noise.child("try"),
+        )?;
+        if best.as_ref().is_none_or(|(most, _)| told > *most) {
+            best = Some((told, proposal));
+        }
+    }
+    let Some((_, proposal)) = best else {
+        return Ok(None);
+    };
+    let noise = noise.child("proof");
+    let split = told_apart(&rivals, records, &proposal.drive, PROOF, noise)?;
+    let again = told_apart(&rivals, records, records[0].drive(), PROOF, noise)?;
+    Ok((split[0] > again[0]).then(|| NextInput {
+        drive: proposal.drive,
+        kind: proposal.kind,
+        rivals: rivals.into_iter().map(|rival| rival.key).collect(),
+        split,
+        again,
+    }))
+}
+
+/// Inputs within the range of those of a record; without inputs, a longer record.
+fn proposals(record: &Record, noise: Noise) -> Result<Vec<Proposal>, DiagnoseError> {
+    let drive = record.drive();
+    let (dt, samples) = (drive.dt(), drive.samples());
+    let given = drive.inputs();
+    let inputs = given.ncols();
+    if inputs == 0 {
+        return [2, 4]
+            .map(|times| {
+                Ok(Proposal {
+                    kind: format!("{times} times as long"),
+                    drive: Drive::autonomous(dt, times * samples).map_err(record_error)?,
+                })
+            })
+            .into_iter()
+            .collect();
+    }
+    let range = |j: usize| {
+        (given.column(j).iter()).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+            (low.min(*v), high.max(*v))
+        })
+    };
+    let ranges: Vec<(f64, f64)> = (0..inputs).map(range).collect();
+    // Shares of the range, by input and sample.
+    let mut shapes: Vec<(String, Signal)> = vec![];
+    for hold in HOLDS.map(|parts| (samples / parts).max(1)) {
+        let seconds = crate::math::six_digits(hold as f64 * dt);
+        let mut source = noise.source(&format!("levels/{hold}"));
+        let levels = Signal::from_shape_fn((samples.div_ceil(hold), inputs), |_| source.uniform());
+        shapes.push((
+            format!("levels held for {seconds} s"),
+            Signal::from_shape_fn((samples, inputs), |(k, j)| levels[[k / hold, j]]),
+        ));
+        // Each input on its own beat, so that all combinations come.
+        shapes.push((
+            format!("full swings every {seconds} s"),
+            Signal::from_shape_fn((samples, inputs), |(k, j)| {
+                ((k / (hold * (j + 1))) % 2) as f64
+            }),
+        ));
+    }
+    let ramp = |k: usize| {
+        let share = k as f64 / samples.max(2) as f64;
+        1.0 - (2.0 * share - 1.0).abs()
+    };
+    shapes.push((
+        "a slow ramp up and down".into(),
+        Signal::from_shape_fn((samples, inputs), |(k, _)| ramp(k)),
+    ));
+    shapes.push((
+        "a staircase up and down".into(),
+        Signal::from_shape_fn((samples, inputs), |(k, _)| {
+            (ramp(k) * STAIRS as f64).floor() / (STAIRS - 1) as f64
+        }),
+    ));
+    (shapes.into_iter())
+        .map(|(kind, shares)| {
+            let values = Signal::from_shape_fn((samples, inputs), |(k, j)| {
+                let (low, high) = ranges[j];
+                low + shares[[k, j]].clamp(0.0, 1.0) * (high - low)
+            });
+            let drive = Drive::new(dt, values).map_err(record_error)?;
+            Ok(Proposal { kind, drive })
+        })
+        .collect()
+}
+
+fn record_error(error: crate::twin::DriveError) -> DiagnoseError {
+    crate::twin::RecordError::from(error).into()
+}
+
+impl Rival<'_> {
+    /// What this rival would measure; `None` where it diverges.
+    fn record(&self, drive: &Drive, noise: Noise) -> Result<Option<Record>, DiagnoseError> {
+        let theta = self.problem.of_record(0, &self.theta);
+        match self.problem.twin.simulate(&theta, drive, noise) {
+            Ok(outputs) => Ok(Some(Record::new(drive.clone(), outputs)?)),
+            Err(SimulationError::Diverged { .. }) => Ok(None),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// Its score on the present records and another one together, fitted to both.
+    fn score(&self, records: &[Record]) -> Result<f64, DiagnoseError> {
+        let problem = self.problem.on(records);
+        let own = self.problem.of_record(0, &self.theta);
+        let mut start = problem.full(&own);
+        for r in 0..self.problem.records.len() {
+            let own = self.problem.of_record(r, &self.theta);
+            problem.place(r, &own, &mut start);
+        }
+        let price = 0.5 * self.numbers * (problem.samples() as f64).ln();
+        let fitted = climb(&problem, &start, WARM)?;
+        Ok(fitted.map_or(f64::NEG_INFINITY, |fitted| fitted.value() - price))
+    }
+}
+
+/// The mean log-likelihood ratio of the closest two rivals, θ held.
+fn first_look(rivals: &[Rival<'_>], drive: &Drive, noise: Noise) -> Result<f64, DiagnoseError> {
+    let mut least = f64::INFINITY;
+    for (i, truth) in rivals.iter().enumerate() {
+        let mut leads = vec![0.0; rivals.len()];
+        for sample in 0..LOOKS {
+            let noise = noise.child("look").sample(sample * MOST as u64 + i as u64);
+            let Some(record) = truth.record(drive, noise)? else {
+                return Ok(f64::NEG_INFINITY);
+            };
+            let records = [record];
+            let of = |rival: &Rival<'_>| -> Result<f64, DiagnoseError> {
+                let problem = rival.problem.on(&records);
+                let theta = problem.full(&rival.problem.of_record(0, &rival.theta));
+                let value = recoverable(problem.log_likelihood(&theta))?;
+                Ok(value.unwrap_or(f64::NEG_INFINITY))
+            };
+            let own = of(truth)?;
+            for (lead, rival) in leads.iter_mut().zip(rivals) {
+                *lead += (own - of(rival)?) / LOOKS as f64;
+            }
+        }
+        let others = leads.iter().enumerate().filter(|(j, _)| *j != i);
+        least = others.map(|(_, lead)| *lead).fold(least, f64::min);
+    }
+    Ok(if least.is_nan() {
+        f64::NEG_INFINITY
+    } else {
+        least
+    })
+}
+
+/// Of how many simulated records, each beside the present ones, the rival that made them leads all others by more than a
+/// class is wide.
+fn told_apart(
+    rivals: &[Rival<'_>],
+    records: &[Record],
+    drive: &Drive,
+    trials: u64,
+    noise: Noise,
+) -> Result<[u64; 2], DiagnoseError> {
+    let told = (0..trials)
+        .into_par_iter()
+        .map(|i| {
+            let truth = (i % rivals.len() as u64) as usize;
+            let Some(record) = rivals[truth].record(drive, noise.sample(i))? else {
+                return Ok(false);
+            };
+            let both = [records, &[record]].concat();
+            let scores: Vec<f64> = (rivals.iter())
+                .map(|rival| rival.score(&both))
+                .collect::<Result<_, DiagnoseError>>()?;
+            let others = scores.iter().enumerate().filter(|(j, _)| *j != truth);
+            let next = others.map(|(_, s)| *s).fold(f64::NEG_INFINITY, f64::max);
+            Ok(scores[truth] > next + RIVALS)
+        })
+        .collect::<Result<Vec<bool>, DiagnoseError>>()?;
+    Ok([told.iter().filter(|t| **t).count() as u64, trials])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn proposals_stay_within_what_was_applied() {
+        let inputs = Signal::from_shape_fn((200, 2), |(k, j)| (k % 7) as f64 + 10.0 * j as f64);
+        let record =
+            Record::new(Drive::new(0.5, inputs).unwrap(), Signal::zeros((200, 1))).unwrap();
+        let all = proposals(&record, Noise::new(1, "t", 0)).unwrap();
+        assert_eq!(all.len(), 2 * HOLDS.len() + 2);
+        for proposal in all {
+            let inputs = proposal.drive.inputs();
+            for (j, (low, high)) in [(0.0, 6.0), (10.0, 16.0)].into_iter().enumerate() {
+                assert!(inputs.column(j).iter().all(|v| (low..=high).contains(v)));
+            }
+        }
+    }
+
+    #[test]
+    fn without_inputs_the_record_is_longer() {
+        let record = Record::new(
+            Drive::autonomous(0.5, 100).unwrap(),
+            Signal::zeros((100, 1)),
+        )
+        .unwrap();
+        let all = proposals(&record, Noise::new(1, "t", 0)).unwrap();
+        let lengths: Vec<usize> = all.iter().map(|p| p.drive.samples()).collect();
+        assert_eq!(lengths, [200, 400]);
+    }
+}
