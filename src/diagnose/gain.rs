@@ -1,6 +1,6 @@
 //! What a known effect would gain: the yardstick of trials whose truth is known.
 
-use super::attribute::explanations;
+use super::attribute::{elsewhere, explanations};
 use super::base_fit::base_fit;
 use super::candidate::{Candidate, candidates};
 use super::decide::grown;
@@ -75,4 +75,51 @@ pub fn gain_of(
         }
     }
     Ok(Some(gain))
+}
+
+/// The log-likelihood, in nats, of a held-out record: of the twin fitted to the record, or with `listed` the best of the twin
+/// with each listed effect. Unknown starts are refitted there. `None` where nothing can be fitted.
+///
+/// # Errors
+///
+/// As [`diagnose`](super::diagnose).
+pub fn held_out_score(
+    study: &Study,
+    record: Record,
+    held_out: Record,
+    listed: bool,
+    settings: &DiagnoseSettings,
+    progress: &Progress,
+) -> Result<Option<f64>, DiagnoseError> {
+    let twin = study.twin();
+    let equations = twin.state_space().ok_or(DiagnoseError::NoEquations)?;
+    let (records, held_out) = ([record], [held_out]);
+    check(study, &records, Some(&held_out[0]), settings)?;
+    let setting = Setting {
+        twin,
+        validation: Some(&held_out),
+        together: None,
+        follows: without_process_noise(equations, &records[0]),
+    };
+    let problem = Problem::of_twin(twin, &records);
+    let noise = Noise::new(settings.seed, "diagnose", 0);
+    let Some(fitted) = base_fit(&problem, settings, noise)? else {
+        return Ok(None);
+    };
+    if !listed {
+        return Ok(elsewhere(&problem.on(&held_out), &fitted.theta)?);
+    }
+    let mut all = candidates(study, &settings.without)?;
+    all.retain(Candidate::is_listed);
+    let Some(bench) = setting.bench(problem, fitted, &[], all)? else {
+        return Ok(None);
+    };
+    let Some(look) = bench.own_look()? else {
+        return Ok(None);
+    };
+    let stage = progress.unseen();
+    let found = explanations(&bench, &look, setting.validation, None, &stage)?;
+    Ok((found.iter())
+        .filter_map(|e| e.validation_likelihood)
+        .reduce(f64::max))
 }

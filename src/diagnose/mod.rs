@@ -51,7 +51,7 @@ mod summary;
 mod variant;
 mod verdict;
 
-pub use gain::gain_of;
+pub use gain::{gain_of, held_out_score};
 pub use held_out::SHORTEST_SPLIT;
 pub(crate) use held_out::held_out_from;
 pub use map::{Band, Cell, Channel, Equation, Lag, Maps, Onset, Region, TermRange, Where, Window};

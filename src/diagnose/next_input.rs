@@ -21,12 +21,14 @@ use rayon::prelude::*;
 const MOST: usize = 3;
 /// Simulations of each rival in the first look, of the best few inputs, and of the one that is proposed.
 const LOOKS: u64 = 2;
-const TRIALS: u64 = 8;
+const TRIALS: u64 = 4;
 const PROOF: u64 = 20;
 /// Inputs that are tried in earnest.
-const FINALISTS: usize = 3;
+const FINALISTS: usize = 2;
 /// Iterations of a refit.
-const WARM: usize = 6;
+const WARM: usize = 4;
+/// Lengths of proposals, as multiples of the present record's.
+const LENGTHS: [usize; 2] = [1, 4];
 /// Parts of a record that levels are held for.
 const HOLDS: [usize; 4] = [80, 27, 10, 4];
 /// Levels of a staircase.
@@ -68,31 +70,22 @@ pub(super) fn next_input(
         return Ok(None);
     }
     let records = bench.problem.records;
-    let mut ranked: Vec<(f64, Proposal)> = proposals(&records[0], noise)?
-        .into_par_iter()
-        .map(|proposal| Ok((first_look(&rivals, &proposal.drive, noise)?, proposal)))
-        .collect::<Result<Vec<_>, DiagnoseError>>()?;
-    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut best: Option<(u64, Proposal)> = None;
-    for (_, proposal) in ranked.into_iter().take(FINALISTS) {
-        let [told, _] = told_apart(
-            &rivals,
-            records,
-            &proposal.drive,
-            TRIALS,
-            noise.child("try"),
-        )?;
-        if best.as_ref().is_none_or(|(most, _)| told > *most) {
-            best = Some((told, proposal));
+    let proof = noise.child("proof");
+    let again = told_apart(&rivals, records, records[0].drive(), PROOF, proof)?;
+    let mut best: Option<([u64; 2], Proposal)> = None;
+    for times in LENGTHS {
+        let Some(proposal) = best_of(&rivals, records, times, noise)? else {
+            continue;
+        };
+        let split = told_apart(&rivals, records, &proposal.drive, PROOF, proof)?;
+        if split[0] > best.as_ref().map_or(again[0], |(most, _)| most[0]) {
+            best = Some((split, proposal));
+        }
+        if 2 * split[0] > PROOF {
+            break;
         }
     }
-    let Some((_, proposal)) = best else {
-        return Ok(None);
-    };
-    let noise = noise.child("proof");
-    let split = told_apart(&rivals, records, &proposal.drive, PROOF, noise)?;
-    let again = told_apart(&rivals, records, records[0].drive(), PROOF, noise)?;
-    Ok((split[0] > again[0]).then(|| NextInput {
+    Ok(best.map(|(split, proposal)| NextInput {
         drive: proposal.drive,
         kind: proposal.kind,
         rivals: rivals.into_iter().map(|rival| rival.key).collect(),
@@ -101,22 +94,47 @@ pub(super) fn next_input(
     }))
 }
 
-/// Inputs within the range of those of a record; without inputs, a longer record.
-fn proposals(record: &Record, noise: Noise) -> Result<Vec<Proposal>, DiagnoseError> {
+/// The best input of a record so many times as long as the present one.
+fn best_of(
+    rivals: &[Rival<'_>],
+    records: &[Record],
+    times: usize,
+    noise: Noise,
+) -> Result<Option<Proposal>, DiagnoseError> {
+    let mut ranked: Vec<(f64, Proposal)> = proposals(&records[0], times, noise)?
+        .into_par_iter()
+        .map(|proposal| Ok((first_look(rivals, &proposal.drive, noise)?, proposal)))
+        .collect::<Result<Vec<_>, DiagnoseError>>()?;
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut best: Option<(u64, Proposal)> = None;
+    for (_, proposal) in ranked.into_iter().take(FINALISTS) {
+        let [told, _] = told_apart(rivals, records, &proposal.drive, TRIALS, noise.child("try"))?;
+        if best.as_ref().is_none_or(|(most, _)| told > *most) {
+            best = Some((told, proposal));
+        }
+    }
+    Ok(best.map(|(_, proposal)| proposal))
+}
+
+/// Inputs within the range of those of a record, so many times as long as it; without inputs, a longer record.
+fn proposals(record: &Record, times: usize, noise: Noise) -> Result<Vec<Proposal>, DiagnoseError> {
     let drive = record.drive();
-    let (dt, samples) = (drive.dt(), drive.samples());
+    let (dt, samples) = (drive.dt(), times * drive.samples());
+    let long = match times {
+        1 => String::new(),
+        _ => format!(", {times} times as long"),
+    };
     let given = drive.inputs();
     let inputs = given.ncols();
     if inputs == 0 {
-        return [2, 4]
-            .map(|times| {
-                Ok(Proposal {
-                    kind: format!("{times} times as long"),
-                    drive: Drive::autonomous(dt, times * samples).map_err(record_error)?,
-                })
-            })
-            .into_iter()
-            .collect();
+        let drive = Drive::autonomous(dt, samples).map_err(record_error)?;
+        return Ok(match times {
+            1 => vec![],
+            _ => vec![Proposal {
+                kind: format!("{times} times as long"),
+                drive,
+            }],
+        });
     }
     let range = |j: usize| {
         (given.column(j).iter()).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
@@ -126,7 +144,7 @@ fn proposals(record: &Record, noise: Noise) -> Result<Vec<Proposal>, DiagnoseErr
     let ranges: Vec<(f64, f64)> = (0..inputs).map(range).collect();
     // Shares of the range, by input and sample.
     let mut shapes: Vec<(String, Signal)> = vec![];
-    for hold in HOLDS.map(|parts| (samples / parts).max(1)) {
+    for hold in HOLDS.map(|parts| (drive.samples() / parts).max(1)) {
         let seconds = crate::math::six_digits(hold as f64 * dt);
         let mut source = noise.source(&format!("levels/{hold}"));
         let levels = Signal::from_shape_fn((samples.div_ceil(hold), inputs), |_| source.uniform());
@@ -163,6 +181,7 @@ fn proposals(record: &Record, noise: Noise) -> Result<Vec<Proposal>, DiagnoseErr
                 low + shares[[k, j]].clamp(0.0, 1.0) * (high - low)
             });
             let drive = Drive::new(dt, values).map_err(record_error)?;
+            let kind = format!("{kind}{long}");
             Ok(Proposal { kind, drive })
         })
         .collect()
@@ -267,7 +286,7 @@ mod tests {
         let inputs = Signal::from_shape_fn((200, 2), |(k, j)| (k % 7) as f64 + 10.0 * j as f64);
         let record =
             Record::new(Drive::new(0.5, inputs).unwrap(), Signal::zeros((200, 1))).unwrap();
-        let all = proposals(&record, Noise::new(1, "t", 0)).unwrap();
+        let all = proposals(&record, 2, Noise::new(1, "t", 0)).unwrap();
         assert_eq!(all.len(), 2 * HOLDS.len() + 2);
         for proposal in all {
             let inputs = proposal.drive.inputs();
@@ -284,8 +303,8 @@ mod tests {
             Signal::zeros((100, 1)),
         )
         .unwrap();
-        let all = proposals(&record, Noise::new(1, "t", 0)).unwrap();
-        let lengths: Vec<usize> = all.iter().map(|p| p.drive.samples()).collect();
-        assert_eq!(lengths, [200, 400]);
+        let of = |times| proposals(&record, times, Noise::new(1, "t", 0)).unwrap();
+        assert!(of(1).is_empty());
+        assert_eq!(of(4)[0].drive.samples(), 400);
     }
 }

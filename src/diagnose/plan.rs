@@ -87,10 +87,6 @@ fn unset_log_axis(centre: f64) -> Axis {
     log_axis(f64::NAN, f64::NAN, centre)
 }
 
-fn is_threshold(m: &Magnitude) -> bool {
-    m.off.is_some_and(f64::is_infinite)
-}
-
 impl Planner<'_> {
     /// Variants of a candidate, and where to look.
     pub fn plans(&self, index: usize, candidate: &Candidate) -> Result<Vec<Plan>, DiagnoseError> {
@@ -232,10 +228,10 @@ impl Planner<'_> {
         let in_unit = |v: f64| v * unit(m.unit, size, dt);
         let starts = m.starts.iter().copied();
         let greatest = in_unit(starts.clone().fold(0.0, |a: f64, v| a.max(v.abs())));
-        if is_threshold(m) && !positive {
+        if m.is_threshold() && !positive {
             let (levels, axis) = self.threshold(m, values);
             (levels.into_iter().map(Lead::At).collect(), axis, (0.0, 1.5))
-        } else if is_threshold(m) {
+        } else if m.is_threshold() {
             let leads = starts.map(|v| Lead::At(in_unit(v))).collect();
             let axis = log_axis(1e-3 * greatest, 1e2 * greatest, greatest);
             (leads, axis, (0.0, 1.5))
@@ -315,7 +311,7 @@ impl Planner<'_> {
             axis(bounds, centre, 2.0 * (high - low), width, longest)
         };
         match shape.unit {
-            _ if is_threshold(shape) => {
+            _ if shape.is_threshold() => {
                 let (levels, axis) = self.threshold(shape, values);
                 (levels[..1].to_vec(), axis)
             }
@@ -369,7 +365,7 @@ impl Planner<'_> {
 fn choices(effect: &dyn UnmodelledEffect, mark: &Mark) -> Vec<Choice> {
     let magnitudes = effect.magnitudes();
     let thresholds: Vec<usize> = (0..magnitudes.len())
-        .filter(|&i| is_threshold(&magnitudes[i]))
+        .filter(|&i| magnitudes[i].is_threshold())
         .collect();
     let choice = |off, register| Choice { off, register };
     if let Mark::Present(m) = mark {

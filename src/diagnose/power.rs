@@ -18,6 +18,7 @@ use super::result::Visible;
 use super::scan::Reference;
 use super::variant::Variant;
 use crate::filter::{FilterError, recoverable};
+use crate::twin::Magnitude;
 use rayon::prelude::*;
 
 /// The normal quantile of 80 %.
@@ -48,6 +49,10 @@ pub(super) fn power(
             let mut best: Option<Least> = None;
             for point in points.filter(|p| dictionary.variants[p.variant].candidate == c) {
                 let variant = &dictionary.variants[point.variant];
+                // A second threshold would show whatever the first one does.
+                if variant.free[1..].iter().any(Magnitude::is_threshold) {
+                    continue;
+                }
                 let problem = variant.problem(&bench.problem);
                 let root = |first: f64| root(bench, &reference, variant, &problem, point, first);
                 if let Some(found) = least(variant, point, need, root)?
@@ -127,7 +132,8 @@ fn least(
     let mut share: f64 = 1.0;
     let within = |share: f64| {
         let value = nothing + share * whole;
-        magnitude.limits.contains(value) && share <= FURTHER
+        let reach = magnitude.limits.contains(value) && axis.bounds.contains(value);
+        reach && share <= FURTHER
     };
     for _ in 0..STEPS {
         let Some(root) = root(nothing + share * whole)? else {

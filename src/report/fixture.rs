@@ -136,6 +136,7 @@ pub(super) fn scorecards() -> [Scorecard; 2] {
         strength: Some(0.7),
         gain: Some(30.0),
         added: None,
+        shortfall: None,
         share: Some(0.9),
         outcome: Some(Outcome {
             verdict: Verdict::StructuralGap,

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 /// docs/withheld.md.
 ///
 /// Beyond the contract: `interval`, `interval_level`, `clear_top1`, `clear_in_class`, `clear_where`, `unlisted_where`,
+/// `clear_class_size`, `clear_abstained`,
 /// `clear_pairs_accepted`, `abstained_rightly`
 /// (the precision of abstaining), `failed`, `by_kind`, `by_strength`, `by_gain`, `confusion`, `list` (every trial).
 ///
@@ -40,10 +41,12 @@ pub fn scorecard_json(card: &Scorecard) -> Value {
         "in_class": count(card.in_class),
         "clear_in_class": count(card.clear_in_class),
         "mean_class_size": card.mean_class_size,
+        "clear_class_size": card.clear_class_size,
         "where": count(card.place),
         "clear_where": count(card.clear_place),
         "unlisted_where": count(card.unlisted_place),
         "abstained": count(card.abstained),
+        "clear_abstained": count(card.clear_abstained),
         "abstained_rightly": count(card.abstained_rightly),
         "wrongly_abstained": count(card.wrongly_abstained),
         "pairs_accepted": count(card.pairs_accepted),
@@ -81,6 +84,8 @@ fn row(row: &Row) -> Value {
         "answer": row.answer(),
         "right": row.is_right(),
         "strength": row.strength,
+        "added": row.added,
+        "shortfall": row.shortfall,
         "gain": row.gain,
         "p_value": outcome.map(|o| o.p_value),
         "where": outcome.and_then(|o| o.target.as_ref()),

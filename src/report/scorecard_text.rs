@@ -59,6 +59,7 @@ pub(super) fn named_scores(card: &Scorecard) -> Vec<(&'static str, Count)> {
         ("listed, abstained", card.wrongly_abstained),
         ("pairs accepted", card.pairs_accepted),
         ("clear pairs accepted", card.clear_pairs_accepted),
+        ("abstained where nothing fits", card.clear_abstained),
         ("intervals that cover", card.interval_covers),
         ("failed", card.failed),
     ]

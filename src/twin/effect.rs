@@ -45,6 +45,11 @@ pub struct Magnitude {
 }
 
 impl Magnitude {
+    /// Whether the magnitude is a level beyond which something happens: off at infinity.
+    pub fn is_threshold(&self) -> bool {
+        self.off.is_some_and(f64::is_infinite)
+    }
+
     /// A magnitude that is off at 0, of either sign.
     pub const fn signed(name: &'static str, unit: &'static str, starts: &'static [f64]) -> Self {
         Self {

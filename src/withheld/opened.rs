@@ -3,7 +3,7 @@
 use super::WithheldError;
 use super::answer::Outcome;
 use super::truth::{Truth, Urn};
-use crate::diagnose::{DiagnoseError, DiagnoseSettings, gain_of, held_out_from};
+use crate::diagnose::{DiagnoseError, DiagnoseSettings, gain_of, held_out_from, held_out_score};
 use crate::progress::Progress;
 use crate::twin::{Noise, Record};
 use serde::{Deserialize, Serialize};
@@ -20,16 +20,21 @@ pub(super) struct Opened {
     /// (before − after)/(before − floor) of the held-out data, `after` being the free run of the world itself; none where
     /// the diagnosis gave no share.
     pub share: Option<f64>,
+    /// Of a gap that no effect of the trial's library describes: held-out nats by which the best listed effect falls short of
+    /// what the twin scores without the departure, the same noise given; none where that was not looked at.
+    pub shortfall: Option<f64>,
 }
 
 impl Opened {
-    /// Fits the true effects to the records, and runs the world without noise beside the held-out one.
+    /// Fits the true effects to the records, and runs the world without noise beside the held-out one. `noise` is the trial's,
+    /// `settings` those of its diagnosis.
     pub fn of(
         urn: &Urn<'_>,
         truth: &Truth,
         outcome: Option<&Outcome>,
         record: Record,
         validation: Option<&Record>,
+        noise: Noise,
         settings: &DiagnoseSettings,
         progress: &Progress,
     ) -> Result<Self, WithheldError> {
@@ -38,12 +43,16 @@ impl Opened {
             None => None,
         };
         let records = [record];
+        let with_all = DiagnoseSettings {
+            without: vec![],
+            ..settings.clone()
+        };
         let gain_of = |effects: &[String]| match gain_of(
             urn.study(),
             &records,
             validation,
             effects,
-            settings,
+            &with_all,
             progress,
         ) {
             Ok(gain) => Ok(gain),
@@ -64,11 +73,18 @@ impl Opened {
                 added = Some(both - alone).filter(|v| v.is_finite());
             }
         }
+        let abstains = truth.kind.is_structural()
+            && (truth.right.iter()).all(|key| settings.without.contains(key));
+        let shortfall = match abstains && !settings.detection_only {
+            true => shortfall(urn, truth, validation.is_some(), noise, settings, progress)?,
+            false => None,
+        };
         Ok(Self {
             trial: truth.trial,
             gain,
             added,
             share,
+            shortfall,
         })
     }
 }
@@ -98,4 +114,33 @@ fn share(
         let after = (squares / (y.nrows() - from) as f64).sqrt() / y.std(0.0);
         (before - after) / (before - floor)
     }))
+}
+
+/// How far the best listed effect stays behind the generator's own law on a held-out record. The law itself cannot be filtered;
+/// what it would score is what the twin scores on the same record without the departure.
+fn shortfall(
+    urn: &Urn<'_>,
+    truth: &Truth,
+    validation: bool,
+    noise: Noise,
+    settings: &DiagnoseSettings,
+    progress: &Progress,
+) -> Result<Option<f64>, WithheldError> {
+    let Some([own, held_out]) = urn.twofold(truth, validation, noise)? else {
+        return Ok(None);
+    };
+    let score = |record, held_out, listed| match held_out_score(
+        urn.study(),
+        record,
+        held_out,
+        listed,
+        settings,
+        progress,
+    ) {
+        Err(error @ DiagnoseError::Cancelled(_)) => Err(WithheldError::from(error)),
+        other => Ok(other.ok().flatten()),
+    };
+    let law = score(own.plain, held_out.plain, false)?;
+    let best = score(own.bent, held_out.bent, true)?;
+    Ok(law.zip(best).map(|(law, best)| law - best))
 }

@@ -8,6 +8,9 @@ use super::truth::Truth;
 /// Nats from which on an effect is clear: it cannot be overlooked by chance.
 const CLEAR: f64 = 12.0;
 
+/// Held-out nats within which a listed effect is as good as an unlisted law.
+const IMITATES: f64 = 6.0;
+
 /// One trial with its key opened.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
@@ -31,6 +34,8 @@ pub struct Row {
     pub added: Option<f64>,
     /// The share of the gap that the true system closes on the held-out data.
     pub share: Option<f64>,
+    /// Held-out nats by which the best listed effect falls short of a law that is not listed.
+    pub shortfall: Option<f64>,
     /// What was said; none where the diagnosis failed.
     pub outcome: Option<Outcome>,
     /// Why there is nothing.
@@ -67,6 +72,7 @@ impl Row {
             gain: opened.gain,
             added: opened.added,
             share: opened.share,
+            shortfall: opened.shortfall,
             outcome: answer.outcome.clone(),
             failure: answer.failure.clone(),
             seconds: answer.seconds,
@@ -86,6 +92,11 @@ impl Row {
     /// Whether the truth is a gap that no effect of the trial's library describes.
     pub fn must_abstain(&self) -> bool {
         self.kind.is_structural() && self.right.is_empty()
+    }
+
+    /// Whether the truth is such a gap, and no listed effect imitates it either.
+    pub fn nothing_fits(&self) -> bool {
+        self.must_abstain() && self.shortfall.is_some_and(|nats| nats > IMITATES)
     }
 
     /// Whether the truth is one effect that the trial's library has, and no double of it counts.

@@ -234,7 +234,8 @@ impl Sealed<'_> {
                     answers[trial].outcome.as_ref(),
                     record,
                     validation.as_ref(),
-                    &self.diagnosis(trial, vec![]),
+                    Noise::new(seed, "withheld", trial as u64),
+                    &self.diagnosis(trial, left_out[trial].clone()),
                     progress,
                 )
             },

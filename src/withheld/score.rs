@@ -118,6 +118,8 @@ pub struct Scorecard {
     pub clear_in_class: Count,
     /// Mean size of classes of the same, where there is one.
     pub mean_class_size: Option<f64>,
+    /// The same, of the clear ones.
+    pub clear_class_size: Option<f64>,
     /// The place is right, of detected `listed` and `parametrised`.
     pub place: Count,
     /// The same, of the clear ones.
@@ -126,6 +128,8 @@ pub struct Scorecard {
     pub unlisted_place: Count,
     /// None of the listed effects, of detected ones that have none: recall.
     pub abstained: Count,
+    /// The same, of those that no listed effect imitates within 6 held-out nats.
+    pub clear_abstained: Count,
     /// None of the listed effects, of detected ones that have one.
     pub wrongly_abstained: Count,
     /// Nothing listed was there, of all that were answered so: precision.
@@ -164,11 +168,14 @@ impl Scorecard {
         let with_class =
             |row: &Row| row.called() && !row.right.is_empty() && row.kind != Kind::Pair;
         let clear_single = |row: &Row| single(row) && row.is_clear();
-        let sizes: Vec<f64> = (rows.iter().filter(|row| with_class(row)))
-            .filter_map(|row| row.outcome.as_ref())
-            .map(|o| o.class.len() as f64)
-            .filter(|size| *size > 0.0)
-            .collect();
+        let sizes = |clear: bool| -> Vec<f64> {
+            (rows.iter().filter(|row| with_class(row)))
+                .filter(|row| !clear || row.is_clear())
+                .filter_map(|row| row.outcome.as_ref())
+                .map(|o| o.class.len() as f64)
+                .filter(|size| *size > 0.0)
+                .collect()
+        };
         let seconds: Vec<f64> = rows.iter().map(|row| row.seconds).collect();
         Self {
             twin: twin.into(),
@@ -189,7 +196,8 @@ impl Scorecard {
                 &|row| with_class(row) && row.is_clear(),
                 &Row::class_is_right,
             ),
-            mean_class_size: mean(&sizes),
+            mean_class_size: mean(&sizes(false)),
+            clear_class_size: mean(&sizes(true)),
             place: over(&single, &Row::place_is_right),
             clear_place: over(&clear_single, &Row::place_is_right),
             unlisted_place: over(
@@ -197,6 +205,7 @@ impl Scorecard {
                 &Row::place_is_right,
             ),
             abstained: over(&|row| row.called() && row.must_abstain(), &Row::abstained),
+            clear_abstained: over(&|row| row.called() && row.nothing_fits(), &Row::abstained),
             wrongly_abstained: over(
                 &|row| row.called() && !row.right.is_empty(),
                 &Row::abstained,

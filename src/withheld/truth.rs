@@ -44,6 +44,14 @@ pub(super) struct Drawn {
     pub truth: Truth,
     pub record: Record,
     pub validation: Option<Record>,
+    /// Of everything random in it.
+    noise: Noise,
+}
+
+/// A record of a world beside that of the same world without its departures: same input, same noise.
+pub(super) struct Twofold {
+    pub bent: Record,
+    pub plain: Record,
 }
 
 /// Where truths come from.
@@ -174,7 +182,32 @@ impl<'a> Urn<'a> {
             truth,
             record,
             validation,
+            noise,
         }))
+    }
+
+    /// The record of a trial and a held-out one, each beside what would have been measured without the departures; `None`
+    /// where such a record runs away.
+    pub fn twofold(
+        &self,
+        truth: &Truth,
+        validation: bool,
+        noise: Noise,
+    ) -> Result<Option<[Twofold; 2]>, WithheldError> {
+        let drawn = self.draw(truth.trial, truth.kind, validation, noise)?;
+        let plain = Truth {
+            bends: vec![],
+            ..truth.clone()
+        };
+        let both = |drive: Drive, noise: Noise| -> Result<Option<Twofold>, WithheldError> {
+            let bent = self.record(truth, drive.clone(), noise)?;
+            let plain = self.record(&plain, drive, noise)?;
+            Ok(bent.zip(plain).map(|(bent, plain)| Twofold { bent, plain }))
+        };
+        let own = both(drawn.record.drive().clone(), drawn.noise)?;
+        let noise = drawn.noise.child("held out");
+        let held_out = both(self.drives.draw(noise)?, noise)?;
+        Ok(own.zip(held_out).map(|(own, held_out)| [own, held_out]))
     }
 
     /// The record of a truth under an input; `None` where it runs away.
@@ -322,6 +355,11 @@ mod tests {
                     let again = urn.draw(trial, kind, true, noise).unwrap();
                     assert_eq!(drawn.truth, again.truth);
                     assert_eq!(drawn.record, again.record);
+                    // The same noise once more, and without departures as many records as with none.
+                    if let Some([own, _]) = urn.twofold(&drawn.truth, true, noise).unwrap() {
+                        assert_eq!(own.bent, drawn.record);
+                        assert_eq!(own.plain == own.bent, drawn.truth.bends.is_empty());
+                    }
                     let truth = drawn.truth;
                     let bends = match kind {
                         Kind::None | Kind::Outside => 0,

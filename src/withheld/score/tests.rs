@@ -18,6 +18,7 @@ fn row(kind: Kind, truth: &[&str], accepted: &[&str], probability: f64) -> Row {
         strength: Some(0.5),
         gain: listed.then_some(20.0),
         added: None,
+        shortfall: None,
         share: Some(0.8),
         outcome: Some(Outcome {
             verdict: match called {
