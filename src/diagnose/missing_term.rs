@@ -1,12 +1,15 @@
 //! What an equation lacks, as the disturbance there that a smoother follows; and what it does in ranges of states and inputs.
 
-use super::attribute::{Explanation, probabilities};
-use super::candidate::Kind;
+use super::attribute::{Explanation, explanations, probabilities};
+use super::candidate::{Kind, candidates};
 use super::catch_all::Place;
 use super::localise::edges;
 use super::map::{Equation, TermRange};
 use super::null::{Bench, Test};
+use super::{DiagnoseError, Setting};
 use crate::filter::{FilterError, FilterSettings, Kalman, recoverable};
+use crate::progress::Stage;
+use crate::study::Study;
 use crate::twin::{Record, Signal, StateSpace};
 
 /// Pieces of a record that the spread of a mean is taken from.
@@ -114,23 +117,59 @@ fn smooth(
     }))
 }
 
-/// `where.equations`: each with the disturbance's probability, and what it does by ranges.
+/// Disturbances of a twin that has none among its candidates, as its free run is to follow the record: fitted apart, for the
+/// map alone.
+pub(super) fn apart<'a>(
+    setting: &Setting<'a>,
+    bench: &Bench<'a>,
+    study: &Study,
+    stage: &Stage,
+) -> Result<Option<(Bench<'a>, Vec<Explanation>)>, DiagnoseError> {
+    let all = candidates(study, &[])?;
+    let disturbances = all
+        .into_iter()
+        .filter(|c| matches!(c.kind, Kind::CatchAll(place, memory) if is_long(place, memory)))
+        .collect();
+    let (problem, fitted) = (bench.problem.clone(), bench.fitted.clone());
+    let Some(bench) = setting.bench(problem, fitted, &[], disturbances)? else {
+        return Ok(None);
+    };
+    let Some(look) = bench.own_look()? else {
+        return Ok(None);
+    };
+    let found = explanations(&bench, &look, None, None, stage)?;
+    Ok(Some((bench, found)))
+}
+
+/// A disturbance of an equation that wanders freely.
+fn is_long(place: Place, memory: f64) -> bool {
+    memory == 1.0 && !matches!(place, Place::Parameter(_))
+}
+
+/// `where.equations`: each with the disturbance's probability, and what it does by ranges. Without a test of the disturbances, p is
+/// that of the likelihood ratio, χ² with two degrees, times the number of equations.
 pub(super) fn equations(
     bench: &Bench<'_>,
     found: &[Explanation],
-    test: &Test,
+    test: Option<&Test>,
 ) -> Result<Vec<Equation>, FilterError> {
+    let places = disturbances(bench, found);
+    let count = places.len() as f64;
     let mut all = vec![];
-    for (explanation, share) in disturbances(bench, found) {
+    for (explanation, share) in places {
         let Some(term) = missing_term(bench, explanation)? else {
             continue;
         };
         let candidates = &bench.dictionary.candidates;
         let target = &candidates[explanation.candidate].target;
-        let p_value = (candidates.iter().zip(&test.candidates))
-            .filter(|(c, _)| !c.is_listed() && c.target == *target)
-            .map(|(_, p)| *p)
-            .fold(1.0, f64::min);
+        let p_value = match test {
+            Some(test) => (candidates.iter().zip(&test.candidates))
+                .filter(|(c, _)| !c.is_listed() && c.target == *target)
+                .map(|(_, p)| *p)
+                .fold(1.0, f64::min),
+            // exp(−x/2) is the survival function of χ² with two degrees.
+            None => (count * (-explanation.gain.max(0.0)).exp()).min(1.0),
+        };
         all.push(Equation {
             equation: term.equation.clone(),
             p_value,

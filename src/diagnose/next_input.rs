@@ -1,8 +1,8 @@
 //! The record to measure next, so that rivals are told apart.
 //!
 //! Inputs of several kinds, within the range of those that were applied, are tried on the fitted rivals: simulate one, filter
-//! with all; the mean log-likelihood ratio of the closest two says what an input is worth at fixed θ. The best few are then
-//! tried in earnest: each rival is fitted anew to the present records and the simulated next one together, and a record counts
+//! with all; what the innovations of two differ by, beyond what θ can answer, is what an input is worth (`scan.rs`). The best is
+//! tried in earnest: each rival is fitted anew to the present records and a simulated next one together, and a record counts
 //! as telling when the rival that made it leads all others by more than a class is wide.
 //!
 //! Source of the criterion: Hunter & Reiner, "Designs for discriminating between two rival models" (1965).
@@ -13,22 +13,20 @@ use super::fit::climb;
 use super::null::Bench;
 use super::problem::Problem;
 use super::result::NextInput;
+use super::scan::Reference;
 use crate::filter::recoverable;
 use crate::twin::{Drive, Noise, Record, Signal, SimulationError};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 /// Rivals that are looked at.
 const MOST: usize = 3;
-/// Simulations of each rival in the first look, of the best few inputs, and of the one that is proposed.
-const LOOKS: u64 = 2;
-const TRIALS: u64 = 4;
+/// Simulations of each proposal.
 const PROOF: u64 = 20;
-/// Inputs that are tried in earnest.
-const FINALISTS: usize = 2;
 /// Iterations of a refit.
 const WARM: usize = 4;
 /// Lengths of proposals, as multiples of the present record's.
-const LENGTHS: [usize; 2] = [1, 4];
+const LENGTHS: [usize; 2] = [1, 3];
 /// Parts of a record that levels are held for.
 const HOLDS: [usize; 4] = [80, 27, 10, 4];
 /// Levels of a staircase.
@@ -45,6 +43,8 @@ struct Rival<'a> {
     key: String,
     problem: Problem<'a>,
     theta: Vec<f64>,
+    /// What the present records know of θ, in φ.
+    information: DMatrix<f64>,
     numbers: f64,
 }
 
@@ -63,6 +63,7 @@ pub(super) fn next_input(
             key: candidates[e.candidate].key(),
             problem: bench.explained(e),
             theta: e.fitted.theta.clone(),
+            information: e.fitted.information.clone(),
             numbers: bench.dictionary.variants[e.variant].free.len() as f64,
         })
         .collect();
@@ -101,19 +102,14 @@ fn best_of(
     times: usize,
     noise: Noise,
 ) -> Result<Option<Proposal>, DiagnoseError> {
-    let mut ranked: Vec<(f64, Proposal)> = proposals(&records[0], times, noise)?
+    let looks = proposals(&records[0], times, noise)?
         .into_par_iter()
         .map(|proposal| Ok((first_look(rivals, &proposal.drive, noise)?, proposal)))
         .collect::<Result<Vec<_>, DiagnoseError>>()?;
-    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut best: Option<(u64, Proposal)> = None;
-    for (_, proposal) in ranked.into_iter().take(FINALISTS) {
-        let [told, _] = told_apart(rivals, records, &proposal.drive, TRIALS, noise.child("try"))?;
-        if best.as_ref().is_none_or(|(most, _)| told > *most) {
-            best = Some((told, proposal));
-        }
-    }
-    Ok(best.map(|(_, proposal)| proposal))
+    let best = (looks.into_iter()).max_by(|a, b| a.0.total_cmp(&b.0));
+    Ok(best
+        .filter(|(nats, _)| *nats > 0.0)
+        .map(|(_, proposal)| proposal))
 }
 
 /// Inputs within the range of those of a record, so many times as long as it; without inputs, a longer record.
@@ -217,36 +213,41 @@ impl Rival<'_> {
     }
 }
 
-/// The mean log-likelihood ratio of the closest two rivals, θ held.
+/// What the closest two rivals would differ by, in nats: half of what the change from the innovations of the one to those of the
+/// other holds that θ of the other, as far as the present records leave it free, cannot imitate.
 fn first_look(rivals: &[Rival<'_>], drive: &Drive, noise: Noise) -> Result<f64, DiagnoseError> {
     let mut least = f64::INFINITY;
     for (i, truth) in rivals.iter().enumerate() {
-        let mut leads = vec![0.0; rivals.len()];
-        for sample in 0..LOOKS {
-            let noise = noise.child("look").sample(sample * MOST as u64 + i as u64);
-            let Some(record) = truth.record(drive, noise)? else {
-                return Ok(f64::NEG_INFINITY);
+        let noise = noise.child("look").sample(i as u64);
+        let Some(record) = truth.record(drive, noise)? else {
+            return Ok(0.0);
+        };
+        let records = [record];
+        let at = |rival: &Rival<'_>| {
+            let problem = rival.problem.on(&records);
+            let theta = problem.full(&rival.problem.of_record(0, &rival.theta));
+            (problem, theta)
+        };
+        let (problem, theta) = at(truth);
+        let Some(own) = recoverable(problem.filtered(&theta))? else {
+            return Ok(0.0);
+        };
+        for rival in rivals
+            .iter()
+            .enumerate()
+            .filter(|(j, _)| *j != i)
+            .map(|(_, r)| r)
+        {
+            let (problem, theta) = at(rival);
+            let d = problem.dimension();
+            let known = rival.information.view((0, 0), (d, d)).into_owned();
+            let Some(reference) = Reference::knowing(&problem, &theta, &known)? else {
+                return Ok(0.0);
             };
-            let records = [record];
-            let of = |rival: &Rival<'_>| -> Result<f64, DiagnoseError> {
-                let problem = rival.problem.on(&records);
-                let theta = problem.full(&rival.problem.of_record(0, &rival.theta));
-                let value = recoverable(problem.log_likelihood(&theta))?;
-                Ok(value.unwrap_or(f64::NEG_INFINITY))
-            };
-            let own = of(truth)?;
-            for (lead, rival) in leads.iter_mut().zip(rivals) {
-                *lead += (own - of(rival)?) / LOOKS as f64;
-            }
+            least = least.min(0.5 * reference.own(&reference.direction(&own)));
         }
-        let others = leads.iter().enumerate().filter(|(j, _)| *j != i);
-        least = others.map(|(_, lead)| *lead).fold(least, f64::min);
     }
-    Ok(if least.is_nan() {
-        f64::NEG_INFINITY
-    } else {
-        least
-    })
+    Ok(if least.is_finite() { least } else { 0.0 })
 }
 
 /// Of how many simulated records, each beside the present ones, the rival that made them leads all others by more than a

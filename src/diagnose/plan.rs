@@ -373,14 +373,9 @@ fn choices(effect: &dyn UnmodelledEffect, mark: &Mark) -> Vec<Choice> {
         return vec![choice(off, None)];
     }
     match thresholds.len() {
-        0 | 1 if effect.least_memory() < effect.memory() => {
-            // The delays of a state need its covariances with the past; those of an input cost less.
-            let registers = match effect.law() {
-                Law::Actuator => REGISTERS.len(),
-                _ => REGISTERS.len() - 1,
-            };
-            (0..registers).map(|i| choice(vec![], Some(i))).collect()
-        }
+        0 | 1 if effect.least_memory() < effect.memory() => (0..REGISTERS.len())
+            .map(|i| choice(vec![], Some(i)))
+            .collect(),
         0 | 1 => vec![choice(vec![], None)],
         _ => {
             let others = |i: &usize| thresholds.iter().copied().filter(|j| j != i).collect();

@@ -9,7 +9,7 @@ use super::evalue::{combined, log_e};
 use super::fit::{Fitted, fit};
 use super::held_out::shrinkage;
 use super::map::Where;
-use super::missing_term::{disturbances, equations, missing_term};
+use super::missing_term::{apart, disturbances, equations, missing_term};
 use super::next_input::next_input;
 use super::null::Bench;
 use super::place::{maps, targets};
@@ -162,18 +162,38 @@ pub fn diagnose(
     }
 
     // Where, and how far?
-    let place = match verdict {
+    let mut place = match verdict {
         Verdict::StructuralGap if !settings.detection_only => {
             let found = found.as_deref().unwrap_or(&[]);
             Where {
                 maps: maps(&bench, &test, found.first(), settings.alpha)?,
                 after,
-                equations: equations(&bench, found, &test)?,
                 ..targets(&bench, found, &test, &answer)
             }
         }
         _ => Where::default(),
     };
+    let mut discovery = None;
+    if verdict == Verdict::StructuralGap && !settings.detection_only {
+        let apart = match setting.follows {
+            true => apart(
+                &setting,
+                &bench,
+                study,
+                &progress.stage("where", equations_of(shown)),
+            )?,
+            false => None,
+        };
+        let (bench, found, test) = match &apart {
+            Some((bench, found)) => (bench, found.as_slice(), None),
+            None => (&bench, found.as_deref().unwrap_or(&[]), Some(&test)),
+        };
+        place.equations = equations(bench, found, test)?;
+        if answer.decision == Decision::NoneOfThese {
+            let target = place.target.as_deref();
+            discovery = regressed(bench, found, target, noise.child("discover"))?;
+        }
+    }
     let next_input = match (answer.decision, &found) {
         (Decision::Class, Some(found)) => {
             next_input(&bench, found, &answer.class, noise.child("next"))?
@@ -183,15 +203,6 @@ pub fn diagnose(
     let power = match settings.detection_only {
         true => vec![],
         false => power(&bench, &nulls, settings.alpha)?,
-    };
-    let discovery = match (answer.decision, &found) {
-        (Decision::NoneOfThese, Some(found)) => regressed(
-            &bench,
-            found,
-            place.target.as_deref(),
-            noise.child("discover"),
-        )?,
-        _ => None,
     };
     let last = step.as_ref().map_or(&bench, |step| &step.bench);
     let (parameters, nuisance) =
@@ -331,6 +342,12 @@ fn regressed(
     };
     let term = missing_term(bench, explanation)?;
     Ok(term.and_then(|term| discover(&term, bench.problem.records, noise)))
+}
+
+/// How many equations the twin has.
+fn equations_of(twin: &dyn StateSpace) -> usize {
+    let outline = twin.outline();
+    outline.states.len() + outline.outputs.len()
 }
 
 /// Whether no state of the twin is noisy, with any noise level that the study leaves open.

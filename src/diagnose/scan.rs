@@ -41,7 +41,20 @@ pub(super) struct Gain {
 }
 
 impl Reference {
+    /// With θ as free as the weak priors leave it.
     pub fn new(problem: &Problem<'_>, theta: &[f64]) -> Result<Option<Self>, FilterError> {
+        let precisions = problem.prior_terms().map(|(_, precision)| precision);
+        let known =
+            DMatrix::from_diagonal(&DVector::from_iterator(problem.dimension(), precisions));
+        Self::knowing(problem, theta, &known)
+    }
+
+    /// With `known` about θ already, an information in φ.
+    pub fn knowing(
+        problem: &Problem<'_>,
+        theta: &[f64],
+        known: &DMatrix<f64>,
+    ) -> Result<Option<Self>, FilterError> {
         let filtered = problem.filtered(theta)?;
         let channels = filtered.first().map_or(1, |f| f.innovations.ncols());
         let roots = (filtered.iter())
@@ -72,9 +85,10 @@ impl Reference {
             reference.directions.set_column(j, &direction);
         }
         let mut gram = reference.directions.tr_mul(&reference.directions);
-        for (j, (_, precision)) in problem.prior_terms().enumerate() {
-            gram[(j, j)] += precision.max(1e-12 * gram[(j, j)]);
+        for j in 0..d {
+            gram[(j, j)] *= 1.0 + 1e-12;
         }
+        gram += known;
         let Some(factor) = gram.cholesky() else {
             return Ok(None);
         };

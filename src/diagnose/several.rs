@@ -16,6 +16,8 @@ const FIRSTS: usize = 2;
 const SECONDS: usize = 12;
 /// How often a partner of the best pair is kept and the other one looked for anew.
 const EXCHANGES: usize = 3;
+/// Nats that a third effect must add beyond what it costs: three numbers more imitate nearly anything a little.
+const WORTH_A_THIRD: f64 = 20.0;
 /// Nats beyond its price that the scan must promise for an effect beside others that leave nothing unexplained.
 const PROMISE: f64 = 5.0;
 
@@ -60,7 +62,7 @@ pub(super) fn several<'a>(
             break;
         }
         match beside(setting, &step, &look, stage)?.best {
-            Some(next) if next.score > step.score + WORTH_ANOTHER + PROMISE => step = next,
+            Some(next) if next.score > step.score + WORTH_A_THIRD => step = next,
             _ => break,
         }
     }
