@@ -237,7 +237,7 @@ fn placebo(
 }
 
 /// The first samples of a record.
-fn first_part(record: &Record, samples: usize) -> Result<Record, DiagnoseError> {
+pub(super) fn first_part(record: &Record, samples: usize) -> Result<Record, DiagnoseError> {
     let drive = record.drive();
     let inputs = drive.inputs().slice(s![..samples, ..]).to_owned();
     let drive = Drive::new(drive.dt(), inputs).map_err(RecordError::from)?;

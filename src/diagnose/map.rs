@@ -14,6 +14,8 @@ pub struct Where {
     pub targets: Vec<TargetShare>,
     /// Equations and what each would have to gain or lose to follow the record, most probable first.
     pub equations: Vec<Equation>,
+    /// Since when the twin does not follow.
+    pub onset: Option<Onset>,
     /// How the record differs from simulations of the refitted twin.
     pub maps: Maps,
     /// The same with the accepted effects, or else the best explanation, added.
@@ -24,8 +26,6 @@ pub struct Where {
 /// together; shares add up to at most one in each list.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Maps {
-    /// The first moment from which on the twin does not follow.
-    pub onset: Option<Onset>,
     /// Windows of time, clearest first.
     pub windows: Vec<Window>,
     /// Ranges of states, inputs and predicted outputs, clearest first.
@@ -38,7 +38,7 @@ pub struct Maps {
     pub bands: Vec<Band>,
 }
 
-/// The start of the first stretch of time that stands out.
+/// The start of the first block of time that the twin, fitted to all before it, does not foresee.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Onset {
     /// Which record, from 0.
@@ -47,7 +47,7 @@ pub struct Onset {
     pub time: f64,
     /// Output.
     pub channel: String,
-    /// Of the stretch that begins there.
+    /// Of the block that begins there, corrected for all blocks.
     pub p_value: f64,
 }
 
@@ -187,7 +187,6 @@ impl Maps {
             cells.iter().filter(|c| c.is_notable()).cloned().collect()
         }
         Self {
-            onset: self.onset.clone(),
             windows: kept(&self.windows),
             regions: kept(&self.regions),
             channels: kept(&self.channels),

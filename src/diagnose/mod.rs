@@ -8,7 +8,7 @@
 //! | what all of that is where nothing is wrong | `null.rs` |
 //! | what a validation record says | `evalue.rs` |
 //! | fit the explanations, order them, accept, abstain | `frequency.rs`, `attribute.rs`, `decide.rs`, `several.rs` |
-//! | where, in the equations, in time, in the states | `localise/`, `map.rs`, `place.rs` |
+//! | where, in the equations, in time, in the states, since when | `localise/`, `map.rs`, `place.rs`, `onset.rs` |
 //! | what the missing term depends on, where no listed effect fits | `missing_term.rs`, `discover.rs` |
 //! | how far, on held-out data | `shrink.rs` |
 //! | the kinds of gap | `verdict.rs` |
@@ -37,6 +37,7 @@ mod missing_term;
 mod next_input;
 mod null;
 mod omnibus;
+mod onset;
 mod place;
 mod plan;
 mod power;

@@ -238,7 +238,7 @@ impl Nulls {
 }
 
 /// The largest entry of each row.
-fn largest(rows: &[Vec<f64>]) -> Vec<f64> {
+pub(super) fn largest(rows: &[Vec<f64>]) -> Vec<f64> {
     (rows.iter())
         .map(|row| row.iter().fold(f64::NEG_INFINITY, |a, v| a.max(*v)))
         .map(|v| if v.is_finite() { v } else { 0.0 })
@@ -255,7 +255,7 @@ fn moments(values: impl Iterator<Item = f64>) -> (f64, f64) {
 }
 
 /// Each entry less the mean of its column over all *other* rows, in their standard deviations.
-fn standardised(rows: &[&Vec<f64>]) -> Vec<Vec<f64>> {
+pub(super) fn standardised(rows: &[&Vec<f64>]) -> Vec<Vec<f64>> {
     let n = rows.len() as f64;
     let width = rows.first().map_or(0, |r| r.len());
     let mut z: Vec<Vec<f64>> = rows.iter().map(|_| vec![0.0; width]).collect();

@@ -4,7 +4,7 @@ use super::DiagnoseError;
 use super::attribute::{Explanation, probabilities};
 use super::decide::Answer;
 use super::localise::{Cut, Past, shares};
-use super::map::{Band, Cell, Channel, Lag, Maps, Onset, Region, Where, Window};
+use super::map::{Band, Cell, Channel, Lag, Maps, Region, Where, Window};
 use super::null::{Bench, Test};
 use super::result::TargetShare;
 use crate::filter::{Filtered, recoverable};
@@ -54,7 +54,6 @@ pub(super) fn maps(
     bench: &Bench<'_>,
     test: &Test,
     best: Option<&Explanation>,
-    alpha: f64,
 ) -> Result<Maps, DiagnoseError> {
     let states = bench.problem.states(&bench.fitted.theta)?;
     let after: Option<Vec<Filtered>> = match best {
@@ -67,7 +66,6 @@ pub(super) fn maps(
     let output = |channel: usize| signals.outputs[channel].name.clone();
     let dt = records[0].drive().dt();
     let mut maps = Maps::default();
-    let mut first: Option<(usize, usize)> = None;
     for ((cut, &p_value), share) in bench.bins.cuts.iter().zip(&test.local).zip(shares) {
         match *cut {
             Cut::Window {
@@ -83,22 +81,6 @@ pub(super) fn maps(
                 p_value,
                 share,
             }),
-            Cut::Stretch {
-                record,
-                channel,
-                from,
-                ..
-            } => {
-                if p_value <= alpha && first.is_none_or(|first| (record, from) < first) {
-                    first = Some((record, from));
-                    maps.onset = Some(Onset {
-                        record,
-                        time: records[record].drive().time(from),
-                        channel: output(channel),
-                        p_value,
-                    });
-                }
-            }
             Cut::Region {
                 variable,
                 low,

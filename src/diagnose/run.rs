@@ -12,6 +12,7 @@ use super::map::Where;
 use super::missing_term::{apart, disturbances, equations, missing_term};
 use super::next_input::next_input;
 use super::null::Bench;
+use super::onset::onset;
 use super::place::{maps, targets};
 use super::power::power;
 use super::problem::Problem;
@@ -141,7 +142,7 @@ pub fn diagnose(
         // The same maps once more with what was accepted, or else came nearest.
         let added = decided.step.as_ref().or(decided.best.as_ref());
         if let (Some(added), Some(left)) = (added, &decided.left) {
-            after = Some(maps(&added.bench, &left.test, None, settings.alpha)?);
+            after = Some(maps(&added.bench, &left.test, None)?);
         }
         (answer, step) = (decided.answer, decided.step);
         effects = reported(&bench, &list, &test, &answer);
@@ -166,7 +167,8 @@ pub fn diagnose(
         Verdict::StructuralGap if !settings.detection_only => {
             let found = found.as_deref().unwrap_or(&[]);
             Where {
-                maps: maps(&bench, &test, found.first(), settings.alpha)?,
+                maps: maps(&bench, &test, found.first())?,
+                onset: onset(&bench, settings.alpha, noise)?,
                 after,
                 ..targets(&bench, found, &test, &answer)
             }

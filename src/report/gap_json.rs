@@ -87,7 +87,11 @@ fn place_json(place: &Where, targets: Vec<Value>) -> Value {
             json!({ "equation": e.equation, "p_value": e.p_value, "share": e.share, "term": term })
         })
         .collect();
+    let onset = place.onset.as_ref().map(|o| {
+        json!({ "record": o.record, "time": o.time, "channel": o.channel, "p_value": o.p_value })
+    });
     let mut all = maps(&place.maps);
+    all.insert("onset".into(), json!(onset));
     all.insert("target".into(), json!(place.target));
     all.insert("targets".into(), json!(targets));
     all.insert("equations".into(), json!(equations));
@@ -133,11 +137,7 @@ fn maps(maps: &Maps) -> Map<String, Value> {
             })
         })
         .collect();
-    let onset = notable.onset.as_ref().map(|o| {
-        json!({ "record": o.record, "time": o.time, "channel": o.channel, "p_value": o.p_value })
-    });
     let lists = [
-        ("onset", json!(onset)),
         ("windows", json!(windows)),
         ("regions", json!(regions)),
         ("channels", json!(channels)),

@@ -6,10 +6,7 @@ use crate::twin::{Outline, Record, Signal};
 
 /// Windows of a record.
 const WINDOWS: usize = 8;
-/// Stretches of a record, half of each in the next one: where the first one stands out, the gap begins.
-const STRETCHES: [usize; 2] = [32, 16];
-/// Least samples of a stretch.
-const SHORTEST: usize = 8;
+
 /// Bins of a variable, of equal numbers of samples.
 const BINS: usize = 5;
 /// Ends of the lags, in samples.
@@ -27,13 +24,7 @@ pub(in crate::diagnose) enum Cut {
         from: usize,
         to: usize,
     },
-    /// The same, shorter and overlapping.
-    Stretch {
-        record: usize,
-        channel: usize,
-        from: usize,
-        to: usize,
-    },
+
     /// Where a variable is in a range.
     Region {
         variable: usize,
@@ -91,7 +82,6 @@ impl Bins {
         for (record, r) in records.iter().enumerate() {
             for channel in 0..outputs.len() {
                 bins.cuts.extend(windows(record, channel, r.samples()));
-                bins.cuts.extend(stretches(record, channel, r.samples()));
             }
         }
         let columns: Vec<Signal> = (states.iter().zip(records))
@@ -148,7 +138,7 @@ impl Bins {
         })
     }
 
-    /// The samples (record, row, channel) of windows, stretches and regions, handed to `f` as (cut, record, row, channel).
+    /// The samples (record, row, channel) of windows and regions, handed to `f` as (cut, record, row, channel).
     pub fn visit(
         &self,
         states: &[(Filtered, Signal)],
@@ -161,12 +151,6 @@ impl Bins {
         for (c, cut) in self.cuts.iter().enumerate() {
             match *cut {
                 Cut::Window {
-                    record,
-                    channel,
-                    from,
-                    to,
-                }
-                | Cut::Stretch {
                     record,
                     channel,
                     from,
@@ -207,21 +191,4 @@ fn windows(record: usize, channel: usize, samples: usize) -> impl Iterator<Item 
         from: w * samples / WINDOWS,
         to: (w + 1) * samples / WINDOWS,
     })
-}
-
-fn stretches(record: usize, channel: usize, samples: usize) -> Vec<Cut> {
-    (STRETCHES.iter())
-        .map(|parts| samples / parts)
-        .filter(|length| *length >= SHORTEST)
-        .flat_map(|length| {
-            (0..=samples - length)
-                .step_by(length / 2)
-                .map(move |from| Cut::Stretch {
-                    record,
-                    channel,
-                    from,
-                    to: from + length,
-                })
-        })
-        .collect()
 }

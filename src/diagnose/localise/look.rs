@@ -24,7 +24,7 @@ pub(super) struct Excess {
 ///
 /// | cut | square of the statistic |
 /// |---|---|
-/// | window, stretch, region | n·mean² + n/2·(mean square − 1)² |
+/// | window, region | n·mean² + n/2·(mean square − 1)² |
 /// | output | the same, and Σ n·ρ_l² over twenty lags |
 /// | lags | Σ n·ρ_l² with the past of the signal |
 /// | band | m·(mean of m periodogram ordinates − 1)² |

@@ -58,7 +58,6 @@ const REGIONS: u8 = 2;
 fn family(cut: &Cut) -> (u8, usize) {
     match cut {
         Cut::Window { .. } => (0, 0),
-        Cut::Stretch { .. } => (1, 0),
         Cut::Region { variable, .. } => (REGIONS, *variable),
         Cut::Channel { .. } => (3, 0),
         Cut::Lag { .. } => (4, 0),
@@ -67,8 +66,5 @@ fn family(cut: &Cut) -> (u8, usize) {
 }
 
 fn in_samples(cut: &Cut) -> bool {
-    matches!(
-        cut,
-        Cut::Window { .. } | Cut::Stretch { .. } | Cut::Region { .. }
-    )
+    matches!(cut, Cut::Window { .. } | Cut::Region { .. })
 }
