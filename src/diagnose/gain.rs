@@ -4,8 +4,9 @@ use super::attribute::{elsewhere, explanations};
 use super::base_fit::base_fit;
 use super::candidate::{Candidate, candidates};
 use super::decide::grown;
+use super::detect::without_process_noise;
 use super::problem::Problem;
-use super::run::{check, without_process_noise};
+use super::run::check;
 use super::{DiagnoseError, DiagnoseSettings, Setting};
 use crate::progress::Progress;
 use crate::study::Study;
@@ -42,6 +43,7 @@ pub fn gain_of(
     }
     let validation: Option<Vec<Record>> = validation.map(|v| vec![v.clone()]);
     let setting = Setting {
+        study,
         twin,
         validation: validation.as_deref(),
         together: None,
@@ -96,6 +98,7 @@ pub fn held_out_score(
     let (records, held_out) = ([record], [held_out]);
     check(study, &records, Some(&held_out[0]), settings)?;
     let setting = Setting {
+        study,
         twin,
         validation: Some(&held_out),
         together: None,

@@ -9,7 +9,6 @@ use super::null::{Bench, Test};
 use super::{DiagnoseError, Setting};
 use crate::filter::{FilterError, FilterSettings, Kalman, recoverable};
 use crate::progress::Stage;
-use crate::study::Study;
 use crate::twin::{Record, Signal, StateSpace};
 
 /// Pieces of a record that the spread of a mean is taken from.
@@ -122,10 +121,9 @@ fn smooth(
 pub(super) fn apart<'a>(
     setting: &Setting<'a>,
     bench: &Bench<'a>,
-    study: &Study,
     stage: &Stage,
 ) -> Result<Option<(Bench<'a>, Vec<Explanation>)>, DiagnoseError> {
-    let all = candidates(study, &[])?;
+    let all = candidates(setting.study, &[])?;
     let disturbances = all
         .into_iter()
         .filter(|c| matches!(c.kind, Kind::CatchAll(place, memory) if is_long(place, memory)))

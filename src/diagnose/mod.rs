@@ -2,7 +2,8 @@
 //!
 //! | step | file |
 //! |---|---|
-//! | fit θ with a weak prior | `fit.rs`, `problem.rs` |
+//! | the way of a diagnosis | `run.rs`, `detect.rs` |
+//! | fit θ with a weak prior | `fit.rs`, `problem.rs`, `base_fit.rs` |
 //! | what each listed effect and each catch-all would gain | `candidate.rs`, `catch_all.rs`, `plan.rs`, `scales.rs`, `variant.rs`, `dictionary.rs`, `scan.rs` |
 //! | are the innovations white? | `omnibus.rs` |
 //! | what all of that is where nothing is wrong | `null.rs` |
@@ -24,6 +25,7 @@ mod base_fit;
 mod candidate;
 mod catch_all;
 mod decide;
+mod detect;
 mod dictionary;
 mod discover;
 mod evalue;
@@ -65,6 +67,7 @@ pub use shrink::Shrinkage;
 
 use crate::filter::FilterError;
 use crate::progress::Cancelled;
+use crate::study::Study;
 use crate::twin::{DigitalTwin, EffectError, ParameterError, Record, RecordError, SimulationError};
 use std::fmt;
 use std::sync::Arc;
@@ -224,6 +227,7 @@ impl fmt::Display for GivenRecord {
 
 /// What all steps share.
 struct Setting<'a> {
+    study: &'a Study,
     twin: &'a Arc<dyn DigitalTwin>,
     validation: Option<&'a [Record]>,
     /// The records and the validation record.

@@ -1,21 +1,85 @@
 //! Where the gap lies: targets, and what simulations say of each cut.
 
-use super::DiagnoseError;
 use super::attribute::{Explanation, probabilities};
 use super::decide::Answer;
+use super::detect::Detected;
+use super::discover::discover;
 use super::localise::{Cut, Past, shares};
 use super::map::{Band, Cell, Channel, Lag, Maps, Region, Where, Window};
+use super::missing_term::{apart, disturbances, equations, missing_term};
 use super::null::{Bench, Test};
-use super::result::TargetShare;
+use super::onset::onset;
+use super::result::{Decision, Discovery, TargetShare};
+use super::{DiagnoseError, Setting};
 use crate::filter::{Filtered, recoverable};
+use crate::progress::Progress;
+use crate::twin::Noise;
 
-/// Targets by what explains the record there, and the one that is named.
-pub(super) fn targets(
+/// `where` of the report but for what is drawn again, and, where nothing listed is accepted, what the missing term depends on.
+pub(super) fn locate(
+    setting: &Setting<'_>,
+    detected: &Detected<'_>,
+    found: &[Explanation],
+    answer: &Answer,
+    alpha: f64,
+    noise: Noise,
+    progress: &Progress,
+) -> Result<(Where, Option<Discovery>), DiagnoseError> {
+    let (bench, test) = (&detected.bench, &detected.test);
+    let mut place = Where {
+        onset: onset(bench, alpha, noise)?,
+        maps: maps(bench, test, found.first())?,
+        ..targets(bench, found, test, answer)
+    };
+    let apart = match setting.follows {
+        true => apart(
+            setting,
+            bench,
+            &progress.stage("where", equations_of(bench)),
+        )?,
+        false => None,
+    };
+    let (bench, found, test) = match &apart {
+        Some((bench, found)) => (bench, found.as_slice(), None),
+        None => (bench, found, Some(test)),
+    };
+    place.equations = equations(bench, found, test)?;
+    let discovery = match answer.decision {
+        Decision::NoneOfThese => regressed(
+            bench,
+            found,
+            place.target.as_deref(),
+            noise.child("discover"),
+        )?,
+        _ => None,
+    };
+    Ok((place, discovery))
+}
+
+/// How many equations the twin has.
+fn equations_of(bench: &Bench<'_>) -> usize {
+    bench.bins.states + bench.problem.twin.signals().outputs.len()
+}
+
+/// What the missing term depends on, in the equation of the named target, or else in the most probable one.
+fn regressed(
     bench: &Bench<'_>,
     found: &[Explanation],
-    test: &Test,
-    answer: &Answer,
-) -> Where {
+    target: Option<&str>,
+    noise: Noise,
+) -> Result<Option<Discovery>, DiagnoseError> {
+    let all = disturbances(bench, found);
+    let name = |e: &Explanation| &bench.dictionary.candidates[e.candidate].target;
+    let named = all.iter().find(|(e, _)| Some(name(e).as_str()) == target);
+    let Some((explanation, _)) = named.or(all.first()) else {
+        return Ok(None);
+    };
+    let term = missing_term(bench, explanation)?;
+    Ok(term.and_then(|term| discover(&term, bench.problem.records, noise)))
+}
+
+/// Targets by what explains the record there, and the one that is named.
+fn targets(bench: &Bench<'_>, found: &[Explanation], test: &Test, answer: &Answer) -> Where {
     let candidates = &bench.dictionary.candidates;
     let chances = probabilities(found);
     let mut targets: Vec<TargetShare> = vec![];

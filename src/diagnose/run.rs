@@ -1,30 +1,24 @@
 //! The way of one diagnosis.
 
-use super::attribute::{Explanation, explanations};
-use super::base_fit::{ITERATIONS, base_fit};
-use super::candidate::{Addition, candidates, not_tested};
+use super::attribute::Explanation;
+use super::candidate::Addition;
 use super::decide::{Accepted, Answer, Step, decide};
-use super::discover::discover;
-use super::evalue::{combined, log_e};
-use super::fit::{Fitted, fit};
+use super::detect::{Detected, detect, explained, without_process_noise};
 use super::held_out::shrinkage;
-use super::map::Where;
-use super::missing_term::{apart, disturbances, equations, missing_term};
+use super::map::Maps;
 use super::next_input::next_input;
 use super::null::Bench;
-use super::onset::onset;
-use super::place::{maps, targets};
+use super::place::{locate, maps};
 use super::power::power;
-use super::problem::Problem;
 use super::result::*;
 use super::shrink::{Runner, free_runs};
 use super::summary::{fitted_parameters, reported};
-use super::verdict::{absorbing, left_the_prior, verdict};
+use super::verdict::absorbing;
 use super::{DiagnoseError, DiagnoseSettings, GivenRecord, Setting};
 use crate::math::six_digits;
 use crate::progress::Progress;
 use crate::study::Study;
-use crate::twin::{Noise, Now, Record, Role, StateSpace};
+use crate::twin::{Noise, Record};
 use std::time::Instant;
 
 /// Shortest record.
@@ -70,180 +64,61 @@ pub fn diagnose(
     let validation: Option<Vec<Record>> = validation.map(|v| vec![v.clone()]);
     let validation = validation.as_deref();
     let together = validation.map(|v| [records, v].concat());
-    let space = twin.parameters();
     let setting = Setting {
+        study,
         twin,
         validation,
         together: together.as_deref(),
         follows: without_process_noise(shown, &records[0]),
     };
-
-    // θ, and how the record looks at it.
-    let problem = Problem::of_twin(twin, records);
-    let stage = progress.stage("fit", 1);
-    let fitted = base_fit(&problem, settings, noise)?.ok_or(DiagnoseError::NoFit)?;
-    stage.tick()?;
-    let mut all = candidates(study, &settings.without)?;
-    if setting.follows {
-        all.retain(|c| c.is_listed() && !c.is_noise());
-    }
-    let not_tested = not_tested(study, &all);
-    let bench =
-        (setting.bench(problem.clone(), fitted.clone(), &[], all)?).ok_or(DiagnoseError::NoFit)?;
-
-    // Is it what the twin makes?
-    let stage = progress.stage("test", settings.replicates);
-    // With a validation record, p is twice the rank's; and without one it is not to end at the edge of the level.
-    let level = 0.5 * settings.alpha;
-    let nulls = (bench.nulls(
-        settings.replicates,
-        0.999 * level,
-        noise.child("null"),
-        &stage,
-    )?)
-    .ok_or(DiagnoseError::NoFit)?;
-    let test = nulls.test();
-    let fit_all = || {
-        let stage = progress.stage("explain", bench.dictionary.candidates.len());
-        explanations(&bench, &nulls.own, validation, None, &stage)
+    let mut detected = detect(&setting, records, settings, noise, progress)?;
+    let Attributed {
+        answer,
+        step,
+        after,
+        effects,
+        found,
+    } = match settings.detection_only {
+        true => Attributed::nothing(),
+        false => attribute(&setting, &mut detected, settings, noise, progress)?,
     };
-    let mut found: Option<Vec<Explanation>> = None;
-    let mut e_value = None;
-    if let Some(records) = validation {
-        let list = fit_all()?;
-        e_value = against(&problem, &fitted, records, &list)?;
-        found = Some(list);
-    }
-    let p_value = combined(test.p_value, e_value);
-    let (outside, within) = left_the_prior(&problem, &fitted, settings.alpha)?;
-    let verdict = verdict(p_value, outside, settings.alpha);
-
-    // Which effect?
-    let mut answer = Answer {
-        decision: Decision::NotNeeded,
-        accepted: vec![],
-        class: vec![],
-        unexplained: None,
-        catch_all: None,
-    };
-    let mut step: Option<Step<'_>> = None;
-    let mut after = None;
-    let mut effects = vec![];
-    if settings.detection_only {
-        // The verdict is all.
-    } else if verdict == Verdict::StructuralGap {
-        let list = match found.take() {
-            Some(list) => list,
-            None => fit_all()?,
-        };
-        let stage = progress.stage("accept", 2 * settings.unexplained);
-        let decided = decide(&setting, &bench, &list, settings, noise, &stage)?;
-        stage.finish();
-        // The same maps once more with what was accepted, or else came nearest.
-        let added = decided.step.as_ref().or(decided.best.as_ref());
-        if let (Some(added), Some(left)) = (added, &decided.left) {
-            after = Some(maps(&added.bench, &left.test, None)?);
-        }
-        (answer, step) = (decided.answer, decided.step);
-        effects = reported(&bench, &list, &test, &answer);
-        found = Some(list);
-    } else if verdict == Verdict::ParameterGap
-        && let Some(within) = within
-    {
-        let stage = progress.stage("explain", bench.dictionary.candidates.len());
-        let list = absorbing(&bench, &nulls.own, within, &stage)?;
-        stage.finish();
-        if !list.is_empty() {
-            answer.decision = Decision::Absorbed;
-            answer.class = (list.iter())
-                .map(|e| bench.dictionary.candidates[e.candidate].key())
-                .collect();
-        }
-        effects = reported(&bench, &list, &test, &answer);
-    }
-
-    // Where, and how far?
-    let mut place = match verdict {
-        Verdict::StructuralGap if !settings.detection_only => {
-            let found = found.as_deref().unwrap_or(&[]);
-            Where {
-                maps: maps(&bench, &test, found.first())?,
-                onset: onset(&bench, settings.alpha, noise)?,
-                after,
-                ..targets(&bench, found, &test, &answer)
+    let Detected {
+        bench, nulls, test, ..
+    } = &detected;
+    let structural = detected.verdict == Verdict::StructuralGap;
+    let (mut place, mut discovery, mut next) = Default::default();
+    let (mut visible, mut shrunk) = (vec![], None);
+    if !settings.detection_only {
+        if let Some(found) = found.as_deref().filter(|_| structural) {
+            let alpha = settings.alpha;
+            (place, discovery) =
+                locate(&setting, &detected, found, &answer, alpha, noise, progress)?;
+            place.after = after;
+            if answer.decision == Decision::Class {
+                next = next_input(bench, found, &answer.class, noise.child("next"))?;
             }
         }
-        _ => Where::default(),
-    };
-    let mut discovery = None;
-    if verdict == Verdict::StructuralGap && !settings.detection_only {
-        let apart = match setting.follows {
-            true => apart(
-                &setting,
-                &bench,
-                study,
-                &progress.stage("where", equations_of(shown)),
-            )?,
-            false => None,
-        };
-        let (bench, found, test) = match &apart {
-            Some((bench, found)) => (bench, found.as_slice(), None),
-            None => (&bench, found.as_deref().unwrap_or(&[]), Some(&test)),
-        };
-        place.equations = equations(bench, found, test)?;
-        if answer.decision == Decision::NoneOfThese {
-            let target = place.target.as_deref();
-            discovery = regressed(bench, found, target, noise.child("discover"))?;
-        }
-    }
-    let next_input = match (answer.decision, &found) {
-        (Decision::Class, Some(found)) => {
-            next_input(&bench, found, &answer.class, noise.child("next"))?
-        }
-        _ => None,
-    };
-    let power = match settings.detection_only {
-        true => vec![],
-        false => power(&bench, &nulls, settings.alpha)?,
-    };
-    let last = step.as_ref().map_or(&bench, |step| &step.bench);
-    let (parameters, nuisance) =
-        fitted_parameters(&space.iter().collect::<Vec<_>>(), last, settings);
-    progress.checkpoint()?;
-    let additions: Vec<Addition> = answer.accepted.iter().map(|a| a.addition.clone()).collect();
-    let shrinkage = match settings.detection_only {
-        true => None,
-        false => shrinkage(
+        visible = power(bench, nulls, settings.alpha)?;
+        progress.checkpoint()?;
+        let found = found.as_deref();
+        shrunk = shrinkage(
             &setting,
-            &bench,
+            bench,
             step.as_ref(),
             &answer,
-            found.as_deref(),
+            found,
             settings,
             noise,
-        )?,
-    };
-    let runs = |record: &Record| -> Result<FreeRuns, DiagnoseError> {
-        let base = Runner::new(twin, &[], problem.of_record(0, &fitted.theta))?;
-        let grown = match additions.is_empty() {
-            true => None,
-            false => {
-                let theta = last.problem.of_record(0, &last.fitted.theta);
-                Some(Runner::new(twin, &additions, theta)?)
-            }
-        };
-        Ok(free_runs(record, &base, grown.as_ref()))
-    };
+        )?;
+    }
+    let last = step.as_ref().map_or(bench, |step| &step.bench);
+    let space = twin.parameters();
+    let (parameters, nuisance) =
+        fitted_parameters(&space.iter().collect::<Vec<_>>(), last, settings);
+    let runs = |record: &Record| beside(&setting, bench, last, &answer, record);
     Ok(Diagnosis {
         twin: study.name().into(),
-        verdict,
-        detection: Detection {
-            p_value,
-            alpha: settings.alpha,
-            statistic: test.statistic,
-            rank_p_value: test.p_value,
-            log_e: e_value,
-        },
+        verdict: detected.verdict,
         parameters,
         nuisance,
         place,
@@ -251,20 +126,118 @@ pub fn diagnose(
             decision: answer.decision,
             effects,
             accepted: answer.accepted.iter().map(Accepted::key).collect(),
-            class: answer.class,
             unexplained_p_value: answer.unexplained,
-            catch_all: answer.catch_all,
-            next_input,
+            next_input: next,
+            class: answer.class.clone(),
+            catch_all: answer.catch_all.clone(),
         },
-        shrinkage,
+        shrinkage: shrunk,
         discovery,
-        power,
+        power: visible,
         free_runs: runs(&records[0])?,
         validation_runs: validation.map(|v| runs(&v[0])).transpose()?,
-        not_tested,
         candidates: bench.dictionary.candidates.len(),
+        detection: detected.detection,
+        not_tested: detected.not_tested,
         seconds: clock.elapsed().as_secs_f64(),
     })
+}
+
+/// Which effect, as far as the verdict asks for one.
+struct Attributed<'a> {
+    answer: Answer,
+    step: Option<Step<'a>>,
+    /// Maps with what was accepted, or else came nearest, added.
+    after: Option<Maps>,
+    effects: Vec<EffectFit>,
+    found: Option<Vec<Explanation>>,
+}
+
+impl Attributed<'_> {
+    fn nothing() -> Self {
+        Self {
+            answer: Answer {
+                decision: Decision::NotNeeded,
+                accepted: vec![],
+                class: vec![],
+                unexplained: None,
+                catch_all: None,
+            },
+            step: None,
+            after: None,
+            effects: vec![],
+            found: None,
+        }
+    }
+}
+
+fn attribute<'a>(
+    setting: &Setting<'a>,
+    detected: &mut Detected<'a>,
+    settings: &DiagnoseSettings,
+    noise: Noise,
+    progress: &Progress,
+) -> Result<Attributed<'a>, DiagnoseError> {
+    let (found, within) = (detected.found.take(), detected.within.take());
+    let Detected {
+        bench, nulls, test, ..
+    } = &*detected;
+    let mut all = Attributed {
+        found,
+        ..Attributed::nothing()
+    };
+    match (detected.verdict, within) {
+        (Verdict::StructuralGap, _) => {
+            let list = match all.found.take() {
+                Some(list) => list,
+                None => explained(setting, bench, nulls, progress)?,
+            };
+            let stage = progress.stage("accept", 2 * settings.unexplained);
+            let decided = decide(setting, bench, &list, settings, noise, &stage)?;
+            stage.finish();
+            let added = decided.step.as_ref().or(decided.best.as_ref());
+            if let (Some(added), Some(left)) = (added, &decided.left) {
+                all.after = Some(maps(&added.bench, &left.test, None)?);
+            }
+            (all.answer, all.step) = (decided.answer, decided.step);
+            all.effects = reported(bench, &list, test, &all.answer);
+            all.found = Some(list);
+        }
+        (Verdict::ParameterGap, Some(within)) => {
+            let stage = progress.stage("explain", bench.dictionary.candidates.len());
+            let list = absorbing(bench, &nulls.own, within, &stage)?;
+            stage.finish();
+            if !list.is_empty() {
+                all.answer.decision = Decision::Absorbed;
+                all.answer.class = (list.iter())
+                    .map(|e| bench.dictionary.candidates[e.candidate].key())
+                    .collect();
+            }
+            all.effects = reported(bench, &list, test, &all.answer);
+        }
+        _ => {}
+    }
+    Ok(all)
+}
+
+/// Free runs beside a record: of the twin, and with the accepted effects.
+fn beside(
+    setting: &Setting<'_>,
+    bench: &Bench<'_>,
+    last: &Bench<'_>,
+    answer: &Answer,
+    record: &Record,
+) -> Result<FreeRuns, DiagnoseError> {
+    let runner = |bench: &Bench<'_>, additions: &[Addition]| {
+        let theta = bench.problem.of_record(0, &bench.fitted.theta);
+        Runner::new(setting.twin, additions, theta)
+    };
+    let additions: Vec<Addition> = answer.accepted.iter().map(|a| a.addition.clone()).collect();
+    let grown = match additions.is_empty() {
+        true => None,
+        false => Some(runner(last, &additions)?),
+    };
+    Ok(free_runs(record, &runner(bench, &[])?, grown.as_ref()))
 }
 
 pub(super) fn check(
@@ -327,59 +300,4 @@ pub(super) fn check(
         );
     }
     Ok(())
-}
-
-/// What the missing term depends on, in the equation of the named target, or else in the most probable one.
-fn regressed(
-    bench: &Bench<'_>,
-    found: &[Explanation],
-    target: Option<&str>,
-    noise: Noise,
-) -> Result<Option<Discovery>, DiagnoseError> {
-    let all = disturbances(bench, found);
-    let name = |e: &Explanation| &bench.dictionary.candidates[e.candidate].target;
-    let named = all.iter().find(|(e, _)| Some(name(e).as_str()) == target);
-    let Some((explanation, _)) = named.or(all.first()) else {
-        return Ok(None);
-    };
-    let term = missing_term(bench, explanation)?;
-    Ok(term.and_then(|term| discover(&term, bench.problem.records, noise)))
-}
-
-/// How many equations the twin has.
-fn equations_of(twin: &dyn StateSpace) -> usize {
-    let outline = twin.outline();
-    outline.states.len() + outline.outputs.len()
-}
-
-/// Whether no state of the twin is noisy, with any noise level that the study leaves open.
-pub(super) fn without_process_noise(twin: &dyn StateSpace, record: &Record) -> bool {
-    let outline = twin.outline();
-    let theta = outline.parameters.centre();
-    let drive = record.drive();
-    let now = Now {
-        t: 0.0,
-        dt: drive.dt(),
-        u: drive.input(0),
-        theta: &theta,
-    };
-    let mut process = vec![0.0; outline.states.len()];
-    let mut measurement = vec![0.0; outline.outputs.len()];
-    twin.noise(&now, &mut process, &mut measurement);
-    process.iter().all(|q| *q == 0.0)
-}
-
-/// log E of the validation record against the twin refitted on it.
-fn against(
-    problem: &Problem<'_>,
-    fitted: &Fitted,
-    records: &[Record],
-    found: &[Explanation],
-) -> Result<Option<f64>, DiagnoseError> {
-    let there = problem.on(records);
-    let space = problem.twin.parameters();
-    let starts = space.iter().filter(|p| p.role == Role::Start).count();
-    let begin = there.full(&problem.of_record(0, &fitted.theta));
-    let refitted = fit(&there, &[begin, there.centre()], ITERATIONS)?;
-    Ok(refitted.and_then(|f| log_e(found, f.log_likelihood, starts, there.samples())))
 }
