@@ -82,9 +82,7 @@ pub fn diagnose(
         true => Attributed::nothing(),
         false => attribute(&setting, &mut detected, settings, noise, progress)?,
     };
-    let Detected {
-        bench, nulls, test, ..
-    } = &detected;
+    let Detected { bench, nulls, .. } = &detected;
     let structural = detected.verdict == Verdict::StructuralGap;
     let (mut place, mut discovery, mut next) = Default::default();
     let (mut visible, mut shrunk) = (vec![], None);
