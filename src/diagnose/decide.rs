@@ -283,6 +283,7 @@ pub(super) fn decide<'a>(
             &listed,
             (&single, &left.look),
             margin,
+            noise,
             stage,
         )?;
         if let Some(step) = several
@@ -294,7 +295,7 @@ pub(super) fn decide<'a>(
             let tests = tests.child("several");
             if let Some(rest) = left_over(setting, &step.bench, settings, tests, stage)?
                 && (rest.p_value > UNEXPLAINED
-                    || (!passes && improves(setting, bench, &step, noise)?))
+                    || (!passes && improves(setting, (bench, &[]), &step, noise)?))
             {
                 return Ok(Decided::among(&keys, step, Some(rest)));
             }
@@ -304,7 +305,7 @@ pub(super) fn decide<'a>(
         return Ok(Decided::among(&keys, single, Some(left)));
     }
     // A single effect that leaves something, but follows a record never seen much better.
-    if improves(setting, bench, &single, noise)? {
+    if improves(setting, (bench, &[]), &single, noise)? {
         return Ok(Decided::named(single, Some(left)));
     }
     Ok(nothing(Some(left), Some(single)))
@@ -344,21 +345,24 @@ fn left_over<'a>(
     Ok(left(seen.map_or(1.0, |nulls| nulls.test().p_value)))
 }
 
-/// Of a twin whose free run is to follow the record: whether it follows the validation record better by a good part, beyond
-/// chance. A real system is never explained to the last bit, and without process noise nothing else would be accepted.
-fn improves(
+/// Of a twin whose free run is to follow the record: whether a step's effects let it follow the validation record better than
+/// those `before` by a good part, beyond chance. A real system is never explained to the last bit, and without process noise
+/// nothing else would be accepted.
+pub(super) fn improves(
     setting: &Setting<'_>,
-    bench: &Bench<'_>,
+    (bench, before): (&Bench<'_>, &[Accepted]),
     step: &Step<'_>,
     noise: Noise,
 ) -> Result<bool, DiagnoseError> {
     let Some(records) = setting.validation.filter(|_| setting.follows) else {
         return Ok(false);
     };
-    let additions: Vec<Addition> = step.accepted.iter().map(|a| a.addition.clone()).collect();
-    let theta = |bench: &Bench<'_>| bench.problem.of_record(0, &bench.fitted.theta);
-    let before = Runner::new(setting.twin, &[], theta(bench))?.errors(&records[0], 0);
-    let after = Runner::new(setting.twin, &additions, theta(&step.bench))?.errors(&records[0], 0);
+    let errors = |bench: &Bench<'_>, accepted: &[Accepted]| -> Result<_, DiagnoseError> {
+        let additions: Vec<Addition> = accepted.iter().map(|a| a.addition.clone()).collect();
+        let theta = bench.problem.of_record(0, &bench.fitted.theta);
+        Ok(Runner::new(setting.twin, &additions, theta)?.errors(&records[0], 0))
+    };
+    let (before, after) = (errors(bench, before)?, errors(&step.bench, &step.accepted)?);
     Ok(before.zip(after).is_some_and(|(before, after)| {
         let (_, interval) = closed(&before, &after, 0.0, noise.child("improves"));
         interval.is_some_and(|[low, _]| low > GOOD_PART)

@@ -18,14 +18,14 @@ use crate::twin::{Noise, Record, SimulationError};
 use rayon::prelude::*;
 
 /// Blocks of a record, and those before the first that is to be foreseen.
-const BLOCKS: usize = 16;
-const LEARNT: usize = 3;
+const BLOCKS: usize = 12;
+const LEARNT: usize = 2;
 /// Least samples of a block.
 const SHORTEST: usize = 10;
-/// Simulations.
-const REPLICATES: u64 = 39;
+/// Simulations beyond those that a p-value at the level takes.
+const BEYOND: f64 = 5.0;
 /// Iterations of a fit that starts where that of a block before ended.
-const WARM: usize = 3;
+const WARM: usize = 2;
 
 /// Of the first record that has one.
 pub(super) fn onset(
@@ -33,19 +33,20 @@ pub(super) fn onset(
     alpha: f64,
     noise: Noise,
 ) -> Result<Option<Onset>, DiagnoseError> {
+    let replicates = (1.0 / alpha + BEYOND) as u64;
     let signals = bench.problem.twin.signals();
     for (r, record) in bench.problem.records.iter().enumerate() {
         let theta = bench.problem.of_record(r, &bench.fitted.theta);
         let Some(own) = foresight(&bench.problem, &theta, record)? else {
             continue;
         };
-        let others: Vec<Option<Vec<f64>>> = (0..REPLICATES)
+        let others: Vec<Option<Vec<f64>>> = (0..replicates)
             .into_par_iter()
             .map(|i| {
                 let noise = noise
                     .child("onset")
                     .child("record")
-                    .sample(i + REPLICATES * r as u64);
+                    .sample(i + replicates * r as u64);
                 let drive = record.drive();
                 let outputs = match bench.problem.twin.simulate(&theta, drive, noise) {
                     Ok(outputs) => outputs,

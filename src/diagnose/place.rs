@@ -44,6 +44,12 @@ pub(super) fn locate(
         None => (bench, found, Some(test)),
     };
     place.equations = equations(bench, found, test)?;
+    if answer.decision == Decision::NoneOfThese && test.is_none() {
+        // No disturbance was among the candidates: the best one says where.
+        place.target = disturbances(bench, found)
+            .first()
+            .map(|(e, _)| bench.dictionary.candidates[e.candidate].target.clone());
+    }
     let discovery = match answer.decision {
         Decision::NoneOfThese => regressed(
             bench,

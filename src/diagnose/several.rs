@@ -4,10 +4,11 @@
 //! neither helps much alone; and each is left out once more, so that none stays that only mended a poor fit of another.
 
 use super::attribute::{Explanation, explanations, probabilities, refitted};
-use super::decide::{Accepted, Step, WORTH_ANOTHER, grown};
+use super::decide::{Accepted, Step, WORTH_ANOTHER, grown, improves};
 use super::null::{Bench, Look};
 use super::{DiagnoseError, Setting};
 use crate::progress::Stage;
+use crate::twin::Noise;
 
 /// Most effects together.
 const MOST: usize = 3;
@@ -38,6 +39,7 @@ pub(super) fn several<'a>(
     listed: &[&Explanation],
     (first, look): (&Step<'a>, &Look),
     margin: f64,
+    noise: Noise,
     stage: &Stage,
 ) -> Result<Option<Step<'a>>, DiagnoseError> {
     let pair = best_pair(setting, bench, listed, (first, look), stage)?;
@@ -61,10 +63,15 @@ pub(super) fn several<'a>(
         if !promises(&step, &look) {
             break;
         }
-        match beside(setting, &step, &look, stage)?.best {
-            Some(next) if next.score > step.score + WORTH_A_THIRD => step = next,
-            _ => break,
+        let next = beside(setting, &step, &look, stage)?.best;
+        let Some(next) = next.filter(|next| next.score > step.score + WORTH_A_THIRD) else {
+            break;
+        };
+        // Where the free run is to follow, likelihoods of thousands of nats are no measure.
+        if setting.follows && !improves(setting, (&step.bench, &step.accepted), &next, noise)? {
+            break;
         }
+        step = next;
     }
     Ok(Some(step))
 }

@@ -23,7 +23,7 @@ fn a_gap_begins_where_it_begins() {
     println!("{}", line("parameter-step@k3", &found));
     let maps = &found.place.maps;
     let onset = found.place.onset.as_ref().expect("no onset");
-    // Of 200 s, in blocks of 12.5 s.
+    // Of 200 s, in blocks of 17 s.
     assert!((85.0..140.0).contains(&onset.time), "{onset:?}");
     assert!(onset.p_value <= 0.05 && onset.channel == "y");
     let sums = [
