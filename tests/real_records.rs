@@ -1,7 +1,7 @@
 //! Measured records, where they are at hand: `../shared/data`, or the folder that `TRUETWIN_DATA` names.
 
 use std::path::{Path, PathBuf};
-use truetwin::diagnose::{DiagnoseSettings, Diagnosis, FreeRuns, Verdict, diagnose};
+use truetwin::diagnose::{Decision, DiagnoseSettings, Diagnosis, FreeRuns, Verdict, diagnose};
 use truetwin::experiment::reference_studies;
 use truetwin::progress::Progress;
 use truetwin::report::{
@@ -112,6 +112,36 @@ fn the_cascaded_tanks_lack_their_overflow() {
     if let Some(folder) = std::env::var_os("TRUETWIN_PICTURES") {
         draw(&study, &mut found, Path::new(&folder));
     }
+}
+
+/// With nothing in the library that these tanks lack, the diagnosis abstains, and regresses what an equation misses.
+#[test]
+fn what_the_cascaded_tanks_lack_is_explored() {
+    let Some((record, validation)) = tanks_records() else {
+        return;
+    };
+    let study = tanks();
+    let every = study.effects();
+    let settings = DiagnoseSettings {
+        without: (every.iter().map(|e| e.typetag_name().to_owned()))
+            .filter(|id| id != "sensor-rectification")
+            .collect(),
+        ..DiagnoseSettings::default()
+    };
+    let silent = Progress::silent();
+    let found = diagnose(&study, &[record], Some(&validation), &settings, &silent).unwrap();
+    assert_eq!(found.which.decision, Decision::NoneOfThese);
+    let discovery = found.discovery.as_ref().expect("no regression");
+    println!(
+        "{}: explained {:.2}",
+        discovery.equation, discovery.explained
+    );
+    for term in &discovery.terms {
+        println!("{term:?}");
+    }
+    assert_eq!(found.place.target.as_ref(), Some(&discovery.equation));
+    assert!(["h1", "h2"].contains(&discovery.equation.as_str()));
+    assert!(discovery.explained > 0.1 && discovery.terms[0].inclusion > 0.3);
 }
 
 /// The pictures of the page, of every fourth sample: the record itself is not to be handed on.

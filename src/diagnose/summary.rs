@@ -32,8 +32,10 @@ pub(super) fn reported(
             }
         })
         .collect();
-    // A pair's magnitudes and gains are those of the two together.
+    // Of several, magnitudes and gains are those of all together; what is left is any other one's alone.
     if answer.accepted.len() > 1 {
+        let together: f64 = answer.accepted.iter().map(|a| a.probability).product();
+        all.iter_mut().for_each(|e| e.probability *= 1.0 - together);
         for accepted in answer.accepted.iter().rev() {
             let at = all.iter().position(|e| e.key() == accepted.key());
             let mut effect = match at {
