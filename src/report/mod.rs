@@ -29,6 +29,7 @@ mod reproduce_json;
 #[cfg(test)]
 mod reproduce_tests;
 mod reproduce_text;
+mod scorecard_figures;
 mod scorecard_html;
 mod scorecard_json;
 mod scorecard_text;

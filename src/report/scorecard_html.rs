@@ -1,11 +1,12 @@
 //! Scores of withheld trials as one page that needs nothing else.
 
-use super::chart::{Bar, BarChart, BarGroup, Chart, Dot, Dots, Panel, Series, Style, escaped};
+use super::chart::escaped;
 use super::digits::{bare, percent, short};
 use super::page::Column::{Number, Text};
 use super::page::{Section, Shade, figure, folded, matrix, page, paragraph, table};
+use super::scorecard_figures::{gains_svg, nats, reliability_svg, strengths_svg};
 use super::scorecard_text::{named_scores, rule};
-use crate::withheld::{Count, Range, Row, Scorecard};
+use crate::withheld::{Count, Row, Scorecard};
 use std::collections::BTreeMap;
 
 /// The scorecard as a self-contained page: scores with intervals, kinds, detection against magnitude, reliability, the
@@ -90,7 +91,7 @@ fn counted(cells: &[&str], count: Count) -> Vec<String> {
     cells.chain([of(count), share, interval]).collect()
 }
 
-fn of(count: Count) -> String {
+pub(super) fn of(count: Count) -> String {
     format!("{} of {}", count.count, count.of)
 }
 
@@ -108,18 +109,7 @@ fn percentages(count: Count) -> (String, String) {
 
 /// Detection over strength and over the gain of the true effect.
 fn detection(card: &Scorecard) -> String {
-    let middle = |r: &Range| 0.5 * (r.low + r.high);
-    let points: Vec<(f64, Count)> = (card.by_strength.iter())
-        .map(|r| (middle(r), r.detected))
-        .collect();
-    let strengths = Shares {
-        title: "Called structural, by strength",
-        description: "Share of trials with a structural truth that were called structural, with 95 % intervals.",
-        x: "strength of the departure: 0 hardly visible, 1 obvious",
-        y: "share detected",
-        diagonal: false,
-    };
-    let mut body = match strengths.svg(&points) {
+    let mut body = match strengths_svg(card) {
         Some(svg) => figure(
             &svg,
             "A point stands in the middle of its range; whiskers are 95 % intervals.",
@@ -149,111 +139,12 @@ fn detection(card: &Scorecard) -> String {
     body
 }
 
-/// A range of gains.
-fn nats(r: &Range) -> String {
-    match (r.low.is_finite(), r.high.is_finite()) {
-        (true, true) => format!("{:.0} … {:.0} nats", r.low, r.high),
-        (false, _) => format!("below {:.0} nats", r.high),
-        (_, false) => format!("above {:.0} nats", r.low),
-    }
-}
-
-/// Detection by gain as bars; `None` where no gain is known.
-fn gains_svg(card: &Scorecard) -> Option<String> {
-    let last = card.by_gain.last()?;
-    let bars = (card.by_gain.iter())
-        .map(|r| {
-            let (low, high) = r.detected.interval();
-            Bar::new(
-                &nats(r),
-                r.detected.share().unwrap_or(f64::NAN),
-                &of(r.detected),
-            )
-            .clear(true)
-            .interval(Some([low, high]))
-        })
-        .collect();
-    let chart = BarChart {
-        title: "Called structural, by gain".into(),
-        description: format!(
-            "Bars with 95 % intervals; {} detected {}.",
-            nats(last),
-            of(last.detected)
-        ),
-        groups: vec![BarGroup {
-            label: "share detected, 95 % interval".into(),
-            full: Some(1.0),
-            bars,
-        }],
-    };
-    Some(chart.svg())
-}
-
-/// A picture of shares with their intervals over x.
-struct Shares {
-    title: &'static str,
-    description: &'static str,
-    x: &'static str,
-    y: &'static str,
-    /// Stated equals found.
-    diagonal: bool,
-}
-
-impl Shares {
-    /// `None` where there are no points.
-    fn svg(&self, points: &[(f64, Count)]) -> Option<String> {
-        let dots: Vec<Dot> = (points.iter())
-            .filter_map(|(x, count)| {
-                let (low, high) = count.interval();
-                Some(Dot {
-                    x: *x,
-                    y: count.share()?,
-                    low,
-                    high,
-                })
-            })
-            .collect();
-        if dots.is_empty() {
-            return None;
-        }
-        let series = match self.diagonal {
-            true => vec![Series::new(
-                "as stated",
-                Style::RECORD,
-                [(0.5, 0.5), (1.0, 1.0)],
-            )],
-            false => vec![],
-        };
-        let dots = Dots {
-            label: "share, 95 % interval".into(),
-            points: dots,
-        };
-        let chart = Chart {
-            title: self.title.into(),
-            description: self.description.into(),
-            x: self.x.into(),
-            panels: vec![Panel::new(self.y, series).dots(dots).range(-0.03, 1.03)],
-        };
-        Some(chart.svg())
-    }
-}
-
 fn reliability(card: &Scorecard) -> String {
-    let points: Vec<(f64, Count)> = (card.reliability.iter())
-        .map(|bin| (bin.stated, bin.right))
-        .collect();
-    let picture = Shares {
-        title: "How often the effect on top is true",
-        description: "Share of right answers by stated probability, with 95 % intervals; the diagonal is perfect.",
-        x: "stated probability",
-        y: "share right",
-        diagonal: true,
-    };
-    let Some(svg) = picture.svg(&points) else {
+    let Some(svg) = reliability_svg(card) else {
         return paragraph("No effect was accepted: nothing to draw.");
     };
-    let rows: Vec<Vec<String>> = (points.iter())
-        .map(|(stated, right)| counted(&[&format!("{stated:.2}")], *right))
+    let rows: Vec<Vec<String>> = (card.reliability.iter())
+        .map(|bin| counted(&[&format!("{:.2}", bin.stated)], bin.right))
         .collect();
     let head = [
         ("stated, mean", Number),

@@ -187,10 +187,10 @@ impl Browser {
             .collect()
     }
 
-    /// A screen so wide, of a phone where it is narrow.
-    pub fn resize(&mut self, width: u32) {
+    /// A screen of this size, of a phone where it is narrow.
+    pub fn resize(&mut self, width: u32, height: u64) {
         let screen = json!({
-            "width": width, "height": 800, "deviceScaleFactor": 1, "mobile": width < 500,
+            "width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500,
         });
         self.ask("Emulation.setDeviceMetricsOverride", screen);
     }

@@ -31,6 +31,8 @@ use truetwin::withheld::{Kind, Named, Outcome, Row, Scorecard};
 
 /// Phone, tablet, desktop.
 const WIDTHS: [u32; 3] = [360, 800, 1280];
+/// Of all of them.
+const HEIGHT: u64 = 800;
 /// A sheet of A4 between its margins, in CSS pixels.
 const SHEET: u32 = 718;
 const MEASURE: &str = include_str!("measure.js");
@@ -107,14 +109,14 @@ fn written(folder: &Path, name: &str, page: &str) -> PathBuf {
 fn complaints(browser: &mut Browser, path: &Path) -> Vec<String> {
     let mut all = vec![];
     browser.media("screen");
-    browser.resize(WIDTHS[0]);
+    browser.resize(WIDTHS[0], HEIGHT);
     browser.open(path);
     for unfolded in [false, true] {
         browser.evaluate(&format!(
             "document.querySelectorAll('details').forEach((d) => d.open = {unfolded})"
         ));
         for width in WIDTHS {
-            browser.resize(width);
+            browser.resize(width, HEIGHT);
             all.extend(measured(browser, width).map(|c| format!("{width} px: {c}")));
         }
     }
@@ -123,7 +125,7 @@ fn complaints(browser: &mut Browser, path: &Path) -> Vec<String> {
     // Folded on the screen, whole on paper.
     browser.evaluate("document.querySelectorAll('details').forEach((d) => d.open = false)");
     browser.media("print");
-    browser.resize(SHEET);
+    browser.resize(SHEET, HEIGHT);
     all.extend(measured(browser, SHEET).map(|c| format!("in print: {c}")));
     let folded = browser.evaluate(
         "[...document.querySelectorAll('details > :not(summary)')].filter((e) => !e.checkVisibility()).length",

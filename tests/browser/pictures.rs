@@ -9,9 +9,11 @@ use std::path::Path;
 pub fn take(browser: &mut Browser, page: &Path, widths: &[u32]) {
     browser.open(page);
     for width in widths {
-        browser.resize(*width);
+        browser.resize(*width, 800);
         browser.evaluate("document.querySelectorAll('details').forEach((d) => d.open = true)");
-        let whole = json!({ "format": "png", "captureBeyondViewport": true });
+        let height = browser.evaluate("document.documentElement.scrollHeight");
+        browser.resize(*width, height.as_u64().unwrap());
+        let whole = json!({ "format": "png" });
         save(
             browser,
             "Page.captureScreenshot",
