@@ -225,6 +225,7 @@ impl Drop for Browser {
             .args(["-9", "--", &group])
             .stderr(Stdio::null())
             .status();
+        let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
