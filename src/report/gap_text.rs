@@ -58,7 +58,7 @@ pub fn gap_text(found: &Diagnosis) -> String {
             .map(|r| format!("{} in {} … {}", r.variable, short(r.low), short(r.high)))
             .collect();
         let mut line = format!("Where: {target}");
-        if let Some(onset) = &maps.onset {
+        if let Some(onset) = maps.onset.as_ref().filter(|o| o.time > 0.0) {
             line.push_str(&format!("; from {} s on", short(onset.time)));
         }
         for (what, list) in [("clearest", when), ("at", regions)] {

@@ -31,9 +31,9 @@ code{font-size:.875rem;overflow-wrap:anywhere}\
 .matrix td{min-width:0!important}.matrix td,.matrix th{padding:.2rem .4rem;text-align:center;font-size:.8125rem;vertical-align:bottom;border:1px solid #ddd}\
 .matrix tbody th{text-align:left;white-space:nowrap}.matrix thead th.turned{writing-mode:vertical-rl;transform:rotate(180deg);\
 text-align:left}.matrix td.right{border:2px solid #222;font-weight:700}\
-@media (max-width:40rem){body{padding:.75rem}table{font-size:.875rem}th[scope=row]{white-space:normal;min-width:6rem}figure>.wide{margin:0 -.75rem;max-width:none}}\
+@media (max-width:40rem){body{padding:.75rem}table{font-size:.875rem}th[scope=row]{white-space:normal;min-width:7rem}figure>.wide{margin:0 -.75rem;max-width:none}}\
 @media print{body{margin:0;max-width:none;padding:0;font-size:11pt}nav,.skip{display:none}h2,h3,summary{break-after:avoid}\
-tr,pre{break-inside:avoid}p:has(+figure){break-after:avoid}.wide{overflow:visible}.wide svg{min-width:0;max-width:34rem!important}\
+tr,pre,.matrix{break-inside:avoid}p:has(+figure){break-after:avoid}.wide{overflow:visible}.wide svg{min-width:0;max-width:34rem!important}\
 td,th{padding-right:.5rem}table{font-size:9pt}td:not(.n){min-width:0}thead th{white-space:normal}\
 details::details-content{content-visibility:visible;display:block;height:auto}summary{color:#222;list-style:none}}";
 

@@ -55,7 +55,11 @@ impl<'a> Axes<'a> {
 
     /// Draws below `top`; returns where it ends.
     pub(super) fn draw(&self, out: &mut String, frame: &Frame, top: f64, last: bool) -> f64 {
-        let top = self.legend(out, top) + 14.0;
+        let mut top = self.legend(out, top) + 14.0;
+        if !self.panel.marks.is_empty() {
+            // Their names stand above the lines.
+            top += LINE - 6.0;
+        }
         let bottom = top + self.panel.height;
         let y = |value: f64| {
             bottom - (value - self.range.0) / (self.range.1 - self.range.0) * self.panel.height
@@ -116,7 +120,7 @@ impl<'a> Axes<'a> {
             dots.draw(out, frame, &y);
         }
         for mark in &self.panel.marks {
-            mark.draw(out, frame, (top, bottom));
+            mark.draw(out, frame, (top - LINE, bottom));
         }
         strip::draw(out, frame, &self.panel.spans, bottom);
         end

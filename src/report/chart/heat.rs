@@ -148,7 +148,8 @@ impl HeatGroup {
                 cell.draw(out, frame, y, CELL);
             }
             if let Some(mark) = &row.mark {
-                mark.draw(out, frame, (head, y + CELL));
+                // Down to the cells, not through their text.
+                mark.draw(out, frame, (head, y));
             }
             y += ROW;
         }

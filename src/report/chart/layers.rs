@@ -91,27 +91,12 @@ impl Mark {
             out,
             r##"<path d="M{x:.1} {top:.1}V{bottom:.1}" stroke="#222222" stroke-width="1.5" stroke-dasharray="2 3"/>"##
         );
-        let needs = width(&self.label, TEXT);
-        let fits = x + needs + 6.0 <= frame.right;
-        let (from, at, anchor) = match fits {
-            true => (x + 3.0, x + 5.0, "start"),
-            false => (x - 7.0 - needs, x - 5.0, "end"),
+        let (at, anchor) = match x + width(&self.label, TEXT) + 6.0 <= frame.right {
+            true => (x + 5.0, "start"),
+            false => (x - 5.0, "end"),
         };
-        let _ = writeln!(
-            out,
-            r##"<rect x="{from:.1}" y="{:.1}" width="{:.1}" height="{:.1}" fill="#ffffff" fill-opacity="0.85"/>"##,
-            top + 2.0,
-            needs + 4.0,
-            TEXT + 5.0
-        );
-        text(
-            out,
-            (at, top + TEXT + 2.0),
-            anchor,
-            TEXT,
-            false,
-            &self.label,
-        );
+        let at = (at, top + TEXT);
+        text(out, at, anchor, TEXT, false, &self.label);
     }
 }
 

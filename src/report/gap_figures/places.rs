@@ -7,6 +7,9 @@ use crate::report::digits::{percent, probability, short, unit_suffix};
 use crate::report::units::Units;
 use crate::study::Study;
 
+/// Shares that are drawn: what rounds to nothing stands in the numbers below the picture.
+const VISIBLE: f64 = 0.005;
+
 /// A cell as a bar.
 fn bar(found: &Diagnosis, label: &str, cell: &impl Cell) -> Bar {
     let note = format!("{}, {}", percent(cell.share()), probability(cell.p_value()));
@@ -30,6 +33,7 @@ pub fn gap_targets_svg(found: &Diagnosis) -> Option<String> {
     let targets = &found.place.targets;
     let first = targets.first()?;
     let bars = (targets.iter())
+        .filter(|t| t.share >= VISIBLE)
         .map(|t| {
             let note = format!("{}, {}", percent(t.share), probability(t.p_value));
             Bar::new(&t.target, t.share, &note).clear(t.p_value < found.detection.alpha)
@@ -51,7 +55,8 @@ pub fn gap_targets_svg(found: &Diagnosis) -> Option<String> {
 /// Ranges of states, inputs and predicted outputs that stand out; `None` where none does.
 pub fn gap_regions_svg(study: &Study, found: &Diagnosis) -> Option<String> {
     let units = Units::of(study);
-    let regions = found.place.maps.notable().regions;
+    let mut regions = found.place.maps.notable().regions;
+    regions.retain(|r| r.share >= VISIBLE);
     let clearest = regions.first()?;
     let groups = grouped(&regions, |r| &r.variable)
         .map(|(variable, mut own)| {

@@ -1,7 +1,7 @@
 //! Where: in time, in the equations, in the twin, at which values, lags and frequencies.
 
 use crate::diagnose::{Diagnosis, Maps, Verdict, Where, Window};
-use crate::report::digits::{bare, error, percent, probability, short};
+use crate::report::digits::{bare, error, percent, probability, short, unit_suffix};
 use crate::report::gap_figures::{
     gap_bands_svg, gap_channels_svg, gap_equations_svg, gap_lags_svg, gap_regions_svg,
     gap_targets_svg, gap_time_svg,
@@ -25,19 +25,16 @@ fn body(study: &Study, found: &Diagnosis) -> String {
         None => String::new(),
     };
     let filled = format!("Filled bars and bold names: p < {}.", found.detection.alpha);
-    if let Some(svg) = gap_targets_svg(found) {
-        let caption =
-            format!("How probable it is that what explains the gap stands there. {filled}");
-        body.push_str(&figure(&svg, &caption));
-    }
+    body.push_str(&targets(found, &filled));
     body.push_str(&time(found));
     body.push_str(&equations(study, found));
     if let Some(svg) = gap_regions_svg(study, found) {
         let caption = format!(
             "Shares of what the best explanation gains, by the filtered state or the input a step before, and by the predicted \
-             output; all ranges of all variables add up to 100 %. Ranges that do not stand out (p > 0.1) are left out. {filled}"
+             output; all ranges of all variables add up to 100 %. Only ranges that stand out (p ≤ 0.1). {filled}"
         );
         body.push_str(&figure(&svg, &caption));
+        body.push_str(&ranges(study, found));
     }
     let further: String = [
         (
@@ -51,7 +48,7 @@ fn body(study: &Study, found: &Diagnosis) -> String {
         ),
         (
             gap_bands_svg(found),
-            "Shares of the innovations\u{2019} power beyond what chance makes.",
+            "Shares of the innovations’ power beyond what chance makes.",
         ),
     ]
     .into_iter()
@@ -63,6 +60,52 @@ fn body(study: &Study, found: &Diagnosis) -> String {
     body
 }
 
+/// Places in the twin.
+fn targets(found: &Diagnosis, filled: &str) -> String {
+    let Some(svg) = gap_targets_svg(found) else {
+        return String::new();
+    };
+    let place = &found.place;
+    let alone = match (place.targets.first(), &place.target) {
+        (Some(first), Some(target)) if first.target != *target => {
+            format!(" Shares are of single explanations; what is accepted acts on {target}.")
+        }
+        _ => String::new(),
+    };
+    let caption =
+        format!("How probable it is that what explains the gap stands there.{alone} {filled}");
+    let rows: Vec<Vec<String>> = (place.targets.iter())
+        .map(|t| vec![t.target.clone(), percent(t.share), bare(t.p_value)])
+        .collect();
+    let head = [("place", Text), ("share", Number), ("p", Number)];
+    let numbers = table("Every place that was looked at.", &head, &rows);
+    figure(&svg, &caption) + &folded("Places in numbers", &numbers)
+}
+
+/// Ranges in numbers.
+fn ranges(study: &Study, found: &Diagnosis) -> String {
+    let units = Units::of(study);
+    let rows: Vec<Vec<String>> = (found.place.maps.notable().regions.iter())
+        .map(|r| {
+            let unit = unit_suffix(units.variable(&r.variable));
+            vec![
+                r.variable.clone(),
+                format!("{} … {}{unit}", short(r.low), short(r.high)),
+                percent(r.share),
+                bare(r.p_value),
+            ]
+        })
+        .collect();
+    let head = [
+        ("variable", Text),
+        ("range", Number),
+        ("share", Number),
+        ("p", Number),
+    ];
+    let numbers = table("Ranges that stand out, clearest first.", &head, &rows);
+    folded("Ranges in numbers", &numbers)
+}
+
 /// When, before and after the effect.
 fn time(found: &Diagnosis) -> String {
     let place = &found.place;
@@ -71,6 +114,11 @@ fn time(found: &Diagnosis) -> String {
     };
     let alpha = found.detection.alpha;
     let mut lead = match &place.maps.onset {
+        Some(o) if o.time <= 0.0 => format!(
+            "The twin does not follow {} from the start on ({}).",
+            channel(&o.channel, o.record),
+            probability(o.p_value)
+        ),
         Some(o) => format!(
             "The twin follows until {} s; from then on {} departs ({}).",
             short(o.time),
@@ -91,7 +139,7 @@ fn time(found: &Diagnosis) -> String {
         ));
     }
     let caption = format!(
-        "Shares of the gap by window and output. Unbroken frame and bold text: p < {alpha}; dashed frame: p \u{2264} 0.1; no frame: \
+        "Shares of the gap by window and output. Unbroken frame and bold text: p < {alpha}; dashed frame: p ≤ 0.1; no frame: \
          such as simulations of the twin show, too. p is corrected for all cells of all maps."
     );
     let numbers = table("Windows in order of time.", &head(place), &rows(place));
@@ -187,11 +235,12 @@ fn equations(study: &Study, found: &Diagnosis) -> String {
         .flat_map(|e| e.term.iter().map(move |t| (e, t)))
         .map(|(e, t)| {
             vec![
-                units.equation(&e.equation),
+                units.equation_name(&e.equation),
                 t.variable.clone(),
-                format!("{} \u{2026} {}", short(t.low), short(t.high)),
+                format!("{} … {}", short(t.low), short(t.high)),
                 short(t.mean),
                 error(t.std_error),
+                units.equation_unit(&e.equation),
             ]
         })
         .collect();
@@ -201,6 +250,7 @@ fn equations(study: &Study, found: &Diagnosis) -> String {
         ("is", Number),
         ("mean missing term", Number),
         ("std. error", Number),
+        ("unit", Text),
     ];
     let numbers = table("Equations that stand out, by ranges.", &head, &rows);
     [
@@ -209,7 +259,7 @@ fn equations(study: &Study, found: &Diagnosis) -> String {
         figure(
             &svg,
             "What each equation would have to gain (above zero) or lose (below) for the twin to follow: means by ranges of each \
-             variable. Boxes: \u{b1} one standard error; thick lines: more than two from zero. Bold heading: the equation stands out.",
+             variable. Boxes: ± one standard error; thick lines: more than two from zero. Bold heading: the equation stands out.",
         ),
         folded("Equations in numbers", &numbers),
     ]
