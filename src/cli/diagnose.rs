@@ -3,9 +3,9 @@
 use super::args::DiagnoseArguments;
 use super::{Context, Failure, output};
 use crate::diagnose::{DiagnoseSettings, GivenRecord, diagnose};
-use crate::report::{gap_html, gap_json, gap_text};
+use crate::report::{NEXT_INPUT, gap_html, gap_json, gap_text};
 use crate::study::Study;
-use crate::twin::{Record, read_record};
+use crate::twin::{Record, drive_csv_text, read_record};
 use crate::two_stage::Estimator;
 use std::path::Path;
 use std::process::ExitCode;
@@ -54,6 +54,9 @@ pub(super) fn run(context: &Context<'_>, options: &DiagnoseArguments) -> Result<
         let text = serde_json::to_string_pretty(&json).map_err(Failure::internal)?;
         folder.write("report.json", &text)?;
         folder.write("report.html", &gap_html(&study, &found))?;
+        if let Some(next) = &found.which.next_input {
+            folder.write(NEXT_INPUT, &drive_csv_text(&next.drive))?;
+        }
         folder.finish()?;
     }
     if context.json {

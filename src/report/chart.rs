@@ -1,4 +1,4 @@
-//! Line charts and bars as SVG.
+//! Line charts, bars, heat maps and small multiples as SVG.
 //!
 //! We draw them ourselves: plotters asks for a bundled TrueType font even where it writes SVG, and an axis, a legend
 //! and a line need none. Text is text in the reader's own font; colours are told apart by colour-blind people (Okabe &
@@ -21,13 +21,19 @@
 mod axes;
 mod bars;
 mod decimate;
+mod heat;
+mod layers;
+mod multiples;
 mod picture;
 mod strip;
 mod text;
 mod ticks;
 
 pub use bars::{Bar, BarChart, BarGroup};
-pub use strip::Span;
+pub use heat::{HeatGroup, HeatMap, HeatRow};
+pub use layers::{Area, Dot, Dots, Mark};
+pub use multiples::{Facet, FacetRow, Multiples, Step};
+pub use strip::{Edge, Span};
 pub(super) use text::escaped;
 
 use axes::{Axes, Frame};
@@ -43,8 +49,8 @@ const LARGEST: u32 = 880;
 /// Distance of anything from the edge.
 const EDGE: f64 = 12.0;
 /// Font sizes of the title and of everything else, and the height of a line of text.
-const TITLE: f64 = 16.0;
-const TEXT: f64 = 13.0;
+const TITLE: f64 = 17.0;
+const TEXT: f64 = 14.0;
 const LINE: f64 = 20.0;
 /// Room for a text that has a row to itself.
 const ROOM: f64 = WIDTH - 2.0 * EDGE;
@@ -75,6 +81,14 @@ pub struct Panel {
     pub series: Vec<Series>,
     /// Stretches of the x axis, marked below it.
     pub spans: Vec<Span>,
+    /// Bands below the lines.
+    pub areas: Vec<Area>,
+    /// Points with their intervals, over the lines.
+    pub dots: Vec<Dots>,
+    /// Places on the x axis.
+    pub marks: Vec<Mark>,
+    /// Ends of the y axis; if none, what the values need.
+    pub range: Option<(f64, f64)>,
 }
 
 impl Panel {
@@ -85,12 +99,51 @@ impl Panel {
             height: 190.0,
             series,
             spans: vec![],
+            areas: vec![],
+            dots: vec![],
+            marks: vec![],
+            range: None,
         }
     }
 
     /// With marked stretches of the x axis.
     pub fn spans(self, spans: Vec<Span>) -> Self {
         Self { spans, ..self }
+    }
+
+    /// With a band below the lines.
+    pub fn area(mut self, area: Area) -> Self {
+        self.areas.push(area);
+        self
+    }
+
+    /// With points and their intervals.
+    pub fn dots(mut self, dots: Dots) -> Self {
+        self.dots.push(dots);
+        self
+    }
+
+    /// With marked places on the x axis.
+    pub fn marks(self, marks: Vec<Mark>) -> Self {
+        Self { marks, ..self }
+    }
+
+    /// With these ends of the y axis.
+    pub fn range(self, low: f64, high: f64) -> Self {
+        Self {
+            range: Some((low, high)),
+            ..self
+        }
+    }
+
+    /// All points of all layers.
+    fn points(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        let lines = self.series.iter().flat_map(|s| s.points.iter().copied());
+        let areas = (self.areas.iter().flat_map(|a| &a.points))
+            .flat_map(|&(x, low, high)| [(x, low), (x, high)]);
+        let dots = (self.dots.iter().flat_map(|d| &d.points))
+            .flat_map(|d| [(d.x, d.low), (d.x, d.y), (d.x, d.high)]);
+        lines.chain(areas).chain(dots)
     }
 
     /// With another height in user units.
@@ -187,13 +240,10 @@ impl Style {
 impl Chart {
     /// The picture, to stand in a file or inside a page.
     pub fn svg(&self) -> String {
-        let points = || {
-            self.panels
-                .iter()
-                .flat_map(|p| &p.series)
-                .flat_map(|s| &s.points)
-        };
-        let x = padded(points().map(|p| p.0), 0.0);
+        let points = self.panels.iter().flat_map(Panel::points);
+        // A point on an axis would be cut in half.
+        let dotted = self.panels.iter().any(|p| !p.dots.is_empty());
+        let x = padded(points.map(|p| p.0), if dotted { 0.05 } else { 0.0 });
         let ticks = Ticks::new(x, 5);
         // The last label may stand under the end of the axis.
         let outermost = widest(&ticks);

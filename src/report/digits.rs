@@ -72,6 +72,11 @@ pub(super) fn probability(p: f64) -> String {
     }
 }
 
+/// A p-value in a column that says so.
+pub(super) fn bare(p: f64) -> String {
+    probability(p).replace("p = ", "").replace("p ", "")
+}
+
 /// A standard error, two significant digits.
 pub(super) fn error(value: f64) -> String {
     Digits::significant(value, OF_ERROR).write(value)

@@ -1,9 +1,16 @@
 //! Estimates that the tests of this module render: a small estimator of the oscillator, really trained.
 
-use crate::diagnose::{Decision, DiagnoseSettings, Diagnosis, Verdict, diagnose};
+pub(super) mod made;
+pub(super) mod made_scores;
+
+use crate::diagnose::{
+    Band, Channel, Decision, Detection, DiagnoseSettings, Diagnosis, Discovery, EffectFit,
+    Equation, FittedNuisance, FittedParameter, FreeRuns, Lag, Maps, NextInput, Onset, Region,
+    Shrinkage, TargetShare, Term, TermRange, Verdict, Visible, Where, Which, Window, diagnose,
+};
 use crate::progress::Progress;
 use crate::study::{RecordPlan, Study, StudyFile};
-use crate::twin::{Noise, Record};
+use crate::twin::{Drive, Interval, Noise, Record, Signal};
 use crate::twins::VanDerPol;
 use crate::two_stage::{Estimate, EstimateOptions, PretrainOptions, pretrain};
 use crate::withheld::{Kind, Named, Outcome, Row, Scorecard};
@@ -45,6 +52,12 @@ pub(super) fn simulated(study: &Study, theta: &[f64], sample: u64) -> Record {
 /// The study of [`diagnoses`].
 pub(super) fn oscillator() -> Study {
     Study::new("van-der-pol", VanDerPol, RecordPlan::autonomous(0.05, 300)).unwrap()
+}
+
+/// The study of [`made::tanks_class`].
+pub(super) fn tanks() -> Study {
+    let studies = crate::experiment::reference_studies().unwrap();
+    studies.into_iter().find(|s| s.name() == "tanks").unwrap()
 }
 
 /// Diagnoses without a gap, with a named effect and a validation record, with a parameter gap.

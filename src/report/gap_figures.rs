@@ -1,9 +1,21 @@
-//! The pictures of a diagnosis.
+//! The pictures of a diagnosis: measured and twin, which effect, how far. Where, what next and exploration have their own files.
 
-use super::chart::{Bar, BarChart, BarGroup, Chart, Panel, Series, Span, Style, roomy};
-use super::digits::{chance, named, percent, probability, short, unit_suffix};
+mod discovery;
+mod equations;
+mod next;
+mod places;
+mod time;
+
+pub use discovery::{gap_missing_svg, gap_terms_svg};
+pub use equations::gap_equations_svg;
+pub use next::gap_next_input_svg;
+pub use places::{gap_bands_svg, gap_channels_svg, gap_lags_svg, gap_regions_svg, gap_targets_svg};
+pub use time::gap_time_svg;
+
+use super::chart::{Bar, BarChart, BarGroup, Chart, Edge, Mark, Panel, Series, Span, Style, roomy};
+use super::digits::{chance, named, percent, short};
 use super::units::Units;
-use crate::diagnose::{Decision, Diagnosis, FreeRuns, Shrinkage};
+use crate::diagnose::{Cell, Decision, Diagnosis, EffectFit, FreeRuns, Maps, Onset, Shrinkage};
 use crate::study::Study;
 
 /// Explanations that are drawn.
@@ -24,7 +36,11 @@ pub fn gap_runs_svg(study: &Study, found: &Diagnosis, validation: bool) -> Optio
             let panel = Panel::new(&named(output), series(runs, j));
             match validation {
                 true => panel,
-                false => panel.spans(windows(found, &output.name)),
+                false => (panel.spans(windows(found, &output.name))).marks(
+                    onset(found.place.onset.as_ref(), 0, &output.name)
+                        .into_iter()
+                        .collect(),
+                ),
             }
         })
         .collect();
@@ -67,102 +83,79 @@ fn series(runs: &FreeRuns, channel: usize) -> Vec<Series> {
         .collect()
 }
 
-/// Windows of the first record.
+/// Windows of the first record that stand out.
 fn windows(found: &Diagnosis, channel: &str) -> Vec<Span> {
-    let notable = found.place.maps.notable().windows;
-    let own = (notable.iter()).filter(|w| w.record == 0 && w.channel == channel);
+    let notable = found.place.maps.notable();
+    let full = largest(&notable);
+    spans(&notable, found.detection.alpha, full, (0, channel))
+}
+
+/// The largest share of a window: as dark as it gets.
+fn largest(maps: &Maps) -> f64 {
+    (maps.windows.iter().map(|w| w.share)).fold(f64::MIN_POSITIVE, f64::max)
+}
+
+/// Windows of one record and output, by time; a share of `full` is as dark as it gets.
+fn spans(maps: &Maps, alpha: f64, full: f64, (record, channel): (usize, &str)) -> Vec<Span> {
+    let own = (maps.windows.iter()).filter(|w| w.record == record && w.channel == channel);
     let mut spans: Vec<Span> = own
         .map(|w| Span {
             from: w.start,
             to: w.end,
             label: percent(w.share),
-            weight: w.share,
-            clear: w.p_value < found.detection.alpha,
+            weight: w.share / full,
+            edge: edge(w, alpha),
         })
         .collect();
     spans.sort_by(|a, b| a.from.total_cmp(&b.from));
     spans
 }
 
-/// Places in the twin by the probability of what explains the gap there; `None` where nothing was looked for.
-pub fn gap_targets_svg(found: &Diagnosis) -> Option<String> {
-    let targets = &found.place.targets;
-    let first = targets.first()?;
-    let bars = (targets.iter())
-        .map(|t| {
-            let note = format!("{}, {}", percent(t.share), probability(t.p_value));
-            Bar::new(&t.target, t.share, &note).clear(t.p_value < found.detection.alpha)
-        })
-        .collect();
-    let chart = BarChart {
-        title: "Where in the twin".into(),
-        description: format!(
-            "Bars of {} places; the first is {} with {}.",
-            targets.len(),
-            first.target,
-            percent(first.share)
-        ),
-        groups: vec![group("", Some(1.0), bars)],
-    };
-    Some(chart.svg())
+/// The frame that says how much a cell stands out.
+fn edge(cell: &impl Cell, alpha: f64) -> Edge {
+    match cell {
+        cell if cell.p_value() < alpha => Edge::Unbroken,
+        cell if cell.is_notable() => Edge::Dashed,
+        _ => Edge::Bare,
+    }
 }
 
-/// Ranges of states and inputs that stand out; `None` where none does.
-pub fn gap_regions_svg(study: &Study, found: &Diagnosis) -> Option<String> {
-    let units = Units::of(study);
-    let regions = found.place.maps.notable().regions;
-    let clearest = regions.first()?;
-    let mut variables: Vec<&str> = regions.iter().map(|r| r.variable.as_str()).collect();
-    variables.sort_unstable();
-    variables.dedup();
-    let groups = (variables.into_iter())
-        .map(|variable| {
-            let unit = unit_suffix(units.variable(variable));
-            let mut own: Vec<_> = regions.iter().filter(|r| r.variable == variable).collect();
-            own.sort_by(|a, b| a.low.total_cmp(&b.low));
-            let bar = |r: &&crate::diagnose::Region| {
-                let label = format!("{} … {}{unit}", short(r.low), short(r.high));
-                let note = format!("{}, {}", percent(r.share), probability(r.p_value));
-                Bar::new(&label, r.share, &note).clear(r.p_value < found.detection.alpha)
-            };
-            BarGroup {
-                label: variable.into(),
-                full: None,
-                bars: own.iter().map(bar).collect(),
-            }
-        })
-        .collect();
-    let chart = BarChart {
-        title: "At which states and inputs".into(),
-        description: format!(
-            "Bars of {} ranges; the longest is {} from {} to {}.",
-            regions.len(),
-            clearest.variable,
-            short(clearest.low),
-            short(clearest.high)
-        ),
-        groups,
-    };
-    Some(chart.svg())
+/// The onset, where it is in this record and output.
+fn onset(onset: Option<&Onset>, record: usize, channel: &str) -> Option<Mark> {
+    let onset = onset?;
+    (onset.record == record && onset.channel == channel).then(|| Mark {
+        x: onset.time,
+        label: format!("onset {} s", short(onset.time)),
+    })
 }
 
 /// Listed effects by probability, then everything else together; `None` where none was fitted.
 pub fn gap_which_svg(found: &Diagnosis) -> Option<String> {
     let which = &found.which;
     let first = which.effects.first()?;
-    let mut bars: Vec<Bar> = (which.effects.iter().take(SHOWN))
-        .map(|effect| {
-            let (key, gain) = (effect.key(), short(effect.log_score_gain));
-            let note = format!("{}, {gain} nats", chance(effect.probability));
-            Bar::new(&key, effect.probability, &note).clear(which.accepted.contains(&key))
-        })
-        .collect();
+    let bar = |effect: &EffectFit| {
+        let (key, gain) = (effect.key(), short(effect.log_score_gain));
+        let note = format!("{}, {gain} nats", chance(effect.probability));
+        Bar::new(&key, effect.probability, &note).clear(which.accepted.contains(&key))
+    };
+    let shown = || which.effects.iter().take(SHOWN);
+    let is_rival =
+        |e: &&EffectFit| which.decision == Decision::Class && which.class.contains(&e.key());
+    let rivals: Vec<Bar> = shown().filter(is_rival).map(bar).collect();
+    let mut others: Vec<Bar> = shown().filter(|e| !is_rival(e)).map(bar).collect();
     // What absorbs a parameter gap is compared with no others.
     if which.decision != Decision::Absorbed {
-        let listed: f64 = bars.iter().map(|bar| bar.value).sum();
+        let listed: f64 = shown().map(|e| e.probability).sum();
         let rest = (1.0 - listed).max(0.0);
-        bars.push(Bar::new("all others, unlisted too", rest, &chance(rest)));
+        others.push(Bar::new("all others, unlisted too", rest, &chance(rest)));
     }
+    let groups = match rivals.is_empty() {
+        true => vec![group("", Some(1.0), others)],
+        false => vec![
+            group("One class: not told apart by these data", Some(1.0), rivals),
+            group("Outside the class", Some(1.0), others),
+        ],
+    };
     let chart = BarChart {
         title: "Explanations by probability".into(),
         description: format!(
@@ -170,7 +163,7 @@ pub fn gap_which_svg(found: &Diagnosis) -> Option<String> {
             first.key(),
             chance(first.probability)
         ),
-        groups: vec![group("", Some(1.0), bars)],
+        groups,
     };
     Some(chart.svg())
 }

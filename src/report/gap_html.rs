@@ -1,43 +1,51 @@
 //! A diagnosis as one page that needs nothing else.
 
+mod discovery;
 mod explanations;
 mod extent;
 mod limits;
 mod numbers;
-mod page;
 mod place;
 mod steps;
 
 use super::digits::probability;
 use super::gap_figures::gap_runs_svg;
 use super::gap_text::verdict_sentence;
+use super::page::{Section, escaped, figure, page, paragraph};
 use super::units::Units;
-use crate::diagnose::Diagnosis;
+use crate::diagnose::{Diagnosis, Verdict};
 use crate::study::Study;
-use page::{escaped, figure, paragraph, section};
 
 /// The diagnosis as a self-contained page, readable on a phone and in print: the verdict, measured and twin before and after,
-/// where, which, how far, parameters, what was not tested, what to do next.
+/// where, which, how far, what to do next, how sure and what was not tested, parameters.
 ///
 /// Pictures are SVG inside the page, with words for those who cannot see them; nothing is told by colour alone. There are no
 /// scripts, and nothing is loaded from elsewhere.
 pub fn gap_html(study: &Study, found: &Diagnosis) -> String {
     let units = Units::of(study);
     let verdict = escaped(&verdict_sentence(found));
-    let body = [
-        format!("<p class=\"verdict\">{verdict}</p>\n"),
-        paragraph(&test(found)),
-        runs(study, found),
-        place::section_of(study, found),
-        explanations::section_of(&units, found),
+    let lead = format!(
+        "<p class=\"verdict\">{verdict}</p>\n{}",
+        paragraph(&test(found))
+    );
+    let mut sections = vec![runs(study, found), place::section_of(study, found)];
+    sections.push(explanations::section_of(&units, found));
+    sections.extend(discovery::section_of(study, found));
+    sections.extend([
         extent::section_of(found),
-        numbers::section_of(&units, found),
-        limits::section_of(found),
-        steps::section_of(&units, found),
-    ];
-    page::page(
+        steps::section_of(study, &units, found),
+        limits::section_of(&units, found),
+    ]);
+    // Where nothing else is to be said, the parameters are the answer.
+    let parameters = match found.verdict {
+        Verdict::StructuralGap => sections.len(),
+        _ => 1,
+    };
+    sections.insert(parameters, numbers::section_of(&units, found));
+    page(
         &format!("{}: what the twin lacks", found.twin),
-        &body.concat(),
+        &lead,
+        &sections,
     )
 }
 
@@ -59,7 +67,7 @@ fn test(found: &Diagnosis) -> String {
 }
 
 /// Measured and twin.
-fn runs(study: &Study, found: &Diagnosis) -> String {
+fn runs(study: &Study, found: &Diagnosis) -> Section {
     let marked = match found.place.maps.notable().windows.is_empty() {
         true => String::new(),
         false => format!(
@@ -81,7 +89,7 @@ fn runs(study: &Study, found: &Diagnosis) -> String {
             "The same on the validation record; no parameter is fitted to it.",
         ));
     }
-    section("runs", "Measured and twin", &body)
+    Section::new("runs", "Measured against twin", body)
 }
 
 #[cfg(test)]

@@ -204,11 +204,12 @@ fn shrinkage(s: &Shrinkage) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::fixture::{diagnoses, validator};
+    use crate::report::fixture::{diagnoses, made, validator};
 
     #[test]
     fn every_verdict_keeps_to_the_contract() {
-        for found in diagnoses() {
+        let by_hand = [made::tanks_class(), made::oscillator_none()];
+        for found in diagnoses().iter().chain(&by_hand) {
             let read: Value = serde_json::from_str(&gap_json(found).to_string()).unwrap();
             let complaints: Vec<String> = (validator("gap").iter_errors(&read))
                 .map(|error| format!("{}: {error}", error.instance_path))

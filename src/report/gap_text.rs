@@ -1,12 +1,17 @@
 //! A diagnosis on the terminal.
 
 use super::digits::{chance, error, percent, probability, short, unit_suffix};
-use crate::diagnose::{Decision, Diagnosis, EffectFit, SHORTEST_SPLIT, Shrinkage, Verdict};
+use super::gap_json::NEXT_INPUT;
+use crate::diagnose::{
+    Decision, Diagnosis, Discovery, EffectFit, NextInput, SHORTEST_SPLIT, Shrinkage, Verdict,
+};
 
 /// Most lines of the text.
 const LINES: usize = 15;
 /// Explanations that are shown.
 const SHOWN: usize = 4;
+/// Terms of a missing law that are shown.
+const TERMS: usize = 3;
 
 /// The diagnosis in at most fifteen lines: the verdict, what it rests on, where, which, how far.
 pub fn gap_text(found: &Diagnosis) -> String {
@@ -53,6 +58,9 @@ pub fn gap_text(found: &Diagnosis) -> String {
             .map(|r| format!("{} in {} … {}", r.variable, short(r.low), short(r.high)))
             .collect();
         let mut line = format!("Where: {target}");
+        if let Some(onset) = found.place.onset.as_ref().filter(|o| o.time > 0.0) {
+            line.push_str(&format!("; from {} s on", short(onset.time)));
+        }
         for (what, list) in [("clearest", when), ("at", regions)] {
             if !list.is_empty() {
                 line.push_str(&format!("; {what} {}", list.join(", ")));
@@ -77,10 +85,12 @@ pub fn gap_text(found: &Diagnosis) -> String {
             probability(p)
         ));
     }
+    lines.extend(found.discovery.as_ref().map(explored));
     lines.push(match &found.shrinkage {
         Some(s) => closed_sentence(s),
         None => no_share(found),
     });
+    lines.extend(found.which.next_input.as_ref().map(measure_next));
     lines.push(format!(
         "{} explanations, {} s.",
         found.candidates,
@@ -148,6 +158,38 @@ pub(super) fn no_share(found: &Diagnosis) -> String {
     "The twin does not run through the held-out data: no share.".into()
 }
 
+/// The first terms of the missing law.
+fn explored(discovery: &Discovery) -> String {
+    let terms: Vec<String> = (discovery.terms.iter().take(TERMS))
+        .map(|t| {
+            format!(
+                "{} · {} ({})",
+                short(t.coefficient),
+                t.name,
+                percent(t.inclusion)
+            )
+        })
+        .collect();
+    let terms = match terms.is_empty() {
+        true => "no term".into(),
+        false => terms.join(", "),
+    };
+    format!(
+        "Exploratory, what {} lacks: {terms}; {} of its variance.",
+        discovery.equation,
+        percent(discovery.explained)
+    )
+}
+
+/// What to measure, and what it splits.
+fn measure_next(next: &NextInput) -> String {
+    let ([split, of], [again, of_again]) = (next.split, next.again);
+    format!(
+        "Measure next: {} ({NEXT_INPUT}); {split} of {of} simulated pairs told apart, the same inputs again {again} of {of_again}.",
+        next.kind
+    )
+}
+
 /// `id@target (name value, …)`.
 fn with_magnitudes(effect: &EffectFit) -> String {
     let values: Vec<String> = (effect.magnitudes.iter())
@@ -160,7 +202,7 @@ fn with_magnitudes(effect: &EffectFit) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::fixture::diagnoses;
+    use crate::report::fixture::{diagnoses, made};
 
     #[test]
     fn fifteen_lines_say_it_all() {
@@ -174,5 +216,31 @@ mod tests {
             "{named}"
         );
         assert!(named.contains("Where: "), "{named}");
+    }
+
+    #[test]
+    fn onset_exploration_and_what_to_measure_are_said() {
+        let class = gap_text(&made::tanks_class());
+        assert!(
+            class.contains("Where: h1; from 612 s on; clearest"),
+            "{class}"
+        );
+        let next = "18 of 20 simulated pairs told apart, the same inputs again 6 of 20";
+        assert!(
+            class.contains(next) && class.contains(NEXT_INPUT),
+            "{class}"
+        );
+        let none = gap_text(&made::oscillator_none());
+        let terms = "Exploratory, what x2 lacks: −0.620 · |x1|·x2 (98 %), ";
+        assert!(
+            none.contains(terms) && none.contains("83 % of its variance"),
+            "{none}"
+        );
+        let mut all = made::oscillator_none();
+        all.which.next_input = made::tanks_class().which.next_input;
+        for text in [class, none, gap_text(&all)] {
+            assert!(text.lines().count() <= LINES, "{text}");
+            assert!(text.ends_with("explanations, 5.20 s.\n"), "{text}");
+        }
     }
 }

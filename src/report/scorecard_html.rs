@@ -1,79 +1,97 @@
 //! Scores of withheld trials as one page that needs nothing else.
 
-use super::chart::{Chart, Panel, Series, Style, escaped};
-use super::digits::{probability, short};
+use super::chart::escaped;
+use super::digits::{bare, percent, short};
+use super::page::Column::{Number, Text};
+use super::page::{Section, Shade, figure, folded, matrix, page, paragraph, table};
+use super::scorecard_figures::{gains_svg, nats, reliability_svg, strengths_svg};
 use super::scorecard_text::{named_scores, rule};
-use crate::withheld::{Count, Range, Row, Scorecard};
+use crate::withheld::{Count, Row, Scorecard};
 use std::collections::BTreeMap;
-
-const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#222;background:#fff}\
-    table{border-collapse:collapse;margin:.5rem 0}td,th{padding:.15rem .6rem;text-align:left;border-bottom:1px solid #ddd;vertical-align:bottom}\
-    .n{text-align:right}.m td,.m th{padding:.1rem .3rem;text-align:center;font-size:.8rem}.m th.r{text-align:left}\
-    .m th.c{writing-mode:vertical-rl;transform:rotate(180deg)}.y{background:#d4e8f5}.w{background:#f8dccb}.s{overflow-x:auto}code{font-size:.85rem;word-break:break-all}";
 
 /// The scorecard as a self-contained page: scores with intervals, kinds, detection against magnitude, reliability, the
 /// confusion matrix, every trial.
 pub fn scorecard_html(card: &Scorecard) -> String {
-    let title = escaped(&format!("{}: withheld trials", card.twin));
-    let scores: String = (named_scores(card).into_iter())
-        .map(|(name, score)| {
-            let (share, interval) = percentages(score);
-            row_of(&[name, &of(score), &share, &interval], 1)
-        })
-        .collect();
-    let kinds: String = (card.by_kind.iter())
-        .map(|k| {
-            let (share, interval) = percentages(k.right);
-            let cells = [
-                k.kind.id(),
-                rule(k.kind),
-                &of(k.structural),
-                &of(k.right),
-                &share,
-                &interval,
-            ];
-            row_of(&cells, 2)
-        })
-        .collect();
-    let size = card.mean_class_size.map_or("–".into(), short);
-    let seconds = card.seconds_per_record.map_or("–".into(), short);
-    format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\
-         <title>{title}</title>\n<style>{STYLE}</style></head>\n<body>\n<h1>{title}</h1>\n\
-         <p>{} trials, seed {}, structural test at level {}. Truths were sealed before the first diagnosis: sha256 of the key file \
-         <code>{}</code>.</p>\n\
-         <h2>Scores</h2>\n<table>\n<tr><th></th><th class=\"n\">count</th><th class=\"n\">share</th><th class=\"n\">95 % interval</th></tr>\n{scores}</table>\n\
-         <p>Clear: the true effect, fitted by the diagnoser, gains over 12 nats. Mean size of a class {size}; mean time of a diagnosis {seconds} s.</p>\n\
-         <h2>Kinds of truth</h2>\n<table>\n<tr><th>kind</th><th>right answer</th><th class=\"n\">called structural</th><th class=\"n\">right</th>\
-         <th class=\"n\">share</th><th class=\"n\">95 % interval</th></tr>\n{kinds}</table>\n\
-         <h2>Detection against magnitude</h2>\n{}{}\
-         <h2>Reliability</h2>\n{}\
-         <h2>Which effect was named</h2>\n{}\
-         <h2>Every trial</h2>\n{}</body></html>\n",
-        card.rows.len(),
-        card.seed,
-        card.alpha,
-        escaped(&card.seal),
-        strengths(card),
-        gains(card),
-        reliability(card),
-        confusion(card),
-        trials(card),
+    let sections = [
+        Section::new("scores", "Scores", scores(card)),
+        Section::new("kinds", "Kinds of truth", kinds(card)),
+        Section::new("detection", "Detection against magnitude", detection(card)),
+        Section::new("reliability", "Reliability", reliability(card)),
+        Section::new("named", "Which effect was named", confusion(card)),
+        Section::new("trials", "Every trial", trials(card)),
+    ];
+    page(
+        &format!("{}: withheld trials", card.twin),
+        &lead(card),
+        &sections,
     )
 }
 
-/// A row of a table; cells from number `first` on are numbers.
-fn row_of(cells: &[&str], first: usize) -> String {
-    let cells: String = (cells.iter().enumerate())
-        .map(|(i, cell)| match i >= first {
-            true => format!("<td class=\"n\">{}</td>", escaped(cell)),
-            false => format!("<td>{}</td>", escaped(cell)),
-        })
-        .collect();
-    format!("<tr>{cells}</tr>\n")
+/// What was found, and how.
+fn lead(card: &Scorecard) -> String {
+    let called = |count: Count| match count.of {
+        0 => "none was tried".into(),
+        _ => of(count),
+    };
+    let verdict = format!(
+        "False alarms: {}. Gaps detected: {}. Of single listed effects, the true one on top: {}.",
+        called(card.false_alarms),
+        called(card.detected),
+        called(card.top1)
+    );
+    format!(
+        "<p class=\"verdict\">{}</p>\n<p>{} trials, seed {}, structural test at level {}. Truths were sealed before the first \
+         diagnosis: sha256 of the key file <code>{}</code>.</p>\n",
+        escaped(&verdict),
+        card.rows.len(),
+        card.seed,
+        card.alpha,
+        escaped(&card.seal)
+    )
 }
 
-fn of(count: Count) -> String {
+fn scores(card: &Scorecard) -> String {
+    let rows: Vec<Vec<String>> = (named_scores(card).into_iter())
+        .map(|(name, score)| counted(&[name], score))
+        .collect();
+    let head = [
+        ("score", Text),
+        ("count", Number),
+        ("share", Number),
+        ("95 % interval", Number),
+    ];
+    let size = card.mean_class_size.map_or("–".into(), short);
+    let seconds = card.seconds_per_record.map_or("–".into(), short);
+    let caption = "Clear: the true effect, fitted by the diagnoser, gains over 12 nats. Intervals are Clopper and Pearson’s.";
+    table(caption, &head, &rows)
+        + &paragraph(&format!(
+            "Mean size of a class {size}; mean time of a diagnosis {seconds} s."
+        ))
+}
+
+fn kinds(card: &Scorecard) -> String {
+    let rows: Vec<Vec<String>> = (card.by_kind.iter())
+        .map(|k| counted(&[k.kind.id(), rule(k.kind), &of(k.structural)], k.right))
+        .collect();
+    let head = [
+        ("kind", Text),
+        ("right answer", Text),
+        ("called structural", Number),
+        ("right", Number),
+        ("share", Number),
+        ("95 % interval", Number),
+    ];
+    table("What was there, and what counts as right.", &head, &rows)
+}
+
+/// Some cells, then a count with its share and interval.
+fn counted(cells: &[&str], count: Count) -> Vec<String> {
+    let (share, interval) = percentages(count);
+    let cells = cells.iter().map(|cell| (*cell).to_owned());
+    cells.chain([of(count), share, interval]).collect()
+}
+
+pub(super) fn of(count: Count) -> String {
     format!("{} of {}", count.count, count.of)
 }
 
@@ -83,99 +101,68 @@ fn percentages(count: Count) -> (String, String) {
     match count.share() {
         None => ("–".into(), "–".into()),
         Some(share) => (
-            format!("{:.0} %", 100.0 * share),
+            percent(share),
             format!("{:.0} … {:.0} %", 100.0 * low, 100.0 * high),
         ),
     }
 }
 
-/// Detection over strength, with its interval.
-fn strengths(card: &Scorecard) -> String {
-    let middle = |r: &Range| 0.5 * (r.low + r.high);
-    let points: Vec<(f64, Count)> = (card.by_strength.iter())
-        .map(|r| (middle(r), r.detected))
-        .collect();
-    curve(
-        "Called structural, by strength of the departure",
-        "Share of trials with a structural truth that were called structural, with 95 % intervals.",
-        "strength, from hardly visible to obvious",
-        "share detected",
-        points,
-        false,
-    )
-}
-
-/// Shares with their intervals over x.
-fn curve(
-    title: &str,
-    description: &str,
-    x: &str,
-    y: &str,
-    points: Vec<(f64, Count)>,
-    diagonal: bool,
-) -> String {
-    if points.is_empty() {
-        return "<p>No trials to draw.</p>\n".into();
-    }
-    let mut series = vec![];
-    if diagonal {
-        series.push(Series::new(
-            "as stated",
-            Style::RECORD,
-            [(0.5, 0.5), (1.0, 1.0)],
-        ));
-    }
-    let line = |pick: &dyn Fn(Count) -> Option<f64>| -> Vec<(f64, f64)> {
-        (points.iter())
-            .filter_map(|(x, count)| Some((*x, pick(*count)?)))
-            .collect()
+/// Detection over strength and over the gain of the true effect.
+fn detection(card: &Scorecard) -> String {
+    let mut body = match strengths_svg(card) {
+        Some(svg) => figure(
+            &svg,
+            "A point stands in the middle of its range; whiskers are 95 % intervals.",
+        ),
+        None => paragraph("No trials to draw."),
     };
-    series.push(Series::new("share", Style::AFTER, line(&Count::share)));
-    for (label, end) in [("95 % interval", 0), ("", 1)] {
-        let ends = line(&|count| Some([count.interval().0, count.interval().1][end]));
-        series.push(Series::new(label, Style::BEFORE, ends));
-    }
-    Chart {
-        title: title.into(),
-        description: description.into(),
-        x: x.into(),
-        panels: vec![Panel::new(y, series)],
-    }
-    .svg()
-}
-
-/// Detection by the gain of the true effect.
-fn gains(card: &Scorecard) -> String {
-    if card.by_gain.is_empty() {
-        return String::new();
-    }
-    let end = |v: f64| match v.is_finite() {
-        true => short(v),
-        false => String::new(),
+    let Some(svg) = gains_svg(card) else {
+        return body;
     };
-    let rows: String = (card.by_gain.iter())
-        .map(|r| {
-            let (share, interval) = percentages(r.detected);
-            let range = format!("{} … {}", end(r.low), end(r.high));
-            row_of(&[&range, &of(r.detected), &share, &interval], 1)
-        })
+    body.push_str(&figure(
+        &svg,
+        "By what the true effects gain when the diagnoser fits them, in nats: what it could have seen at best.",
+    ));
+    let rows: Vec<Vec<String>> = (card.by_gain.iter())
+        .map(|r| counted(&[&nats(r)], r.detected))
         .collect();
-    format!(
-        "<table>\n<tr><th>gain of the true effect, nats</th><th class=\"n\">detected</th><th class=\"n\">share</th><th class=\"n\">95 % interval</th></tr>\n{rows}</table>\n"
-    )
+    let head = [
+        ("gain of the true effect", Text),
+        ("detected", Number),
+        ("share", Number),
+        ("95 % interval", Number),
+    ];
+    body.push_str(&folded(
+        "Detection by gain in numbers",
+        &table("Detected, by gain.", &head, &rows),
+    ));
+    body
 }
 
 fn reliability(card: &Scorecard) -> String {
-    let points = (card.reliability.iter())
-        .map(|bin| (bin.stated, bin.right))
+    let Some(svg) = reliability_svg(card) else {
+        return paragraph("No effect was accepted: nothing to draw.");
+    };
+    let rows: Vec<Vec<String>> = (card.reliability.iter())
+        .map(|bin| counted(&[&format!("{:.2}", bin.stated)], bin.right))
         .collect();
-    curve(
-        "How often the effect on top is a true one",
-        "Share of right answers by stated probability, with 95 % intervals; the diagonal is perfect.",
-        "stated probability",
-        "share right",
-        points,
-        true,
+    let head = [
+        ("stated, mean", Number),
+        ("right", Number),
+        ("share", Number),
+        ("95 % interval", Number),
+    ];
+    figure(
+        &svg,
+        "Where an effect was accepted: its stated probability against how often it was a true one. On the diagonal, what is \
+         stated is what happens; below it, too much is claimed.",
+    ) + &folded(
+        "Reliability in numbers",
+        &table(
+            "Answers of about the same stated probability.",
+            &head,
+            &rows,
+        ),
     )
 }
 
@@ -196,65 +183,76 @@ fn confusion(card: &Scorecard) -> String {
         *(counts.entry(id(&row.truth)).or_default().entry(short)).or_insert(0) += 1;
     }
     if counts.is_empty() {
-        return "<p>No trials with one listed effect.</p>\n".into();
+        return paragraph("No trials with one listed effect.");
     }
-    let mut answers: Vec<&String> = counts.values().flat_map(BTreeMap::keys).collect();
+    let mut answers: Vec<String> = (counts.values().flat_map(BTreeMap::keys).cloned()).collect();
     answers.sort();
     answers.dedup();
-    let head: String = (answers.iter())
-        .map(|a| format!("<th class=\"c\">{}</th>", escaped(a)))
-        .collect();
-    let body: String = (counts.iter())
+    let rows: Vec<(String, Vec<Option<Shade>>)> = (counts.iter())
         .map(|(truth, row)| {
-            let cells: String = (answers.iter())
-                .map(
-                    |answer| match (row.get(*answer), answer.as_str() == *truth) {
-                        (Some(n), true) => format!("<td class=\"y\">{n}</td>"),
-                        (Some(n), false) => format!("<td class=\"w\">{n}</td>"),
-                        (None, _) => "<td></td>".into(),
-                    },
-                )
+            let all: u64 = row.values().sum();
+            let cells = (answers.iter())
+                .map(|answer| {
+                    let n = *row.get(answer)?;
+                    Some(Shade {
+                        text: n.to_string(),
+                        weight: n as f64 / all.max(1) as f64,
+                        right: answer == truth,
+                    })
+                })
                 .collect();
-            format!("<tr><th class=\"r\">{}</th>{cells}</tr>\n", escaped(truth))
+            ((*truth).to_owned(), cells)
         })
         .collect();
-    format!(
-        "<p>One listed effect was there: truths down, answers across, targets left out.</p>\n\
-         <div class=\"s\"><table class=\"m\">\n<tr><th></th>{head}</tr>\n{body}</table></div>\n"
+    matrix(
+        "One listed effect was there: truths down, answers across, targets left out. Framed and bold: right. Darker: a larger \
+         share of the row.",
+        &answers,
+        &rows,
     )
 }
 
 fn trials(card: &Scorecard) -> String {
-    let rows: String = card.rows.iter().map(trial).collect();
-    format!(
-        "<div class=\"s\"><table>\n<tr><th>trial</th><th>kind</th><th>truth</th><th>answer</th><th>right</th><th class=\"n\">strength</th>\
-         <th class=\"n\">gain</th><th class=\"n\">test</th></tr>\n{rows}</table></div>\n"
+    let rows: Vec<Vec<String>> = card.rows.iter().map(trial).collect();
+    let head = [
+        ("trial", Number),
+        ("kind", Text),
+        ("truth", Text),
+        ("answer", Text),
+        ("right", Text),
+        ("strength", Number),
+        ("gain", Number),
+        ("p", Number),
+    ];
+    let wrong = card.rows.iter().filter(|row| !row.is_right()).count();
+    paragraph(&format!(
+        "{wrong} of {} trials were not answered as the rule of their kind asks.",
+        card.rows.len()
+    )) + &folded(
+        "Trials one by one",
+        &table("In the order in which they were drawn.", &head, &rows),
     )
 }
 
-fn trial(row: &Row) -> String {
+fn trial(row: &Row) -> Vec<String> {
     let or_dash = |value: Option<f64>| value.map_or("–".into(), short);
-    let p = row
-        .outcome
-        .as_ref()
-        .map_or("–".into(), |o| probability(o.p_value));
-    let cells: [&str; 8] = [
-        &row.trial.to_string(),
-        row.kind.id(),
-        &row.truth,
-        &row.answer(),
-        if row.is_right() { "yes" } else { "no" },
-        &or_dash(row.strength),
-        &or_dash(row.gain),
-        &p,
-    ];
-    row_of(&cells, 5)
+    let p = row.outcome.as_ref().map_or("–".into(), |o| bare(o.p_value));
+    vec![
+        row.trial.to_string(),
+        row.kind.id().into(),
+        row.truth.clone(),
+        row.answer(),
+        if row.is_right() { "yes" } else { "no" }.into(),
+        or_dash(row.strength),
+        or_dash(row.gain),
+        p,
+    ]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::fixture::scorecards;
+    use crate::report::fixture::{made_scores, scorecards};
 
     #[test]
     fn the_page_stands_alone() {
@@ -262,10 +260,37 @@ mod tests {
         for card in [&full, &empty] {
             let page = scorecard_html(card);
             assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>\n"));
-            assert!(!page.contains("src=") && !page.contains("href="));
+            assert!(!page.contains("src=") && !page.contains("<script"));
+            assert_eq!(
+                page.matches("href=").count(),
+                page.matches("href=\"#").count()
+            );
         }
         let page = scorecard_html(&full);
-        assert!(page.matches("<svg").count() == 2 && page.contains("<td class=\"y\">1</td>"));
+        assert_eq!(page.matches("<svg").count(), 3);
+        assert!(page.contains("<td class=\"right\"") && page.contains("1 of 2 trials were not"));
         assert!(page.contains("<td>failed</td>"));
+    }
+
+    #[test]
+    fn many_trials_are_drawn_and_counted() {
+        let page = scorecard_html(&made_scores::scorecard());
+        for text in [
+            "False alarms: 0 of 30. Gaps detected: 72 of 90. Of single listed effects, the true one on top: 45 of 48.",
+            "<title>Called structural, by strength</title>",
+            "<title>Called structural, by gain</title>",
+            "<title>How often the effect on top is true</title>",
+            ">as stated<",
+            ">50 … 100 nats<",
+            "<td class=\"right\" style=\"background:rgb(0 114 178 / 0.50)\">12</td>",
+            "22 of 120 trials were not answered",
+        ] {
+            assert!(page.contains(text), "{text}");
+        }
+        assert_eq!(
+            page.matches("<circle").count(),
+            9 + 2,
+            "dots, and those of two legends"
+        );
     }
 }

@@ -25,34 +25,68 @@ impl Units {
         }
     }
 
-    /// The effect that was fitted.
-    pub(super) fn effect(&self, fit: &EffectFit) -> Option<&dyn UnmodelledEffect> {
+    /// The effect of this id and target.
+    pub(super) fn effect(&self, id: &str, target: &str) -> Option<&dyn UnmodelledEffect> {
         (self.effects.iter())
-            .find(|e| e.typetag_name() == fit.id && e.target() == fit.target)
+            .find(|e| e.typetag_name() == id && e.target() == target)
             .map(|e| e.as_ref())
     }
 
-    /// Of a state or an input.
+    /// Of a state, an input or an output.
     pub(super) fn variable(&self, name: &str) -> &str {
-        let known = self
-            .states
-            .iter()
-            .chain(&self.inputs)
-            .find(|q| q.name == name);
+        let signals = self.inputs.iter().chain(&self.outputs);
+        let known = (self.states.iter().chain(signals)).find(|q| q.name == name);
         known.map_or("", |q| &q.unit)
+    }
+
+    /// Whether this is a state: its equation gives a rate.
+    fn is_state(&self, name: &str) -> bool {
+        self.states.iter().any(|q| q.name == name)
+    }
+
+    /// Of what the equation of a state or an output gives.
+    pub(super) fn equation_unit(&self, name: &str) -> String {
+        let unit = self.variable(name);
+        match (self.is_state(name), unit) {
+            (false, unit) => unit.into(),
+            (true, "" | "-" | "1") => "1/s".into(),
+            (true, unit) if unit.chars().all(char::is_alphanumeric) => format!("{unit}/s"),
+            (true, unit) => format!("({unit})/s"),
+        }
+    }
+
+    /// `rate of h1`, or `output y`.
+    pub(super) fn equation_name(&self, name: &str) -> String {
+        match self.is_state(name) {
+            true => format!("rate of {name}"),
+            false => format!("output {name}"),
+        }
+    }
+
+    /// `rate of h1 in V/s`, or `output y in V`.
+    pub(super) fn equation(&self, name: &str) -> String {
+        let what = self.equation_name(name);
+        match unit_suffix(&self.equation_unit(name)) {
+            unit if unit.is_empty() => what,
+            unit => format!("{what} in{unit}"),
+        }
+    }
+
+    /// The unit of one magnitude of a listed effect; none where the effect is not known.
+    pub(super) fn of_magnitude(&self, id: &str, target: &str, name: &str) -> Option<String> {
+        let effect = self.effect(id, target)?;
+        let known = effect.magnitudes().into_iter().find(|m| m.name == name)?;
+        Some(self.magnitude(effect, known.unit))
     }
 
     /// `level 3.00 V, spill 0.500`; values held at infinity are left out.
     pub(super) fn magnitudes(&self, fit: &EffectFit) -> String {
-        let effect = self.effect(fit);
-        let unit = |name: &str| {
-            let known = effect?.magnitudes().into_iter().find(|m| m.name == name)?;
-            Some(self.magnitude(effect?, known.unit))
-        };
         let finite = fit.magnitudes.iter().filter(|(_, value)| value.is_finite());
         let all: Vec<String> = finite
             .map(|(name, value)| {
-                let unit = unit(name).unwrap_or_default();
+                let unit = self
+                    .of_magnitude(&fit.id, &fit.target, name)
+                    .unwrap_or_default();
                 format!("{name} {}{}", short(*value), unit_suffix(&unit))
             })
             .collect();
@@ -156,5 +190,18 @@ mod tests {
         ] {
             assert_eq!(Units::of(&studies[study]).magnitudes(&fit), expected);
         }
+    }
+
+    #[test]
+    fn equations_are_named_with_the_unit_of_what_they_give() {
+        let studies = reference_studies().unwrap();
+        let [oscillator, tanks] = [0, 1].map(|i| Units::of(&studies[i]));
+        assert_eq!(tanks.equation("h1"), "rate of h1 in V/s");
+        assert_eq!(tanks.equation("y"), "output y in V");
+        assert_eq!(oscillator.equation("x1"), "rate of x1 in 1/s");
+        assert_eq!(oscillator.equation("x2"), "rate of x2 in (1/s)/s");
+        let level = tanks.of_magnitude("state-ceiling", "h1", "level");
+        assert_eq!(level.as_deref(), Some("V"));
+        assert_eq!(tanks.of_magnitude("state-ceiling", "h9", "level"), None);
     }
 }

@@ -48,6 +48,6 @@ pub use noise::{Noise, Source};
 pub use parameter::{PRIOR_DEVIATION, Parameter, ParameterError, ParameterSpace, Role};
 pub use record::{Record, RecordError};
 pub use record_csv::{
-    CsvError, parse_record, read_drive, read_record, record_csv_text, write_record,
+    CsvError, drive_csv_text, parse_record, read_drive, read_record, record_csv_text, write_record,
 };
 pub use state_space::{Now, Outliers, Outline, StateSpace};

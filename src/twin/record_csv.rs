@@ -102,15 +102,23 @@ pub fn parse_record(text: &str, path: &Path) -> Result<Record, CsvError> {
     Table::parse(text.as_bytes(), path)?.record(path)
 }
 
+/// The text of an input file, as [`read_drive`] reads it.
+pub fn drive_csv_text(drive: &Drive) -> String {
+    csv_text(drive, &Signal::zeros((drive.samples(), 0)))
+}
+
 /// The text of a record file; reading it gives the same bits of u and y.
 pub fn record_csv_text(record: &Record) -> String {
-    let (drive, outputs) = (record.drive(), record.outputs());
+    csv_text(record.drive(), record.outputs())
+}
+
+fn csv_text(drive: &Drive, outputs: &Signal) -> String {
     let mut header = vec!["t".to_owned()];
     header.extend(column_names("u", drive.inputs().ncols()));
     header.extend(column_names("y", outputs.ncols()));
     let mut text = header.join(",");
     text.push('\n');
-    for k in 0..record.samples() {
+    for k in 0..drive.samples() {
         text.push_str(&rounded_time(drive.time(k), drive.dt()).to_string());
         for value in drive.input(k).iter().chain(outputs.row(k)) {
             text.push_str(&format!(",{value}"));
@@ -397,5 +405,24 @@ mod tests {
         let back = read_record(&path).unwrap();
         assert_eq!(back.outputs(), record.outputs());
         assert_eq!(back.drive().inputs(), record.drive().inputs());
+    }
+
+    #[test]
+    fn inputs_survive_the_file_and_so_do_instants_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("u.csv");
+        let inputs = Signal::from_shape_fn((4, 2), |(k, j)| k as f64 / (j as f64 + 3.0));
+        for (drive, header) in [
+            (Drive::new(0.1, inputs).unwrap(), "t,u1,u2\n"),
+            (Drive::new(0.1, Signal::ones((3, 1))).unwrap(), "t,u\n"),
+            (Drive::autonomous(0.5, 3).unwrap(), "t\n0\n0.5\n1\n"),
+        ] {
+            let text = drive_csv_text(&drive);
+            assert!(text.starts_with(header), "{text}");
+            std::fs::write(&path, text).unwrap();
+            let back = read_drive(&path).unwrap();
+            assert_eq!(back.inputs(), drive.inputs());
+            assert!((back.dt() - drive.dt()).abs() < 1e-12);
+        }
     }
 }

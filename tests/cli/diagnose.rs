@@ -63,6 +63,9 @@ fn a_lacking_spring_is_reported_and_bad_calls_are_refused() {
     assert_eq!(report["shrinkage"]["held_out"], "validation record");
     let page = fs::read_to_string(place.join("out/report.html")).unwrap();
     assert!(page.contains("Structural gap: the twin lacks cubic-stiffness@x2"));
+    // What is to be measured next lies beside the page, where something is.
+    let next = place.join("out/next-input.csv");
+    assert_eq!(next.exists(), !report["which"]["next_input"].is_null());
 
     refused(&[&call[..], &twin].concat(), &["exists already"]);
 }

@@ -1,10 +1,11 @@
 //! One panel: axes, ticks, legend, lines.
 
 use super::decimate::decimate;
+use super::layers::{self, Swatch};
 use super::strip;
 use super::text::{BOLD, clipped, text, width};
 use super::ticks::{Ticks, padded};
-use super::{EDGE, LINE, Panel, ROOM, Series, TEXT, WIDTH, widest};
+use super::{EDGE, LINE, Panel, ROOM, TEXT, WIDTH, widest};
 use std::fmt::Write;
 
 /// Length of a line in the legend, with the gap after it.
@@ -39,11 +40,7 @@ pub(super) struct Axes<'a> {
 
 impl<'a> Axes<'a> {
     pub(super) fn new(panel: &'a Panel) -> Self {
-        let values = panel
-            .series
-            .iter()
-            .flat_map(|s| s.points.iter().map(|p| p.1));
-        let range = padded(values, 0.05);
+        let range = (panel.range).unwrap_or_else(|| padded(panel.points().map(|p| p.1), 0.05));
         Self {
             ticks: Ticks::new(range, (panel.height / 34.0) as usize),
             panel,
@@ -58,7 +55,11 @@ impl<'a> Axes<'a> {
 
     /// Draws below `top`; returns where it ends.
     pub(super) fn draw(&self, out: &mut String, frame: &Frame, top: f64, last: bool) -> f64 {
-        let top = self.legend(out, top) + 8.0;
+        let mut top = self.legend(out, top) + 14.0;
+        if !self.panel.marks.is_empty() {
+            // Their names stand above the lines.
+            top += LINE - 6.0;
+        }
         let bottom = top + self.panel.height;
         let y = |value: f64| {
             bottom - (value - self.range.0) / (self.range.1 - self.range.0) * self.panel.height
@@ -95,6 +96,9 @@ impl<'a> Axes<'a> {
             out,
             r##"<path d="M{left:.1} {top:.1}V{bottom:.1}H{right:.1}" fill="none" stroke="#555555"/>"##
         );
+        for area in &self.panel.areas {
+            area.draw(out, frame, &y);
+        }
         for series in &self.panel.series {
             let mut path = String::new();
             let mut pen = 'M';
@@ -112,6 +116,12 @@ impl<'a> Axes<'a> {
                 r#"<path d="{path}" fill="none" {stroke} stroke-linejoin="round"/>"#
             );
         }
+        for dots in &self.panel.dots {
+            dots.draw(out, frame, &y);
+        }
+        for mark in &self.panel.marks {
+            mark.draw(out, frame, (top - LINE, bottom));
+        }
         strip::draw(out, frame, &self.panel.spans, bottom);
         end
     }
@@ -123,27 +133,21 @@ impl<'a> Axes<'a> {
         let mut at = (EDGE, top + LINE);
         text(out, at, "start", TEXT, true, &quantity);
         at.0 += width(&quantity, TEXT * BOLD) + GAP;
-        let entries: Vec<(String, f64, &Series)> = (self.panel.series.iter())
-            .filter(|series| !series.label.is_empty())
-            .map(|series| {
-                let label = clipped(&series.label, TEXT, ROOM - SWATCH);
-                (label.clone(), SWATCH + width(&label, TEXT), series)
+        let entries: Vec<(String, f64, Swatch)> = (layers::legend(self.panel))
+            .map(|(label, swatch)| {
+                let label = clipped(label, TEXT, ROOM - SWATCH);
+                (label.clone(), SWATCH + width(&label, TEXT), swatch)
             })
             .collect();
         let all: f64 = entries.iter().map(|(_, needs, _)| needs + GAP).sum();
         if at.0 + all - GAP > WIDTH - EDGE && !entries.is_empty() {
             at = (EDGE, at.1 + LINE);
         }
-        for (label, needs, series) in entries {
+        for (label, needs, swatch) in entries {
             if at.0 > EDGE && at.0 + needs > WIDTH - EDGE {
                 at = (EDGE, at.1 + LINE);
             }
-            let (y, stroke) = (at.1 - 0.35 * TEXT, series.style.stroke());
-            let (x, end) = (at.0, at.0 + SWATCH - 6.0);
-            let _ = writeln!(
-                out,
-                r#"<path d="M{x:.1} {y:.1}H{end:.1}" fill="none" {stroke}/>"#
-            );
+            swatch.draw(out, (at.0, at.1 - 0.35 * TEXT), SWATCH - 6.0);
             text(out, (at.0 + SWATCH, at.1), "start", TEXT, false, &label);
             at.0 += needs + GAP;
         }

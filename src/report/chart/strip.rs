@@ -11,6 +11,17 @@ const GAP: f64 = 5.0;
 /// Opacity of a stretch of full weight: text on it must stay legible.
 const DENSEST: f64 = 0.55;
 
+/// How a stretch is framed, so that it is told apart without colour.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Edge {
+    /// An unbroken frame, and bold text.
+    Unbroken,
+    /// A dashed frame.
+    Dashed,
+    /// No frame.
+    Bare,
+}
+
 /// A stretch of the x axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Span {
@@ -22,8 +33,32 @@ pub struct Span {
     pub label: String,
     /// From 0 to 1: how dark it is.
     pub weight: f64,
-    /// An unbroken frame and bold text; otherwise the frame is dashed.
-    pub clear: bool,
+    /// Its frame.
+    pub edge: Edge,
+}
+
+impl Span {
+    /// Draws a cell so high below `top`.
+    pub(super) fn draw(&self, out: &mut String, frame: &Frame, top: f64, height: f64) {
+        let (from, to) = (frame.x(self.from) + 1.0, frame.x(self.to) - 1.0);
+        let opacity = DENSEST * self.weight.clamp(0.0, 1.0);
+        let stroke = match self.edge {
+            Edge::Unbroken => r##" stroke="#222222""##,
+            Edge::Dashed => r##" stroke="#222222" stroke-dasharray="3 3""##,
+            Edge::Bare => "",
+        };
+        let _ = writeln!(
+            out,
+            r##"<rect x="{from:.1}" y="{top:.1}" width="{:.1}" height="{height}" fill="#d55e00" fill-opacity="{opacity:.2}"{stroke}/>"##,
+            (to - from).max(0.0)
+        );
+        let clear = self.edge == Edge::Unbroken;
+        let bold = if clear { BOLD } else { 1.0 };
+        if width(&self.label, TEXT * bold) <= to - from {
+            let at = (0.5 * (from + to), top + 0.5 * height + 0.35 * TEXT);
+            text(out, at, "middle", TEXT, clear, &self.label);
+        }
+    }
 }
 
 /// Room that the strip takes below the axis.
@@ -36,24 +71,7 @@ pub(super) fn height(spans: &[Span]) -> f64 {
 
 /// Draws the strip below an axis at `bottom`.
 pub(super) fn draw(out: &mut String, frame: &Frame, spans: &[Span], bottom: f64) {
-    let top = bottom + GAP;
     for span in spans {
-        let (from, to) = (frame.x(span.from) + 1.0, frame.x(span.to) - 1.0);
-        let opacity = DENSEST * span.weight.clamp(0.0, 1.0);
-        let dash = if span.clear {
-            ""
-        } else {
-            r#" stroke-dasharray="3 3""#
-        };
-        let _ = writeln!(
-            out,
-            r##"<rect x="{from:.1}" y="{top:.1}" width="{:.1}" height="{HEIGHT}" fill="#d55e00" fill-opacity="{opacity:.2}" stroke="#222222"{dash}/>"##,
-            (to - from).max(0.0)
-        );
-        let bold = if span.clear { BOLD } else { 1.0 };
-        if width(&span.label, TEXT * bold) <= to - from {
-            let at = (0.5 * (from + to), top + 0.5 * HEIGHT + 0.35 * TEXT);
-            text(out, at, "middle", TEXT, span.clear, &span.label);
-        }
+        span.draw(out, frame, bottom + GAP, HEIGHT);
     }
 }

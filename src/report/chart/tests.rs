@@ -63,7 +63,10 @@ fn spans() -> Vec<Span> {
         to,
         label: "40 %".into(),
         weight: 0.4,
-        clear,
+        edge: match clear {
+            true => Edge::Unbroken,
+            false => Edge::Dashed,
+        },
     };
     vec![span(0.0, 2.0, true), span(2.0, 2.1, false)]
 }
@@ -155,4 +158,100 @@ fn lines_break_at_holes_and_nothing_is_drawn_of_nothing() {
     let empty = chart(1, 0, 0).svg();
     assert!(!empty.contains("NaN"), "{empty}");
     assert!(chart(0, 0, 0).svg().ends_with("</svg>\n"));
+}
+
+#[test]
+fn bands_points_and_marks_stay_inside_and_are_named() {
+    let mut layered = chart(1, 1, 50);
+    let dot = Dot {
+        x: 1.0,
+        y: 2.0,
+        low: -40.0,
+        high: 40.0,
+    };
+    let mark = |x: f64| Mark {
+        x,
+        label: "onset 2.40 s".into(),
+    };
+    layered.panels[0].dots = vec![Dots {
+        label: "share".into(),
+        points: vec![dot],
+    }];
+    layered.panels[0].areas = vec![Area {
+        label: "band".into(),
+        points: vec![(0.0, -1.0, 1.0), (1.0, f64::NAN, 1.0), (2.0, -2.0, 2.0)],
+    }];
+    layered.panels[0].marks = vec![mark(0.1), mark(2.4)];
+    let svg = layered.svg();
+    assert_inside(&svg);
+    assert!(!svg.contains("NaN"));
+    for name in [">share<", ">band<", ">onset 2.40 s<"] {
+        assert!(svg.contains(name), "{name}");
+    }
+    // On the side that has room.
+    assert!(svg.contains("text-anchor=\"end\">onset 2.40 s<"));
+}
+
+#[test]
+fn a_heat_map_tells_cells_apart_by_their_frames() {
+    let mut cells = spans();
+    cells.push(Span {
+        edge: Edge::Bare,
+        from: 2.1,
+        to: 4.0,
+        ..cells[0].clone()
+    });
+    let row = HeatRow {
+        label: "a name that is much too long for the room that names have".into(),
+        cells,
+        mark: Some(Mark {
+            x: 3.9,
+            label: "onset".into(),
+        }),
+    };
+    let map = HeatMap {
+        title: "Windows".into(),
+        description: "cells".into(),
+        x: "t in s".into(),
+        groups: vec![HeatGroup {
+            label: "twin".into(),
+            rows: vec![row],
+        }],
+    };
+    let svg = map.svg();
+    assert_inside(&svg);
+    assert_eq!(svg.matches(r#"stroke-dasharray="3 3""#).count(), 1);
+    assert_eq!(svg.matches("font-weight=\"600\">40 %<").count(), 1);
+    assert!(svg.contains(">40 %<") && svg.contains(">onset<"));
+}
+
+#[test]
+fn small_multiples_have_a_zero_line_and_bold_what_is_clear() {
+    let step = |low: f64, mean: f64| Step {
+        low,
+        high: low + 1.0,
+        mean,
+        error: 0.1,
+    };
+    let facet = |x: &str| Facet {
+        x: x.into(),
+        steps: vec![step(0.0, 0.05), step(1.0, -1.0), step(2.0, f64::NAN)],
+    };
+    let picture = Multiples {
+        title: "Missing".into(),
+        description: "a term".into(),
+        rows: vec![FacetRow {
+            label: "rate of h".into(),
+            clear: true,
+            facets: ["a in V", "b", "c", "a fourth one with a long name"]
+                .map(facet)
+                .to_vec(),
+        }],
+    };
+    let svg = picture.svg();
+    assert_inside(&svg);
+    assert!(!svg.contains("NaN"));
+    assert_eq!(svg.matches("stroke-width=\"4\"").count(), 4);
+    assert_eq!(svg.matches("stroke-width=\"1.5\"").count(), 4);
+    assert!(svg.contains("font-weight=\"600\">rate of h<"));
 }

@@ -1,14 +1,15 @@
 //! Which effect: explanations by probability, with magnitudes.
 
-use super::page::Column::{Number, Text};
-use super::page::{figure, paragraph, section, table};
 use crate::diagnose::{Decision, Diagnosis, EffectFit, Verdict};
+use crate::report::digits::bare;
 use crate::report::digits::{chance, probability, short};
 use crate::report::gap_figures::gap_which_svg;
+use crate::report::page::Column::{Number, Text};
+use crate::report::page::{Section, figure, paragraph, table};
 use crate::report::units::Units;
 
-pub(super) fn section_of(units: &Units, found: &Diagnosis) -> String {
-    section("which", "Which effect", &body(units, found))
+pub(super) fn section_of(units: &Units, found: &Diagnosis) -> Section {
+    Section::new("which", "Which effect", body(units, found))
 }
 
 fn body(units: &Units, found: &Diagnosis) -> String {
@@ -21,7 +22,7 @@ fn body(units: &Units, found: &Diagnosis) -> String {
             }
             _ => {
                 "Probability among all listed effects and unlisted disturbances, and gain in log density over the twin alone. \
-                 Filled bars and bold names: accepted."
+                 Filled bar and bold name: accepted."
             }
         };
         body.push_str(&figure(&svg, caption));
@@ -82,7 +83,7 @@ fn row(units: &Units, found: &Diagnosis, effect: &EffectFit) -> Vec<String> {
     let standing = if which.accepted.contains(&key) {
         "accepted"
     } else if which.class.contains(&key) {
-        "rival"
+        "rival, same class"
     } else {
         ""
     };
@@ -92,8 +93,6 @@ fn row(units: &Units, found: &Diagnosis, effect: &EffectFit) -> Vec<String> {
         units.magnitudes(effect),
         chance(effect.probability),
         short(effect.log_score_gain),
-        effect.p_value.map_or("–".into(), |p| {
-            probability(p).replace("p = ", "").replace("p ", "")
-        }),
+        effect.p_value.map_or("–".into(), bare),
     ]
 }

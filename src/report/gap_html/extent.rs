@@ -1,13 +1,13 @@
 //! How far the gap closes, on data that no fit has seen.
 
-use super::page::{figure, paragraph, section};
 use crate::diagnose::{Diagnosis, Shrinkage};
 use crate::report::digits::short;
 use crate::report::gap_figures::gap_shrinkage_svg;
 use crate::report::gap_text::{closed_sentence, no_share};
+use crate::report::page::{Section, figure, paragraph};
 
-pub(super) fn section_of(found: &Diagnosis) -> String {
-    section("extent", "How far the gap closes", &body(found))
+pub(super) fn section_of(found: &Diagnosis) -> Section {
+    Section::new("extent", "How far the gap closes", body(found))
 }
 
 fn body(found: &Diagnosis) -> String {

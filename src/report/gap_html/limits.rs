@@ -1,9 +1,50 @@
-//! What the answer does not cover.
+//! How sure the answer is, and what it does not cover.
 
-use super::page::{list, section};
-use crate::diagnose::Diagnosis;
+use crate::diagnose::{Diagnosis, Visible};
+use crate::report::digits::{percent, probability, short, unit_suffix};
+use crate::report::page::Column::{Number, Text};
+use crate::report::page::{Section, folded, list, paragraph, table};
+use crate::report::units::Units;
 
-pub(super) fn section_of(found: &Diagnosis) -> String {
+pub(super) fn section_of(units: &Units, found: &Diagnosis) -> Section {
+    let body = [
+        list(&sure(found)),
+        list(&untested(found)),
+        power(units, found),
+    ]
+    .concat();
+    Section::new("limits", "How sure, and what was not tested", body)
+}
+
+/// What the numbers rest on.
+fn sure(found: &Diagnosis) -> Vec<String> {
+    let d = &found.detection;
+    let mut items = vec![format!(
+        "The test simulates records of the refitted twin, treats each as it treats the measured one, and ranks the measured one \
+         among them ({}). It calls a right twin wrong in about {} of records.",
+        probability(d.rank_p_value),
+        percent(d.alpha)
+    )];
+    items.push(match d.log_e {
+        Some(log_e) => format!(
+            "The validation record, fitted by nobody, speaks for itself: log E {}; above {} it would be enough alone.",
+            short(log_e),
+            short((2.0 / d.alpha).ln())
+        ),
+        None => "No validation record was given: an explanation that fits this record by luck is not caught.".into(),
+    });
+    if !found.which.effects.is_empty() {
+        items.push(
+            "Probabilities of effects compare what was looked at; they are high even where the right law is not among it. p-values \
+             of effects are corrected for all candidates."
+                .into(),
+        );
+    }
+    items
+}
+
+/// What was left out.
+fn untested(found: &Diagnosis) -> Vec<String> {
     let mut items = vec![format!(
         "{} explanations were looked at, and pairs of the best of them; not three effects at once, and no law outside the list \
          but disturbances.",
@@ -11,12 +52,53 @@ pub(super) fn section_of(found: &Diagnosis) -> String {
     )];
     if !found.not_tested.is_empty() {
         items.push(format!(
-            "Left out by the call, by the study, or because no filter models them: {}.",
+            "Not tested, left out by the call, by the study, or because no filter models them: {}.",
             found.not_tested.join(", ")
         ));
     }
-    if found.validation_runs.is_none() {
-        items.push("No validation record was given: an explanation that fits this record by luck is not caught.".into());
+    items
+}
+
+/// What would have been seen.
+fn power(units: &Units, found: &Diagnosis) -> String {
+    if found.power.is_empty() {
+        return String::new();
     }
-    section("limits", "What was not tested", &list(&items))
+    let hidden = found.power.iter().filter(|v| v.value.is_none()).count();
+    let lead = match hidden {
+        0 => "Every listed effect would have been seen, had it been large enough.".into(),
+        n => format!(
+            "{n} of {} listed effects could not have been seen in such a record, however large within reach.",
+            found.power.len()
+        ),
+    };
+    let rows: Vec<Vec<String>> = found.power.iter().map(|v| row(units, v)).collect();
+    let head = [
+        ("effect", Text),
+        ("magnitude", Text),
+        ("smallest seen", Number),
+    ];
+    let numbers = table(
+        "The smallest magnitude that 80 of 100 such records reveal. Smaller ones may be there and go unseen.",
+        &head,
+        &rows,
+    );
+    [
+        paragraph(&lead),
+        folded("What this record could have revealed", &numbers),
+    ]
+    .concat()
+}
+
+fn row(units: &Units, visible: &Visible) -> Vec<String> {
+    let unit =
+        (units.of_magnitude(&visible.id, &visible.target, &visible.magnitude)).unwrap_or_default();
+    vec![
+        format!("{}@{}", visible.id, visible.target),
+        visible.magnitude.clone(),
+        match visible.value {
+            Some(value) => format!("{}{}", short(value), unit_suffix(&unit)),
+            None => "none in reach".into(),
+        },
+    ]
 }

@@ -1,12 +1,12 @@
 //! Parameters, and everything else that was estimated.
 
-use super::page::Column::{Number, Text};
-use super::page::{paragraph, section, table};
 use crate::diagnose::Diagnosis;
 use crate::report::digits::{Digits, error, short, unit_suffix};
+use crate::report::page::Column::{Number, Text};
+use crate::report::page::{Section, paragraph, table};
 use crate::report::units::Units;
 
-pub(super) fn section_of(units: &Units, found: &Diagnosis) -> String {
+pub(super) fn section_of(units: &Units, found: &Diagnosis) -> Section {
     let beside = match found.which.accepted.is_empty() {
         true => "refitted",
         false => "refitted beside the accepted effects",
@@ -69,5 +69,5 @@ pub(super) fn section_of(units: &Units, found: &Diagnosis) -> String {
     if found.parameters.is_empty() {
         body = paragraph("The twin has no parameters of its own.");
     }
-    section("parameters", "Parameters", &body)
+    Section::new("parameters", "Parameters", body)
 }

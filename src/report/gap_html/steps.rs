@@ -1,13 +1,16 @@
 //! What to do next.
 
-use super::page::{list, paragraph, preformatted, section};
-use crate::diagnose::{Decision, Diagnosis, EffectFit, Verdict};
+use crate::diagnose::{Decision, Diagnosis, EffectFit, NextInput, Verdict};
 use crate::math::six_digits;
 use crate::report::digits::short;
+use crate::report::gap_figures::gap_next_input_svg;
+use crate::report::gap_json::NEXT_INPUT;
+use crate::report::page::{Section, figure, list, paragraph, preformatted, subheading};
 use crate::report::units::Units;
+use crate::study::Study;
 use crate::twin::Law;
 
-pub(super) fn section_of(units: &Units, found: &Diagnosis) -> String {
+pub(super) fn section_of(study: &Study, units: &Units, found: &Diagnosis) -> Section {
     let mut body = list(&steps(found));
     let accepted = &found.which.accepted;
     if !accepted.is_empty() {
@@ -20,7 +23,44 @@ pub(super) fn section_of(units: &Units, found: &Diagnosis) -> String {
         ));
         body.push_str(&preformatted(&tables.join("\n")));
     }
-    section("next", "What to do next", &body)
+    if let Some(next) = &found.which.next_input {
+        body.push_str(&measure(study, found, next));
+    }
+    Section::new("next", "What to do next", body)
+}
+
+/// The record that tells rivals apart.
+fn measure(study: &Study, found: &Diagnosis, next: &NextInput) -> String {
+    let drive = &next.drive;
+    let mut body = subheading("Measure this next");
+    body.push_str(&paragraph(&format!(
+        "{NEXT_INPUT}, beside this page, holds {}: {} samples every {} s, {} s in all. It is to tell apart {}.",
+        next.kind,
+        drive.samples(),
+        short(drive.dt()),
+        short(drive.time(drive.samples())),
+        next.rivals.join(" and ")
+    )));
+    let ([split, of], [again, of_again]) = (next.split, next.again);
+    body.push_str(&paragraph(&format!(
+        "{split} of {of} simulated pairs of the present record and such a one were told apart; with the same inputs measured again, \
+         {again} of {of_again}."
+    )));
+    match gap_next_input_svg(study, found) {
+        Some(svg) => {
+            body.push_str(&figure(&svg, "The input, held over each step."));
+        }
+        None => body.push_str(&paragraph(
+            "The twin has no input: the file holds the instants alone.",
+        )),
+    }
+    let call = format!(
+        "truetwin diagnose RECORD.csv NEXT.csv --twin {}",
+        found.twin
+    );
+    body.push_str(&paragraph("Then diagnose both records together:"));
+    body.push_str(&preformatted(&call));
+    body
 }
 
 fn steps(found: &Diagnosis) -> Vec<String> {
@@ -38,6 +78,10 @@ fn steps(found: &Diagnosis) -> Vec<String> {
         (_, Decision::Named) => {
             steps.push(format!("Add {} to the twin.", which.accepted.join(" and ")));
         }
+        (_, Decision::Class) if which.next_input.is_some() => steps.push(format!(
+            "Tell the rivals apart ({}): measure the record below.",
+            which.class.join(", ")
+        )),
         (_, Decision::Class) => steps.push(format!(
             "Tell the rivals apart ({}): give a validation record, or a record whose input reaches further or changes faster; \
              docs/choosing-effects.md says what separates neighbours.",
@@ -90,6 +134,13 @@ fn none_of_these(found: &Diagnosis) -> Vec<String> {
             short(w.end)
         ));
     }
+    let terms: Vec<&str> = (found.discovery.iter().flat_map(|d| &d.terms))
+        .filter(|term| term.inclusion > 0.5)
+        .map(|term| term.name.as_str())
+        .collect();
+    if !terms.is_empty() {
+        look.push_str(&format!("; the exploration points to {}", terms.join(", ")));
+    }
     vec![
         look + ".",
         "Write the law that you suspect as an effect of your own (examples/own_effect.rs) and diagnose again.".into(),
@@ -98,7 +149,7 @@ fn none_of_these(found: &Diagnosis) -> Vec<String> {
 
 /// `[[effect]]` with its keys.
 fn study_table(units: &Units, fit: &EffectFit) -> Option<String> {
-    let effect = units.effect(fit)?;
+    let effect = units.effect(&fit.id, &fit.target)?;
     let other = effect.other().map_or(String::new(), |name| {
         let key = match effect.law() {
             Law::Limit => "to",

@@ -1,0 +1,271 @@
+//! The pages that are written, in a real browser: nothing is cut off, nothing lies over anything, no script fails, the keyboard
+//! reaches everything, everything has a name, and it prints.
+//!
+//! Needs Chromium on the path (or `TRUETWIN_CHROMIUM`); without one the test says so and is skipped, unless
+//! `TRUETWIN_BROWSER=required`. `TRUETWIN_PAGES=DIR` keeps the pages there with pictures of them at each width and as PDF.
+#![cfg(unix)]
+
+mod devtools;
+#[path = "../../src/report/fixture/made.rs"]
+mod made;
+#[path = "../../src/report/fixture/made_scores.rs"]
+mod made_scores;
+mod pictures;
+
+use devtools::{Browser, chromium};
+use serde_json::json;
+use std::fs;
+use std::path::{Path, PathBuf};
+use truetwin::diagnose::{
+    Band, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit, Equation, FittedNuisance,
+    FittedParameter, FreeRuns, Lag, Maps, NextInput, Onset, Region, Shrinkage, TargetShare, Term,
+    TermRange, Verdict, Visible, Where, Which, Window,
+};
+use truetwin::experiment::reference_studies;
+use truetwin::report::{gap_html, scorecard_html};
+use truetwin::study::{RecordPlan, Study};
+use truetwin::twin::{
+    Drive, Interval, Now, Outline, Parameter, ParameterSpace, Quantity, Signal, StateSpace,
+};
+use truetwin::withheld::{Kind, Named, Outcome, Row, Scorecard};
+
+/// Phone, tablet, desktop.
+const WIDTHS: [u32; 3] = [360, 800, 1280];
+/// Of all of them.
+const HEIGHT: u64 = 800;
+/// A sheet of A4 between its margins, in CSS pixels.
+const SHEET: u32 = 718;
+const MEASURE: &str = include_str!("measure.js");
+
+/// The browser; `None` where the test is to be skipped.
+fn browser() -> Option<Browser> {
+    let Some(path) = chromium() else {
+        let required = std::env::var("TRUETWIN_BROWSER").is_ok_and(|v| v == "required");
+        assert!(
+            !required,
+            "TRUETWIN_BROWSER=required, and no chromium is on the path; install it, or name it in TRUETWIN_CHROMIUM"
+        );
+        println!(
+            "skipped: no chromium is on the path; install it, or name it in TRUETWIN_CHROMIUM"
+        );
+        return None;
+    };
+    Some(Browser::start(&path))
+}
+
+/// A plant of three states, two inputs and two outputs, with long names.
+struct Rig;
+impl StateSpace for Rig {
+    fn outline(&self) -> Outline {
+        let quantities = |names: &[(&str, &str)]| -> Vec<Quantity> {
+            names
+                .iter()
+                .map(|(n, unit)| Quantity::new(n, unit))
+                .collect()
+        };
+        Outline {
+            parameters: ParameterSpace::new([Parameter::new("k", "1/s", 0.1, 1.0)]),
+            states: quantities(&[
+                ("enthalpy", "kJ/kg"),
+                ("a_state_with_a_name_that_is_long", "V"),
+                ("x3", "-"),
+            ]),
+            inputs: quantities(&[("feed", "kg/s"), ("bypass", "-")]),
+            outputs: quantities(&[("temperature_of_the_condenser", "K"), ("y2", "-")]),
+        }
+    }
+    fn drift(&self, _: &Now<'_>, _: &[f64], rates: &mut [f64]) {
+        rates.fill(0.0);
+    }
+    fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+        y.copy_from_slice(&x[..2]);
+    }
+}
+
+/// Every kind of page.
+fn pages() -> Vec<(&'static str, String)> {
+    let studies = reference_studies().unwrap();
+    let [oscillator, tanks] = studies.as_slice() else {
+        panic!("two reference twins");
+    };
+    let rig = Study::new("rig", Rig, RecordPlan::autonomous(0.1, 4)).unwrap();
+    vec![
+        ("class", gap_html(tanks, &made::tanks_class())),
+        ("none", gap_html(oscillator, &made::oscillator_none())),
+        ("no-gap", gap_html(oscillator, &made::oscillator_no_gap())),
+        ("pair", gap_html(&rig, &made::rig_pair())),
+        ("scorecard", scorecard_html(&made_scores::scorecard())),
+    ]
+}
+
+/// A page in a file.
+fn written(folder: &Path, name: &str, page: &str) -> PathBuf {
+    let path = folder.join(format!("{name}.html"));
+    fs::write(&path, page).unwrap();
+    path
+}
+
+/// Everything that is wrong with a page.
+fn complaints(browser: &mut Browser, path: &Path) -> Vec<String> {
+    let mut all = vec![];
+    browser.media("screen");
+    browser.resize(WIDTHS[0], HEIGHT);
+    browser.open(path);
+    for unfolded in [false, true] {
+        browser.evaluate(&format!(
+            "document.querySelectorAll('details').forEach((d) => d.open = {unfolded})"
+        ));
+        for width in WIDTHS {
+            browser.resize(width, HEIGHT);
+            all.extend(measured(browser, width).map(|c| format!("{width} px: {c}")));
+        }
+    }
+    all.extend(unreached(browser));
+    all.extend(unnamed(browser));
+    // Folded on the screen, whole on paper.
+    browser.evaluate("document.querySelectorAll('details').forEach((d) => d.open = false)");
+    browser.media("print");
+    browser.resize(SHEET, HEIGHT);
+    all.extend(measured(browser, SHEET).map(|c| format!("in print: {c}")));
+    let folded = browser.evaluate(
+        "[...document.querySelectorAll('details > :not(summary)')].filter((e) => !e.checkVisibility()).length",
+    );
+    if folded != 0 {
+        all.push(format!("in print: {folded} parts stay folded"));
+    }
+    let sheet = json!({ "printBackground": true, "paperWidth": 8.27, "paperHeight": 11.69 });
+    let printed = browser.ask("Page.printToPDF", sheet);
+    let pdf = pictures::decoded(printed["data"].as_str().unwrap());
+    if !pdf.starts_with(b"%PDF-") || pdf.len() < 10_000 {
+        all.push(format!("it prints as {} bytes", pdf.len()));
+    }
+    browser.media("screen");
+    all.extend(browser.complaints());
+    all
+}
+
+fn measured(browser: &mut Browser, width: u32) -> impl Iterator<Item = String> + use<> {
+    let found = browser.evaluate(&format!("{MEASURE}({width})"));
+    let found: Vec<String> = serde_json::from_value(found).unwrap();
+    found.into_iter()
+}
+
+/// What takes the focus, but not by the Tab key, or without showing it.
+fn unreached(browser: &mut Browser) -> Vec<String> {
+    let count = browser.evaluate(
+        "window.stops = [...document.querySelectorAll('a, summary, .wide')]; document.activeElement.blur(); scrollTo(0, 0); stops.length",
+    );
+    let count = count.as_u64().unwrap();
+    for _ in 0..count + 2 {
+        browser.press("Tab", 9);
+        browser.evaluate(
+            "{ const e = document.activeElement; e.reached = true; e.seen = getComputedStyle(e).outlineStyle !== 'none' }",
+        );
+    }
+    let missed = browser.evaluate(
+        "stops.filter((e) => !e.reached || !e.seen).map((e) => `${e.tagName} \"${e.textContent.trim().slice(0, 30)}\": ${e.reached ? 'focus not seen' : 'never reached by Tab'}`)",
+    );
+    serde_json::from_value(missed).unwrap()
+}
+
+/// Pictures without a name for those who hear the page.
+fn unnamed(browser: &mut Browser) -> Vec<String> {
+    let tree = browser.ask("Accessibility.getFullAXTree", json!({}));
+    let nodes = tree["nodes"].as_array().unwrap();
+    let images =
+        || (nodes.iter()).filter(|n| matches!(n["role"]["value"].as_str(), Some("image" | "img")));
+    let mut all = vec![];
+    if images().count() == 0 {
+        all.push("no picture is there to hear".into());
+    }
+    let nameless = images().filter(|n| n["name"]["value"].as_str().unwrap_or_default().is_empty());
+    all.extend(nameless.map(|n| format!("a picture without a name: {n}")));
+    all
+}
+
+#[test]
+fn every_page_is_whole_at_every_width_and_in_print() {
+    let Some(mut browser) = browser() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let mut all = vec![];
+    for (name, page) in pages() {
+        let path = written(folder.path(), name, &page);
+        all.extend((complaints(&mut browser, &path).into_iter()).map(|c| format!("{name}: {c}")));
+        if let Some(kept) = std::env::var_os("TRUETWIN_PAGES") {
+            let path = written(Path::new(&kept), name, &page);
+            pictures::take(&mut browser, &path, &WIDTHS);
+        }
+    }
+    assert!(all.is_empty(), "{}", all.join("\n"));
+}
+
+/// The test sees what it is to see: pages broken on purpose.
+#[test]
+fn a_broken_page_is_complained_of() {
+    let Some(mut browser) = browser() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (_, page) = pages().swap_remove(2);
+    let body = |extra: &str| page.replacen("</main>", &format!("{extra}</main>"), 1);
+    let picture = |text: &str| {
+        body(&format!(
+            "<svg role=\"img\" viewBox=\"0 0 520 100\" width=\"520\"><title>a</title><desc>b</desc>{text}</svg>"
+        ))
+    };
+    for (name, broken, expected) in [
+        (
+            "wide",
+            body("<p style=\"width:900px\">wide</p>"),
+            "wide on a screen of",
+        ),
+        (
+            "outside",
+            picture("<text x=\"500\" y=\"50\">beyond the edge</text>"),
+            "leaves its picture",
+        ),
+        (
+            "over",
+            picture("<text x=\"5\" y=\"50\">one</text><text x=\"9\" y=\"52\">two</text>"),
+            "lies over",
+        ),
+        (
+            "nameless",
+            page.replacen("<title>van-der-pol: record", "<title></title><title>", 1),
+            "no title",
+        ),
+        (
+            "throws",
+            body("<script>throw new Error('lost')</script>"),
+            "exceptionThrown",
+        ),
+        (
+            "console",
+            body("<script>console.error('lost')</script>"),
+            "consoleAPICalled",
+        ),
+        (
+            "loads",
+            body("<img alt=\"a\" src=\"http://127.0.0.1:9/a.png\">"),
+            "requestWillBeSent",
+        ),
+        (
+            "unreached",
+            page.replacen(
+                "<a href=\"#which\"",
+                "<a tabindex=\"-1\" href=\"#which\"",
+                1,
+            ),
+            "never reached by Tab",
+        ),
+        ("pale", body("<p style=\"color:#999\">pale</p>"), "contrast"),
+        (
+            "folded",
+            page.replacen("details::details-content", "b", 1),
+            "stay folded",
+        ),
+    ] {
+        assert_ne!(broken, page, "{name}");
+        let path = written(folder.path(), name, &broken);
+        let all = complaints(&mut browser, &path);
+        assert!(all.iter().any(|c| c.contains(expected)), "{name}: {all:?}");
+    }
+}
