@@ -151,3 +151,27 @@ fn power_is_what_it_says() {
         "{seen} of {records}"
     );
 }
+
+/// Two effects at once, one in the equations and one at the sensor: both are accepted, and nothing else.
+#[test]
+fn two_effects_are_both_accepted() {
+    let study = study("van-der-pol");
+    let noise = Noise::new(46, "pair", 0);
+    let text = "[[effect]]\nid='coulomb-friction'\ntarget='x2'\nmagnitudes={force=0.2}\n\
+                [[effect]]\nid='sensor-bias'\ntarget='sensor'\nmagnitudes={offset=0.15}\n";
+    let record = record(study.twin(), text, &[1.4], drive(&study, noise), noise);
+    let found = found(&study, record, None);
+    println!("{}", line("pair", &found));
+    let mut accepted = found.which.accepted.clone();
+    accepted.sort();
+    assert_eq!(accepted, ["coulomb-friction@x2", "sensor-bias@sensor"]);
+    assert_eq!(found.which.decision, Decision::Named);
+    let sum: f64 = found
+        .which
+        .effects
+        .iter()
+        .skip(2)
+        .map(|e| e.probability)
+        .sum();
+    assert!(sum <= 1.0, "{sum}");
+}
