@@ -2,6 +2,7 @@
 
 use super::attribute::explanations;
 use super::base_fit::base_fit;
+use super::black_box::measured;
 use super::candidate::{Candidate, candidates};
 use super::decide::grown;
 use super::problem::Problem;
@@ -28,9 +29,8 @@ pub fn gain_of(
     settings: &DiagnoseSettings,
     progress: &Progress,
 ) -> Result<Option<f64>, DiagnoseError> {
-    let twin = study.twin();
-    let equations = twin.state_space().ok_or(DiagnoseError::NoEquations)?;
     check(study, records, validation, settings)?;
+    let (twin, silent) = &measured(study.twin(), records)?;
     let named: Vec<Candidate> = (candidates(study, &settings.without)?.into_iter())
         .filter(|c| c.is_listed() && effects.contains(&c.key()))
         .collect();
@@ -45,7 +45,8 @@ pub fn gain_of(
         twin,
         validation: validation.as_deref(),
         together: None,
-        follows: without_process_noise(equations, &records[0]),
+        follows: *silent || without_process_noise(twin.as_ref(), &records[0]),
+        silent: *silent,
     };
     let problem = Problem::of_twin(twin, records);
     let noise = Noise::new(settings.seed, "diagnose", 0);

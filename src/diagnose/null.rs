@@ -1,6 +1,7 @@
 //! What the statistics are where nothing is wrong: the twin itself simulated, refitted and looked at in the same way.
 
 use super::DiagnoseError;
+use super::black_box::Shared;
 use super::dictionary::Dictionary;
 use super::fit::{Fitted, climb};
 use super::localise::{Bins, local};
@@ -85,7 +86,20 @@ impl<'a> Bench<'a> {
 
     /// How the records themselves look.
     pub fn own_look(&self) -> Result<Option<Look>, FilterError> {
+        if self.problem.twin.state_space().is_none() {
+            return Ok(self
+                .shared()?
+                .and_then(|s| s.look(self, self.problem.records)));
+        }
         self.look(&self.problem, &self.fitted.theta)
+    }
+
+    /// Of a black box: what all looks share.
+    fn shared(&self) -> Result<Option<Shared>, FilterError> {
+        match self.problem.twin.state_space() {
+            Some(_) => Ok(None),
+            None => Shared::new(self),
+        }
     }
 
     /// Looks at records of `problem`, fitted at θ.
@@ -105,17 +119,26 @@ impl<'a> Bench<'a> {
     }
 
     /// One simulation of the fitted twin, refitted and looked at.
-    fn replicate(&self, noise: Noise) -> Result<Option<Look>, DiagnoseError> {
+    fn replicate(
+        &self,
+        noise: Noise,
+        shared: Option<&Shared>,
+    ) -> Result<Option<Look>, DiagnoseError> {
         let mut records = Vec::new();
         for (r, record) in self.problem.records.iter().enumerate() {
             let theta = self.problem.of_record(r, &self.fitted.theta);
             let drive = record.drive();
             let noise = noise.child("record").sample(r as u64);
             match self.problem.twin.simulate(&theta, drive, noise) {
+                // A black box may diverge without saying so.
+                Ok(outputs) if outputs.iter().any(|v| !v.is_finite()) => return Ok(None),
                 Ok(outputs) => records.push(Record::new(drive.clone(), outputs)?),
                 Err(SimulationError::Diverged { .. }) => return Ok(None),
                 Err(error) => return Err(error.into()),
             }
+        }
+        if let Some(shared) = shared {
+            return Ok(shared.look(self, &records));
         }
         let problem = self.problem.on(&records);
         let Some(fitted) = climb(&problem, &self.fitted.theta, WARM)? else {
@@ -137,7 +160,12 @@ impl<'a> Bench<'a> {
         noise: Noise,
         stage: &Stage,
     ) -> Result<Option<Nulls>, DiagnoseError> {
-        let Some(own) = self.look(&self.problem, &self.fitted.theta)? else {
+        let shared = self.shared()?;
+        let own = match &shared {
+            Some(shared) => shared.look(self, self.problem.records),
+            None => self.own_look()?,
+        };
+        let Some(own) = own else {
             return Ok(None);
         };
         let mut nulls = Nulls {
@@ -150,7 +178,8 @@ impl<'a> Bench<'a> {
             let batch = (from as u64..to as u64)
                 .into_par_iter()
                 .map(|i| {
-                    let look = self.replicate(noise.child("replicate").sample(i))?;
+                    let look =
+                        self.replicate(noise.child("replicate").sample(i), shared.as_ref())?;
                     stage.tick()?;
                     Ok(look)
                 })

@@ -7,7 +7,7 @@ use super::localise::{Cell, shares};
 use super::null::{Bench, Test};
 use super::result::*;
 use crate::filter::recoverable;
-use crate::twin::{Signal, StateSpace};
+use crate::twin::{Outline, Signal};
 
 /// Windows and regions are reported below this p-value.
 const NOTABLE: f64 = 0.1;
@@ -18,7 +18,7 @@ pub(super) fn locate(
     found: &[Explanation],
     test: &Test,
     answer: &Answer,
-    equations: &dyn StateSpace,
+    outline: &Outline,
 ) -> Result<Where, DiagnoseError> {
     let candidates = &bench.dictionary.candidates;
     let chances = probabilities(found);
@@ -56,7 +56,6 @@ pub(super) fn locate(
     };
     let records = bench.problem.records;
     let shares = shares(&bench.bins, &means, records, &before, after.as_deref());
-    let outline = equations.outline();
     let (mut windows, mut regions) = (vec![], vec![]);
     for ((cell, p), share) in bench.bins.cells.iter().zip(&test.local).zip(shares) {
         if *p > NOTABLE {

@@ -1,8 +1,9 @@
-//! A twin with equations and the records that it is fitted to.
+//! A twin and the records that it is fitted to.
 
+use super::black_box::{self, Predictor};
 use crate::filter::{Coordinates, FilterError, FilterSettings, Filtered, Kalman, Score};
 use crate::twin::{
-    DigitalTwin, Interval, Parameter, ParameterSpace, Record, Role, Signal, StateSpace,
+    DigitalTwin, Interval, Outline, Parameter, ParameterSpace, Record, Role, Signal,
 };
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
@@ -111,7 +112,7 @@ impl Slope {
 }
 
 impl<'a> Problem<'a> {
-    /// `axes` belong to the parameters of the twin; the twin must show its equations.
+    /// `axes` belong to the parameters of the twin; their likelihood is a filter's, or, without equations, that of an ensemble.
     pub fn new(twin: Arc<dyn DigitalTwin>, axes: Vec<Axis>, records: &'a [Record]) -> Self {
         let space = twin.parameters();
         let mut all = axes;
@@ -173,10 +174,21 @@ impl<'a> Problem<'a> {
         (0..self.dimension()).any(free).then_some(problem)
     }
 
-    fn equations(&self) -> &dyn StateSpace {
-        self.twin
-            .state_space()
-            .expect("twins without equations are refused before")
+    /// States, inputs and outputs; of a black box, its predicted outputs stand for states.
+    pub fn outline(&self) -> Outline {
+        match self.twin.state_space() {
+            Some(equations) => equations.outline(),
+            None => black_box::outline(self.twin.as_ref()),
+        }
+    }
+
+    /// Of a black box: what predicts each record at θ.
+    pub fn predictors(&self, theta: &[f64]) -> Result<Vec<Predictor>, FilterError> {
+        (self.records.iter().enumerate())
+            .map(|(r, record)| {
+                black_box::predictor(self.twin.as_ref(), &self.of_record(r, theta), record)
+            })
+            .collect()
     }
 
     /// Number of samples of all records.
@@ -241,9 +253,13 @@ impl<'a> Problem<'a> {
     }
 
     pub fn log_likelihood(&self, theta: &[f64]) -> Result<f64, FilterError> {
+        let Some(equations) = self.twin.state_space() else {
+            let all = self.filtered(theta)?;
+            return Ok(all.iter().map(|f| f.log_likelihood).sum());
+        };
         let mut sum = 0.0;
         for (r, record) in self.records.iter().enumerate() {
-            let kalman = Kalman::new(self.equations(), record, &self.filter)?;
+            let kalman = Kalman::new(equations, record, &self.filter)?;
             sum += kalman.log_likelihood(&self.of_record(r, theta))?;
         }
         Ok(sum)
@@ -256,6 +272,15 @@ impl<'a> Problem<'a> {
 
     /// Innovations and filtered states of each record.
     pub fn states(&self, theta: &[f64]) -> Result<Vec<(Filtered, Signal)>, FilterError> {
+        if self.twin.state_space().is_none() {
+            let all = self.filtered(theta)?.into_iter().zip(self.records);
+            return Ok(all
+                .map(|(f, record)| {
+                    let predicted = f.predictions(record.outputs());
+                    (f, predicted)
+                })
+                .collect());
+        }
         let keep = FilterSettings {
             keep_states: true,
             ..self.filter.clone()
@@ -279,13 +304,22 @@ impl<'a> Problem<'a> {
     ) -> Result<Vec<Filtered>, FilterError> {
         (self.records.iter().enumerate())
             .map(|(r, record)| {
-                Kalman::new(self.equations(), record, settings)?.filter(&self.of_record(r, theta))
+                let theta = self.of_record(r, theta);
+                match self.twin.state_space() {
+                    Some(equations) => Kalman::new(equations, record, settings)?.filter(&theta),
+                    None => black_box::filtered(self.twin.as_ref(), &theta, record),
+                }
             })
             .collect()
     }
 
     /// Gradient and information at θ.
     pub fn slope(&self, theta: &[f64]) -> Result<Slope, FilterError> {
+        let Some(equations) = self.twin.state_space() else {
+            let mut slope = black_box::slope(self, theta)?;
+            self.add_priors(theta, &mut slope);
+            return Ok(slope);
+        };
         let d = self.dimension();
         let mut slope = Slope {
             log_likelihood: 0.0,
@@ -294,7 +328,7 @@ impl<'a> Problem<'a> {
             information: DMatrix::zeros(d, d),
         };
         for (r, record) in self.records.iter().enumerate() {
-            let kalman = Kalman::new(self.equations(), record, &self.filter)?;
+            let kalman = Kalman::new(equations, record, &self.filter)?;
             let place = &self.places[r];
             let score = Score::forward(&kalman, &self.of_record(r, theta), &self.of_record[r])?;
             slope.log_likelihood += score.log_likelihood;
@@ -305,21 +339,29 @@ impl<'a> Problem<'a> {
                 }
             }
         }
+        self.add_priors(theta, &mut slope);
+        Ok(slope)
+    }
+
+    fn add_priors(&self, theta: &[f64], slope: &mut Slope) {
         let phi = self.coordinates.of(theta);
         for (j, (centre, precision)) in self.prior_terms().enumerate() {
             slope.gradient[j] -= precision * (phi[j] - centre);
             slope.information[(j, j)] += precision;
         }
-        Ok(slope)
     }
 
     /// Points around θ whose innovations tell their derivatives: (moved θ, distance in φ), one for each entry.
     pub fn neighbours(&self, theta: &[f64]) -> Vec<(Vec<f64>, f64)> {
-        const SHARE: f64 = 0.1;
+        // Runs are smooth in θ up to a simulator's own tolerance only.
+        let share = match self.twin.state_space() {
+            Some(_) => 0.1,
+            None => 1.0,
+        };
         let phi = self.coordinates.of(theta);
         (0..phi.len())
             .map(|j| {
-                let (moved, distance) = self.coordinates.beside(&phi, j, SHARE);
+                let (moved, distance) = self.coordinates.beside(&phi, j, share);
                 (self.coordinates.theta(&moved), distance)
             })
             .collect()

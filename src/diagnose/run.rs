@@ -2,6 +2,7 @@
 
 use super::attribute::{Explanation, explanations, probabilities};
 use super::base_fit::{ITERATIONS, base_fit};
+use super::black_box::{dithered, measured};
 use super::candidate::{Addition, candidates, not_tested};
 use super::decide::{Accepted, Answer, Step, decide, magnitudes};
 use super::evalue::{combined, log_e};
@@ -17,7 +18,7 @@ use super::{DiagnoseError, DiagnoseSettings, GivenRecord, Setting};
 use crate::math::six_digits;
 use crate::progress::Progress;
 use crate::study::Study;
-use crate::twin::{Noise, Now, PRIOR_DEVIATION, Parameter, Record, Role, StateSpace};
+use crate::twin::{DigitalTwin, Noise, Now, PRIOR_DEVIATION, Parameter, Record, Role};
 use std::time::Instant;
 
 /// Shortest record.
@@ -48,7 +49,7 @@ const REPORTED: usize = 12;
 ///
 /// # Errors
 ///
-/// [`DiagnoseError`]: a black box, records that do not fit the twin or each other, settings that cannot be used, a twin that
+/// [`DiagnoseError`]: records that do not fit the twin or each other, settings that cannot be used, a twin that
 /// no start fits, and cancellation.
 pub fn diagnose(
     study: &Study,
@@ -58,10 +59,15 @@ pub fn diagnose(
     progress: &Progress,
 ) -> Result<Diagnosis, DiagnoseError> {
     let clock = Instant::now();
-    let twin = study.twin();
-    let equations = twin.state_space().ok_or(DiagnoseError::NoEquations)?;
     check(study, records, validation, settings)?;
     let noise = Noise::new(settings.seed, "diagnose", 0);
+    let (twin, silent) = &measured(study.twin(), records)?;
+    let silent = *silent;
+    let dithered = match silent {
+        true => Some(dithered(records, noise)?),
+        false => None,
+    };
+    let records = dithered.as_deref().unwrap_or(records);
     let validation: Option<Vec<Record>> = validation.map(|v| vec![v.clone()]);
     let validation = validation.as_deref();
     let together = validation.map(|v| [records, v].concat());
@@ -70,7 +76,8 @@ pub fn diagnose(
         twin,
         validation,
         together: together.as_deref(),
-        follows: without_process_noise(equations, &records[0]),
+        follows: silent || without_process_noise(twin.as_ref(), &records[0]),
+        silent,
     };
 
     // θ, and how the record looks at it.
@@ -155,7 +162,7 @@ pub fn diagnose(
             found.as_deref().unwrap_or(&[]),
             &test,
             &answer,
-            equations,
+            &problem.outline(),
         )?,
         _ => Where::default(),
     };
@@ -276,8 +283,11 @@ pub(super) fn check(
     Ok(())
 }
 
-/// Whether no state of the twin is noisy, with any noise level that the study leaves open.
-pub(super) fn without_process_noise(twin: &dyn StateSpace, record: &Record) -> bool {
+/// Whether no state of the twin is noisy, with any noise level that the study leaves open; nobody knows of a black box.
+pub(super) fn without_process_noise(twin: &dyn DigitalTwin, record: &Record) -> bool {
+    let Some(twin) = twin.state_space() else {
+        return false;
+    };
     let outline = twin.outline();
     let theta = outline.parameters.centre();
     let drive = record.drive();
