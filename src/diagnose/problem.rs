@@ -6,7 +6,7 @@ use crate::twin::{
     DigitalTwin, Interval, Outline, Parameter, ParameterSpace, Record, Role, Signal,
 };
 use nalgebra::{DMatrix, DVector};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 /// Standard deviation of the weak log-prior of a positive parameter.
 const LOG_DEVIATION: f64 = 0.6;
@@ -94,7 +94,12 @@ pub(super) struct Problem<'a> {
     pub coordinates: Coordinates,
     of_record: Vec<Coordinates>,
     filter: FilterSettings,
+    /// What a black box showed last: a fit looks at a θ before it steps from there.
+    seen: Arc<Mutex<Option<Seen>>>,
 }
+
+/// θ and the innovations there.
+type Seen = (Vec<f64>, Vec<Filtered>);
 
 /// Gradient and information of all records and the weak prior, in φ.
 pub(super) struct Slope {
@@ -147,6 +152,7 @@ impl<'a> Problem<'a> {
             twin,
             records,
             filter: FilterSettings::default(),
+            seen: Arc::default(),
         }
     }
 
@@ -255,7 +261,9 @@ impl<'a> Problem<'a> {
     pub fn log_likelihood(&self, theta: &[f64]) -> Result<f64, FilterError> {
         let Some(equations) = self.twin.state_space() else {
             let all = self.filtered(theta)?;
-            return Ok(all.iter().map(|f| f.log_likelihood).sum());
+            let sum = all.iter().map(|f| f.log_likelihood).sum();
+            *self.seen.lock().unwrap_or_else(|e| e.into_inner()) = Some((theta.to_vec(), all));
+            return Ok(sum);
         };
         let mut sum = 0.0;
         for (r, record) in self.records.iter().enumerate() {
@@ -263,6 +271,20 @@ impl<'a> Problem<'a> {
             sum += kalman.log_likelihood(&self.of_record(r, theta))?;
         }
         Ok(sum)
+    }
+
+    /// Innovations that were seen last, if it was at θ.
+    pub fn last_seen(&self, theta: &[f64]) -> Option<Vec<Filtered>> {
+        let seen = self.seen.lock().unwrap_or_else(|e| e.into_inner());
+        (seen.as_ref().filter(|(at, _)| at == theta)).map(|(_, all)| all.clone())
+    }
+
+    /// Gain at which a fit is done, in nats; what simulations say is not worth the last of them.
+    pub fn done(&self) -> f64 {
+        match self.twin.state_space() {
+            Some(_) => 5e-3,
+            None => 5e-2,
+        }
     }
 
     /// Innovations of each record.

@@ -1,5 +1,6 @@
 //! Whether a diagnosis alarms as rarely as it says, and names what is there.
 
+mod black_box;
 mod study_of_many;
 mod trials;
 

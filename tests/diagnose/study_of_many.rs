@@ -60,6 +60,10 @@ fn study_of_many_records() {
                 base: twin.clone(),
                 kind: i as usize % UNLISTED,
             }),
+            // Effects of signals are where a box can have them: behind its noise.
+            "listed" if truth.contains("sensor") || truth.contains("actuator") => {
+                shown.twin().clone()
+            }
             _ => twin.clone(),
         };
         let make = |noise: Noise| -> Record {

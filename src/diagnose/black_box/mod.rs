@@ -7,7 +7,9 @@
 //! |---|---|
 //! | runs at one θ under the record's own input, the same draws at every θ | `ensemble.rs` |
 //! | each row predicted from the rows before it, as the runs do: innovations, covariances | `predictor.rs` |
+//! | the density of innovations with outliers among them | `tail.rs` |
 //! | gradient and information of that likelihood | `slope.rs` |
+//! | a first fit that keeps in phase | `growing.rs` |
 //! | simulated records looked at without simulating each of them anew | `shared.rs` |
 //! | a simulator without noise of its own | `silent.rs` |
 //! | the disturbance that stands for whatever is not listed | `disturbed.rs` |
@@ -17,12 +19,15 @@
 
 mod disturbed;
 mod ensemble;
+mod growing;
 mod predictor;
 mod shared;
 mod silent;
 mod slope;
+mod tail;
 
 pub(super) use disturbed::disturbed;
+pub(super) use growing::base_fit;
 pub(super) use predictor::Predictor;
 pub(super) use shared::Shared;
 pub(super) use silent::{dithered, measured};

@@ -10,32 +10,35 @@
 //! unknown about the mean and B: a record far from all runs is predicted with less confidence, not with more.
 //!
 //! About linear dynamics around the mean run this is what a Kalman filter does, its gain read off the runs, row by row; what is
-//! not linear within the scatter of the runs widens Σ.
+//! not linear within the scatter of the runs widens Σ. Rare large errors make the density a Student's (`tail.rs`).
 
 use super::ensemble::Ensemble;
+use super::tail::Tail;
 use crate::filter::Filtered;
+use crate::math::quantile;
 use crate::twin::Signal;
 use nalgebra::{DMatrix, DVector};
 use ndarray::Array3;
-use std::f64::consts::TAU;
 
 /// Rows before a row that it is predicted from.
 const LAGS: usize = 4;
 /// Runs for each number that a row is predicted from.
 const RUNS_EACH: usize = 6;
-/// Independent noise that everything measured has, as a share of the output's size: twins without noise are not believed
-/// beyond that.
+/// Independent noise that everything measured has, as a share of the output's size.
 const FLOOR: f64 = 1e-5;
+/// And as a share of what most rows have: a known start or a clipped output is not believed to the last bit.
+const LEAST: f64 = 0.1;
+const MOST_ROWS: f64 = 0.9;
 
 /// What predicts one row.
 #[derive(Debug, Clone)]
-struct Row {
+pub(super) struct Row {
     /// B, transposed: outputs × regressors.
-    weights: DMatrix<f64>,
+    pub weights: DMatrix<f64>,
     /// Inverse of the root of A.
     whitening: DMatrix<f64>,
     /// Σ.
-    covariance: DMatrix<f64>,
+    pub covariance: DMatrix<f64>,
 }
 
 /// What predicts all rows at one θ.
@@ -45,6 +48,7 @@ pub(in crate::diagnose) struct Predictor {
     lags: usize,
     runs: f64,
     rows: Vec<Row>,
+    tail: Tail,
 }
 
 impl Predictor {
@@ -61,14 +65,23 @@ impl Predictor {
                 (FLOOR * size).max(1e-150).powi(2)
             })
             .collect();
-        let rows = (0..ensemble.mean.nrows())
+        let mut rows: Vec<Row> = (0..ensemble.mean.nrows())
             .map(|k| row(ensemble, k, lags.min(k), &floors))
             .collect();
+        let tail = Tail::of(ensemble, &rows, lags);
+        for j in 0..p {
+            let all: Vec<f64> = rows.iter().map(|row| row.covariance[(j, j)]).collect();
+            let least = LEAST * LEAST * quantile(&all, MOST_ROWS).unwrap_or(0.0);
+            for row in &mut rows {
+                row.covariance[(j, j)] = row.covariance[(j, j)].max(least);
+            }
+        }
         Self {
             mean: ensemble.mean.clone(),
             lags,
             runs: m as f64,
             rows,
+            tail,
         }
     }
 
@@ -98,7 +111,7 @@ impl Predictor {
                     filtered.covariances[[k, i, j]] = covariance[(i, j)];
                 }
             }
-            let density = -0.5 * (v.norm_squared() + log_determinant + p as f64 * TAU.ln());
+            let density = self.tail.log_density(&v) - 0.5 * log_determinant;
             filtered.log_densities[k] = density;
             filtered.log_likelihood += density;
         }

@@ -14,7 +14,11 @@ pub(in crate::diagnose) fn slope(
     problem: &Problem<'_>,
     theta: &[f64],
 ) -> Result<Slope, FilterError> {
-    let here = Reference::bare(problem.filtered(theta)?);
+    let here = match problem.last_seen(theta) {
+        Some(here) => here,
+        None => problem.filtered(theta)?,
+    };
+    let here = Reference::bare(here);
     let d = problem.dimension();
     let directions: Vec<Option<DVector<f64>>> = (problem.neighbours(theta).into_par_iter())
         .enumerate()
