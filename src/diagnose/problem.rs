@@ -14,6 +14,8 @@ const LOG_DEVIATION: f64 = 0.6;
 const FACTOR: f64 = 4.0;
 /// Longest step of a fit in a logarithm; otherwise, as a share of the width.
 const LONGEST: f64 = 0.5;
+/// And of the noise level of a black box.
+const LONGEST_NOISE: f64 = 2.0;
 
 /// How one entry of θ moves in a fit.
 #[derive(Debug, Clone, PartialEq)]
@@ -158,7 +160,16 @@ impl<'a> Problem<'a> {
 
     /// A twin with the weak priors of its own parameters.
     pub fn of_twin(twin: &Arc<dyn DigitalTwin>, records: &'a [Record]) -> Self {
-        let axes = twin.parameters().iter().map(Axis::of).collect();
+        let mut axes: Vec<Axis> = twin.parameters().iter().map(Axis::of).collect();
+        if twin.state_space().is_none() {
+            // What an effect explains of a simulator's misfit may be all of it.
+            let noise = |p: &Parameter| p.role == Role::Noise;
+            for (axis, _) in
+                (axes.iter_mut().zip(twin.parameters().iter())).filter(|(_, p)| noise(p))
+            {
+                axis.longest = LONGEST_NOISE;
+            }
+        }
         Self::new(twin.clone(), axes, records)
     }
 

@@ -32,12 +32,13 @@ impl Units {
             .map(|e| e.as_ref())
     }
 
-    /// Of a state or an input.
+    /// Of a state, an input or a black box's output.
     pub(super) fn variable(&self, name: &str) -> &str {
         let known = self
             .states
             .iter()
             .chain(&self.inputs)
+            .chain(&self.outputs)
             .find(|q| q.name == name);
         known.map_or("", |q| &q.unit)
     }

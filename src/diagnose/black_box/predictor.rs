@@ -27,7 +27,7 @@ const RUNS_EACH: usize = 6;
 /// Independent noise that everything measured has, as a share of the output's size.
 const FLOOR: f64 = 1e-5;
 /// And as a share of what most rows have: a known start or a clipped output is not believed to the last bit.
-const LEAST: f64 = 0.1;
+const LEAST: f64 = 0.3;
 const MOST_ROWS: f64 = 0.9;
 
 /// What predicts one row.

@@ -11,8 +11,8 @@ use crate::twin::{
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
-/// Least noise of such a twin, as a share of an output's deviation.
-const LEAST: f64 = 1e-4;
+/// Least noise of such a twin, as a share of an output's deviation: differences and fits are not good to many more digits.
+const LEAST: f64 = 1e-3;
 /// Values of runs that are kept.
 const KEPT: usize = 2_000_000;
 
