@@ -29,7 +29,8 @@ const REPORTED: usize = 12;
 /// Diagnoses the gap between a twin and records of one real system.
 ///
 /// All records share θ, but for unknown starts. A validation record is used for the test, the order of explanations, and
-/// the share closed. The same seed gives the same bits on any number of threads.
+/// the share closed. A twin without equations is looked at through ensembles of its simulations instead of a filter; only effects of its
+/// signals can then be named. The same seed gives the same bits on any number of threads.
 ///
 /// ```
 /// use truetwin::diagnose::{DiagnoseSettings, Verdict, diagnose};

@@ -29,6 +29,8 @@ const FLOOR: f64 = 1e-5;
 /// And as a share of what most rows have: a known start or a clipped output is not believed to the last bit.
 const LEAST: f64 = 0.3;
 const MOST_ROWS: f64 = 0.9;
+/// Rows with less than this share of the largest variance are clipped, or the start.
+const ALIVE: f64 = 1e-3;
 
 /// What predicts one row.
 #[derive(Debug, Clone)]
@@ -68,12 +70,11 @@ impl Predictor {
         let mut rows: Vec<Row> = (0..ensemble.mean.nrows())
             .map(|k| row(ensemble, k, lags.min(k), &floors))
             .collect();
-        let tail = Tail::of(ensemble, &rows, lags);
-        for j in 0..p {
-            let all: Vec<f64> = rows.iter().map(|row| row.covariance[(j, j)]).collect();
-            let least = LEAST * LEAST * quantile(&all, MOST_ROWS).unwrap_or(0.0);
-            for row in &mut rows {
-                row.covariance[(j, j)] = row.covariance[(j, j)].max(least);
+        let least: Vec<f64> = (0..p).map(|j| least(&rows, j)).collect();
+        let tail = Tail::of(ensemble, &rows, lags, &least);
+        for row in &mut rows {
+            for (j, least) in least.iter().enumerate() {
+                row.covariance[(j, j)] = row.covariance[(j, j)].max(*least);
             }
         }
         Self {
@@ -117,6 +118,14 @@ impl Predictor {
         }
         filtered
     }
+}
+
+/// Least variance of output j in a row.
+fn least(rows: &[Row], j: usize) -> f64 {
+    let all = || rows.iter().map(|row| row.covariance[(j, j)]);
+    let largest = all().fold(0.0, f64::max);
+    let alive: Vec<f64> = all().filter(|s| *s >= ALIVE * largest).collect();
+    LEAST * LEAST * quantile(&alive, MOST_ROWS).unwrap_or(0.0)
 }
 
 /// C⁻¹e and log det S of S = C·Cᵀ.

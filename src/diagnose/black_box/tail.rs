@@ -27,13 +27,13 @@ pub(super) enum Tail {
 }
 
 impl Tail {
-    /// Of the runs' own residuals.
-    pub fn of(ensemble: &Ensemble, rows: &[Row], lags: usize) -> Self {
+    /// Of the runs' own residuals, in rows of more than the least variance.
+    pub fn of(ensemble: &Ensemble, rows: &[Row], lags: usize, least: &[f64]) -> Self {
         let p = ensemble.outputs();
         let (mut squares, mut fourths, mut count) = (0.0, 0.0, 0.0);
         let mut residual = vec![0.0; ensemble.runs];
         for (k, row) in rows.iter().enumerate() {
-            for j in 0..p {
+            for j in (0..p).filter(|&j| row.covariance[(j, j)] > least[j]) {
                 residual.copy_from_slice(ensemble.of(k, j));
                 for i in 0..lags.min(k) * p {
                     let weight = row.weights[(j, i)];
