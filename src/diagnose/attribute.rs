@@ -23,6 +23,9 @@ const SECOND_ROUND: usize = 10;
 const SECOND_STARTS: usize = 2;
 /// And from so many draws of θ from the prior: where much is missing, the twin's own best θ may be anywhere.
 const SECOND_DRAWS: u64 = 3;
+/// Of a black box, whose every look costs an ensemble: explanations and draws of that round.
+const SECOND_ROUND_SIMULATED: usize = 5;
+const SECOND_DRAWS_SIMULATED: u64 = 1;
 /// Iterations of a fit.
 const ITERATIONS: usize = 15;
 /// Numbers that a catch-all counts for: strength and memory.
@@ -103,16 +106,20 @@ pub(super) fn explanations(
     order(&mut found);
     // Once more from where the best ended: a poor θ leads to poor fits.
     if only.is_none() {
+        let (round, draws) = match bench.problem.twin.state_space() {
+            Some(_) => (SECOND_ROUND, SECOND_DRAWS),
+            None => (SECOND_ROUND_SIMULATED, SECOND_DRAWS_SIMULATED),
+        };
         let space = bench.problem.twin.parameters();
         let d = space.len();
         let anywhere = Noise::new(0, "second round", 0);
         let thetas: Vec<Vec<f64>> = (found.iter().take(SECOND_STARTS))
             .map(|e| bench.explained(e).of_record(0, &e.fitted.theta)[..d].to_vec())
-            .chain((0..SECOND_DRAWS).map(|i| space.draw_prior(anywhere.sample(i))))
+            .chain((0..draws).map(|i| space.draw_prior(anywhere.sample(i))))
             .collect();
         let again: Vec<usize> = (0..found.len())
             .filter(|&i| bench.dictionary.candidates[found[i].candidate].is_listed() || i < 3)
-            .take(SECOND_ROUND)
+            .take(round)
             .collect();
         let better: Vec<Option<Fitted>> = again
             .par_iter()

@@ -1,6 +1,7 @@
 //! The first fit of the twin as it is.
 
 use super::DiagnoseSettings;
+use super::black_box;
 use super::fit::{Fitted, fit};
 use super::problem::Problem;
 use crate::filter::{FilterError, recoverable};
@@ -19,6 +20,9 @@ pub(super) fn base_fit(
     settings: &DiagnoseSettings,
     noise: Noise,
 ) -> Result<Option<Fitted>, FilterError> {
+    if problem.twin.state_space().is_none() {
+        return black_box::base_fit(problem, settings, noise);
+    }
     let space = problem.twin.parameters();
     let mut screened: Vec<(f64, Vec<f64>)> = (0..SCREENED)
         .into_par_iter()

@@ -4,7 +4,7 @@ use super::DiagnoseError;
 use super::catch_all::{Place, disturbed};
 use crate::study::Study;
 use crate::twin::{
-    DigitalTwin, Law, Magnitude, Outline, Role, UnmodelledEffect, augment_short, fix,
+    DigitalTwin, Law, Magnitude, Outline, Role, Signals, UnmodelledEffect, augment_short, fix,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -127,8 +127,10 @@ pub(super) fn candidates(
         .filter(|c| !named(&c.id, &c.target))
         .filter(|c| !already.contains(&c.key()))
         .collect();
-    let outline = twin.state_space().map(|t| t.outline());
-    all.extend(outline.iter().flat_map(catch_alls));
+    all.extend(match twin.state_space() {
+        Some(equations) => catch_alls(&equations.outline()),
+        None => catch_alls_of_signals(&twin.signals()),
+    });
     Ok(all)
 }
 
@@ -158,17 +160,34 @@ fn catch_alls(outline: &Outline) -> Vec<Candidate> {
     let states = (outline.states.iter().enumerate())
         .filter(|(_, s)| !s.name.contains('/'))
         .map(|(i, s)| (Place::State(i), s.name.clone()));
-    let sensors = (0..outline.outputs.len()).map(|j| {
-        let name = match outline.outputs.len() {
-            1 => "sensor".into(),
-            _ => format!("sensor{}", j + 1),
-        };
-        (Place::Sensor(j), name)
-    });
+    let sensors = numbered("sensor", outline.outputs.len(), Place::Sensor);
     let parameters = (outline.parameters.iter().enumerate())
         .filter(|(_, p)| p.role == Role::Physical)
         .map(|(i, p)| (Place::Parameter(i), p.name.clone()));
-    (states.chain(sensors).chain(parameters))
+    disturbances(states.chain(sensors).chain(parameters))
+}
+
+/// Of a twin that shows nothing but its signals.
+fn catch_alls_of_signals(signals: &Signals) -> Vec<Candidate> {
+    let sensors = numbered("sensor", signals.outputs.len(), Place::Sensor);
+    let actuators = numbered("actuator", signals.inputs.len(), Place::Actuator);
+    disturbances(sensors.chain(actuators))
+}
+
+/// Places and targets of all sensors or actuators.
+fn numbered(
+    word: &str,
+    count: usize,
+    place: fn(usize) -> Place,
+) -> impl Iterator<Item = (Place, String)> {
+    (0..count).map(move |j| match count {
+        1 => (place(j), word.to_owned()),
+        _ => (place(j), format!("{word}{}", j + 1)),
+    })
+}
+
+fn disturbances(places: impl Iterator<Item = (Place, String)>) -> Vec<Candidate> {
+    places
         .flat_map(|(place, target)| {
             MEMORIES.map(|memory| Candidate {
                 id: "disturbance".into(),

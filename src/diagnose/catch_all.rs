@@ -14,6 +14,8 @@ pub(super) enum Place {
     State(usize),
     /// Added to an output, before its noise.
     Sensor(usize),
+    /// Added to an input; only where there are no equations.
+    Actuator(usize),
     /// Added to the logarithm of a parameter.
     Parameter(usize),
 }
@@ -30,10 +32,9 @@ pub(super) fn disturbed(
     place: Place,
     memory: f64,
 ) -> Arc<dyn DigitalTwin> {
-    let mut outline = base
-        .state_space()
-        .map(StateSpace::outline)
-        .expect("twins without equations are refused before");
+    let Some(mut outline) = base.state_space().map(StateSpace::outline) else {
+        return super::black_box::disturbed(base, place, memory);
+    };
     outline.states.push(Quantity::new("disturbance/0", ""));
     let sigma = Parameter::new("disturbance", "", 0.01, 1.0).role(Role::Effect);
     outline.parameters = ParameterSpace::new(outline.parameters.iter().cloned().chain([sigma]));

@@ -175,9 +175,7 @@ impl<'a> Setting<'a> {
         candidates: Vec<Candidate>,
     ) -> Result<Option<Bench<'a>>, DiagnoseError> {
         let states = problem.states(&fitted.theta)?;
-        let outline =
-            (problem.twin.state_space().map(|t| t.outline())).ok_or(DiagnoseError::NoEquations)?;
-        let bins = super::localise::Bins::new(&outline, &states, problem.records);
+        let bins = super::localise::Bins::new(&problem.outline(), &states, problem.records);
         let Some(reference) = Reference::new(&problem, &fitted.theta)? else {
             return Ok(None);
         };

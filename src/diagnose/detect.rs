@@ -11,7 +11,7 @@ use super::result::{Detection, Verdict};
 use super::verdict::{left_the_prior, verdict};
 use super::{DiagnoseError, DiagnoseSettings, Setting};
 use crate::progress::Progress;
-use crate::twin::{Noise, Now, Record, Role, StateSpace};
+use crate::twin::{DigitalTwin, Noise, Now, Record, Role};
 
 /// The twin, fitted and tested.
 pub(super) struct Detected<'a> {
@@ -98,8 +98,11 @@ pub(super) fn explained(
     explanations(bench, &nulls.own, setting.validation, None, &stage)
 }
 
-/// Whether no state of the twin is noisy, with any noise level that the study leaves open.
-pub(super) fn without_process_noise(twin: &dyn StateSpace, record: &Record) -> bool {
+/// Whether no state of the twin is noisy, with any noise level that the study leaves open; nobody knows of a black box.
+pub(super) fn without_process_noise(twin: &dyn DigitalTwin, record: &Record) -> bool {
+    let Some(twin) = twin.state_space() else {
+        return false;
+    };
     let outline = twin.outline();
     let theta = outline.parameters.centre();
     let drive = record.drive();

@@ -110,24 +110,33 @@ impl Dictionary {
         theta: &[f64],
         reference: &Reference,
     ) -> Result<Vec<Gain>, FilterError> {
-        let base = |variant: &Variant, point: &Point| {
-            let of = variant.problem(problem);
-            // Starts of further records stand behind the magnitudes.
-            let mut full = of.full(&variant.theta(&problem.of_record(0, theta), &point.m));
-            for r in 1..problem.records.len() {
-                let own = variant.theta(&problem.of_record(r, theta), &point.m);
-                of.place(r, &own, &mut full);
-            }
-            recoverable(of.filtered(&full))
-        };
         (self.points.par_iter())
             .map(|point| {
-                let there = base(&self.variants[point.variant], point)?;
+                let (of, full) = self.at(problem, theta, point);
+                let there = recoverable(of.filtered(&full))?;
                 Ok(there.map_or(Gain::default(), |there| {
                     reference.gain(&reference.direction(&there), point.range)
                 }))
             })
             .collect()
+    }
+
+    /// The twin with the effect of a point, and its full θ there.
+    pub fn at<'a>(
+        &self,
+        problem: &Problem<'a>,
+        theta: &[f64],
+        point: &Point,
+    ) -> (Problem<'a>, Vec<f64>) {
+        let variant = &self.variants[point.variant];
+        let of = variant.problem(problem);
+        // Starts of further records stand behind the magnitudes.
+        let mut full = of.full(&variant.theta(&problem.of_record(0, theta), &point.m));
+        for r in 1..problem.records.len() {
+            let own = variant.theta(&problem.of_record(r, theta), &point.m);
+            of.place(r, &own, &mut full);
+        }
+        (of, full)
     }
 
     /// The best gain of each candidate.

@@ -4,9 +4,6 @@ use super::problem::{Problem, Slope};
 use crate::filter::{FilterError, recoverable};
 use nalgebra::{DMatrix, DVector};
 
-/// Gain at which a fit is called done, in nats.
-const DONE: f64 = 5e-3;
-
 /// Where a fit ended.
 #[derive(Debug, Clone)]
 pub(super) struct Fitted {
@@ -68,7 +65,7 @@ pub(super) fn climb(
         let next = c.clamp(&(&phi + &step));
         let moved = (&next - &phi).amax();
         // Not worth a look: the gain that the step promises is nothing.
-        if moved < 1e-9 || slope.gradient.dot(&step) < 0.2 * DONE {
+        if moved < 1e-9 || slope.gradient.dot(&step) < 0.2 * problem.done() {
             break;
         }
         // The likelihood alone tells whether to go there; the derivatives follow if so.
@@ -80,7 +77,7 @@ pub(super) fn climb(
                 let Some(better) = at(&next)? else { break };
                 (phi, slope) = (next, better);
                 damping = (0.1 * damping).max(1e-6);
-                if gain < DONE {
+                if gain < problem.done() {
                     break;
                 }
             }

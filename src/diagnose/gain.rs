@@ -2,6 +2,7 @@
 
 use super::attribute::{elsewhere, explanations};
 use super::base_fit::base_fit;
+use super::black_box::measured;
 use super::candidate::{Candidate, candidates};
 use super::decide::grown;
 use super::detect::without_process_noise;
@@ -29,9 +30,8 @@ pub fn gain_of(
     settings: &DiagnoseSettings,
     progress: &Progress,
 ) -> Result<Option<f64>, DiagnoseError> {
-    let twin = study.twin();
-    let equations = twin.state_space().ok_or(DiagnoseError::NoEquations)?;
     check(study, records, validation, settings)?;
+    let (twin, silent) = &measured(study.twin(), records)?;
     let named: Vec<Candidate> = (candidates(study, &settings.without)?.into_iter())
         .filter(|c| c.is_listed() && effects.contains(&c.key()))
         .collect();
@@ -47,7 +47,8 @@ pub fn gain_of(
         twin,
         validation: validation.as_deref(),
         together: None,
-        follows: without_process_noise(equations, &records[0]),
+        follows: *silent || without_process_noise(twin.as_ref(), &records[0]),
+        silent: *silent,
     };
     let problem = Problem::of_twin(twin, records);
     let noise = Noise::new(settings.seed, "diagnose", 0);
@@ -93,16 +94,16 @@ pub fn held_out_score(
     settings: &DiagnoseSettings,
     progress: &Progress,
 ) -> Result<Option<f64>, DiagnoseError> {
-    let twin = study.twin();
-    let equations = twin.state_space().ok_or(DiagnoseError::NoEquations)?;
     let (records, held_out) = ([record], [held_out]);
     check(study, &records, Some(&held_out[0]), settings)?;
+    let (twin, silent) = &measured(study.twin(), &records)?;
     let setting = Setting {
         study,
         twin,
         validation: Some(&held_out),
         together: None,
-        follows: without_process_noise(equations, &records[0]),
+        follows: *silent || without_process_noise(twin.as_ref(), &records[0]),
+        silent: *silent,
     };
     let problem = Problem::of_twin(twin, &records);
     let noise = Noise::new(settings.seed, "diagnose", 0);

@@ -118,7 +118,8 @@ pub(super) fn shrinkage(
     let space = twin.parameters();
     let mut quiet = accepted.theta.clone();
     for (j, p) in space.iter().enumerate() {
-        if p.role == Role::Noise {
+        // That of a simulator without noise is all that it misses.
+        if p.role == Role::Noise && !setting.silent {
             quiet[j] = base[j];
         }
     }

@@ -17,11 +17,13 @@
 //! | which record would tell rivals apart | `next_input.rs` |
 //! | what is reported of all that | `summary.rs`, `result.rs` |
 //! | what a known effect would gain, for trials | `gain.rs` |
+//! | all of that for a twin without equations | `black_box/` |
 //!
 //! See docs/diagnosing-a-gap.md for the mathematics and how to read the answer.
 
 mod attribute;
 mod base_fit;
+mod black_box;
 mod candidate;
 mod catch_all;
 mod decide;
@@ -118,11 +120,6 @@ impl Default for DiagnoseSettings {
 /// Why there is no diagnosis.
 #[derive(Debug, thiserror::Error)]
 pub enum DiagnoseError {
-    /// A black box.
-    #[error(
-        "diagnose needs equations, which this twin does not show; implement StateSpace for it, or use `estimate`, whose gate needs none"
-    )]
-    NoEquations,
     /// No record.
     #[error("no record was given; give at least one")]
     NoRecord,
@@ -235,4 +232,6 @@ struct Setting<'a> {
     /// Whether the twin has no process noise: its free run is to follow the record, and neither noise nor a disturbance
     /// is a rival: either would explain anything.
     follows: bool,
+    /// Whether the twin is a simulator without noise of its own, and has been given measurement noise.
+    silent: bool,
 }

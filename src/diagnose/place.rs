@@ -31,7 +31,8 @@ pub(super) fn locate(
         maps: maps(bench, test, found.first())?,
         ..targets(bench, found, test, answer)
     };
-    let apart = match setting.follows {
+    let shows = setting.twin.state_space().is_some();
+    let apart = match setting.follows && shows {
         true => apart(
             setting,
             bench,

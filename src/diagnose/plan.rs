@@ -102,7 +102,8 @@ impl Planner<'_> {
                     _ => Mark::Unmarked,
                 };
                 let plan = |choice: &Choice| self.listed(index, effect, &values, &mark, choice);
-                (choices(effect.as_ref(), &mark).iter())
+                let filtered = self.study.state_space().is_some();
+                (choices(effect.as_ref(), &mark, filtered).iter())
                     .filter_map(|choice| plan(choice).transpose())
                     .collect()
             }
@@ -114,6 +115,7 @@ impl Planner<'_> {
         let guess = match place {
             Place::State(i) => 0.05 * deviation(&scales.columns(Law::Force, i)) / scales.dt(),
             Place::Sensor(j) => 0.05 * deviation(&scales.columns(Law::Sensor, j)),
+            Place::Actuator(j) => 0.05 * deviation(&scales.columns(Law::Actuator, j)),
             Place::Parameter(_) => 0.05,
         };
         let visible = Lead::Visible {
@@ -171,6 +173,12 @@ impl Planner<'_> {
         };
         let (mut leads, axis, range) = self.first(first, effect.law(), values, choice.register);
         let mut axes = vec![axis];
+        if choice.register.is_none() && effect.least_memory() < effect.memory() {
+            // No later than the whole register reaches.
+            let reach = (effect.memory() - 1) as f64 * self.scales.dt();
+            let bounds = axes[0].bounds;
+            axes[0].bounds = Interval::unchecked(bounds.low(), bounds.high().min(reach));
+        }
         let mut shapes = Vec::new();
         let mut jumps = Vec::new();
         for (i, shape) in free.iter().enumerate().skip(1) {
@@ -362,7 +370,9 @@ impl Planner<'_> {
 }
 
 /// The ways to use an effect: as its mark says; one threshold, or all of them; delays by length.
-fn choices(effect: &dyn UnmodelledEffect, mark: &Mark) -> Vec<Choice> {
+///
+/// Only filters pay for a long register.
+fn choices(effect: &dyn UnmodelledEffect, mark: &Mark, filtered: bool) -> Vec<Choice> {
     let magnitudes = effect.magnitudes();
     let thresholds: Vec<usize> = (0..magnitudes.len())
         .filter(|&i| magnitudes[i].is_threshold())
@@ -373,7 +383,7 @@ fn choices(effect: &dyn UnmodelledEffect, mark: &Mark) -> Vec<Choice> {
         return vec![choice(off, None)];
     }
     match thresholds.len() {
-        0 | 1 if effect.least_memory() < effect.memory() => (0..REGISTERS.len())
+        0 | 1 if filtered && effect.least_memory() < effect.memory() => (0..REGISTERS.len())
             .map(|i| choice(vec![], Some(i)))
             .collect(),
         0 | 1 => vec![choice(vec![], None)],

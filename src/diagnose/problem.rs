@@ -1,11 +1,12 @@
-//! A twin with equations and the records that it is fitted to.
+//! A twin and the records that it is fitted to.
 
+use super::black_box::{self, Predictor};
 use crate::filter::{Coordinates, FilterError, FilterSettings, Filtered, Kalman, Score};
 use crate::twin::{
-    DigitalTwin, Interval, Parameter, ParameterSpace, Record, Role, Signal, StateSpace,
+    DigitalTwin, Interval, Outline, Parameter, ParameterSpace, Record, Role, Signal,
 };
 use nalgebra::{DMatrix, DVector};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 /// Standard deviation of the weak log-prior of a positive parameter.
 const LOG_DEVIATION: f64 = 0.6;
@@ -13,6 +14,8 @@ const LOG_DEVIATION: f64 = 0.6;
 const FACTOR: f64 = 4.0;
 /// Longest step of a fit in a logarithm; otherwise, as a share of the width.
 const LONGEST: f64 = 0.5;
+/// And of the noise level of a black box.
+const LONGEST_NOISE: f64 = 2.0;
 
 /// How one entry of θ moves in a fit.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,7 +96,12 @@ pub(super) struct Problem<'a> {
     pub coordinates: Coordinates,
     of_record: Vec<Coordinates>,
     filter: FilterSettings,
+    /// What a black box showed last: a fit looks at a θ before it steps from there.
+    seen: Arc<Mutex<Option<Seen>>>,
 }
+
+/// θ and the innovations there.
+type Seen = (Vec<f64>, Vec<Filtered>);
 
 /// Gradient and information of all records and the weak prior, in φ.
 pub(super) struct Slope {
@@ -111,7 +119,7 @@ impl Slope {
 }
 
 impl<'a> Problem<'a> {
-    /// `axes` belong to the parameters of the twin; the twin must show its equations.
+    /// `axes` belong to the parameters of the twin; their likelihood is a filter's, or, without equations, that of an ensemble.
     pub fn new(twin: Arc<dyn DigitalTwin>, axes: Vec<Axis>, records: &'a [Record]) -> Self {
         let space = twin.parameters();
         let mut all = axes;
@@ -146,12 +154,22 @@ impl<'a> Problem<'a> {
             twin,
             records,
             filter: FilterSettings::default(),
+            seen: Arc::default(),
         }
     }
 
     /// A twin with the weak priors of its own parameters.
     pub fn of_twin(twin: &Arc<dyn DigitalTwin>, records: &'a [Record]) -> Self {
-        let axes = twin.parameters().iter().map(Axis::of).collect();
+        let mut axes: Vec<Axis> = twin.parameters().iter().map(Axis::of).collect();
+        if twin.state_space().is_none() {
+            // What an effect explains of a simulator's misfit may be all of it.
+            let noise = |p: &Parameter| p.role == Role::Noise;
+            for (axis, _) in
+                (axes.iter_mut().zip(twin.parameters().iter())).filter(|(_, p)| noise(p))
+            {
+                axis.longest = LONGEST_NOISE;
+            }
+        }
         Self::new(twin.clone(), axes, records)
     }
 
@@ -173,10 +191,21 @@ impl<'a> Problem<'a> {
         (0..self.dimension()).any(free).then_some(problem)
     }
 
-    fn equations(&self) -> &dyn StateSpace {
-        self.twin
-            .state_space()
-            .expect("twins without equations are refused before")
+    /// States, inputs and outputs; of a black box, its predicted outputs stand for states.
+    pub fn outline(&self) -> Outline {
+        match self.twin.state_space() {
+            Some(equations) => equations.outline(),
+            None => black_box::outline(self.twin.as_ref()),
+        }
+    }
+
+    /// Of a black box: what predicts each record at θ.
+    pub fn predictors(&self, theta: &[f64]) -> Result<Vec<Predictor>, FilterError> {
+        (self.records.iter().enumerate())
+            .map(|(r, record)| {
+                black_box::predictor(self.twin.as_ref(), &self.of_record(r, theta), record)
+            })
+            .collect()
     }
 
     /// Number of samples of all records.
@@ -241,12 +270,32 @@ impl<'a> Problem<'a> {
     }
 
     pub fn log_likelihood(&self, theta: &[f64]) -> Result<f64, FilterError> {
+        let Some(equations) = self.twin.state_space() else {
+            let all = self.filtered(theta)?;
+            let sum = all.iter().map(|f| f.log_likelihood).sum();
+            *self.seen.lock().unwrap_or_else(|e| e.into_inner()) = Some((theta.to_vec(), all));
+            return Ok(sum);
+        };
         let mut sum = 0.0;
         for (r, record) in self.records.iter().enumerate() {
-            let kalman = Kalman::new(self.equations(), record, &self.filter)?;
+            let kalman = Kalman::new(equations, record, &self.filter)?;
             sum += kalman.log_likelihood(&self.of_record(r, theta))?;
         }
         Ok(sum)
+    }
+
+    /// Innovations that were seen last, if it was at θ.
+    pub fn last_seen(&self, theta: &[f64]) -> Option<Vec<Filtered>> {
+        let seen = self.seen.lock().unwrap_or_else(|e| e.into_inner());
+        (seen.as_ref().filter(|(at, _)| at == theta)).map(|(_, all)| all.clone())
+    }
+
+    /// Gain at which a fit is done, in nats; what simulations say is not worth the last of them.
+    pub fn done(&self) -> f64 {
+        match self.twin.state_space() {
+            Some(_) => 5e-3,
+            None => 5e-2,
+        }
     }
 
     /// Innovations of each record.
@@ -256,6 +305,15 @@ impl<'a> Problem<'a> {
 
     /// Innovations and filtered states of each record.
     pub fn states(&self, theta: &[f64]) -> Result<Vec<(Filtered, Signal)>, FilterError> {
+        if self.twin.state_space().is_none() {
+            let all = self.filtered(theta)?.into_iter().zip(self.records);
+            return Ok(all
+                .map(|(f, record)| {
+                    let predicted = f.predictions(record.outputs());
+                    (f, predicted)
+                })
+                .collect());
+        }
         let keep = FilterSettings {
             keep_states: true,
             ..self.filter.clone()
@@ -279,13 +337,22 @@ impl<'a> Problem<'a> {
     ) -> Result<Vec<Filtered>, FilterError> {
         (self.records.iter().enumerate())
             .map(|(r, record)| {
-                Kalman::new(self.equations(), record, settings)?.filter(&self.of_record(r, theta))
+                let theta = self.of_record(r, theta);
+                match self.twin.state_space() {
+                    Some(equations) => Kalman::new(equations, record, settings)?.filter(&theta),
+                    None => black_box::filtered(self.twin.as_ref(), &theta, record),
+                }
             })
             .collect()
     }
 
     /// Gradient and information at θ.
     pub fn slope(&self, theta: &[f64]) -> Result<Slope, FilterError> {
+        let Some(equations) = self.twin.state_space() else {
+            let mut slope = black_box::slope(self, theta)?;
+            self.add_priors(theta, &mut slope);
+            return Ok(slope);
+        };
         let d = self.dimension();
         let mut slope = Slope {
             log_likelihood: 0.0,
@@ -294,7 +361,7 @@ impl<'a> Problem<'a> {
             information: DMatrix::zeros(d, d),
         };
         for (r, record) in self.records.iter().enumerate() {
-            let kalman = Kalman::new(self.equations(), record, &self.filter)?;
+            let kalman = Kalman::new(equations, record, &self.filter)?;
             let place = &self.places[r];
             let score = Score::forward(&kalman, &self.of_record(r, theta), &self.of_record[r])?;
             slope.log_likelihood += score.log_likelihood;
@@ -305,21 +372,29 @@ impl<'a> Problem<'a> {
                 }
             }
         }
+        self.add_priors(theta, &mut slope);
+        Ok(slope)
+    }
+
+    fn add_priors(&self, theta: &[f64], slope: &mut Slope) {
         let phi = self.coordinates.of(theta);
         for (j, (centre, precision)) in self.prior_terms().enumerate() {
             slope.gradient[j] -= precision * (phi[j] - centre);
             slope.information[(j, j)] += precision;
         }
-        Ok(slope)
     }
 
     /// Points around θ whose innovations tell their derivatives: (moved θ, distance in φ), one for each entry.
     pub fn neighbours(&self, theta: &[f64]) -> Vec<(Vec<f64>, f64)> {
-        const SHARE: f64 = 0.1;
+        // Runs are smooth in θ up to a simulator's own tolerance only.
+        let share = match self.twin.state_space() {
+            Some(_) => 0.1,
+            None => 1.0,
+        };
         let phi = self.coordinates.of(theta);
         (0..phi.len())
             .map(|j| {
-                let (moved, distance) = self.coordinates.beside(&phi, j, SHARE);
+                let (moved, distance) = self.coordinates.beside(&phi, j, share);
                 (self.coordinates.theta(&moved), distance)
             })
             .collect()

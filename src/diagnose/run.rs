@@ -1,6 +1,7 @@
 //! The way of one diagnosis.
 
 use super::attribute::Explanation;
+use super::black_box::{dithered, measured};
 use super::candidate::Addition;
 use super::decide::{Accepted, Answer, Step, decide};
 use super::detect::{Detected, detect, explained, without_process_noise};
@@ -27,7 +28,8 @@ const LEAST: usize = 50;
 /// Diagnoses the gap between a twin and records of one real system.
 ///
 /// All records share θ, but for unknown starts. A validation record is used for the test, the order of explanations, and
-/// the share closed. The same seed gives the same bits on any number of threads.
+/// the share closed. A twin without equations is looked at through ensembles of its simulations instead of a filter; only effects of its
+/// signals can then be named. The same seed gives the same bits on any number of threads.
 ///
 /// ```
 /// use truetwin::diagnose::{DiagnoseSettings, Verdict, diagnose};
@@ -47,7 +49,7 @@ const LEAST: usize = 50;
 ///
 /// # Errors
 ///
-/// [`DiagnoseError`]: a black box, records that do not fit the twin or each other, settings that cannot be used, a twin that
+/// [`DiagnoseError`]: records that do not fit the twin or each other, settings that cannot be used, a twin that
 /// no start fits, and cancellation.
 pub fn diagnose(
     study: &Study,
@@ -57,10 +59,15 @@ pub fn diagnose(
     progress: &Progress,
 ) -> Result<Diagnosis, DiagnoseError> {
     let clock = Instant::now();
-    let twin = study.twin();
-    let shown = twin.state_space().ok_or(DiagnoseError::NoEquations)?;
     check(study, records, validation, settings)?;
     let noise = Noise::new(settings.seed, "diagnose", 0);
+    let (twin, silent) = &measured(study.twin(), records)?;
+    let silent = *silent;
+    let dithered = match silent {
+        true => Some(dithered(records, noise)?),
+        false => None,
+    };
+    let records = dithered.as_deref().unwrap_or(records);
     let validation: Option<Vec<Record>> = validation.map(|v| vec![v.clone()]);
     let validation = validation.as_deref();
     let together = validation.map(|v| [records, v].concat());
@@ -69,7 +76,8 @@ pub fn diagnose(
         twin,
         validation,
         together: together.as_deref(),
-        follows: without_process_noise(shown, &records[0]),
+        follows: silent || without_process_noise(twin.as_ref(), &records[0]),
+        silent,
     };
     let mut detected = detect(&setting, records, settings, noise, progress)?;
     let Attributed {

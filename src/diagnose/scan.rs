@@ -43,10 +43,7 @@ pub(super) struct Gain {
 impl Reference {
     /// With θ as free as the weak priors leave it.
     pub fn new(problem: &Problem<'_>, theta: &[f64]) -> Result<Option<Self>, FilterError> {
-        let precisions = problem.prior_terms().map(|(_, precision)| precision);
-        let known =
-            DMatrix::from_diagonal(&DVector::from_iterator(problem.dimension(), precisions));
-        Self::knowing(problem, theta, &known)
+        Self::knowing(problem, theta, &weak(problem))
     }
 
     /// With `known` about θ already, an information in φ.
@@ -56,6 +53,42 @@ impl Reference {
         known: &DMatrix<f64>,
     ) -> Result<Option<Self>, FilterError> {
         let filtered = problem.filtered(theta)?;
+        let mut beside = Vec::new();
+        for (moved, distance) in problem.neighbours(theta) {
+            let Some(there) = recoverable(problem.filtered(&moved))? else {
+                return Ok(None);
+            };
+            beside.push((there, distance));
+        }
+        Ok(Self::with(filtered, &beside, known))
+    }
+
+    /// From innovations at θ̂, a step beside it along each axis, and what is known about θ already.
+    pub fn with(
+        filtered: Vec<Filtered>,
+        beside: &[(Vec<Filtered>, f64)],
+        known: &DMatrix<f64>,
+    ) -> Option<Self> {
+        let mut reference = Self::bare(filtered);
+        let d = beside.len();
+        reference.directions = DMatrix::zeros(reference.r.len(), d);
+        for (j, (there, distance)) in beside.iter().enumerate() {
+            let direction = reference.direction(there) / *distance;
+            reference.directions.set_column(j, &direction);
+        }
+        let mut gram = reference.directions.tr_mul(&reference.directions);
+        for j in 0..d {
+            gram[(j, j)] *= 1.0 + 1e-12;
+        }
+        gram += known;
+        let factor = gram.cholesky()?;
+        reference.answer = factor.solve(&reference.directions.tr_mul(&reference.r));
+        reference.factor = factor;
+        Some(reference)
+    }
+
+    /// Innovations alone, to take directions from; θ is not projected out.
+    pub fn bare(filtered: Vec<Filtered>) -> Self {
         let channels = filtered.first().map_or(1, |f| f.innovations.ncols());
         let roots = (filtered.iter())
             .flat_map(|f| (0..f.innovations.nrows()).flat_map(|k| inverse_root(f, k)))
@@ -65,36 +98,27 @@ impl Reference {
             .flat_map(|v| [*v, (v * v - 1.0) * std::f64::consts::FRAC_1_SQRT_2])
             .collect();
         let r = DVector::from_vec(residual);
-        let d = problem.dimension();
-        let mut reference = Self {
+        Self {
             filtered,
             roots,
             channels,
-            directions: DMatrix::zeros(r.len(), d),
+            directions: DMatrix::zeros(r.len(), 0),
             r,
-            factor: DMatrix::identity(d, d)
+            factor: DMatrix::identity(0, 0)
                 .cholesky()
                 .expect("the identity is positive definite"),
-            answer: DVector::zeros(d),
-        };
-        for (j, (moved, distance)) in problem.neighbours(theta).into_iter().enumerate() {
-            let Some(there) = recoverable(problem.filtered(&moved))? else {
-                return Ok(None);
-            };
-            let direction = reference.direction(&there) / distance;
-            reference.directions.set_column(j, &direction);
+            answer: DVector::zeros(0),
         }
-        let mut gram = reference.directions.tr_mul(&reference.directions);
-        for j in 0..d {
-            gram[(j, j)] *= 1.0 + 1e-12;
-        }
-        gram += known;
-        let Some(factor) = gram.cholesky() else {
-            return Ok(None);
-        };
-        reference.answer = factor.solve(&reference.directions.tr_mul(&reference.r));
-        reference.factor = factor;
-        Ok(Some(reference))
+    }
+
+    /// r: standardised innovations and their squares.
+    pub fn residual(&self) -> &DVector<f64> {
+        &self.r
+    }
+
+    /// The Gauss–Newton step of θ, the weak prior pulling as `pull` says.
+    pub fn step(&self, pull: &DVector<f64>) -> DVector<f64> {
+        (self.factor).solve(&(self.directions.tr_mul(&self.r) + pull))
     }
 
     /// d from the innovations elsewhere.
@@ -151,6 +175,12 @@ impl Reference {
             alpha,
         }
     }
+}
+
+/// What the weak priors know about θ, in φ.
+pub(super) fn weak(problem: &Problem<'_>) -> DMatrix<f64> {
+    let precisions = problem.prior_terms().map(|(_, precision)| precision);
+    DMatrix::from_diagonal(&DVector::from_iterator(problem.dimension(), precisions))
 }
 
 /// C⁻¹ of row k, from S = C·Cᵀ: row-major, lower.

@@ -4,7 +4,7 @@ use super::DiagnoseError;
 use super::candidate::{Addition, with};
 use super::result::FreeRuns;
 use crate::math::{median, quantile};
-use crate::twin::{DigitalTwin, Noise, Record, Signal};
+use crate::twin::{DigitalTwin, Noise, Record, Signal, free_run};
 use crate::two_stage::track;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -79,6 +79,7 @@ impl Runner {
 
     /// Median error of records simulated at θ against their own free run.
     pub fn floor(&self, record: &Record, from: usize, noise: Noise) -> Option<f64> {
+        let free = free_run(self.twin.as_ref(), &self.theta, record.drive()).ok()?;
         let errors: Vec<f64> = (0..FLOOR)
             .into_par_iter()
             .filter_map(|i| {
@@ -87,10 +88,9 @@ impl Runner {
                     .twin
                     .simulate(&self.theta, drive, noise.sample(i))
                     .ok()?;
-                let free = self.twin.simulate(&self.theta, drive, Noise::OFF).ok()?;
                 // In units of the measured record, as the other errors are.
                 let scale = variances(record.outputs());
-                Some(root(&scaled(&(outputs - free), &scale, from)))
+                Some(root(&scaled(&(outputs - &free), &scale, from)))
             })
             .collect();
         median(&errors).ok()

@@ -1,7 +1,7 @@
 //! Kalman filters over any twin with equations: likelihood, innovations, smoothed states.
 //!
 //! A filter turns a record into the log-likelihood of θ and into innovations, which are white with unit variance
-//! when the twin is right. It needs a [`StateSpace`] twin; a black box has none.
+//! when the twin is right. It needs a [`StateSpace`] twin; of a black box, `diagnose` asks simulations instead.
 //!
 //! | to … | look at |
 //! |---|---|

@@ -1,5 +1,6 @@
 //! Whether a diagnosis alarms as rarely as it says, and names what is there.
 
+mod black_box;
 mod complete;
 mod study_of_many;
 mod trials;
@@ -9,7 +10,7 @@ use trials::*;
 use truetwin::diagnose::{Decision, DiagnoseSettings, Verdict, diagnose};
 use truetwin::math::binomial_bounds;
 use truetwin::progress::{Listener, Progress};
-use truetwin::twin::{DigitalTwin, Drive, Noise, ParameterSpace, Record, Signal, SimulationError};
+use truetwin::twin::{DigitalTwin, Drive, Noise, Record, Signal};
 
 /// Records of the twin itself, half of them with θ outside the prior: alarms stay within the binomial bound.
 #[test]
@@ -140,16 +141,6 @@ impl Listener for Stop {
     }
 }
 
-struct Box1;
-impl DigitalTwin for Box1 {
-    fn parameters(&self) -> ParameterSpace {
-        ParameterSpace::new([truetwin::twin::Parameter::new("a", "-", 0.5, 2.0)])
-    }
-    fn simulate(&self, theta: &[f64], drive: &Drive, _: Noise) -> Result<Signal, SimulationError> {
-        Ok(drive.inputs().mapv(|u| theta[0] * u))
-    }
-}
-
 #[test]
 fn what_cannot_be_diagnosed_is_refused_in_one_line() {
     let study = study("van-der-pol");
@@ -174,8 +165,4 @@ fn what_cannot_be_diagnosed_is_refused_in_one_line() {
         run(one, &usual, &Progress::new(Arc::new(Stop))),
         "cancelled"
     );
-    let plan = truetwin::study::RecordPlan::autonomous(0.1, 60);
-    let closed = truetwin::study::Study::new("box", Box1, plan).unwrap();
-    let error = diagnose(&closed, one, None, &usual, &silent).unwrap_err();
-    assert!(error.to_string().contains("needs equations"), "{error}");
 }

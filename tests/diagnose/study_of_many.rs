@@ -12,7 +12,7 @@ fn number(name: &str, or: u64) -> u64 {
         .unwrap_or(or)
 }
 
-/// A study of many records; choose with TWIN, KIND, FROM, TRIALS, VALIDATION.
+/// A study of many records; choose with TWIN, KIND, FROM, TRIALS, VALIDATION; BOX=1 hides the equations.
 #[test]
 #[ignore = "minutes; a study, not a test"]
 fn study_of_many_records() {
@@ -21,6 +21,10 @@ fn study_of_many_records() {
     let only = std::env::var("ONLY").unwrap_or_default();
     let with_validation = number("VALIDATION", 0) == 1;
     let study = study(&name);
+    let shown = match number("BOX", 0) {
+        1 => boxed(&study),
+        _ => study.clone(),
+    };
     let (from, trials) = (number("FROM", 0), number("TRIALS", 20));
     let effects = clear(&name);
     let (mut structural, mut top, mut class, mut abstained, mut place) = (0, 0, 0, 0, 0);
@@ -56,13 +60,17 @@ fn study_of_many_records() {
                 base: twin.clone(),
                 kind: i as usize % UNLISTED,
             }),
+            // Effects of signals are where a box can have them: behind its noise.
+            "listed" if truth.contains("sensor") || truth.contains("actuator") => {
+                shown.twin().clone()
+            }
             _ => twin.clone(),
         };
         let make = |noise: Noise| -> Record {
             record(&source, &text, &theta, drive(&study, noise), noise)
         };
         let validation = with_validation.then(|| make(noise.child("validation")));
-        let found = found(&study, make(noise), validation);
+        let found = found(&shown, make(noise), validation);
         println!("{i:3} {}", line(&truth, &found));
         done += 1;
         seconds += found.seconds;

@@ -7,12 +7,34 @@ use truetwin::experiment::reference_studies;
 use truetwin::progress::Progress;
 use truetwin::study::Study;
 use truetwin::twin::{
-    DigitalTwin, Drive, Noise, Now, Outline, Record, StateSpace, augment, given_magnitudes,
+    DigitalTwin, Drive, Noise, Now, Outline, ParameterSpace, Record, Signal, Signals,
+    SimulationError, StateSpace, augment, given_magnitudes,
 };
 
 pub fn study(name: &str) -> Study {
     let studies = reference_studies().unwrap();
     studies.into_iter().find(|s| s.name() == name).unwrap()
+}
+
+/// A twin without its equations: noise and all come out of one box.
+pub struct Boxed(pub Arc<dyn DigitalTwin>);
+
+impl DigitalTwin for Boxed {
+    fn parameters(&self) -> ParameterSpace {
+        self.0.parameters()
+    }
+    fn signals(&self) -> Signals {
+        self.0.signals()
+    }
+    fn simulate(&self, p: &[f64], d: &Drive, n: Noise) -> Result<Signal, SimulationError> {
+        self.0.simulate(p, d, n)
+    }
+}
+
+/// The study of a twin with its equations hidden.
+pub fn boxed(study: &Study) -> Study {
+    let twin = Boxed(study.twin().clone());
+    Study::new(study.name(), twin, study.plan().clone()).unwrap()
 }
 
 /// θ within the prior, or within the middle of the bounds and outside of the prior.

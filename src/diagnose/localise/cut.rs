@@ -61,6 +61,8 @@ pub(in crate::diagnose) struct Bins {
     pub variables: Vec<String>,
     /// How many of them are states.
     pub states: usize,
+    /// Which outputs are among them.
+    predicted: Vec<usize>,
 }
 
 impl Bins {
@@ -72,12 +74,19 @@ impl Bins {
             .collect();
         let n = own.len();
         let (inputs, outputs) = (&outline.inputs, &outline.outputs);
+        // A black box's predicted outputs stand for its states already.
+        let predicted: Vec<usize> = (0..outputs.len())
+            .filter(|j| !own.contains(&outputs[*j].name))
+            .collect();
+        let names = predicted.iter().map(|j| &outputs[*j]);
+        let more: Vec<String> = (inputs.iter().chain(names))
+            .map(|q| q.name.clone())
+            .collect();
         let mut bins = Self {
             cuts: vec![],
-            variables: (own.into_iter())
-                .chain(inputs.iter().chain(outputs).map(|q| q.name.clone()))
-                .collect(),
+            variables: own.into_iter().chain(more).collect(),
             states: n,
+            predicted,
         };
         for (record, r) in records.iter().enumerate() {
             for channel in 0..outputs.len() {
@@ -131,7 +140,7 @@ impl Bins {
                 v if v < self.states => states[[before, v]],
                 v if v < self.states + inputs => drive.input(before)[v - self.states],
                 v => {
-                    let j = v - self.states - inputs;
+                    let j = self.predicted[v - self.states - inputs];
                     y[[k, j]] - filtered.innovations[[k, j]]
                 }
             }
