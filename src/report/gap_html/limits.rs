@@ -35,8 +35,9 @@ fn sure(found: &Diagnosis) -> Vec<String> {
     });
     if !found.which.effects.is_empty() {
         items.push(
-            "Probabilities of effects compare what was looked at; they are high even where the right law is not among it. p-values \
-             of effects are corrected for all candidates."
+            "Probabilities of effects compare what was looked at, 7 % kept for a law that is not listed and that one of these \
+             imitates; sealed trials say how often they are right (docs/diagnosing-a-gap.md). p-values of effects are corrected for \
+             all candidates."
                 .into(),
         );
     }
@@ -46,8 +47,8 @@ fn sure(found: &Diagnosis) -> Vec<String> {
 /// What was left out.
 fn untested(found: &Diagnosis) -> Vec<String> {
     let mut items = vec![format!(
-        "{} explanations were looked at, and pairs of the best of them; not three effects at once, and no law outside the list \
-         but disturbances.",
+        "{} explanations were looked at, and up to three effects together, each beside the best; no law outside the list but \
+         disturbances.",
         found.candidates
     )];
     if !found.not_tested.is_empty() {

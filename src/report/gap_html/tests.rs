@@ -197,7 +197,7 @@ fn each_answer_says_what_to_do_with_it() {
 fn every_part_of_the_answer_has_its_place() {
     let class = gap_html(&tanks(), &made::tanks_class());
     for text in [
-        "The twin follows until 612 s; from then on y departs (p = 0.012).",
+        "Fitted to all before it, the twin foresees each stretch until 612 s; there y departs (p = 0.012).",
         "With state-ceiling@h1 added: no window stands out.",
         "<title>Windows of time</title>",
         ">onset 612 s<",
