@@ -197,12 +197,7 @@ fn explain(
         let variant = &dictionary.variants[*v];
         let problem = variant.problem(&bench.problem);
         let start = |theta: &[f64], m: &[f64]| -> Vec<f64> {
-            let mut full = problem.full(&variant.theta(&bench.problem.of_record(0, theta), m));
-            for r in 1..problem.records.len() {
-                let own = variant.theta(&bench.problem.of_record(r, theta), m);
-                problem.place(r, &own, &mut full);
-            }
-            problem.clamp(&full)
+            problem.clamp(&variant.at(&bench.problem, theta, m).1)
         };
         let mut starts = vec![start(&bench.fitted.theta, m)];
         if n == 0 {

@@ -128,15 +128,7 @@ impl Dictionary {
         theta: &[f64],
         point: &Point,
     ) -> (Problem<'a>, Vec<f64>) {
-        let variant = &self.variants[point.variant];
-        let of = variant.problem(problem);
-        // Starts of further records stand behind the magnitudes.
-        let mut full = of.full(&variant.theta(&problem.of_record(0, theta), &point.m));
-        for r in 1..problem.records.len() {
-            let own = variant.theta(&problem.of_record(r, theta), &point.m);
-            of.place(r, &own, &mut full);
-        }
-        (of, full)
+        self.variants[point.variant].at(problem, theta, &point.m)
     }
 
     /// The best gain of each candidate.

@@ -31,7 +31,6 @@ pub(super) fn peaks(
     let Some((index, variant)) = found else {
         return Ok(vec![]);
     };
-    let problem = variant.problem(&bench.problem);
     let record = &bench.problem.records[0];
     let (dt, samples) = (record.drive().dt(), record.samples() as f64);
     let unit = variant.axes[0].width;
@@ -43,12 +42,7 @@ pub(super) fn peaks(
         let mut parts = [0.0; 2];
         for (part, phase) in parts.iter_mut().zip([0.0, std::f64::consts::FRAC_PI_2]) {
             let m = [unit, frequency, phase];
-            let mut full =
-                problem.full(&variant.theta(&bench.problem.of_record(0, &bench.fitted.theta), &m));
-            for r in 1..problem.records.len() {
-                let base = bench.problem.of_record(r, &bench.fitted.theta);
-                problem.place(r, &variant.theta(&base, &m), &mut full);
-            }
+            let (problem, full) = variant.at(&bench.problem, &bench.fitted.theta, &m);
             let Some(there) = recoverable(problem.filtered(&full))? else {
                 continue;
             };

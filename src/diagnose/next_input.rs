@@ -201,12 +201,7 @@ impl Rival<'_> {
     /// Its score on the present records and another one together, fitted to both.
     fn score(&self, records: &[Record]) -> Result<f64, DiagnoseError> {
         let problem = self.problem.on(records);
-        let own = self.problem.of_record(0, &self.theta);
-        let mut start = problem.full(&own);
-        for r in 0..self.problem.records.len() {
-            let own = self.problem.of_record(r, &self.theta);
-            problem.place(r, &own, &mut start);
-        }
+        let start = problem.carried(&self.problem, &self.theta);
         let price = 0.5 * self.numbers * (problem.samples() as f64).ln();
         let fitted = climb(&problem, &start, WARM)?;
         Ok(fitted.map_or(f64::NEG_INFINITY, |fitted| fitted.value() - price))

@@ -89,11 +89,7 @@ impl<'a> Bench<'a> {
     /// The bench's twin on other records, the first of which are its own, and θ to start a fit from.
     pub fn on<'b>(&self, records: &'b [Record]) -> (Problem<'b>, Vec<f64>) {
         let problem = self.problem.on(records);
-        let mut start = problem.full(&self.problem.of_record(0, &self.fitted.theta));
-        for r in 0..self.problem.records.len() {
-            let own = self.problem.of_record(r, &self.fitted.theta);
-            problem.place(r, &own, &mut start);
-        }
+        let start = problem.carried(&self.problem, &self.fitted.theta);
         (problem, start)
     }
 

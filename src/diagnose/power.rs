@@ -13,7 +13,6 @@
 
 use super::dictionary::Point;
 use super::null::{Bench, Nulls};
-use super::problem::Problem;
 use super::result::Visible;
 use super::scan::Reference;
 use super::variant::Variant;
@@ -53,8 +52,7 @@ pub(super) fn power(
                 if variant.free[1..].iter().any(Magnitude::is_threshold) {
                     continue;
                 }
-                let problem = variant.problem(&bench.problem);
-                let root = |first: f64| root(bench, &reference, variant, &problem, point, first);
+                let root = |first: f64| root(bench, &reference, variant, point, first);
                 if let Some(found) = least(variant, point, need, root)?
                     && best.as_ref().is_none_or(|b| found.distance < b.distance)
                 {
@@ -92,7 +90,6 @@ fn root(
     bench: &Bench<'_>,
     reference: &Reference,
     variant: &Variant,
-    problem: &Problem<'_>,
     point: &Point,
     first: f64,
 ) -> Result<Option<f64>, FilterError> {
@@ -100,11 +97,7 @@ fn root(
         .into_iter()
         .chain(point.m[1..].iter().copied())
         .collect();
-    let own = |r: usize| variant.theta(&bench.problem.of_record(r, &bench.fitted.theta), &m);
-    let mut full = problem.full(&own(0));
-    for r in 1..problem.records.len() {
-        problem.place(r, &own(r), &mut full);
-    }
+    let (problem, full) = variant.at(&bench.problem, &bench.fitted.theta, &m);
     let there = recoverable(problem.filtered(&full))?;
     Ok(there.map(|there| reference.own(&reference.direction(&there)).sqrt()))
 }

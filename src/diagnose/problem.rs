@@ -232,6 +232,15 @@ impl<'a> Problem<'a> {
         full
     }
 
+    /// Full θ from that of another problem, whose records are the first of these: others start as its first one does.
+    pub fn carried(&self, other: &Problem<'_>, theta: &[f64]) -> Vec<f64> {
+        let mut full = self.full(&other.of_record(0, theta));
+        for r in 0..other.records.len() {
+            self.place(r, &other.of_record(r, theta), &mut full);
+        }
+        full
+    }
+
     /// Puts θ of one record into the full θ.
     pub fn place(&self, r: usize, theta: &[f64], full: &mut [f64]) {
         for (&j, value) in self.places[r].iter().zip(theta) {

@@ -41,6 +41,17 @@ impl Variant {
         Problem::new(self.twin.clone(), axes, base.records)
     }
 
+    /// The variant on the records of the base twin's problem, and its full θ: the base's with these free magnitudes.
+    pub fn at<'a>(&self, base: &Problem<'a>, theta: &[f64], m: &[f64]) -> (Problem<'a>, Vec<f64>) {
+        let problem = self.problem(base);
+        let mut full = problem.full(&self.theta(&base.of_record(0, theta), m));
+        // Starts of further records stand behind the magnitudes.
+        for r in 1..base.records.len() {
+            problem.place(r, &self.theta(&base.of_record(r, theta), m), &mut full);
+        }
+        (problem, full)
+    }
+
     /// Sets the scale of the first magnitude to what is just visible.
     pub fn rescale(&mut self, unit: f64) {
         let Some(first) = self.axes.first_mut() else {
