@@ -5,17 +5,14 @@ use super::candidate::Addition;
 use super::decide::{Accepted, Answer, Step};
 use super::fit::{Fitted, fit};
 use super::null::Bench;
+use super::posterior::posterior;
 use super::problem::Problem;
 use super::shrink::{Runner, Shrinkage, closed, interval, root};
 use super::{DiagnoseError, DiagnoseSettings, Setting};
 use crate::filter::{FilterError, recoverable};
 use crate::twin::{Drive, Noise, Record, RecordError, Role};
-use nalgebra::DVector;
 use ndarray::s;
 use rayon::prelude::*;
-
-/// Draws of θ for the interval of a share.
-const DRAWS: usize = 200;
 
 /// Samples of the shortest record whose last third is held out.
 pub const SHORTEST_SPLIT: usize = 300;
@@ -163,51 +160,6 @@ fn all_data<'a>(
     };
     let (problem, start) = step.bench.on(records);
     Ok(fit(&problem, &[start], 10)?.map(|fitted| (problem, fitted)))
-}
-
-/// Draws of θ given the problem's records: from N(θ̂, F⁻¹) in φ within the bounds, taken again by their posterior density over
-/// that of the draw, as directions that the records hardly know bend.
-fn posterior(
-    problem: &Problem<'_>,
-    fitted: &Fitted,
-    noise: Noise,
-) -> Result<Vec<Vec<f64>>, FilterError> {
-    let c = &problem.coordinates;
-    let centre = DVector::from_vec(c.of(&fitted.theta));
-    let Some(root) = fitted.information.clone().cholesky() else {
-        return Ok(vec![]);
-    };
-    let mut source = noise.source("draws");
-    let drawn: Vec<(Vec<f64>, f64)> = (0..DRAWS)
-        .filter_map(|_| {
-            let z = DVector::from_fn(centre.len(), |_, _| source.normal());
-            // F = L·Lᵀ: L⁻ᵀz has the covariance F⁻¹.
-            let step = root.l().tr_solve_lower_triangular(&z)?;
-            let theta = c.theta(c.clamp(&(&centre + step)).as_slice());
-            Some((theta, 0.5 * z.norm_squared()))
-        })
-        .collect();
-    let weighed: Vec<Option<f64>> = (drawn.par_iter())
-        .map(|(theta, own)| {
-            let likelihood = recoverable(problem.log_likelihood(theta))?;
-            Ok(likelihood.map(|l| l + problem.log_prior(theta, true) - fitted.objective + own))
-        })
-        .collect::<Result<_, FilterError>>()?;
-    let top = (weighed.iter().flatten()).fold(f64::NEG_INFINITY, |a, w| a.max(*w));
-    let weights = weighed.iter().map(|w| w.map_or(0.0, |w| (w - top).exp()));
-    let cumulated: Vec<f64> = (weights.scan(0.0, |sum, w| {
-        *sum += w;
-        Some(*sum)
-    }))
-    .collect();
-    let whole = cumulated.last().copied().unwrap_or(0.0);
-    Ok((0..DRAWS)
-        .filter_map(|i| {
-            let at = whole * (i as f64 + 0.5) / DRAWS as f64;
-            let (theta, _) = drawn.get(cumulated.partition_point(|sum| *sum < at))?;
-            Some(problem.of_record(0, theta))
-        })
-        .collect())
 }
 
 /// The error with the listed effect that explains least, fitted as the accepted one was.

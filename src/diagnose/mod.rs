@@ -11,7 +11,7 @@
 //! | fit the explanations, order them, accept, abstain | `frequency.rs`, `attribute.rs`, `decide.rs`, `several.rs` |
 //! | where, in the equations, in time, in the states, since when | `localise/`, `map.rs`, `place.rs`, `onset.rs` |
 //! | what the missing term depends on, where no listed effect fits | `missing_term.rs`, `discover.rs` |
-//! | how far, on held-out data | `shrink.rs` |
+//! | how far, on held-out data | `shrink.rs`, `held_out.rs`, `posterior.rs` |
 //! | the kinds of gap | `verdict.rs` |
 //! | which effects the record could have revealed | `power.rs` |
 //! | which record would tell rivals apart | `next_input.rs` |
@@ -44,6 +44,7 @@ mod omnibus;
 mod onset;
 mod place;
 mod plan;
+mod posterior;
 mod power;
 mod problem;
 mod result;
