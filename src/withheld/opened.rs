@@ -32,12 +32,12 @@ impl Opened {
         urn: &Urn<'_>,
         truth: &Truth,
         outcome: Option<&Outcome>,
-        record: Record,
-        validation: Option<&Record>,
+        (record, validation): (Record, Option<Record>),
         noise: Noise,
         settings: &DiagnoseSettings,
         progress: &Progress,
     ) -> Result<Self, WithheldError> {
+        let validation = validation.as_ref();
         let share = match outcome {
             Some(outcome) => share(urn, truth, outcome, &record, validation)?,
             None => None,

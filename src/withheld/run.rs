@@ -227,13 +227,11 @@ impl Sealed<'_> {
             progress,
             |o: &Opened| o.trial,
             |trial| {
-                let (record, validation) = self.records(trial)?;
                 Opened::of(
                     &self.trials.urn,
                     &keys[trial],
                     answers[trial].outcome.as_ref(),
-                    record,
-                    validation.as_ref(),
+                    self.records(trial)?,
                     Noise::new(seed, "withheld", trial as u64),
                     &self.diagnosis(trial, left_out[trial].clone()),
                     progress,
