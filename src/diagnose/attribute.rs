@@ -34,8 +34,8 @@ const CATCH_ALL: f64 = 2.0;
 pub(super) const RIVALS: f64 = 3.0;
 /// Nats that a factor e in probability takes, and the probability that a law that nobody listed imitates all of them: fitted to
 /// answers of sealed trials (docs/withheld.md).
-const TEMPERATURE: f64 = 2.5;
-const IMITATED: f64 = 0.07;
+const TEMPERATURE: f64 = 1.5;
+const IMITATED: f64 = 0.05;
 
 /// A fitted explanation.
 #[derive(Debug, Clone)]

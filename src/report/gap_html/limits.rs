@@ -35,7 +35,7 @@ fn sure(found: &Diagnosis) -> Vec<String> {
     });
     if !found.which.effects.is_empty() {
         items.push(
-            "Probabilities of effects compare what was looked at, 7 % kept for a law that is not listed and that one of these \
+            "Probabilities of effects compare what was looked at, 5 % kept for a law that is not listed and that one of these \
              imitates; sealed trials say how often they are right (docs/diagnosing-a-gap.md). p-values of effects are corrected for \
              all candidates."
                 .into(),
