@@ -47,7 +47,8 @@ pub(super) enum Command {
     Estimate(EstimateArguments),
     /// Learn what the twin lacks: whether parameters can explain the record, where not, which effect, how far it closes the gap.
     ///
-    /// Needs no training; the twin must show its equations. DIR holds report.json and report.html.
+    /// Needs no training. DIR holds report.json, report.html and, where another record would tell rivals apart,
+    /// next-input.csv. Of a twin that shows no equations, only effects of sensors and actuators can be named.
     Diagnose(DiagnoseArguments),
     /// Score every method on simulated records: the paper's table and figures.
     ///
@@ -190,7 +191,7 @@ pub(super) struct DiagnoseArguments {
     /// Effects that are not to be named.
     #[arg(long, value_name = "ID[@TARGET],..", value_delimiter = ',')]
     pub without: Vec<String>,
-    /// A new folder for report.json and report.html.
+    /// A new folder for report.json, report.html and next-input.csv.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }
