@@ -56,7 +56,8 @@ pub(super) fn several<'a>(
                 .then_some(alone));
         }
     }
-    while step.accepted.len() < MOST {
+    // Beside a noise, two effects follow nearly anything.
+    while step.accepted.len() < MOST && !step.accepted.iter().any(Accepted::is_noise) {
         let Some(look) = step.bench.own_look()? else {
             break;
         };
@@ -64,7 +65,10 @@ pub(super) fn several<'a>(
             break;
         }
         let next = beside(setting, &step, &look, stage)?.best;
-        let Some(next) = next.filter(|next| next.score > step.score + WORTH_A_THIRD) else {
+        let worth = |next: &Step<'_>| {
+            next.score > step.score + WORTH_A_THIRD && !next.accepted.iter().any(Accepted::is_noise)
+        };
+        let Some(next) = next.filter(worth) else {
             break;
         };
         // Where the free run is to follow, likelihoods of thousands of nats are no measure.
