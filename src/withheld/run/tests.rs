@@ -123,3 +123,32 @@ fn studies_that_change_the_twin_or_leave_nothing_to_name_are_refused() {
     assert!(refused("[noise]\ny = 0.1").contains("changes [noise]"));
     assert!(refused("[library]\nonly = ['actuator-gain']").contains("kind listed"));
 }
+
+#[test]
+fn a_verdict_alone_is_the_verdict_of_the_whole() {
+    let study = oscillator();
+    let place = tempfile::tempdir().unwrap();
+    let card = |detection_only, name: &str| {
+        let settings = Settings {
+            kinds: vec![Kind::Unlisted, Kind::Pair],
+            detection_only,
+            ..two()
+        };
+        let sealed = sealed(&study, settings, &place.path().join(name)).unwrap();
+        sealed.score(&Progress::silent()).unwrap()
+    };
+    let (whole, verdicts) = (card(false, "whole"), card(true, "verdicts"));
+    for (whole, alone) in whole.rows.iter().zip(&verdicts.rows) {
+        let (all, only) = (
+            whole.outcome.as_ref().unwrap(),
+            alone.outcome.as_ref().unwrap(),
+        );
+        assert_eq!((all.verdict, all.p_value), (only.verdict, only.p_value));
+        assert!(only.accepted.is_empty() && only.before.is_none());
+        // What the key adds is made of the records: the weaker effect of a pair, how far listed effects fall short.
+        match whole.kind {
+            Kind::Pair => assert!(whole.added.is_some() && whole.gain >= whole.added),
+            _ => assert!(whole.shortfall.is_some() && alone.shortfall.is_none()),
+        }
+    }
+}
