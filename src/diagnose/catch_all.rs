@@ -46,6 +46,14 @@ pub(super) fn disturbed(
     })
 }
 
+/// √(1 − a²), and 1 for a = 1: how much of σ comes anew at each step.
+pub(super) fn share(memory: f64) -> f64 {
+    match 1.0 - memory * memory {
+        s if s > 0.0 => s.sqrt(),
+        _ => 1.0,
+    }
+}
+
 struct Disturbed {
     base: Arc<dyn DigitalTwin>,
     place: Place,
@@ -110,10 +118,7 @@ impl StateSpace for Disturbed {
         self.with(now, 0.0, |twin, now| {
             twin.noise(now, &mut process[..n], measurement);
         });
-        let share = match 1.0 - self.memory * self.memory {
-            s if s > 0.0 => s.sqrt(),
-            _ => 1.0,
-        };
+        let share = share(self.memory);
         process[n] = share * now.theta[now.theta.len() - 1];
     }
     fn limits(&self) -> Vec<Interval> {

@@ -5,7 +5,6 @@ use super::base_fit::base_fit;
 use super::black_box::measured;
 use super::candidate::{Candidate, candidates};
 use super::decide::grown;
-use super::detect::without_process_noise;
 use super::problem::Problem;
 use super::run::check;
 use super::{DiagnoseError, DiagnoseSettings, Setting};
@@ -31,7 +30,7 @@ pub fn gain_of(
     progress: &Progress,
 ) -> Result<Option<f64>, DiagnoseError> {
     check(study, records, validation, settings)?;
-    let (twin, silent) = &measured(study.twin(), records)?;
+    let twin = measured(study.twin(), records)?;
     let named: Vec<Candidate> = (candidates(study, &settings.without)?.into_iter())
         .filter(|c| c.is_listed() && effects.contains(&c.key()))
         .collect();
@@ -42,15 +41,8 @@ pub fn gain_of(
         return Ok(None);
     }
     let validation: Option<Vec<Record>> = validation.map(|v| vec![v.clone()]);
-    let setting = Setting {
-        study,
-        twin,
-        validation: validation.as_deref(),
-        together: None,
-        follows: *silent || without_process_noise(twin.as_ref(), &records[0]),
-        silent: *silent,
-    };
-    let problem = Problem::of_twin(twin, records);
+    let setting = Setting::new(study, &twin, records, validation.as_deref(), None);
+    let problem = Problem::of_twin(setting.twin, records);
     let noise = Noise::new(settings.seed, "diagnose", 0);
     let Some(fitted) = base_fit(&problem, settings, noise)? else {
         return Ok(None);
@@ -96,16 +88,9 @@ pub fn held_out_score(
 ) -> Result<Option<f64>, DiagnoseError> {
     let (records, held_out) = ([record], [held_out]);
     check(study, &records, Some(&held_out[0]), settings)?;
-    let (twin, silent) = &measured(study.twin(), &records)?;
-    let setting = Setting {
-        study,
-        twin,
-        validation: Some(&held_out),
-        together: None,
-        follows: *silent || without_process_noise(twin.as_ref(), &records[0]),
-        silent: *silent,
-    };
-    let problem = Problem::of_twin(twin, &records);
+    let twin = measured(study.twin(), &records)?;
+    let setting = Setting::new(study, &twin, &records, Some(&held_out), None);
+    let problem = Problem::of_twin(setting.twin, &records);
     let noise = Noise::new(settings.seed, "diagnose", 0);
     let Some(fitted) = base_fit(&problem, settings, noise)? else {
         return Ok(None);

@@ -190,10 +190,10 @@ fn placebo(
 }
 
 /// The first samples of a record.
-pub(super) fn first_part(record: &Record, samples: usize) -> Result<Record, DiagnoseError> {
+pub(super) fn first_part(record: &Record, samples: usize) -> Result<Record, RecordError> {
     let drive = record.drive();
     let inputs = drive.inputs().slice(s![..samples, ..]).to_owned();
-    let drive = Drive::new(drive.dt(), inputs).map_err(RecordError::from)?;
+    let drive = Drive::new(drive.dt(), inputs)?;
     let outputs = record.outputs().slice(s![..samples, ..]).to_owned();
-    Ok(Record::new(drive, outputs)?)
+    Record::new(drive, outputs)
 }

@@ -26,6 +26,7 @@ mod base_fit;
 mod black_box;
 mod candidate;
 mod catch_all;
+mod correlation;
 mod decide;
 mod detect;
 mod dictionary;
@@ -235,4 +236,24 @@ struct Setting<'a> {
     follows: bool,
     /// Whether the twin is a simulator without noise of its own, and has been given measurement noise.
     silent: bool,
+}
+
+impl<'a> Setting<'a> {
+    /// Of the twin as [`measured`](black_box::measured) shows it.
+    fn new(
+        study: &'a Study,
+        (twin, silent): &'a (Arc<dyn DigitalTwin>, bool),
+        records: &[Record],
+        validation: Option<&'a [Record]>,
+        together: Option<&'a [Record]>,
+    ) -> Self {
+        Self {
+            study,
+            twin,
+            validation,
+            together,
+            follows: *silent || detect::without_process_noise(twin.as_ref(), &records[0]),
+            silent: *silent,
+        }
+    }
 }

@@ -15,7 +15,7 @@ use super::problem::Problem;
 use super::result::NextInput;
 use super::scan::Reference;
 use crate::filter::recoverable;
-use crate::twin::{Drive, Noise, Record, Signal, SimulationError};
+use crate::twin::{Drive, Noise, Record, RecordError, Signal, SimulationError};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -123,7 +123,7 @@ fn proposals(record: &Record, times: usize, noise: Noise) -> Result<Vec<Proposal
     let given = drive.inputs();
     let inputs = given.ncols();
     if inputs == 0 {
-        let drive = Drive::autonomous(dt, samples).map_err(record_error)?;
+        let drive = Drive::autonomous(dt, samples).map_err(RecordError::from)?;
         return Ok(match times {
             1 => vec![],
             _ => vec![Proposal {
@@ -176,15 +176,11 @@ fn proposals(record: &Record, times: usize, noise: Noise) -> Result<Vec<Proposal
                 let (low, high) = ranges[j];
                 low + shares[[k, j]].clamp(0.0, 1.0) * (high - low)
             });
-            let drive = Drive::new(dt, values).map_err(record_error)?;
+            let drive = Drive::new(dt, values).map_err(RecordError::from)?;
             let kind = format!("{kind}{long}");
             Ok(Proposal { kind, drive })
         })
         .collect()
-}
-
-fn record_error(error: crate::twin::DriveError) -> DiagnoseError {
-    crate::twin::RecordError::from(error).into()
 }
 
 impl Rival<'_> {

@@ -9,6 +9,7 @@
 use super::DiagnoseError;
 use super::fit::climb;
 use super::held_out::first_part;
+use super::localise::level;
 use super::map::Onset;
 use super::null::{Bench, largest, standardised};
 use super::problem::Problem;
@@ -114,7 +115,7 @@ fn foresight(
             let n = v.len() as f64;
             let sum: f64 = v.iter().sum();
             let square: f64 = v.iter().map(|v| v * v).sum();
-            all.push((sum * sum / n + 0.5 * n * (square / n - 1.0).powi(2)).sqrt());
+            all.push(level((n, sum, square)).square.sqrt());
         }
     }
     Ok(Some(all))

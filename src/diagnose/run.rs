@@ -4,7 +4,7 @@ use super::attribute::Explanation;
 use super::black_box::{dithered, measured};
 use super::candidate::Addition;
 use super::decide::{Accepted, Answer, Step, decide};
-use super::detect::{Detected, detect, explained, without_process_noise};
+use super::detect::{Detected, detect, explained};
 use super::held_out::shrinkage;
 use super::map::Maps;
 use super::next_input::next_input;
@@ -61,9 +61,8 @@ pub fn diagnose(
     let clock = Instant::now();
     check(study, records, validation, settings)?;
     let noise = Noise::new(settings.seed, "diagnose", 0);
-    let (twin, silent) = &measured(study.twin(), records)?;
-    let silent = *silent;
-    let dithered = match silent {
+    let twin = measured(study.twin(), records)?;
+    let dithered = match twin.1 {
         true => Some(dithered(records, noise)?),
         false => None,
     };
@@ -71,14 +70,7 @@ pub fn diagnose(
     let validation: Option<Vec<Record>> = validation.map(|v| vec![v.clone()]);
     let validation = validation.as_deref();
     let together = validation.map(|v| [records, v].concat());
-    let setting = Setting {
-        study,
-        twin,
-        validation,
-        together: together.as_deref(),
-        follows: silent || without_process_noise(twin.as_ref(), &records[0]),
-        silent,
-    };
+    let setting = Setting::new(study, &twin, records, validation, together.as_deref());
     let mut detected = detect(&setting, records, settings, noise, progress)?;
     let Attributed {
         answer,
@@ -118,7 +110,7 @@ pub fn diagnose(
         )?;
     }
     let last = step.as_ref().map_or(bench, |step| &step.bench);
-    let space = twin.parameters();
+    let space = setting.twin.parameters();
     let (parameters, nuisance) =
         fitted_parameters(&space.iter().collect::<Vec<_>>(), last, settings);
     let runs = |record: &Record| beside(&setting, bench, last, &answer, record);

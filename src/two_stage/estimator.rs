@@ -53,11 +53,6 @@ impl Estimator {
         &self.settings
     }
 
-    /// scratch
-    pub fn set_settings(&mut self, s: Settings) {
-        self.settings = s;
-    }
-
     /// The seed of bank and training.
     pub fn seed(&self) -> u64 {
         self.seed

@@ -1,6 +1,6 @@
 //! Disturbances of a black box's signals: what stands for an effect that nobody listed.
 
-use crate::diagnose::catch_all::Place;
+use crate::diagnose::catch_all::{Place, share};
 use crate::twin::{
     DigitalTwin, Drive, Noise, Parameter, ParameterSpace, Role, Signal, Signals, SimulationError,
 };
@@ -32,10 +32,7 @@ struct Disturbed {
 impl Disturbed {
     fn add(&self, sigma: f64, noise: Noise, column: usize, signal: &mut Signal) {
         let mut source = noise.source("disturbance");
-        let share = match 1.0 - self.memory * self.memory {
-            s if s > 0.0 => s.sqrt(),
-            _ => 1.0,
-        };
+        let share = share(self.memory);
         let mut d = 0.0;
         for value in signal.column_mut(column) {
             *value += d;

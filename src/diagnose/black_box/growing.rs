@@ -5,10 +5,10 @@
 
 use crate::diagnose::DiagnoseSettings;
 use crate::diagnose::fit::{Fitted, climb};
+use crate::diagnose::held_out::first_part;
 use crate::diagnose::problem::Problem;
 use crate::filter::{FilterError, recoverable};
-use crate::twin::{Drive, Noise, Record, RecordError};
-use ndarray::s;
+use crate::twin::{Noise, Record, RecordError};
 use rayon::prelude::*;
 
 /// Shares of the records, and how many of the best fits go on to the next.
@@ -42,8 +42,8 @@ pub(in crate::diagnose) fn base_fit(
         .collect();
     for (level, share) in SHARES.into_iter().enumerate() {
         let begun: Vec<Record> = (problem.records.iter())
-            .map(|r| beginning(r, share))
-            .collect::<Result<_, _>>()?;
+            .map(|r| first_part(r, ((share * r.samples() as f64) as usize).max(1)))
+            .collect::<Result<_, RecordError>>()?;
         let short = problem.on(&begun);
         if level == 0 {
             let values: Vec<Option<f64>> = (starts.par_iter())
@@ -79,15 +79,4 @@ fn fits(problem: &Problem<'_>, starts: &[Vec<f64>]) -> Result<Vec<Fitted>, Filte
     let mut found: Vec<Fitted> = found.into_iter().flatten().collect();
     found.sort_by(|a, b| b.objective.total_cmp(&a.objective));
     Ok(found)
-}
-
-/// The first samples of a record.
-fn beginning(record: &Record, share: f64) -> Result<Record, RecordError> {
-    let samples = ((share * record.samples() as f64) as usize).max(1);
-    let drive = record.drive();
-    let drive = Drive::new(
-        drive.dt(),
-        drive.inputs().slice(s![..samples, ..]).to_owned(),
-    )?;
-    Record::new(drive, record.outputs().slice(s![..samples, ..]).to_owned())
 }

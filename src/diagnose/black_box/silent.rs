@@ -4,6 +4,7 @@
 //! be white noise of any size, but not of any colour.
 
 use super::ensemble::run;
+use crate::diagnose::scales::{deviation, largest};
 use crate::twin::{
     DigitalTwin, Drive, Interval, Noise, Parameter, ParameterSpace, Record, RecordError, Role,
     Signal, Signals, SimulationError,
@@ -74,11 +75,8 @@ pub(in crate::diagnose) fn dithered(
 
 /// Deviation, or what is left of it where nothing moves.
 fn size(values: &[f64]) -> f64 {
-    let n = values.len().max(1) as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
-    let largest = values.iter().fold(0.0, |a: f64, v| a.max(v.abs()));
-    variance.sqrt().max(1e-3 * largest).max(1e-100)
+    let least = (1e-3 * largest(values)).max(1e-100);
+    deviation(values).max(least)
 }
 
 fn levels(twin: &dyn DigitalTwin, record: &Record) -> Vec<Parameter> {

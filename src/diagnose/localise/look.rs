@@ -1,6 +1,7 @@
 //! How little the innovations of each cut look like N(0, 1) and white.
 
 use super::cut::{Bins, Cut, Past};
+use crate::diagnose::correlation::{centred, correlation};
 use crate::filter::Filtered;
 use crate::twin::{Record, Signal};
 use rustfft::FftPlanner;
@@ -13,7 +14,7 @@ const LEAST: f64 = 5.0;
 
 /// What is left of a cut beyond chance.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Excess {
+pub(in crate::diagnose) struct Excess {
     /// A statistic that is about χ² where nothing is wrong.
     pub square: f64,
     /// Its mean there.
@@ -75,7 +76,7 @@ pub(super) fn excess(
 }
 
 /// Of (count, sum, sum of squares).
-fn level((n, sum, square): (f64, f64, f64)) -> Excess {
+pub(in crate::diagnose) fn level((n, sum, square): (f64, f64, f64)) -> Excess {
     if n < LEAST {
         return Excess::default();
     }
@@ -174,19 +175,6 @@ fn powers(v: &[f64], planner: &mut FftPlanner<f64>) -> Vec<f64> {
     (line[1..].iter().take(n / 2))
         .map(|z| z.norm_sqr() / n as f64)
         .collect()
-}
-
-fn centred(values: &[f64]) -> Vec<f64> {
-    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
-    values.iter().map(|v| v - mean).collect()
-}
-
-/// Of a(k) with b(k − lag), both centred.
-fn correlation(a: &[f64], b: &[f64], lag: usize) -> f64 {
-    let dot: f64 = a[lag..].iter().zip(b).map(|(a, b)| a * b).sum();
-    let norm = |x: &[f64]| x.iter().map(|v| v * v).sum::<f64>();
-    let scale = (norm(a) * norm(b)).sqrt();
-    if scale > 0.0 { dot / scale } else { 0.0 }
 }
 
 #[cfg(test)]

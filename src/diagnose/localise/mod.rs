@@ -11,5 +11,5 @@ mod look;
 mod shares;
 
 pub(super) use cut::{Bins, Cut, Past, edges};
-pub(super) use look::local;
+pub(super) use look::{level, local};
 pub(super) use shares::shares;
