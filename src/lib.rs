@@ -37,6 +37,7 @@ pub mod files;
 pub mod math;
 pub mod optimise;
 pub mod progress;
+pub mod work;
 
 pub mod twin;
 

@@ -3,6 +3,7 @@
 use crate::experiment::Scenario;
 use crate::study::PresetName;
 use crate::withheld::Kind;
+use crate::work::Share;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::{Path, PathBuf};
 
@@ -70,6 +71,11 @@ pub(super) enum Command {
 }
 
 impl Command {
+    /// Whether the ranks of a cluster share the work of this verb.
+    pub fn is_shared_out(&self) -> bool {
+        matches!(self, Self::Reproduce(_) | Self::Withheld(_))
+    }
+
     /// The study file of the call, if it has one.
     pub fn study(&self) -> Option<&Path> {
         let subject = match self {
@@ -258,6 +264,9 @@ pub(super) struct ReproduceArguments {
     /// A folder for the results: a new one, or one of this very call to go on with.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Only part i of n of the records, for job arrays; once all parts are done, the same call without it ends the work.
+    #[arg(long, value_name = "I/N", requires = "out")]
+    pub shard: Option<Share>,
 }
 
 #[derive(Debug, Args)]
@@ -286,6 +295,9 @@ pub(super) struct WithheldArguments {
     /// End each diagnosis with its verdict: false alarms and detection, in a third of the time.
     #[arg(long)]
     pub detection_only: bool,
+    /// Only part i of n of the diagnoses, for job arrays; once all parts are done, the same call without it ends the work.
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<Share>,
 }
 
 /// A kind of truth.

@@ -3,7 +3,7 @@
 use crate::bank::BankError;
 use crate::diagnose::DiagnoseError;
 use crate::effect::EffectFileError;
-use crate::experiment::{MonteCarloError, ScenarioError, StoreError};
+use crate::experiment::{MonteCarloError, ScenarioError};
 use crate::feature::FeatureError;
 use crate::gate::GateError;
 use crate::network::NetworkError;
@@ -15,6 +15,7 @@ use crate::twin::{
 };
 use crate::two_stage::{EstimateError, EstimatorFileError, PretrainError};
 use crate::withheld::WithheldError;
+use crate::work::{Team, TeamError, WorkError};
 use std::fmt::Display;
 use std::path::Path;
 use std::process::ExitCode;
@@ -83,6 +84,19 @@ impl Failure {
         self
     }
 
+    /// The exit code.
+    pub fn code(&self) -> u8 {
+        self.code
+    }
+
+    /// As [`report`](Self::report), of what every process of a team finds: one says it.
+    pub fn report_of(self, team: &Team) -> ExitCode {
+        match team.leads() {
+            true => self.report(),
+            false => ExitCode::from(self.code),
+        }
+    }
+
     /// Prints the line and gives the exit code.
     pub fn report(self) -> ExitCode {
         let line = self
@@ -115,7 +129,8 @@ users!(
     ParameterError,
     RecordError,
     SimulationError,
-    StoreError,
+    TeamError,
+    WorkError,
 );
 
 /// Errors that the setting of the study can cause.

@@ -33,6 +33,7 @@ mod withheld;
 
 use crate::progress::Progress;
 use crate::study::{Study, StudyError, StudyFile};
+use crate::work::{Share, Team};
 use args::{Arguments, Command, Subject};
 use clap::{CommandFactory, FromArgMatches};
 use failure::Failure;
@@ -51,23 +52,38 @@ pub fn run_from<E: Into<StudyError>>(
     studies: impl IntoIterator<Item = Result<Study, E>>,
     arguments: impl IntoIterator<Item = impl Into<std::ffi::OsString> + Clone>,
 ) -> ExitCode {
+    let team = match Team::join() {
+        Ok(team) => team,
+        Err(error) => return Failure::from(error).report(),
+    };
     let matches = Arguments::command().try_get_matches_from(arguments);
     let parsed = match matches.and_then(|matches| Arguments::from_arg_matches(&matches)) {
         Ok(parsed) => parsed,
         Err(error) if !error.use_stderr() => {
             // Help and version are results.
-            print!("{error}");
+            if team.leads() {
+                print!("{error}");
+            }
             return ExitCode::SUCCESS;
         }
-        Err(error) => return Failure::usage(&error).report(),
+        Err(error) => return Failure::usage(&error).report_of(&team),
     };
+    if !team.is_alone() && !parsed.command.is_shared_out() {
+        let failure = Failure::user("this verb runs as one process; start it without mpirun");
+        return failure.report_of(&team);
+    }
     let studies: Result<Vec<Study>, E> = studies.into_iter().collect();
     let result = studies
         .map_err(|error| Failure::from(error.into()))
-        .and_then(|studies| in_pool(parsed.threads, || dispatch(&parsed, &studies)));
+        .and_then(|studies| in_pool(parsed.threads, || dispatch(&parsed, &studies, &team)));
     match result {
         Ok(code) => code,
-        Err(failure) => failure.report(),
+        Err(failure) => {
+            let code = failure.code();
+            let exit = failure.report();
+            team.abandon(code);
+            exit
+        }
     }
 }
 
@@ -89,13 +105,17 @@ fn in_pool<R: Send>(
     }
 }
 
-fn dispatch(arguments: &Arguments, studies: &[Study]) -> Result<ExitCode, Failure> {
-    let progress = progress::bars();
+fn dispatch(arguments: &Arguments, studies: &[Study], team: &Team) -> Result<ExitCode, Failure> {
+    let progress = match team.leads() {
+        true => progress::bars(),
+        false => Progress::silent(),
+    };
     let context = Context {
         studies,
         json: arguments.json,
         seed: arguments.seed,
         progress: &progress,
+        team,
     };
     let result = match &arguments.command {
         Command::Twins => twins::run(&context),
@@ -118,6 +138,7 @@ struct Context<'a> {
     json: bool,
     seed: u64,
     progress: &'a Progress,
+    team: &'a Team,
 }
 
 impl Context<'_> {
@@ -133,6 +154,17 @@ impl Context<'_> {
             }
             (None, None) => Err(Failure::user(
                 "name a twin with --twin, or a file with --study",
+            )),
+        }
+    }
+
+    /// What this process does of numbered work: the part of `--shard`, or its rank's.
+    fn share(&self, asked: Option<Share>) -> Result<Share, Failure> {
+        match asked {
+            None => Ok(self.team.share()),
+            Some(share) if self.team.is_alone() => Ok(share),
+            Some(_) => Err(Failure::user(
+                "--shard is for jobs of their own; under mpirun the ranks share the work out themselves",
             )),
         }
     }

@@ -1,11 +1,12 @@
 //! Results: standard output, files that appear whole, folders that appear whole.
 
-use super::Failure;
+use super::{Context, Failure};
 use crate::files::{self, folder, with_remedy};
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
 /// Prints a result; a reader that has gone away (`| head`) is no failure.
 pub(super) fn print(text: &str) -> Result<(), Failure> {
@@ -22,6 +23,26 @@ pub(super) fn print(text: &str) -> Result<(), Failure> {
 /// Prints one JSON object.
 pub(super) fn print_json(value: &Value) -> Result<(), Failure> {
     print(&serde_json::to_string_pretty(value).map_err(Failure::internal)?)
+}
+
+/// Says how far a job array has come.
+pub(super) fn print_share(
+    context: &Context<'_>,
+    folder: &Path,
+    what: &str,
+    there: usize,
+    of: usize,
+) -> Result<ExitCode, Failure> {
+    match context.json {
+        true => print_json(&json!({
+            "schema": "truetwin.share/1", "folder": folder, "pieces": what, "there": there, "of": of,
+        }))?,
+        false => print(&format!(
+            "{}: {there} of {of} {what} are there; once the other shares are done, the same call without --shard ends the work",
+            folder.display()
+        ))?,
+    }
+    Ok(ExitCode::SUCCESS)
 }
 
 /// Refuses a path that is taken, and a folder that is not there, before the work starts.

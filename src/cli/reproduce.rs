@@ -2,12 +2,11 @@
 
 use super::args::ReproduceArguments;
 use super::{Context, Failure, output};
-use crate::experiment::{
-    Benchmark, FreeRuns, Manifest, MeanRuns, MonteCarlo, Origin, Run, Store, score,
-};
+use crate::experiment::{Benchmark, FreeRuns, MeanRuns, MonteCarlo, Origin, Run, score};
 use crate::report::{first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
 use crate::study::Study;
 use crate::two_stage::{Estimator, PretrainOptions, pretrain};
+use crate::work::WorkFolder;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -35,30 +34,46 @@ pub(super) fn run(
         epochs: options.epochs,
         seed: context.seed,
     };
-    let store = match &options.out {
+    if options.out.is_none() && !context.team.is_alone() {
+        return Err(Failure::user("ranks meet in a folder; name one with --out"));
+    }
+    let share = context.share(options.shard)?;
+    let folder = match &options.out {
         Some(out) => {
             let origin = match &given {
                 Some((path, _)) => Origin::File(path),
                 None => Origin::Trained(&training),
             };
-            Some(Store::open(out, &Manifest::new(study, &plan, origin)?)?)
+            Some(plan.folder(out, study, origin)?)
         }
         None => None,
     };
-    let estimator = match (given, &store) {
+    let estimator = match (given, &folder) {
         (Some((_, estimator)), _) => estimator,
         (None, None) => pretrain(study, &training, context.progress)?.0,
-        (None, Some(store)) => kept(context, study, &training, store)?,
+        (None, Some(folder)) => kept(context, study, &training, folder)?,
     };
-    let runs = plan.run(&estimator, store.as_ref(), context.progress)?;
+    if let (Some(out), Some(folder)) = (&options.out, &folder) {
+        let there = plan
+            .run_share(&estimator, Some(folder), share, context.progress)?
+            .len();
+        if options.shard.is_some() && there < options.runs {
+            return output::print_share(context, out, "records", there, options.runs);
+        }
+        context.team.wait();
+        if !context.team.leads() {
+            return Ok(ExitCode::SUCCESS);
+        }
+    }
+    let runs = plan.run(&estimator, folder.as_ref(), context.progress)?;
     let scores = score(study, &plan, &runs);
     let json = reproduce_json(study, &plan, estimator.preset(), &scores);
     let text = reproduce_text(study, &plan, estimator.preset(), &scores);
-    if let Some(store) = &store {
-        draw(store, study, &plan, &runs)?;
-        store.write("table.txt", &text)?;
+    if let Some(folder) = &folder {
+        draw(folder, study, &plan, &runs)?;
+        folder.write("table.txt", &text)?;
         // Last: where it is, everything is.
-        store.write("reproduce.json", &format!("{json:#}\n"))?;
+        folder.write("reproduce.json", &format!("{json:#}\n"))?;
     }
     match context.json {
         true => output::print_json(&json)?,
@@ -85,25 +100,31 @@ fn kept(
     context: &Context<'_>,
     study: &Study,
     training: &PretrainOptions,
-    store: &Store,
+    folder: &WorkFolder,
 ) -> Result<Estimator, Failure> {
-    let path = store.estimator();
-    if !path.exists() {
+    let path = folder.file("estimator.est");
+    if context.team.leads() && !path.exists() {
         (pretrain(study, training, context.progress)?.0).save(&path)?;
     }
+    context.team.wait();
     Ok(Estimator::load(&path, context.studies)?)
 }
 
 /// `trajectories.svg`, where all records have the same truth, and `first-record.svg`.
-fn draw(store: &Store, study: &Study, plan: &MonteCarlo, runs: &[Run]) -> Result<(), Failure> {
+fn draw(
+    folder: &WorkFolder,
+    study: &Study,
+    plan: &MonteCarlo,
+    runs: &[Run],
+) -> Result<(), Failure> {
     if let Some(means) = MeanRuns::of(study, plan, runs)?
         && let Some(svg) = mean_runs_svg(study, &means)
     {
-        store.write("trajectories.svg", &svg)?;
+        folder.write("trajectories.svg", &svg)?;
     }
     if let Some(first) = runs.first() {
         let free = FreeRuns::of(study, plan, first)?;
-        store.write("first-record.svg", &first_run_svg(study, &free))?;
+        folder.write("first-record.svg", &first_run_svg(study, &free))?;
     }
     Ok(())
 }

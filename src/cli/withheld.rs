@@ -17,8 +17,21 @@ pub(super) fn run(context: &Context<'_>, options: &WithheldArguments) -> Result<
         detection_only: options.detection_only,
     };
     let sealed = Withheld::new(&study, settings)?.seal(&options.out, context.progress)?;
-    // Published before the first diagnosis.
-    eprintln!("keys sealed: sha256 {}", sealed.seal());
+    if context.team.leads() {
+        // Published before the first diagnosis.
+        eprintln!("keys sealed: sha256 {}", sealed.seal());
+    }
+    let share = context.share(options.shard)?;
+    let answers = sealed.answer(share, context.progress)?.len();
+    if options.shard.is_some() && answers < options.trials {
+        return output::print_share(context, &options.out, "trials", answers, options.trials);
+    }
+    context.team.wait();
+    sealed.open_keys(share, context.progress)?;
+    context.team.wait();
+    if !context.team.leads() {
+        return Ok(ExitCode::SUCCESS);
+    }
     let card = sealed.score(context.progress)?;
     let json = scorecard_json(&card);
     sealed.write("scorecard.html", &scorecard_html(&card))?;

@@ -5,14 +5,13 @@
 //! | run the estimator and the baselines on many simulated records | [`MonteCarlo::run`], [`Run`] |
 //! | turn the runs into errors and coverage | [`score`], [`Scores`] |
 //! | choose where true parameters come from | [`Scenario`] |
-//! | keep runs in a folder and go on later | [`Store`], [`Manifest`] |
+//! | keep runs in a folder and go on later | [`MonteCarlo::folder`] |
 //! | draw what the answers predict | [`FreeRuns`], [`MeanRuns`] |
 //! | have a twin's test points, invariants, published figures | [`Benchmark`] |
 
-pub(crate) mod crew;
+mod folder;
 mod free_runs;
 mod invariant;
-pub(crate) mod manifest;
 mod method;
 mod monte_carlo;
 mod paper;
@@ -20,15 +19,13 @@ mod record;
 mod run;
 mod scenario;
 mod score;
-mod store;
 
+pub use folder::Origin;
 pub use free_runs::{FreeRuns, MeanRuns};
 pub use invariant::{Invariant, Symmetry};
-pub use manifest::{Manifest, Origin};
 pub use method::Method;
 pub use monte_carlo::{MonteCarlo, MonteCarloError};
 pub use paper::reference_studies;
 pub use run::{Answer, Run};
 pub use scenario::{Benchmark, Published, Scenario, ScenarioError, TestPoint};
 pub use score::{COVERAGE_LEVEL, Coverage, MethodScore, Scores, score};
-pub use store::{Store, StoreError};

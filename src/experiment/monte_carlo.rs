@@ -1,13 +1,14 @@
 //! Every method on many simulated records.
 
-use super::crew::share_out;
+use super::folder::RUNS;
 use super::record::simulated;
 use super::scenario::Draws;
-use super::{Benchmark, Run, Scenario, ScenarioError, Store, StoreError};
+use super::{Benchmark, Run, Scenario, ScenarioError};
 use crate::progress::{Cancelled, Progress};
 use crate::study::Study;
 use crate::twin::{Record, RecordError, SimulationError};
 use crate::two_stage::Estimator;
+use crate::work::{Piece, Pieces, Share, WorkError, WorkFolder};
 
 /// What is run.
 #[derive(Debug, Clone)]
@@ -39,7 +40,7 @@ pub enum MonteCarloError {
     Hopeless(String),
     /// The folder of runs.
     #[error(transparent)]
-    Store(#[from] StoreError),
+    Work(#[from] WorkError),
     /// No threads.
     #[error("no threads could be started: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
@@ -71,40 +72,16 @@ impl MonteCarlo {
     /// Runs every stage of `estimator`, and the baselines, on simulated records, in order. Records are independent:
     /// run i depends on (seed, i) alone, and on no number of threads.
     ///
-    /// With a `store`, each run is kept there as soon as it is done, and what is there already is not run again.
+    /// With a `folder`, each run is kept there as soon as it is done, and what is there already is not run again.
     ///
     /// Records run in parallel, each on its share of the current threads.
     pub fn run(
         &self,
         estimator: &Estimator,
-        store: Option<&Store>,
+        folder: Option<&WorkFolder>,
         progress: &Progress,
     ) -> Result<Vec<Run>, MonteCarloError> {
-        let study = estimator.study();
-        let draws = self.draws(study)?;
-        let parameters = study.twin().parameters().len();
-        let stage = progress.stage("records", self.runs);
-        let mut runs = Vec::with_capacity(self.runs);
-        let mut missing = Vec::new();
-        for run in 0..self.runs {
-            match store.map_or(Ok(None), |store| store.load(run, parameters))? {
-                Some(known) => {
-                    runs.push(known);
-                    stage.tick()?;
-                }
-                None => missing.push(run),
-            }
-        }
-        runs.extend(share_out(&missing, |run| {
-            let record = simulated(study, &draws, self.seed, run)?;
-            let done = Run::new(estimator, run, &record, progress)?;
-            if let Some(store) = store {
-                store.keep(&done)?;
-            }
-            stage.tick()?;
-            Ok::<_, MonteCarloError>(done)
-        })?);
-        runs.sort_by_key(|run| run.run);
+        let runs = self.run_share(estimator, folder, Share::WHOLE, progress)?;
         match runs.iter().all(|run| run.failure.is_some()) {
             true => Err(MonteCarloError::Hopeless(
                 (runs.into_iter().find_map(|run| run.failure)).unwrap_or_default(),
@@ -112,12 +89,48 @@ impl MonteCarlo {
             false => Ok(runs),
         }
     }
+
+    /// As [`run`](Self::run), but only the runs of a share; returns these and all that the folder had before.
+    pub fn run_share(
+        &self,
+        estimator: &Estimator,
+        folder: Option<&WorkFolder>,
+        share: Share,
+        progress: &Progress,
+    ) -> Result<Vec<Run>, MonteCarloError> {
+        let study = estimator.study();
+        let draws = self.draws(study)?;
+        let parameters = study.twin().parameters().len();
+        let pieces = Pieces {
+            folder,
+            part: RUNS,
+            count: self.runs,
+            share,
+        };
+        pieces.all(
+            &progress.stage("records", self.runs),
+            |run: &Run| match run.fits(parameters) {
+                true => Ok(()),
+                false => Err("its methods or parameters are those of another study"),
+            },
+            |run| {
+                let record = simulated(study, &draws, self.seed, run)?;
+                Run::new(estimator, run, &record, progress)
+            },
+        )
+    }
+}
+
+impl Piece for Run {
+    fn number(&self) -> usize {
+        self.run
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::{Manifest, Origin, reference_studies, score};
+    use crate::experiment::{Origin, reference_studies, score};
     use crate::progress::Listener;
     use crate::study::{PresetName, RecordPlan};
     use crate::twin::{DigitalTwin, Drive, Noise, Parameter, ParameterSpace, Signal};
@@ -150,9 +163,8 @@ mod tests {
         }
     }
 
-    fn open(path: &Path, plan: &MonteCarlo) -> Result<Store, StoreError> {
-        let origin = Origin::Trained(&TRAINING);
-        Store::open(path, &Manifest::new(oscillator().study(), plan, origin)?)
+    fn open(path: &Path, plan: &MonteCarlo) -> Result<WorkFolder, WorkError> {
+        plan.folder(path, oscillator().study(), Origin::Trained(&TRAINING))
     }
 
     /// All but the times.
@@ -184,8 +196,8 @@ mod tests {
         let path = place.path().join("study");
         let plan = plan(Scenario::First, 3);
         let run = || {
-            let store = open(&path, &plan).unwrap();
-            plan.run(oscillator(), Some(&store), &Progress::silent())
+            let folder = open(&path, &plan).unwrap();
+            plan.run(oscillator(), Some(&folder), &Progress::silent())
         };
         let first = run().unwrap();
         assert_eq!(
@@ -209,6 +221,23 @@ mod tests {
         assert!(error.contains("its number"), "{error}");
     }
 
+    #[test]
+    fn shares_make_the_whole_and_each_keeps_to_its_own() {
+        let place = tempfile::tempdir().unwrap();
+        let plan = plan(Scenario::First, 3);
+        let folder = open(&place.path().join("study"), &plan).unwrap();
+        let share = |text: &str| {
+            let share = text.parse().unwrap();
+            let runs = plan.run_share(oscillator(), Some(&folder), share, &Progress::silent());
+            runs.unwrap().iter().map(|run| run.run).collect::<Vec<_>>()
+        };
+        assert_eq!(share("2/2"), [0, 2]);
+        assert_eq!(share("1/2"), [0, 1, 2]);
+        let runs = plan.run(oscillator(), Some(&folder), &Progress::silent());
+        let alone = plan.run(oscillator(), None, &Progress::silent());
+        assert_eq!(answers(runs.unwrap()), answers(alone.unwrap()));
+    }
+
     /// The same study without a folder, with the times of `timed`.
     fn plan_again(plan: &MonteCarlo, timed: &[Run]) -> Vec<Run> {
         let mut runs = plan.run(oscillator(), None, &Progress::silent()).unwrap();
@@ -221,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn other_folders_are_refused() {
+    fn another_plan_is_refused() {
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("study");
         open(&path, &plan(Scenario::First, 3)).unwrap();
@@ -229,18 +258,6 @@ mod tests {
         assert!(
             error.to_string().contains("runs was 3, now it is 4"),
             "{error}"
-        );
-        let error = open(place.path(), &plan(Scenario::First, 3)).unwrap_err();
-        assert!(
-            error.to_string().contains("no folder of `reproduce`"),
-            "{error}"
-        );
-        let error = open(&place.path().join("a/b"), &plan(Scenario::First, 3)).unwrap_err();
-        assert!(error.to_string().contains("make it first"), "{error}");
-        assert_eq!(
-            fs::read_dir(place.path()).unwrap().count(),
-            1,
-            "nothing is left over"
         );
     }
 
@@ -256,11 +273,11 @@ mod tests {
     fn a_stop_is_heard_inside_a_run_and_leaves_no_run_behind() {
         let place = tempfile::tempdir().unwrap();
         let plan = plan(Scenario::First, 2);
-        let store = open(&place.path().join("study"), &plan).unwrap();
+        let folder = open(&place.path().join("study"), &plan).unwrap();
         let progress = Progress::new(Arc::new(Stopped));
-        let error = plan.run(oscillator(), Some(&store), &progress);
+        let error = plan.run(oscillator(), Some(&folder), &progress);
         assert!(matches!(error, Err(MonteCarloError::Cancelled(_))));
-        assert_eq!(fs::read_dir(store.file("runs")).unwrap().count(), 0);
+        assert_eq!(fs::read_dir(folder.file("runs")).unwrap().count(), 0);
     }
 
     /// A twin without equations that diverges in the upper half of its bounds.

@@ -121,12 +121,11 @@ impl Run {
         })
     }
 
-    /// Whether this may be run number `run` of a study with `parameters` parameters.
-    pub(super) fn fits(&self, run: usize, parameters: usize) -> bool {
+    /// Whether this may be a run of a study with `parameters` parameters.
+    pub(super) fn fits(&self, parameters: usize) -> bool {
         let whole = |theta: &Vec<f64>| theta.len() == parameters;
         let methods = self.answers.iter().map(|answer| answer.method);
-        self.run == run
-            && whole(&self.truth)
+        whole(&self.truth)
             && (self.interval.len() == parameters
                 || (self.interval.is_empty() && self.failure.is_some()))
             && methods.eq(Method::all())

@@ -2,12 +2,11 @@
 
 use super::world::World;
 use crate::diagnose::DiagnoseError;
-use crate::files::{folder, with_remedy};
 use crate::progress::Cancelled;
 use crate::study::PlanError;
 use crate::twin::{CsvError, DriveError, RecordError};
-use std::io;
-use std::path::{Path, PathBuf};
+use crate::work::WorkError;
+use std::path::PathBuf;
 
 /// Why there is no scorecard.
 #[derive(Debug, thiserror::Error)]
@@ -36,39 +35,16 @@ pub enum WithheldError {
         "trial {0}: no record could be made that does not run away; narrow [prior] and [bounds]"
     )]
     Runaway(usize),
-    /// Something cannot be read or written.
-    #[error("{}: {}", path.display(), with_remedy(error))]
-    Io {
-        /// File or folder.
-        path: PathBuf,
-        /// What the system said.
-        error: io::Error,
-    },
-    /// There is no place for the folder.
-    #[error("{}: the folder {} does not exist; make it first", path.display(), folder(path).display())]
-    Place {
-        /// Folder.
-        path: PathBuf,
-    },
-    /// The path is taken by something else.
-    #[error(
-        "{} exists already and is no folder of `withheld`; choose another --out, or remove it",
-        path.display()
-    )]
-    Foreign {
-        /// Folder.
-        path: PathBuf,
-    },
-    /// The folder is of another call.
-    #[error(
-        "{} holds trials of another call: {difference}; repeat that call to go on with it, or choose another --out",
-        path.display()
-    )]
-    Other {
-        /// Folder.
-        path: PathBuf,
-        /// What is different.
-        difference: String,
+    /// Of the folder.
+    #[error(transparent)]
+    Work(#[from] WorkError),
+    /// Keys are opened once every answer is there, and some are not.
+    #[error("{there} of {of} answers are there; finish the other shares first")]
+    Unanswered {
+        /// Answers.
+        there: usize,
+        /// Trials.
+        of: usize,
     },
     /// A file of the folder that this program did not write.
     #[error("{}: cannot be used ({reason}); {remedy}", path.display())]
@@ -101,13 +77,4 @@ pub enum WithheldError {
     /// Stopped from outside.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
-}
-
-impl WithheldError {
-    pub(super) fn io(path: &Path, error: io::Error) -> Self {
-        Self::Io {
-            path: path.into(),
-            error,
-        }
-    }
 }

@@ -2,16 +2,13 @@
 
 use super::WithheldError;
 use super::truth::Truth;
-use crate::experiment::manifest::difference;
-use crate::files::{NewFolder, folder, replace, sha256, write_new};
+use crate::files::sha256;
 use crate::twin::{Record, read_record, record_csv_text};
+use crate::work::{Manifest, NewWork, WorkError, WorkFolder};
 use serde::Serialize;
-use serde::de::DeserializeOwned;
-use serde_json::{Map, Value};
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-const MANIFEST: &str = "manifest.json";
 const KEYS: &str = "keys.json";
 const SEAL: &str = "seal.txt";
 const LEFT_OUT: &str = "left-out.json";
@@ -23,21 +20,20 @@ pub(super) const OPENED: &str = "opened";
 /// Of a key file that is not the one that was sealed.
 const AGAIN: &str = "remove the folder and start again";
 
-/// A folder of trials.
+/// A folder of trials: what every [`WorkFolder`] has, and
 ///
 /// | file | holds |
 /// |---|---|
-/// | `manifest.json` | what the trials depend on; another call that differs is refused |
 /// | `keys.json` | the truth of every trial; not read again before every answer is there |
 /// | `seal.txt` | SHA-256 of `keys.json`, published before the first diagnosis |
 /// | `left-out.json` | the effects that each trial's library does without, where the call asks for that |
 /// | `records/0000.csv`, `records/0000-validation.csv` | what the diagnoser sees |
-/// | `answers/0000.json` | what it said; appears whole when it is done |
+/// | `answers/0000.json` | what it said |
 /// | `opened/0000.json` | what the true effect gains; made with the key |
 /// | `scorecard.json`, `scorecard.html` | made of all that |
 #[derive(Debug, Clone)]
 pub(super) struct Folder {
-    path: PathBuf,
+    pub work: WorkFolder,
     /// SHA-256 of the key file.
     pub seal: String,
 }
@@ -45,132 +41,75 @@ pub(super) struct Folder {
 /// One trial's records, by number.
 fn record_name(trial: usize, validation: bool) -> String {
     match validation {
-        true => format!("{trial:04}-validation.csv"),
-        false => format!("{trial:04}.csv"),
+        true => format!("{RECORDS}/{trial:04}-validation.csv"),
+        false => format!("{RECORDS}/{trial:04}.csv"),
     }
 }
 
 /// A new folder that is filled with sealed trials.
-pub(super) struct Filling {
-    new: NewFolder,
-    place: PathBuf,
-}
+pub(super) struct Filling<'a>(&'a NewWork<'a>);
 
-impl Filling {
-    /// A folder that will be at `place`.
-    pub fn new(place: &Path) -> Result<Self, WithheldError> {
-        if !folder(place).is_dir() {
-            return Err(WithheldError::Place { path: place.into() });
-        }
-        let made = NewFolder::new(place).and_then(|new| {
-            for name in [RECORDS, ANSWERS, OPENED] {
-                std::fs::create_dir(new.file(name))?;
-            }
-            Ok(new)
-        });
-        Ok(Self {
-            new: made.map_err(|error| WithheldError::io(place, error))?,
-            place: place.into(),
-        })
-    }
-
+impl Filling<'_> {
     /// Adds a record.
-    pub fn record(
-        &self,
-        trial: usize,
-        validation: bool,
-        record: &Record,
-    ) -> Result<(), WithheldError> {
-        let name = Path::new(RECORDS).join(record_name(trial, validation));
-        self.write(&name, record_csv_text(record).as_bytes())
+    pub fn record(&self, trial: usize, validation: bool, record: &Record) -> Result<(), WorkError> {
+        let name = record_name(trial, validation);
+        self.0.write(&name, record_csv_text(record).as_bytes())
     }
 
     /// Says which effects each trial's library does without: the diagnoser may know that much.
-    pub fn left_out(&self, effects: &[&Vec<String>]) -> Result<(), WithheldError> {
-        let text = json_text(effects).map_err(|error| WithheldError::io(&self.place, error))?;
-        self.write(Path::new(LEFT_OUT), text.as_bytes())
+    pub fn left_out(&self, effects: &[&Vec<String>]) -> Result<(), WorkError> {
+        self.json(LEFT_OUT, effects).map(|_| ())
     }
 
-    /// Writes keys, seal and manifest, and puts the folder in its place.
-    pub fn finish(
-        self,
-        keys: &[Truth],
-        manifest: &Map<String, Value>,
-    ) -> Result<Folder, WithheldError> {
-        let keys = json_text(keys).map_err(|error| WithheldError::io(&self.place, error))?;
+    /// Writes keys and seal.
+    pub fn keys(&self, keys: &[Truth]) -> Result<(), WorkError> {
+        let keys = self.json(KEYS, keys)?;
         let seal = sha256(keys.as_bytes());
-        self.write(Path::new(KEYS), keys.as_bytes())?;
-        self.write(Path::new(SEAL), format!("{seal}\n").as_bytes())?;
-        let text = json_text(manifest).map_err(|error| WithheldError::io(&self.place, error))?;
-        self.write(Path::new(MANIFEST), text.as_bytes())?;
-        let finished = self.new.finish();
-        finished.map_err(|error| WithheldError::io(&self.place, error))?;
-        Ok(Folder {
-            path: self.place,
-            seal,
-        })
+        self.0.write(SEAL, format!("{seal}\n").as_bytes())
     }
 
-    fn write(&self, name: &Path, bytes: &[u8]) -> Result<(), WithheldError> {
-        let path = self.new.file("").join(name);
-        std::fs::write(path, bytes)
-            .map_err(|error| WithheldError::io(&self.place.join(name), error))
+    fn json<T: Serialize + ?Sized>(&self, name: &str, value: &T) -> Result<String, WorkError> {
+        let text = serde_json::to_string_pretty(value)
+            .map_err(|error| WorkError::io(Path::new(name), io::Error::from(error)))?;
+        let text = format!("{text}\n");
+        self.0.write(name, text.as_bytes())?;
+        Ok(text)
     }
 }
 
 impl Folder {
-    /// Goes on with a folder that was made by the same call; `None` where there is nothing yet.
-    pub fn open(path: &Path, manifest: &Map<String, Value>) -> Result<Option<Self>, WithheldError> {
-        if path.symlink_metadata().is_err() {
-            return Ok(None);
-        }
-        let foreign = || WithheldError::Foreign { path: path.into() };
-        let text = std::fs::read_to_string(path.join(MANIFEST)).map_err(|_| foreign())?;
-        let found: Map<String, Value> = serde_json::from_str(&text).map_err(|_| foreign())?;
-        if !(found.get("schema").and_then(Value::as_str))
-            .is_some_and(|schema| schema.starts_with("truetwin.withheld-folder/"))
-        {
-            return Err(foreign());
-        }
-        if let Some(difference) = difference(manifest, &found) {
-            return Err(WithheldError::Other {
-                path: path.into(),
-                difference,
-            });
-        }
-        let file = path.join(SEAL);
-        let seal = std::fs::read_to_string(&file).map_err(|e| WithheldError::io(&file, e))?;
-        Ok(Some(Self {
-            path: path.into(),
-            seal: seal.trim().into(),
-        }))
-    }
-
-    /// Where a file lies.
-    pub fn file(&self, name: &str) -> PathBuf {
-        self.path.join(name)
+    /// Goes on with a folder that was made by the same call; or makes one, which `fill` fills.
+    pub fn open(
+        path: &Path,
+        manifest: &Manifest,
+        fill: impl FnOnce(&Filling<'_>) -> Result<(), WithheldError>,
+    ) -> Result<Self, WithheldError> {
+        let parts = [RECORDS, ANSWERS, OPENED];
+        let work = WorkFolder::open(path, manifest, &parts, |new| fill(&Filling(new)))?;
+        let seal = work.read(SEAL)?.trim().into();
+        Ok(Self { work, seal })
     }
 
     /// Reads a trial's record.
     pub fn record(&self, trial: usize, validation: bool) -> Result<Record, WithheldError> {
-        let path = self.file(RECORDS).join(record_name(trial, validation));
-        Ok(read_record(&path)?)
+        Ok(read_record(
+            &self.work.file(&record_name(trial, validation)),
+        )?)
     }
 
     /// Opens the keys of so many trials, if they are still those that were sealed.
     pub fn keys(&self, trials: usize) -> Result<Vec<Truth>, WithheldError> {
-        let path = self.file(KEYS);
-        let bytes = std::fs::read(&path).map_err(|error| WithheldError::io(&path, error))?;
+        let text = self.work.read(KEYS)?;
         let damaged = |reason: String| WithheldError::Damaged {
-            path: path.clone(),
+            path: self.work.file(KEYS),
             reason,
             remedy: AGAIN,
         };
-        if sha256(&bytes) != self.seal {
+        if sha256(text.as_bytes()) != self.seal {
             return Err(damaged("its SHA-256 is not that of seal.txt".into()));
         }
         let keys: Vec<Truth> =
-            serde_json::from_slice(&bytes).map_err(|error| damaged(error.to_string()))?;
+            serde_json::from_str(&text).map_err(|error| damaged(error.to_string()))?;
         match keys.iter().map(|key| key.trial).eq(0..trials) {
             true => Ok(keys),
             false => Err(damaged("trials are missing".into())),
@@ -179,11 +118,9 @@ impl Folder {
 
     /// The effects that the libraries of so many trials do without.
     pub fn left_out(&self, trials: usize) -> Result<Vec<Vec<String>>, WithheldError> {
-        let path = self.file(LEFT_OUT);
-        let text =
-            std::fs::read_to_string(&path).map_err(|error| WithheldError::io(&path, error))?;
+        let text = self.work.read(LEFT_OUT)?;
         let damaged = |reason: String| WithheldError::Damaged {
-            path: path.clone(),
+            path: self.work.file(LEFT_OUT),
             reason,
             remedy: AGAIN,
         };
@@ -194,52 +131,4 @@ impl Folder {
             false => Err(damaged("trials are missing".into())),
         }
     }
-
-    /// What is kept of a trial in `answers` or `opened`, if it is there.
-    pub fn kept<T: DeserializeOwned>(
-        &self,
-        what: &str,
-        trial: usize,
-        number: impl Fn(&T) -> usize,
-    ) -> Result<Option<T>, WithheldError> {
-        let path = self.file(what).join(format!("{trial:04}.json"));
-        let text = match std::fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(WithheldError::io(&path, error)),
-        };
-        let damaged = |reason: String| WithheldError::Damaged {
-            path: path.clone(),
-            reason,
-            remedy: "remove it, and it is made again",
-        };
-        let found: T = serde_json::from_str(&text).map_err(|error| damaged(error.to_string()))?;
-        match number(&found) == trial {
-            true => Ok(Some(found)),
-            false => Err(damaged("it is of another trial".into())),
-        }
-    }
-
-    /// Keeps something of a trial.
-    pub fn keep<T: Serialize>(
-        &self,
-        what: &str,
-        trial: usize,
-        value: &T,
-    ) -> Result<(), WithheldError> {
-        let path = self.file(what).join(format!("{trial:04}.json"));
-        json_text(value)
-            .and_then(|text| write_new(&path, text.as_bytes()))
-            .map_err(|error| WithheldError::io(&path, error))
-    }
-
-    /// Writes a result, in place of an earlier one.
-    pub fn write(&self, name: &str, text: &str) -> Result<(), WithheldError> {
-        let path = self.file(name);
-        replace(&path, text.as_bytes()).map_err(|error| WithheldError::io(&path, error))
-    }
-}
-
-fn json_text<T: Serialize + ?Sized>(value: &T) -> io::Result<String> {
-    Ok(format!("{}\n", serde_json::to_string_pretty(value)?))
 }

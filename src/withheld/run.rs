@@ -7,15 +7,15 @@ use super::truth::Urn;
 use super::unlisted::index;
 use super::{Answer, Kind, Row, Scorecard, WithheldError};
 use crate::diagnose::DiagnoseSettings;
-use crate::experiment::crew::share_out;
 use crate::progress::Progress;
 use crate::study::Study;
 use crate::twin::{Noise, Record};
-use serde_json::{Map, Value, json};
+use crate::work::{Manifest, Piece, Pieces, Share};
+use serde_json::json;
 use std::path::Path;
 
 /// Layout of the folder; raised when it changes.
-const SCHEMA: &str = "truetwin.withheld-folder/2";
+const LAYOUT: u32 = 2;
 
 /// What is tried.
 ///
@@ -103,25 +103,16 @@ impl<'a> Withheld<'a> {
     ///
     /// [`WithheldError`]: a folder of another call, a place that cannot be written.
     pub fn seal(self, path: &Path, progress: &Progress) -> Result<Sealed<'a>, WithheldError> {
-        let manifest = self.manifest();
-        let folder = match Folder::open(path, &manifest)? {
-            Some(folder) => folder,
-            None => self.fill(path, &manifest, progress)?,
-        };
+        let fill = |filling: &Filling<'_>| self.fill(filling, progress);
+        let folder = Folder::open(path, &self.manifest(), fill)?;
         Ok(Sealed {
             trials: self,
             folder,
         })
     }
 
-    fn fill(
-        &self,
-        path: &Path,
-        manifest: &Map<String, Value>,
-        progress: &Progress,
-    ) -> Result<Folder, WithheldError> {
+    fn fill(&self, filling: &Filling<'_>, progress: &Progress) -> Result<(), WithheldError> {
         let Settings { trials, seed, .. } = self.settings;
-        let filling = Filling::new(path)?;
         let stage = progress.stage("seal", trials);
         let mut dealer = Noise::new(seed, "withheld kinds", 0).source("deal");
         let kinds = deal(&self.settings.kinds, trials, |n| index(&mut dealer, n));
@@ -140,33 +131,25 @@ impl<'a> Withheld<'a> {
             let effects: Vec<&Vec<String>> = keys.iter().map(|key| &key.effects).collect();
             filling.left_out(&effects)?;
         }
-        filling.finish(&keys, manifest)
+        Ok(filling.keys(&keys)?)
     }
 
     /// What the trials depend on.
-    fn manifest(&self) -> Map<String, Value> {
+    fn manifest(&self) -> Manifest {
         let study = self.urn.study();
         let settings = &self.settings;
         let kinds: Vec<&str> = settings.kinds.iter().map(|kind| kind.id()).collect();
-        let entries = [
-            ("schema", SCHEMA.into()),
-            ("version", env!("CARGO_PKG_VERSION").into()),
-            ("twin", study.name().into()),
-            ("trials", settings.trials.into()),
-            ("seed", settings.seed.into()),
-            ("kinds", json!(kinds)),
-            ("without", settings.without.into()),
-            ("validation", settings.validation.into()),
-            ("detection_only", settings.detection_only.into()),
-            // A file that was read can be written.
-            (
-                "study",
-                toml::to_string(study.file()).unwrap_or_default().into(),
-            ),
-        ];
-        (entries.into_iter())
-            .map(|(key, value)| (key.to_owned(), value))
-            .collect()
+        // A file that was read can be written.
+        let file = toml::to_string(study.file()).unwrap_or_default();
+        Manifest::new("withheld", LAYOUT)
+            .with("twin", study.name())
+            .with("trials", settings.trials)
+            .with("seed", settings.seed)
+            .with("kinds", json!(kinds))
+            .with("without", settings.without)
+            .with("validation", settings.validation)
+            .with("detection_only", settings.detection_only)
+            .with("study", file)
     }
 }
 
@@ -190,42 +173,70 @@ impl Sealed<'_> {
     ///
     /// [`WithheldError`]: files that cannot be read or written, keys that are not those that were sealed, a stop.
     pub fn score(&self, progress: &Progress) -> Result<Scorecard, WithheldError> {
-        let Settings {
-            trials,
-            seed,
-            without,
-            ..
-        } = self.trials.settings;
-        let left_out = match without {
-            true => self.folder.left_out(trials)?,
-            false => vec![vec![]; trials],
-        };
-        let answers = self.each(
-            "trials",
-            ANSWERS,
-            progress,
-            |a: &Answer| a.trial,
+        let answers = self.answer(Share::WHOLE, progress)?;
+        let opened = self.open(Share::WHOLE, progress)?;
+        let keys = self.folder.keys(self.trials.settings.trials)?;
+        let without = self.trials.settings.without;
+        let rows: Vec<Row> = (keys.iter().zip(&answers).zip(&opened))
+            .map(|((truth, answer), opened)| Row::new(truth, answer, opened, without))
+            .collect();
+        let twin = self.trials.urn.study().name();
+        let alpha = DiagnoseSettings::default().alpha;
+        let seed = self.trials.settings.seed;
+        Ok(Scorecard::new(twin, seed, alpha, self.seal(), rows))
+    }
+
+    /// Diagnoses the records of a share that have no answer yet; returns all answers that are there then.
+    ///
+    /// # Errors
+    ///
+    /// As [`score`](Self::score).
+    pub fn answer(&self, share: Share, progress: &Progress) -> Result<Vec<Answer>, WithheldError> {
+        let left_out = self.left_out()?;
+        self.pieces(ANSWERS, share).all(
+            &progress.stage("trials", self.trials.settings.trials),
+            |_: &Answer| Ok(()),
             |trial| {
                 let (record, validation) = self.records(trial)?;
                 let settings = self.diagnosis(trial, left_out[trial].clone());
                 let study = self.trials.urn.study();
-                Ok(Answer::of(
+                let answer = Answer::of(
                     trial,
                     study,
                     record,
                     validation.as_ref(),
                     &settings,
                     progress,
-                )?)
+                );
+                Ok::<_, WithheldError>(answer?)
             },
-        )?;
+        )
+    }
+
+    /// Works out what the opened keys of a share add, where that has not been done; how many trials are finished then.
+    ///
+    /// # Errors
+    ///
+    /// As [`score`](Self::score); [`WithheldError::Unanswered`] before every answer is there, whatever the share.
+    pub fn open_keys(&self, share: Share, progress: &Progress) -> Result<usize, WithheldError> {
+        Ok(self.open(share, progress)?.len())
+    }
+
+    fn open(&self, share: Share, progress: &Progress) -> Result<Vec<Opened>, WithheldError> {
+        let Settings { trials, seed, .. } = self.trials.settings;
+        let answers: Vec<Answer> = self.pieces(ANSWERS, share).kept(|_| Ok(()))?;
+        if answers.len() < trials {
+            return Err(WithheldError::Unanswered {
+                there: answers.len(),
+                of: trials,
+            });
+        }
         // Every answer is there: now, and not before, the keys.
         let keys = self.folder.keys(trials)?;
-        let opened = self.each(
-            "open",
-            OPENED,
-            progress,
-            |o: &Opened| o.trial,
+        let left_out = self.left_out()?;
+        self.pieces(OPENED, share).all(
+            &progress.stage("open", trials),
+            |_: &Opened| Ok(()),
             |trial| {
                 Opened::of(
                     &self.trials.urn,
@@ -237,49 +248,32 @@ impl Sealed<'_> {
                     progress,
                 )
             },
-        )?;
-        let rows: Vec<Row> = (keys.iter().zip(&answers).zip(&opened))
-            .map(|((truth, answer), opened)| Row::new(truth, answer, opened, without))
-            .collect();
-        let twin = self.trials.urn.study().name();
-        let alpha = DiagnoseSettings::default().alpha;
-        Ok(Scorecard::new(twin, seed, alpha, self.seal(), rows))
+        )
     }
 
     /// Puts a result into the folder, in place of an earlier one.
     pub fn write(&self, name: &str, text: &str) -> Result<(), WithheldError> {
-        self.folder.write(name, text)
+        Ok(self.folder.work.write(name, text)?)
     }
 
-    /// Something of every trial, in order: kept, or made and kept.
-    fn each<T: serde::Serialize + serde::de::DeserializeOwned + Send>(
-        &self,
-        stage: &'static str,
-        what: &str,
-        progress: &Progress,
-        number: impl Fn(&T) -> usize,
-        make: impl Fn(usize) -> Result<T, WithheldError> + Sync,
-    ) -> Result<Vec<T>, WithheldError> {
-        let trials = self.trials.settings.trials;
-        let stage = progress.stage(stage, trials);
-        let (mut all, mut missing) = (Vec::with_capacity(trials), vec![]);
-        for trial in 0..trials {
-            match self.folder.kept(what, trial, &number)? {
-                Some(kept) => {
-                    all.push(kept);
-                    stage.tick()?;
-                }
-                None => missing.push(trial),
-            }
+    fn pieces(&self, part: &'static str, share: Share) -> Pieces<'_> {
+        Pieces {
+            folder: Some(&self.folder.work),
+            part,
+            count: self.trials.settings.trials,
+            share,
         }
-        all.extend(share_out(&missing, |trial| {
-            let made = make(trial)?;
-            self.folder.keep(what, trial, &made)?;
-            stage.tick()?;
-            Ok::<_, WithheldError>(made)
-        })?);
-        all.sort_by_key(|one| number(one));
-        Ok(all)
+    }
+
+    /// The effects that each trial's library does without.
+    fn left_out(&self) -> Result<Vec<Vec<String>>, WithheldError> {
+        let Settings {
+            trials, without, ..
+        } = self.trials.settings;
+        match without {
+            true => self.folder.left_out(trials),
+            false => Ok(vec![vec![]; trials]),
+        }
     }
 
     fn records(&self, trial: usize) -> Result<(Record, Option<Record>), WithheldError> {
@@ -303,6 +297,18 @@ impl Sealed<'_> {
             detection_only: self.trials.settings.detection_only,
             ..DiagnoseSettings::default()
         }
+    }
+}
+
+impl Piece for Answer {
+    fn number(&self) -> usize {
+        self.trial
+    }
+}
+
+impl Piece for Opened {
+    fn number(&self) -> usize {
+        self.trial
     }
 }
 

@@ -52,13 +52,28 @@ fn trials_are_gone_on_with_and_keys_stay_as_they_were_sealed() {
     );
     fs::copy(path.join("answers/0000.json"), &answer).unwrap();
     let error = score().unwrap_err().to_string();
-    assert!(error.contains("another trial"), "{error}");
+    assert!(error.contains("its number"), "{error}");
     fs::remove_file(&answer).unwrap();
     fs::write(path.join("keys.json"), [&keys[..], b" "].concat()).unwrap();
     let error = score().unwrap_err().to_string();
     assert!(error.contains("SHA-256"), "{error}");
     // The answer was given before the key was looked at.
     assert!(answer.exists());
+}
+
+#[test]
+fn keys_stay_sealed_until_every_share_has_answered() {
+    let study = oscillator();
+    let place = tempfile::tempdir().unwrap();
+    let sealed = sealed(&study, two(), &place.path().join("trials")).unwrap();
+    let silent = Progress::silent();
+    let [first, second] = ["1/2", "2/2"].map(|share| share.parse().unwrap());
+    assert_eq!(sealed.answer(first, &silent).unwrap().len(), 1);
+    let error = sealed.open_keys(first, &silent).unwrap_err().to_string();
+    assert!(error.contains("1 of 2 answers"), "{error}");
+    assert_eq!(sealed.answer(second, &silent).unwrap().len(), 2);
+    assert_eq!(sealed.open_keys(first, &silent).unwrap(), 1);
+    assert_eq!(sealed.score(&silent).unwrap().rows.len(), 2);
 }
 
 #[test]

@@ -51,8 +51,15 @@ pub(crate) fn share_out<T: Send, E: Send + From<ThreadPoolBuildError>>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::MonteCarloError;
     use crate::progress::Cancelled;
+
+    #[derive(Debug, thiserror::Error)]
+    enum Stop {
+        #[error(transparent)]
+        Threads(#[from] ThreadPoolBuildError),
+        #[error(transparent)]
+        Cancelled(#[from] Cancelled),
+    }
 
     #[test]
     fn every_item_is_done_once_whatever_the_threads() {
@@ -60,7 +67,7 @@ mod tests {
             let pool = ThreadPoolBuilder::new().num_threads(threads).build();
             let mut done = pool.unwrap().install(|| {
                 share_out(&[4, 5, 6, 7, 8], |i| {
-                    Ok::<_, MonteCarloError>((i, rayon::current_num_threads()))
+                    Ok::<_, Stop>((i, rayon::current_num_threads()))
                 })
                 .unwrap()
             });
@@ -70,18 +77,18 @@ mod tests {
             let most = threads.div_ceil(threads.min(5));
             assert!(done.iter().all(|d| (1..=most).contains(&d.1)), "{done:?}");
         }
-        assert!(share_out(&[], Ok::<_, MonteCarloError>).unwrap().is_empty());
+        assert!(share_out(&[], Ok::<_, Stop>).unwrap().is_empty());
     }
 
     #[test]
     fn an_error_ends_the_work() {
         let begun = AtomicUsize::new(0);
         let items: Vec<usize> = (0..1000).collect();
-        let result = share_out(&items, |_| -> Result<(), MonteCarloError> {
+        let result = share_out(&items, |_| -> Result<(), Stop> {
             begun.fetch_add(1, Ordering::Relaxed);
             Err(Cancelled.into())
         });
-        assert!(matches!(result, Err(MonteCarloError::Cancelled(_))));
+        assert!(matches!(result, Err(Stop::Cancelled(_))));
         assert!(begun.into_inner() <= rayon::current_num_threads());
     }
 }

@@ -1,0 +1,326 @@
+//! A folder that keeps finished pieces of long work.
+
+use super::Manifest;
+use crate::files::{NewFolder, folder, replace, with_remedy, write_new};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::io;
+use std::path::{Path, PathBuf};
+
+const MANIFEST: &str = "manifest.json";
+
+/// A folder with the pieces of one call, which can be interrupted and gone on with, also by several processes at once.
+///
+/// | file | holds |
+/// |---|---|
+/// | `manifest.json` | what the pieces depend on; another call that differs is refused |
+/// | `PART/0000.json`, … | a piece each; appears whole when it is done |
+/// | anything else | what the work starts from, and results made of the pieces |
+#[derive(Debug, Clone)]
+pub struct WorkFolder {
+    path: PathBuf,
+    verb: &'static str,
+}
+
+/// Why a folder of work cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum WorkError {
+    /// Something cannot be read or written.
+    #[error("{}: {}", path.display(), with_remedy(error))]
+    Io {
+        /// File or folder.
+        path: PathBuf,
+        /// What the system said.
+        error: io::Error,
+    },
+    /// There is no place for it.
+    #[error("{}: the folder {} does not exist; make it first", path.display(), folder(path).display())]
+    Place {
+        /// Folder.
+        path: PathBuf,
+    },
+    /// The path is taken by something else.
+    #[error(
+        "{} exists already and is no folder of `{verb}`; choose another --out, or remove it",
+        path.display()
+    )]
+    Foreign {
+        /// Folder.
+        path: PathBuf,
+        /// What was to go on with it.
+        verb: &'static str,
+    },
+    /// The folder is of another call.
+    #[error(
+        "{} holds the work of another call: {difference}; repeat that call to go on with it, or choose another --out",
+        path.display()
+    )]
+    Other {
+        /// Folder.
+        path: PathBuf,
+        /// What is different.
+        difference: String,
+    },
+    /// A piece that this work did not make.
+    #[error("{}: cannot be used ({reason}); remove it, and it is made again", path.display())]
+    Piece {
+        /// File.
+        path: PathBuf,
+        /// What does not fit.
+        reason: String,
+    },
+}
+
+impl WorkError {
+    /// What the system said about a path.
+    pub fn io(path: &Path, error: io::Error) -> Self {
+        Self::Io {
+            path: path.into(),
+            error,
+        }
+    }
+}
+
+/// A folder of work that is not in its place yet.
+pub struct NewWork<'a> {
+    filling: NewFolder,
+    place: &'a Path,
+}
+
+impl NewWork<'_> {
+    /// Adds a file that the work starts from.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError::Io`].
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), WorkError> {
+        std::fs::write(self.filling.file(name), bytes)
+            .map_err(|error| WorkError::io(&self.place.join(name), error))
+    }
+}
+
+impl WorkFolder {
+    /// Goes on with the folder that the same call made; or makes it, with a folder for each of `parts` and what `fill` adds.
+    ///
+    /// The folder appears whole. Of several processes that make it at once, one wins, and all go on with its folder.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError`]: a path that is taken, a folder of another call, a place that cannot be written; and those of `fill`.
+    pub fn open<E: From<WorkError>>(
+        path: &Path,
+        manifest: &Manifest,
+        parts: &[&str],
+        fill: impl FnOnce(&NewWork<'_>) -> Result<(), E>,
+    ) -> Result<Self, E> {
+        if path.symlink_metadata().is_err() {
+            if !folder(path).is_dir() {
+                return Err(WorkError::Place { path: path.into() }.into());
+            }
+            let failed = |error| WorkError::io(path, error);
+            let new = NewWork {
+                filling: NewFolder::new(path).map_err(failed)?,
+                place: path,
+            };
+            for part in parts {
+                std::fs::create_dir(new.filling.file(part)).map_err(failed)?;
+            }
+            fill(&new)?;
+            new.write(MANIFEST, manifest.text().as_bytes())?;
+            match new.filling.finish() {
+                Err(error) if !taken(&error) => return Err(failed(error).into()),
+                _ => {}
+            }
+        }
+        let (found, there) = Self::find(path, manifest.verb())?;
+        match manifest.differs(&there) {
+            None => Ok(found),
+            Some(difference) => Err(WorkError::Other {
+                path: path.into(),
+                difference,
+            }
+            .into()),
+        }
+    }
+
+    /// The folder at a path, whatever call of `verb` made it.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError::Foreign`] for anything else.
+    pub fn find(path: &Path, verb: &'static str) -> Result<(Self, Manifest), WorkError> {
+        let text = std::fs::read_to_string(path.join(MANIFEST)).ok();
+        let found = text.and_then(|text| Manifest::parse(verb, &text));
+        let path = path.to_owned();
+        match found {
+            Some(manifest) => Ok((Self { path, verb }, manifest)),
+            None => Err(WorkError::Foreign { path, verb }),
+        }
+    }
+
+    /// Where it lies.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What makes such folders.
+    pub fn verb(&self) -> &'static str {
+        self.verb
+    }
+
+    /// Where a file of the folder lies.
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+
+    /// Writes a result, in place of an earlier one.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError::Io`].
+    pub fn write(&self, name: &str, text: &str) -> Result<(), WorkError> {
+        let path = self.file(name);
+        replace(&path, text.as_bytes()).map_err(|error| WorkError::io(&path, error))
+    }
+
+    /// A file of the folder as text.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError::Io`].
+    pub fn read(&self, name: &str) -> Result<String, WorkError> {
+        let path = self.file(name);
+        std::fs::read_to_string(&path).map_err(|error| WorkError::io(&path, error))
+    }
+
+    fn piece(&self, part: &str, number: usize) -> PathBuf {
+        self.file(part).join(format!("{number:04}.json"))
+    }
+
+    /// Piece `number` of a part, if it was kept; `fits` says what is wrong with it.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError::Io`]; [`WorkError::Piece`] for a file that is no such piece.
+    pub fn kept<T: DeserializeOwned>(
+        &self,
+        part: &str,
+        number: usize,
+        fits: impl FnOnce(&T) -> Result<(), &'static str>,
+    ) -> Result<Option<T>, WorkError> {
+        let path = self.piece(part, number);
+        let text = match std::fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(WorkError::io(&path, error)),
+        };
+        let wrong = |reason: String| WorkError::Piece {
+            path: path.clone(),
+            reason,
+        };
+        let found: T = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        fits(&found).map_err(|reason| wrong(reason.into()))?;
+        Ok(Some(found))
+    }
+
+    /// Keeps piece `number` of a part; where another process has kept it in the meantime, that one stays.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError::Io`].
+    pub fn keep<T: Serialize>(
+        &self,
+        part: &str,
+        number: usize,
+        piece: &T,
+    ) -> Result<(), WorkError> {
+        let path = self.piece(part, number);
+        let written = serde_json::to_string_pretty(piece)
+            .map_err(io::Error::from)
+            .and_then(|text| write_new(&path, format!("{text}\n").as_bytes()));
+        match written {
+            Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
+                Err(WorkError::io(&path, error))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Whether another process was faster to put a folder in its place.
+fn taken(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        io::ErrorKind::AlreadyExists | io::ErrorKind::DirectoryNotEmpty
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn manifest(runs: u32) -> Manifest {
+        Manifest::new("reproduce", 1).with("runs", runs)
+    }
+
+    fn open(path: &Path, runs: u32) -> Result<WorkFolder, WorkError> {
+        WorkFolder::open(path, &manifest(runs), &["runs"], |new| {
+            new.write("start.txt", b"a")
+        })
+    }
+
+    #[test]
+    fn pieces_are_kept_whole_and_found_again() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("work");
+        let folder = open(&path, 2).unwrap();
+        let any = |_: &Vec<u32>| Ok(());
+        assert_eq!(folder.kept("runs", 1, any).unwrap(), None);
+        folder.keep("runs", 1, &vec![1, 2]).unwrap();
+        folder.keep("runs", 1, &vec![3]).unwrap();
+        let again = open(&path, 2).unwrap();
+        assert_eq!(again.kept("runs", 1, any).unwrap(), Some(vec![1, 2]));
+        let refused = |_: &Vec<u32>| Err("it is odd");
+        let error = again.kept("runs", 1, refused).unwrap_err().to_string();
+        assert!(
+            error.contains("0001.json") && error.contains("it is odd"),
+            "{error}"
+        );
+        fs::write(path.join("runs/0001.json"), "[1, ").unwrap();
+        let error = again.kept("runs", 1, any).unwrap_err().to_string();
+        assert!(error.contains("remove it"), "{error}");
+    }
+
+    #[test]
+    fn other_folders_are_refused_and_nothing_is_left_over() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("work");
+        open(&path, 2).unwrap();
+        let refused = |path: &Path, runs| open(path, runs).unwrap_err().to_string();
+        assert!(refused(&path, 3).contains("runs was 2, now it is 3"));
+        assert!(refused(place.path(), 2).contains("no folder of `reproduce`"));
+        assert!(refused(&place.path().join("a/b"), 2).contains("make it first"));
+        let failed: Result<_, WorkError> =
+            WorkFolder::open(&place.path().join("new"), &manifest(1), &[], |_| {
+                Err(WorkError::io(Path::new("x"), io::Error::other("full")))
+            });
+        assert!(failed.is_err());
+        assert_eq!(fs::read_dir(place.path()).unwrap().count(), 1);
+    }
+
+    /// Many processes begin at once: all end up in one folder.
+    #[test]
+    fn who_comes_second_goes_on_with_the_folder_of_the_first() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("work");
+        std::thread::scope(|scope| {
+            let all: Vec<_> = (0..8).map(|_| scope.spawn(|| open(&path, 2))).collect();
+            for one in all {
+                one.join().unwrap().unwrap();
+            }
+        });
+        assert_eq!(fs::read_dir(place.path()).unwrap().count(), 1);
+        assert_eq!(fs::read_to_string(path.join("start.txt")).unwrap(), "a");
+    }
+}

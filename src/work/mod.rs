@@ -1,0 +1,24 @@
+//! Long work: shared out to threads and processes, kept piece by piece, gone on with after an interruption.
+//!
+//! Work is *numbered*: piece k depends on its number and the call alone, so that who does it, when, and how often it was
+//! interrupted changes nothing.
+//!
+//! | to … | look at |
+//! |---|---|
+//! | keep finished pieces in a folder, and go on with it | [`WorkFolder`], [`Manifest`] |
+//! | do a part of the pieces: of a job array, of the ranks of a cluster | [`Share`] |
+//! | wait for the other ranks | [`Team`] |
+
+mod crew;
+mod folder;
+mod manifest;
+mod pieces;
+mod share;
+mod team;
+
+pub(crate) use crew::share_out;
+pub use folder::{NewWork, WorkError, WorkFolder};
+pub use manifest::{Manifest, checksum};
+pub(crate) use pieces::{Piece, Pieces};
+pub use share::{Share, ShareError};
+pub use team::{Team, TeamError};
