@@ -2,28 +2,18 @@
 //! by hand. `RAYON_NUM_THREADS=1 cargo bench --bench bank`.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use std::borrow::Cow;
 use std::hint::black_box;
-use std::sync::Arc;
 use std::time::Duration;
-use truetwin::bank::{Draw, FeatureSimulator};
 use truetwin::feature::{Ar, Arx, FeatureRecipe};
 use truetwin::progress::Progress;
-use truetwin::study::RecordPlan;
+use truetwin::shards::Prior;
+use truetwin::study::{RecordPlan, Study};
 use truetwin::twin::{DigitalTwin, Drive, Noise};
 use truetwin::twins::{CascadedTanks, VanDerPol};
 
 /// Simulations an iteration.
 const BANK: usize = 200;
 const THETA: [f64; 4] = [0.6, 0.5, 0.55, 1.0];
-
-/// Name, twin, what records look like, features.
-type Case<'a> = (
-    &'a str,
-    &'a Arc<dyn DigitalTwin>,
-    &'a RecordPlan,
-    &'a dyn FeatureRecipe,
-);
 
 /// Draws from the prior, each with its own input, as pretraining does.
 fn bank(c: &mut Criterion) {
@@ -33,12 +23,12 @@ fn bank(c: &mut Criterion) {
         outputs: lags,
         inputs: lags,
     };
-    let oscillator: Arc<dyn DigitalTwin> = Arc::new(VanDerPol);
-    let tanks: Arc<dyn DigitalTwin> = Arc::new(CascadedTanks);
-    let cases: [Case; 3] = [
-        ("van der Pol, AR(5)", &oscillator, &free, &Ar { order: 5 }),
-        ("tanks, ARX(8, 8)", &tanks, &staircase, &arx(8)),
-        ("tanks, ARX(64, 64)", &tanks, &staircase, &arx(64)),
+    let oscillator = Study::new("oscillator", VanDerPol, free).expect("a plan of this twin");
+    let tanks = Study::new("tanks", CascadedTanks, staircase).expect("a plan of this twin");
+    let cases: [(&str, &Study, &dyn FeatureRecipe); 3] = [
+        ("van der Pol, AR(5)", &oscillator, &Ar { order: 5 }),
+        ("tanks, ARX(8, 8)", &tanks, &arx(8)),
+        ("tanks, ARX(64, 64)", &tanks, &arx(64)),
     ];
     let mut group = c.benchmark_group("bank");
     group
@@ -46,25 +36,11 @@ fn bank(c: &mut Criterion) {
         .sample_size(20)
         .warm_up_time(Duration::from_millis(500))
         .measurement_time(Duration::from_secs(3));
-    for (name, twin, plan, features) in cases {
-        let drives = plan.prepare(&twin.signals()).expect("a plan of this twin");
-        let simulator = FeatureSimulator::new(twin.clone(), features).expect("fits the twin");
-        let space = twin.parameters();
+    for (name, study, features) in cases {
+        let prior = Prior::new(study, features).expect("fits the twin");
         let stage = Progress::silent().stage("bank", BANK);
         group.bench_function(name, |b| {
-            b.iter(|| {
-                simulator.draws(
-                    BANK,
-                    |i| Noise::new(1, "bench", i),
-                    |_, _, noise| {
-                        Ok(Some(Draw {
-                            theta: space.draw_prior(noise),
-                            drive: Cow::Owned(drives.draw(noise).expect("levels are finite")),
-                        }))
-                    },
-                    &stage,
-                )
-            })
+            b.iter(|| prior.rows(0..BANK as u64, 1, "bench", &stage))
         });
     }
     group.finish();

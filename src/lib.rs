@@ -56,6 +56,8 @@ pub mod refine;
 pub mod sample;
 pub mod study;
 
+pub mod shards;
+
 pub mod two_stage;
 
 pub mod baseline;

@@ -42,6 +42,13 @@ pub(super) enum Command {
     Check(Subject),
     /// Simulate a record.
     Simulate(SimulateOptions),
+    /// Simulate a bank from the prior onto the disk; run again, it goes on where it stopped.
+    ///
+    /// DIR holds manifest.json and shards/*.npz, each shard with `theta` and `features`, for `pretrain --bank DIR` or numpy.load.
+    /// Row i depends on the seed and i alone: any number of threads, jobs (--shard) and ranks (mpirun) makes the same bytes.
+    Bank(BankArguments),
+    /// Put the banks of a job array together, or turn a bank into one .npz or .csv file.
+    Merge(MergeArguments),
     /// Simulate a bank from the prior, train the network, write one estimator file.
     Pretrain(PretrainArguments),
     /// Estimate the parameters behind a measured record.
@@ -73,15 +80,16 @@ pub(super) enum Command {
 impl Command {
     /// Whether the ranks of a cluster share the work of this verb.
     pub fn is_shared_out(&self) -> bool {
-        matches!(self, Self::Reproduce(_) | Self::Withheld(_))
+        matches!(self, Self::Bank(_) | Self::Reproduce(_) | Self::Withheld(_))
     }
 
     /// The study file of the call, if it has one.
     pub fn study(&self) -> Option<&Path> {
         let subject = match self {
-            Self::Twins | Self::Estimate(_) | Self::Demo(_) => return None,
+            Self::Twins | Self::Merge(_) | Self::Estimate(_) | Self::Demo(_) => return None,
             Self::Effects(subject) | Self::Check(subject) => subject,
             Self::Simulate(options) => &options.subject,
+            Self::Bank(options) => &options.subject,
             Self::Pretrain(options) => &options.subject,
             Self::Diagnose(options) => &options.subject,
             Self::Reproduce(options) => &options.subject,
@@ -142,6 +150,39 @@ impl From<PresetArgument> for PresetName {
 }
 
 #[derive(Debug, Args)]
+#[command(after_help = "A job array of four, then one bank:\n  \
+        truetwin bank --twin tanks --size 1000000 --shard $I/4 --out bank-$I\n  \
+        truetwin merge bank-1 bank-2 bank-3 bank-4 --out bank\n  \
+        truetwin pretrain --twin tanks --bank bank --out tanks.est\n\
+        On a shared file system all jobs may name one DIR, and nothing is to be merged. See docs/scaling.md.")]
+pub(super) struct BankArguments {
+    #[command(flatten)]
+    pub subject: Subject,
+    /// Simulations.
+    #[arg(long, value_name = "M", value_parser = at_least_one)]
+    pub size: usize,
+    /// A folder for the shards: a new one, or one of this very call to go on with.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Only part i of n of the shards, for job arrays that count from 0 or from 1.
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<Share>,
+    /// Whose features.
+    #[arg(long, value_enum, default_value = "default")]
+    pub preset: PresetArgument,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct MergeArguments {
+    /// Folders of one call of `truetwin bank`.
+    #[arg(value_name = "DIR", required = true)]
+    pub from: Vec<PathBuf>,
+    /// A new folder for the bank, or a file with the name of an .npz or .csv.
+    #[arg(long, value_name = "OUT")]
+    pub out: PathBuf,
+}
+
+#[derive(Debug, Args)]
 pub(super) struct PretrainArguments {
     #[command(flatten)]
     pub subject: Subject,
@@ -151,6 +192,9 @@ pub(super) struct PretrainArguments {
     /// Simulations to train on; the preset's unless given.
     #[arg(long, value_name = "M")]
     pub bank_size: Option<usize>,
+    /// A bank to train on, instead of simulating one: a folder of `truetwin bank`, or an .npz or .csv file of theta and features.
+    #[arg(long, value_name = "BANK", conflicts_with = "bank_size")]
+    pub bank: Option<PathBuf>,
     /// Passes over the bank; the preset's unless given.
     #[arg(long)]
     pub epochs: Option<usize>,

@@ -1,6 +1,7 @@
 //! From any error to one line and an exit code.
 
 use crate::bank::BankError;
+use crate::bank::file::BankFileError;
 use crate::diagnose::DiagnoseError;
 use crate::effect::EffectFileError;
 use crate::experiment::{MonteCarloError, ScenarioError};
@@ -8,6 +9,7 @@ use crate::feature::FeatureError;
 use crate::gate::GateError;
 use crate::network::NetworkError;
 use crate::refine::RefineError;
+use crate::shards::{PriorError, ShardsError};
 use crate::study::{PlanError, StudyError};
 use crate::twin::{
     AdaptationError, CsvError, DriveError, EffectError, ParameterError, RecordError,
@@ -121,6 +123,7 @@ macro_rules! users {
 }
 users!(
     AdaptationError,
+    BankFileError,
     CsvError,
     DriveError,
     EffectError,
@@ -211,10 +214,24 @@ impl From<PretrainError> for Failure {
             PretrainError::Settings(_) => Self::user(error),
             PretrainError::Plan(error) => error.into(),
             PretrainError::Feature(error) => error.into(),
+            PretrainError::File(_) | PretrainError::Memory(_) | PretrainError::Width { .. } => {
+                Self::user(error)
+            }
             PretrainError::TooManyFeatures { .. } | PretrainError::Standardise(_) => Self {
                 about_study: true,
                 ..Self::user(error)
             },
+        }
+    }
+}
+
+impl From<ShardsError> for Failure {
+    fn from(error: ShardsError) -> Self {
+        match error {
+            ShardsError::Bank(error) => error.into(),
+            ShardsError::Prior(PriorError::Feature(error)) => error.into(),
+            ShardsError::Prior(PriorError::Plan(error)) => error.into(),
+            _ => Self::user(error),
         }
     }
 }

@@ -17,12 +17,14 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod args;
+mod bank;
 mod check;
 mod demo;
 mod diagnose;
 mod effects;
 mod estimate;
 mod failure;
+mod merge;
 mod output;
 mod pretrain;
 mod progress;
@@ -122,6 +124,8 @@ fn dispatch(arguments: &Arguments, studies: &[Study], team: &Team) -> Result<Exi
         Command::Effects(subject) => effects::run(&context, subject),
         Command::Check(subject) => check::run(&context, subject),
         Command::Simulate(options) => simulate::run(&context, options),
+        Command::Bank(options) => bank::run(&context, options),
+        Command::Merge(options) => merge::run(&context, options),
         Command::Pretrain(options) => pretrain::run(&context, options),
         Command::Estimate(options) => estimate::run(&context, options),
         Command::Diagnose(options) => diagnose::run(&context, options),

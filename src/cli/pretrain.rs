@@ -2,8 +2,13 @@
 
 use super::args::PretrainArguments;
 use super::{Context, Failure, output};
-use crate::two_stage::{PretrainOptions, pretrain};
+use crate::bank::file;
+use crate::network::History;
+use crate::shards::{BankPlan, ShardedBank};
+use crate::study::Study;
+use crate::two_stage::{Estimator, PretrainOptions, pretrain, pretrain_on};
 use serde_json::json;
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -17,7 +22,10 @@ pub(super) fn run(context: &Context<'_>, options: &PretrainArguments) -> Result<
         epochs: options.epochs,
         seed: context.seed,
     };
-    let (estimator, history) = pretrain(&study, &settings, context.progress)?;
+    let (estimator, history) = match &options.bank {
+        None => pretrain(&study, &settings, context.progress)?,
+        Some(path) => from_bank(context, &study, path, &settings)?,
+    };
     estimator.save(&options.out)?;
     let seconds = clock.elapsed().as_secs_f64();
     let bank = estimator.settings().bank_size;
@@ -47,4 +55,26 @@ pub(super) fn run(context: &Context<'_>, options: &PretrainArguments) -> Result<
         ))?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Of a bank that is there.
+fn from_bank(
+    context: &Context<'_>,
+    study: &Study,
+    path: &Path,
+    settings: &PretrainOptions,
+) -> Result<(Estimator, History), Failure> {
+    if file::is_named(path) {
+        let bank = file::read(path, &study.twin().parameters().names())?;
+        return Ok(pretrain_on(study, &bank, settings, context.progress)?);
+    }
+    let bank = ShardedBank::open(path)?;
+    let plan = BankPlan {
+        study,
+        preset: settings.preset,
+        size: bank.size(),
+        seed: bank.seed(),
+    };
+    plan.check(&bank)?;
+    Ok(pretrain_on(study, &bank, settings, context.progress)?)
 }

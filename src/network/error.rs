@@ -59,6 +59,9 @@ pub enum NetworkError {
         /// The value.
         value: f64,
     },
+    /// A part of the samples cannot be read.
+    #[error("{0}")]
+    Samples(String),
     /// The loss left the finite numbers.
     #[error(
         "the loss is not finite in epoch {epoch} at learning rate {learning_rate}; \

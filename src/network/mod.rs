@@ -37,6 +37,7 @@ mod adam;
 mod architectures;
 mod dense;
 mod error;
+mod feed;
 mod first_weight;
 mod gemm;
 mod kernel;
@@ -44,6 +45,7 @@ mod loss;
 mod model;
 mod multi_head;
 mod rows;
+mod samples;
 mod settings;
 mod tensors;
 #[cfg(test)]
@@ -56,6 +58,7 @@ pub use dense::{BuiltDense, BuiltNormDense, Dense, NormDense};
 pub use error::NetworkError;
 pub use first_weight::FirstWeight;
 pub use multi_head::architecture;
+pub use samples::{Part, Samples};
 pub use settings::{History, Schedule, Training};
 pub use tensors::NamedTensor;
 
@@ -65,6 +68,7 @@ use dfdx::prelude::{
     TensorCollection,
 };
 use ndarray::Array2;
+use samples::Matrices;
 use std::fmt::Debug;
 use std::sync::Arc;
 
@@ -148,6 +152,24 @@ pub trait Architecture: Send + Sync + Debug {
         &self,
         features: &Array2<f64>,
         targets: &Array2<f64>,
+        settings: &Training,
+        seed: u64,
+        progress: &Progress,
+    ) -> Result<(Arc<dyn Network>, History), NetworkError> {
+        self.train_on(&Matrices { features, targets }, settings, seed, progress)
+    }
+
+    /// As [`train`](Self::train), on samples that need not fit into memory: of samples of more than 64 MiB that come in
+    /// several parts, no more than that are held at a time. The last parts are held out then; each epoch has the others in
+    /// an order of its own, rows in an order of their own among those that are in memory together. Fewer samples are trained
+    /// on as in [`train`](Self::train), to the same bits.
+    ///
+    /// # Errors
+    ///
+    /// As [`train`](Self::train), and [`NetworkError::Samples`] for a part that cannot be read.
+    fn train_on(
+        &self,
+        samples: &dyn Samples,
         settings: &Training,
         seed: u64,
         progress: &Progress,

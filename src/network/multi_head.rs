@@ -1,10 +1,11 @@
 //! The object-safe faces: an architecture that trains networks, and a network that predicts.
 
+use super::feed::{Data, Feed};
 use super::model::{self, Model, ModelOf};
 use super::rows::Rows;
-use super::train::{Data, Purpose, derive, train};
+use super::train::{Purpose, derive, train};
 use super::{
-    Architecture, HeadArchitecture, History, NamedTensor, Network, NetworkError, Training,
+    Architecture, HeadArchitecture, History, NamedTensor, Network, NetworkError, Samples, Training,
 };
 use crate::progress::Progress;
 use dfdx::prelude::ConstDim;
@@ -61,18 +62,26 @@ impl<A: HeadArchitecture> Architecture for Of<A> {
         A::Features::SIZE
     }
 
-    fn train(
+    fn train_on(
         &self,
-        features: &Array2<f64>,
-        targets: &Array2<f64>,
+        samples: &dyn Samples,
         settings: &Training,
         seed: u64,
         progress: &Progress,
     ) -> Result<(Arc<dyn Network>, History), NetworkError> {
-        let mut network = Self::build(features.ncols(), targets.ncols(), seed)?;
-        let data = network.data(features, targets)?;
-        let history = train(&mut network.model, &data, settings, seed, progress, "train")?;
-        Ok((Arc::new(network), history))
+        settings.validate()?;
+        let network = Self::build(samples.features(), samples.targets(), seed)?;
+        let read = |index: usize| {
+            let part = samples.part(index);
+            let (features, targets) = part.map_err(|e| NetworkError::Samples(e.to_string()))?;
+            network.data(&features, &targets)
+        };
+        let width = A::Features::SIZE + samples.targets();
+        let feed = Feed::new(&samples.parts(), width, &read, settings.holdout, seed)?;
+        let mut model = network.model.clone();
+        let history = train(&mut model, &feed, settings, seed, progress, "train")?;
+        let inputs = network.inputs;
+        Ok((Arc::new(MultiHead::<A> { inputs, model }), history))
     }
 
     fn restore(
@@ -156,15 +165,20 @@ impl<A: HeadArchitecture> Network for MultiHead<A> {
         seed: u64,
         progress: &Progress,
     ) -> Result<(Arc<dyn Network>, History), NetworkError> {
-        let Data { features, targets } = self.data(features, targets)?;
-        let data = Data {
-            features: self.model.hidden(&features)?,
-            targets,
+        settings.validate()?;
+        let read = |_: usize| {
+            let Data { features, targets } = self.data(features, targets)?;
+            Ok(Data {
+                features: self.model.hidden(&features)?,
+                targets,
+            })
         };
+        let width = A::Hidden::SIZE + targets.ncols();
+        let feed = Feed::new(&[features.nrows()], width, &read, settings.holdout, seed)?;
         // Heads alone are a model too, with a trunk that does nothing.
         let heads = self.model.heads.clone();
         let mut heads = Model::<A::Hidden, A::Hidden, (), _>::new((), heads);
-        let history = train(&mut heads, &data, settings, seed, progress, "tune")?;
+        let history = train(&mut heads, &feed, settings, seed, progress, "tune")?;
         let tuned = Self {
             inputs: self.inputs,
             model: Model::new(self.model.trunk.clone(), heads.heads),

@@ -44,6 +44,12 @@ impl Rows {
         Ok(Self { width, numbers })
     }
 
+    /// Adds the rows of another matrix of the same width.
+    pub(super) fn append(&mut self, other: Self) {
+        debug_assert_eq!(self.width, other.width);
+        self.numbers.extend(other.numbers);
+    }
+
     pub(super) fn len(&self) -> usize {
         self.numbers.len() / self.width
     }

@@ -1,15 +1,12 @@
 //! The training loop.
 
 use super::adam::Adam;
+use super::feed::{Block, Feed};
 use super::loss::Loss;
 use super::model::Model;
-use super::rows::Rows;
 use super::{FirstWeight, History, Layers, NamedTensor, NetworkError, Training};
 use crate::progress::Progress;
 use dfdx::prelude::{Backward, Const, ConstDim, Cpu};
-use rand::SeedableRng;
-use rand::seq::SliceRandom;
-use rand_chacha::ChaCha8Rng;
 
 /// What a number drawn from the seed is for; each purpose has draws of its own.
 #[derive(Clone, Copy)]
@@ -32,12 +29,6 @@ pub(super) fn derive(seed: u64, purpose: Purpose, counter: u64) -> u64 {
     scramble(scramble(scramble(seed) ^ purpose as u64) ^ counter)
 }
 
-/// Samples to learn from: one row of features and one of targets each.
-pub(super) struct Data {
-    pub(super) features: Rows,
-    pub(super) targets: Rows,
-}
-
 /// The weights that did best on the held-out rows so far.
 struct Best<M> {
     error: f64,
@@ -45,10 +36,11 @@ struct Best<M> {
     model: M,
 }
 
-/// Trains `model` in place; where rows are held out, it ends with the weights that were best on them.
+/// Trains `model` in place; where rows are held out, it ends with the weights that were best on them. One tick of the stage a
+/// block.
 pub(super) fn train<I, K, T, H>(
     model: &mut Model<I, K, T, H>,
-    data: &Data,
+    feed: &Feed<'_>,
     settings: &Training,
     seed: u64,
     progress: &Progress,
@@ -60,58 +52,57 @@ where
     T: Layers<I, K>,
     H: Layers<K, Const<1>> + FirstWeight<K>,
 {
-    settings.validate()?;
     let loss = Loss {
         weights: settings.weights_for(model.heads.len())?,
         delta: settings.huber_delta as f32,
         orthogonality: settings.orthogonality as f32,
     };
-    let (mut rows, held_out) = split(data.targets.len(), settings.holdout, seed)?;
-    let held_out = Data {
-        features: data.features.select(&held_out),
-        targets: data.targets.select(&held_out),
-    };
     let mut adam = Adam::new(settings.weight_decay);
     let mut history = History::default();
     let mut best: Option<Best<_>> = None;
     let mut step = 0;
-    let stage = progress.stage(stage, settings.epochs);
+    let rows = feed.rows() as f64;
+    let blocks = feed.blocks(0, seed).len();
+    let stage = progress.stage(stage, settings.epochs * blocks);
     for epoch in 0..settings.epochs {
         let learning_rate = settings.rate(epoch);
         let diverged = NetworkError::Diverged {
             epoch: epoch + 1,
             learning_rate,
         };
-        // Each epoch orders the rows anew from their first order, so that an epoch depends on its number alone.
-        rows.sort_unstable();
-        let order = derive(seed, Purpose::Shuffle, epoch as u64);
-        rows.shuffle(&mut ChaCha8Rng::seed_from_u64(order));
-
         let mut total = 0.0;
-        for batch in rows.chunks(settings.batch) {
-            let device = Cpu::seed_from_u64(derive(seed, Purpose::Dropout, step));
-            step += 1;
-            let predictions = model.forward_taped(data.features.gather(batch), &device)?;
-            let targets = data.targets.gather(batch);
-            let (error, taped) = loss.taped(predictions, &targets, &model.heads)?;
-            if !error.is_finite() {
-                return Err(diverged);
+        for (number, parts) in feed.blocks(epoch, seed).iter().enumerate() {
+            if number > 0 {
+                stage.tick()?;
             }
-            total += error * batch.len() as f64;
-            let mut gradients = taped.try_backward()?;
-            let mut adam = adam.step(learning_rate, &mut gradients);
-            adam.update(&mut model.trunk)?;
-            for head in &mut model.heads {
-                adam.update(head)?;
+            let Block { data, order } = feed.block(parts, number, epoch, seed)?;
+            for batch in order.chunks(settings.batch) {
+                let device = Cpu::seed_from_u64(derive(seed, Purpose::Dropout, step));
+                step += 1;
+                let predictions = model.forward_taped(data.features.gather(batch), &device)?;
+                let targets = data.targets.gather(batch);
+                let (error, taped) = loss.taped(predictions, &targets, &model.heads)?;
+                if !error.is_finite() {
+                    return Err(diverged);
+                }
+                total += error * batch.len() as f64;
+                let mut gradients = taped.try_backward()?;
+                let mut adam = adam.step(learning_rate, &mut gradients);
+                adam.update(&mut model.trunk)?;
+                for head in &mut model.heads {
+                    adam.update(head)?;
+                }
             }
         }
-        history.training.push(total / rows.len() as f64);
+        history.training.push(total / rows);
         history.epochs_run = epoch + 1;
         history.best_epoch = epoch;
         let mut stop = false;
-        if held_out.targets.len() > 0 {
-            let predictions = model.predict(&held_out.features)?;
-            let error = loss.error(predictions.numbers(), held_out.targets.numbers());
+        let held_out = feed.held_out(|data| {
+            let predictions = model.predict(&data.features)?;
+            Ok(loss.error(predictions.numbers(), data.targets.numbers()))
+        })?;
+        if let Some(error) = held_out {
             if !error.is_finite() {
                 return Err(diverged);
             }
@@ -147,48 +138,12 @@ where
     Ok(history)
 }
 
-/// Indices of the rows to train on and of those held out.
-fn split(count: usize, share: f64, seed: u64) -> Result<(Vec<usize>, Vec<usize>), NetworkError> {
-    let held_out = match (share * count as f64).round() as usize {
-        0 if share > 0.0 => 1,
-        held_out => held_out,
-    };
-    if held_out >= count {
-        return Err(NetworkError::Empty {
-            what: "rows left to train on",
-            least: 1 + usize::from(share > 0.0),
-        });
-    }
-    let mut training: Vec<usize> = (0..count).collect();
-    let order = derive(seed, Purpose::Split, 0);
-    training.shuffle(&mut ChaCha8Rng::seed_from_u64(order));
-    let held_out = training.split_off(count - held_out);
-    Ok((training, held_out))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::network::layers::*;
     use dfdx::prelude::{Cpu, DeviceBuildExt, SplitTape, TensorFromVec, Trace};
     use std::collections::HashSet;
-
-    #[test]
-    fn the_split_is_a_partition_that_the_seed_decides() {
-        let (training, held_out) = split(50, 0.2, 3).unwrap();
-        assert_eq!((training.len(), held_out.len()), (40, 10));
-        let all: HashSet<_> = training.iter().chain(&held_out).collect();
-        assert_eq!(all.len(), 50);
-        assert_eq!(split(50, 0.2, 3).unwrap().1, held_out);
-        assert_ne!(split(50, 0.2, 4).unwrap().1, held_out);
-        assert_eq!(
-            split(3, 0.01, 0).unwrap().1.len(),
-            1,
-            "a share is never nothing"
-        );
-        assert!(split(1, 0.2, 0).is_err());
-        assert!(split(0, 0.0, 0).is_err());
-    }
 
     #[test]
     fn derived_seeds_differ_by_seed_purpose_and_counter() {

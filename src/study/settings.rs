@@ -7,8 +7,8 @@ use crate::refine::{RefineSettings, RefineSettingsError};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Largest bank that is held in memory.
-const MOST_SIMULATIONS: usize = 10_000_000;
+/// Largest bank.
+const MOST_SIMULATIONS: usize = 1_000_000_000_000;
 
 /// Which of a study's two recipes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
@@ -247,11 +247,7 @@ impl Settings {
         }
         if self.bank_size > MOST_SIMULATIONS {
             let value = self.bank_size as f64;
-            return refuse(
-                "bank size",
-                value,
-                "at most 10 million simulations fit into memory",
-            );
+            return refuse("bank size", value, "at most 10¹² simulations are taken");
         }
         for (field, value) in [
             ("cloud size", self.cloud.size),

@@ -53,7 +53,7 @@ pub fn cloud(
     let size = size + (size / CALIBRATION_SHARE).max(CALIBRATION);
     let stage = progress.stage("cloud", size);
     let draws = simulator.draws(
-        size,
+        0..size as u64,
         |i| noise.sample(i),
         |i, attempt, noise| {
             let mut theta = sampler.draw(i, noise).as_slice().to_vec();

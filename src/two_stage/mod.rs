@@ -1,6 +1,6 @@
 //! The Two-Stage estimator: pretrained on simulations, tested, refined, tuned.
 //!
-//! [`pretrain`] makes an [`Estimator`]; [`Estimator::estimate`] takes a record through gate, Gauss–Newton, cloud and
+//! [`pretrain`] makes an [`Estimator`] ([`pretrain_on`] of a bank that is there); [`Estimator::estimate`] takes a record through gate, Gauss–Newton, cloud and
 //! tuned heads; [`Estimator::save`] and [`Estimator::load`] keep it in one file.
 //!
 //! Source: Lakshminarayanan, Guerrero & Rojas, "Fine-Tuning a Simulation-Driven Estimator".
@@ -23,7 +23,7 @@ pub use cloud::{Around, cloud};
 pub use estimate::{Estimate, EstimateError, EstimateOptions, INTERVAL_LEVEL, Nuisance, Seconds};
 pub use estimator::Estimator;
 pub use file::EstimatorFileError;
-pub use pretrain::{PretrainError, PretrainOptions, pretrain};
+pub use pretrain::{PretrainError, PretrainOptions, pretrain, pretrain_on};
 pub use readout::Readout;
 pub use scaler::Scaler;
 pub use standardiser::Standardiser;

@@ -2,18 +2,24 @@
 
 use super::readout::Readout;
 use super::{Calibration, Estimator, Scaler, Standardiser};
-use crate::bank::{BankError, Draw, Draws, FeatureSimulator};
+use crate::bank::file::BankFileError;
+use crate::bank::{Bank, BankError, Draws};
 use crate::feature::FeatureError;
 use crate::math::WhiteningError;
-use crate::network::{History, NetworkError};
+use crate::network::{History, NetworkError, Part, Samples};
 use crate::progress::Progress;
-use crate::study::{DriveSource, Inputs, PlanError, PresetName, SettingsError, Study};
-use crate::twin::Noise;
-use ndarray::Array2;
+use crate::shards::{Prior, PriorError};
+use crate::study::{Inputs, PlanError, PresetName, Settings, SettingsError, Study};
+use ndarray::{Array2, Axis, concatenate, s};
 use std::borrow::Cow;
+use std::error::Error;
 
 /// Simulations apart from the bank, on which the error of the network is measured.
 const CALIBRATION: usize = 1000;
+/// Rows that inputs and targets are standardised with.
+const STANDARD: usize = 20_000;
+/// Most simulations of a bank in memory.
+const MOST_IN_MEMORY: usize = 10_000_000;
 /// Largest network input, in standard deviations of the bank: far outside, the network should not extrapolate.
 const LIMIT: f64 = 6.0;
 
@@ -45,6 +51,26 @@ pub enum PretrainError {
     /// Of the simulations.
     #[error(transparent)]
     Bank(#[from] BankError),
+    /// Of a bank on disk.
+    #[error(transparent)]
+    File(#[from] BankFileError),
+    /// More simulations than fit into memory.
+    #[error(
+        "bank size = {0}; at most {MOST_IN_MEMORY} fit into memory: make a bank on disk with `truetwin bank`, then pretrain --bank"
+    )]
+    Memory(usize),
+    /// A bank of another width.
+    #[error(
+        "the bank has {given} {what}, twin and preset have {expected}; make a bank with this study and preset"
+    )]
+    Width {
+        /// Parameters or features.
+        what: &'static str,
+        /// In the bank.
+        given: usize,
+        /// Of the study.
+        expected: usize,
+    },
     /// Of the training.
     #[error(transparent)]
     Network(#[from] NetworkError),
@@ -65,10 +91,14 @@ pub enum PretrainError {
     },
 }
 
-/// Simulates a bank from the prior and trains the network on it.
+/// Simulates a bank from the prior, in memory, and trains the network on it.
 ///
 /// θ is uniform in the prior, each simulation has its own noise and, where the study draws inputs, its own input.
 /// Targets are standardised, which makes equal weights the paper's w_j = 1/Var(θ_j).
+///
+/// # Errors
+///
+/// [`PretrainError`].
 ///
 /// Source: Lakshminarayanan, Guerrero & Rojas, section III.
 pub fn pretrain(
@@ -76,39 +106,105 @@ pub fn pretrain(
     options: &PretrainOptions,
     progress: &Progress,
 ) -> Result<(Estimator, History), PretrainError> {
-    let preset = study.preset(options.preset);
-    let mut settings = preset.settings.clone();
+    let settings = settings(study, options)?;
+    let size = settings.bank_size;
+    if size > MOST_IN_MEMORY {
+        return Err(PretrainError::Memory(size));
+    }
+    let prior = prior(study, options)?;
+    let stage = progress.stage("bank", size);
+    let bank = prior.rows(0..size as u64, options.seed, "bank", &stage)?;
+    train(study, options, settings, &prior, &bank, progress)
+}
+
+/// Trains the network on a bank that is there, of this study's prior and the preset's features.
+///
+/// A bank of at most 64 MiB as 32-bit numbers gives, row for row, the estimator of [`pretrain`]; of a larger one, no more than
+/// that is in memory at a time ([`Architecture::train_on`](crate::network::Architecture::train_on)).
+///
+/// # Errors
+///
+/// [`PretrainError`]; also for rows of another width.
+pub fn pretrain_on(
+    study: &Study,
+    bank: &dyn Bank,
+    options: &PretrainOptions,
+    progress: &Progress,
+) -> Result<(Estimator, History), PretrainError> {
+    let options = PretrainOptions {
+        bank_size: Some(bank.rows()),
+        ..*options
+    };
+    let settings = settings(study, &options)?;
+    let prior = prior(study, &options)?;
+    train(study, &options, settings, &prior, bank, progress)
+}
+
+/// The preset's numbers with what the options say otherwise, checked.
+fn settings(study: &Study, options: &PretrainOptions) -> Result<Settings, PretrainError> {
+    let mut settings = study.preset(options.preset).settings.clone();
     settings.bank_size = options.bank_size.unwrap_or(settings.bank_size);
     settings.training.epochs = options.epochs.unwrap_or(settings.training.epochs);
     settings.check()?;
-    let simulator = FeatureSimulator::new(study.twin().clone(), preset.features.as_ref())?;
+    Ok(settings)
+}
+
+/// The prior through the preset's features, which the network must take.
+fn prior(study: &Study, options: &PretrainOptions) -> Result<Prior, PretrainError> {
+    let preset = study.preset(options.preset);
+    let prior = Prior::new(study, preset.features.as_ref())?;
     let most = preset.architecture.max_features();
-    if simulator.dim() > most {
+    if prior.dim() > most {
         return Err(PretrainError::TooManyFeatures {
-            features: simulator.dim(),
+            features: prior.dim(),
             network: preset.architecture.id(),
             most,
         });
     }
-    let drives = study.drives()?;
-    let stage = progress.stage("bank", settings.bank_size + CALIBRATION);
+    Ok(prior)
+}
+
+fn train(
+    study: &Study,
+    options: &PretrainOptions,
+    settings: Settings,
+    prior: &Prior,
+    bank: &dyn Bank,
+    progress: &Progress,
+) -> Result<(Estimator, History), PretrainError> {
+    let preset = study.preset(options.preset);
     let seed = options.seed;
-    let bank =
-        |size, purpose: &'static str| simulate(&simulator, &drives, size, seed, purpose, &stage);
-    let training = bank(settings.bank_size, "bank")?;
-    let calibration = bank(CALIBRATION, "calibration")?;
+    let first = first_rows(bank)?;
+    for (what, given, expected) in [
+        (
+            "parameters",
+            first.theta.ncols(),
+            study.twin().parameters().len(),
+        ),
+        ("features", first.features.ncols(), prior.dim()),
+    ] {
+        if given != expected {
+            return Err(PretrainError::Width {
+                what,
+                given,
+                expected,
+            });
+        }
+    }
     let inputs = match settings.inputs {
-        Inputs::Each => Standardiser::each(&training.features),
-        Inputs::Principal => Standardiser::principal(&training.features, LIMIT)?,
+        Inputs::Each => Standardiser::each(&first.features),
+        Inputs::Principal => Standardiser::principal(&first.features, LIMIT)?,
     };
-    let targets = Scaler::fit(&training.theta);
-    let (network, history) = preset.architecture.train(
-        &inputs.apply(&training.features),
-        &targets.apply(&training.theta),
-        &settings.training,
-        seed,
-        progress,
-    )?;
+    let targets = Scaler::fit(&first.theta);
+    let samples = Standardised {
+        bank,
+        inputs: &inputs,
+        targets: &targets,
+    };
+    let (network, history) =
+        (preset.architecture).train_on(&samples, &settings.training, seed, progress)?;
+    let stage = progress.stage("calibration", CALIBRATION);
+    let calibration = prior.rows(0..CALIBRATION as u64, seed, "calibration", &stage)?;
     let mut estimator = Estimator {
         study: study.clone(),
         preset: options.preset,
@@ -131,28 +227,63 @@ pub fn pretrain(
     Ok((estimator, history))
 }
 
-/// A bank from the prior.
-fn simulate(
-    simulator: &FeatureSimulator,
-    drives: &DriveSource,
-    size: usize,
-    seed: u64,
-    purpose: &str,
-    stage: &crate::progress::Stage,
-) -> Result<Draws, BankError> {
-    let space = simulator.twin().parameters();
-    simulator.draws(
-        size,
-        |i| Noise::new(seed, purpose, i),
-        |_, _, noise| {
-            let drive = drives
-                .draw(noise)
-                .map_err(|error| BankError::Input(error.to_string()))?;
-            Ok(Some(Draw {
-                theta: space.draw_prior(noise),
-                drive: Cow::Owned(drive),
-            }))
-        },
-        stage,
-    )
+/// The first [`STANDARD`] rows of a bank, or all: rows are alike, and so many tell means and deviations well enough.
+fn first_rows(bank: &dyn Bank) -> Result<Draws, BankFileError> {
+    let mut parts = Vec::new();
+    let mut rows = 0;
+    for (index, count) in bank.parts().into_iter().enumerate() {
+        if rows >= STANDARD {
+            break;
+        }
+        parts.push(bank.part(index)?);
+        rows += count;
+    }
+    let rows = rows.min(STANDARD);
+    let stacked = |of: fn(&Draws) -> &Array2<f64>| {
+        let views: Vec<_> = parts.iter().map(|part| of(part).view()).collect();
+        let all = concatenate(Axis(0), &views).unwrap_or_default();
+        all.slice_move(s![..rows.min(views.iter().map(|v| v.nrows()).sum()), ..])
+    };
+    Ok(Draws {
+        theta: stacked(|draws| &draws.theta),
+        features: stacked(|draws| &draws.features),
+        redrawn: 0,
+    })
+}
+
+/// A bank as the network sees it.
+struct Standardised<'a> {
+    bank: &'a dyn Bank,
+    inputs: &'a Standardiser,
+    targets: &'a Scaler,
+}
+
+impl Samples for Standardised<'_> {
+    fn features(&self) -> usize {
+        self.inputs.mean.len()
+    }
+
+    fn targets(&self) -> usize {
+        self.targets.mean.len()
+    }
+
+    fn parts(&self) -> Vec<usize> {
+        self.bank.parts()
+    }
+
+    fn part(&self, index: usize) -> Result<Part<'_>, Box<dyn Error + Send + Sync>> {
+        let draws = self.bank.part(index)?;
+        let features = self.inputs.apply(&draws.features);
+        let targets = self.targets.apply(&draws.theta);
+        Ok((Cow::Owned(features), Cow::Owned(targets)))
+    }
+}
+
+impl From<PriorError> for PretrainError {
+    fn from(error: PriorError) -> Self {
+        match error {
+            PriorError::Feature(error) => Self::Feature(error),
+            PriorError::Plan(error) => Self::Plan(error),
+        }
+    }
 }

@@ -4,6 +4,7 @@ use super::Manifest;
 use crate::files::{NewFolder, folder, replace, with_remedy, write_new};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde_json::Value;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -181,6 +182,15 @@ impl WorkFolder {
     pub fn write(&self, name: &str, text: &str) -> Result<(), WorkError> {
         let path = self.file(name);
         replace(&path, text.as_bytes()).map_err(|error| WorkError::io(&path, error))
+    }
+
+    /// Puts the checksums of all pieces into the manifest: the work is finished.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError::Io`].
+    pub fn finish(&self, manifest: &Manifest, checksums: Value) -> Result<(), WorkError> {
+        self.write(MANIFEST, &manifest.clone().finished(checksums).text())
     }
 
     /// A file of the folder as text.

@@ -5,6 +5,8 @@ use crate::files::sha256;
 use serde_json::{Map, Value};
 use std::path::Path;
 
+/// The entry that a finished folder has beside what its pieces depend on.
+const CHECKSUMS: &str = "checksums";
 /// Longest value that is worth showing in a message.
 const SHORT: usize = 40;
 
@@ -38,6 +40,22 @@ impl Manifest {
         self.entries.get(key)
     }
 
+    /// Checksums of the pieces, once all are there.
+    pub fn checksums(&self) -> Option<&Value> {
+        self.entries.get(CHECKSUMS)
+    }
+
+    /// Without checksums.
+    pub fn unfinished(mut self) -> Self {
+        self.entries.shift_remove(CHECKSUMS);
+        self
+    }
+
+    /// With the checksums of all pieces.
+    pub(super) fn finished(self, checksums: Value) -> Self {
+        self.with(CHECKSUMS, checksums)
+    }
+
     /// What makes such folders.
     pub fn verb(&self) -> &'static str {
         self.verb
@@ -58,10 +76,11 @@ impl Manifest {
         ours.then_some(Self { verb, entries })
     }
 
-    /// The first thing that `found` says otherwise, in words; `None` where both say the same.
+    /// The first thing that `found` says otherwise, in words; `None` where both say the same, finished or not.
     pub fn differs(&self, found: &Self) -> Option<String> {
         let keys = self.entries.keys().chain(found.entries.keys());
-        keys.map(|key| (key, found.get(key), self.get(key)))
+        keys.filter(|key| *key != CHECKSUMS)
+            .map(|key| (key, found.get(key), self.get(key)))
             .find(|(_, there, here)| there != here)
             .map(|(key, there, here)| {
                 let (there, here) = (shown(there), shown(here));

@@ -357,7 +357,7 @@ fn wrong_calls_are_refused_with_the_remedy() {
             "--bank-size",
             "99999999999",
         ],
-        &["10 million"],
+        &["truetwin bank"],
     );
     refused(
         &["reproduce", "--twin", "tanks", "--runs", "0"],

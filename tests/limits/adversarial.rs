@@ -27,7 +27,13 @@ fn bank(study: &Study, simulator: &FeatureSimulator, size: usize, purpose: &str)
         }))
     };
     let stage = Progress::silent().stage("bank", size);
-    (simulator.draws(size, |i| Noise::new(SEED, purpose, i), draw, &stage)).unwrap()
+    (simulator.draws(
+        0..size as u64,
+        |i| Noise::new(SEED, purpose, i),
+        draw,
+        &stage,
+    ))
+    .unwrap()
 }
 
 /// Rows moved by ε in the direction in which the squared error grows, input by input.

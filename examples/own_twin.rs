@@ -1,0 +1,59 @@
+//! A twin of one's own with the whole command line: copy this file, change the equations.
+//!
+//! `cargo run --release --example own_twin -- demo`, or check, simulate, pretrain, estimate, diagnose, …
+
+use truetwin::feature::Score;
+use truetwin::network::layers::*;
+use truetwin::study::{RecordPlan, Study, StudyError};
+use truetwin::twin::*;
+
+/// A leaking tank: area·ḣ = u − k·h.
+struct Tank;
+
+impl StateSpace for Tank {
+    fn outline(&self) -> Outline {
+        Outline {
+            // Name, unit, prior (where the network is trained); then the bounds of what is possible at all.
+            parameters: ParameterSpace::new([
+                Parameter::new("k", "m²/s", 0.2, 1.0).within(0.01, 3.0),
+                Parameter::new("area", "m²", 0.5, 1.5).within(0.2, 5.0),
+            ]),
+            states: vec![Quantity::new("h", "m")],
+            inputs: vec![Quantity::new("u", "m³/s")],
+            outputs: vec![Quantity::new("y", "m")],
+        }
+    }
+    fn drift(&self, now: &Now, x: &[f64], dx: &mut [f64]) {
+        let (k, area) = (now.theta[0], now.theta[1]);
+        dx[0] = (now.u[0] - k * x[0]) / area;
+    }
+    fn observe(&self, _: &Now, x: &[f64], y: &mut [f64]) {
+        y[0] = x[0];
+    }
+    // Standard deviations: of the increment added to the level each step, and of the sensor.
+    fn noise(&self, _: &Now, process: &mut [f64], measurement: &mut [f64]) {
+        (process[0], measurement[0]) = (0.01, 0.02);
+    }
+}
+
+/// A small network: a trunk that all parameters share, and one head for each.
+struct Small;
+
+impl HeadArchitecture for Small {
+    const ID: &'static str = "small";
+    type Features = Const<16>; // at most 16 features
+    type Hidden = Const<64>;
+    type Trunk = (NormDense<16, 64, Leaky>, Dense<64, 64, Leaky>);
+    type Head = (Linear<64, 32>, Tanh, Linear<32, 1>);
+}
+
+fn study() -> Result<Study, StudyError> {
+    // Records: step in seconds, samples, levels of the input, samples that each is held.
+    let records = RecordPlan::levels(0.1, 300, 0.0, 1.0, 20);
+    let study = Study::new("tank", Tank, records)?.with_features(Score::default());
+    Ok(study.with_architecture::<Small>())
+}
+
+fn main() -> std::process::ExitCode {
+    truetwin::cli::run([study()])
+}

@@ -1,0 +1,292 @@
+//! Rows of parameters and features in files: NumPy's `.npz` and CSV.
+//!
+//! | form | holds | opened by |
+//! |---|---|---|
+//! | `.npz` | arrays `theta` (M × d) and `features` (M × n), f64, not compressed | `numpy.load` |
+//! | `.csv` | a column for each parameter, by name, then `x1` … `xn` | anything |
+//!
+//! Both keep every bit. The same draws give the same bytes: an archive carries no time.
+//!
+//! ```
+//! use ndarray::array;
+//! use truetwin::bank::{Draws, file};
+//! let draws = Draws { theta: array![[1.0], [2.0]], features: array![[0.1, 0.2], [0.3, 0.4]], redrawn: 0 };
+//! let folder = tempfile::tempdir()?;
+//! for name in ["bank.npz", "bank.csv"] {
+//!     let path = folder.path().join(name);
+//!     file::write(&path, &draws, &["a"])?;
+//!     assert_eq!(file::read(&path, &["a"])?, draws);
+//! }
+//! # Ok::<(), truetwin::bank::file::BankFileError>(())
+//! ```
+
+use super::Draws;
+use crate::files::{with_remedy, write_new};
+use ndarray::{Array1, Array2};
+use ndarray_npy::{NpzReader, NpzWriter, ReadNpzError, WriteNpzError};
+use std::io::{self, Cursor};
+use std::path::{Path, PathBuf};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime};
+
+/// Why a file of rows cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum BankFileError {
+    /// Something cannot be read or written.
+    #[error("{}: {}", path.display(), with_remedy(error))]
+    Io {
+        /// File.
+        path: PathBuf,
+        /// What the system said.
+        error: io::Error,
+    },
+    /// The file holds something else.
+    #[error("{}: no bank ({reason}); {remedy}", path.display())]
+    Content {
+        /// File.
+        path: PathBuf,
+        /// What does not fit.
+        reason: String,
+        /// What can be done.
+        remedy: &'static str,
+    },
+    /// The name does not say which form.
+    #[error("{}: banks are written and read as .npz or .csv; choose such a name", .0.display())]
+    Form(PathBuf),
+}
+
+impl BankFileError {
+    pub(crate) fn io(path: &Path, error: io::Error) -> Self {
+        Self::Io {
+            path: path.into(),
+            error,
+        }
+    }
+}
+
+/// What to do about a file from elsewhere.
+const GIVE: &str = "give theta (rows × parameters) and features (rows × features), one simulation a row, all finite";
+
+enum Form {
+    Npz,
+    Csv,
+}
+
+fn form(path: &Path) -> Result<Form, BankFileError> {
+    match path.extension().and_then(|e| e.to_str()) {
+        Some("npz") => Ok(Form::Npz),
+        Some("csv") => Ok(Form::Csv),
+        _ => Err(BankFileError::Form(path.into())),
+    }
+}
+
+/// Whether a path has the name of a file of rows.
+pub fn is_named(path: &Path) -> bool {
+    form(path).is_ok()
+}
+
+/// Writes a new file in the form that its name ends with; `names` are the parameters'.
+///
+/// # Errors
+///
+/// A place that is taken or cannot be written, a name of no form.
+pub fn write(path: &Path, draws: &Draws, names: &[&str]) -> Result<(), BankFileError> {
+    let bytes = match form(path)? {
+        Form::Npz => npz(draws).map_err(io::Error::other),
+        Form::Csv => csv_text(draws, names),
+    };
+    bytes
+        .and_then(|bytes| write_new(path, &bytes))
+        .map_err(|error| BankFileError::io(path, error))
+}
+
+/// Reads a file in the form that its name ends with, of a twin with these parameters.
+///
+/// # Errors
+///
+/// A file that cannot be read, holds something else, other parameters, or numbers that are not finite.
+pub fn read(path: &Path, names: &[&str]) -> Result<Draws, BankFileError> {
+    let form = form(path)?;
+    let bytes = std::fs::read(path).map_err(|error| BankFileError::io(path, error))?;
+    let wrong = |reason: String| BankFileError::Content {
+        path: path.into(),
+        reason,
+        remedy: GIVE,
+    };
+    let draws = match form {
+        Form::Npz => from_npz(&bytes).map_err(|error| wrong(error.to_string()))?,
+        Form::Csv => from_csv(&bytes, names).map_err(wrong)?,
+    };
+    check(&draws, names.len()).map_err(wrong)?;
+    Ok(draws)
+}
+
+/// Whether the rows are whole, finite, and of so many parameters.
+pub(crate) fn check(draws: &Draws, parameters: usize) -> Result<(), String> {
+    let (theta, features) = (&draws.theta, &draws.features);
+    if theta.ncols() != parameters {
+        return Err(format!(
+            "{} parameters, the twin has {parameters}",
+            theta.ncols()
+        ));
+    }
+    if theta.nrows() != features.nrows() {
+        return Err(format!(
+            "{} rows of theta, {} of features",
+            theta.nrows(),
+            features.nrows()
+        ));
+    }
+    for (what, matrix) in [("theta", theta), ("features", features)] {
+        if let Some(((row, column), value)) = matrix.indexed_iter().find(|(_, v)| !v.is_finite()) {
+            return Err(format!("{what}, row {row}, column {column}: {value}"));
+        }
+    }
+    Ok(())
+}
+
+/// The bytes of an `.npz` archive.
+pub(crate) fn npz(draws: &Draws) -> Result<Vec<u8>, WriteNpzError> {
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Stored)
+        .last_modified_time(DateTime::default());
+    let mut archive = NpzWriter::new_with_options(Cursor::new(Vec::new()), options);
+    archive.add_array("theta", &draws.theta)?;
+    archive.add_array("features", &draws.features)?;
+    archive.add_array("redrawn", &Array1::from_elem(1, draws.redrawn as u64))?;
+    Ok(archive.finish()?.into_inner())
+}
+
+/// Rows of an `.npz` archive.
+pub(crate) fn from_npz(bytes: &[u8]) -> Result<Draws, ReadNpzError> {
+    let mut archive = NpzReader::new(Cursor::new(bytes))?;
+    // An archive from elsewhere does not count what was drawn again.
+    let redrawn = (archive.by_name("redrawn").ok()).and_then(|r: Array1<u64>| r.first().copied());
+    Ok(Draws {
+        theta: archive.by_name("theta")?,
+        features: archive.by_name("features")?,
+        redrawn: redrawn.unwrap_or(0) as usize,
+    })
+}
+
+fn csv_text(draws: &Draws, names: &[&str]) -> io::Result<Vec<u8>> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    let features = (1..=draws.features.ncols()).map(|j| format!("x{j}"));
+    csv.write_record(names.iter().map(|name| (*name).to_owned()).chain(features))?;
+    for (theta, features) in draws.theta.rows().into_iter().zip(draws.features.rows()) {
+        csv.write_record(theta.iter().chain(features).map(f64::to_string))?;
+    }
+    csv.into_inner().map_err(|error| error.into_error())
+}
+
+fn from_csv(bytes: &[u8], names: &[&str]) -> Result<Draws, String> {
+    let mut csv = csv::Reader::from_reader(bytes);
+    let header = csv.headers().map_err(|error| error.to_string())?;
+    let d = names.len();
+    let n = header.len().saturating_sub(d);
+    let features = (1..=n).map(|j| format!("x{j}"));
+    if n == 0
+        || !header
+            .iter()
+            .eq(names.iter().map(|name| (*name).to_owned()).chain(features))
+    {
+        return Err(format!("the header is not {},x1,x2,…", names.join(",")));
+    }
+    let (mut theta, mut rest, mut rows) = (Vec::new(), Vec::new(), 0);
+    for (row, record) in csv.records().enumerate() {
+        let record = record.map_err(|error| error.to_string())?;
+        for (column, cell) in record.iter().enumerate() {
+            let value: f64 = (cell.trim().parse())
+                .map_err(|_| format!("row {row}, column {column}: \"{cell}\" is no number"))?;
+            match column < d {
+                true => theta.push(value),
+                false => rest.push(value),
+            }
+        }
+        rows += 1;
+    }
+    let matrix = |width, values| Array2::from_shape_vec((rows, width), values);
+    Ok(Draws {
+        theta: matrix(d, theta).map_err(|error| error.to_string())?,
+        features: matrix(n, rest).map_err(|error| error.to_string())?,
+        redrawn: 0,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::array;
+
+    fn draws() -> Draws {
+        Draws {
+            theta: array![[0.1 + 0.2, 1e-300], [f64::MAX, -0.0]],
+            features: array![[1.0 / 3.0], [std::f64::consts::PI]],
+            redrawn: 0,
+        }
+    }
+
+    const NAMES: [&str; 2] = ["a", "b"];
+
+    #[test]
+    fn every_bit_comes_back_from_both_forms() {
+        let place = tempfile::tempdir().unwrap();
+        for name in ["bank.npz", "bank.csv"] {
+            let path = place.path().join(name);
+            write(&path, &draws(), &NAMES).unwrap();
+            assert_eq!(read(&path, &NAMES).unwrap(), draws(), "{name}");
+            let taken = write(&path, &draws(), &NAMES).unwrap_err();
+            assert!(taken.to_string().contains("choose another"), "{taken}");
+        }
+        let path = place.path().join("bank.txt");
+        let error = write(&path, &draws(), &NAMES).unwrap_err().to_string();
+        assert!(error.contains(".npz or .csv"), "{error}");
+    }
+
+    /// Checksums of shards rest on it: nothing but the numbers is in an archive.
+    #[test]
+    fn an_archive_is_a_function_of_its_rows() {
+        let bytes = npz(&draws()).unwrap();
+        assert_eq!(bytes, npz(&draws()).unwrap());
+        // Zip's date of 1 January 1980, wherever a date stands.
+        let header = bytes.windows(4).position(|w| w == b"PK\x03\x04").unwrap();
+        assert_eq!(bytes[header + 10..header + 14], [0, 0, 0x21, 0]);
+    }
+
+    #[test]
+    fn what_is_no_bank_is_said_with_the_remedy() {
+        let place = tempfile::tempdir().unwrap();
+        let refused = |name: &str, bytes: &[u8]| {
+            let path = place.path().join(name);
+            std::fs::write(&path, bytes).unwrap();
+            let error = read(&path, &NAMES).unwrap_err().to_string();
+            assert!(
+                error.contains(name) && error.contains("give theta"),
+                "{error}"
+            );
+            error
+        };
+        let whole = npz(&draws()).unwrap();
+        refused("cut.npz", &whole[..whole.len() - 40]);
+        refused("text.npz", b"a,b,x1");
+        let wide = Draws {
+            theta: array![[1.0]],
+            features: array![[1.0]],
+            redrawn: 0,
+        };
+        assert!(refused("wide.npz", &npz(&wide).unwrap()).contains("1 parameters"));
+        let short = Draws {
+            features: array![[1.0]],
+            ..draws()
+        };
+        assert!(refused("short.npz", &npz(&short).unwrap()).contains("1 of features"));
+        let nan = Draws {
+            features: array![[1.0], [f64::NAN]],
+            ..draws()
+        };
+        assert!(refused("nan.npz", &npz(&nan).unwrap()).contains("row 1, column 0: NaN"));
+        assert!(refused("header.csv", b"a,c,x1\n1,2,3\n").contains("a,b,x1"));
+        assert!(refused("cell.csv", b"a,b,x1\n1,2,z\n").contains("\"z\" is no number"));
+        assert!(refused("ragged.csv", b"a,b,x1\n1,2\n").contains("2 fields"));
+    }
+}

@@ -1,0 +1,19 @@
+//! Simulations compressed to features: banks for training, clouds around an estimate, nulls for tests.
+//!
+//! | to … | look at |
+//! |---|---|
+//! | simulate a twin and take features | [`FeatureSimulator`] |
+//! | make many rows, each a pure function of its number | [`FeatureSimulator::draws`], [`Draws`] |
+//! | train on more rows than fit into memory | [`Bank`] |
+//! | exchange rows with NumPy and spreadsheets | [`file`] |
+
+mod draws;
+mod error;
+pub mod file;
+mod parts;
+mod simulator;
+
+pub use draws::{Draw, Draws};
+pub use error::{BankError, DrawError};
+pub use parts::Bank;
+pub use simulator::FeatureSimulator;

@@ -1,0 +1,36 @@
+//! Banks in parts.
+
+use super::Draws;
+use super::file::BankFileError;
+use std::borrow::Cow;
+
+/// Simulations that need not fit into memory at once: rows of parameters and features, in parts.
+///
+/// Rows are independent draws, so that any set of parts is a sample of the whole.
+pub trait Bank: Sync {
+    /// Rows of each part, in order.
+    fn parts(&self) -> Vec<usize>;
+
+    /// Part number `index`.
+    ///
+    /// # Errors
+    ///
+    /// A part that cannot be read, or is not what it was.
+    fn part(&self, index: usize) -> Result<Cow<'_, Draws>, BankFileError>;
+
+    /// All rows.
+    fn rows(&self) -> usize {
+        self.parts().iter().sum()
+    }
+}
+
+/// A bank in memory: one part.
+impl Bank for Draws {
+    fn parts(&self) -> Vec<usize> {
+        vec![self.theta.nrows()]
+    }
+
+    fn part(&self, _: usize) -> Result<Cow<'_, Draws>, BankFileError> {
+        Ok(Cow::Borrowed(self))
+    }
+}

@@ -1,0 +1,343 @@
+//! From parts to the blocks of an epoch: what is in memory, in which order, and what is held out.
+
+use super::NetworkError;
+use super::rows::Rows;
+use super::train::{Purpose, derive};
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+use std::borrow::Cow;
+
+/// Most bytes of a block of several parts; one part is never divided.
+const BLOCK: usize = 64 << 20;
+
+/// Samples to learn from: one row of features and one of targets each.
+#[derive(Debug, Clone)]
+pub(super) struct Data {
+    pub features: Rows,
+    pub targets: Rows,
+}
+
+impl Data {
+    fn append(&mut self, other: Self) {
+        self.features.append(other.features);
+        self.targets.append(other.targets);
+    }
+}
+
+/// Reads a part.
+pub(super) type Read<'a> = dyn Fn(usize) -> Result<Data, NetworkError> + 'a;
+
+/// The rows of a training.
+///
+/// Where all parts together fit into a block they are read once: rows are held out at random, and each epoch has all other
+/// rows in an order of its own. Otherwise the last parts are held out, and each epoch puts the other parts in an order of its
+/// own, reads as many at a time as fit into a block, and orders the rows within.
+pub(super) enum Feed<'a> {
+    Whole {
+        data: Data,
+        training: Vec<usize>,
+        held_out: Data,
+    },
+    Streamed {
+        read: &'a Read<'a>,
+        /// Rows of each part.
+        sizes: Vec<usize>,
+        /// Parts before this one are trained on, the others are held out.
+        training: usize,
+        /// Most rows of a block.
+        most: usize,
+    },
+}
+
+/// Rows in memory, and the order in which they are used.
+pub(super) struct Block<'a> {
+    pub data: Cow<'a, Data>,
+    pub order: Vec<usize>,
+}
+
+impl<'a> Feed<'a> {
+    /// `sizes` are the rows of each part, `width` the 32-bit numbers of a row; about `share` of the rows is held out.
+    pub fn new(
+        sizes: &[usize],
+        width: usize,
+        read: &'a Read<'a>,
+        share: f64,
+        seed: u64,
+    ) -> Result<Self, NetworkError> {
+        Self::with_block(sizes, BLOCK / (size_of::<f32>() * width), read, share, seed)
+    }
+
+    /// With at most `most` rows in a block.
+    fn with_block(
+        sizes: &[usize],
+        most: usize,
+        read: &'a Read<'a>,
+        share: f64,
+        seed: u64,
+    ) -> Result<Self, NetworkError> {
+        let rows: usize = sizes.iter().sum();
+        if sizes.len() < 2 || rows <= most {
+            let data = together(read, 0..sizes.len())?;
+            let (training, held_out) = split(rows, share, seed)?;
+            let held_out = Data {
+                features: data.features.select(&held_out),
+                targets: data.targets.select(&held_out),
+            };
+            return Ok(Self::Whole {
+                data,
+                training,
+                held_out,
+            });
+        }
+        let (mut training, mut held_out) = (sizes.len(), 0);
+        while training > 1 && (held_out as f64) < share * rows as f64 {
+            training -= 1;
+            held_out += sizes[training];
+        }
+        Ok(Self::Streamed {
+            read,
+            sizes: sizes.to_vec(),
+            training,
+            most,
+        })
+    }
+
+    /// Rows that are trained on.
+    pub fn rows(&self) -> usize {
+        match self {
+            Self::Whole { training, .. } => training.len(),
+            Self::Streamed {
+                sizes, training, ..
+            } => sizes[..*training].iter().sum(),
+        }
+    }
+
+    /// The parts of each block of an epoch.
+    pub fn blocks(&self, epoch: usize, seed: u64) -> Vec<Vec<usize>> {
+        match self {
+            Self::Whole { .. } => vec![vec![]],
+            Self::Streamed {
+                sizes,
+                training,
+                most,
+                ..
+            } => {
+                let mut parts: Vec<usize> = (0..*training).collect();
+                parts.shuffle(&mut order(seed, epoch, 0));
+                grouped(&parts, sizes, *most)
+            }
+        }
+    }
+
+    /// Block number `block` of an epoch, which has these parts.
+    pub fn block(
+        &self,
+        parts: &[usize],
+        block: usize,
+        epoch: usize,
+        seed: u64,
+    ) -> Result<Block<'_>, NetworkError> {
+        Ok(match self {
+            Self::Whole { data, training, .. } => {
+                let mut rows = training.clone();
+                rows.shuffle(&mut order(seed, epoch, 0));
+                Block {
+                    data: Cow::Borrowed(data),
+                    order: rows,
+                }
+            }
+            Self::Streamed { read, .. } => {
+                let data = together(read, parts.iter().copied())?;
+                let mut rows: Vec<usize> = (0..data.targets.len()).collect();
+                rows.shuffle(&mut order(seed, epoch, 1 + block));
+                Block {
+                    data: Cow::Owned(data),
+                    order: rows,
+                }
+            }
+        })
+    }
+
+    /// The mean of `error` over the rows held out; `None` where there are none.
+    pub fn held_out(
+        &self,
+        error: impl Fn(&Data) -> Result<f64, NetworkError>,
+    ) -> Result<Option<f64>, NetworkError> {
+        match self {
+            Self::Whole { held_out, .. } if held_out.targets.len() == 0 => Ok(None),
+            Self::Whole { held_out, .. } => Ok(Some(error(held_out)?)),
+            Self::Streamed {
+                read,
+                sizes,
+                training,
+                most,
+            } => {
+                let parts: Vec<usize> = (*training..sizes.len()).collect();
+                let (mut total, mut rows) = (0.0, 0.0);
+                for block in grouped(&parts, sizes, *most) {
+                    let data = together(read, block.into_iter())?;
+                    let here = data.targets.len() as f64;
+                    total += here * error(&data)?;
+                    rows += here;
+                }
+                Ok((rows > 0.0).then_some(total / rows))
+            }
+        }
+    }
+}
+
+/// The generator that orders the rows of a block, or (number 0) the parts or the only block of an epoch. An epoch depends
+/// on its number alone.
+fn order(seed: u64, epoch: usize, number: usize) -> ChaCha8Rng {
+    let epoch = derive(seed, Purpose::Shuffle, epoch as u64);
+    ChaCha8Rng::seed_from_u64(match number {
+        0 => epoch,
+        number => derive(epoch, Purpose::Shuffle, number as u64),
+    })
+}
+
+/// Parts one after another, as many at a time as have at most `most` rows, but at least one.
+fn grouped(parts: &[usize], sizes: &[usize], most: usize) -> Vec<Vec<usize>> {
+    let mut blocks: Vec<Vec<usize>> = Vec::new();
+    let mut rows = 0;
+    for &part in parts {
+        match blocks.last_mut() {
+            Some(block) if rows + sizes[part] <= most => block.push(part),
+            _ => {
+                blocks.push(vec![part]);
+                rows = 0;
+            }
+        }
+        rows += sizes[part];
+    }
+    blocks
+}
+
+fn together(read: &Read<'_>, parts: impl Iterator<Item = usize>) -> Result<Data, NetworkError> {
+    let mut all: Option<Data> = None;
+    for part in parts {
+        let data = read(part)?;
+        match &mut all {
+            None => all = Some(data),
+            Some(all) => all.append(data),
+        }
+    }
+    all.ok_or(NetworkError::Empty {
+        what: "samples",
+        least: 1,
+    })
+}
+
+/// Indices of the rows to train on and of those held out.
+fn split(count: usize, share: f64, seed: u64) -> Result<(Vec<usize>, Vec<usize>), NetworkError> {
+    let held_out = match (share * count as f64).round() as usize {
+        0 if share > 0.0 => 1,
+        held_out => held_out,
+    };
+    if held_out >= count {
+        return Err(NetworkError::Empty {
+            what: "rows left to train on",
+            least: 1 + usize::from(share > 0.0),
+        });
+    }
+    let mut training: Vec<usize> = (0..count).collect();
+    let order = derive(seed, Purpose::Split, 0);
+    training.shuffle(&mut ChaCha8Rng::seed_from_u64(order));
+    let held_out = training.split_off(count - held_out);
+    // Each epoch orders them anew, from here.
+    training.sort_unstable();
+    Ok((training, held_out))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::RefCell;
+    use std::collections::HashSet;
+
+    #[test]
+    fn the_split_is_a_partition_that_the_seed_decides() {
+        let (training, held_out) = split(50, 0.2, 3).unwrap();
+        assert_eq!((training.len(), held_out.len()), (40, 10));
+        let all: HashSet<_> = training.iter().chain(&held_out).collect();
+        assert_eq!(all.len(), 50);
+        assert_eq!(split(50, 0.2, 3).unwrap().1, held_out);
+        assert_ne!(split(50, 0.2, 4).unwrap().1, held_out);
+        assert_eq!(
+            split(3, 0.01, 0).unwrap().1.len(),
+            1,
+            "a share is never nothing"
+        );
+        assert!(split(1, 0.2, 0).is_err());
+        assert!(split(0, 0.0, 0).is_err());
+    }
+
+    /// Part p has `sizes[p]` rows; each row's only feature is its number in the whole.
+    fn part(sizes: &[usize], part: usize) -> Data {
+        let first: usize = sizes[..part].iter().sum();
+        let numbers: Vec<f32> = (first..first + sizes[part]).map(|i| i as f32).collect();
+        Data {
+            features: Rows::new(1, numbers.clone()),
+            targets: Rows::new(1, numbers),
+        }
+    }
+
+    /// The rows of an epoch in the order of their use.
+    fn epoch(feed: &Feed<'_>, epoch: usize) -> Vec<usize> {
+        let mut all = Vec::new();
+        for (number, parts) in feed.blocks(epoch, 7).iter().enumerate() {
+            let block = feed.block(parts, number, epoch, 7).unwrap();
+            let numbers = block.data.features.numbers();
+            all.extend(block.order.iter().map(|i| numbers[*i] as usize));
+        }
+        all
+    }
+
+    #[test]
+    fn every_epoch_has_every_row_once_in_an_order_of_its_own_whatever_the_blocks() {
+        let sizes = [4, 4, 4, 4, 4, 3];
+        let read = |index: usize| Ok(part(&sizes, index));
+        for (most, in_memory) in [(100, true), (8, false), (3, false)] {
+            let feed = Feed::with_block(&sizes, most, &read, 0.2, 1).unwrap();
+            assert_eq!(matches!(feed, Feed::Whole { .. }), in_memory);
+            let [first, second] = [0, 1].map(|e| epoch(&feed, e));
+            assert_ne!(first, second);
+            assert_eq!(
+                first,
+                epoch(&feed, 0),
+                "an epoch depends on its number alone"
+            );
+            assert_eq!(first.len(), feed.rows());
+            let held_out = RefCell::new(Vec::new());
+            let mean = feed.held_out(|data| {
+                let numbers = data.features.numbers();
+                held_out
+                    .borrow_mut()
+                    .extend(numbers.iter().map(|v| *v as usize));
+                Ok(f64::from(numbers.iter().sum::<f32>()) / numbers.len() as f64)
+            });
+            let held_out = held_out.into_inner();
+            let sum: usize = held_out.iter().sum();
+            assert!((mean.unwrap().unwrap() - sum as f64 / held_out.len() as f64).abs() < 1e-9);
+            for order in [first, second] {
+                let all: HashSet<usize> = order.iter().chain(&held_out).copied().collect();
+                assert_eq!((all.len(), order.len() + held_out.len()), (23, 23));
+            }
+            assert!((5..=7).contains(&held_out.len()), "{held_out:?}");
+        }
+    }
+
+    #[test]
+    fn blocks_hold_as_many_parts_as_fit_and_no_part_is_divided() {
+        let sizes = [4, 4, 9, 1, 1];
+        assert_eq!(
+            grouped(&[0, 1, 2, 3, 4], &sizes, 8),
+            [vec![0, 1], vec![2], vec![3, 4]]
+        );
+        let read = |_| unreachable!();
+        let feed = Feed::with_block(&sizes, 8, &read, 0.0, 1).unwrap();
+        assert_eq!(feed.rows(), 19);
+        assert_eq!(feed.held_out(|_| Ok(1.0)).unwrap(), None);
+    }
+}

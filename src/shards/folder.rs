@@ -1,0 +1,254 @@
+//! The folder of shards.
+
+use super::ShardsError;
+use super::plan::VERB;
+use crate::bank::file::{self, BankFileError};
+use crate::bank::{Bank, Draws};
+use crate::files::{sha256, write_new};
+use crate::work::{Manifest, WorkError, WorkFolder};
+use serde_json::{Value, json};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::io;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// Where shards lie.
+pub(super) const SHARDS: &str = "shards";
+/// What to do about a shard that is not what it was.
+const AGAIN: &str = "run the same `truetwin bank` call again, and it is made again";
+
+/// What lies in a folder of shards.
+#[derive(Debug, Clone)]
+pub(super) struct Shards {
+    folder: WorkFolder,
+    manifest: Manifest,
+    size: usize,
+    rows: usize,
+    /// Shards of the whole bank.
+    pub of: usize,
+    /// Checksum of each shard that is there.
+    pub there: BTreeMap<usize, String>,
+}
+
+/// The name of a shard.
+fn name(number: usize, checksum: &str) -> String {
+    format!("{number:06}-{checksum}.npz")
+}
+
+/// Number and checksum of a shard, of its name; `None` for any other file.
+fn parse(name: &str) -> Option<(usize, &str)> {
+    let (number, checksum) = name.strip_suffix(".npz")?.split_once('-')?;
+    let hexadecimal = checksum.bytes().all(|b| b.is_ascii_hexdigit());
+    (checksum.len() == 64 && hexadecimal).then_some((number.parse().ok()?, checksum))
+}
+
+impl Shards {
+    /// Of a folder with this manifest.
+    pub fn list(folder: WorkFolder, manifest: Manifest) -> Result<Self, ShardsError> {
+        let number = |key: &str| {
+            (manifest.get(key).and_then(Value::as_u64))
+                .filter(|n| *n > 0)
+                .and_then(|n| usize::try_from(n).ok())
+        };
+        let (Some(size), Some(rows)) = (number("size"), number("rows of a shard")) else {
+            let path = folder.path().into();
+            return Err(WorkError::Foreign { path, verb: VERB }.into());
+        };
+        let of = size.div_ceil(rows);
+        let place = folder.file(SHARDS);
+        let mut there = BTreeMap::new();
+        let failed = |error| ShardsError::from(WorkError::io(&place, error));
+        for entry in std::fs::read_dir(&place).map_err(failed)? {
+            let found = entry.map_err(failed)?.file_name();
+            let Some((number, checksum)) = found.to_str().and_then(parse) else {
+                continue;
+            };
+            if let Some(other) = there.insert(number, checksum.to_owned()) {
+                return Err(ShardsError::Conflict {
+                    one: place.join(name(number, checksum)),
+                    other: place.join(name(number, &other)),
+                });
+            }
+        }
+        there.retain(|number, _| *number < of);
+        Ok(Self {
+            folder,
+            manifest,
+            size,
+            rows,
+            of,
+            there,
+        })
+    }
+
+    /// The same folder as it is now.
+    pub fn again(self) -> Result<Self, ShardsError> {
+        Self::list(self.folder, self.manifest)
+    }
+
+    /// Rows of a shard.
+    pub fn rows(&self, number: usize) -> Range<u64> {
+        let end = ((number + 1) * self.rows).min(self.size);
+        (number * self.rows) as u64..end as u64
+    }
+
+    /// Where a shard lies.
+    pub fn file(&self, number: usize) -> Option<PathBuf> {
+        let checksum = self.there.get(&number)?;
+        Some(self.folder.file(SHARDS).join(name(number, checksum)))
+    }
+
+    /// The bytes of a shard, if they are what they were.
+    pub fn bytes(&self, number: usize) -> Result<Vec<u8>, ShardsError> {
+        let incomplete = || ShardsError::Incomplete {
+            path: self.folder.path().into(),
+            there: self.there.len(),
+            of: self.of,
+        };
+        let path = self.file(number).ok_or_else(incomplete)?;
+        let bytes = std::fs::read(&path).map_err(|error| BankFileError::io(&path, error))?;
+        match self.there.get(&number) == Some(&sha256(&bytes)) {
+            true => Ok(bytes),
+            false => Err(damaged(path, "its SHA-256 is not that of its name").into()),
+        }
+    }
+
+    /// Adds a shard; where another process has made it in the meantime, that one stays.
+    pub fn add(&self, number: usize, bytes: &[u8]) -> Result<(), ShardsError> {
+        let path = self.folder.file(SHARDS).join(name(number, &sha256(bytes)));
+        match write_new(&path, bytes) {
+            Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
+                Err(BankFileError::io(&path, error).into())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Removes a shard that is not what it was.
+    pub fn remove(&self, number: usize) -> Result<(), ShardsError> {
+        match self.file(number) {
+            Some(path) => {
+                std::fs::remove_file(&path).map_err(|error| BankFileError::io(&path, error).into())
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Puts the checksums into the manifest, if every shard is there.
+    pub fn finish(&self) -> Result<(), ShardsError> {
+        if self.there.len() == self.of {
+            let checksums: Vec<&String> = self.there.values().collect();
+            self.folder.finish(&self.manifest, json!(checksums))?;
+        }
+        Ok(())
+    }
+
+    /// The folder's manifest.
+    pub fn manifest(&self) -> &Manifest {
+        &self.manifest
+    }
+}
+
+fn damaged(path: PathBuf, reason: &str) -> BankFileError {
+    BankFileError::Content {
+        path,
+        reason: reason.into(),
+        remedy: AGAIN,
+    }
+}
+
+/// A whole bank on disk: each shard is a part, read when it is asked for.
+#[derive(Debug, Clone)]
+pub struct ShardedBank {
+    shards: Shards,
+    seed: u64,
+    names: Vec<String>,
+}
+
+impl ShardedBank {
+    /// The bank in a folder.
+    ///
+    /// # Errors
+    ///
+    /// [`ShardsError`]: no folder of a bank, shards that are missing or are not those of the manifest.
+    pub fn open(path: &Path) -> Result<Self, ShardsError> {
+        let (folder, manifest) = WorkFolder::find(path, VERB)?;
+        let foreign = || WorkError::Foreign {
+            path: path.into(),
+            verb: VERB,
+        };
+        let seed = (manifest.get("seed").and_then(Value::as_u64)).ok_or_else(foreign)?;
+        let parameters = manifest.get("parameters").and_then(Value::as_array);
+        let names = (parameters.ok_or_else(foreign)?.iter())
+            .map(|p| p["name"].as_str().map(str::to_owned).ok_or_else(foreign))
+            .collect::<Result<_, _>>()?;
+        let finished = manifest.checksums().cloned();
+        let shards = Shards::list(folder, manifest)?;
+        let there = json!(shards.there.values().collect::<Vec<_>>());
+        if shards.there.len() < shards.of || finished.is_none() {
+            return Err(ShardsError::Incomplete {
+                path: path.into(),
+                there: shards.there.len(),
+                of: shards.of,
+            });
+        }
+        if finished != Some(there) {
+            let file = shards.folder.file(SHARDS);
+            return Err(damaged(file, "its shards are not those of manifest.json").into());
+        }
+        Ok(Self {
+            shards,
+            seed,
+            names,
+        })
+    }
+
+    /// Simulations, M.
+    pub fn size(&self) -> usize {
+        self.shards.size
+    }
+
+    /// The seed of its rows.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// Names of the parameters.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Where it lies.
+    pub fn path(&self) -> &Path {
+        self.shards.folder.path()
+    }
+
+    pub(super) fn manifest(&self) -> &Manifest {
+        self.shards.manifest()
+    }
+}
+
+impl Bank for ShardedBank {
+    fn parts(&self) -> Vec<usize> {
+        let rows = |number| self.shards.rows(number).count();
+        (0..self.shards.of).map(rows).collect()
+    }
+
+    fn part(&self, index: usize) -> Result<Cow<'_, Draws>, BankFileError> {
+        let wrong = |reason: String| {
+            let path = self.shards.file(index);
+            damaged(path.unwrap_or_else(|| self.path().into()), &reason)
+        };
+        let bytes = self.shards.bytes(index).map_err(|error| match error {
+            ShardsError::File(error) => error,
+            error => wrong(error.to_string()),
+        })?;
+        let draws = file::from_npz(&bytes).map_err(|error| wrong(error.to_string()))?;
+        file::check(&draws, self.names.len()).map_err(wrong)?;
+        match draws.theta.nrows() == self.shards.rows(index).count() {
+            true => Ok(Cow::Owned(draws)),
+            false => Err(wrong("another number of rows".into())),
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! Simulations from the prior of a study.
+
+use crate::bank::{BankError, Draw, Draws, FeatureSimulator};
+use crate::feature::{FeatureError, FeatureRecipe};
+use crate::progress::Stage;
+use crate::study::{DriveSource, PlanError, Study};
+use crate::twin::{Noise, ParameterSpace};
+use std::borrow::Cow;
+use std::ops::Range;
+
+/// Draws from a study's prior: θ uniform in the prior, each with noise and, where the study draws inputs, an input of its own.
+///
+/// Source: Lakshminarayanan, Guerrero & Rojas, section III.
+pub struct Prior {
+    simulator: FeatureSimulator,
+    space: ParameterSpace,
+    drives: DriveSource,
+}
+
+impl Prior {
+    /// Of a study, seen through features.
+    ///
+    /// # Errors
+    ///
+    /// Features that the twin cannot have.
+    pub fn new(study: &Study, features: &dyn FeatureRecipe) -> Result<Self, PriorError> {
+        Ok(Self {
+            simulator: FeatureSimulator::new(study.twin().clone(), features)?,
+            space: study.twin().parameters(),
+            drives: study.drives()?,
+        })
+    }
+
+    /// Number of features.
+    pub fn dim(&self) -> usize {
+        self.simulator.dim()
+    }
+
+    /// Rows `rows` of what `purpose` names: row i depends on (seed, purpose, i) alone.
+    ///
+    /// # Errors
+    ///
+    /// As [`FeatureSimulator::draws`].
+    pub fn rows(
+        &self,
+        rows: Range<u64>,
+        seed: u64,
+        purpose: &str,
+        stage: &Stage,
+    ) -> Result<Draws, BankError> {
+        self.simulator.draws(
+            rows,
+            |i| Noise::new(seed, purpose, i),
+            |_, _, noise| {
+                let drive = (self.drives.draw(noise))
+                    .map_err(|error| BankError::Input(error.to_string()))?;
+                Ok(Some(Draw {
+                    theta: self.space.draw_prior(noise),
+                    drive: Cow::Owned(drive),
+                }))
+            },
+            stage,
+        )
+    }
+}
+
+/// Why a study's prior cannot be simulated.
+#[derive(Debug, thiserror::Error)]
+pub enum PriorError {
+    /// Of the features.
+    #[error(transparent)]
+    Feature(#[from] FeatureError),
+    /// Of step, length, input.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+}
