@@ -4,6 +4,9 @@ use sha2::{Digest, Sha256};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+/// How names of files and folders begin that are not in their place yet.
+const PREFIX: &str = ".truetwin-";
+
 /// Writes a new file: the bytes go to a temporary file beside it, which is then put in its place.
 ///
 /// # Errors
@@ -29,10 +32,25 @@ fn filled(path: &Path, bytes: &[u8]) -> io::Result<tempfile::NamedTempFile> {
         // As any new file: the user's mask decides who may read it.
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let mut file = builder.prefix(".truetwin-").tempfile_in(folder(path))?;
+    let mut file = builder.prefix(PREFIX).tempfile_in(folder(path))?;
     file.write_all(bytes)?;
     file.as_file().sync_all()?;
     Ok(file)
+}
+
+/// Removes the unfinished files that processes have left in a folder when they died; for folders that nobody writes to.
+///
+/// # Errors
+///
+/// What the system says.
+pub fn sweep(folder: &Path) -> io::Result<()> {
+    for entry in std::fs::read_dir(folder)? {
+        let entry = entry?;
+        if entry.file_name().to_string_lossy().starts_with(PREFIX) {
+            std::fs::remove_file(entry.path())?;
+        }
+    }
+    Ok(())
 }
 
 /// A folder that is filled beside its place and appears there whole.
@@ -47,7 +65,7 @@ impl NewFolder {
     pub fn new(place: &Path) -> io::Result<Self> {
         let mut builder = tempfile::Builder::new();
         Ok(Self {
-            filling: builder.prefix(".truetwin-").tempdir_in(folder(place))?,
+            filling: builder.prefix(PREFIX).tempdir_in(folder(place))?,
             place: place.into(),
         })
     }

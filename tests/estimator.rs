@@ -269,7 +269,7 @@ fn an_estimate_in_a_corner_of_the_bounds_stands() {
     };
     let estimate = (estimator.estimate(&record, &options, &Progress::silent())).unwrap();
     let bounds = study.twin().parameters().bounds();
-    assert!(estimate.fine.is_some() && estimate.redrawn > 0);
+    assert!(estimate.fine.is_some() && estimate.redrawn() > 0);
     assert!(
         estimate
             .theta

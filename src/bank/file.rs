@@ -22,8 +22,8 @@
 
 use super::Draws;
 use crate::files::{with_remedy, write_new};
-use ndarray::{Array1, Array2};
-use ndarray_npy::{NpzReader, NpzWriter, ReadNpzError, WriteNpzError};
+use ndarray::Array2;
+use ndarray_npy::{NpzReader, NpzWriter, ReadNpzError, WriteNpyExt, WriteNpzError};
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 use zip::write::SimpleFileOptions;
@@ -51,7 +51,7 @@ pub enum BankFileError {
         remedy: &'static str,
     },
     /// The name does not say which form.
-    #[error("{}: banks are written and read as .npz or .csv; choose such a name", .0.display())]
+    #[error("{}: banks are written and read as .npz or .csv, features also as .npy; choose such a name", .0.display())]
     Form(PathBuf),
 }
 
@@ -77,6 +77,45 @@ fn form(path: &Path) -> Result<Form, BankFileError> {
         Some("npz") => Ok(Form::Npz),
         Some("csv") => Ok(Form::Csv),
         _ => Err(BankFileError::Form(path.into())),
+    }
+}
+
+/// Writes a new file of features alone, one record a row: `.npy`, `.npz` (array `features`) or `.csv` (`x1` … `xn`).
+///
+/// # Errors
+///
+/// As [`write`].
+pub fn write_features(path: &Path, features: &Array2<f64>) -> Result<(), BankFileError> {
+    let bytes = match path.extension().and_then(|e| e.to_str()) {
+        Some("npy") => {
+            let mut bytes = Vec::new();
+            let written = features.write_npy(&mut bytes);
+            written.map(|()| bytes).map_err(io::Error::other)
+        }
+        Some("npz") => archive(&[("features", features)]).map_err(io::Error::other),
+        Some("csv") => csv_text(&features_alone(features), &[]),
+        _ => return Err(BankFileError::Form(path.into())),
+    };
+    bytes
+        .and_then(|bytes| write_new(path, &bytes))
+        .map_err(|error| BankFileError::io(path, error))
+}
+
+/// The CSV text of [`write_features`].
+///
+/// # Errors
+///
+/// Out of memory alone.
+pub fn features_csv_text(features: &Array2<f64>) -> io::Result<String> {
+    let bytes = csv_text(&features_alone(features), &[])?;
+    String::from_utf8(bytes).map_err(io::Error::other)
+}
+
+fn features_alone(features: &Array2<f64>) -> Draws {
+    Draws {
+        theta: Array2::zeros((features.nrows(), 0)),
+        features: features.clone(),
+        redrawn: 0,
     }
 }
 
@@ -147,25 +186,27 @@ pub(crate) fn check(draws: &Draws, parameters: usize) -> Result<(), String> {
 
 /// The bytes of an `.npz` archive.
 pub(crate) fn npz(draws: &Draws) -> Result<Vec<u8>, WriteNpzError> {
+    archive(&[("theta", &draws.theta), ("features", &draws.features)])
+}
+
+fn archive(arrays: &[(&str, &Array2<f64>)]) -> Result<Vec<u8>, WriteNpzError> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Stored)
         .last_modified_time(DateTime::default());
     let mut archive = NpzWriter::new_with_options(Cursor::new(Vec::new()), options);
-    archive.add_array("theta", &draws.theta)?;
-    archive.add_array("features", &draws.features)?;
-    archive.add_array("redrawn", &Array1::from_elem(1, draws.redrawn as u64))?;
+    for (name, array) in arrays {
+        archive.add_array(*name, *array)?;
+    }
     Ok(archive.finish()?.into_inner())
 }
 
 /// Rows of an `.npz` archive.
 pub(crate) fn from_npz(bytes: &[u8]) -> Result<Draws, ReadNpzError> {
     let mut archive = NpzReader::new(Cursor::new(bytes))?;
-    // An archive from elsewhere does not count what was drawn again.
-    let redrawn = (archive.by_name("redrawn").ok()).and_then(|r: Array1<u64>| r.first().copied());
     Ok(Draws {
         theta: archive.by_name("theta")?,
         features: archive.by_name("features")?,
-        redrawn: redrawn.unwrap_or(0) as usize,
+        redrawn: 0,
     })
 }
 
@@ -241,6 +282,24 @@ mod tests {
         let path = place.path().join("bank.txt");
         let error = write(&path, &draws(), &NAMES).unwrap_err().to_string();
         assert!(error.contains(".npz or .csv"), "{error}");
+    }
+
+    #[test]
+    fn features_alone_are_written_in_three_forms() {
+        let place = tempfile::tempdir().unwrap();
+        let x = array![[0.1, 2.0], [-1e-9, 3.5]];
+        let at = |name: &str| {
+            let path = place.path().join(name);
+            write_features(&path, &x).unwrap();
+            path
+        };
+        let npy: Array2<f64> = ndarray_npy::read_npy(at("x.npy")).unwrap();
+        let file = std::fs::File::open(at("x.npz")).unwrap();
+        let npz: Array2<f64> = NpzReader::new(file).unwrap().by_name("features").unwrap();
+        assert_eq!((npy, npz), (x.clone(), x.clone()));
+        let csv = std::fs::read_to_string(at("x.csv")).unwrap();
+        assert_eq!(csv, "x1,x2\n0.1,2\n-0.000000001,3.5\n");
+        assert!(write_features(&place.path().join("x.txt"), &x).is_err());
     }
 
     /// Checksums of shards rest on it: nothing but the numbers is in an archive.

@@ -47,6 +47,8 @@ pub(super) enum Command {
     /// DIR holds manifest.json and shards/*.npz, each shard with `theta` and `features`, for `pretrain --bank DIR` or numpy.load.
     /// Row i depends on the seed and i alone: any number of threads, jobs (--shard) and ranks (mpirun) makes the same bytes.
     Bank(BankArguments),
+    /// Compress records to features, as a network would see them.
+    Features(FeaturesArguments),
     /// Put the banks of a job array together, or turn a bank into one .npz or .csv file.
     Merge(MergeArguments),
     /// Simulate a bank from the prior, train the network, write one estimator file.
@@ -88,6 +90,7 @@ impl Command {
         let subject = match self {
             Self::Twins | Self::Merge(_) | Self::Estimate(_) | Self::Demo(_) => return None,
             Self::Effects(subject) | Self::Check(subject) => subject,
+            Self::Features(options) => &options.subject,
             Self::Simulate(options) => &options.subject,
             Self::Bank(options) => &options.subject,
             Self::Pretrain(options) => &options.subject,
@@ -173,6 +176,21 @@ pub(super) struct BankArguments {
 }
 
 #[derive(Debug, Args)]
+pub(super) struct FeaturesArguments {
+    /// Records, measured or simulated.
+    #[arg(value_name = "R.csv", required = true)]
+    pub records: Vec<PathBuf>,
+    #[command(flatten)]
+    pub subject: Subject,
+    /// Whose features.
+    #[arg(long, value_enum, default_value = "default")]
+    pub preset: PresetArgument,
+    /// A new .npy, .npz or .csv file, one record a row; standard output, as CSV, unless given.
+    #[arg(long, value_name = "X.npy")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
 pub(super) struct MergeArguments {
     /// Folders of one call of `truetwin bank`.
     #[arg(value_name = "DIR", required = true)]
@@ -220,7 +238,7 @@ pub(super) struct EstimateArguments {
     /// Refine and tune even where the gate would keep the network's estimate.
     #[arg(long)]
     pub always_refine: bool,
-    /// A new folder for estimate.json, overlay.svg and trajectories.csv.
+    /// A new folder for estimate.json, overlay.svg, trajectories.csv and, after a refit, the cloud of simulations (cloud.npz).
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }

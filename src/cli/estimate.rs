@@ -2,6 +2,7 @@
 
 use super::args::EstimateArguments;
 use super::{Context, Failure, output};
+use crate::bank::file;
 use crate::report::{estimate_json, estimate_text, overlay_svg, trajectories_csv};
 use crate::study::Study;
 use crate::twin::{Record, read_record};
@@ -52,7 +53,7 @@ pub(super) fn show(
     }
 }
 
-/// `estimate.json`, `overlay.svg`, `trajectories.csv`.
+/// `estimate.json`, `overlay.svg`, `trajectories.csv`, `cloud.npz`.
 pub(super) fn write_results(
     folder: &output::NewFolder,
     study: &Study,
@@ -61,6 +62,10 @@ pub(super) fn write_results(
 ) -> Result<(), Failure> {
     let json = serde_json::to_string_pretty(&estimate_json(study, estimate));
     folder.write("estimate.json", &json.map_err(Failure::internal)?)?;
+    if let Some(cloud) = &estimate.cloud {
+        let names: Vec<&str> = estimate.names.iter().map(String::as_str).collect();
+        file::write(&folder.file("cloud.npz"), cloud, &names)?;
+    }
     let before = estimate.tracking_initial.as_ref().map(|t| &t.outputs);
     // A free run that diverged leaves nothing to draw; the text says so.
     let Some(after) = estimate.tracking.as_ref().map(|t| &t.outputs) else {

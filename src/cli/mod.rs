@@ -24,6 +24,7 @@ mod diagnose;
 mod effects;
 mod estimate;
 mod failure;
+mod features;
 mod merge;
 mod output;
 mod pretrain;
@@ -125,6 +126,7 @@ fn dispatch(arguments: &Arguments, studies: &[Study], team: &Team) -> Result<Exi
         Command::Check(subject) => check::run(&context, subject),
         Command::Simulate(options) => simulate::run(&context, options),
         Command::Bank(options) => bank::run(&context, options),
+        Command::Features(options) => features::run(&context, options),
         Command::Merge(options) => merge::run(&context, options),
         Command::Pretrain(options) => pretrain::run(&context, options),
         Command::Estimate(options) => estimate::run(&context, options),

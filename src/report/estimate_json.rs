@@ -87,7 +87,7 @@ pub fn estimate_json(study: &Study, estimate: &Estimate) -> Value {
         "parameters": parameters,
         "directions": directions,
         "refitted": estimate.refitted,
-        "redrawn": estimate.redrawn,
+        "redrawn": estimate.redrawn(),
     })
 }
 

@@ -210,7 +210,7 @@ fn tracking(study: &Study, estimate: &Estimate) -> String {
 
 /// Simulations and seconds.
 fn effort(estimate: &Estimate) -> String {
-    let redrawn = match estimate.redrawn {
+    let redrawn = match estimate.redrawn() {
         0 => String::new(),
         n => format!(" ({n} of the cloud drawn anew)"),
     };

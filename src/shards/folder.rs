@@ -4,12 +4,11 @@ use super::ShardsError;
 use super::plan::VERB;
 use crate::bank::file::{self, BankFileError};
 use crate::bank::{Bank, Draws};
-use crate::files::{sha256, write_new};
+use crate::files::{sha256, sweep, write_new};
 use crate::work::{Manifest, WorkError, WorkFolder};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -118,9 +117,7 @@ impl Shards {
     pub fn add(&self, number: usize, bytes: &[u8]) -> Result<(), ShardsError> {
         let path = self.folder.file(SHARDS).join(name(number, &sha256(bytes)));
         match write_new(&path, bytes) {
-            Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
-                Err(BankFileError::io(&path, error).into())
-            }
+            Err(error) if !path.exists() => Err(BankFileError::io(&path, error).into()),
             _ => Ok(()),
         }
     }
@@ -135,11 +132,13 @@ impl Shards {
         }
     }
 
-    /// Puts the checksums into the manifest, if every shard is there.
+    /// Puts the checksums into the manifest, if every shard is there; sweeps out what processes that died have left.
     pub fn finish(&self) -> Result<(), ShardsError> {
         if self.there.len() == self.of {
             let checksums: Vec<&String> = self.there.values().collect();
             self.folder.finish(&self.manifest, json!(checksums))?;
+            let place = self.folder.file(SHARDS);
+            sweep(&place).map_err(|error| WorkError::io(&place, error))?;
         }
         Ok(())
     }

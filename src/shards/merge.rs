@@ -108,7 +108,7 @@ pub fn merge_into_file(
     let draws = Draws {
         theta: stacked(|draws| &draws.theta),
         features: stacked(|draws| &draws.features),
-        redrawn: parts.iter().map(|part| part.redrawn).sum(),
+        redrawn: 0,
     };
     let names: Vec<&str> = bank.names().iter().map(String::as_str).collect();
     file::write(out, &draws, &names)?;

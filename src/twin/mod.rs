@@ -27,6 +27,7 @@ mod noise;
 mod parameter;
 mod record;
 mod record_csv;
+mod record_parquet;
 mod state_space;
 
 pub use adapt::{Adaptation, AdaptationError, Level, adapt};

@@ -1,9 +1,10 @@
-//! Records and inputs as CSV files.
+//! Records and inputs as CSV files; or as Parquet files with the same columns, in a build with the feature `parquet`.
 //!
 //! A header, then one row a sample: `t` in seconds, uniform to 1e-3 of a step and increasing; inputs `u` or
 //! `u1,u2,…`; outputs `y` or `y1,y2,…`. Rows are counted as an editor counts lines: the header is row 1.
 
 use super::record::column_names;
+use super::record_parquet;
 use super::{Drive, DriveError, Record, RecordError, Signal};
 use crate::files::{with_remedy, write_new};
 use std::path::{Path, PathBuf};
@@ -152,6 +153,9 @@ struct Table {
 
 impl Table {
     fn read(path: &Path) -> Result<Self, CsvError> {
+        if path.extension().is_some_and(|e| e == "parquet") {
+            return Self::parse(record_parquet::csv_text(path)?.as_bytes(), path);
+        }
         let file = std::fs::File::open(path).map_err(|error| CsvError::Io {
             path: path.into(),
             error,

@@ -3,7 +3,7 @@
 use super::cloud::{Around, cloud};
 use super::tune::tune;
 use super::{Estimator, Spread, Tracking, track};
-use crate::bank::{BankError, FeatureSimulator};
+use crate::bank::{BankError, Draws, FeatureSimulator};
 use crate::feature::FeatureError;
 use crate::gate::{GateError, GateForm, GateOutcome, GateTest};
 use crate::network::NetworkError;
@@ -72,8 +72,8 @@ pub struct Estimate {
     pub validation: Option<Tracking>,
     /// Simulator calls.
     pub simulations: usize,
-    /// Draws of the cloud that were drawn again: out of bounds, diverged, or without features.
-    pub redrawn: usize,
+    /// The cloud that the heads were tuned on, and measured on: its last rows they never saw.
+    pub cloud: Option<Draws>,
     /// Wall-clock times.
     pub seconds: Seconds,
 }
@@ -171,6 +171,13 @@ impl Estimate {
     }
 }
 
+impl Estimate {
+    /// Draws of the cloud that were drawn again: out of bounds, diverged, or without features.
+    pub fn redrawn(&self) -> usize {
+        self.cloud.as_ref().map_or(0, |draws| draws.redrawn)
+    }
+}
+
 impl Estimator {
     /// Estimates θ from a record: features, network, gate; and where the gate rejects: Gauss–Newton, cloud, tuned
     /// heads, gate again.
@@ -249,7 +256,7 @@ impl Estimator {
             tracking,
             validation,
             simulations: simulator.calls(),
-            redrawn: outcome.redrawn,
+            cloud: outcome.cloud,
             seconds,
         })
     }
@@ -274,7 +281,7 @@ struct Outcome {
     information: Option<Information>,
     after: Option<GateOutcome>,
     refitted: bool,
-    redrawn: usize,
+    cloud: Option<Draws>,
 }
 
 /// An estimate with its uncertainty.
@@ -375,7 +382,7 @@ impl Run<'_> {
             information,
             after: None,
             refitted: false,
-            redrawn: 0,
+            cloud: None,
         })
     }
 
@@ -452,7 +459,7 @@ impl Run<'_> {
             information: Some(refined.information),
             after,
             refitted: true,
-            redrawn: draws.redrawn,
+            cloud: Some(draws),
         })
     }
 

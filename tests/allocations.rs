@@ -1,0 +1,59 @@
+//! The simulation loop allocates nothing: a longer record costs no more allocations than a short one.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use truetwin::study::RecordPlan;
+use truetwin::twin::{DigitalTwin, Noise};
+use truetwin::twins::{CascadedTanks, VanDerPol};
+
+struct Counting;
+
+thread_local! {
+    static COUNT: Cell<usize> = const { Cell::new(0) };
+}
+
+// SAFETY: hands everything on to the system's allocator.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.with(|count| count.set(count.get() + 1));
+        // SAFETY: the caller's promise.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
+        // SAFETY: the caller's promise.
+        unsafe { System.dealloc(memory, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Allocations of one simulation of so many samples.
+fn allocations(twin: &dyn DigitalTwin, plan: &RecordPlan, samples: usize, theta: &[f64]) -> usize {
+    let plan = RecordPlan {
+        samples,
+        ..plan.clone()
+    };
+    let noise = Noise::new(1, "allocations", 0);
+    let drive = plan.prepare(&twin.signals()).unwrap().draw(noise).unwrap();
+    let before = COUNT.get();
+    twin.simulate(theta, &drive, noise).unwrap();
+    COUNT.get() - before
+}
+
+#[test]
+fn a_longer_record_costs_no_more_allocations() {
+    let cases: [(&dyn DigitalTwin, RecordPlan, &[f64]); 2] = [
+        (&VanDerPol, RecordPlan::autonomous(0.05, 0), &[1.5]),
+        (
+            &CascadedTanks,
+            RecordPlan::levels(0.5, 0, 0.0, 3.0, 30),
+            &[0.6, 0.5, 0.55, 1.0],
+        ),
+    ];
+    for (twin, plan, theta) in cases {
+        let [short, long] = [100, 10_000].map(|n| allocations(twin, &plan, n, theta));
+        assert_eq!(short, long);
+        assert!((1..100).contains(&short), "{short} allocations a record");
+    }
+}
