@@ -1,7 +1,8 @@
 //! Simulations with features a second, on one core, and the price of writing a twin as equations: the tanks beside a loop
-//! by hand. `RAYON_NUM_THREADS=1 cargo bench --bench bank`.
+//! by hand, one at a time and in batches on more and more threads. `RAYON_NUM_THREADS=1 cargo bench --bench bank`.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use rayon::prelude::*;
 use std::hint::black_box;
 use std::time::Duration;
 use truetwin::feature::{Ar, Arx, FeatureRecipe};
@@ -92,5 +93,40 @@ fn simulators(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, bank, simulators);
+/// Records at once, on so many threads.
+const BATCH: u64 = 512;
+
+/// Batches of tanks records on pools of threads, by the generic simulator and by hand.
+fn threads(c: &mut Criterion) {
+    let plan = RecordPlan::levels(0.5, 400, 0.0, 3.0, 30);
+    let source = plan.prepare(&CascadedTanks.signals());
+    let drive = (source.expect("a plan of the tanks").draw(Noise::OFF)).expect("levels are finite");
+    let mut group = c.benchmark_group("batches of tanks records");
+    group
+        .throughput(Throughput::Elements(BATCH))
+        .sample_size(20)
+        .warm_up_time(Duration::from_millis(500))
+        .measurement_time(Duration::from_secs(2));
+    let most = std::thread::available_parallelism().map_or(1, usize::from);
+    for threads in (0..).map(|i| 1 << i).take_while(|n| *n <= most) {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.expect("threads can be started");
+        let noise = |i| Noise::new(1, "bench", i);
+        // The last output of each record, so that none is left out.
+        let generic = |i| match CascadedTanks.simulate(&THETA, &drive, noise(i)) {
+            Ok(y) => y[[y.nrows() - 1, 0]],
+            Err(_) => f64::NAN,
+        };
+        let hand = |i| by_hand(&THETA, &drive, noise(i))[drive.samples() - 1];
+        group.bench_function(format!("equations, {threads} threads"), |b| {
+            b.iter(|| pool.install(|| (0..BATCH).into_par_iter().map(generic).sum::<f64>()))
+        });
+        group.bench_function(format!("by hand, {threads} threads"), |b| {
+            b.iter(|| pool.install(|| (0..BATCH).into_par_iter().map(hand).sum::<f64>()))
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, bank, simulators, threads);
 criterion_main!(benches);

@@ -14,6 +14,7 @@
 //! |---|---|
 //! | plug in a simulator | [`twin::StateSpace`], [`twin::DigitalTwin`] |
 //! | say what records look like and which recipe to use | [`study::Study`] |
+//! | fill a bank on disk, from many processes | [`shards::BankPlan`], [`work`] |
 //! | train, save, load, estimate | [`two_stage::pretrain`], [`two_stage::Estimator`] |
 //! | compress records otherwise | [`feature::FeatureMap`], [`feature::FeatureRecipe`] |
 //! | shape the network | [`network::HeadArchitecture`] |
