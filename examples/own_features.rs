@@ -5,7 +5,7 @@
 //! $ cargo run --release --example own_features -- demo
 //! ```
 //!
-//! A study file takes them by their kind: `[features] kind = "gains"`, `ranges = 6`.
+//! A study file takes them by their kind: `[features] kind = "gains"`, `ranges = 8`.
 
 use serde::{Deserialize, Serialize};
 use std::process::ExitCode;
@@ -21,7 +21,7 @@ impl DigitalTwin for Amplifier {
     fn parameters(&self) -> ParameterSpace {
         ParameterSpace::new([
             Parameter::new("a", "V", 1.0, 3.0).within(0.1, 9.0),
-            Parameter::new("b", "V", 0.5, 2.0).within(0.1, 9.0),
+            Parameter::new("b", "V", 0.5, 2.0).within(0.1, 4.0),
         ])
     }
     fn simulate(
@@ -76,7 +76,7 @@ impl FeatureMap for Gains {
 
 fn study() -> Result<Study, StudyError> {
     let plan = RecordPlan::levels(0.1, 300, -3.0, 3.0, 1);
-    Ok(Study::new("amplifier", Amplifier, plan)?.with_features(Gains { ranges: 6 }))
+    Ok(Study::new("amplifier", Amplifier, plan)?.with_features(Gains { ranges: 8 }))
 }
 
 fn main() -> ExitCode {
