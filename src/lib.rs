@@ -13,6 +13,7 @@
 //! | to … | look at |
 //! |---|---|
 //! | plug in a simulator | [`twin::StateSpace`], [`twin::DigitalTwin`] |
+//! | plug in a program written in any language | [`external::program`] |
 //! | say what records look like and which recipe to use | [`study::Study`] |
 //! | train, save, load, estimate | [`two_stage::pretrain`], [`two_stage::Estimator`] |
 //! | compress records otherwise | [`feature::FeatureMap`], [`feature::FeatureRecipe`] |
@@ -54,6 +55,8 @@ pub mod gate;
 pub mod refine;
 pub mod sample;
 pub mod study;
+
+pub mod external;
 
 pub mod two_stage;
 

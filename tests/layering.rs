@@ -9,7 +9,7 @@ const LAYERS: [&[&str]; 6] = [
     &["files", "math", "optimise", "progress"],
     &["twin", "filter", "feature", "network"],
     &[
-        "twins", "effect", "bank", "gate", "refine", "sample", "study",
+        "twins", "effect", "bank", "gate", "refine", "sample", "study", "external",
     ],
     &["two_stage", "baseline", "diagnose"],
     &["experiment", "withheld", "report"],

@@ -22,6 +22,7 @@ mod demo;
 mod diagnose;
 mod effects;
 mod estimate;
+mod external;
 mod failure;
 mod output;
 mod pretrain;
@@ -91,8 +92,11 @@ fn in_pool<R: Send>(
 
 fn dispatch(arguments: &Arguments, studies: &[Study]) -> Result<ExitCode, Failure> {
     let progress = progress::bars();
+    let external = external::study(&arguments.external, studies)?;
+    let studies: Vec<Study> = studies.iter().chain(&external).cloned().collect();
     let context = Context {
-        studies,
+        studies: &studies,
+        external: external.as_ref(),
         json: arguments.json,
         seed: arguments.seed,
         progress: &progress,
@@ -114,14 +118,17 @@ fn dispatch(arguments: &Arguments, studies: &[Study]) -> Result<ExitCode, Failur
 
 /// What every verb sees.
 struct Context<'a> {
+    /// All there are, the external one among them.
     studies: &'a [Study],
+    /// The one that this call brings along.
+    external: Option<&'a Study>,
     json: bool,
     seed: u64,
     progress: &'a Progress,
 }
 
 impl Context<'_> {
-    /// The study that `--twin` or `--study` names.
+    /// The study that `--twin` or `--study` names, else the one that the call brings along.
     fn study(&self, subject: &Subject) -> Result<Study, Failure> {
         match (&subject.twin, &subject.study) {
             (Some(name), _) => Ok(self.named(name)?.clone()),
@@ -131,9 +138,11 @@ impl Context<'_> {
                 let study = self.named(&file.twin).map_err(at)?;
                 study.configure(&file).map_err(|error| at(error.into()))
             }
-            (None, None) => Err(Failure::user(
-                "name a twin with --twin, or a file with --study",
-            )),
+            (None, None) => (self.external.cloned()).ok_or_else(|| {
+                Failure::user(
+                    "no twin is named; give --twin NAME (`truetwin twins` lists them), --study S.toml, or --program 'COMMAND'",
+                )
+            }),
         }
     }
 

@@ -1,0 +1,143 @@
+//! Copies of a program, lent to one thread at a time.
+
+use super::command::ProgramCommand;
+use super::description::Description;
+use super::protocol::{self, LONGEST_DESCRIPTION};
+use super::text::excerpt;
+use super::worker::{Trouble, Worker};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// How long programs are waited for once their standard input is closed.
+const GRACE: Duration = Duration::from_millis(500);
+
+/// Starts workers when they are needed, keeps the idle ones, and ends all with itself.
+pub(super) struct Pool {
+    command: ProgramCommand,
+    /// For one answer.
+    timeout: Duration,
+    most: usize,
+    state: Mutex<State>,
+    free: Condvar,
+}
+
+#[derive(Default)]
+struct State {
+    idle: Vec<Worker>,
+    /// Lent out or being started.
+    lent: usize,
+}
+
+/// The right to use one worker; given back when dropped.
+struct Place<'a>(&'a Pool);
+
+impl Drop for Place<'_> {
+    fn drop(&mut self) {
+        self.0.lock().lent -= 1;
+        self.0.free.notify_one();
+    }
+}
+
+impl Pool {
+    /// At most `most` workers.
+    pub fn new(command: ProgramCommand, timeout: Duration, most: usize) -> Self {
+        Self {
+            command,
+            timeout,
+            most,
+            state: Mutex::default(),
+            free: Condvar::new(),
+        }
+    }
+
+    /// The command that starts a worker.
+    pub fn command(&self) -> &ProgramCommand {
+        &self.command
+    }
+
+    /// Takes in a worker that was started elsewhere.
+    pub fn adopt(&self, worker: Worker) {
+        self.lock().idle.push(worker);
+    }
+
+    /// Sends a line to a worker that has said to be `expected`, and reads its answer with `read`. A worker that gave no
+    /// good answer is ended; `read`'s error is nonsense.
+    pub fn ask<T>(
+        &self,
+        line: &str,
+        longest: usize,
+        expected: &Description,
+        read: impl FnOnce(&str) -> Result<T, String>,
+    ) -> Result<T, Trouble> {
+        let (idle, _place) = self.take();
+        let mut worker = match idle {
+            Some(worker) => worker,
+            None => {
+                let (worker, found) = introduce(&self.command, self.timeout)
+                    .map_err(|error| Trouble::Gone(format!("did not start again: {error}")))??;
+                if found != *expected {
+                    let problem = "describes itself otherwise than when it was first started";
+                    return Err(Trouble::Nonsense(problem.into()));
+                }
+                worker
+            }
+        };
+        let answer = worker.ask(line.to_owned(), longest, self.timeout)?;
+        let read = read(&answer).map_err(|problem| nonsense(&answer, &problem, &worker))?;
+        self.lock().idle.push(worker);
+        Ok(read)
+    }
+
+    /// An idle worker that lives, or the right to start one; waits until there is either.
+    fn take(&self) -> (Option<Worker>, Place<'_>) {
+        let mut state = self.lock();
+        while state.lent >= self.most {
+            let woken = self.free.wait(state);
+            state = woken.unwrap_or_else(PoisonError::into_inner);
+        }
+        state.lent += 1;
+        let place = Place(self);
+        // Some programs end after an answer; that is no failure of the next one.
+        while let Some(mut worker) = state.idle.pop() {
+            if worker.lives() {
+                return (Some(worker), place);
+            }
+        }
+        (None, place)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for Pool {
+    fn drop(&mut self) {
+        let state = self.state.get_mut();
+        let idle = &mut state.unwrap_or_else(PoisonError::into_inner).idle;
+        idle.iter_mut().for_each(Worker::dismiss);
+        let by = Instant::now() + GRACE;
+        idle.iter_mut().for_each(|worker| worker.stop(by));
+    }
+}
+
+/// Starts a worker and asks what it is.
+pub(super) fn introduce(
+    command: &ProgramCommand,
+    timeout: Duration,
+) -> std::io::Result<Result<(Worker, Description), Trouble>> {
+    let mut worker = Worker::start(command)?;
+    let answer = worker.ask(protocol::describe(), LONGEST_DESCRIPTION, timeout);
+    Ok(answer.and_then(|line| match Description::parse(&line) {
+        Ok(description) => Ok((worker, description)),
+        Err(problem) => Err(nonsense(&line, &problem, &worker)),
+    }))
+}
+
+fn nonsense(line: &str, problem: &str, worker: &Worker) -> Trouble {
+    Trouble::Nonsense(format!(
+        "answered \"{}\": {problem}{}",
+        excerpt(line),
+        worker.last_words()
+    ))
+}
