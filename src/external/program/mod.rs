@@ -157,7 +157,8 @@ impl ProgramTwin {
         let mut attempt = 0;
         loop {
             attempt += 1;
-            match self.pool.ask(&line, longest, &self.description, read) {
+            let fresh = attempt > 1;
+            match (self.pool).ask(&line, longest, fresh, &self.description, read) {
                 Ok(Answer::Error(text)) => {
                     return Err(self.health.broken(named(format!("says: {text}"))));
                 }

@@ -61,15 +61,16 @@ impl Pool {
     }
 
     /// Sends a line to a worker that has said to be `expected`, and reads its answer with `read`. A worker that gave no
-    /// good answer is ended; `read`'s error is nonsense.
+    /// good answer is ended; `read`'s error is nonsense. A `fresh` worker has answered no request before.
     pub fn ask<T>(
         &self,
         line: &str,
         longest: usize,
+        fresh: bool,
         expected: &Description,
         read: impl FnOnce(&str) -> Result<T, String>,
     ) -> Result<T, Trouble> {
-        let (idle, _place) = self.take();
+        let (idle, _place) = self.take(fresh);
         let mut worker = match idle {
             Some(worker) => worker,
             None => {
@@ -88,8 +89,8 @@ impl Pool {
         Ok(read)
     }
 
-    /// An idle worker that lives, or the right to start one; waits until there is either.
-    fn take(&self) -> (Option<Worker>, Place<'_>) {
+    /// An idle worker that lives, or the right to start one, as is always so of a `fresh` one; waits until there is either.
+    fn take(&self, fresh: bool) -> (Option<Worker>, Place<'_>) {
         let mut state = self.lock();
         while state.lent >= self.most {
             let woken = self.free.wait(state);
@@ -97,6 +98,13 @@ impl Pool {
         }
         state.lent += 1;
         let place = Place(self);
+        if fresh {
+            // One of the idle ones makes room.
+            let surplus = (state.lent + state.idle.len() > self.most).then(|| state.idle.pop());
+            drop(state);
+            drop(surplus);
+            return (None, place);
+        }
         // Some programs end after an answer; that is no failure of the next one.
         while let Some(mut worker) = state.idle.pop() {
             if worker.lives() {
