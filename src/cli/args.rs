@@ -40,7 +40,13 @@ pub(super) struct External {
     /// A program that is a twin: it reads and writes lines of JSON. No shell is run.
     #[arg(long, global = true, value_name = "COMMAND")]
     pub program: Option<String>,
-    /// Copies of the program that run at once; one a thread unless said.
+    /// An FMU that is a twin: FMI 2.0 or 3.0, co-simulation. Needs a build with the feature fmi.
+    #[arg(long, global = true, value_name = "M.fmu", conflicts_with = "program")]
+    pub fmu: Option<PathBuf>,
+    /// Parameters, inputs and outputs of the FMU that the twin has; of a kind that none is named of, all.
+    #[arg(long, global = true, value_name = "NAME,..", value_delimiter = ',')]
+    pub variables: Vec<String>,
+    /// Copies of the program or FMU that run at once; one a thread unless said.
     #[arg(long, global = true, value_name = "N")]
     pub workers: Option<usize>,
     /// Seconds that one answer of the program may take; 60 unless said.

@@ -140,7 +140,7 @@ impl Context<'_> {
             }
             (None, None) => (self.external.cloned()).ok_or_else(|| {
                 Failure::user(
-                    "no twin is named; give --twin NAME (`truetwin twins` lists them), --study S.toml, or --program 'COMMAND'",
+                    "no twin is named; give --twin NAME (`truetwin twins` lists them), --study S.toml, --program 'COMMAND', or --fmu M.fmu",
                 )
             }),
         }

@@ -3,9 +3,19 @@
 /// Longest name, in characters.
 const LONGEST: usize = 100;
 
+fn odd(c: char) -> bool {
+    c.is_whitespace() || c.is_control() || ",=@\"'\\".contains(c)
+}
+
+/// `name` with `_` in place of what [`check`] refuses.
+#[cfg(feature = "fmi")]
+pub(super) fn made_fit(name: &str) -> String {
+    let fit = |c| if odd(c) { '_' } else { c };
+    name.chars().take(LONGEST).map(fit).collect()
+}
+
 /// Whether `name` can stand on a command line (`--theta a=1,b=2`), in a study file and in a table; else what is wrong.
 pub(super) fn check(name: &str) -> Result<(), String> {
-    let odd = |c: char| c.is_whitespace() || c.is_control() || ",=@\"'\\".contains(c);
     if name.is_empty() {
         return Err("a name is empty; give each its own".into());
     }
@@ -14,7 +24,7 @@ pub(super) fn check(name: &str) -> Result<(), String> {
             "a name has more than {LONGEST} characters; shorten it"
         ));
     }
-    match name.chars().find(|c| odd(*c)) {
+    match name.chars().find(|&c| odd(c)) {
         Some(c) => Err(format!(
             "the name {name:?} holds {c:?}; use letters, digits, _ - . instead"
         )),

@@ -84,6 +84,15 @@ fn wrong_calls_are_refused_in_one_line() {
         &["check", "--twin", "tanks", "--workers", "2"],
         &["--workers", "--program"],
     );
+    refused(
+        &["check", "--twin", "tanks", "--variables", "k"],
+        &["--variables", "--fmu"],
+    );
+    #[cfg(not(feature = "fmi"))]
+    refused(
+        &["check", "--fmu", "rig.fmu"],
+        &["rig.fmu", "--features fmi"],
+    );
     refused(&["check", "--program", ""], &["no program is named"]);
     refused(&["check", "--program", "python3 'x"], &["quote"]);
     refused(

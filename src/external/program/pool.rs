@@ -1,11 +1,11 @@
 //! Copies of a program, lent to one thread at a time.
 
+use super::super::lending::Lending;
 use super::command::ProgramCommand;
 use super::description::Description;
 use super::protocol::{self, LONGEST_DESCRIPTION};
 use super::text::excerpt;
 use super::worker::{Trouble, Worker};
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// How long programs are waited for once their standard input is closed.
@@ -16,26 +16,7 @@ pub(super) struct Pool {
     command: ProgramCommand,
     /// For one answer.
     timeout: Duration,
-    most: usize,
-    state: Mutex<State>,
-    free: Condvar,
-}
-
-#[derive(Default)]
-struct State {
-    idle: Vec<Worker>,
-    /// Lent out or being started.
-    lent: usize,
-}
-
-/// The right to use one worker; given back when dropped.
-struct Place<'a>(&'a Pool);
-
-impl Drop for Place<'_> {
-    fn drop(&mut self) {
-        self.0.lock().lent -= 1;
-        self.0.free.notify_one();
-    }
+    workers: Lending<Worker>,
 }
 
 impl Pool {
@@ -44,9 +25,7 @@ impl Pool {
         Self {
             command,
             timeout,
-            most,
-            state: Mutex::default(),
-            free: Condvar::new(),
+            workers: Lending::new(most),
         }
     }
 
@@ -57,7 +36,7 @@ impl Pool {
 
     /// Takes in a worker that was started elsewhere.
     pub fn adopt(&self, worker: Worker) {
-        self.lock().idle.push(worker);
+        self.workers.adopt(worker);
     }
 
     /// Sends a line to a worker that has said to be `expected`, and reads its answer with `read`. A worker that gave no
@@ -70,7 +49,8 @@ impl Pool {
         expected: &Description,
         read: impl FnOnce(&str) -> Result<T, String>,
     ) -> Result<T, Trouble> {
-        let (idle, _place) = self.take(fresh);
+        // Some programs end after an answer; that is no failure of the next one.
+        let (idle, place) = self.workers.take(fresh, Worker::lives);
         let mut worker = match idle {
             Some(worker) => worker,
             None => {
@@ -85,44 +65,14 @@ impl Pool {
         };
         let answer = worker.ask(line.to_owned(), longest, self.timeout)?;
         let read = read(&answer).map_err(|problem| nonsense(&answer, &problem, &worker))?;
-        self.lock().idle.push(worker);
+        place.give_back(worker);
         Ok(read)
-    }
-
-    /// An idle worker that lives, or the right to start one, as is always so of a `fresh` one; waits until there is either.
-    fn take(&self, fresh: bool) -> (Option<Worker>, Place<'_>) {
-        let mut state = self.lock();
-        while state.lent >= self.most {
-            let woken = self.free.wait(state);
-            state = woken.unwrap_or_else(PoisonError::into_inner);
-        }
-        state.lent += 1;
-        let place = Place(self);
-        if fresh {
-            // One of the idle ones makes room.
-            let surplus = (state.lent + state.idle.len() > self.most).then(|| state.idle.pop());
-            drop(state);
-            drop(surplus);
-            return (None, place);
-        }
-        // Some programs end after an answer; that is no failure of the next one.
-        while let Some(mut worker) = state.idle.pop() {
-            if worker.lives() {
-                return (Some(worker), place);
-            }
-        }
-        (None, place)
-    }
-
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Drop for Pool {
     fn drop(&mut self) {
-        let state = self.state.get_mut();
-        let idle = &mut state.unwrap_or_else(PoisonError::into_inner).idle;
+        let idle = self.workers.idle();
         idle.iter_mut().for_each(Worker::dismiss);
         let by = Instant::now() + GRACE;
         idle.iter_mut().for_each(|worker| worker.stop(by));
