@@ -25,27 +25,35 @@ pub(super) enum Step {
 
 /// An instance for co-simulation.
 pub(super) enum Instance {
-    Two(InstanceTwo),
-    Three(InstanceThree),
+    Two(Box<InstanceTwo>),
+    Three(Box<InstanceThree>),
 }
 
-fn refused(error: impl Into<fmi::Error>, what: &str) -> Refusal {
-    let error = error.into();
+/// An outcome of the library as ours; `what` is for the message.
+fn done<T>(outcome: Result<T, impl Into<fmi::Error>>, what: &str) -> Result<(), Refusal> {
+    let error = match outcome {
+        Ok(_) => return Ok(()),
+        Err(error) => error.into(),
+    };
     let text = format!("{what}: {error}");
-    match error {
+    Err(match error {
         fmi::Error::Fmi2Error(fmi::fmi2::Fmi2Error::Fatal)
         | fmi::Error::Fmi3Error(fmi::fmi3::Fmi3Error::Fatal) => Refusal::Fatal(text),
         _ => Refusal::Error(text),
-    }
+    })
 }
 
 impl Instance {
     /// A new instance; the library is loaded.
     pub fn new(archive: &Archive) -> Result<Self, fmi::Error> {
+        let (name, visible, logging) = ("truetwin", false, false);
         Ok(match archive {
-            Archive::Two(import) => Self::Two(import.instantiate_cs("truetwin", false, false)?),
+            Archive::Two(import) => {
+                Self::Two(Box::new(import.instantiate_cs(name, visible, logging)?))
+            }
             Archive::Three(import) => {
-                Self::Three(import.instantiate_cs("truetwin", false, false, false, false, &[])?)
+                let made = import.instantiate_cs(name, visible, logging, false, false, &[])?;
+                Self::Three(Box::new(made))
             }
         })
     }
@@ -53,44 +61,25 @@ impl Instance {
     /// As newly made.
     pub fn reset(&mut self) -> Result<(), Refusal> {
         match self {
-            Self::Two(it) => (FmiInstance::reset(it))
-                .map_err(|e| refused(e, "reset"))
-                .map(drop),
-            Self::Three(it) => (FmiInstance::reset(it))
-                .map_err(|e| refused(e, "reset"))
-                .map(drop),
+            Self::Two(it) => done(FmiInstance::reset(it.as_mut()), "reset"),
+            Self::Three(it) => done(FmiInstance::reset(it.as_mut()), "reset"),
         }
     }
 
     /// Sets reals by their references.
     pub fn set(&mut self, references: &[u32], values: &[f64], what: &str) -> Result<(), Refusal> {
-        if references.is_empty() {
-            return Ok(());
-        }
         match self {
-            Self::Two(it) => it
-                .set_real(references, values)
-                .map_err(|e| refused(e, what))
-                .map(drop),
-            Self::Three(it) => it
-                .set_float64(references, values)
-                .map_err(|e| refused(e, what))
-                .map(drop),
+            _ if references.is_empty() => Ok(()),
+            Self::Two(it) => done(it.set_real(references, values), what),
+            Self::Three(it) => done(it.set_float64(references, values), what),
         }
     }
 
     /// Reads reals by their references.
     pub fn get(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), Refusal> {
-        let what = "reading outputs";
         match self {
-            Self::Two(it) => it
-                .get_real(references, values)
-                .map_err(|e| refused(e, what))
-                .map(drop),
-            Self::Three(it) => it
-                .get_float64(references, values)
-                .map_err(|e| refused(e, what))
-                .map(drop),
+            Self::Two(it) => done(it.get_real(references, values), "reading outputs"),
+            Self::Three(it) => done(it.get_float64(references, values), "reading outputs"),
         }
     }
 
@@ -98,12 +87,20 @@ impl Instance {
     pub fn enter(&mut self, start: f64) -> Result<(), Refusal> {
         let what = "entering the initialisation";
         match self {
-            Self::Two(it) => FmiInstance::enter_initialization_mode(it, None, start, None)
-                .map_err(|e| refused(e, what))
-                .map(drop),
-            Self::Three(it) => FmiInstance::enter_initialization_mode(it, None, start, None)
-                .map_err(|e| refused(e, what))
-                .map(drop),
+            Self::Two(it) => {
+                let it = it.as_mut();
+                done(
+                    FmiInstance::enter_initialization_mode(it, None, start, None),
+                    what,
+                )
+            }
+            Self::Three(it) => {
+                let it = it.as_mut();
+                done(
+                    FmiInstance::enter_initialization_mode(it, None, start, None),
+                    what,
+                )
+            }
         }
     }
 
@@ -111,37 +108,23 @@ impl Instance {
     pub fn exit(&mut self) -> Result<(), Refusal> {
         let what = "the initialisation";
         match self {
-            Self::Two(it) => FmiInstance::exit_initialization_mode(it)
-                .map_err(|e| refused(e, what))
-                .map(drop),
-            Self::Three(it) => FmiInstance::exit_initialization_mode(it)
-                .map_err(|e| refused(e, what))
-                .map(drop),
+            Self::Two(it) => done(FmiInstance::exit_initialization_mode(it.as_mut()), what),
+            Self::Three(it) => done(FmiInstance::exit_initialization_mode(it.as_mut()), what),
         }
     }
 
     /// From `time` on for `step` seconds.
     pub fn step(&mut self, time: f64, step: f64) -> Result<Step, Refusal> {
         let what = "a step";
+        let (mut event, mut ended, mut early, mut reached) = (false, false, false, time);
+        let told = (&mut event, &mut ended, &mut early, &mut reached);
         match self {
-            Self::Two(it) => match it.do_step(time, step, true) {
-                Ok(_) => Ok(Step::Done),
-                Err(error) => Err(refused(error, what)),
-            },
+            Self::Two(it) => done(it.do_step(time, step, true), what)?,
             Self::Three(it) => {
-                let (mut event, mut ended, mut early, mut reached) = (false, false, false, time);
-                it.do_step(
-                    time,
-                    step,
-                    true,
-                    &mut event,
-                    &mut ended,
-                    &mut early,
-                    &mut reached,
-                )
-                .map_err(|e| refused(e, what))?;
-                Ok(if ended { Step::Ended } else { Step::Done })
+                let outcome = it.do_step(time, step, true, told.0, told.1, told.2, told.3);
+                done(outcome, what)?;
             }
         }
+        Ok(if ended { Step::Ended } else { Step::Done })
     }
 }
