@@ -95,7 +95,7 @@ fn twin(name: &str, before: &str, settings: ProgramSettings) -> ProgramTwin {
 fn impatient() -> ProgramSettings {
     ProgramSettings {
         workers: Some(2),
-        timeout: Duration::from_secs(1),
+        timeout: Duration::from_millis(600),
         retries: 0,
     }
 }

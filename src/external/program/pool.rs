@@ -8,6 +8,8 @@ use super::text::excerpt;
 use super::worker::{Trouble, Worker};
 use std::time::{Duration, Instant};
 
+/// Least time for a start: imports and licences take longer than a simulation.
+const START: Duration = Duration::from_secs(30);
 /// How long programs are waited for once their standard input is closed.
 const GRACE: Duration = Duration::from_millis(500);
 
@@ -85,7 +87,8 @@ pub(super) fn introduce(
     timeout: Duration,
 ) -> std::io::Result<Result<(Worker, Description), Trouble>> {
     let mut worker = Worker::start(command)?;
-    let answer = worker.ask(protocol::describe(), LONGEST_DESCRIPTION, timeout);
+    let time = timeout.max(START);
+    let answer = worker.ask(protocol::describe(), LONGEST_DESCRIPTION, time);
     Ok(answer.and_then(|line| match Description::parse(&line) {
         Ok(description) => Ok((worker, description)),
         Err(problem) => Err(nonsense(&line, &problem, &worker)),

@@ -15,7 +15,7 @@ const LONGEST: Duration = Duration::from_secs(366 * 24 * 3600);
 /// | field | default | range | |
 /// |---|---|---|---|
 /// | `workers` | as many as threads simulate | 1 … 1024 | copies of the program that run at once |
-/// | `timeout` | 60 s | above 0, at most a year | for one answer; the first one of a copy includes its start |
+/// | `timeout` | 60 s | above 0, at most a year | for one answer; to start and describe itself, a copy has at least 30 s |
 /// | `retries` | 2 | 0 … 100 | attempts on a fresh copy after one that ended or was late |
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ProgramSettings {
