@@ -13,6 +13,7 @@
 //! | to … | look at |
 //! |---|---|
 //! | plug in a simulator | [`twin::StateSpace`], [`twin::DigitalTwin`] |
+//! | plug in a program written in any language | [`external::program`] |
 //! | say what records look like and which recipe to use | [`study::Study`] |
 //! | fill a bank on disk, from many processes | [`shards::BankPlan`], [`work`] |
 //! | train, save, load, estimate | [`two_stage::pretrain`], [`two_stage::Estimator`] |
@@ -57,6 +58,7 @@ pub mod refine;
 pub mod sample;
 pub mod study;
 
+pub mod external;
 pub mod shards;
 
 pub mod two_stage;

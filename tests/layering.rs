@@ -9,7 +9,7 @@ const LAYERS: [&[&str]; 6] = [
     &["files", "math", "optimise", "progress", "work"],
     &["twin", "filter", "feature", "network"],
     &[
-        "twins", "effect", "bank", "gate", "refine", "sample", "study", "shards",
+        "twins", "effect", "bank", "gate", "refine", "sample", "study", "shards", "external",
     ],
     &["two_stage", "baseline", "diagnose"],
     &["experiment", "withheld", "report"],
@@ -113,13 +113,17 @@ fn grouped_uses_are_seen() {
     assert_eq!(uses(text), ["twin", "math", "gate"]);
 }
 
-/// Only `network` names dfdx, only `optimise` argmin: each can be replaced in one place.
+/// Only `network` names dfdx, only `optimise` argmin, only `external/fmu` fmi: each can be replaced in one place.
 #[test]
 fn large_dependencies_have_one_room() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let mut files = Vec::new();
     rust_files(&root, &mut files);
-    for (library, room) in [("dfdx::", "network"), ("argmin::", "optimise")] {
+    for (library, room) in [
+        ("dfdx::", "network"),
+        ("argmin::", "optimise"),
+        ("fmi::", "external/fmu"),
+    ] {
         for path in &files {
             let code: String = (fs::read_to_string(path).unwrap().lines())
                 .map(|l| l.split("//").next().unwrap_or("").to_owned() + "\n")

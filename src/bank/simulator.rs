@@ -116,7 +116,7 @@ impl FeatureSimulator {
     ) -> Result<Vec<f64>, DrawError> {
         let outputs = match self.twin.simulate(theta, drive, noise) {
             Ok(outputs) => outputs,
-            Err(error @ SimulationError::Diverged { .. }) => {
+            Err(error) if error.costs_one_run() => {
                 return Err(DrawError::Rejected(error.to_string()));
             }
             Err(error) => return Err(BankError::Simulation(error).into()),
@@ -128,9 +128,11 @@ impl FeatureSimulator {
             Err(
                 error @ (FeatureError::Constant { .. }
                 | FeatureError::Regression(_)
-                | FeatureError::Information
-                | FeatureError::Reference(SimulationError::Diverged { .. })),
+                | FeatureError::Information),
             ) => rejected(error.to_string()),
+            Err(FeatureError::Reference(error)) if error.costs_one_run() => {
+                rejected(error.to_string())
+            }
             Err(FeatureError::Filter(error)) if error.is_recoverable() => {
                 rejected(error.to_string())
             }

@@ -153,7 +153,7 @@ impl PredictionError {
         for _ in 0..self.iterations {
             let jacobian = match problem.slopes(&theta) {
                 Ok(jacobian) => jacobian,
-                Err(BaselineError::Simulation(SimulationError::Diverged { .. })) => break,
+                Err(BaselineError::Simulation(error)) if error.costs_one_run() => break,
                 Err(error) => return Err(error),
             };
             let d = theta.len();
@@ -171,7 +171,8 @@ impl PredictionError {
                         better = Some((to, found));
                         break;
                     }
-                    Ok(_) | Err(BaselineError::Simulation(SimulationError::Diverged { .. })) => {}
+                    Ok(_) => {}
+                    Err(BaselineError::Simulation(error)) if error.costs_one_run() => {}
                     Err(error) => return Err(error),
                 }
                 step *= 0.5;
@@ -214,8 +215,8 @@ impl OutputError<'_> {
 
 impl From<BaselineError> for EvaluationError {
     fn from(error: BaselineError) -> Self {
-        match error {
-            BaselineError::Simulation(SimulationError::Diverged { .. }) => Self::rejected(error),
+        match &error {
+            BaselineError::Simulation(cause) if cause.costs_one_run() => Self::rejected(error),
             _ => Self::fatal(error),
         }
     }

@@ -14,7 +14,8 @@ use std::path::{Path, PathBuf};
     version,
     after_help = "A first look:   truetwin demo\n\
         The main job:   truetwin pretrain --twin tanks --out tanks.est\n                \
-        truetwin estimate record.csv --estimator tanks.est --out result\n\n\
+        truetwin estimate record.csv --estimator tanks.est --out result\n\
+        Your simulator: truetwin check --program 'python3 model.py'   (docs/external-programs.md)\n\n\
         Records are CSV: t (seconds, uniform), inputs u or u1,u2,…, outputs y or y1,y2,…\n\
         Exit: 0 done, 2 the call or a file is wrong (one line says what, where and what to do), 1 anything else."
 )]
@@ -30,6 +31,28 @@ pub(super) struct Arguments {
     /// Threads to use; all cores unless said.
     #[arg(long, global = true)]
     pub threads: Option<usize>,
+    #[command(flatten)]
+    pub external: External,
+}
+
+/// A twin from outside, for this call alone.
+#[derive(Debug, Args)]
+pub(super) struct External {
+    /// A program that is a twin: it reads and writes lines of JSON. No shell is run.
+    #[arg(long, global = true, value_name = "COMMAND")]
+    pub program: Option<String>,
+    /// An FMU that is a twin: FMI 2.0 or 3.0, co-simulation. Needs a build with the feature fmi.
+    #[arg(long, global = true, value_name = "M.fmu", conflicts_with = "program")]
+    pub fmu: Option<PathBuf>,
+    /// Parameters, inputs and outputs of the FMU that the twin has; of a kind that none is named of, all.
+    #[arg(long, global = true, value_name = "NAME,..", value_delimiter = ',')]
+    pub variables: Vec<String>,
+    /// Copies of the program or FMU that run at once; one a thread unless said.
+    #[arg(long, global = true, value_name = "N")]
+    pub workers: Option<usize>,
+    /// Seconds that one answer of the program may take; 60 unless said.
+    #[arg(long, global = true, value_name = "SECONDS")]
+    pub timeout: Option<f64>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -102,9 +125,9 @@ impl Command {
     }
 }
 
-/// Which twin, in which setting.
+/// Which twin, in which setting; of a call with `--program`, that program's unless said.
 #[derive(Debug, Clone, Args)]
-#[group(required = true, multiple = false)]
+#[group(multiple = false)]
 pub(super) struct Subject {
     /// A twin by name (see `truetwin twins`).
     #[arg(long)]

@@ -23,6 +23,7 @@ mod demo;
 mod diagnose;
 mod effects;
 mod estimate;
+mod external;
 mod failure;
 mod features;
 mod merge;
@@ -113,8 +114,11 @@ fn dispatch(arguments: &Arguments, studies: &[Study], team: &Team) -> Result<Exi
         true => progress::bars(),
         false => Progress::silent(),
     };
+    let external = external::study(&arguments.external, studies)?;
+    let studies: Vec<Study> = studies.iter().chain(&external).cloned().collect();
     let context = Context {
-        studies,
+        studies: &studies,
+        external: external.as_ref(),
         json: arguments.json,
         seed: arguments.seed,
         progress: &progress,
@@ -140,7 +144,10 @@ fn dispatch(arguments: &Arguments, studies: &[Study], team: &Team) -> Result<Exi
 
 /// What every verb sees.
 struct Context<'a> {
+    /// All there are, the external one among them.
     studies: &'a [Study],
+    /// The one that this call brings along.
+    external: Option<&'a Study>,
     json: bool,
     seed: u64,
     progress: &'a Progress,
@@ -148,7 +155,7 @@ struct Context<'a> {
 }
 
 impl Context<'_> {
-    /// The study that `--twin` or `--study` names.
+    /// The study that `--twin` or `--study` names, else the one that the call brings along.
     fn study(&self, subject: &Subject) -> Result<Study, Failure> {
         match (&subject.twin, &subject.study) {
             (Some(name), _) => Ok(self.named(name)?.clone()),
@@ -158,9 +165,11 @@ impl Context<'_> {
                 let study = self.named(&file.twin).map_err(at)?;
                 study.configure(&file).map_err(|error| at(error.into()))
             }
-            (None, None) => Err(Failure::user(
-                "name a twin with --twin, or a file with --study",
-            )),
+            (None, None) => (self.external.cloned()).ok_or_else(|| {
+                Failure::user(
+                    "no twin is named; give --twin NAME (`truetwin twins` lists them), --study S.toml, --program 'COMMAND', or --fmu M.fmu",
+                )
+            }),
         }
     }
 

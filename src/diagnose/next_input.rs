@@ -15,7 +15,7 @@ use super::problem::Problem;
 use super::result::NextInput;
 use super::scan::Reference;
 use crate::filter::recoverable;
-use crate::twin::{Drive, Noise, Record, RecordError, Signal, SimulationError};
+use crate::twin::{Drive, Noise, Record, RecordError, Signal};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -189,7 +189,7 @@ impl Rival<'_> {
         let theta = self.problem.of_record(0, &self.theta);
         match self.problem.twin.simulate(&theta, drive, noise) {
             Ok(outputs) => Ok(Some(Record::new(drive.clone(), outputs)?)),
-            Err(SimulationError::Diverged { .. }) => Ok(None),
+            Err(error) if error.costs_one_run() => Ok(None),
             Err(error) => Err(error.into()),
         }
     }

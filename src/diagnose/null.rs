@@ -11,7 +11,7 @@ use super::scan::{Gain, Reference};
 use crate::filter::FilterError;
 use crate::math::{quantile, rank_p_value};
 use crate::progress::Stage;
-use crate::twin::{Noise, Record, SimulationError};
+use crate::twin::{Noise, Record};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -142,7 +142,7 @@ impl<'a> Bench<'a> {
                 // A black box may diverge without saying so.
                 Ok(outputs) if outputs.iter().any(|v| !v.is_finite()) => return Ok(None),
                 Ok(outputs) => records.push(Record::new(drive.clone(), outputs)?),
-                Err(SimulationError::Diverged { .. }) => return Ok(None),
+                Err(error) if error.costs_one_run() => return Ok(None),
                 Err(error) => return Err(error.into()),
             }
         }

@@ -15,7 +15,7 @@ use super::null::{Bench, largest, standardised};
 use super::problem::Problem;
 use crate::filter::{FilterError, recoverable};
 use crate::math::rank_p_value;
-use crate::twin::{Noise, Record, SimulationError};
+use crate::twin::{Noise, Record};
 use rayon::prelude::*;
 
 /// Blocks of a record, and those before the first that is to be foreseen.
@@ -55,7 +55,7 @@ pub(super) fn onset(
                 let drive = record.drive();
                 let outputs = match bench.problem.twin.simulate(&theta, drive, noise) {
                     Ok(outputs) => outputs,
-                    Err(SimulationError::Diverged { .. }) => return Ok(None),
+                    Err(error) if error.costs_one_run() => return Ok(None),
                     Err(error) => return Err(error.into()),
                 };
                 let record = Record::new(drive.clone(), outputs)?;

@@ -3,7 +3,7 @@
 use super::MonteCarloError;
 use super::scenario::Draws;
 use crate::study::Study;
-use crate::twin::{Noise, Record, SimulationError};
+use crate::twin::{Noise, Record};
 
 /// Draws of θ that are tried before a diverging twin is given up.
 const ATTEMPTS: u64 = 20;
@@ -39,7 +39,7 @@ pub(super) fn simulated(
                     noise,
                 });
             }
-            Err(SimulationError::Diverged { .. }) if draws.can_redraw() && attempt < ATTEMPTS => {}
+            Err(error) if error.costs_one_run() && draws.can_redraw() && attempt < ATTEMPTS => {}
             Err(error) => return Err(error.into()),
         }
     }

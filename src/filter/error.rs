@@ -62,12 +62,11 @@ pub enum FilterError {
 impl FilterError {
     /// Whether another θ may do: the search goes on elsewhere.
     pub fn is_recoverable(&self) -> bool {
-        matches!(
-            self,
-            Self::Diverged { .. }
-                | Self::NoSpread { .. }
-                | Self::Simulation(SimulationError::Diverged { .. })
-        )
+        match self {
+            Self::Diverged { .. } | Self::NoSpread { .. } => true,
+            Self::Simulation(error) => error.costs_one_run(),
+            _ => false,
+        }
     }
 }
 

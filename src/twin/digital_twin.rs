@@ -43,7 +43,8 @@ pub trait DigitalTwin: Send + Sync {
     ///
     /// # Errors
     ///
-    /// [`SimulationError::Diverged`] costs this one run; [`SimulationError::Fatal`] ends the whole work.
+    /// [`SimulationError::Diverged`] and [`SimulationError::Failed`] cost this one run; [`SimulationError::Fatal`] ends
+    /// the whole work.
     fn simulate(
         &self,
         theta: &[f64],
@@ -114,6 +115,9 @@ pub enum SimulationError {
         /// Time of the first non-finite value, in seconds.
         at: f64,
     },
+    /// This run failed for another reason, such as a solver that gave up; others may work.
+    #[error("this simulation failed: {0}")]
+    Failed(Box<dyn Error + Send + Sync>),
     /// The simulator does not work at all; no other parameters will help.
     #[error("the simulator failed: {0}")]
     Fatal(Box<dyn Error + Send + Sync>),
@@ -123,5 +127,17 @@ impl SimulationError {
     /// A fatal error from a message.
     pub fn fatal(message: impl Into<String>) -> Self {
         Self::Fatal(message.into().into())
+    }
+
+    /// Whether only this run is lost: a search goes on elsewhere, a draw is drawn again.
+    ///
+    /// ```
+    /// use truetwin::twin::SimulationError;
+    /// assert!(SimulationError::Diverged { at: 0.5 }.costs_one_run());
+    /// assert!(SimulationError::Failed("the solver found no root".into()).costs_one_run());
+    /// assert!(!SimulationError::fatal("no licence").costs_one_run());
+    /// ```
+    pub fn costs_one_run(&self) -> bool {
+        matches!(self, Self::Diverged { .. } | Self::Failed(_))
     }
 }

@@ -78,7 +78,7 @@ pub enum EstimatorFileError {
         found: u32,
     },
     /// Its twin is not among the known ones.
-    #[error("{}: made for twin \"{twin}\", known are {known}; use the program that has this twin", path.display())]
+    #[error("{}: made for twin \"{twin}\", known are {known}; use the program that has this twin, or name it with --program or --fmu", path.display())]
     Twin {
         /// File.
         path: PathBuf,

@@ -77,7 +77,7 @@ pub(super) fn run(
             outputs.dim()
         ))),
         Ok(outputs) => Ok(outputs.iter().all(|v| v.is_finite()).then_some(outputs)),
-        Err(SimulationError::Diverged { .. }) => Ok(None),
+        Err(error) if error.costs_one_run() => Ok(None),
         Err(error) => Err(error),
     }
 }

@@ -1,0 +1,94 @@
+//! A twin that only this call knows: `--program` or `--fmu`.
+
+use super::Failure;
+use super::args::External;
+use crate::external::program::{ProgramCommand, ProgramError, ProgramSettings, ProgramTwin};
+use crate::study::Study;
+use std::path::Path;
+use std::time::Duration;
+
+/// The study of the program or FMU that the call names, beside `registered` ones; `None` where it names none.
+///
+/// Foreign code is started here and nowhere else: no study file and no estimator can name any.
+pub(super) fn study(options: &External, registered: &[Study]) -> Result<Option<Study>, Failure> {
+    check_options(options)?;
+    let (what, study) = match (&options.program, &options.fmu) {
+        (None, None) => return Ok(None),
+        (Some(line), _) => (format!("the program `{line}`"), program(options, line)?),
+        (None, Some(path)) => (path.display().to_string(), fmu(options, path)?),
+    };
+    let name = study.name();
+    if registered.iter().any(|other| other.name() == name) {
+        return Err(Failure::user(format!(
+            "{what} calls its twin \"{name}\", which is registered already; let it have another name"
+        )));
+    }
+    Ok(Some(study))
+}
+
+/// Whether each option has something that it is about.
+fn check_options(options: &External) -> Result<(), Failure> {
+    let (program, fmu) = (options.program.is_some(), options.fmu.is_some());
+    let rules = [
+        (program && fmu, "--fmu", "give either --program or --fmu"),
+        (
+            options.workers.is_some() && !program && !fmu,
+            "--workers",
+            "it is about a program or an FMU: give --program 'COMMAND' or --fmu M.fmu, or leave it out",
+        ),
+        (
+            options.timeout.is_some() && !program,
+            "--timeout",
+            "it is about a program: give --program 'COMMAND', or leave it out",
+        ),
+        (
+            !options.variables.is_empty() && !fmu,
+            "--variables",
+            "it is about an FMU: give --fmu M.fmu, or leave it out",
+        ),
+    ];
+    match rules.iter().find(|(wrong, ..)| *wrong) {
+        Some((_, option, remedy)) => Err(Failure::user(format!("{option}: {remedy}"))),
+        None => Ok(()),
+    }
+}
+
+fn program(options: &External, line: &str) -> Result<Study, Failure> {
+    let mut settings = ProgramSettings {
+        workers: options.workers,
+        ..ProgramSettings::default()
+    };
+    if let Some(seconds) = options.timeout {
+        settings.timeout = Duration::try_from_secs_f64(seconds).map_err(|_| {
+            Failure::user(format!(
+                "--timeout {seconds}: give a positive number of seconds"
+            ))
+        })?;
+    }
+    Ok(ProgramTwin::start(ProgramCommand::parse(line)?, settings)?.into_study()?)
+}
+
+#[cfg(feature = "fmi")]
+fn fmu(options: &External, path: &Path) -> Result<Study, Failure> {
+    use crate::external::fmu::{FmuSettings, FmuTwin};
+    let settings = FmuSettings {
+        variables: options.variables.clone(),
+        workers: options.workers,
+    };
+    let twin = FmuTwin::open(path, settings).map_err(Failure::user)?;
+    twin.into_study().map_err(Failure::user)
+}
+
+#[cfg(not(feature = "fmi"))]
+fn fmu(_: &External, path: &Path) -> Result<Study, Failure> {
+    Err(Failure::user(format!(
+        "--fmu {}: this build cannot read FMUs; rebuild with `--features fmi`",
+        path.display()
+    )))
+}
+
+impl From<ProgramError> for Failure {
+    fn from(error: ProgramError) -> Self {
+        Self::user(error)
+    }
+}

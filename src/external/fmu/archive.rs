@@ -1,0 +1,116 @@
+//! The archive that an FMU is.
+
+use super::FmuError;
+use super::description::{ModelDescription, Version};
+use fmi::fmi2::import::Fmi2Import;
+use fmi::fmi3::import::Fmi3Import;
+use fmi::traits::FmiImport;
+use std::fs::File;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// An unpacked FMU; the folder goes with the value.
+pub(super) enum Archive {
+    Two(Fmi2Import),
+    Three(Fmi3Import),
+}
+
+/// Unpacks an FMU into a temporary folder and reads its description.
+pub(super) fn open(path: &Path) -> Result<(ModelDescription, TempDir), FmuError> {
+    let at = |problem: String| FmuError::Archive {
+        path: path.into(),
+        problem,
+    };
+    let file = File::open(path).map_err(|error| FmuError::Io {
+        path: path.into(),
+        error,
+    })?;
+    let mut archive = zip::ZipArchive::new(file).map_err(|error| at(error.to_string()))?;
+    let folder = tempfile::Builder::new().prefix("truetwin-fmu-").tempdir();
+    let folder = folder.map_err(|error| at(format!("no temporary folder: {error}")))?;
+    (archive.extract(folder.path())).map_err(|error| at(error.to_string()))?;
+    let bytes = std::fs::read(folder.path().join("modelDescription.xml"))
+        .map_err(|_| at("it holds no modelDescription.xml".into()))?;
+    let description = ModelDescription::parse(&text(bytes)).map_err(|problem| {
+        let problem = format!("modelDescription.xml: {problem}");
+        at(problem)
+    })?;
+    Ok((description, folder))
+}
+
+/// UTF-8, or else Latin-1, which some tools write.
+fn text(bytes: Vec<u8>) -> String {
+    match String::from_utf8(bytes) {
+        Ok(text) => text,
+        Err(error) => error.into_bytes().into_iter().map(char::from).collect(),
+    }
+}
+
+impl Archive {
+    /// Ready to be instantiated. The library's loader is given the few attributes that it needs: its own reader refuses
+    /// descriptions with units.
+    pub fn new(description: &ModelDescription, folder: TempDir) -> Result<Self, fmi::Error> {
+        let ModelDescription {
+            version,
+            version_text,
+            name,
+            token,
+            identifier,
+            ..
+        } = description;
+        let token_name = match version {
+            Version::Two => "guid",
+            Version::Three => "instantiationToken",
+        };
+        let [version_text, name, token, identifier] =
+            [version_text, name, token, identifier].map(|text| escaped(text));
+        let text = format!(
+            "<fmiModelDescription fmiVersion=\"{version_text}\" modelName=\"{name}\" {token_name}=\"{token}\">\
+             <CoSimulation modelIdentifier=\"{identifier}\"/><ModelVariables/><ModelStructure/></fmiModelDescription>"
+        );
+        Ok(match version {
+            Version::Two => Self::Two(Fmi2Import::new(folder, &text)?),
+            Version::Three => Self::Three(Fmi3Import::new(folder, &text)?),
+        })
+    }
+
+    /// A function of the standard that the library lacks, if there is one.
+    pub fn lacks(&self, identifier: &str) -> Result<Option<&'static str>, fmi::Error> {
+        macro_rules! missing {
+            ($binding:expr, $($function:ident),*) => {
+                [$((stringify!($function), $binding.$function.is_err())),*].to_vec()
+            };
+        }
+        let functions = match self {
+            Self::Two(import) => missing!(
+                import.binding(identifier)?,
+                fmi2Instantiate,
+                fmi2FreeInstance,
+                fmi2SetupExperiment,
+                fmi2EnterInitializationMode,
+                fmi2ExitInitializationMode,
+                fmi2Reset,
+                fmi2SetReal,
+                fmi2GetReal,
+                fmi2DoStep
+            ),
+            Self::Three(import) => missing!(
+                import.binding(identifier)?,
+                fmi3InstantiateCoSimulation,
+                fmi3FreeInstance,
+                fmi3EnterInitializationMode,
+                fmi3ExitInitializationMode,
+                fmi3Reset,
+                fmi3SetFloat64,
+                fmi3GetFloat64,
+                fmi3DoStep
+            ),
+        };
+        let found = functions.into_iter().find(|(_, missing)| *missing);
+        Ok(found.map(|(name, _)| name))
+    }
+}
+
+fn escaped(text: &str) -> String {
+    (text.replace('&', "&amp;").replace('<', "&lt;")).replace('"', "&quot;")
+}

@@ -1,0 +1,194 @@
+//! A twin from an FMU, as Modelica tools, Simulink and many others export them (cargo feature `fmi`).
+//!
+//! FMI 2.0 and 3.0, co-simulation. `docs/fmu.md` says what becomes of the model description.
+
+mod archive;
+mod description;
+mod error;
+mod instance;
+mod worker;
+
+pub use error::FmuError;
+
+use super::lending::Lending;
+use super::name;
+use crate::study::{RecordPlan, Study};
+use crate::twin::{DigitalTwin, Drive, Noise, ParameterSpace, Signal, Signals, SimulationError};
+use archive::Archive;
+use description::Variable;
+use instance::Instance;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use worker::{References, Worker};
+
+/// How an FMU is used.
+///
+/// | field | default | |
+/// |---|---|---|
+/// | `variables` | all | names of the parameters to estimate, of inputs and outputs; of a kind that none is named of, all are used |
+/// | `workers` | as many as threads simulate | instances at once; 1 of an FMU that allows no more |
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct FmuSettings {
+    /// Names of the real parameters, inputs and outputs that the twin has; the others keep their start.
+    pub variables: Vec<String>,
+    /// Instances at once; `None`: one for each thread of the rayon pool that opens the twin.
+    pub workers: Option<usize>,
+}
+
+/// An FMU as a black box without noise of its own.
+///
+/// θ are the real parameters. Prior and bounds are `min` and `max` of the description; where one of them is missing, the prior
+/// is `start` ± 50 % (`[-1, 1]` for 0) and the bounds reach from a tenth of `start` to ten times (`[-10, 10]`), both cut at the
+/// limit that is given. A study file narrows both.
+///
+/// Row k is read when time k·Δt is reached, before input k is set: an output that depends on an input directly lags it by a
+/// sample. A step that fails is a divergence at its time; a refused initialisation costs the run. Instances are reset between
+/// runs and have a thread each. The FMU runs in this process: if it crashes or hangs, so does this.
+///
+/// ```no_run
+/// use truetwin::external::fmu::{FmuSettings, FmuTwin};
+/// let twin = FmuTwin::open("models/Rig.fmu".as_ref(), FmuSettings::default())?;
+/// truetwin::cli::run([twin.into_study()]);
+/// # Ok::<(), truetwin::external::fmu::FmuError>(())
+/// ```
+pub struct FmuTwin {
+    /// Ended before the folder goes.
+    workers: Lending<Worker>,
+    archive: Arc<Archive>,
+    references: References,
+    start: f64,
+    path: PathBuf,
+    name: String,
+    parameters: ParameterSpace,
+    signals: Signals,
+    plan: RecordPlan,
+}
+
+impl std::fmt::Debug for FmuTwin {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("FmuTwin")
+            .field("path", &self.path)
+            .field("name", &self.name)
+            .finish_non_exhaustive()
+    }
+}
+
+impl FmuTwin {
+    /// Unpacks an FMU, reads its description and makes a first instance.
+    ///
+    /// # Errors
+    ///
+    /// A file that is no FMU for co-simulation, or not for this platform; variables that it does not have.
+    pub fn open(path: &Path, settings: FmuSettings) -> Result<Self, FmuError> {
+        let (mut description, folder) = archive::open(path)?;
+        let variables = |problem: String| FmuError::Variables {
+            path: path.into(),
+            problem,
+        };
+        description.select(&settings.variables).map_err(variables)?;
+        for list in [
+            &mut description.parameters,
+            &mut description.inputs,
+            &mut description.outputs,
+        ] {
+            list.iter_mut()
+                .for_each(|v| v.name = name::made_fit(&v.name));
+            let names = list.iter().map(|v| v.name.as_str());
+            name::check_all("variables", names).map_err(variables)?;
+        }
+        if description.outputs.is_empty() {
+            return Err(variables("no real output; export it with one".into()));
+        }
+        let failed = |problem: String| FmuError::Instance {
+            path: path.into(),
+            problem,
+        };
+        let archive = Archive::new(&description, folder).map_err(|e| failed(e.to_string()))?;
+        let lacks = archive.lacks(&description.identifier);
+        if let Some(function) = lacks.map_err(|e| failed(e.to_string()))? {
+            return Err(failed(format!("its library has no {function}")));
+        }
+        let archive = Arc::new(archive);
+        // Only to see that it can be made; instances live on threads of their own.
+        drop(Instance::new(&archive).map_err(|e| failed(e.to_string()))?);
+        let threads = settings.workers.unwrap_or_else(rayon::current_num_threads);
+        let references = |list: &[Variable]| list.iter().map(|v| v.reference).collect();
+        let quantities = |list: &[Variable]| list.iter().map(Variable::quantity).collect();
+        Ok(Self {
+            workers: Lending::new(if description.alone { 1 } else { threads.max(1) }),
+            archive,
+            references: References {
+                parameters: references(&description.parameters),
+                inputs: references(&description.inputs),
+                outputs: references(&description.outputs),
+            },
+            start: description.start,
+            path: path.into(),
+            name: name::made_fit(&description.name),
+            parameters: ParameterSpace::new(description.parameters.iter().map(Variable::parameter)),
+            signals: Signals {
+                inputs: quantities(&description.inputs),
+                outputs: quantities(&description.outputs),
+            },
+            plan: description.plan(),
+        })
+    }
+
+    /// The name of the model.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Step and length of the default experiment; random input levels where all inputs have the same limits.
+    pub fn plan(&self) -> &RecordPlan {
+        &self.plan
+    }
+
+    /// The study of this twin with the default experiment as its record plan.
+    ///
+    /// # Errors
+    ///
+    /// As [`Study::new`]: no parameter, or boxes without room.
+    pub fn into_study(self) -> Result<Study, FmuError> {
+        let (path, name, plan) = (self.path.clone(), self.name.clone(), self.plan.clone());
+        Study::new(&name, self, plan).map_err(|error| FmuError::Study { path, error })
+    }
+}
+
+impl DigitalTwin for FmuTwin {
+    fn parameters(&self) -> ParameterSpace {
+        self.parameters.clone()
+    }
+
+    fn signals(&self) -> Signals {
+        self.signals.clone()
+    }
+
+    /// The noise goes unused: FMUs have none.
+    fn simulate(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        _noise: Noise,
+    ) -> Result<Signal, SimulationError> {
+        let given = (theta.len(), drive.inputs().ncols());
+        let expected = (self.parameters.len(), self.signals.inputs.len());
+        if given != expected {
+            return Err(SimulationError::fatal(format!(
+                "{given:?} parameters and inputs were given, the FMU has {expected:?}"
+            )));
+        }
+        if theta.iter().any(|value| !value.is_finite()) {
+            return Err(SimulationError::Diverged { at: 0.0 });
+        }
+        let (idle, place) = self.workers.take(false, |_| true);
+        let mut worker = idle.unwrap_or_else(|| {
+            Worker::new(self.archive.clone(), self.references.clone(), self.start)
+        });
+        let outcome = worker.simulate(theta, drive);
+        if !matches!(outcome, Err(SimulationError::Fatal(_))) {
+            place.give_back(worker);
+        }
+        outcome
+    }
+}

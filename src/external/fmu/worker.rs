@@ -1,0 +1,173 @@
+//! A thread that owns one instance: FMUs may be called from one thread only.
+
+use super::archive::Archive;
+use super::instance::{Instance, Refusal, Step};
+use crate::twin::{Drive, Signal, SimulationError};
+use std::sync::Arc;
+use std::sync::mpsc::{Sender, channel};
+use std::thread::{self, JoinHandle};
+
+/// Which variables are set and read, in the twin's order.
+#[derive(Debug, Clone, Default)]
+pub(super) struct References {
+    pub parameters: Vec<u32>,
+    pub inputs: Vec<u32>,
+    pub outputs: Vec<u32>,
+}
+
+/// One simulation and where its outcome goes.
+struct Job {
+    theta: Vec<f64>,
+    drive: Drive,
+    reply: Sender<Result<Signal, SimulationError>>,
+}
+
+/// An instance on its thread; both end with the value.
+pub(super) struct Worker {
+    jobs: Option<Sender<Job>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Worker {
+    /// A thread for an instance that starts at `start` seconds; the instance is made with the first simulation.
+    pub fn new(archive: Arc<Archive>, references: References, start: f64) -> Self {
+        let (jobs, to_do) = channel::<Job>();
+        let thread = thread::spawn(move || {
+            let mut bench = Bench {
+                archive,
+                references,
+                start,
+                instance: None,
+            };
+            for job in to_do {
+                // Who no longer waits for the outcome does not miss it.
+                let _ = job.reply.send(bench.simulate(&job.theta, &job.drive));
+            }
+        });
+        Self {
+            jobs: Some(jobs),
+            thread: Some(thread),
+        }
+    }
+
+    /// One simulation.
+    pub fn simulate(&mut self, theta: &[f64], drive: &Drive) -> Result<Signal, SimulationError> {
+        let (reply, outcome) = channel();
+        let job = Job {
+            theta: theta.to_vec(),
+            drive: drive.clone(),
+            reply,
+        };
+        let sent = self
+            .jobs
+            .as_ref()
+            .is_some_and(|jobs| jobs.send(job).is_ok());
+        // A status that the standard does not know ends the thread.
+        let lost = || Err(SimulationError::fatal("the FMU left the FMI standard"));
+        if sent {
+            outcome.recv().unwrap_or_else(|_| lost())
+        } else {
+            lost()
+        }
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        self.jobs = None;
+        if let Some(thread) = self.thread.take() {
+            // A thread that ended early has said so to whoever waited.
+            let _ = thread.join();
+        }
+    }
+}
+
+struct Bench {
+    archive: Arc<Archive>,
+    references: References,
+    start: f64,
+    instance: Option<Instance>,
+}
+
+impl Bench {
+    fn simulate(&mut self, theta: &[f64], drive: &Drive) -> Result<Signal, SimulationError> {
+        // An instance that cannot be reset, or failed, is made anew.
+        let used = self.instance.take();
+        let reset = used.and_then(|mut used| used.reset().is_ok().then_some(used));
+        let mut instance = match reset {
+            Some(instance) => instance,
+            None => Instance::new(&self.archive).map_err(|error| {
+                SimulationError::fatal(format!("no instance of the FMU: {error}"))
+            })?,
+        };
+        match run(&mut instance, &self.references, self.start, theta, drive) {
+            Ok(outputs) => {
+                self.instance = Some(instance);
+                Ok(outputs)
+            }
+            Err(Ending::Diverged(at)) => Err(SimulationError::Diverged { at }),
+            Err(Ending::Refused(Refusal::Error(text))) => Err(SimulationError::Failed(
+                format!("the FMU refuses {text}").into(),
+            )),
+            Err(Ending::Refused(Refusal::Fatal(text))) => {
+                // The standard forbids any further call, that to free it included.
+                std::mem::forget(instance);
+                Err(SimulationError::fatal(format!(
+                    "the FMU is corrupt: {text}"
+                )))
+            }
+        }
+    }
+}
+
+/// Why a run has no outputs.
+enum Ending {
+    Diverged(f64),
+    Refused(Refusal),
+}
+
+impl From<Refusal> for Ending {
+    fn from(refusal: Refusal) -> Self {
+        Self::Refused(refusal)
+    }
+}
+
+/// Row k is read when time k·Δt is reached, before input k is set: FMI 2.0 forbids to read between setting and stepping.
+fn run(
+    instance: &mut Instance,
+    references: &References,
+    start: f64,
+    theta: &[f64],
+    drive: &Drive,
+) -> Result<Signal, Ending> {
+    let References {
+        parameters,
+        inputs,
+        outputs,
+    } = references;
+    instance.set(parameters, theta, "these parameters")?;
+    instance.enter(start)?;
+    instance.set(inputs, drive.input(0), "the first input")?;
+    instance.exit()?;
+    let mut signal = Signal::zeros((drive.samples(), outputs.len()));
+    let mut row = vec![0.0; outputs.len()];
+    for k in 0..drive.samples() {
+        if k > 0 {
+            let before = drive.time(k - 1);
+            match instance.step(start + before, drive.dt()) {
+                Ok(Step::Done) => {}
+                Ok(Step::Ended) | Err(Refusal::Error(_)) => return Err(Ending::Diverged(before)),
+                Err(fatal) => return Err(fatal.into()),
+            }
+        }
+        instance.get(outputs, &mut row)?;
+        if row.iter().any(|value| !value.is_finite()) {
+            return Err(Ending::Diverged(drive.time(k)));
+        }
+        signal.row_mut(k).assign(&ndarray::ArrayView1::from(&row));
+        if k > 0 {
+            instance.set(inputs, drive.input(k), "an input")?;
+        }
+    }
+    Ok(signal)
+}

@@ -1,0 +1,75 @@
+//! Names that come from outside: of twins, parameters and channels.
+
+/// Longest name, in characters.
+const LONGEST: usize = 100;
+
+fn odd(c: char) -> bool {
+    c.is_whitespace() || c.is_control() || ",=@\"'\\".contains(c)
+}
+
+/// `name` with `_` in place of what [`check`] refuses.
+#[cfg(feature = "fmi")]
+pub(super) fn made_fit(name: &str) -> String {
+    let fit = |c| if odd(c) { '_' } else { c };
+    name.chars().take(LONGEST).map(fit).collect()
+}
+
+/// Whether `name` can stand on a command line (`--theta a=1,b=2`), in a study file and in a table; else what is wrong.
+pub(super) fn check(name: &str) -> Result<(), String> {
+    if name.is_empty() {
+        return Err("a name is empty; give each its own".into());
+    }
+    if name.chars().count() > LONGEST {
+        return Err(format!(
+            "a name has more than {LONGEST} characters; shorten it"
+        ));
+    }
+    match name.chars().find(|&c| odd(c)) {
+        Some(c) => Err(format!(
+            "the name {name:?} holds {c:?}; use letters, digits, _ - . instead"
+        )),
+        None => Ok(()),
+    }
+}
+
+/// As [`check`] for each of `names`, which must be unique.
+pub(super) fn check_all<'a>(
+    what: &str,
+    names: impl IntoIterator<Item = &'a str>,
+) -> Result<(), String> {
+    let mut seen = std::collections::BTreeSet::new();
+    for name in names {
+        check(name).map_err(|problem| format!("{what}: {problem}"))?;
+        if !seen.insert(name) {
+            return Err(format!(
+                "{what}: {name} stands there twice; give each its own name"
+            ));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_a_command_line_cannot_hold_are_refused() {
+        for good in ["k", "body.mass", "der(x)", "x[1]", "ν", "heat-loss_2"] {
+            assert_eq!(check(good), Ok(()), "{good}");
+        }
+        for bad in [
+            "",
+            "a b",
+            "a,b",
+            "a=b",
+            "gain@u",
+            "new\nline",
+            &"x".repeat(101),
+        ] {
+            assert!(check(bad).is_err(), "{bad:?}");
+        }
+        let twice = check_all("inputs", ["u", "u"]).unwrap_err();
+        assert!(twice.contains("inputs: u stands there twice"), "{twice}");
+    }
+}

@@ -1,0 +1,174 @@
+//! What a program says about itself.
+
+use super::super::name;
+use crate::study::{InputPlan, RecordPlan, RecordTable};
+use crate::twin::{Interval, Parameter, ParameterSpace, Quantity, Signals};
+use serde::Deserialize;
+
+/// Most parameters, inputs or outputs of one program.
+const MOST: usize = 1000;
+
+/// The answer to `{"truetwin": 1, "request": "describe"}`, checked.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Description {
+    /// Name of the twin.
+    pub name: String,
+    /// In the order of θ.
+    pub parameters: ParameterSpace,
+    /// Inputs and outputs.
+    pub signals: Signals,
+    /// What simulated records look like unless a study says otherwise.
+    pub record: RecordPlan,
+}
+
+/// As it stands in the line.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Told {
+    name: String,
+    parameters: Vec<ToldParameter>,
+    #[serde(default)]
+    inputs: Vec<ToldQuantity>,
+    outputs: Vec<ToldQuantity>,
+    record: RecordTable,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ToldParameter {
+    name: String,
+    #[serde(default)]
+    unit: String,
+    prior: Interval,
+    bounds: Option<Interval>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ToldQuantity {
+    name: String,
+    #[serde(default)]
+    unit: String,
+}
+
+impl Description {
+    /// From the program's line; the error says what is wrong and what to write.
+    pub fn parse(line: &str) -> Result<Self, String> {
+        let told: Told = serde_json::from_str(line).map_err(|error| error.to_string())?;
+        name::check(&told.name).map_err(|problem| format!("name: {problem}"))?;
+        let names = |all: &[ToldQuantity]| all.iter().map(|q| q.name.clone()).collect();
+        let parameters: Vec<String> = told.parameters.iter().map(|p| p.name.clone()).collect();
+        let lists: [(&str, Vec<String>); 3] = [
+            ("parameters", parameters),
+            ("inputs", names(&told.inputs)),
+            ("outputs", names(&told.outputs)),
+        ];
+        for (what, names) in &lists {
+            if names.len() > MOST {
+                return Err(format!("{} {what}; at most {MOST} are read", names.len()));
+            }
+            name::check_all(what, names.iter().map(String::as_str))?;
+        }
+        if told.outputs.is_empty() {
+            return Err("no output; name at least one".into());
+        }
+        let parameters = ParameterSpace::new(told.parameters.iter().map(|p| {
+            let bounds = p.bounds.unwrap_or(p.prior);
+            Parameter::new(&p.name, &p.unit, p.prior.low(), p.prior.high())
+                .within(bounds.low(), bounds.high())
+        }));
+        parameters.check().map_err(|error| error.to_string())?;
+        let quantities = |all: &[ToldQuantity]| {
+            (all.iter())
+                .map(|q| Quantity::new(&q.name, &q.unit))
+                .collect()
+        };
+        let signals = Signals {
+            inputs: quantities(&told.inputs),
+            outputs: quantities(&told.outputs),
+        };
+        let record = plan(&told.record)?;
+        // Inputs may be left to a study file; all that is said is checked here.
+        if signals.inputs.is_empty() || record.input.is_some() {
+            record
+                .prepare(&signals)
+                .map_err(|error| error.to_string())?;
+        }
+        Ok(Self {
+            name: told.name,
+            parameters,
+            signals,
+            record,
+        })
+    }
+}
+
+fn plan(table: &RecordTable) -> Result<RecordPlan, String> {
+    let (Some(step), Some(samples)) = (table.step, table.samples) else {
+        return Err(
+            "record: step and samples are needed, as {\"step\": 0.1, \"samples\": 300}".into(),
+        );
+    };
+    if !(step > 0.0 && step.is_finite()) || samples == 0 {
+        return Err(format!(
+            "record: step = {step} s, samples = {samples}; both must be positive"
+        ));
+    }
+    if let Some(InputPlan::File(path)) = &table.input {
+        return Err(format!(
+            "record: input is the file {}; say {{\"levels\": [low, high], \"hold\": n}}, and name files in a study file",
+            path.display()
+        ));
+    }
+    Ok(RecordPlan {
+        step,
+        samples,
+        input: table.input.clone(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GOOD: &str = r#"{"name": "lag", "parameters": [{"name": "tau", "unit": "s", "prior": [1, 3], "bounds": [0.1, 9]},
+        {"name": "k", "prior": [0.5, 2]}], "inputs": [{"name": "u", "unit": "V"}], "outputs": [{"name": "y"}],
+        "record": {"step": 0.1, "samples": 60, "input": {"levels": [-1, 1], "hold": 5}}}"#;
+
+    #[test]
+    fn a_description_is_read_whole() {
+        let found = Description::parse(GOOD).unwrap();
+        assert_eq!(found.name, "lag");
+        assert_eq!(found.parameters.names(), ["tau", "k"]);
+        assert_eq!(found.parameters[0].bounds, Interval::new(0.1, 9.0).unwrap());
+        assert_eq!(found.parameters[1].bounds, found.parameters[1].prior);
+        assert_eq!(found.signals.inputs, [Quantity::new("u", "V")]);
+        assert_eq!(found.record, RecordPlan::levels(0.1, 60, -1.0, 1.0, 5));
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        for (from, to, part) in [
+            ("\"name\": \"lag\",", "", "missing field `name`"),
+            ("\"lag\"", "\"a lag\"", "\"a lag\" holds ' '"),
+            ("\"k\"", "\"tau\"", "parameters: tau stands there twice"),
+            ("[1, 3]", "[3, 1]", "turned inside out"),
+            ("[0.1, 9]", "[2, 9]", "leaves its bounds"),
+            ("[{\"name\": \"y\"}]", "[]", "no output"),
+            ("\"samples\": 60,", "", "step and samples are needed"),
+            ("0.1, \"samples\"", "-1, \"samples\"", "step = -1"),
+            ("\"hold\": 5", "\"hold\": 0", "hold = 0"),
+            (
+                "{\"levels\": [-1, 1], \"hold\": 5}",
+                "\"/etc/x.csv\"",
+                "study file",
+            ),
+            ("\"outputs\"", "\"outptus\"", "unknown field `outptus`"),
+        ] {
+            assert!(GOOD.contains(from), "{from}");
+            let message = Description::parse(&GOOD.replace(from, to)).unwrap_err();
+            assert!(message.contains(part), "{message}");
+            assert!(!message.contains('\n'), "{message}");
+        }
+    }
+}

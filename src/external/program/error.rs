@@ -1,0 +1,41 @@
+//! Why a program is no twin.
+
+use crate::files::with_remedy;
+use crate::study::StudyError;
+
+/// Why a program cannot be used as a twin.
+#[derive(Debug, thiserror::Error)]
+pub enum ProgramError {
+    /// The line names no program.
+    #[error("the program \"{line}\": {problem}")]
+    Command {
+        /// What was given.
+        line: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A setting out of its range.
+    #[error("the program's {0}")]
+    Settings(String),
+    /// The system cannot start it.
+    #[error("the program `{command}` cannot be started: {}", with_remedy(error))]
+    Start {
+        /// The command.
+        command: String,
+        /// What the system said.
+        error: std::io::Error,
+    },
+    /// It does not say what it is.
+    #[error(
+        "the program `{command}` {problem}; asked to describe itself, it must answer one line of JSON with name, parameters, outputs and record"
+    )]
+    Describe {
+        /// The command.
+        command: String,
+        /// What it did instead.
+        problem: String,
+    },
+    /// What it says makes no study.
+    #[error(transparent)]
+    Study(#[from] StudyError),
+}

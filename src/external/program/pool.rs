@@ -1,0 +1,104 @@
+//! Copies of a program, lent to one thread at a time.
+
+use super::super::lending::Lending;
+use super::command::ProgramCommand;
+use super::description::Description;
+use super::protocol::{self, LONGEST_DESCRIPTION};
+use super::text::excerpt;
+use super::worker::{Trouble, Worker};
+use std::time::{Duration, Instant};
+
+/// Least time for a start: imports and licences take longer than a simulation.
+const START: Duration = Duration::from_secs(30);
+/// How long programs are waited for once their standard input is closed.
+const GRACE: Duration = Duration::from_millis(500);
+
+/// Starts workers when they are needed, keeps the idle ones, and ends all with itself.
+pub(super) struct Pool {
+    command: ProgramCommand,
+    /// For one answer.
+    timeout: Duration,
+    workers: Lending<Worker>,
+}
+
+impl Pool {
+    /// At most `most` workers.
+    pub fn new(command: ProgramCommand, timeout: Duration, most: usize) -> Self {
+        Self {
+            command,
+            timeout,
+            workers: Lending::new(most),
+        }
+    }
+
+    /// The command that starts a worker.
+    pub fn command(&self) -> &ProgramCommand {
+        &self.command
+    }
+
+    /// Takes in a worker that was started elsewhere.
+    pub fn adopt(&self, worker: Worker) {
+        self.workers.adopt(worker);
+    }
+
+    /// Sends a line to a worker that has said to be `expected`, and reads its answer with `read`. A worker that gave no
+    /// good answer is ended; `read`'s error is nonsense. A `fresh` worker has answered no request before.
+    pub fn ask<T>(
+        &self,
+        line: &str,
+        longest: usize,
+        fresh: bool,
+        expected: &Description,
+        read: impl FnOnce(&str) -> Result<T, String>,
+    ) -> Result<T, Trouble> {
+        // Some programs end after an answer; that is no failure of the next one.
+        let (idle, place) = self.workers.take(fresh, Worker::lives);
+        let mut worker = match idle {
+            Some(worker) => worker,
+            None => {
+                let (worker, found) = introduce(&self.command, self.timeout)
+                    .map_err(|error| Trouble::Gone(format!("did not start again: {error}")))??;
+                if found != *expected {
+                    let problem = "describes itself otherwise than when it was first started";
+                    return Err(Trouble::Nonsense(problem.into()));
+                }
+                worker
+            }
+        };
+        let answer = worker.ask(line.to_owned(), longest, self.timeout)?;
+        let read = read(&answer).map_err(|problem| nonsense(&answer, &problem, &worker))?;
+        place.give_back(worker);
+        Ok(read)
+    }
+}
+
+impl Drop for Pool {
+    fn drop(&mut self) {
+        let idle = self.workers.idle();
+        idle.iter_mut().for_each(Worker::dismiss);
+        let by = Instant::now() + GRACE;
+        idle.iter_mut().for_each(|worker| worker.stop(by));
+    }
+}
+
+/// Starts a worker and asks what it is.
+pub(super) fn introduce(
+    command: &ProgramCommand,
+    timeout: Duration,
+) -> std::io::Result<Result<(Worker, Description), Trouble>> {
+    let mut worker = Worker::start(command)?;
+    let time = timeout.max(START);
+    let answer = worker.ask(protocol::describe(), LONGEST_DESCRIPTION, time);
+    Ok(answer.and_then(|line| match Description::parse(&line) {
+        Ok(description) => Ok((worker, description)),
+        Err(problem) => Err(nonsense(&line, &problem, &worker)),
+    }))
+}
+
+fn nonsense(line: &str, problem: &str, worker: &Worker) -> Trouble {
+    Trouble::Nonsense(format!(
+        "answered \"{}\": {problem}{}",
+        excerpt(line),
+        worker.last_words()
+    ))
+}

@@ -1,0 +1,269 @@
+//! The lines that go to a program and come from it.
+
+use super::text::excerpt;
+use crate::twin::{Drive, Quantity, Signal, Signals};
+use serde::{Deserialize, Serialize, Serializer};
+use std::collections::BTreeMap;
+
+/// The version of the protocol, told with the first request.
+const VERSION: u32 = 1;
+/// Longest description, in bytes.
+pub(super) const LONGEST_DESCRIPTION: usize = 1 << 20;
+
+/// The line that asks a program what it is.
+pub(super) fn describe() -> String {
+    format!("{{\"truetwin\": {VERSION}, \"request\": \"describe\"}}\n")
+}
+
+/// Values by name, written as an object in the given order.
+struct Named<'a, V>(Vec<(&'a str, V)>);
+
+impl<V: Serialize> Serialize for Named<'_, V> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(name, value)| (name, value)))
+    }
+}
+
+#[derive(Serialize)]
+struct Simulate<'a> {
+    request: &'static str,
+    id: u64,
+    theta: Named<'a, f64>,
+    step: f64,
+    samples: usize,
+    inputs: Named<'a, Vec<f64>>,
+    seed: Option<u64>,
+}
+
+/// The line that asks for one run; numbers survive it bit for bit.
+pub(super) fn simulate(
+    id: u64,
+    names: &[&str],
+    theta: &[f64],
+    inputs: &[Quantity],
+    drive: &Drive,
+    seed: Option<u64>,
+) -> String {
+    let columns = drive.inputs().columns().into_iter();
+    let request = Simulate {
+        request: "simulate",
+        id,
+        theta: Named(names.iter().copied().zip(theta.iter().copied()).collect()),
+        step: drive.dt(),
+        samples: drive.samples(),
+        inputs: Named(
+            (inputs.iter())
+                .map(|q| q.name.as_str())
+                .zip(columns.map(|c| c.to_vec()))
+                .collect(),
+        ),
+        seed,
+    };
+    // Plain numbers and strings: nothing here can fail to be written.
+    let mut line = serde_json::to_string(&request).unwrap_or_default();
+    line.push('\n');
+    line
+}
+
+/// Longest line that can be an honest answer: 32 bytes a number, names, an error's text.
+pub(super) fn longest_answer(signals: &Signals, samples: usize) -> usize {
+    let names: usize = signals.outputs.iter().map(|q| q.name.len() + 16).sum();
+    (32 * samples)
+        .saturating_mul(signals.outputs.len())
+        .saturating_add(names + (1 << 16))
+}
+
+/// What a program answers to a simulation.
+#[derive(Debug, PartialEq)]
+pub(super) enum Answer {
+    /// Outputs, samples × channels, all finite.
+    Outputs(Signal),
+    /// The run left the finite numbers at this time, in seconds.
+    Diverged(f64),
+    /// The program says that it cannot go on.
+    Error(String),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Told {
+    id: u64,
+    outputs: Option<BTreeMap<String, Vec<Option<f64>>>>,
+    diverged: Option<f64>,
+    error: Option<String>,
+}
+
+/// Reads the answer to request `id`; the error says what is wrong with it and what to answer instead.
+pub(super) fn answer(
+    line: &str,
+    id: u64,
+    signals: &Signals,
+    drive: &Drive,
+) -> Result<Answer, String> {
+    let told: Told = match serde_json::from_str(line) {
+        Ok(told) => told,
+        Err(error) => serde_json::from_str(&finite_only(line)).map_err(|_| {
+            format!("{error}; write answers alone to standard output, one line each, and all else to standard error")
+        })?,
+    };
+    if told.id != id {
+        return Err(format!(
+            "the answer has id {}, the request has {id}; answer each request once, in order",
+            told.id
+        ));
+    }
+    match (told.outputs, told.diverged, told.error) {
+        (Some(outputs), None, None) => stack(outputs, signals, drive),
+        (None, Some(at), None) => Ok(Answer::Diverged(at)),
+        (None, None, Some(text)) => Ok(Answer::Error(excerpt(&text))),
+        _ => Err("exactly one of outputs, diverged (a time in seconds) and error is needed".into()),
+    }
+}
+
+/// Channels by name as a signal; what is not finite is a divergence at its time.
+fn stack(
+    mut outputs: BTreeMap<String, Vec<Option<f64>>>,
+    signals: &Signals,
+    drive: &Drive,
+) -> Result<Answer, String> {
+    let samples = drive.samples();
+    let mut signal = Signal::zeros((samples, signals.outputs.len()));
+    let mut bad = samples;
+    for (quantity, mut column) in signals.outputs.iter().zip(signal.columns_mut()) {
+        let name = &quantity.name;
+        let Some(values) = outputs.remove(name) else {
+            return Err(format!("outputs lack {name}"));
+        };
+        if values.len() != samples {
+            let given = values.len();
+            return Err(format!(
+                "output {name} has {given} values, {samples} samples were asked for"
+            ));
+        }
+        for (k, (to, value)) in column.iter_mut().zip(values).enumerate() {
+            match value {
+                Some(value) => *to = value,
+                None => bad = bad.min(k),
+            }
+        }
+    }
+    if let Some(name) = outputs.keys().next() {
+        return Err(format!("{} is no output of this twin", excerpt(name)));
+    }
+    Ok(match bad < samples {
+        true => Answer::Diverged(drive.time(bad)),
+        false => Answer::Outputs(signal),
+    })
+}
+
+/// A line whose NaN and Infinity, which JSON has not but many writers write, are null.
+fn finite_only(line: &str) -> String {
+    let mut fixed = String::with_capacity(line.len());
+    let mut rest = line;
+    let mut quoted = false;
+    while let Some(c) = rest.chars().next() {
+        let mut taken = c.len_utf8();
+        if quoted && c == '\\' {
+            taken += rest[1..].chars().next().map_or(0, char::len_utf8);
+        } else if c == '"' {
+            quoted = !quoted;
+        } else if !quoted && c.is_ascii_alphabetic() {
+            taken = rest
+                .find(|c: char| !c.is_ascii_alphabetic())
+                .unwrap_or(rest.len());
+            let word = rest[..taken].to_ascii_lowercase();
+            if ["nan", "inf", "infinity"].contains(&word.as_str()) {
+                while fixed.ends_with(['-', '+']) {
+                    fixed.pop();
+                }
+                fixed.push_str("null");
+                rest = &rest[taken..];
+                continue;
+            }
+        }
+        fixed.push_str(&rest[..taken]);
+        rest = &rest[taken..];
+    }
+    fixed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(line: &str) -> Result<Answer, String> {
+        let drive = Drive::autonomous(0.5, 3).unwrap();
+        answer(line, 7, &Signals::default(), &drive)
+    }
+
+    #[test]
+    fn a_request_is_one_line_and_loses_no_bit() {
+        let values = [0.1 + 0.2, -1e-310, 1.0, 5e300 / 3.0];
+        let inputs = Signal::from_shape_vec((4, 1), values.to_vec()).unwrap();
+        let drive = Drive::new(1.0 / 3.0, inputs).unwrap();
+        let inputs = [Quantity::new("u", "V")];
+        let line = simulate(3, &["b", "a"], &[1.0 / 7.0, 2.0], &inputs, &drive, None);
+        assert_eq!(line.matches('\n').count(), 1);
+        assert!(
+            line.starts_with("{\"request\":\"simulate\",\"id\":3,\"theta\":{\"b\":"),
+            "{line}"
+        );
+        assert!(line.ends_with("\"seed\":null}\n"), "{line}");
+        let back: serde_json::Value = serde_json::from_str(&line).unwrap();
+        assert_eq!(back["theta"]["b"].as_f64(), Some(1.0 / 7.0));
+        assert_eq!(back["step"].as_f64(), Some(1.0 / 3.0));
+        for (k, value) in values.iter().enumerate() {
+            assert_eq!(back["inputs"]["u"][k].as_f64(), Some(*value));
+        }
+    }
+
+    #[test]
+    fn answers_are_read() {
+        let outputs = read(r#"{"id": 7, "outputs": {"y": [1, 0.25, -3e-7]}}"#).unwrap();
+        let expected = Signal::from_shape_vec((3, 1), vec![1.0, 0.25, -3e-7]).unwrap();
+        assert_eq!(outputs, Answer::Outputs(expected));
+        assert_eq!(
+            read(r#"{"id": 7, "diverged": 3.2}"#),
+            Ok(Answer::Diverged(3.2))
+        );
+        let error = read(r#"{"id": 7, "error": "no\nlicence"}"#);
+        assert_eq!(error, Ok(Answer::Error("no licence".into())));
+    }
+
+    #[test]
+    fn what_is_not_finite_is_a_divergence_at_its_time() {
+        for word in ["NaN", "-Infinity", "null", "nan", "-nan", "inf"] {
+            let line = format!("{{\"id\": 7, \"outputs\": {{\"y\": [1, {word}, 2]}}}}");
+            assert_eq!(read(&line), Ok(Answer::Diverged(0.5)), "{word}");
+        }
+        assert_eq!(
+            finite_only(r#"{"nan": "a\"NaN", "b": true}"#),
+            r#"{"nan": "a\"NaN", "b": true}"#
+        );
+    }
+
+    #[test]
+    fn nonsense_is_named() {
+        for (line, part) in [
+            ("Loading model ...", "standard error"),
+            (
+                r#"{"id": 6, "outputs": {"y": [1, 2, 3]}}"#,
+                "id 6, the request has 7",
+            ),
+            (
+                r#"{"id": 7, "outputs": {"y": [1, 2]}}"#,
+                "2 values, 3 samples",
+            ),
+            (r#"{"id": 7, "outputs": {}}"#, "outputs lack y"),
+            (
+                r#"{"id": 7, "outputs": {"y": [1, 2, 3], "z": []}}"#,
+                "z is no output",
+            ),
+            (r#"{"id": 7}"#, "exactly one of"),
+            (r#"{"id": 7, "outptus": {}}"#, "unknown field `outptus`"),
+        ] {
+            let message = read(line).unwrap_err();
+            assert!(message.contains(part), "{message}");
+        }
+    }
+}

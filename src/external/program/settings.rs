@@ -1,0 +1,66 @@
+//! How a program is run.
+
+use super::ProgramError;
+use std::time::Duration;
+
+/// Most copies of a program.
+const MOST_WORKERS: usize = 1024;
+/// Most attempts at one simulation beside the first.
+const MOST_RETRIES: usize = 100;
+/// Longest time-out: a year.
+const LONGEST: Duration = Duration::from_secs(366 * 24 * 3600);
+
+/// How a program is run.
+///
+/// | field | default | range | |
+/// |---|---|---|---|
+/// | `workers` | as many as threads simulate | 1 … 1024 | copies of the program that run at once |
+/// | `timeout` | 60 s | above 0, at most a year | for one answer; to start and describe itself, a copy has at least 30 s |
+/// | `retries` | 2 | 0 … 100 | attempts on a fresh copy after one that ended or was late |
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ProgramSettings {
+    /// Copies of the program that run at once; `None`: one for each thread of the rayon pool that starts the twin.
+    pub workers: Option<usize>,
+    /// Longest time that one answer may take.
+    pub timeout: Duration,
+    /// Further attempts at a simulation whose worker ended or was late.
+    pub retries: usize,
+}
+
+impl Default for ProgramSettings {
+    fn default() -> Self {
+        Self {
+            workers: None,
+            timeout: Duration::from_secs(60),
+            retries: 2,
+        }
+    }
+}
+
+impl ProgramSettings {
+    /// Whether each field is in its range.
+    pub(super) fn check(&self) -> Result<(), ProgramError> {
+        let wrong = |text: String| Err(ProgramError::Settings(text));
+        if let Some(workers) = self.workers
+            && !(1..=MOST_WORKERS).contains(&workers)
+        {
+            return wrong(format!(
+                "workers = {workers}; choose between 1 and {MOST_WORKERS}"
+            ));
+        }
+        if self.timeout.is_zero() || self.timeout > LONGEST {
+            let seconds = self.timeout.as_secs_f64();
+            return wrong(format!(
+                "timeout = {seconds} s; choose more than 0 s, at most {} s",
+                LONGEST.as_secs()
+            ));
+        }
+        if self.retries > MOST_RETRIES {
+            return wrong(format!(
+                "retries = {}; choose at most {MOST_RETRIES}",
+                self.retries
+            ));
+        }
+        Ok(())
+    }
+}

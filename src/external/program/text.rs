@@ -1,0 +1,54 @@
+//! Pieces of foreign text, fit for a one-line message.
+
+/// Longest piece that a message quotes, in characters.
+const QUOTED: usize = 160;
+/// Longest end of standard error that a message quotes, in characters.
+const LAST_WORDS: usize = 400;
+
+/// The beginning of `text` in one line, without control characters.
+pub(super) fn excerpt(text: &str) -> String {
+    let line = one_line(text);
+    match line.char_indices().nth(QUOTED) {
+        Some((end, _)) => format!("{} …", &line[..end]),
+        None => line,
+    }
+}
+
+/// The end of what a program wrote to standard error, in one line; its lines are parted by ` | `.
+pub(super) fn last_words(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(bytes);
+    let lines: Vec<String> = (text.lines().map(one_line))
+        .filter(|line| !line.is_empty())
+        .collect();
+    let joined = lines.join(" | ");
+    let surplus = joined.chars().count().saturating_sub(LAST_WORDS);
+    match joined.char_indices().nth(surplus) {
+        Some((from, _)) if surplus > 0 => format!("… {}", &joined[from..]),
+        _ => joined,
+    }
+}
+
+fn one_line(text: &str) -> String {
+    let plain: String = (text.chars())
+        .map(|c| if c.is_control() { ' ' } else { c })
+        .collect();
+    plain.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_are_short_and_in_one_line() {
+        assert_eq!(excerpt(" a\n\u{1b}[31mb\t "), "a [31mb");
+        assert_eq!(excerpt(&"ä".repeat(500)).chars().count(), QUOTED + 2);
+        assert_eq!(
+            last_words(b"Traceback:\n  File x\n\nValueError: no\n"),
+            "Traceback: | File x | ValueError: no"
+        );
+        let long = last_words(format!("{}end", "ö".repeat(999)).as_bytes());
+        assert!(long.starts_with("… ö") && long.ends_with("end"), "{long}");
+        assert_eq!(last_words(&[0xff, 0xfe]), "\u{fffd}\u{fffd}");
+    }
+}

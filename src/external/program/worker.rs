@@ -1,0 +1,236 @@
+//! One running copy of a program, asked line by line.
+
+use super::command::ProgramCommand;
+use super::text::{excerpt, last_words};
+use std::io::{self, Read, Write};
+use std::process::{Child, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+/// Bytes of standard error that are kept for messages.
+const KEPT: usize = 2048;
+/// Bytes that are read at once, and how many such pieces may wait to be looked at.
+const PIECE: usize = 1 << 16;
+const PIECES: usize = 4;
+/// How long a program that ends is waited for: its status and last words are worth it.
+const LAST_BREATH: Duration = Duration::from_millis(300);
+
+/// Why a worker gave no answer.
+#[derive(Debug)]
+pub(super) enum Trouble {
+    /// It ended or took too long; another copy may do.
+    Gone(String),
+    /// It said what no other copy will say better.
+    Nonsense(String),
+}
+
+impl Trouble {
+    /// What happened, to be read after the program's name.
+    pub fn text(self) -> String {
+        let (Self::Gone(text) | Self::Nonsense(text)) = self;
+        text
+    }
+}
+
+/// A child process whose standard output and standard error are always being read, so that it never waits for us.
+///
+/// Reading, writing and draining have a thread each: pipes know no time-outs, and a program that neither reads nor writes
+/// must not hold up more than its own request. The threads end with the pipes.
+pub(super) struct Worker {
+    child: Child,
+    /// Dropped, it closes the program's standard input.
+    requests: Option<Sender<String>>,
+    pieces: Receiver<Vec<u8>>,
+    /// Read, and not yet part of an answer.
+    waiting: Vec<u8>,
+    words: Arc<Mutex<Vec<u8>>>,
+    drain: JoinHandle<()>,
+}
+
+impl Worker {
+    /// Starts the program.
+    pub fn start(command: &ProgramCommand) -> io::Result<Self> {
+        let mut child = (command.command())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()?;
+        let missing = || io::Error::other("the system gave no pipe");
+        let (Some(stdin), Some(stdout), Some(stderr)) =
+            (child.stdin.take(), child.stdout.take(), child.stderr.take())
+        else {
+            return Err(missing());
+        };
+        let (requests, to_write) = channel::<String>();
+        let (read, pieces) = sync_channel(PIECES);
+        let words = Arc::new(Mutex::new(Vec::new()));
+        let kept = words.clone();
+        thread::spawn(move || write_all(stdin, &to_write));
+        thread::spawn(move || read_all(stdout, &read));
+        let drain = thread::spawn(move || drain(stderr, &kept));
+        Ok(Self {
+            child,
+            requests: Some(requests),
+            pieces,
+            waiting: Vec::new(),
+            words,
+            drain,
+        })
+    }
+
+    /// Sends one line and waits for the next one: at most `time`, at most `longest` bytes.
+    pub fn ask(&mut self, line: String, longest: usize, time: Duration) -> Result<String, Trouble> {
+        let deadline = Instant::now() + time;
+        let sent = self.requests.as_ref().map(|to| to.send(line));
+        if !matches!(sent, Some(Ok(()))) {
+            return Err(self.ended());
+        }
+        let mut seen = 0;
+        loop {
+            // What was looked at before holds no end of line.
+            if let Some(end) = self.waiting[seen..].iter().position(|b| *b == b'\n') {
+                let rest = self.waiting.split_off(seen + end + 1);
+                let line = std::mem::replace(&mut self.waiting, rest);
+                if line.len() > longest {
+                    return Err(too_long(longest, &line));
+                }
+                seen = 0;
+                let text = String::from_utf8(line).map_err(|_| {
+                    Trouble::Nonsense("answered with bytes that are no UTF-8".into())
+                })?;
+                // Blank lines say nothing.
+                if text.trim().is_empty() {
+                    continue;
+                }
+                return Ok(text);
+            }
+            seen = self.waiting.len();
+            if seen > longest {
+                return Err(too_long(longest, &self.waiting));
+            }
+            let left = deadline.saturating_duration_since(Instant::now());
+            match self.pieces.recv_timeout(left) {
+                Ok(piece) => self.waiting.extend(piece),
+                Err(RecvTimeoutError::Disconnected) => return Err(self.ended()),
+                Err(RecvTimeoutError::Timeout) => {
+                    let seconds = time.as_secs_f64();
+                    let text = format!("gave no answer within {seconds} s{}", self.last_words());
+                    return Err(Trouble::Gone(text));
+                }
+            }
+            // Blank lines without end are no answer either.
+            if Instant::now() > deadline {
+                let text = format!("gave no whole answer in time{}", self.last_words());
+                return Err(Trouble::Gone(text));
+            }
+        }
+    }
+
+    /// Whether the process still runs.
+    pub fn lives(&mut self) -> bool {
+        matches!(self.child.try_wait(), Ok(None))
+    }
+
+    /// What it wrote to standard error last, as the end of a message; empty where it wrote nothing.
+    pub fn last_words(&self) -> String {
+        let words = self.words.lock().unwrap_or_else(PoisonError::into_inner);
+        match last_words(&words) {
+            text if text.is_empty() => text,
+            text => format!("; its standard error ends: {text}"),
+        }
+    }
+
+    /// The trouble of a program that closed its pipes, once it is gone.
+    fn ended(&mut self) -> Trouble {
+        let by = Instant::now() + LAST_BREATH;
+        while self.lives() && Instant::now() < by {
+            thread::sleep(Duration::from_millis(2));
+        }
+        let how = match self.child.try_wait() {
+            Ok(Some(status)) => format!("ended ({status})"),
+            _ => "closed its standard output".to_owned(),
+        };
+        self.stop(Instant::now());
+        while !self.drain.is_finished() && Instant::now() < by {
+            thread::sleep(Duration::from_millis(2));
+        }
+        Trouble::Gone(format!("{how} without an answer{}", self.last_words()))
+    }
+
+    /// Closes the program's standard input: a hint to end.
+    pub fn dismiss(&mut self) {
+        self.requests = None;
+    }
+
+    /// Waits for the end until `by`, then enforces it. Nothing of the process is left.
+    pub fn stop(&mut self, by: Instant) {
+        self.dismiss();
+        while self.lives() && Instant::now() < by {
+            thread::sleep(Duration::from_millis(1));
+        }
+        // Of a process that is gone already, both say so.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        self.stop(Instant::now());
+    }
+}
+
+fn too_long(longest: usize, line: &[u8]) -> Trouble {
+    let start = excerpt(&String::from_utf8_lossy(&line[..line.len().min(PIECE)]));
+    Trouble::Nonsense(format!(
+        "answered with a line of more than {longest} bytes: \"{start}\""
+    ))
+}
+
+/// Writes requests until there are no more, or nobody reads them.
+fn write_all(mut to: impl Write, requests: &Receiver<String>) {
+    for request in requests {
+        if to
+            .write_all(request.as_bytes())
+            .and_then(|()| to.flush())
+            .is_err()
+        {
+            return;
+        }
+    }
+}
+
+/// Hands on what is read, in pieces.
+fn read_all(mut from: impl Read, to: &SyncSender<Vec<u8>>) {
+    let mut piece = vec![0; PIECE];
+    while let Some(length) = read(&mut from, &mut piece) {
+        if to.send(piece[..length].to_vec()).is_err() {
+            return;
+        }
+    }
+}
+
+/// Reads to the end and keeps the last bytes.
+fn drain(mut from: impl Read, kept: &Mutex<Vec<u8>>) {
+    let mut piece = vec![0; PIECE];
+    while let Some(length) = read(&mut from, &mut piece) {
+        let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.extend_from_slice(&piece[length.saturating_sub(KEPT)..length]);
+        let surplus = kept.len().saturating_sub(KEPT);
+        kept.drain(..surplus);
+    }
+}
+
+/// Bytes read; `None` at the end.
+fn read(from: &mut impl Read, piece: &mut [u8]) -> Option<usize> {
+    loop {
+        match from.read(piece) {
+            Ok(0) => return None,
+            Ok(length) => return Some(length),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(_) => return None,
+        }
+    }
+}
