@@ -46,21 +46,22 @@ fn done(mut command: Command) -> Output {
     output
 }
 
-/// Every file of a folder, by name.
+/// Every file of a folder and its folders, by the end of its path.
 fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut all = BTreeMap::new();
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
+        let name = PathBuf::from(path.file_name().unwrap());
         match path.is_dir() {
-            true => all.extend(files(&path)),
+            true => {
+                all.extend((files(&path).into_iter()).map(|(end, bytes)| (name.join(end), bytes)))
+            }
             false => {
-                all.insert(path.clone(), fs::read(&path).unwrap());
+                all.insert(name, fs::read(&path).unwrap());
             }
         }
     }
-    (all.into_iter())
-        .map(|(path, bytes)| (path.strip_prefix(folder).unwrap().to_owned(), bytes))
-        .collect()
+    all
 }
 
 #[test]

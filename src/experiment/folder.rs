@@ -1,14 +1,14 @@
 //! The folder of a study of many records.
 
 use super::MonteCarlo;
-use crate::study::{InputPlan, Study};
+use crate::study::Study;
 use crate::two_stage::PretrainOptions;
 use crate::work::{Manifest, WorkError, WorkFolder, checksum};
 use serde_json::json;
 use std::path::Path;
 
 /// Layout of the folder; raised when it changes.
-const LAYOUT: u32 = 1;
+const LAYOUT: u32 = 2;
 /// Where runs are kept.
 pub(super) const RUNS: &str = "runs";
 
@@ -40,18 +40,11 @@ impl MonteCarlo {
 
     /// Everything that the runs depend on; files by their checksums.
     fn manifest(&self, study: &Study, origin: Origin<'_>) -> Result<Manifest, WorkError> {
-        // A file that was read can be written.
-        let file = toml::to_string(study.file()).unwrap_or_default();
-        let mut manifest = Manifest::new("reproduce", LAYOUT)
-            .with("twin", study.name())
+        let manifest = study
+            .manifest("reproduce", LAYOUT)?
             .with("scenario", self.scenario.number())
             .with("runs", self.runs)
-            .with("seed", self.seed)
-            .with("study", file)
-            .with("record", json!([study.plan().step, study.plan().samples]));
-        if let Some(InputPlan::File(path)) = &study.plan().input {
-            manifest = manifest.with("input file", checksum(path)?);
-        }
+            .with("seed", self.seed);
         Ok(match origin {
             Origin::File(path) => manifest.with("estimator", checksum(path)?),
             Origin::Trained(options) => {

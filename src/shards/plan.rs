@@ -5,9 +5,9 @@ use super::{Prior, ShardsError};
 use crate::bank::BankError;
 use crate::bank::file::{BankFileError, npz};
 use crate::progress::Progress;
-use crate::study::{InputPlan, PresetName, Study};
-use crate::work::{Manifest, Share, WorkFolder, checksum};
-use serde_json::{Value, json};
+use crate::study::{PresetName, Study};
+use crate::work::{Manifest, Share, WorkFolder};
+use serde_json::json;
 use std::io;
 use std::path::Path;
 
@@ -134,28 +134,12 @@ impl BankPlan<'_> {
     /// Everything that the rows depend on.
     pub(super) fn manifest(&self) -> Result<Manifest, ShardsError> {
         let study = self.study;
-        let space = study.twin().parameters();
-        let parameters: Vec<Value> = (space.iter())
-            .map(|p| json!({ "name": p.name, "prior": p.prior, "bounds": p.bounds }))
-            .collect();
-        // A file that was read can be written.
-        let file = toml::to_string(study.file()).unwrap_or_default();
-        let mut manifest = Manifest::new(VERB, LAYOUT)
-            .with("twin", study.name())
+        Ok(study
+            .manifest(VERB, LAYOUT)?
             .with("size", self.size)
             .with("rows of a shard", rows_of_a_shard(self.size))
             .with("seed", self.seed)
-            .with("features", json!(study.preset(self.preset).features))
-            .with("parameters", parameters)
-            .with("study", file)
-            .with("record", json!([study.plan().step, study.plan().samples]));
-        match &study.plan().input {
-            Some(InputPlan::File(path)) => {
-                manifest = manifest.with("input file", checksum(path)?);
-            }
-            input => manifest = manifest.with("input", json!(input)),
-        }
-        Ok(manifest)
+            .with("features", json!(study.preset(self.preset).features)))
     }
 
     /// Whether a bank was made as this plan says.

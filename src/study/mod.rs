@@ -1,6 +1,7 @@
 //! A twin together with everything that estimating its parameters needs, checked.
 
 mod file;
+mod manifest;
 mod plan;
 mod settings;
 

@@ -10,12 +10,12 @@ use crate::diagnose::DiagnoseSettings;
 use crate::progress::Progress;
 use crate::study::Study;
 use crate::twin::{Noise, Record};
-use crate::work::{Manifest, Piece, Pieces, Share};
+use crate::work::{Manifest, Piece, Pieces, Share, WorkError};
 use serde_json::json;
 use std::path::Path;
 
 /// Layout of the folder; raised when it changes.
-const LAYOUT: u32 = 2;
+const LAYOUT: u32 = 3;
 
 /// What is tried.
 ///
@@ -104,7 +104,7 @@ impl<'a> Withheld<'a> {
     /// [`WithheldError`]: a folder of another call, a place that cannot be written.
     pub fn seal(self, path: &Path, progress: &Progress) -> Result<Sealed<'a>, WithheldError> {
         let fill = |filling: &Filling<'_>| self.fill(filling, progress);
-        let folder = Folder::open(path, &self.manifest(), fill)?;
+        let folder = Folder::open(path, &self.manifest()?, fill)?;
         Ok(Sealed {
             trials: self,
             folder,
@@ -135,21 +135,18 @@ impl<'a> Withheld<'a> {
     }
 
     /// What the trials depend on.
-    fn manifest(&self) -> Manifest {
+    fn manifest(&self) -> Result<Manifest, WorkError> {
         let study = self.urn.study();
         let settings = &self.settings;
         let kinds: Vec<&str> = settings.kinds.iter().map(|kind| kind.id()).collect();
-        // A file that was read can be written.
-        let file = toml::to_string(study.file()).unwrap_or_default();
-        Manifest::new("withheld", LAYOUT)
-            .with("twin", study.name())
+        Ok(study
+            .manifest("withheld", LAYOUT)?
             .with("trials", settings.trials)
             .with("seed", settings.seed)
             .with("kinds", json!(kinds))
             .with("without", settings.without)
             .with("validation", settings.validation)
-            .with("detection_only", settings.detection_only)
-            .with("study", file)
+            .with("detection_only", settings.detection_only))
     }
 }
 

@@ -185,7 +185,15 @@ fn an_estimate_repeats_fits_its_schema_and_writes_its_folder() {
         .map(|e| e.unwrap().file_name())
         .collect();
     names.sort();
-    assert_eq!(names, ["estimate.json", "overlay.svg", "trajectories.csv"]);
+    assert_eq!(
+        names,
+        [
+            "cloud.npz",
+            "estimate.json",
+            "overlay.svg",
+            "trajectories.csv"
+        ]
+    );
     assert!(
         fs::read_to_string(format!("{out}/overlay.svg"))
             .unwrap()
