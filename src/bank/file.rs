@@ -17,7 +17,7 @@
 //!     file::write(&path, &draws, &["a"])?;
 //!     assert_eq!(file::read(&path, &["a"])?, draws);
 //! }
-//! # Ok::<(), truetwin::bank::file::BankFileError>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 use super::Draws;

@@ -37,6 +37,7 @@ pub(super) struct Arguments {
 
 /// A twin from outside, for this call alone.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "A simulator that is not in Rust")]
 pub(super) struct External {
     /// A program that is a twin: it reads and writes lines of JSON. No shell is run.
     #[arg(long, global = true, value_name = "COMMAND")]

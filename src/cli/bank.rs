@@ -16,8 +16,11 @@ pub(super) fn run(context: &Context<'_>, options: &BankArguments) -> Result<Exit
         seed: context.seed,
     };
     let share = context.share(options.shard)?;
-    // What other ranks do counts too.
-    let before = plan.finish(&options.out).map_or(0, |filled| filled.rows);
+    // What other ranks do counts too; one rank looks.
+    let before = match context.team.leads() {
+        true => plan.finish(&options.out).map_or(0, |filled| filled.rows),
+        false => 0,
+    };
     context.team.wait();
     let clock = Instant::now();
     plan.fill(&options.out, share, context.progress)?;

@@ -104,7 +104,11 @@ fn kept(
 ) -> Result<Estimator, Failure> {
     let path = folder.file("estimator.est");
     if context.team.leads() && !path.exists() {
-        (pretrain(study, training, context.progress)?.0).save(&path)?;
+        let saved = (pretrain(study, training, context.progress)?.0).save(&path);
+        // Another job may have been faster, and has trained the same.
+        if !path.exists() {
+            saved?;
+        }
     }
     context.team.wait();
     Ok(Estimator::load(&path, context.studies)?)

@@ -113,6 +113,18 @@ impl Shards {
         }
     }
 
+    /// Whether a shard is there and is what it was.
+    pub fn is_sound(&self, number: usize) -> Result<bool, ShardsError> {
+        match self.bytes(number) {
+            Ok(_) => Ok(true),
+            Err(
+                ShardsError::Incomplete { .. } | ShardsError::File(BankFileError::Content { .. }),
+            ) => Ok(false),
+            // A file that cannot be read now may be sound.
+            Err(error) => Err(error),
+        }
+    }
+
     /// Adds a shard; where another process has made it in the meantime, that one stays.
     pub fn add(&self, number: usize, bytes: &[u8]) -> Result<(), ShardsError> {
         let path = self.folder.file(SHARDS).join(name(number, &sha256(bytes)));

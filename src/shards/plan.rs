@@ -95,12 +95,9 @@ impl BankPlan<'_> {
         let stage = progress.stage("kept shards", mine().count());
         let mut missing = Vec::new();
         for number in mine() {
-            match shards.bytes(number) {
-                Ok(_) => {}
-                Err(_) => {
-                    shards.remove(number)?;
-                    missing.push(number);
-                }
+            if !shards.is_sound(number)? {
+                shards.remove(number)?;
+                missing.push(number);
             }
             stage.tick().map_err(BankError::from)?;
         }
