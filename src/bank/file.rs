@@ -22,7 +22,7 @@
 
 use super::Draws;
 use crate::files::{with_remedy, write_new};
-use ndarray::Array2;
+use ndarray::{Array2, Ix2, OwnedRepr};
 use ndarray_npy::{NpzReader, NpzWriter, ReadNpzError, WriteNpyExt, WriteNpzError};
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
@@ -200,12 +200,19 @@ fn archive(arrays: &[(&str, &Array2<f64>)]) -> Result<Vec<u8>, WriteNpzError> {
     Ok(archive.finish()?.into_inner())
 }
 
-/// Rows of an `.npz` archive.
+/// Rows of an `.npz` archive, of 64 or 32 bits.
 pub(crate) fn from_npz(bytes: &[u8]) -> Result<Draws, ReadNpzError> {
     let mut archive = NpzReader::new(Cursor::new(bytes))?;
+    let mut array = |name| match archive.by_name::<OwnedRepr<f64>, Ix2>(name) {
+        Ok(array) => Ok(array),
+        Err(error) => match archive.by_name::<OwnedRepr<f32>, Ix2>(name) {
+            Ok(array) => Ok(array.mapv(f64::from)),
+            Err(_) => Err(error),
+        },
+    };
     Ok(Draws {
-        theta: archive.by_name("theta")?,
-        features: archive.by_name("features")?,
+        theta: array("theta")?,
+        features: array("features")?,
         redrawn: 0,
     })
 }
@@ -282,6 +289,24 @@ mod tests {
         let path = place.path().join("bank.txt");
         let error = write(&path, &draws(), &NAMES).unwrap_err().to_string();
         assert!(error.contains(".npz or .csv"), "{error}");
+    }
+
+    /// As NumPy writes them: compressed, of 32 bits, column after column.
+    #[test]
+    fn archives_of_others_are_read() {
+        use ndarray::ShapeBuilder;
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("bank.npz");
+        let theta = array![[0.5f32, 1.0], [2.0, 3.0]];
+        let mut features = Array2::<f64>::zeros((2, 3).f());
+        features[[1, 2]] = 7.0;
+        let mut archive = NpzWriter::new_compressed(std::fs::File::create(&path).unwrap());
+        archive.add_array("theta", &theta).unwrap();
+        archive.add_array("features", &features).unwrap();
+        archive.finish().unwrap();
+        let draws = read(&path, &NAMES).unwrap();
+        assert_eq!(draws.theta, theta.mapv(f64::from));
+        assert_eq!(draws.features, features);
     }
 
     #[test]
