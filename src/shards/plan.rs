@@ -118,8 +118,8 @@ impl BankPlan<'_> {
     ///
     /// [`ShardsError`]: no folder of this call.
     pub fn finish(&self, path: &Path) -> Result<Filled, ShardsError> {
-        let (folder, _) = WorkFolder::find(path, VERB)?;
-        let shards = Shards::list(folder, self.manifest()?)?;
+        let manifest = self.manifest()?;
+        let shards = Shards::list(WorkFolder::resume(path, &manifest)?, manifest)?;
         shards.finish()?;
         Ok(Filled {
             there: shards.there.len(),

@@ -20,7 +20,6 @@ const MANIFEST: &str = "manifest.json";
 #[derive(Debug, Clone)]
 pub struct WorkFolder {
     path: PathBuf,
-    verb: &'static str,
 }
 
 /// Why a folder of work cannot be used.
@@ -133,14 +132,22 @@ impl WorkFolder {
                 _ => {}
             }
         }
+        Ok(Self::resume(path, manifest)?)
+    }
+
+    /// The folder that the same call made.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError`]: no folder of this verb, a folder of another call.
+    pub fn resume(path: &Path, manifest: &Manifest) -> Result<Self, WorkError> {
         let (found, there) = Self::find(path, manifest.verb())?;
         match manifest.differs(&there) {
             None => Ok(found),
             Some(difference) => Err(WorkError::Other {
                 path: path.into(),
                 difference,
-            }
-            .into()),
+            }),
         }
     }
 
@@ -154,7 +161,7 @@ impl WorkFolder {
         let found = text.and_then(|text| Manifest::parse(verb, &text));
         let path = path.to_owned();
         match found {
-            Some(manifest) => Ok((Self { path, verb }, manifest)),
+            Some(manifest) => Ok((Self { path }, manifest)),
             None => Err(WorkError::Foreign { path, verb }),
         }
     }
@@ -162,11 +169,6 @@ impl WorkFolder {
     /// Where it lies.
     pub fn path(&self) -> &Path {
         &self.path
-    }
-
-    /// What makes such folders.
-    pub fn verb(&self) -> &'static str {
-        self.verb
     }
 
     /// Where a file of the folder lies.

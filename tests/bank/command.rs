@@ -97,6 +97,11 @@ fn wrong_calls_are_refused_with_the_remedy() {
         assert!(said.contains(hint), "{call}: {said}");
     }
     done(at, &format!("{bank} --out half"));
+    let manifest = || std::fs::read(at.join("half/manifest.json")).unwrap();
+    let before = manifest();
+    let said = refused(at, &format!("{bank} --seed 2 --out half"));
+    assert!(said.contains("seed was 1, now it is 2"), "{said}");
+    assert_eq!(manifest(), before, "a finished bank stays what it is");
     let said = refused(
         at,
         "pretrain --twin van-der-pol --preset paper --bank half --out x.est",
