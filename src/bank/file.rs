@@ -84,7 +84,7 @@ fn form(path: &Path) -> Result<Form, BankFileError> {
 ///
 /// # Errors
 ///
-/// As [`write`].
+/// As [`write()`].
 pub fn write_features(path: &Path, features: &Array2<f64>) -> Result<(), BankFileError> {
     let bytes = match path.extension().and_then(|e| e.to_str()) {
         Some("npy") => {
