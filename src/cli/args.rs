@@ -104,6 +104,15 @@ pub(super) enum Command {
 }
 
 impl Command {
+    /// Whether the same call goes on where this one stopped.
+    pub fn is_resumed(&self) -> bool {
+        match self {
+            Self::Bank(_) | Self::Withheld(_) => true,
+            Self::Reproduce(options) => options.out.is_some(),
+            _ => false,
+        }
+    }
+
     /// Whether the ranks of a cluster share the work of this verb.
     pub fn is_shared_out(&self) -> bool {
         matches!(self, Self::Bank(_) | Self::Reproduce(_) | Self::Withheld(_))

@@ -55,6 +55,15 @@ impl Failure {
         }
     }
 
+    /// The user has stopped it.
+    pub fn stopped(message: impl Display, code: u8) -> Self {
+        Self {
+            message: message.to_string(),
+            code,
+            about_study: false,
+        }
+    }
+
     /// A wrong call, in one line.
     pub fn usage(error: &clap::Error) -> Self {
         if error.kind() == clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {

@@ -32,6 +32,7 @@ mod pretrain;
 mod progress;
 mod reproduce;
 mod simulate;
+mod stop;
 mod twins;
 mod withheld;
 
@@ -41,6 +42,7 @@ use crate::work::{Share, Team};
 use args::{Arguments, Command, Subject};
 use clap::{CommandFactory, FromArgMatches};
 use failure::Failure;
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 /// More threads than any machine has cores are a slip of the keyboard.
@@ -54,13 +56,14 @@ pub fn run<E: Into<StudyError>>(studies: impl IntoIterator<Item = Result<Study, 
 /// Runs the command line `arguments`, the program's name first, over `studies`.
 pub fn run_from<E: Into<StudyError>>(
     studies: impl IntoIterator<Item = Result<Study, E>>,
-    arguments: impl IntoIterator<Item = impl Into<std::ffi::OsString> + Clone>,
+    arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>,
 ) -> ExitCode {
     let team = match Team::join() {
         Ok(team) => team,
         Err(error) => return Failure::from(error).report(),
     };
-    let matches = Arguments::command().try_get_matches_from(arguments);
+    let words: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
+    let matches = Arguments::command().try_get_matches_from(&words);
     let parsed = match matches.and_then(|matches| Arguments::from_arg_matches(&matches)) {
         Ok(parsed) => parsed,
         Err(error) if !error.use_stderr() => {
@@ -76,12 +79,18 @@ pub fn run_from<E: Into<StudyError>>(
         let failure = Failure::user("this verb runs as one process; start it without mpirun");
         return failure.report_of(&team);
     }
+    stop::listen();
     let studies: Result<Vec<Study>, E> = studies.into_iter().collect();
     let result = studies
         .map_err(|error| Failure::from(error.into()))
         .and_then(|studies| in_pool(parsed.threads, || dispatch(&parsed, &studies, &team)));
     match result {
         Ok(code) => code,
+        Err(_) if stop::asked() => {
+            let exit = stop::failure(&parsed.command, &words).report_of(&team);
+            team.abandon(stop::CODE);
+            exit
+        }
         Err(failure) => {
             let code = failure.code();
             let exit = failure.report();
@@ -112,7 +121,7 @@ fn in_pool<R: Send>(
 fn dispatch(arguments: &Arguments, studies: &[Study], team: &Team) -> Result<ExitCode, Failure> {
     let progress = match team.leads() {
         true => progress::bars(),
-        false => Progress::silent(),
+        false => progress::unseen(),
     };
     let external = external::study(&arguments.external, studies)?;
     let studies: Vec<Study> = studies.iter().chain(&external).cloned().collect();

@@ -1,5 +1,6 @@
 //! Progress bars on standard error, on a terminal only.
 
+use super::stop;
 use crate::progress::{Listener, Progress};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use std::collections::HashMap;
@@ -14,6 +15,20 @@ pub(super) fn bars() -> Progress {
     Progress::new(Arc::new(Bars::default()))
 }
 
+/// No bars; ends when it is asked to.
+pub(super) fn unseen() -> Progress {
+    Progress::new(Arc::new(Unseen))
+}
+
+struct Unseen;
+
+impl Listener for Unseen {
+    fn advanced(&self, _: &str, _: u64, _: u64) {}
+    fn cancelled(&self) -> bool {
+        stop::asked()
+    }
+}
+
 #[derive(Default)]
 struct Bars {
     all: MultiProgress,
@@ -21,6 +36,10 @@ struct Bars {
 }
 
 impl Listener for Bars {
+    fn cancelled(&self) -> bool {
+        stop::asked()
+    }
+
     fn advanced(&self, stage: &str, done: u64, total: u64) {
         // A poisoned lock means that a thread panicked; bars are not worth another panic.
         let Ok(mut open) = self.open.lock() else {
