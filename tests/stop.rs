@@ -1,4 +1,5 @@
-//! Ctrl-C: a clean end, the call that goes on, and then the same bytes as of an undisturbed run.
+//! Ctrl-C: a clean end, the call that goes on; `kill -9` at any moment: the same call goes on all the same. Then the bytes are those
+//! of an undisturbed run.
 #![cfg(unix)]
 
 use std::collections::BTreeMap;
@@ -93,4 +94,123 @@ fn a_training_that_is_stopped_leaves_nothing() {
     assert_eq!(output.status.code(), Some(130), "{said}");
     assert!(said.contains("nothing was written"), "{said}");
     assert_eq!(entries(at), 0);
+}
+
+/// Moments in milliseconds up to `longest`, drawn once and for all.
+fn moments(longest: u64) -> impl Iterator<Item = u64> {
+    let mut state = 7u64;
+    std::iter::repeat_with(move || {
+        state =
+            (state.wrapping_mul(6_364_136_223_846_793_005)).wrapping_add(1_442_695_040_888_963_407);
+        5 + (state >> 33) % longest
+    })
+}
+
+/// Kills a call again and again until it is done; how often it was killed.
+fn killed(folder: &Path, arguments: &str, longest: u64) -> usize {
+    let mut kills = 0;
+    for moment in moments(longest) {
+        let mut child = start(folder, arguments);
+        let by = Instant::now() + Duration::from_millis(moment);
+        while Instant::now() < by && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        match child.try_wait().unwrap() {
+            Some(status) => {
+                let said = child.wait_with_output().unwrap().stderr;
+                let said = String::from_utf8_lossy(&said).into_owned();
+                assert!(status.success(), "after {kills} kills: {said}");
+                return kills;
+            }
+            None => {
+                child.kill().unwrap();
+                child.wait().unwrap();
+                kills += 1;
+                assert!(kills < 1000, "it does not come forward");
+            }
+        }
+    }
+    unreachable!("moments do not end")
+}
+
+#[test]
+fn a_bank_survives_kills_at_any_moment() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    let bank = "bank --twin van-der-pol --size 6000";
+    let kills = killed(at, &format!("{bank} --out killed"), 160);
+    assert!(kills >= 5, "only {kills}");
+    assert!(
+        start(at, &format!("{bank} --out whole"))
+            .wait()
+            .unwrap()
+            .success()
+    );
+    assert_eq!(
+        files(&at.join("killed/shards")),
+        files(&at.join("whole/shards"))
+    );
+    let manifest = |name: &str| fs::read(at.join(name).join("manifest.json")).unwrap();
+    assert_eq!(manifest("killed"), manifest("whole"));
+    println!("{kills} kills survived");
+}
+
+/// A JSON file without its times.
+fn timeless(path: &Path) -> serde_json::Value {
+    fn strip(value: &mut serde_json::Value) {
+        match value {
+            serde_json::Value::Object(all) => {
+                let time = |key: &str| ["ms", "seconds", "seconds_per_record"].contains(&key);
+                all.retain(|key, _| !time(key));
+                all.values_mut().for_each(strip);
+            }
+            serde_json::Value::Array(all) => all.iter_mut().for_each(strip),
+            _ => {}
+        }
+    }
+    let mut value = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
+    strip(&mut value);
+    value
+}
+
+#[test]
+fn trials_and_records_survive_kills_at_any_moment() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    // A moment must now and then be long enough for the longest piece.
+    for (call, part, result, longest) in [
+        (
+            "withheld --twin van-der-pol --trials 6 --detection-only",
+            "answers",
+            "scorecard.json",
+            2500,
+        ),
+        (
+            "reproduce --twin van-der-pol --runs 12 --bank-size 200 --epochs 2",
+            "runs",
+            "reproduce.json",
+            400,
+        ),
+    ] {
+        let verb = call.split(' ').next().unwrap();
+        let kills = killed(at, &format!("{call} --out killed-{verb}"), longest);
+        assert!(
+            start(at, &format!("{call} --out whole-{verb}"))
+                .wait()
+                .unwrap()
+                .success()
+        );
+        let [killed, whole] = ["killed", "whole"].map(|name| at.join(format!("{name}-{verb}")));
+        assert_eq!(
+            timeless(&killed.join(result)),
+            timeless(&whole.join(result)),
+            "{verb}"
+        );
+        assert_eq!(
+            entries(&killed.join(part)),
+            entries(&whole.join(part)),
+            "nothing half-written stays"
+        );
+        println!("{verb}: {kills} kills survived");
+    }
 }

@@ -1,7 +1,7 @@
 //! A folder that keeps finished pieces of long work.
 
 use super::Manifest;
-use crate::files::{NewFolder, folder, replace, with_remedy, write_new};
+use crate::files::{NewFolder, folder, replace, sweep, with_remedy, write_new};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -251,11 +251,15 @@ impl WorkFolder {
             .map_err(io::Error::from)
             .and_then(|text| write_new(&path, format!("{text}\n").as_bytes()));
         match written {
-            Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
-                Err(WorkError::io(&path, error))
-            }
+            Err(error) if !path.exists() => Err(WorkError::io(&path, error)),
             _ => Ok(()),
         }
+    }
+
+    /// Sweeps out what processes that died have left in a part whose pieces are all there.
+    pub(super) fn sweep(&self, part: &str) -> Result<(), WorkError> {
+        let place = self.file(part);
+        sweep(&place).map_err(|error| WorkError::io(&place, error))
     }
 }
 

@@ -72,6 +72,11 @@ impl Pieces<'_> {
             Ok::<T, E>(made)
         })?);
         all.sort_by_key(Piece::number);
+        if let Some(folder) = self.folder
+            && all.len() == self.count
+        {
+            folder.sweep(self.part)?;
+        }
         Ok(all)
     }
 }
