@@ -2,12 +2,18 @@
 //!
 //! Without `mpirun` these tests say that they skipped, unless `TRUETWIN_MPI=required`.
 
+#[path = "common/files.rs"]
+mod files;
+#[path = "common/timeless.rs"]
+mod timeless;
+
+use files::files;
 use serde_json::Value;
-use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
+use timeless::timeless;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_truetwin");
 
@@ -44,24 +50,6 @@ fn done(mut command: Command) -> Output {
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{command:?}: {said}");
     output
-}
-
-/// Every file of a folder and its folders, by the end of its path.
-fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut all = BTreeMap::new();
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        let name = PathBuf::from(path.file_name().unwrap());
-        match path.is_dir() {
-            true => {
-                all.extend((files(&path).into_iter()).map(|(end, bytes)| (name.join(end), bytes)))
-            }
-            false => {
-                all.insert(name, fs::read(&path).unwrap());
-            }
-        }
-    }
-    all
 }
 
 #[test]
@@ -166,25 +154,6 @@ fn a_rank_that_dies_loses_its_unfinished_shard_and_nothing_else() {
         }
     }
     assert_eq!(files(&killed), whole, "half-written files are gone, too");
-}
-
-/// A JSON file without its times.
-fn timeless(path: &Path) -> Value {
-    fn strip(value: &mut Value) {
-        match value {
-            Value::Object(all) => {
-                all.retain(|key, _| {
-                    !matches!(key.as_str(), "ms" | "seconds" | "seconds_per_record")
-                });
-                all.values_mut().for_each(strip);
-            }
-            Value::Array(all) => all.iter_mut().for_each(strip),
-            _ => {}
-        }
-    }
-    let mut value = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
-    strip(&mut value);
-    value
 }
 
 #[test]

@@ -2,11 +2,17 @@
 //! of an undisturbed run.
 #![cfg(unix)]
 
-use std::collections::BTreeMap;
+#[path = "common/files.rs"]
+mod files;
+#[path = "common/timeless.rs"]
+mod timeless;
+
+use files::files;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
+use timeless::timeless;
 
 fn start(folder: &Path, arguments: &str) -> std::process::Child {
     Command::new(env!("CARGO_BIN_EXE_truetwin"))
@@ -38,13 +44,6 @@ fn interrupted(folder: &Path, arguments: &str, signal: &str, ready: impl Fn() ->
             .success()
     );
     child.wait_with_output().unwrap()
-}
-
-fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    (fs::read_dir(folder).unwrap())
-        .map(|entry| entry.unwrap().path())
-        .map(|path| (path.file_name().unwrap().into(), fs::read(&path).unwrap()))
-        .collect()
 }
 
 #[test]
@@ -153,24 +152,6 @@ fn a_bank_survives_kills_at_any_moment() {
     let manifest = |name: &str| fs::read(at.join(name).join("manifest.json")).unwrap();
     assert_eq!(manifest("killed"), manifest("whole"));
     println!("{kills} kills survived");
-}
-
-/// A JSON file without its times.
-fn timeless(path: &Path) -> serde_json::Value {
-    fn strip(value: &mut serde_json::Value) {
-        match value {
-            serde_json::Value::Object(all) => {
-                let time = |key: &str| ["ms", "seconds", "seconds_per_record"].contains(&key);
-                all.retain(|key, _| !time(key));
-                all.values_mut().for_each(strip);
-            }
-            serde_json::Value::Array(all) => all.iter_mut().for_each(strip),
-            _ => {}
-        }
-    }
-    let mut value = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
-    strip(&mut value);
-    value
 }
 
 #[test]

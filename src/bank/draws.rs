@@ -3,7 +3,7 @@
 use super::{BankError, DrawError, FeatureSimulator};
 use crate::progress::Stage;
 use crate::twin::{Drive, Noise};
-use ndarray::Array2;
+use ndarray::{Array2, Axis, concatenate, s};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -30,6 +30,28 @@ pub struct Draws {
     pub features: Array2<f64>,
     /// Draws that were out of bounds, diverged or had no features, and were drawn again.
     pub redrawn: usize,
+}
+
+impl Draws {
+    /// The rows of several parts, one after another, `most` of them at most.
+    pub(crate) fn stacked(parts: &[Cow<'_, Self>], most: usize) -> Self {
+        let stack = |of: fn(&Self) -> &Array2<f64>| {
+            let mut left = most;
+            let views: Vec<_> = (parts.iter())
+                .map(|part| {
+                    let rows = of(part).nrows().min(left);
+                    left -= rows;
+                    of(part).slice(s![..rows, ..])
+                })
+                .collect();
+            concatenate(Axis(0), &views).unwrap_or_default()
+        };
+        Self {
+            theta: stack(|draws| &draws.theta),
+            features: stack(|draws| &draws.features),
+            redrawn: parts.iter().map(|part| part.redrawn).sum(),
+        }
+    }
 }
 
 /// One simulation of a set.

@@ -121,7 +121,7 @@ fn in_pool<R: Send>(
 fn dispatch(arguments: &Arguments, studies: &[Study], team: &Team) -> Result<ExitCode, Failure> {
     let progress = match team.leads() {
         true => progress::bars(),
-        false => progress::unseen(),
+        false => progress::bars().unshown(),
     };
     let external = external::study(&arguments.external, studies)?;
     let studies: Vec<Study> = studies.iter().chain(&external).cloned().collect();

@@ -15,20 +15,6 @@ pub(super) fn bars() -> Progress {
     Progress::new(Arc::new(Bars::default()))
 }
 
-/// No bars; ends when it is asked to.
-pub(super) fn unseen() -> Progress {
-    Progress::new(Arc::new(Unseen))
-}
-
-struct Unseen;
-
-impl Listener for Unseen {
-    fn advanced(&self, _: &str, _: u64, _: u64) {}
-    fn cancelled(&self) -> bool {
-        stop::asked()
-    }
-}
-
 #[derive(Default)]
 struct Bars {
     all: MultiProgress,

@@ -24,6 +24,8 @@ pub(super) struct Shards {
     manifest: Manifest,
     size: usize,
     rows: usize,
+    /// Names of the parameters.
+    pub names: Vec<String>,
     /// Shards of the whole bank.
     pub of: usize,
     /// Checksum of each shard that is there.
@@ -50,9 +52,14 @@ impl Shards {
                 .filter(|n| *n > 0)
                 .and_then(|n| usize::try_from(n).ok())
         };
-        let (Some(size), Some(rows)) = (number("size"), number("rows of a shard")) else {
-            let path = folder.path().into();
-            return Err(WorkError::Foreign { path, verb: VERB }.into());
+        let names = (manifest.get("parameters").and_then(Value::as_array)).and_then(|all| {
+            let name = |p: &Value| p["name"].as_str().map(str::to_owned);
+            all.iter().map(name).collect::<Option<Vec<String>>>()
+        });
+        let (Some(size), Some(rows), Some(names)) =
+            (number("size"), number("rows of a shard"), names)
+        else {
+            return Err(foreign(folder.path()).into());
         };
         let of = size.div_ceil(rows);
         let place = folder.file(SHARDS);
@@ -76,6 +83,7 @@ impl Shards {
             manifest,
             size,
             rows,
+            names,
             of,
             there,
         })
@@ -98,6 +106,11 @@ impl Shards {
         Some(self.folder.file(SHARDS).join(name(number, checksum)))
     }
 
+    /// What a message about a shard names.
+    fn place(&self, number: usize) -> PathBuf {
+        (self.file(number)).unwrap_or_else(|| self.folder.path().into())
+    }
+
     /// The bytes of a shard, if they are what they were.
     pub fn bytes(&self, number: usize) -> Result<Vec<u8>, ShardsError> {
         let incomplete = || ShardsError::Incomplete {
@@ -111,6 +124,20 @@ impl Shards {
             true => Ok(bytes),
             false => Err(damaged(path, "its SHA-256 is not that of its name").into()),
         }
+    }
+
+    /// The rows of a shard, checked.
+    pub fn draws(&self, number: usize) -> Result<Draws, ShardsError> {
+        let bytes = self.bytes(number)?;
+        let draws = file::from_npz(&bytes).map_err(|error| error.to_string());
+        let checked = draws.and_then(|draws| {
+            file::check(&draws, self.names.len())?;
+            match draws.theta.nrows() == self.rows(number).count() {
+                true => Ok(draws),
+                false => Err("another number of rows".into()),
+            }
+        });
+        checked.map_err(|reason| damaged(self.place(number), &reason).into())
     }
 
     /// Whether a shard is there and is what it was.
@@ -161,6 +188,12 @@ impl Shards {
     }
 }
 
+/// Of a folder whose manifest says too little.
+fn foreign(path: &Path) -> WorkError {
+    let path = path.into();
+    WorkError::Foreign { path, verb: VERB }
+}
+
 fn damaged(path: PathBuf, reason: &str) -> BankFileError {
     BankFileError::Content {
         path,
@@ -174,7 +207,6 @@ fn damaged(path: PathBuf, reason: &str) -> BankFileError {
 pub struct ShardedBank {
     shards: Shards,
     seed: u64,
-    names: Vec<String>,
 }
 
 impl ShardedBank {
@@ -185,15 +217,8 @@ impl ShardedBank {
     /// [`ShardsError`]: no folder of a bank, shards that are missing or are not those of the manifest.
     pub fn open(path: &Path) -> Result<Self, ShardsError> {
         let (folder, manifest) = WorkFolder::find(path, VERB)?;
-        let foreign = || WorkError::Foreign {
-            path: path.into(),
-            verb: VERB,
-        };
-        let seed = (manifest.get("seed").and_then(Value::as_u64)).ok_or_else(foreign)?;
-        let parameters = manifest.get("parameters").and_then(Value::as_array);
-        let names = (parameters.ok_or_else(foreign)?.iter())
-            .map(|p| p["name"].as_str().map(str::to_owned).ok_or_else(foreign))
-            .collect::<Result<_, _>>()?;
+        let seed = manifest.get("seed").and_then(Value::as_u64);
+        let seed = seed.ok_or_else(|| foreign(path))?;
         let finished = manifest.checksums().cloned();
         let shards = Shards::list(folder, manifest)?;
         let there = json!(shards.there.values().collect::<Vec<_>>());
@@ -208,11 +233,7 @@ impl ShardedBank {
             let file = shards.folder.file(SHARDS);
             return Err(damaged(file, "its shards are not those of manifest.json").into());
         }
-        Ok(Self {
-            shards,
-            seed,
-            names,
-        })
+        Ok(Self { shards, seed })
     }
 
     /// Simulations, M.
@@ -227,7 +248,7 @@ impl ShardedBank {
 
     /// Names of the parameters.
     pub fn names(&self) -> &[String] {
-        &self.names
+        &self.shards.names
     }
 
     /// Where it lies.
@@ -247,19 +268,10 @@ impl Bank for ShardedBank {
     }
 
     fn part(&self, index: usize) -> Result<Cow<'_, Draws>, BankFileError> {
-        let wrong = |reason: String| {
-            let path = self.shards.file(index);
-            damaged(path.unwrap_or_else(|| self.path().into()), &reason)
-        };
-        let bytes = self.shards.bytes(index).map_err(|error| match error {
-            ShardsError::File(error) => error,
-            error => wrong(error.to_string()),
-        })?;
-        let draws = file::from_npz(&bytes).map_err(|error| wrong(error.to_string()))?;
-        file::check(&draws, self.names.len()).map_err(wrong)?;
-        match draws.theta.nrows() == self.shards.rows(index).count() {
-            true => Ok(Cow::Owned(draws)),
-            false => Err(wrong("another number of rows".into())),
+        match self.shards.draws(index) {
+            Ok(draws) => Ok(Cow::Owned(draws)),
+            Err(ShardsError::File(error)) => Err(error),
+            Err(error) => Err(damaged(self.shards.place(index), &error.to_string())),
         }
     }
 }

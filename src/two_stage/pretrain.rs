@@ -10,7 +10,7 @@ use crate::network::{History, NetworkError, Part, Samples};
 use crate::progress::Progress;
 use crate::shards::{Prior, PriorError};
 use crate::study::{Inputs, PlanError, PresetName, Settings, SettingsError, Study};
-use ndarray::{Array2, Axis, concatenate, s};
+use ndarray::Array2;
 use std::borrow::Cow;
 use std::error::Error;
 
@@ -238,17 +238,7 @@ fn first_rows(bank: &dyn Bank) -> Result<Draws, BankFileError> {
         parts.push(bank.part(index)?);
         rows += count;
     }
-    let rows = rows.min(STANDARD);
-    let stacked = |of: fn(&Draws) -> &Array2<f64>| {
-        let views: Vec<_> = parts.iter().map(|part| of(part).view()).collect();
-        let all = concatenate(Axis(0), &views).unwrap_or_default();
-        all.slice_move(s![..rows.min(views.iter().map(|v| v.nrows()).sum()), ..])
-    };
-    Ok(Draws {
-        theta: stacked(|draws| &draws.theta),
-        features: stacked(|draws| &draws.features),
-        redrawn: 0,
-    })
+    Ok(Draws::stacked(&parts, STANDARD))
 }
 
 /// A bank as the network sees it.

@@ -16,7 +16,7 @@ mod pieces;
 mod share;
 mod team;
 
-pub(crate) use crew::share_out;
+use crew::share_out;
 pub use folder::{NewWork, WorkError, WorkFolder};
 pub use manifest::{Manifest, checksum};
 pub(crate) use pieces::{Piece, Pieces};

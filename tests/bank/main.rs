@@ -1,9 +1,11 @@
 //! Banks on disk: the same bytes whoever makes them, mended where they are damaged, trained on as in memory.
 
 mod command;
+#[path = "../common/files.rs"]
+mod files;
 mod training;
 
-use std::collections::BTreeMap;
+use files::files;
 use std::fs;
 use std::path::{Path, PathBuf};
 use truetwin::bank::Bank;
@@ -29,25 +31,6 @@ fn plan(study: &Study, size: usize) -> BankPlan<'_> {
 fn fill(plan: &BankPlan<'_>, path: &Path, share: &str) -> Result<(usize, usize), ShardsError> {
     let filled = plan.fill(path, share.parse().unwrap(), &Progress::silent())?;
     Ok((filled.there, filled.of))
-}
-
-/// Every file of a folder, by name.
-fn bytes(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut all = BTreeMap::new();
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        match path.is_dir() {
-            true => all.extend(
-                bytes(&path)
-                    .into_iter()
-                    .map(|(name, bytes)| (Path::new(path.file_name().unwrap()).join(name), bytes)),
-            ),
-            false => {
-                all.insert(path.file_name().unwrap().into(), fs::read(&path).unwrap());
-            }
-        }
-    }
-    all
 }
 
 fn shards(folder: &Path) -> Vec<PathBuf> {
@@ -93,10 +76,10 @@ fn threads_shares_order_and_interruptions_change_no_byte() {
     let kept = shards(&at("stopped")).len();
     assert!((1..10).contains(&kept), "{kept}");
     fill(&plan, &at("stopped"), "1/1").unwrap();
-    let one = bytes(&at("one"));
+    let one = files(&at("one"));
     assert_eq!(one.len(), 11, "shards and manifest, nothing else");
     for name in ["three", "shared", "merged", "stopped"] {
-        assert_eq!(bytes(&at(name)), one, "{name}");
+        assert_eq!(files(&at(name)), one, "{name}");
     }
 }
 
@@ -131,7 +114,7 @@ fn damaged_shards_are_named_and_made_again() {
     let (study, place) = (oscillator(), tempfile::tempdir().unwrap());
     let (plan, path) = (plan(&study, 40), place.path().join("bank"));
     fill(&plan, &path, "1/1").unwrap();
-    let whole = bytes(&path);
+    let whole = files(&path);
     let shard = shards(&path)[1].clone();
     let damage: [(&str, Harm); 3] = [
         ("cut", |p| {
@@ -155,7 +138,7 @@ fn damaged_shards_are_named_and_made_again() {
         let error = read.unwrap_err().to_string();
         assert!(error.contains("again"), "{what}: {error}");
         assert_eq!(fill(&plan, &path, "1/1").unwrap(), (3, 3), "{what}");
-        assert_eq!(bytes(&path), whole, "{what}");
+        assert_eq!(files(&path), whole, "{what}");
     }
 }
 
