@@ -32,10 +32,19 @@ fn filled(path: &Path, bytes: &[u8]) -> io::Result<tempfile::NamedTempFile> {
         // As any new file: the user's mask decides who may read it.
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let mut file = builder.prefix(PREFIX).tempfile_in(folder(path))?;
+    let file = builder.prefix(PREFIX).tempfile_in(folder(path));
+    let mut file = file.map_err(without_path)?;
     file.write_all(bytes)?;
     file.as_file().sync_all()?;
     Ok(file)
+}
+
+/// An error without the name of a temporary file, which says nothing to anybody.
+fn without_path(error: io::Error) -> io::Error {
+    match error.get_ref() {
+        Some(_) => error.kind().into(),
+        None => error,
+    }
 }
 
 /// Removes the unfinished files that processes have left in a folder when they died; for folders that nobody writes to.
@@ -64,8 +73,9 @@ impl NewFolder {
     /// A folder that will be at `place`.
     pub fn new(place: &Path) -> io::Result<Self> {
         let mut builder = tempfile::Builder::new();
+        let filling = builder.prefix(PREFIX).tempdir_in(folder(place));
         Ok(Self {
-            filling: builder.prefix(PREFIX).tempdir_in(folder(place))?,
+            filling: filling.map_err(without_path)?,
             place: place.into(),
         })
     }
@@ -111,7 +121,10 @@ pub fn with_remedy(error: &io::Error) -> String {
         io::ErrorKind::IsADirectory => "name a file, not a folder",
         io::ErrorKind::PermissionDenied => "change its permissions, or choose another place",
         io::ErrorKind::AlreadyExists => "choose another name, or remove it",
-        io::ErrorKind::StorageFull => "make room, or choose another place",
+        io::ErrorKind::ReadOnlyFilesystem => "choose another place",
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            "make room, or choose another place"
+        }
         io::ErrorKind::InvalidData => "save it as UTF-8 text",
         _ => "check the path and the disk",
     };

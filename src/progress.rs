@@ -139,6 +139,17 @@ impl Stage {
         self.progress.checkpoint()
     }
 
+    /// So many units were done before, by work that this goes on with.
+    pub fn skip(&self, done: usize) {
+        let done = self.done.fetch_add(done as u64, Ordering::Relaxed) + done as u64;
+        if let Some(listener) = &self.progress.0
+            && !self.name.is_empty()
+            && done > 0
+        {
+            listener.advanced(self.name, done, self.total);
+        }
+    }
+
     /// The stage ended before its last unit (early stop): report it complete.
     pub fn finish(&self) {
         if let Some(listener) = &self.progress.0 {

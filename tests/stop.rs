@@ -82,17 +82,25 @@ fn a_bank_that_is_stopped_says_how_to_go_on_and_does() {
 }
 
 #[test]
-fn a_training_that_is_stopped_leaves_nothing() {
+fn a_training_that_is_stopped_says_how_to_go_on() {
     let place = tempfile::tempdir().unwrap();
     let at = place.path();
     let call = "pretrain --twin van-der-pol --bank-size 20000 --epochs 5000 --out v.est";
-    let since = Instant::now();
-    let later = || since.elapsed() > Duration::from_millis(1500);
-    let output = interrupted(at, call, "-INT", later);
+    let training = at.join("v.est.part");
+    let output = interrupted(at, call, "-INT", || training.exists());
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(130), "{said}");
-    assert!(said.contains("nothing was written"), "{said}");
-    assert_eq!(entries(at), 0);
+    assert!(said.contains("goes on: ") && said.contains(call), "{said}");
+    assert_eq!(entries(at), 1, "the work, and no estimator");
+    // Another call does not go on with it.
+    let other = call.replace("5000", "4000");
+    let output = start(at, &other).wait_with_output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(
+        said.contains("v.est.part holds the work of another call"),
+        "{said}"
+    );
 }
 
 /// Moments in milliseconds up to `longest`, drawn once and for all.
@@ -106,9 +114,12 @@ fn moments(longest: u64) -> impl Iterator<Item = u64> {
 }
 
 /// Kills a call again and again until it is done; how often it was killed.
-fn killed(folder: &Path, arguments: &str, longest: u64) -> usize {
+fn killed(folder: &Path, arguments: &str, longest: u64, done: impl Fn() -> bool) -> usize {
     let mut kills = 0;
     for moment in moments(longest) {
+        if done() {
+            return kills;
+        }
         let mut child = start(folder, arguments);
         let by = Instant::now() + Duration::from_millis(moment);
         while Instant::now() < by && child.try_wait().unwrap().is_none() {
@@ -137,7 +148,7 @@ fn a_bank_survives_kills_at_any_moment() {
     let place = tempfile::tempdir().unwrap();
     let at = place.path();
     let bank = "bank --twin van-der-pol --size 6000";
-    let kills = killed(at, &format!("{bank} --out killed"), 160);
+    let kills = killed(at, &format!("{bank} --out killed"), 160, || false);
     assert!(kills >= 5, "only {kills}");
     assert!(
         start(at, &format!("{bank} --out whole"))
@@ -152,6 +163,42 @@ fn a_bank_survives_kills_at_any_moment() {
     let manifest = |name: &str| fs::read(at.join(name).join("manifest.json")).unwrap();
     assert_eq!(manifest("killed"), manifest("whole"));
     println!("{kills} kills survived");
+}
+
+/// The bank, the training, the estimator file: the same bytes, and no trace of the work.
+#[test]
+fn a_pretraining_survives_kills_at_any_moment() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    let call = "pretrain --twin van-der-pol --bank-size 3000 --epochs 20 --checkpoint 0";
+    let kills = killed(at, &format!("{call} --out killed.est"), 400, || {
+        // A kill between the last step and the end of the process; the same call would refuse to write it again.
+        at.join("killed.est").exists() && entries(at) == 1
+    });
+    assert!(kills >= 5, "only {kills}");
+    let whole = start(at, &format!("{call} --out whole.est")).wait();
+    assert!(whole.unwrap().success());
+    let [killed, whole] = ["killed.est", "whole.est"].map(|name| fs::read(at.join(name)).unwrap());
+    assert!(killed == whole, "other bytes after {kills} kills");
+    assert_eq!(entries(at), 2);
+    println!("{kills} kills survived");
+}
+
+#[test]
+fn two_processes_do_not_pretrain_one_estimator() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    let call = "pretrain --twin van-der-pol --bank-size 2000 --epochs 5000 --out v.est";
+    let mut first = start(at, call);
+    while !at.join("v.est.part/training").exists() && !at.join("v.est.part/bank").exists() {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    let second = start(at, call).wait_with_output().unwrap();
+    first.kill().unwrap();
+    first.wait().unwrap();
+    let said = String::from_utf8(second.stderr).unwrap();
+    assert_eq!(second.status.code(), Some(2), "{said}");
+    assert!(said.contains("another process is at work"), "{said}");
 }
 
 #[test]
@@ -174,7 +221,9 @@ fn trials_and_records_survive_kills_at_any_moment() {
         ),
     ] {
         let verb = call.split(' ').next().unwrap();
-        let kills = killed(at, &format!("{call} --out killed-{verb}"), longest);
+        let kills = killed(at, &format!("{call} --out killed-{verb}"), longest, || {
+            false
+        });
         assert!(
             start(at, &format!("{call} --out whole-{verb}"))
                 .wait()

@@ -6,6 +6,7 @@ use crate::withheld::Kind;
 use crate::work::Share;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Calibrate a digital twin from a measured record, and be told when it cannot be trusted.
 #[derive(Debug, Parser)]
@@ -107,7 +108,7 @@ impl Command {
     /// Whether the same call goes on where this one stopped.
     pub fn is_resumed(&self) -> bool {
         match self {
-            Self::Bank(_) | Self::Withheld(_) => true,
+            Self::Bank(_) | Self::Pretrain(_) | Self::Withheld(_) => true,
             Self::Reproduce(options) => options.out.is_some(),
             _ => false,
         }
@@ -234,6 +235,9 @@ pub(super) struct MergeArguments {
 }
 
 #[derive(Debug, Args)]
+#[command(
+    after_help = "Stopped or killed, the same call goes on where it was: EST.part keeps the bank and the training until EST is there."
+)]
 pub(super) struct PretrainArguments {
     #[command(flatten)]
     pub subject: Subject,
@@ -252,6 +256,9 @@ pub(super) struct PretrainArguments {
     /// Recipe.
     #[arg(long, value_enum, default_value = "default")]
     pub preset: PresetArgument,
+    /// Seconds after which the training is kept, again and again; 0: after each block of the bank.
+    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = seconds)]
+    pub checkpoint: Duration,
 }
 
 #[derive(Debug, Args)]
@@ -408,6 +415,11 @@ fn at_least_one(text: &str) -> Result<usize, String> {
         Ok(number) => Ok(number),
         Err(error) => Err(format!("{error}")),
     }
+}
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    let number: f64 = text.parse().map_err(|error| format!("{error}"))?;
+    Duration::try_from_secs_f64(number).map_err(|error| error.to_string())
 }
 
 #[derive(Debug, Args)]

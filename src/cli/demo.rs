@@ -29,10 +29,10 @@ pub(super) fn run(context: &Context<'_>, options: &DemoArguments) -> Result<Exit
             "a record simulated somewhere in the bounds",
         ),
     };
-    eprintln!(
+    output::say(&format!(
         "demo: {origin}, twin {}; training on {BANK} simulations from the prior",
         study.name()
-    );
+    ));
     let settings = PretrainOptions {
         preset: PresetName::Default,
         bank_size: Some(BANK),
@@ -50,10 +50,10 @@ pub(super) fn run(context: &Context<'_>, options: &DemoArguments) -> Result<Exit
         write_record(&folder.file("record.csv"), &record)?;
         write_results(&folder, study, &record, &estimate)?;
         folder.finish()?;
-        eprintln!(
+        output::say(&format!(
             "demo: {0}/overlay.svg shows measured against twin, {0}/record.csv the record",
             out.display()
-        );
+        ));
     }
     show(context, study, &estimate)?;
     Ok(ExitCode::SUCCESS)

@@ -1,5 +1,6 @@
 //! From any error to one line and an exit code.
 
+use super::output;
 use crate::bank::BankError;
 use crate::bank::file::BankFileError;
 use crate::diagnose::DiagnoseError;
@@ -115,7 +116,7 @@ impl Failure {
             .split_whitespace()
             .collect::<Vec<_>>()
             .join(" ");
-        eprintln!("error: {line}");
+        output::say(&format!("error: {line}"));
         ExitCode::from(self.code)
     }
 }
@@ -223,9 +224,13 @@ impl From<PretrainError> for Failure {
             PretrainError::Settings(_) => Self::user(error),
             PretrainError::Plan(error) => error.into(),
             PretrainError::Feature(error) => error.into(),
-            PretrainError::File(_) | PretrainError::Memory(_) | PretrainError::Width { .. } => {
-                Self::user(error)
-            }
+            PretrainError::Shards(error) => error.into(),
+            PretrainError::File(_)
+            | PretrainError::Memory(_)
+            | PretrainError::Width { .. }
+            | PretrainError::Work(_)
+            | PretrainError::Taken(_)
+            | PretrainError::Save(_) => Self::user(error),
             PretrainError::TooManyFeatures { .. } | PretrainError::Standardise(_) => Self {
                 about_study: true,
                 ..Self::user(error)

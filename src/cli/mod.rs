@@ -14,8 +14,6 @@
 //! Results go to standard output, progress and messages to standard error. Exit 0: done; 2: the call or a file is
 //! wrong, in one line with the remedy; 1: anything else.
 
-#![allow(clippy::print_stdout, clippy::print_stderr)]
-
 mod args;
 mod bank;
 mod check;
@@ -68,10 +66,11 @@ pub fn run_from<E: Into<StudyError>>(
         Ok(parsed) => parsed,
         Err(error) if !error.use_stderr() => {
             // Help and version are results.
-            if team.leads() {
-                print!("{error}");
-            }
-            return ExitCode::SUCCESS;
+            let shown = match team.leads() {
+                true => output::print(&error.to_string()),
+                false => Ok(()),
+            };
+            return shown.map_or_else(Failure::report, |()| ExitCode::SUCCESS);
         }
         Err(error) => return Failure::usage(&error).report_of(&team),
     };

@@ -10,14 +10,20 @@ use std::process::ExitCode;
 
 /// Prints a result; a reader that has gone away (`| head`) is no failure.
 pub(super) fn print(text: &str) -> Result<(), Failure> {
-    let mut out = std::io::stdout().lock();
+    let mut out = io::stdout().lock();
     let ends = if text.ends_with('\n') { "" } else { "\n" };
     match write!(out, "{text}{ends}").and_then(|()| out.flush()) {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(Failure::internal(format!("standard output: {error}")))
-        }
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Failure::user(format!(
+            "standard output: {}",
+            with_remedy(&error)
+        ))),
         _ => Ok(()),
     }
+}
+
+/// Says something to people beside the result; who listens no more misses it, and nothing else happens.
+pub(super) fn say(text: &str) {
+    let _ = writeln!(io::stderr().lock(), "{text}");
 }
 
 /// Prints one JSON object.
@@ -53,14 +59,20 @@ pub(super) fn check_new(path: &Path) -> Result<(), Failure> {
             "{name} exists already; choose another --out, or remove it"
         )));
     }
+    check_folder(path)
+}
+
+/// Refuses a path in a folder that is not there, before the work starts.
+pub(super) fn check_folder(path: &Path) -> Result<(), Failure> {
     let folder = folder(path);
-    if !folder.is_dir() {
-        return Err(Failure::user(format!(
-            "{name}: the folder {} does not exist; make it first",
+    match folder.is_dir() {
+        true => Ok(()),
+        false => Err(Failure::user(format!(
+            "{}: the folder {} does not exist; make it first",
+            path.display(),
             folder.display()
-        )));
+        ))),
     }
-    Ok(())
 }
 
 /// A folder that is filled beside its place and appears there whole.

@@ -2,18 +2,18 @@
 
 use super::args::PretrainArguments;
 use super::{Context, Failure, output};
-use crate::bank::file;
-use crate::network::History;
+use crate::bank::{Bank, file};
 use crate::shards::{BankPlan, ShardedBank};
 use crate::study::Study;
-use crate::two_stage::{Estimator, PretrainOptions, pretrain, pretrain_on};
+use crate::two_stage::{GivenBank, PretrainOptions, Pretraining};
+use crate::work::checksum;
 use serde_json::json;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
 pub(super) fn run(context: &Context<'_>, options: &PretrainArguments) -> Result<ExitCode, Failure> {
-    output::check_new(&options.out)?;
+    output::check_folder(&options.out)?;
     let study = context.study(&options.subject)?;
     let clock = Instant::now();
     let settings = PretrainOptions {
@@ -22,11 +22,18 @@ pub(super) fn run(context: &Context<'_>, options: &PretrainArguments) -> Result<
         epochs: options.epochs,
         seed: context.seed,
     };
+    let pretraining = Pretraining::new(&study, settings).every(options.checkpoint);
     let (estimator, history) = match &options.bank {
-        None => pretrain(&study, &settings, context.progress)?,
-        Some(path) => from_bank(context, &study, path, &settings)?,
+        None => pretraining.write(&options.out, context.progress)?,
+        Some(path) => {
+            let (bank, checksum) = given(&study, path, &settings)?;
+            let bank = GivenBank {
+                bank: bank.as_ref(),
+                checksum,
+            };
+            pretraining.on(bank).write(&options.out, context.progress)?
+        }
     };
-    estimator.save(&options.out)?;
     let seconds = clock.elapsed().as_secs_f64();
     let bank = estimator.settings().bank_size;
     let loss = history.training.last().copied().unwrap_or(f64::NAN);
@@ -57,16 +64,15 @@ pub(super) fn run(context: &Context<'_>, options: &PretrainArguments) -> Result<
     Ok(ExitCode::SUCCESS)
 }
 
-/// Of a bank that is there.
-fn from_bank(
-    context: &Context<'_>,
+/// A bank that is there, and its checksum.
+fn given(
     study: &Study,
     path: &Path,
     settings: &PretrainOptions,
-) -> Result<(Estimator, History), Failure> {
+) -> Result<(Box<dyn Bank>, String), Failure> {
     if file::is_named(path) {
         let bank = file::read(path, &study.twin().parameters().names())?;
-        return Ok(pretrain_on(study, &bank, settings, context.progress)?);
+        return Ok((Box::new(bank), checksum(path)?));
     }
     let bank = ShardedBank::open(path)?;
     let plan = BankPlan {
@@ -76,5 +82,6 @@ fn from_bank(
         seed: bank.seed(),
     };
     plan.check(&bank)?;
-    Ok(pretrain_on(study, &bank, settings, context.progress)?)
+    let checksum = bank.checksum();
+    Ok((Box::new(bank), checksum))
 }

@@ -5,10 +5,14 @@ use super::{Context, Failure, output};
 use crate::experiment::{Benchmark, FreeRuns, MeanRuns, MonteCarlo, Origin, Run, score};
 use crate::report::{first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
 use crate::study::Study;
-use crate::two_stage::{Estimator, PretrainOptions, pretrain};
-use crate::work::WorkFolder;
+use crate::two_stage::{Estimator, PretrainError, PretrainOptions, Pretraining, pretrain};
+use crate::work::{WorkError, WorkFolder};
 use std::path::Path;
 use std::process::ExitCode;
+use std::time::Duration;
+
+/// How often a job looks whether another one has trained the estimator.
+const LOOK: Duration = Duration::from_millis(200);
 
 pub(super) fn run(
     context: &Context<'_>,
@@ -103,11 +107,16 @@ fn kept(
     folder: &WorkFolder,
 ) -> Result<Estimator, Failure> {
     let path = folder.file("estimator.est");
-    if context.team.leads() && !path.exists() {
-        let saved = (pretrain(study, training, context.progress)?.0).save(&path);
-        // Another job may have been faster, and has trained the same.
-        if !path.exists() {
-            saved?;
+    while context.team.leads() && !path.exists() {
+        match Pretraining::new(study, *training).write(&path, context.progress) {
+            // Another job trains the same.
+            Err(PretrainError::Work(WorkError::Busy { .. })) => {
+                context.progress.checkpoint().map_err(Failure::internal)?;
+                std::thread::sleep(LOOK);
+            }
+            // Another job was faster.
+            Err(_) if path.exists() => {}
+            trained => drop(trained?),
         }
     }
     context.team.wait();

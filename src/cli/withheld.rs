@@ -19,7 +19,7 @@ pub(super) fn run(context: &Context<'_>, options: &WithheldArguments) -> Result<
     let sealed = Withheld::new(&study, settings)?.seal(&options.out, context.progress)?;
     if context.team.leads() {
         // Published before the first diagnosis.
-        eprintln!("keys sealed: sha256 {}", sealed.seal());
+        output::say(&format!("keys sealed: sha256 {}", sealed.seal()));
     }
     let share = context.share(options.shard)?;
     let answers = sealed.answer(share, context.progress)?.len();

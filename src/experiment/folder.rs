@@ -8,7 +8,7 @@ use serde_json::json;
 use std::path::Path;
 
 /// Layout of the folder; raised when it changes.
-const LAYOUT: u32 = 2;
+const LAYOUT: u32 = 3;
 /// Where runs are kept.
 pub(super) const RUNS: &str = "runs";
 

@@ -22,16 +22,17 @@ const EPSILON: f32 = 1e-8;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Adam {
     /// Steps taken, t.
-    steps: i32,
+    pub(super) steps: i32,
     weight_decay: f32,
     /// One for each tensor, in visiting order.
-    moments: Vec<Moments>,
+    pub(super) moments: Vec<Moments>,
 }
 
+/// The moving averages of a tensor's gradient and of its square.
 #[derive(Debug, Clone, Default)]
-struct Moments {
-    first: Vec<f32>,
-    second: Vec<f32>,
+pub(super) struct Moments {
+    pub first: Vec<f32>,
+    pub second: Vec<f32>,
 }
 
 impl Adam {

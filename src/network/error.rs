@@ -1,6 +1,7 @@
 //! What can go wrong with a network, each with its remedy.
 
 use crate::progress::Cancelled;
+use std::path::PathBuf;
 
 /// Why a network could not be built, trained, evaluated or restored.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -62,6 +63,14 @@ pub enum NetworkError {
     /// A part of the samples cannot be read.
     #[error("{0}")]
     Samples(String),
+    /// The state of the training cannot be kept.
+    #[error("{}: {reason}", path.display())]
+    Checkpoint {
+        /// File.
+        path: PathBuf,
+        /// What the system said, and what to do.
+        reason: String,
+    },
     /// The loss left the finite numbers.
     #[error(
         "the loss is not finite in epoch {epoch} at learning rate {learning_rate}; \

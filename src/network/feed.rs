@@ -69,7 +69,7 @@ impl<'a> Feed<'a> {
     }
 
     /// With at most `most` rows in a block.
-    fn with_block(
+    pub fn with_block(
         sizes: &[usize],
         most: usize,
         read: &'a Read<'a>,

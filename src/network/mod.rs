@@ -35,6 +35,7 @@
 mod activation;
 mod adam;
 mod architectures;
+mod checkpoints;
 mod dense;
 mod error;
 mod feed;
@@ -54,6 +55,7 @@ mod train;
 
 pub use activation::{Activation, Leaky};
 pub use architectures::{Compact, Deep};
+pub use checkpoints::Checkpoints;
 pub use dense::{BuiltDense, BuiltNormDense, Dense, NormDense};
 pub use error::NetworkError;
 pub use first_weight::FirstWeight;
@@ -156,7 +158,8 @@ pub trait Architecture: Send + Sync + Debug {
         seed: u64,
         progress: &Progress,
     ) -> Result<(Arc<dyn Network>, History), NetworkError> {
-        self.train_on(&Matrices { features, targets }, settings, seed, progress)
+        let samples = Matrices { features, targets };
+        self.train_on(&samples, settings, seed, &Checkpoints::none(), progress)
     }
 
     /// As [`train`](Self::train), on samples that need not fit into memory: of samples of more than 64 MiB that come in
@@ -164,14 +167,18 @@ pub trait Architecture: Send + Sync + Debug {
     /// an order of its own, rows in an order of their own among those that are in memory together. Fewer samples are trained
     /// on as in [`train`](Self::train), to the same bits.
     ///
+    /// A training that was interrupted goes on with what `checkpoints` have kept of it, to the same bits, too.
+    ///
     /// # Errors
     ///
-    /// As [`train`](Self::train), and [`NetworkError::Samples`] for a part that cannot be read.
+    /// As [`train`](Self::train), [`NetworkError::Samples`] for a part that cannot be read, and
+    /// [`NetworkError::Checkpoint`] where the state cannot be written.
     fn train_on(
         &self,
         samples: &dyn Samples,
         settings: &Training,
         seed: u64,
+        checkpoints: &Checkpoints,
         progress: &Progress,
     ) -> Result<(Arc<dyn Network>, History), NetworkError>;
 

@@ -3,9 +3,10 @@
 use super::feed::{Data, Feed};
 use super::model::{self, Model, ModelOf};
 use super::rows::Rows;
-use super::train::{Purpose, derive, train};
+use super::train::{Course, Purpose, derive, train};
 use super::{
-    Architecture, HeadArchitecture, History, NamedTensor, Network, NetworkError, Samples, Training,
+    Architecture, Checkpoints, HeadArchitecture, History, NamedTensor, Network, NetworkError,
+    Samples, Training,
 };
 use crate::progress::Progress;
 use dfdx::prelude::ConstDim;
@@ -67,6 +68,7 @@ impl<A: HeadArchitecture> Architecture for Of<A> {
         samples: &dyn Samples,
         settings: &Training,
         seed: u64,
+        checkpoints: &Checkpoints,
         progress: &Progress,
     ) -> Result<(Arc<dyn Network>, History), NetworkError> {
         settings.validate()?;
@@ -79,7 +81,15 @@ impl<A: HeadArchitecture> Architecture for Of<A> {
         let width = A::Features::SIZE + samples.targets();
         let feed = Feed::new(&samples.parts(), width, &read, settings.holdout, seed)?;
         let mut model = network.model.clone();
-        let history = train(&mut model, &feed, settings, seed, progress, "train")?;
+        let course = Course {
+            settings,
+            seed,
+            checkpoints,
+            architecture: A::ID,
+            progress,
+            stage: "train",
+        };
+        let history = train(&mut model, &feed, &course)?;
         let inputs = network.inputs;
         Ok((Arc::new(MultiHead::<A> { inputs, model }), history))
     }
@@ -178,7 +188,15 @@ impl<A: HeadArchitecture> Network for MultiHead<A> {
         // Heads alone are a model too, with a trunk that does nothing.
         let heads = self.model.heads.clone();
         let mut heads = Model::<A::Hidden, A::Hidden, (), _>::new((), heads);
-        let history = train(&mut heads, &feed, settings, seed, progress, "tune")?;
+        let course = Course {
+            settings,
+            seed,
+            checkpoints: &Checkpoints::none(),
+            architecture: A::ID,
+            progress,
+            stage: "tune",
+        };
+        let history = train(&mut heads, &feed, &course)?;
         let tuned = Self {
             inputs: self.inputs,
             model: Model::new(self.model.trunk.clone(), heads.heads),

@@ -5,6 +5,7 @@ use super::*;
 use crate::progress::{Cancelled, Listener};
 use ndarray::{Axis, concatenate, s};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
 /// Small, and with each kind of layer and dropout.
 struct Mixed;
@@ -408,5 +409,53 @@ fn the_ready_architectures_train() {
     assert_eq!(
         format!("{network:?}"),
         "Network { architecture: \"deep\", inputs: 128, outputs: 4 }"
+    );
+}
+
+#[test]
+fn a_state_that_is_damaged_or_of_another_network_counts_as_none() {
+    let (features, targets) = samples(64, 3, 1);
+    let samples = Matrices {
+        features: &features,
+        targets: &targets,
+    };
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("training");
+    let kept = || Checkpoints::new(&path, Duration::ZERO);
+    let progress = Progress::silent();
+    let settings = quick(3);
+    let (whole, _) = (architecture::<Mixed>())
+        .train_on(&samples, &settings, 1, &kept(), &progress)
+        .unwrap();
+    let state = std::fs::read(&path).unwrap();
+    let mut altered = state.clone();
+    altered[state.len() / 2] ^= 1;
+    for damaged in [&state[..state.len() / 2], &altered, b"", b"no state"] {
+        std::fs::write(&path, damaged).unwrap();
+        let (network, _) = (architecture::<Mixed>())
+            .train_on(&samples, &settings, 1, &kept(), &progress)
+            .unwrap();
+        assert_eq!(network.weights(), whole.weights());
+    }
+    let (_, history) = (architecture::<Smooth>())
+        .train_on(&samples, &settings, 1, &kept(), &progress)
+        .unwrap();
+    assert_eq!(history.training.len(), 3, "it has begun anew");
+}
+
+#[test]
+fn a_state_that_cannot_be_kept_is_said() {
+    let (features, targets) = samples(64, 3, 1);
+    let nowhere = Checkpoints::new("/nowhere/training", Duration::ZERO);
+    let samples = Matrices {
+        features: &features,
+        targets: &targets,
+    };
+    let error = architecture::<Mixed>()
+        .train_on(&samples, &quick(1), 1, &nowhere, &Progress::silent())
+        .unwrap_err();
+    assert!(
+        error.to_string().starts_with("/nowhere/training: "),
+        "{error}"
     );
 }

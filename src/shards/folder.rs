@@ -6,6 +6,7 @@ use crate::bank::file::{self, BankFileError};
 use crate::bank::{Bank, Draws};
 use crate::files::{sha256, sweep, write_new};
 use crate::work::{Manifest, WorkError, WorkFolder};
+use ndarray::{Array2, s};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -249,6 +250,43 @@ impl ShardedBank {
     /// Names of the parameters.
     pub fn names(&self) -> &[String] {
         &self.shards.names
+    }
+
+    /// All rows, in memory.
+    ///
+    /// # Errors
+    ///
+    /// [`BankFileError`]: a shard that cannot be read, or is not what it was.
+    pub fn read(&self) -> Result<Draws, BankFileError> {
+        let mut all: Option<Draws> = None;
+        let mut from = 0;
+        for index in 0..self.shards.of {
+            let part = self.part(index)?;
+            let size = |matrix: &Array2<f64>| Array2::zeros((self.rows(), matrix.ncols()));
+            let all = all.get_or_insert_with(|| Draws {
+                theta: size(&part.theta),
+                features: size(&part.features),
+                redrawn: 0,
+            });
+            let to = from + part.theta.nrows();
+            for (all, part) in [
+                (&mut all.theta, &part.theta),
+                (&mut all.features, &part.features),
+            ] {
+                if part.ncols() != all.ncols() {
+                    let place = self.shards.place(index);
+                    return Err(damaged(place, "another number of features"));
+                }
+                all.slice_mut(s![from..to, ..]).assign(part);
+            }
+            from = to;
+        }
+        all.ok_or_else(|| damaged(self.path().into(), "it has no rows"))
+    }
+
+    /// What tells this bank from any other.
+    pub fn checksum(&self) -> String {
+        self.shards.manifest.checksum()
     }
 
     /// Where it lies.

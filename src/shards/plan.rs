@@ -12,7 +12,7 @@ use std::io;
 use std::path::Path;
 
 /// Layout of the folder; raised when it changes.
-const LAYOUT: u32 = 1;
+const LAYOUT: u32 = 2;
 pub(super) const VERB: &str = "bank";
 /// Most simulations of a bank.
 pub(super) const MOST: usize = 1_000_000_000_000;

@@ -1,12 +1,14 @@
 //! What work over a study depends on, as far as the study decides it.
 
 use super::{InputPlan, Study};
+use crate::files::sha256;
+use crate::twin::Noise;
 use crate::work::{Manifest, WorkError, checksum};
 use serde_json::{Value, json};
 
 impl Study {
     /// A manifest of a folder that `verb` makes, with the twin, its parameters, the study file, records and inputs (an input
-    /// file by its checksum).
+    /// file by its checksum), and the checksum of one simulation, which tells a twin whose equations have changed since.
     ///
     /// # Errors
     ///
@@ -23,10 +25,31 @@ impl Study {
             // A file that was read can be written.
             .with("study", toml::to_string(self.file()).unwrap_or_default())
             .with("record", json!([plan.step, plan.samples]));
-        Ok(match &plan.input {
+        let manifest = match &plan.input {
             Some(InputPlan::File(path)) => manifest.with("input file", checksum(path)?),
             input => manifest.with("input", json!(input)),
-        })
+        };
+        // Last: what else is different tells more.
+        Ok(manifest.with("simulation", self.simulation()))
+    }
+
+    /// Checksum of a simulation at a point of the prior; of what is wrong with it, where it fails.
+    fn simulation(&self) -> String {
+        let twin = self.twin();
+        let noise = Noise::new(0, "manifest", 0);
+        let drive = (self.drives().map_err(|error| error.to_string()))
+            .and_then(|drives| drives.draw(noise).map_err(|error| error.to_string()));
+        let outputs = drive.and_then(|drive| {
+            let theta = twin.parameters().draw_prior(noise);
+            (twin.simulate(&theta, &drive, noise)).map_err(|error| error.to_string())
+        });
+        match outputs {
+            Ok(signal) => {
+                let bytes: Vec<u8> = (signal.iter()).flat_map(|v| v.to_le_bytes()).collect();
+                sha256(&bytes)
+            }
+            Err(error) => error,
+        }
     }
 }
 

@@ -7,7 +7,7 @@
 use super::readout::Readout;
 use super::{Calibration, Estimator, Scaler, Standardiser};
 use crate::feature::{FeatureError, FeatureRecipe};
-use crate::files::{with_remedy, write_new};
+use crate::files::{replace, with_remedy, write_new};
 use crate::network::{NamedTensor, NetworkError};
 use crate::study::{PresetName, Settings, Study, StudyError, StudyFile, StudyFileError};
 use ndarray::Array2;
@@ -142,6 +142,16 @@ impl At<'_> {
 impl Estimator {
     /// Writes a new file; it appears whole or not at all. The same estimator gives the same bytes.
     pub fn save(&self, path: &Path) -> Result<(), EstimatorFileError> {
+        write_new(path, &self.bytes(path)?).map_err(|e| At(path).io(e))
+    }
+
+    /// As [`save`](Self::save), in place of a file that is there.
+    pub(super) fn save_again(&self, path: &Path) -> Result<(), EstimatorFileError> {
+        replace(path, &self.bytes(path)?).map_err(|e| At(path).io(e))
+    }
+
+    /// What the file at `path` holds.
+    fn bytes(&self, path: &Path) -> Result<Vec<u8>, EstimatorFileError> {
         let at = At(path);
         let study = toml::to_string(self.study.file()).map_err(|e| at.foreign(e))?;
         let space = self.study.twin().parameters();
@@ -169,9 +179,7 @@ impl Estimator {
             })
             .collect::<Result<_, EstimatorFileError>>()?;
         let metadata = Some(HashMap::from([(KEY.to_owned(), text)]));
-        let bytes = safetensors::serialize(views, &metadata)
-            .map_err(|error| at.foreign(format!("{error:?}")))?;
-        write_new(path, &bytes).map_err(|e| at.io(e))
+        safetensors::serialize(views, &metadata).map_err(|error| at.foreign(format!("{error:?}")))
     }
 
     /// Reads a file made for one of `studies`.

@@ -1,18 +1,20 @@
 //! Bank and training.
 
 use super::readout::Readout;
-use super::{Calibration, Estimator, Scaler, Standardiser};
+use super::{Calibration, Estimator, EstimatorFileError, Scaler, Standardiser};
 use crate::bank::file::BankFileError;
 use crate::bank::{Bank, BankError, Draws};
 use crate::feature::FeatureError;
 use crate::math::WhiteningError;
-use crate::network::{History, NetworkError, Part, Samples};
+use crate::network::{Checkpoints, History, NetworkError, Part, Samples};
 use crate::progress::Progress;
-use crate::shards::{Prior, PriorError};
+use crate::shards::{Prior, PriorError, ShardsError};
 use crate::study::{Inputs, PlanError, PresetName, Settings, SettingsError, Study};
+use crate::work::WorkError;
 use ndarray::Array2;
 use std::borrow::Cow;
 use std::error::Error;
+use std::path::PathBuf;
 
 /// Simulations apart from the bank, on which the error of the network is measured.
 const CALIBRATION: usize = 1000;
@@ -71,6 +73,18 @@ pub enum PretrainError {
         /// Of the study.
         expected: usize,
     },
+    /// Of the folder in which a pretraining is kept.
+    #[error(transparent)]
+    Work(#[from] WorkError),
+    /// Of the bank in that folder.
+    #[error(transparent)]
+    Shards(#[from] ShardsError),
+    /// There is something in the estimator's place.
+    #[error("{} exists already; choose another --out, or remove it", .0.display())]
+    Taken(PathBuf),
+    /// The estimator cannot be written.
+    #[error(transparent)]
+    Save(#[from] EstimatorFileError),
     /// Of the training.
     #[error(transparent)]
     Network(#[from] NetworkError),
@@ -108,13 +122,12 @@ pub fn pretrain(
 ) -> Result<(Estimator, History), PretrainError> {
     let settings = settings(study, options)?;
     let size = settings.bank_size;
-    if size > MOST_IN_MEMORY {
-        return Err(PretrainError::Memory(size));
-    }
+    fits_into_memory(size)?;
     let prior = prior(study, options)?;
     let stage = progress.stage("bank", size);
     let bank = prior.rows(0..size as u64, options.seed, "bank", &stage)?;
-    train(study, options, settings, &prior, &bank, progress)
+    let nowhere = Checkpoints::none();
+    train(study, options, settings, &prior, &bank, &nowhere, progress)
 }
 
 /// Trains the network on a bank that is there, of this study's prior and the preset's features.
@@ -131,17 +144,47 @@ pub fn pretrain_on(
     options: &PretrainOptions,
     progress: &Progress,
 ) -> Result<(Estimator, History), PretrainError> {
+    pretrain_from(study, bank, options, &Checkpoints::none(), progress)
+}
+
+/// As [`pretrain_on`], and goes on with what was kept of the training.
+pub(super) fn pretrain_from(
+    study: &Study,
+    bank: &dyn Bank,
+    options: &PretrainOptions,
+    checkpoints: &Checkpoints,
+    progress: &Progress,
+) -> Result<(Estimator, History), PretrainError> {
     let options = PretrainOptions {
         bank_size: Some(bank.rows()),
         ..*options
     };
     let settings = settings(study, &options)?;
     let prior = prior(study, &options)?;
-    train(study, &options, settings, &prior, bank, progress)
+    train(
+        study,
+        &options,
+        settings,
+        &prior,
+        bank,
+        checkpoints,
+        progress,
+    )
+}
+
+/// Refuses a bank that is too large.
+pub(super) fn fits_into_memory(size: usize) -> Result<(), PretrainError> {
+    match size <= MOST_IN_MEMORY {
+        true => Ok(()),
+        false => Err(PretrainError::Memory(size)),
+    }
 }
 
 /// The preset's numbers with what the options say otherwise, checked.
-fn settings(study: &Study, options: &PretrainOptions) -> Result<Settings, PretrainError> {
+pub(super) fn settings(
+    study: &Study,
+    options: &PretrainOptions,
+) -> Result<Settings, PretrainError> {
     let mut settings = study.preset(options.preset).settings.clone();
     settings.bank_size = options.bank_size.unwrap_or(settings.bank_size);
     settings.training.epochs = options.epochs.unwrap_or(settings.training.epochs);
@@ -170,6 +213,7 @@ fn train(
     settings: Settings,
     prior: &Prior,
     bank: &dyn Bank,
+    checkpoints: &Checkpoints,
     progress: &Progress,
 ) -> Result<(Estimator, History), PretrainError> {
     let preset = study.preset(options.preset);
@@ -201,8 +245,13 @@ fn train(
         inputs: &inputs,
         targets: &targets,
     };
-    let (network, history) =
-        (preset.architecture).train_on(&samples, &settings.training, seed, progress)?;
+    let (network, history) = (preset.architecture).train_on(
+        &samples,
+        &settings.training,
+        seed,
+        checkpoints,
+        progress,
+    )?;
     let stage = progress.stage("calibration", CALIBRATION);
     let calibration = prior.rows(0..CALIBRATION as u64, seed, "calibration", &stage)?;
     let mut estimator = Estimator {

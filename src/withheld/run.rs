@@ -15,7 +15,7 @@ use serde_json::json;
 use std::path::Path;
 
 /// Layout of the folder; raised when it changes.
-const LAYOUT: u32 = 3;
+const LAYOUT: u32 = 4;
 
 /// What is tried.
 ///

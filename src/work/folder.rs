@@ -61,6 +61,12 @@ pub enum WorkError {
         /// What is different.
         difference: String,
     },
+    /// Another process has the folder.
+    #[error("{}: another process is at work on it; wait until it is done, or stop it", path.display())]
+    Busy {
+        /// Folder.
+        path: PathBuf,
+    },
     /// A piece that this work did not make.
     #[error("{}: cannot be used ({reason}); remove it, and it is made again", path.display())]
     Piece {
@@ -184,6 +190,15 @@ impl WorkFolder {
     pub fn write(&self, name: &str, text: &str) -> Result<(), WorkError> {
         let path = self.file(name);
         replace(&path, text.as_bytes()).map_err(|error| WorkError::io(&path, error))
+    }
+
+    /// Removes the folder with all that is in it: the work is done, and its result is elsewhere.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError::Io`].
+    pub fn remove(self) -> Result<(), WorkError> {
+        std::fs::remove_dir_all(&self.path).map_err(|error| WorkError::io(&self.path, error))
     }
 
     /// Puts the checksums of all pieces into the manifest: the work is finished.

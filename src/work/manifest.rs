@@ -61,6 +61,11 @@ impl Manifest {
         self.verb
     }
 
+    /// SHA-256 of all of it, in hexadecimal digits.
+    pub fn checksum(&self) -> String {
+        sha256(self.text().as_bytes())
+    }
+
     /// As it stands in the folder.
     pub(super) fn text(&self) -> String {
         format!("{:#}\n", Value::Object(self.entries.clone()))

@@ -6,11 +6,13 @@
 //! | to … | look at |
 //! |---|---|
 //! | keep finished pieces in a folder, and go on with it | [`WorkFolder`], [`Manifest`] |
+//! | keep other processes out of a folder | [`Lock`] |
 //! | do a part of the pieces: of a job array, of the ranks of a cluster | [`Share`] |
 //! | wait for the other ranks | [`Team`] |
 
 mod crew;
 mod folder;
+mod lock;
 mod manifest;
 mod pieces;
 mod share;
@@ -18,6 +20,7 @@ mod team;
 
 use crew::share_out;
 pub use folder::{NewWork, WorkError, WorkFolder};
+pub use lock::Lock;
 pub use manifest::{Manifest, checksum};
 pub(crate) use pieces::{Piece, Pieces};
 pub use share::{Share, ShareError};

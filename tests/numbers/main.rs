@@ -1,0 +1,6 @@
+//! Numbers as people have them: parameters and signals of any magnitude, long records, many parameters and outputs.
+
+mod chain;
+mod magnitudes;
+mod odd;
+mod sizes;
