@@ -6,6 +6,7 @@ use crate::diagnose::DiagnoseError;
 use crate::effect::EffectFileError;
 use crate::experiment::{MonteCarloError, ScenarioError};
 use crate::feature::FeatureError;
+use crate::foreign::printable;
 use crate::gate::GateError;
 use crate::network::NetworkError;
 use crate::refine::RefineError;
@@ -115,7 +116,8 @@ impl Failure {
             .split_whitespace()
             .collect::<Vec<_>>()
             .join(" ");
-        eprintln!("error: {line}");
+        // What a message quotes may come from anywhere.
+        eprintln!("error: {}", printable(&line));
         ExitCode::from(self.code)
     }
 }

@@ -1,7 +1,7 @@
 //! What a folder of work is about: what another call must say to go on with it.
 
 use super::WorkError;
-use crate::files::sha256;
+use crate::files::sha256_of;
 use serde_json::{Map, Value};
 use std::path::Path;
 
@@ -106,8 +106,7 @@ fn shown(value: Option<&Value>) -> String {
 ///
 /// A file that cannot be read.
 pub fn checksum(path: &Path) -> Result<String, WorkError> {
-    let bytes = std::fs::read(path).map_err(|error| WorkError::io(path, error))?;
-    Ok(sha256(&bytes))
+    sha256_of(path).map_err(|error| WorkError::io(path, error))
 }
 
 #[cfg(test)]
