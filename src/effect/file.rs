@@ -1,6 +1,6 @@
 //! Effects from files.
 
-use crate::foreign::{MESSAGE, one_line, read_text};
+use crate::foreign::{MESSAGE, check_names, one_line, read_text};
 use crate::twin::{Effects, UnmodelledEffect};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -72,6 +72,13 @@ pub fn read_effects(path: &Path) -> Result<Effects, EffectFileError> {
 }
 
 fn parse(text: &str, path: &Path) -> Result<Effects, EffectFileError> {
+    if let Ok(table) = toml::from_str(text) {
+        check_names(&table).map_err(|problem| EffectFileError::Text {
+            path: path.into(),
+            line: 1,
+            problem,
+        })?;
+    }
     let wrong = |at: usize, error: toml::de::Error| {
         let lines = error.message().lines().map(str::trim);
         EffectFileError::Text {

@@ -2,7 +2,7 @@
 
 use crate::feature::FeatureRecipe;
 use crate::files::{folder, with_remedy};
-use crate::foreign::{MESSAGE, one_line, read_text};
+use crate::foreign::{MESSAGE, check_names, one_line, read_text};
 use crate::study::plan::InputPlan;
 use crate::twin::{CsvError, Effects, Interval, Level, read_drive};
 use serde::{Deserialize, Serialize};
@@ -209,11 +209,15 @@ impl StudyFile {
         if text.len() as u64 > MOST {
             return Err(wrong(1, &format!("more than {} MiB of text", MOST >> 20)));
         }
-        toml::from_str(text).map_err(|error| {
+        let syntax = |error: toml::de::Error| {
             let at = error.span().map_or(0, |span| span.start);
             let before = text.bytes().take(at);
             wrong(before.filter(|b| *b == b'\n').count() + 1, error.message())
-        })
+        };
+        let file = toml::from_str(text).map_err(syntax)?;
+        let table = toml::from_str(text).map_err(syntax)?;
+        check_names(&table).map_err(|problem| wrong(1, &problem))?;
+        Ok(file)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::Manifest;
 use crate::files::{NewFolder, folder, replace, sweep, with_remedy, write_new};
-use crate::foreign::{check_folder, read_kept_text};
+use crate::foreign::{MESSAGE, check_folder, one_line, read_kept_text};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -242,7 +242,7 @@ impl WorkFolder {
         };
         let wrong = |reason: String| WorkError::Piece {
             path: path.clone(),
-            reason,
+            reason: one_line(&reason, MESSAGE),
         };
         let found: T = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
         fits(&found).map_err(|reason| wrong(reason.into()))?;

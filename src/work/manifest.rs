@@ -2,6 +2,7 @@
 
 use super::WorkError;
 use crate::files::sha256_of;
+use crate::foreign::excerpt;
 use serde_json::{Map, Value};
 use std::path::Path;
 
@@ -85,8 +86,8 @@ impl Manifest {
             .map(|(key, there, here)| {
                 let (there, here) = (shown(there), shown(here));
                 match there.chars().count().max(here.chars().count()) <= SHORT {
-                    true => format!("{key} was {there}, now it is {here}"),
-                    false => format!("{key} was another"),
+                    true => excerpt(&format!("{key} was {there}, now it is {here}")),
+                    false => excerpt(&format!("{key} was another")),
                 }
             })
     }

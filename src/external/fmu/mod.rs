@@ -5,6 +5,8 @@
 mod archive;
 mod description;
 mod error;
+#[doc(hidden)]
+pub mod fuzzing;
 mod instance;
 mod unpack;
 mod worker;
