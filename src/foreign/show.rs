@@ -100,9 +100,16 @@ mod tests {
     fn names_that_cannot_be_shown_are_found_wherever_they_stand() {
         let check = |text: &str| check_names(&toml::from_str(text).unwrap());
         assert_eq!(check("a = 1\n[b]\n\"µ.c\" = ['x y', 2.0]"), Ok(()));
-        for bad in ["\"a\\u001B\" = 1", "a = [[{ b = \"\\n\" }]]", "a.\"\\u202E\".b = 1"] {
+        for bad in [
+            "\"a\\u001B\" = 1",
+            "a = [[{ b = \"\\n\" }]]",
+            "a.\"\\u202E\".b = 1",
+        ] {
             let problem = check(bad).unwrap_err();
-            assert!(problem.contains("hidden") && !problem.contains(hidden), "{problem}");
+            assert!(
+                problem.contains("hidden") && !problem.contains(hidden),
+                "{problem}"
+            );
         }
         let long = format!("{} = 1", "a".repeat(1001));
         assert!(check(&long).unwrap_err().contains("more than 1000"));

@@ -32,8 +32,22 @@ const MIB: usize = 1 << 20;
 fn rows_without_end_and_too_many_columns() {
     let place = place();
     for (name, bytes) in [
-        ("line.csv", b"t,u,y\n".iter().copied().chain(std::iter::repeat_n(b'1', 3 * MIB)).collect::<Vec<u8>>()),
-        ("quote.csv", b"t,u,y\n0,1,\"".iter().copied().chain(b"2\n".repeat(2 * MIB)).collect()),
+        (
+            "line.csv",
+            b"t,u,y\n"
+                .iter()
+                .copied()
+                .chain(std::iter::repeat_n(b'1', 3 * MIB))
+                .collect::<Vec<u8>>(),
+        ),
+        (
+            "quote.csv",
+            b"t,u,y\n0,1,\""
+                .iter()
+                .copied()
+                .chain(b"2\n".repeat(2 * MIB))
+                .collect(),
+        ),
         ("header.csv", vec![b'y'; 3 * MIB]),
     ] {
         let path = file(&place, name, &bytes);
@@ -41,7 +55,11 @@ fn rows_without_end_and_too_many_columns() {
         assert!(message.contains("a row of more than 1 MiB"), "{message}");
     }
     let columns: Vec<String> = (1..=3000).map(|j| format!("y{j}")).collect();
-    let path = file(&place, "wide.csv", format!("t,{}\n", columns.join(",")).as_bytes());
+    let path = file(
+        &place,
+        "wide.csv",
+        format!("t,{}\n", columns.join(",")).as_bytes(),
+    );
     let message = refused(8 * MIB, || read_record(&path));
     assert!(message.contains("3001 columns, at most 2001"), "{message}");
 }
@@ -52,13 +70,24 @@ fn devices_and_pipes_without_end() {
     let zero = Path::new("/dev/zero");
     assert!(refused(8 * MIB, || read_record(zero)).contains("1 MiB"));
     assert!(refused(8 * MIB, || StudyFile::read(zero)).contains("longer than 1 MiB"));
-    assert!(refused(8 * MIB, || truetwin::effect::read_effects(zero)).contains("longer than 1 MiB"));
+    assert!(
+        refused(8 * MIB, || truetwin::effect::read_effects(zero)).contains("longer than 1 MiB")
+    );
     let place = place();
     let pipe = place.path().join("pipe.csv");
-    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    assert!(
+        std::process::Command::new("mkfifo")
+            .arg(&pipe)
+            .status()
+            .unwrap()
+            .success()
+    );
     let writer = pipe.clone();
     std::thread::spawn(move || {
-        let mut to = std::fs::OpenOptions::new().write(true).open(writer).unwrap();
+        let mut to = std::fs::OpenOptions::new()
+            .write(true)
+            .open(writer)
+            .unwrap();
         // Ends when nobody reads any more.
         while to.write_all(&[b'7'; 4096]).is_ok() {}
     });
@@ -82,7 +111,10 @@ fn nesting_without_end() {
         ("piece", deep("[")),
         ("description", deep("{\"a\":")),
         ("answer", deep("[")),
-        ("answer", format!("{{\"id\": 1, \"outputs\": {}", deep("{\"y\":"))),
+        (
+            "answer",
+            format!("{{\"id\": 1, \"outputs\": {}", deep("{\"y\":")),
+        ),
         #[cfg(feature = "fmi")]
         ("fmu", deep("<a>")),
     ] {
@@ -104,12 +136,16 @@ fn nesting_without_end() {
 fn arrays_that_claim_to_be_huge() {
     for (shape, part) in [
         ("(1000000000000, 3)", "more than 536870912 numbers"),
-        ("(18446744073709551615, 18446744073709551615)", "does not fit"),
+        (
+            "(18446744073709551615, 18446744073709551615)",
+            "does not fit",
+        ),
         ("(4294967296, 4294967296)", "does not fit"),
         ("(100000, 1000)", "does not fit the 0 bytes"),
         ("(2,)", "no matrix"),
     ] {
-        let dictionary = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
+        let dictionary =
+            format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
         let mut array = b"\x93NUMPY\x01\x00".to_vec();
         array.extend((dictionary.len() as u16).to_le_bytes());
         array.extend(dictionary.bytes());

@@ -20,12 +20,17 @@ const TIMES: usize = 200;
 const PLUS: usize = 16 << 20;
 
 fn seeds(reader: &str) -> Vec<(PathBuf, Vec<u8>)> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/seeds").join(reader);
-    let mut paths: Vec<PathBuf> = (std::fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display())))
-        .map(|entry| entry.unwrap().path())
-        .collect();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/fuzz/seeds")
+        .join(reader);
+    let mut paths: Vec<PathBuf> = (std::fs::read_dir(&folder)
+        .unwrap_or_else(|e| panic!("{}: {e}", folder.display())))
+    .map(|entry| entry.unwrap().path())
+    .collect();
     paths.sort();
-    (paths.into_iter()).map(|path| (path.clone(), std::fs::read(path).unwrap())).collect()
+    (paths.into_iter())
+        .map(|path| (path.clone(), std::fs::read(path).unwrap()))
+        .collect()
 }
 
 /// Holds a reader to its word on one input; returns whether it was read.
@@ -33,7 +38,11 @@ fn hold(reader: &str, read: readers::Reader, input: &[u8], which: &str) -> bool 
     let checked = catch_unwind(AssertUnwindSafe(|| {
         let (outcome, peak) = memory::peak(|| read(input));
         let most = TIMES * input.len() + PLUS;
-        assert!(peak <= most, "{peak} bytes of memory for {} bytes", input.len());
+        assert!(
+            peak <= most,
+            "{peak} bytes of memory for {} bytes",
+            input.len()
+        );
         if let Err(message) = &outcome {
             readers::check_message(reader, message);
         }
@@ -44,7 +53,10 @@ fn hold(reader: &str, read: readers::Reader, input: &[u8], which: &str) -> bool 
         std::fs::create_dir_all(&folder).unwrap();
         let path = folder.join(format!("{reader}-{}", which.replace('/', "-")));
         std::fs::write(&path, input).unwrap();
-        panic!("{reader}, {which}: see above; the input is {}", path.display());
+        panic!(
+            "{reader}, {which}: see above; the input is {}",
+            path.display()
+        );
     })
 }
 
@@ -66,7 +78,10 @@ fn fuzz(name: &str) {
         accepted += u64::from(hold(name, read, &input, &index.to_string()));
     }
     // Mutations must get past the first check now and then, and must not all be harmless.
-    assert!(accepted > EACH / 200 && accepted < EACH, "{accepted} of {EACH} inputs of {name} were read");
+    assert!(
+        accepted > EACH / 200 && accepted < EACH,
+        "{accepted} of {EACH} inputs of {name} were read"
+    );
     eprintln!("{name}: {EACH} inputs, {accepted} read");
 }
 
@@ -76,8 +91,17 @@ macro_rules! fuzzed {
     };
 }
 fuzzed!(
-    record, study, effect, estimator, manifest, piece, bank, description, answer,
-    #[cfg(feature = "fmi")] fmu
+    record,
+    study,
+    effect,
+    estimator,
+    manifest,
+    piece,
+    bank,
+    description,
+    answer,
+    #[cfg(feature = "fmi")]
+    fmu
 );
 
 /// Makes the seeds that are not text anew: `cargo test --test fuzz -- --ignored seeds`.
@@ -107,14 +131,23 @@ fn seeds_that_are_not_text() {
     };
     let (estimator, _) = pretrain(&study, &options, &Progress::silent()).unwrap();
     estimator.save(&new("estimator/tiny.est")).unwrap();
-    let plan = BankPlan { study: &study, preset: PresetName::Default, size: 20, seed: 1 };
+    let plan = BankPlan {
+        study: &study,
+        preset: PresetName::Default,
+        size: 20,
+        seed: 1,
+    };
     let place = tempfile::tempdir().unwrap();
     let folder = place.path().join("bank");
-    plan.fill(&folder, "1/1".parse().unwrap(), &Progress::silent()).unwrap();
+    plan.fill(&folder, "1/1".parse().unwrap(), &Progress::silent())
+        .unwrap();
     let mut text = std::fs::read_to_string(folder.join("manifest.json")).unwrap();
     text.push_str(readers::NAMES);
     for entry in std::fs::read_dir(folder.join("shards")).unwrap() {
-        text.push_str(&format!("{}\n", entry.unwrap().file_name().to_string_lossy()));
+        text.push_str(&format!(
+            "{}\n",
+            entry.unwrap().file_name().to_string_lossy()
+        ));
     }
     std::fs::write(new("manifest/bank.txt"), text).unwrap();
 }

@@ -6,17 +6,70 @@ use rand_chacha::ChaCha8Rng;
 
 /// Numbers at the edges of what numbers can be.
 const NUMBERS: [&str; 22] = [
-    "1e308", "-1e308", "1e309", "1e-320", "NaN", "-nan", "inf", "-Infinity", "-0", "0", "-1", "0.5", "1e0", "2147483648",
-    "9007199254740993", "9223372036854775807", "9223372036854775808", "18446744073709551615", "18446744073709551616",
-    "1e18", "0x10", "00",
+    "1e308",
+    "-1e308",
+    "1e309",
+    "1e-320",
+    "NaN",
+    "-nan",
+    "inf",
+    "-Infinity",
+    "-0",
+    "0",
+    "-1",
+    "0.5",
+    "1e0",
+    "2147483648",
+    "9007199254740993",
+    "9223372036854775807",
+    "9223372036854775808",
+    "18446744073709551615",
+    "18446744073709551616",
+    "1e18",
+    "0x10",
+    "00",
 ];
 
 /// Pieces that mean something to one reader or another, or to a terminal.
 const PIECES: [&[u8]; 38] = [
-    b"\0", b"\xff\xfe", b"\xef\xbb\xbf", b"\xc3\x28", b"\r\n", b"\n\n", b"\"", b"'", b"\"\"\"", b"\\", b"\\u0000", b"\\ud800",
-    b",", b",,", b";", b"\t", b"#", b"=", b"[", b"]", b"{", b"}", b"[[", b"null", b"true", b"../../etc/x", b"/etc/x",
-    b"\x1b[2J", b"\xc2\x9b31m", b"\xe2\x80\xae", b"<script>", b"&amp;", b"&#0;", b"<!DOCTYPE a [<!ENTITY b \"b\">]>", b"<![CDATA[",
-    b"PK\x05\x06", b"__proto__", b"%n",
+    b"\0",
+    b"\xff\xfe",
+    b"\xef\xbb\xbf",
+    b"\xc3\x28",
+    b"\r\n",
+    b"\n\n",
+    b"\"",
+    b"'",
+    b"\"\"\"",
+    b"\\",
+    b"\\u0000",
+    b"\\ud800",
+    b",",
+    b",,",
+    b";",
+    b"\t",
+    b"#",
+    b"=",
+    b"[",
+    b"]",
+    b"{",
+    b"}",
+    b"[[",
+    b"null",
+    b"true",
+    b"../../etc/x",
+    b"/etc/x",
+    b"\x1b[2J",
+    b"\xc2\x9b31m",
+    b"\xe2\x80\xae",
+    b"<script>",
+    b"&amp;",
+    b"&#0;",
+    b"<!DOCTYPE a [<!ENTITY b \"b\">]>",
+    b"<![CDATA[",
+    b"PK\x05\x06",
+    b"__proto__",
+    b"%n",
 ];
 
 /// `seed` after one to four changes; `other` is what is spliced in.
@@ -54,10 +107,13 @@ fn change(bytes: &mut Vec<u8>, other: &[u8], random: &mut ChaCha8Rng) {
         _ => {
             let ends = bytes.iter().filter(|b| **b == b'\n').count();
             if ends > 0 {
-                *bytes = bytes.iter().flat_map(|b| match b {
-                    b'\n' => vec![b'\r', b'\n'],
-                    b => vec![*b],
-                }).collect();
+                *bytes = bytes
+                    .iter()
+                    .flat_map(|b| match b {
+                        b'\n' => vec![b'\r', b'\n'],
+                        b => vec![*b],
+                    })
+                    .collect();
             }
         }
     }
@@ -70,7 +126,8 @@ fn insert(bytes: &mut Vec<u8>, at: usize, what: &[u8]) {
 /// The next number of a text, after `at` or else from the start, becomes one at the edge.
 fn replace_number(bytes: &mut Vec<u8>, at: usize, random: &mut ChaCha8Rng) {
     let digit = |b: &u8| b.is_ascii_digit();
-    let Some(begin) = (bytes[at..].iter().position(digit).map(|k| at + k)).or_else(|| bytes.iter().position(digit))
+    let Some(begin) = (bytes[at..].iter().position(digit).map(|k| at + k))
+        .or_else(|| bytes.iter().position(digit))
     else {
         return;
     };
@@ -82,8 +139,14 @@ fn replace_number(bytes: &mut Vec<u8>, at: usize, random: &mut ChaCha8Rng) {
 
 /// The line at `at` stands there once more: duplicate keys, columns, rows.
 fn repeat_line(bytes: &mut Vec<u8>, at: usize) {
-    let begin = bytes[..at].iter().rposition(|b| *b == b'\n').map_or(0, |k| k + 1);
-    let end = bytes[at..].iter().position(|b| *b == b'\n').map_or(bytes.len(), |k| at + k + 1);
+    let begin = bytes[..at]
+        .iter()
+        .rposition(|b| *b == b'\n')
+        .map_or(0, |k| k + 1);
+    let end = bytes[at..]
+        .iter()
+        .position(|b| *b == b'\n')
+        .map_or(bytes.len(), |k| at + k + 1);
     let line = bytes[begin..end].to_vec();
     bytes.splice(begin..begin, line);
 }
@@ -97,7 +160,16 @@ fn nest(bytes: &mut Vec<u8>, at: usize, random: &mut ChaCha8Rng) {
 
 /// Four or eight bytes that claim a length.
 fn huge_length(bytes: &mut [u8], at: usize, random: &mut ChaCha8Rng) {
-    let lengths = [u64::MAX, 1 << 63, 1 << 32, 1 << 31, (1 << 32) - 1, (1 << 31) - 1, 0, 1];
+    let lengths = [
+        u64::MAX,
+        1 << 63,
+        1 << 32,
+        1 << 31,
+        (1 << 32) - 1,
+        (1 << 31) - 1,
+        0,
+        1,
+    ];
     let length = lengths.choose(random).copied().unwrap_or(0).to_le_bytes();
     let width = if random.r#gen() { 4 } else { 8 };
     for (byte, new) in bytes[at..].iter_mut().zip(&length[..width]) {

@@ -13,8 +13,8 @@ use truetwin::bank::{Bank, Draws, file as bank_file};
 use truetwin::effect::read_effects;
 use truetwin::experiment::{Run, reference_studies};
 use truetwin::external::program::fuzzing as program;
-use truetwin::network::layers::*;
 use truetwin::network::HeadArchitecture;
+use truetwin::network::layers::*;
 use truetwin::progress::Progress;
 use truetwin::shards::{ShardedBank, merge, merge_into_file};
 use truetwin::study::{RecordPlan, Study, StudyFile};
@@ -27,6 +27,7 @@ use truetwin::work::WorkFolder;
 pub type Reader = fn(&[u8]) -> Result<(), String>;
 
 /// All of them, by name.
+#[allow(dead_code)]
 pub fn readers() -> Vec<(&'static str, Reader)> {
     vec![
         ("record", record),
@@ -94,7 +95,9 @@ pub fn effect(data: &[u8]) -> Result<(), String> {
     let Some(study) = studies().iter().find(|s| s.name() == "tanks") else {
         return Ok(());
     };
-    augment(study.twin().clone(), found).map(|_| ()).map_err(text)
+    augment(study.twin().clone(), found)
+        .map(|_| ())
+        .map_err(text)
 }
 
 /// A network of a few weights, so that a whole estimator is a few kilobytes.
@@ -178,7 +181,10 @@ pub fn manifest(data: &[u8]) -> Result<(), String> {
     let _ = fs::remove_dir_all(&out);
     hold_message("manifest", merge(&from, &out, &Progress::silent()));
     let table = place().join("merged.csv");
-    hold_message("manifest", merge_into_file(&from, &table, &Progress::silent()));
+    hold_message(
+        "manifest",
+        merge_into_file(&from, &table, &Progress::silent()),
+    );
     let bank = ShardedBank::open(&folder).map_err(text)?;
     for part in 0..bank.parts().len().min(3) {
         hold_message("manifest", bank.part(part));
@@ -214,7 +220,9 @@ pub fn bank(data: &[u8]) -> Result<(), String> {
         [0x93, b'N', ..] => file("bank.npz", &archive(data)),
         _ => file("bank.csv", data),
     };
-    bank_file::read(&path, &["a", "b"]).map(|_| ()).map_err(text)
+    bank_file::read(&path, &["a", "b"])
+        .map(|_| ())
+        .map_err(text)
 }
 
 /// An archive with sound `theta` and these bytes as `features`.
@@ -266,6 +274,14 @@ pub fn answer(data: &[u8]) -> Result<(), String> {
 #[cfg(feature = "fmi")]
 pub fn fmu(data: &[u8]) -> Result<(), String> {
     truetwin::external::fmu::fuzzing::description(line(data)?)
+}
+
+/// A reader on one input: it reads, or says in such a message why not. For the targets of `fuzz/`.
+#[allow(dead_code)]
+pub fn hold(name: &str, read: Reader, data: &[u8]) {
+    if let Err(message) = read(data) {
+        check_message(name, &message);
+    }
 }
 
 /// What a message must be: one line, not endless, without what steers a terminal; of readers that a user calls, with a remedy.
