@@ -107,6 +107,18 @@ pub fn sha256(bytes: &[u8]) -> String {
     digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
+/// SHA-256 of a file, which is not in memory as a whole.
+///
+/// # Errors
+///
+/// What the system says.
+pub fn sha256_of(path: &Path) -> io::Result<String> {
+    let mut hash = Sha256::new();
+    io::copy(&mut std::fs::File::open(path)?, &mut hash)?;
+    let digest = hash.finalize();
+    Ok(digest.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
 /// The folder that a path lies in.
 pub fn folder(path: &Path) -> &Path {
     path.parent()
@@ -126,6 +138,8 @@ pub fn with_remedy(error: &io::Error) -> String {
             "make room, or choose another place"
         }
         io::ErrorKind::InvalidData => "save it as UTF-8 text",
+        io::ErrorKind::Unsupported => "remove it, and put a file or folder of its own there",
+        io::ErrorKind::FileTooLarge => "check that it is the file that you mean",
         _ => "check the path and the disk",
     };
     format!("{error}; {remedy}")

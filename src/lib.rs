@@ -36,6 +36,7 @@
 
 // Layers, lowest first; a module uses only what stands above it here (tests/layering.rs holds it so).
 pub mod files;
+mod foreign;
 pub mod math;
 pub mod optimise;
 pub mod progress;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// The layers of docs/architecture.md, lowest first; within a layer, in order.
 const LAYERS: [&[&str]; 6] = [
-    &["files", "math", "optimise", "progress", "work"],
+    &["files", "foreign", "math", "optimise", "progress", "work"],
     &["twin", "filter", "feature", "network"],
     &[
         "twins", "effect", "bank", "gate", "refine", "sample", "study", "shards", "external",

@@ -21,10 +21,13 @@
 //! ```
 
 use super::Draws;
+use super::npz::Npz;
 use crate::files::{with_remedy, write_new};
-use ndarray::{Array2, Ix2, OwnedRepr};
-use ndarray_npy::{NpzReader, NpzWriter, ReadNpzError, WriteNpyExt, WriteNpzError};
-use std::io::{self, Cursor};
+use crate::foreign::{MESSAGE, MOST_NUMBERS, Rows, excerpt, one_line};
+use ndarray::Array2;
+use ndarray_npy::{NpzWriter, WriteNpyExt, WriteNpzError};
+use std::fs::File;
+use std::io::{self, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime};
@@ -146,15 +149,15 @@ pub fn write(path: &Path, draws: &Draws, names: &[&str]) -> Result<(), BankFileE
 /// A file that cannot be read, holds something else, other parameters, or numbers that are not finite.
 pub fn read(path: &Path, names: &[&str]) -> Result<Draws, BankFileError> {
     let form = form(path)?;
-    let bytes = std::fs::read(path).map_err(|error| BankFileError::io(path, error))?;
+    let file = File::open(path).map_err(|error| BankFileError::io(path, error))?;
     let wrong = |reason: String| BankFileError::Content {
         path: path.into(),
-        reason,
+        reason: one_line(&reason, MESSAGE),
         remedy: GIVE,
     };
     let draws = match form {
-        Form::Npz => from_npz(&bytes).map_err(|error| wrong(error.to_string()))?,
-        Form::Csv => from_csv(&bytes, names).map_err(wrong)?,
+        Form::Npz => from_npz(io::BufReader::new(file)).map_err(wrong)?,
+        Form::Csv => from_csv(file, names).map_err(wrong)?,
     };
     check(&draws, names.len()).map_err(wrong)?;
     Ok(draws)
@@ -201,18 +204,11 @@ fn archive(arrays: &[(&str, &Array2<f64>)]) -> Result<Vec<u8>, WriteNpzError> {
 }
 
 /// Rows of an `.npz` archive, of 64 or 32 bits.
-pub(crate) fn from_npz(bytes: &[u8]) -> Result<Draws, ReadNpzError> {
-    let mut archive = NpzReader::new(Cursor::new(bytes))?;
-    let mut array = |name| match archive.by_name::<OwnedRepr<f64>, Ix2>(name) {
-        Ok(array) => Ok(array),
-        Err(error) => match archive.by_name::<OwnedRepr<f32>, Ix2>(name) {
-            Ok(array) => Ok(array.mapv(f64::from)),
-            Err(_) => Err(error),
-        },
-    };
+pub(crate) fn from_npz(archive: impl Read + Seek) -> Result<Draws, String> {
+    let mut archive = Npz::new(archive)?;
     Ok(Draws {
-        theta: array("theta")?,
-        features: array("features")?,
+        theta: archive.matrix("theta")?,
+        features: archive.matrix("features")?,
         redrawn: 0,
     })
 }
@@ -227,9 +223,9 @@ fn csv_text(draws: &Draws, names: &[&str]) -> io::Result<Vec<u8>> {
     csv.into_inner().map_err(|error| error.into_error())
 }
 
-fn from_csv(bytes: &[u8], names: &[&str]) -> Result<Draws, String> {
-    let mut csv = csv::Reader::from_reader(bytes);
-    let header = csv.headers().map_err(|error| error.to_string())?;
+fn from_csv(file: impl Read, names: &[&str]) -> Result<Draws, String> {
+    let mut csv = Rows::new(file);
+    let header = csv.header().map_err(|error| error.to_string())?;
     let d = names.len();
     let n = header.len().saturating_sub(d);
     let features = (1..=n).map(|j| format!("x{j}"));
@@ -241,11 +237,20 @@ fn from_csv(bytes: &[u8], names: &[&str]) -> Result<Draws, String> {
         return Err(format!("the header is not {},x1,x2,…", names.join(",")));
     }
     let (mut theta, mut rest, mut rows) = (Vec::new(), Vec::new(), 0);
-    for (row, record) in csv.records().enumerate() {
-        let record = record.map_err(|error| error.to_string())?;
-        for (column, cell) in record.iter().enumerate() {
-            let value: f64 = (cell.trim().parse())
-                .map_err(|_| format!("row {row}, column {column}: \"{cell}\" is no number"))?;
+    let mut cells = csv::StringRecord::new();
+    while csv.read(&mut cells).map_err(|error| error.to_string())? {
+        if (rows + 1) * (d + n) > MOST_NUMBERS {
+            return Err(format!(
+                "more than {MOST_NUMBERS} numbers; keep such a bank in shards"
+            ));
+        }
+        for (column, cell) in cells.iter().enumerate() {
+            let value: f64 = (cell.parse()).map_err(|_| {
+                format!(
+                    "row {rows}, column {column}: \"{}\" is no number",
+                    excerpt(cell)
+                )
+            })?;
             match column < d {
                 true => theta.push(value),
                 false => rest.push(value),
@@ -320,7 +325,10 @@ mod tests {
         };
         let npy: Array2<f64> = ndarray_npy::read_npy(at("x.npy")).unwrap();
         let file = std::fs::File::open(at("x.npz")).unwrap();
-        let npz: Array2<f64> = NpzReader::new(file).unwrap().by_name("features").unwrap();
+        let npz: Array2<f64> = ndarray_npy::NpzReader::new(file)
+            .unwrap()
+            .by_name("features")
+            .unwrap();
         assert_eq!((npy, npz), (x.clone(), x.clone()));
         let csv = std::fs::read_to_string(at("x.csv")).unwrap();
         assert_eq!(csv, "x1,x2\n0.1,2\n-0.000000001,3.5\n");

@@ -10,6 +10,7 @@
 mod draws;
 mod error;
 pub mod file;
+mod npz;
 mod parts;
 mod simulator;
 

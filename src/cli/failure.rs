@@ -116,6 +116,7 @@ impl Failure {
             .split_whitespace()
             .collect::<Vec<_>>()
             .join(" ");
+        // What a message quotes may come from anywhere.
         output::say(&format!("error: {line}"));
         ExitCode::from(self.code)
     }

@@ -2,14 +2,18 @@
 
 use super::{Context, Failure};
 use crate::files::{self, folder, with_remedy};
+use crate::foreign::{hidden, printable};
 use serde_json::{Value, json};
+use std::borrow::Cow;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Prints a result; a reader that has gone away (`| head`) is no failure.
+/// Prints a result; a reader that has gone away (`| head`) is no failure. Names and units may come from a program or a file:
+/// nothing among them steers the terminal.
 pub(super) fn print(text: &str) -> Result<(), Failure> {
+    let text = printable(text);
     let mut out = io::stdout().lock();
     let ends = if text.ends_with('\n') { "" } else { "\n" };
     match write!(out, "{text}{ends}").and_then(|()| out.flush()) {
@@ -23,12 +27,30 @@ pub(super) fn print(text: &str) -> Result<(), Failure> {
 
 /// Says something to people beside the result; who listens no more misses it, and nothing else happens.
 pub(super) fn say(text: &str) {
-    let _ = writeln!(io::stderr().lock(), "{text}");
+    let _ = writeln!(io::stderr().lock(), "{}", printable(text));
 }
 
 /// Prints one JSON object.
 pub(super) fn print_json(value: &Value) -> Result<(), Failure> {
-    print(&serde_json::to_string_pretty(value).map_err(Failure::internal)?)
+    let text = serde_json::to_string_pretty(value).map_err(Failure::internal)?;
+    print(&hidden_escaped(&text))
+}
+
+/// JSON whose strings hold hidden characters as JSON writes them, so that they survive and steer nothing.
+fn hidden_escaped(json: &str) -> Cow<'_, str> {
+    let odd = |c: char| hidden(c) && c != '\n';
+    if !json.contains(odd) {
+        return Cow::Borrowed(json);
+    }
+    let mut text = String::with_capacity(json.len() + 16);
+    for c in json.chars() {
+        match odd(c) {
+            // All of them are below U+10000.
+            true => text.push_str(&format!("\\u{:04x}", u32::from(c))),
+            false => text.push(c),
+        }
+    }
+    Cow::Owned(text)
 }
 
 /// Says how far a job array has come.
@@ -107,4 +129,18 @@ impl NewFolder {
 
 fn failed(path: &Path, error: &io::Error) -> Failure {
     Failure::user(format!("{}: {}", path.display(), with_remedy(error)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hidden_characters_survive_json_as_escapes() {
+        let value = json!({ "unit": "\u{9b}31m \u{202e} \u{1b}[2J µ" });
+        let text = serde_json::to_string_pretty(&value).unwrap();
+        let shown = hidden_escaped(&text);
+        assert!(!shown.contains(|c| hidden(c) && c != '\n'), "{shown:?}");
+        assert_eq!(serde_json::from_str::<Value>(&shown).unwrap(), value);
+    }
 }

@@ -1,8 +1,12 @@
 //! Effects from files.
 
+use crate::foreign::{MESSAGE, check_names, one_line, read_text};
 use crate::twin::{Effects, UnmodelledEffect};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
+
+/// Longest effect file, in bytes: thousands of effects.
+const MOST: u64 = 1 << 20;
 
 /// What is wrong with an effect file: which file, where, and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -60,7 +64,7 @@ pub fn parse_effects(text: &str) -> Result<Effects, EffectFileError> {
 
 /// Effects from a file.
 pub fn read_effects(path: &Path) -> Result<Effects, EffectFileError> {
-    let text = std::fs::read_to_string(path).map_err(|error| EffectFileError::Io {
+    let text = read_text(path, MOST).map_err(|error| EffectFileError::Io {
         path: path.into(),
         error,
     })?;
@@ -68,16 +72,26 @@ pub fn read_effects(path: &Path) -> Result<Effects, EffectFileError> {
 }
 
 fn parse(text: &str, path: &Path) -> Result<Effects, EffectFileError> {
+    if let Ok(table) = toml::from_str(text) {
+        check_names(&table).map_err(|problem| EffectFileError::Text {
+            path: path.into(),
+            line: 1,
+            problem,
+        })?;
+    }
     let wrong = |at: usize, error: toml::de::Error| {
         let lines = error.message().lines().map(str::trim);
         EffectFileError::Text {
             path: path.into(),
             line: 1 + text.bytes().take(at).filter(|b| *b == b'\n').count(),
-            problem: (lines.filter(|line| !line.is_empty()))
-                .collect::<Vec<_>>()
-                .join(", ")
-                // The only variants here are ids.
-                .replace("unknown variant", "unknown id"),
+            problem: one_line(
+                &(lines.filter(|line| !line.is_empty()))
+                    .collect::<Vec<_>>()
+                    .join(", ")
+                    // The only variants here are ids.
+                    .replace("unknown variant", "unknown id"),
+                MESSAGE,
+            ),
         }
     };
     let file: EffectFile =

@@ -1,10 +1,12 @@
 //! Names that come from outside: of twins, parameters and channels.
 
-/// Longest name, in characters.
+use crate::foreign::hidden;
+
+/// Longest name or unit, in characters.
 const LONGEST: usize = 100;
 
 fn odd(c: char) -> bool {
-    c.is_whitespace() || c.is_control() || ",=@\"'\\".contains(c)
+    c.is_whitespace() || hidden(c) || ",=@\"'\\".contains(c)
 }
 
 /// `name` with `_` in place of what [`check`] refuses.
@@ -28,6 +30,26 @@ pub(super) fn check(name: &str) -> Result<(), String> {
         Some(c) => Err(format!(
             "the name {name:?} holds {c:?}; use letters, digits, _ - . instead"
         )),
+        None => Ok(()),
+    }
+}
+
+/// A unit, fit to be shown beside a number: without hidden characters, and not too long.
+#[cfg(feature = "fmi")]
+pub(super) fn made_fit_unit(unit: &str) -> String {
+    let fit = |c| if hidden(c) { '_' } else { c };
+    unit.chars().take(LONGEST).map(fit).collect()
+}
+
+/// Whether a unit can be shown beside a number; else what is wrong.
+pub(super) fn check_unit(unit: &str) -> Result<(), String> {
+    if unit.chars().count() > LONGEST {
+        return Err(format!(
+            "a unit has more than {LONGEST} characters; shorten it"
+        ));
+    }
+    match unit.chars().find(|&c| hidden(c)) {
+        Some(c) => Err(format!("the unit {unit:?} holds {c:?}; leave that out")),
         None => Ok(()),
     }
 }
@@ -65,9 +87,16 @@ mod tests {
             "a=b",
             "gain@u",
             "new\nline",
+            "\u{9b}2J",
+            "turned\u{202e}",
             &"x".repeat(101),
         ] {
             assert!(check(bad).is_err(), "{bad:?}");
+        }
+        assert_eq!(check_unit("µm·s⁻² (a \"b\")"), Ok(()));
+        for bad in ["\u{1b}[2J", "a\nb", &"x".repeat(101)] {
+            let problem = check_unit(bad).unwrap_err();
+            assert!(!problem.contains(hidden), "{problem}");
         }
         let twice = check_all("inputs", ["u", "u"]).unwrap_err();
         assert!(twice.contains("inputs: u stands there twice"), "{twice}");

@@ -1,15 +1,17 @@
 //! The folder of shards.
 
 use super::ShardsError;
-use super::plan::VERB;
+use super::plan::{MOST, VERB, rows_of_a_shard};
 use crate::bank::file::{self, BankFileError};
 use crate::bank::{Bank, Draws};
 use crate::files::{sha256, sweep, write_new};
+use crate::foreign::{MESSAGE, MOST_NUMBERS, one_line, read_kept};
 use crate::work::{Manifest, WorkError, WorkFolder};
 use ndarray::{Array2, s};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -62,8 +64,12 @@ impl Shards {
         else {
             return Err(foreign(folder.path()).into());
         };
+        // Everything below counts shards: no manifest may make it count without end.
+        if size > MOST || rows != rows_of_a_shard(size) {
+            return Err(foreign(folder.path()).into());
+        }
         let of = size.div_ceil(rows);
-        let place = folder.file(SHARDS);
+        let place = folder.part(SHARDS)?;
         let mut there = BTreeMap::new();
         let failed = |error| ShardsError::from(WorkError::io(&place, error));
         for entry in std::fs::read_dir(&place).map_err(failed)? {
@@ -71,6 +77,9 @@ impl Shards {
             let Some((number, checksum)) = found.to_str().and_then(parse) else {
                 continue;
             };
+            if number >= of {
+                continue;
+            }
             if let Some(other) = there.insert(number, checksum.to_owned()) {
                 return Err(ShardsError::Conflict {
                     one: place.join(name(number, checksum)),
@@ -78,7 +87,6 @@ impl Shards {
                 });
             }
         }
-        there.retain(|number, _| *number < of);
         Ok(Self {
             folder,
             manifest,
@@ -120,7 +128,8 @@ impl Shards {
             of: self.of,
         };
         let path = self.file(number).ok_or_else(incomplete)?;
-        let bytes = std::fs::read(&path).map_err(|error| BankFileError::io(&path, error))?;
+        let bytes = read_kept(&path, 8 * MOST_NUMBERS as u64)
+            .map_err(|error| BankFileError::io(&path, error))?;
         match self.there.get(&number) == Some(&sha256(&bytes)) {
             true => Ok(bytes),
             false => Err(damaged(path, "its SHA-256 is not that of its name").into()),
@@ -130,7 +139,7 @@ impl Shards {
     /// The rows of a shard, checked.
     pub fn draws(&self, number: usize) -> Result<Draws, ShardsError> {
         let bytes = self.bytes(number)?;
-        let draws = file::from_npz(&bytes).map_err(|error| error.to_string());
+        let draws = file::from_npz(io::Cursor::new(bytes));
         let checked = draws.and_then(|draws| {
             file::check(&draws, self.names.len())?;
             match draws.theta.nrows() == self.rows(number).count() {
@@ -155,7 +164,7 @@ impl Shards {
 
     /// Adds a shard; where another process has made it in the meantime, that one stays.
     pub fn add(&self, number: usize, bytes: &[u8]) -> Result<(), ShardsError> {
-        let path = self.folder.file(SHARDS).join(name(number, &sha256(bytes)));
+        let path = (self.folder.part(SHARDS)?).join(name(number, &sha256(bytes)));
         match write_new(&path, bytes) {
             Err(error) if !path.exists() => Err(BankFileError::io(&path, error).into()),
             _ => Ok(()),
@@ -177,7 +186,7 @@ impl Shards {
         if self.there.len() == self.of {
             let checksums: Vec<&String> = self.there.values().collect();
             self.folder.finish(&self.manifest, json!(checksums))?;
-            let place = self.folder.file(SHARDS);
+            let place = self.folder.part(SHARDS)?;
             sweep(&place).map_err(|error| WorkError::io(&place, error))?;
         }
         Ok(())
@@ -198,7 +207,7 @@ fn foreign(path: &Path) -> WorkError {
 fn damaged(path: PathBuf, reason: &str) -> BankFileError {
     BankFileError::Content {
         path,
-        reason: reason.into(),
+        reason: one_line(reason, MESSAGE),
         remedy: AGAIN,
     }
 }

@@ -7,6 +7,7 @@ use crate::bank::{BankError, Draws, file};
 use crate::progress::Progress;
 use crate::work::WorkFolder;
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Missing shards that a message names.
@@ -90,12 +91,23 @@ fn listed(from: &[PathBuf]) -> Result<Vec<Shards>, ShardsError> {
 
 /// Who has shards 0 … `of` − 1; all must be there, and agree.
 fn holders(all: &[Shards], of: usize) -> Result<Vec<&Shards>, ShardsError> {
+    // What is there is counted before anything is made for every shard: a manifest may speak of far more.
+    let there: BTreeSet<usize> = (all.iter().flat_map(|s| s.there.keys().copied())).collect();
+    if there.len() < of {
+        let absent = (0..of).filter(|number| !there.contains(number));
+        let mut missing: Vec<String> = absent.take(NAMED + 1).map(|n| n.to_string()).collect();
+        let more = if missing.len() > NAMED { ", …" } else { "" };
+        missing.truncate(NAMED);
+        return Err(ShardsError::Missing {
+            there: there.len(),
+            of,
+            missing: format!("{}{more}", missing.join(", ")),
+        });
+    }
     let mut found = Vec::with_capacity(of);
-    let mut missing = Vec::new();
-    for number in 0..of {
+    for number in there {
         let mut holders = all.iter().filter(|s| s.there.contains_key(&number));
         let Some(holder) = holders.next() else {
-            missing.push(number.to_string());
             continue;
         };
         if let Some(other) = holders.find(|s| s.there.get(&number) != holder.there.get(&number))
@@ -105,14 +117,5 @@ fn holders(all: &[Shards], of: usize) -> Result<Vec<&Shards>, ShardsError> {
         }
         found.push(holder);
     }
-    if missing.is_empty() {
-        return Ok(found);
-    }
-    let more = if missing.len() > NAMED { ", …" } else { "" };
-    missing.truncate(NAMED);
-    Err(ShardsError::Missing {
-        there: found.len(),
-        of,
-        missing: format!("{}{more}", missing.join(", ")),
-    })
+    Ok(found)
 }

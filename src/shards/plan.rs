@@ -65,7 +65,7 @@ pub struct Filled {
 }
 
 /// Rows of each shard of a bank, the last one excepted: a function of its size alone.
-fn rows_of_a_shard(size: usize) -> usize {
+pub(super) fn rows_of_a_shard(size: usize) -> usize {
     size.div_ceil(SHARES).clamp(FEWEST_ROWS, MOST_ROWS)
 }
 

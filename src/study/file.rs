@@ -2,12 +2,16 @@
 
 use crate::feature::FeatureRecipe;
 use crate::files::{folder, with_remedy};
+use crate::foreign::{MESSAGE, check_names, one_line, read_text};
 use crate::study::plan::InputPlan;
 use crate::twin::{CsvError, Effects, Interval, Level, read_drive};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+/// Longest study file, in bytes: a hundred times one that names every parameter and effect.
+const MOST: u64 = 1 << 20;
 
 /// What a study file holds; everything but `twin` is optional, unknown keys are refused.
 ///
@@ -136,7 +140,7 @@ pub enum StudyFileError {
         error: std::io::Error,
     },
     /// It is no study.
-    #[error("{}, line {line}: {message}", path.display())]
+    #[error("{}, line {line}: {message}; correct that line", path.display())]
     Syntax {
         /// File.
         path: PathBuf,
@@ -169,7 +173,7 @@ pub enum StudyFileError {
 impl StudyFile {
     /// Reads a study file. A relative input file is looked for beside it; its step and length become the study's.
     pub fn read(path: &Path) -> Result<Self, StudyFileError> {
-        let text = std::fs::read_to_string(path).map_err(|error| StudyFileError::Io {
+        let text = read_text(path, MOST).map_err(|error| StudyFileError::Io {
             path: path.into(),
             error,
         })?;
@@ -196,13 +200,24 @@ impl StudyFile {
 
     /// Parses the text of a study file; `path` is for messages.
     pub fn parse(text: &str, path: &Path) -> Result<Self, StudyFileError> {
-        toml::from_str(text).map_err(|error| StudyFileError::Syntax {
+        let wrong = |line, message: &str| StudyFileError::Syntax {
             path: path.into(),
-            line: error.span().map_or(1, |span| {
-                text[..span.start.min(text.len())].matches('\n').count() + 1
-            }),
-            message: error.message().replace('\n', " "),
-        })
+            line,
+            message: one_line(message, MESSAGE),
+        };
+        // Not every text comes from a file of its own: an estimator holds one, too.
+        if text.len() as u64 > MOST {
+            return Err(wrong(1, &format!("more than {} MiB of text", MOST >> 20)));
+        }
+        let syntax = |error: toml::de::Error| {
+            let at = error.span().map_or(0, |span| span.start);
+            let before = text.bytes().take(at);
+            wrong(before.filter(|b| *b == b'\n').count() + 1, error.message())
+        };
+        let file = toml::from_str(text).map_err(syntax)?;
+        let table = toml::from_str(text).map_err(syntax)?;
+        check_names(&table).map_err(|problem| wrong(1, &problem))?;
+        Ok(file)
     }
 }
 

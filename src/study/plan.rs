@@ -1,12 +1,13 @@
 //! What a simulated record looks like: step, length, input.
 
+use crate::foreign::MOST_NUMBERS;
 use crate::twin::{
     CsvError, Drive, DriveError, Interval, Noise, Record, Signal, Signals, read_drive,
 };
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Longest record that is simulated.
+/// Longest record that is simulated; as long as the longest that is read.
 const MOST_SAMPLES: usize = 50_000_000;
 
 /// Where the inputs of simulated records come from.
@@ -61,6 +62,16 @@ pub enum PlanError {
         "[record] samples = {0}; at most {MOST_SAMPLES} can be simulated: take a larger step or a shorter record"
     )]
     Samples(usize),
+    /// More numbers than any record has.
+    #[error(
+        "[record] samples = {samples} for {channels} inputs and outputs; at most {MOST_NUMBERS} numbers can be simulated: take a shorter record"
+    )]
+    Numbers {
+        /// Samples asked for.
+        samples: usize,
+        /// Inputs and outputs.
+        channels: usize,
+    },
     /// The twin has inputs, and nothing says which.
     #[error(
         "the twin has {0} inputs; say what they look like: [record] input = {{ levels = [low, high], hold = n }}, or a file"
@@ -114,9 +125,16 @@ impl RecordPlan {
     /// Makes ready what drives are drawn from; reads the input file, if one is named.
     pub fn prepare(&self, signals: &Signals) -> Result<DriveSource, PlanError> {
         let channels = signals.inputs.len();
+        let all = channels + signals.outputs.len();
         let fixed = match &self.input {
             Some(_) if channels == 0 => return Err(PlanError::Surplus),
             _ if self.samples > MOST_SAMPLES => return Err(PlanError::Samples(self.samples)),
+            _ if self.samples.saturating_mul(all) > MOST_NUMBERS => {
+                return Err(PlanError::Numbers {
+                    samples: self.samples,
+                    channels: all,
+                });
+            }
             None if channels == 0 => Some(Drive::autonomous(self.step, self.samples)?),
             None => return Err(PlanError::NoInput(channels)),
             Some(InputPlan::File(path)) => Some(self.read(path, channels)?),
@@ -124,11 +142,9 @@ impl RecordPlan {
                 if *hold == 0 {
                     return Err(PlanError::Hold);
                 }
-                // Step and ends are checked here, once, so that drawing cannot fail.
-                Drive::new(
-                    self.step,
-                    Signal::from_elem((self.samples, 1), levels.centre()),
-                )?;
+                // Step and ends are checked here, once, so that drawing cannot fail; one sample shows it.
+                let samples = self.samples.min(1);
+                Drive::new(self.step, Signal::from_elem((samples, 1), levels.centre()))?;
                 None
             }
         };

@@ -59,7 +59,10 @@ impl Drive {
             });
         }
         // Rows are read as slices in the simulation loop.
-        let inputs = inputs.as_standard_layout().into_owned();
+        let inputs = match inputs.is_standard_layout() {
+            true => inputs,
+            false => inputs.as_standard_layout().into_owned(),
+        };
         Ok(Self { dt, inputs })
     }
 

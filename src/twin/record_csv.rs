@@ -7,7 +7,13 @@ use super::record::column_names;
 use super::record_parquet;
 use super::{Drive, DriveError, Record, RecordError, Signal};
 use crate::files::{with_remedy, write_new};
+use crate::foreign::{MOST_NUMBERS, Rows, excerpt};
 use std::path::{Path, PathBuf};
+
+/// Longest record: a sample a millisecond for half a day.
+const MOST_SAMPLES: usize = 50_000_000;
+/// Most columns: t and a thousand inputs and outputs each.
+const MOST_COLUMNS: usize = 2001;
 
 /// What is wrong with a file: which file, where, which value, and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -65,6 +71,14 @@ pub enum CsvError {
         value: f64,
         /// Time expected.
         expected: f64,
+    },
+    /// More than any record has.
+    #[error("{}: {problem}; cut the record into shorter ones, or resample it", path.display())]
+    Size {
+        /// File.
+        path: PathBuf,
+        /// The limit that it exceeds.
+        problem: String,
     },
     /// Too few rows to know the step.
     #[error("{}: {rows} rows of data; at least 2 are needed to know the step", path.display())]
@@ -154,7 +168,7 @@ struct Table {
 impl Table {
     fn read(path: &Path) -> Result<Self, CsvError> {
         if path.extension().is_some_and(|e| e == "parquet") {
-            return Self::parse(record_parquet::csv_text(path)?.as_bytes(), path);
+            return record_parquet::with_rows(path, |rows| Self::parse(rows, path));
         }
         let file = std::fs::File::open(path).map_err(|error| CsvError::Io {
             path: path.into(),
@@ -180,10 +194,18 @@ impl Table {
     }
 
     fn parse(text: impl std::io::Read, path: &Path) -> Result<Self, CsvError> {
-        let mut reader = csv::ReaderBuilder::new()
-            .trim(csv::Trim::All)
-            .from_reader(text);
-        let header = reader.headers().map_err(|e| csv_error(path, e))?.clone();
+        let mut reader = Rows::new(text);
+        let header = reader.header().map_err(|e| csv_error(path, e))?;
+        let large = |problem: String| CsvError::Size {
+            path: path.into(),
+            problem,
+        };
+        if header.len() > MOST_COLUMNS {
+            let given = header.len();
+            return Err(large(format!(
+                "{given} columns, at most {MOST_COLUMNS} are read"
+            )));
+        }
         let (inputs, outputs) = channels(&header).map_err(|problem| CsvError::Header {
             path: path.into(),
             problem,
@@ -191,46 +213,48 @@ impl Table {
         let columns = 1 + inputs + outputs;
         // Where column j of the file goes in a row ordered t, u1, u2, …, y1, y2, ….
         let places: Vec<usize> = header.iter().map(|name| place(name, inputs)).collect();
-        let mut values = Vec::new();
+        // Numbers alone are kept, and each once: a record may fill half of the memory.
+        let (mut t, mut u, mut y) = (Vec::new(), Vec::new(), Vec::new());
+        let mut row = vec![0.0; columns];
         let mut cells = csv::StringRecord::new();
-        let mut rows = 0;
-        while reader
-            .read_record(&mut cells)
-            .map_err(|e| csv_error(path, e))?
-        {
-            let line = cells.position().map_or(rows + 2, |p| p.line() as usize);
-            values.resize(values.len() + columns, 0.0);
-            let row = &mut values[rows * columns..];
-            for ((cell, &place), name) in cells.iter().zip(&places).zip(&header) {
-                row[place] =
-                    (cell.parse::<f64>().ok().filter(|v| v.is_finite())).ok_or_else(|| {
-                        CsvError::Cell {
-                            path: path.into(),
-                            row: line,
-                            column: name.into(),
-                            value: cell.into(),
-                        }
-                    })?;
+        while reader.read(&mut cells).map_err(|e| csv_error(path, e))? {
+            if t.len() == MOST_SAMPLES {
+                return Err(large(format!("more than {MOST_SAMPLES} samples")));
             }
-            rows += 1;
+            if (t.len() + 1) * columns > MOST_NUMBERS {
+                return Err(large(format!("more than {MOST_NUMBERS} numbers")));
+            }
+            for ((cell, &place), name) in cells.iter().zip(&places).zip(&header) {
+                let number = cell.parse::<f64>().ok().filter(|v| v.is_finite());
+                row[place] = number.ok_or_else(|| CsvError::Cell {
+                    path: path.into(),
+                    row: cells.position().map_or(t.len() + 2, |p| p.line() as usize),
+                    column: name.into(),
+                    value: excerpt(cell),
+                })?;
+            }
+            t.push(row[0]);
+            u.extend_from_slice(&row[1..=inputs]);
+            y.extend_from_slice(&row[1 + inputs..]);
         }
+        let rows = t.len();
         if rows < 2 {
             return Err(CsvError::Short {
                 path: path.into(),
                 rows,
             });
         }
-        let all =
-            Signal::from_shape_vec((rows, columns), values).map_err(|error| CsvError::Header {
+        let dt = uniform_step(path, t)?;
+        let signal = |width: usize, values: Vec<f64>| {
+            Signal::from_shape_vec((rows, width), values).map_err(|error| CsvError::Header {
                 path: path.into(),
                 problem: error.to_string(),
-            })?;
-        let dt = uniform_step(path, all.column(0).iter().copied().collect())?;
-        let part = |from: usize, to: usize| all.slice(ndarray::s![.., from..to]).to_owned();
+            })
+        };
         Ok(Self {
             dt,
-            inputs: part(1, 1 + inputs),
-            outputs: part(1 + inputs, columns),
+            inputs: signal(inputs, u)?,
+            outputs: signal(outputs, y)?,
         })
     }
 }
@@ -279,7 +303,8 @@ fn channels(header: &csv::StringRecord) -> Result<(usize, usize), String> {
     };
     if let Some(name) = header.iter().find(|name| !known(name)) {
         return Err(format!(
-            "column \"{name}\" is not part of a record; name the columns t, u or u1,u2,…, y or y1,y2,… and remove others"
+            "column \"{}\" is not part of a record; name the columns t, u or u1,u2,…, y or y1,y2,… and remove others",
+            excerpt(name)
         ));
     }
     if header.iter().all(str::is_empty) {
@@ -288,8 +313,8 @@ fn channels(header: &csv::StringRecord) -> Result<(usize, usize), String> {
     if header.len() != expected.len() || !header.iter().any(|name| name == "t") {
         return Err(format!(
             "columns {} are not {}; t and each channel must stand there once",
-            header.iter().collect::<Vec<_>>().join(","),
-            expected.join(",")
+            excerpt(&header.iter().collect::<Vec<_>>().join(",")),
+            excerpt(&expected.join(","))
         ));
     }
     let mut names: Vec<_> = header.iter().collect();

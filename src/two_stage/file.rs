@@ -8,6 +8,7 @@ use super::readout::Readout;
 use super::{Calibration, Estimator, Scaler, Standardiser};
 use crate::feature::{FeatureError, FeatureRecipe};
 use crate::files::{replace, with_remedy, write_new};
+use crate::foreign::{MESSAGE, one_line, read};
 use crate::network::{NamedTensor, NetworkError};
 use crate::study::{PresetName, Settings, Study, StudyError, StudyFile, StudyFileError};
 use ndarray::Array2;
@@ -20,6 +21,8 @@ use std::sync::Arc;
 
 /// Layout of the file; raised when it changes.
 const SCHEMA: u32 = 2;
+/// Longest file, in bytes: a network of 250 million weights.
+const MOST: u64 = 1 << 30;
 /// Key of the JSON text in the container's metadata.
 const KEY: &str = "truetwin";
 /// Prefix of the network's tensors.
@@ -128,7 +131,7 @@ impl At<'_> {
     fn foreign(&self, reason: impl ToString) -> EstimatorFileError {
         EstimatorFileError::Foreign {
             path: self.0.into(),
-            reason: reason.to_string(),
+            reason: one_line(&reason.to_string(), MESSAGE),
         }
     }
     fn study(&self, error: impl Into<StudyError>) -> EstimatorFileError {
@@ -185,7 +188,7 @@ impl Estimator {
     /// Reads a file made for one of `studies`.
     pub fn load(path: &Path, studies: &[Study]) -> Result<Self, EstimatorFileError> {
         let at = At(path);
-        let bytes = std::fs::read(path).map_err(|e| at.io(e))?;
+        let bytes = read(path, MOST).map_err(|e| at.io(e))?;
         let (_, metadata) =
             SafeTensors::read_metadata(&bytes).map_err(|e| at.foreign(format!("{e:?}")))?;
         let text = (metadata.metadata().as_ref().and_then(|m| m.get(KEY)))
@@ -209,7 +212,7 @@ impl Estimator {
             let known: Vec<_> = studies.iter().map(Study::name).collect();
             return Err(EstimatorFileError::Twin {
                 path: path.into(),
-                twin: file.twin,
+                twin: one_line(&file.twin, MESSAGE),
                 known: known.join(", "),
             });
         };
@@ -218,16 +221,21 @@ impl Estimator {
         if names != header.names.join(", ") {
             return Err(EstimatorFileError::Parameters {
                 path: path.into(),
-                file: header.names.join(", "),
+                file: one_line(&header.names.join(", "), MESSAGE),
                 twin: names,
             });
         }
         let Some(architecture) = study.architecture(&header.architecture) else {
             return Err(EstimatorFileError::Architecture {
                 path: path.into(),
-                architecture: header.architecture,
+                architecture: one_line(&header.architecture, MESSAGE),
             });
         };
+        // A network has a head for each parameter: no header may have any other number made.
+        if header.outputs != header.names.len() {
+            let (outputs, names) = (header.outputs, header.names.len());
+            return Err(at.foreign(format!("{outputs} outputs for {names} parameters")));
+        }
         let weights = weights(&tensors);
         let network = (architecture.restore(header.inputs, header.outputs, &weights))
             .map_err(|error: NetworkError| at.foreign(error))?;
@@ -342,7 +350,7 @@ fn parse_header(at: &At<'_>, text: &str) -> Result<Header, EstimatorFileError> {
         }
         Some(schema) => Err(EstimatorFileError::Schema {
             path: at.0.into(),
-            found: schema as u32,
+            found: u32::try_from(schema).unwrap_or(u32::MAX),
         }),
         None => Err(at.foreign("its header has no schema")),
     }

@@ -3,6 +3,7 @@
 use super::WithheldError;
 use super::truth::Truth;
 use crate::files::sha256;
+use crate::foreign::check_file;
 use crate::twin::{Record, read_record, record_csv_text};
 use crate::work::{Manifest, NewWork, WorkError, WorkFolder};
 use serde::Serialize;
@@ -92,9 +93,10 @@ impl Folder {
 
     /// Reads a trial's record.
     pub fn record(&self, trial: usize, validation: bool) -> Result<Record, WithheldError> {
-        Ok(read_record(
-            &self.work.file(&record_name(trial, validation)),
-        )?)
+        self.work.part(RECORDS)?;
+        let path = self.work.file(&record_name(trial, validation));
+        check_file(&path).map_err(|error| WorkError::io(&path, error))?;
+        Ok(read_record(&path)?)
     }
 
     /// Opens the keys of so many trials, if they are still those that were sealed.

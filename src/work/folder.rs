@@ -2,6 +2,7 @@
 
 use super::Manifest;
 use crate::files::{NewFolder, folder, replace, sweep, with_remedy, write_new};
+use crate::foreign::{MESSAGE, check_folder, one_line, read_kept_text};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -9,6 +10,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 const MANIFEST: &str = "manifest.json";
+/// Longest file of a folder that is read whole, in bytes: the manifest of a bank of 10¹⁰ simulations is a tenth of it.
+const MOST: u64 = 1 << 28;
 
 /// A folder with the pieces of one call, which can be interrupted and gone on with, also by several processes at once.
 ///
@@ -163,7 +166,7 @@ impl WorkFolder {
     ///
     /// [`WorkError::Foreign`] for anything else.
     pub fn find(path: &Path, verb: &'static str) -> Result<(Self, Manifest), WorkError> {
-        let text = std::fs::read_to_string(path.join(MANIFEST)).ok();
+        let text = read_kept_text(&path.join(MANIFEST), MOST).ok();
         let found = text.and_then(|text| Manifest::parse(verb, &text));
         let path = path.to_owned();
         match found {
@@ -217,11 +220,22 @@ impl WorkFolder {
     /// [`WorkError::Io`].
     pub fn read(&self, name: &str) -> Result<String, WorkError> {
         let path = self.file(name);
-        std::fs::read_to_string(&path).map_err(|error| WorkError::io(&path, error))
+        read_kept_text(&path, MOST).map_err(|error| WorkError::io(&path, error))
     }
 
-    fn piece(&self, part: &str, number: usize) -> PathBuf {
-        self.file(part).join(format!("{number:04}.json"))
+    /// Where a part lies; a link that leads out of the folder is none.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError::Io`].
+    pub fn part(&self, part: &str) -> Result<PathBuf, WorkError> {
+        let path = self.file(part);
+        check_folder(&path).map_err(|error| WorkError::io(&path, error))?;
+        Ok(path)
+    }
+
+    fn piece(&self, part: &str, number: usize) -> Result<PathBuf, WorkError> {
+        Ok(self.part(part)?.join(format!("{number:04}.json")))
     }
 
     /// Piece `number` of a part, if it was kept; `fits` says what is wrong with it.
@@ -235,15 +249,15 @@ impl WorkFolder {
         number: usize,
         fits: impl FnOnce(&T) -> Result<(), &'static str>,
     ) -> Result<Option<T>, WorkError> {
-        let path = self.piece(part, number);
-        let text = match std::fs::read_to_string(&path) {
+        let path = self.piece(part, number)?;
+        let text = match read_kept_text(&path, MOST) {
             Ok(text) => text,
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
             Err(error) => return Err(WorkError::io(&path, error)),
         };
         let wrong = |reason: String| WorkError::Piece {
             path: path.clone(),
-            reason,
+            reason: one_line(&reason, MESSAGE),
         };
         let found: T = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
         fits(&found).map_err(|reason| wrong(reason.into()))?;
@@ -261,7 +275,7 @@ impl WorkFolder {
         number: usize,
         piece: &T,
     ) -> Result<(), WorkError> {
-        let path = self.piece(part, number);
+        let path = self.piece(part, number)?;
         let written = serde_json::to_string_pretty(piece)
             .map_err(io::Error::from)
             .and_then(|text| write_new(&path, format!("{text}\n").as_bytes()));
@@ -273,7 +287,7 @@ impl WorkFolder {
 
     /// Sweeps out what processes that died have left in a part whose pieces are all there.
     pub(super) fn sweep(&self, part: &str) -> Result<(), WorkError> {
-        let place = self.file(part);
+        let place = self.part(part)?;
         sweep(&place).map_err(|error| WorkError::io(&place, error))
     }
 }

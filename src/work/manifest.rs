@@ -1,7 +1,8 @@
 //! What a folder of work is about: what another call must say to go on with it.
 
 use super::WorkError;
-use crate::files::sha256;
+use crate::files::sha256_of;
+use crate::foreign::excerpt;
 use serde_json::{Map, Value};
 use std::path::Path;
 
@@ -90,8 +91,8 @@ impl Manifest {
             .map(|(key, there, here)| {
                 let (there, here) = (shown(there), shown(here));
                 match there.chars().count().max(here.chars().count()) <= SHORT {
-                    true => format!("{key} was {there}, now it is {here}"),
-                    false => format!("{key} was another"),
+                    true => excerpt(&format!("{key} was {there}, now it is {here}")),
+                    false => excerpt(&format!("{key} was another")),
                 }
             })
     }
@@ -111,8 +112,7 @@ fn shown(value: Option<&Value>) -> String {
 ///
 /// A file that cannot be read.
 pub fn checksum(path: &Path) -> Result<String, WorkError> {
-    let bytes = std::fs::read(path).map_err(|error| WorkError::io(path, error))?;
-    Ok(sha256(&bytes))
+    sha256_of(path).map_err(|error| WorkError::io(path, error))
 }
 
 #[cfg(test)]

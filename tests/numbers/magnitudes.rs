@@ -1,7 +1,7 @@
 //! The same system in other units: the same answers, up to the units.
 
 use crate::chain::{Chain, Units};
-use truetwin::baseline::{DualFilter, PredictionError};
+use truetwin::baseline::{DualFilter, DualStart, PredictionError};
 use truetwin::diagnose::{DiagnoseSettings, Diagnosis, diagnose};
 use truetwin::progress::Progress;
 use truetwin::twin::{Record, Signal};
@@ -120,7 +120,7 @@ fn baselines_do_not_depend_on_units() {
             state_walk: plain.state_walk * units.states.powi(2),
             parameter_walk: plain.parameter_walk * units.parameters.powi(2),
             measurement: plain.measurement * units.outputs,
-            ..plain
+            start: DualStart::Twin,
         };
         let dual = filter.run(&chain, &record, &start).unwrap();
         [converged.theta, few.theta, dual.theta]

@@ -2,12 +2,17 @@
 
 use super::FmuError;
 use super::description::{ModelDescription, Version};
+use super::unpack::{MOST_BYTES, unpack};
+use crate::foreign::read;
 use fmi::fmi2::import::Fmi2Import;
 use fmi::fmi3::import::Fmi3Import;
 use fmi::traits::FmiImport;
 use std::fs::File;
 use std::path::Path;
 use tempfile::TempDir;
+
+/// Longest description, in bytes: a hundred thousand variables take half of it.
+const MOST_DESCRIPTION: u64 = 1 << 26;
 
 /// An unpacked FMU; the folder goes with the value.
 pub(super) enum Archive {
@@ -25,12 +30,17 @@ pub(super) fn open(path: &Path) -> Result<(ModelDescription, TempDir), FmuError>
         path: path.into(),
         error,
     })?;
-    let mut archive = zip::ZipArchive::new(file).map_err(|error| at(error.to_string()))?;
     let folder = tempfile::Builder::new().prefix("truetwin-fmu-").tempdir();
     let folder = folder.map_err(|error| at(format!("no temporary folder: {error}")))?;
-    (archive.extract(folder.path())).map_err(|error| at(error.to_string()))?;
-    let bytes = std::fs::read(folder.path().join("modelDescription.xml"))
-        .map_err(|_| at("it holds no modelDescription.xml".into()))?;
+    unpack(file, folder.path(), MOST_BYTES).map_err(at)?;
+    let bytes = read(
+        &folder.path().join("modelDescription.xml"),
+        MOST_DESCRIPTION,
+    )
+    .map_err(|error| match error.kind() {
+        std::io::ErrorKind::NotFound => at("it holds no modelDescription.xml".into()),
+        _ => at(format!("modelDescription.xml: {error}")),
+    })?;
     let description = ModelDescription::parse(&text(bytes)).map_err(|problem| {
         let problem = format!("modelDescription.xml: {problem}");
         at(problem)

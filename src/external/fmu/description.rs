@@ -1,5 +1,6 @@
 //! What a model description says, of either version of the standard.
 
+use crate::foreign::{MESSAGE, one_line};
 use crate::study::{InputPlan, Levels, RecordPlan};
 use crate::twin::{Interval, Parameter, Quantity};
 use roxmltree::{Document, Node};
@@ -95,6 +96,10 @@ fn attribute<'a>(node: Node<'a, '_>, name: &str) -> Result<&'a str, String> {
 impl ModelDescription {
     /// From the file's text; the error says what is missing.
     pub fn parse(text: &str) -> Result<Self, String> {
+        Self::read(text).map_err(|problem| one_line(&problem, MESSAGE))
+    }
+
+    fn read(text: &str) -> Result<Self, String> {
         let document = Document::parse(text).map_err(|error| error.to_string())?;
         let root = document.root_element();
         if !root.has_tag_name("fmiModelDescription") {
@@ -130,6 +135,13 @@ impl ModelDescription {
             stop: time("stopTime")?,
             step: time("stepSize")?,
         };
+        // The loader makes a path of it.
+        if found.identifier.contains(['/', '\\', ':', '\0']) || found.identifier.starts_with('.') {
+            return Err(format!(
+                "modelIdentifier = \"{}\" is no name of a library",
+                found.identifier
+            ));
+        }
         found.read_variables(root)?;
         Ok(found)
     }
@@ -333,6 +345,11 @@ mod tests {
                 "modelIdentifier=\"mass\"",
                 "",
                 "no attribute modelIdentifier",
+            ),
+            (
+                "modelIdentifier=\"mass\"",
+                "modelIdentifier=\"../../mass\"",
+                "is no name of a library",
             ),
             (
                 "min=\"0\"",

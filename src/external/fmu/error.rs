@@ -16,7 +16,7 @@ pub enum FmuError {
         error: std::io::Error,
     },
     /// It is no FMU that can be used.
-    #[error("{}: no usable FMU: {problem}", path.display())]
+    #[error("{}: no usable FMU: {problem}; export it again", path.display())]
     Archive {
         /// File.
         path: PathBuf,

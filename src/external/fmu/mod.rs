@@ -5,7 +5,10 @@
 mod archive;
 mod description;
 mod error;
+#[doc(hidden)]
+pub mod fuzzing;
 mod instance;
+mod unpack;
 mod worker;
 
 pub use error::FmuError;
@@ -91,8 +94,10 @@ impl FmuTwin {
             &mut description.inputs,
             &mut description.outputs,
         ] {
-            list.iter_mut()
-                .for_each(|v| v.name = name::made_fit(&v.name));
+            for variable in list.iter_mut() {
+                variable.name = name::made_fit(&variable.name);
+                variable.unit = name::made_fit_unit(&variable.unit);
+            }
             let names = list.iter().map(|v| v.name.as_str());
             name::check_all("variables", names).map_err(variables)?;
         }

@@ -1,6 +1,7 @@
 //! What a program says about itself.
 
 use super::super::name;
+use crate::foreign::{MESSAGE, one_line};
 use crate::study::{InputPlan, RecordPlan, RecordTable};
 use crate::twin::{Interval, Parameter, ParameterSpace, Quantity, Signals};
 use serde::Deserialize;
@@ -54,7 +55,10 @@ struct ToldQuantity {
 impl Description {
     /// From the program's line; the error says what is wrong and what to write.
     pub fn parse(line: &str) -> Result<Self, String> {
-        let told: Told = serde_json::from_str(line).map_err(|error| error.to_string())?;
+        let told: Told = serde_json::from_str(line).map_err(|error| {
+            let problem = error.to_string();
+            one_line(&problem, MESSAGE)
+        })?;
         name::check(&told.name).map_err(|problem| format!("name: {problem}"))?;
         let names = |all: &[ToldQuantity]| all.iter().map(|q| q.name.clone()).collect();
         let parameters: Vec<String> = told.parameters.iter().map(|p| p.name.clone()).collect();
@@ -68,6 +72,10 @@ impl Description {
                 return Err(format!("{} {what}; at most {MOST} are read", names.len()));
             }
             name::check_all(what, names.iter().map(String::as_str))?;
+        }
+        let quantities = told.inputs.iter().chain(&told.outputs).map(|q| &q.unit);
+        for unit in told.parameters.iter().map(|p| &p.unit).chain(quantities) {
+            name::check_unit(unit)?;
         }
         if told.outputs.is_empty() {
             return Err("no output; name at least one".into());
@@ -151,6 +159,7 @@ mod tests {
         for (from, to, part) in [
             ("\"name\": \"lag\",", "", "missing field `name`"),
             ("\"lag\"", "\"a lag\"", "\"a lag\" holds ' '"),
+            ("\"s\"", "\"\\u001b[2J\"", "the unit \"\\u{1b}[2J\" holds"),
             ("\"k\"", "\"tau\"", "parameters: tau stands there twice"),
             ("[1, 3]", "[3, 1]", "turned inside out"),
             ("[0.1, 9]", "[2, 9]", "leaves its bounds"),

@@ -21,6 +21,8 @@
 mod command;
 mod description;
 mod error;
+#[doc(hidden)]
+pub mod fuzzing;
 mod health;
 mod pool;
 mod protocol;

@@ -4,8 +4,8 @@ use super::super::lending::Lending;
 use super::command::ProgramCommand;
 use super::description::Description;
 use super::protocol::{self, LONGEST_DESCRIPTION};
-use super::text::excerpt;
 use super::worker::{Trouble, Worker};
+use crate::foreign::excerpt;
 use std::time::{Duration, Instant};
 
 /// Least time for a start: imports and licences take longer than a simulation.

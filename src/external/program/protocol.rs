@@ -1,6 +1,6 @@
 //! The lines that go to a program and come from it.
 
-use super::text::excerpt;
+use crate::foreign::{MESSAGE, excerpt, one_line};
 use crate::twin::{Drive, Quantity, Signal, Signals};
 use serde::{Deserialize, Serialize, Serializer};
 use std::collections::BTreeMap;
@@ -103,6 +103,7 @@ pub(super) fn answer(
     let told: Told = match serde_json::from_str(line) {
         Ok(told) => told,
         Err(error) => serde_json::from_str(&finite_only(line)).map_err(|_| {
+            let error = one_line(&error.to_string(), MESSAGE);
             format!("{error}; write answers alone to standard output, one line each, and all else to standard error")
         })?,
     };

@@ -1,18 +1,9 @@
 //! Pieces of foreign text, fit for a one-line message.
 
-/// Longest piece that a message quotes, in characters.
-const QUOTED: usize = 160;
+use crate::foreign::hidden;
+
 /// Longest end of standard error that a message quotes, in characters.
 const LAST_WORDS: usize = 400;
-
-/// The beginning of `text` in one line, without control characters.
-pub(super) fn excerpt(text: &str) -> String {
-    let line = one_line(text);
-    match line.char_indices().nth(QUOTED) {
-        Some((end, _)) => format!("{} …", &line[..end]),
-        None => line,
-    }
-}
 
 /// The end of what a program wrote to standard error, in one line; its lines are parted by ` | `.
 pub(super) fn last_words(bytes: &[u8]) -> String {
@@ -30,7 +21,7 @@ pub(super) fn last_words(bytes: &[u8]) -> String {
 
 fn one_line(text: &str) -> String {
     let plain: String = (text.chars())
-        .map(|c| if c.is_control() { ' ' } else { c })
+        .map(|c| if hidden(c) { ' ' } else { c })
         .collect();
     plain.split_whitespace().collect::<Vec<_>>().join(" ")
 }
@@ -41,8 +32,6 @@ mod tests {
 
     #[test]
     fn pieces_are_short_and_in_one_line() {
-        assert_eq!(excerpt(" a\n\u{1b}[31mb\t "), "a [31mb");
-        assert_eq!(excerpt(&"ä".repeat(500)).chars().count(), QUOTED + 2);
         assert_eq!(
             last_words(b"Traceback:\n  File x\n\nValueError: no\n"),
             "Traceback: | File x | ValueError: no"

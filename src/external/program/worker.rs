@@ -1,7 +1,8 @@
 //! One running copy of a program, asked line by line.
 
 use super::command::ProgramCommand;
-use super::text::{excerpt, last_words};
+use super::text::last_words;
+use crate::foreign::excerpt;
 use std::io::{self, Read, Write};
 use std::process::{Child, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};

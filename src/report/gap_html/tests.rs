@@ -278,3 +278,39 @@ fn absurd_numbers_and_hostile_names_stay_short_and_harmless() {
     );
     assert!(page.contains("a&amp;b@&quot;x&quot;"));
 }
+
+/// Names may come from a program or an FMU: on a page they are text, whatever they hold.
+#[test]
+fn hostile_names_are_text_on_the_page() {
+    const HOSTILE: &str = "<script>alert(1)</script><img src=x onerror=\"alert(2)\">'&\u{1b}[2J";
+    for mut found in [
+        made::tanks_class(),
+        made::rig_pair(),
+        made::oscillator_none(),
+    ] {
+        let hostile = || HOSTILE.to_owned();
+        found.twin = hostile();
+        for parameter in &mut found.parameters {
+            (parameter.name, parameter.unit) = (hostile(), hostile());
+        }
+        found.place.target = found.place.target.as_ref().map(|_| hostile());
+        for window in &mut found.place.maps.windows {
+            window.channel = hostile();
+        }
+        for region in &mut found.place.maps.regions {
+            region.variable = hostile();
+        }
+        for effect in &mut found.which.effects {
+            effect.target = hostile();
+        }
+        for key in (found.which.accepted.iter_mut()).chain(&mut found.which.class) {
+            *key = hostile();
+        }
+        found.not_tested = vec![hostile()];
+        let page = gap_html(&oscillator(), &found);
+        let elements = balanced(&page);
+        assert!(!elements.iter().any(|e| e == "script" || e == "img"));
+        assert!(!page.contains('\u{1b}'));
+        assert!(page.contains("&lt;script&gt;"));
+    }
+}

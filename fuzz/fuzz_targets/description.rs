@@ -1,0 +1,8 @@
+#![no_main]
+
+#[path = "../../tests/fuzz/readers.rs"]
+mod readers;
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| {
+    readers::hold("description", readers::description, data);
+});

@@ -1,0 +1,11 @@
+//! What only a whole FMU reaches otherwise, for the fuzz tests. No part of the library's interface.
+
+use super::description::{ModelDescription, Variable};
+
+/// Reads a text as a `modelDescription.xml`.
+pub fn description(text: &str) -> Result<(), String> {
+    let found = ModelDescription::parse(text)?;
+    let parameters: Vec<_> = found.parameters.iter().map(Variable::parameter).collect();
+    let _ = (found.plan(), parameters);
+    Ok(())
+}

@@ -1,0 +1,124 @@
+//! Foreign text, fit for a terminal and for a message of one line.
+
+use std::borrow::Cow;
+
+/// Longest piece that a message quotes, in characters.
+const QUOTED: usize = 160;
+/// Longest name or path in a study or effect file, in characters.
+const LONGEST: usize = 1000;
+
+/// Whether a character steers what is around it instead of being seen: controls of terminals (U+009B alone begins an escape
+/// sequence), marks that turn the direction of writing, and those without width.
+pub(crate) fn hidden(c: char) -> bool {
+    c.is_control()
+        || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
+}
+
+/// Text for a terminal: lines stay lines, every other hidden character is a replacement character.
+pub(crate) fn printable(text: &str) -> Cow<'_, str> {
+    let odd = |c: char| hidden(c) && c != '\n';
+    match text.contains(odd) {
+        false => Cow::Borrowed(text),
+        true => Cow::Owned(text.replace(odd, "\u{fffd}")),
+    }
+}
+
+/// The beginning of `text` in one line, without hidden characters.
+pub(crate) fn excerpt(text: &str) -> String {
+    one_line(text, QUOTED)
+}
+
+/// As [`excerpt`], with `most` characters: for messages of parsers, which list what they know.
+pub(crate) fn one_line(text: &str, most: usize) -> String {
+    let (mut line, mut length, mut space) = (String::new(), 0, false);
+    for c in text.chars() {
+        if hidden(c) || c.is_whitespace() {
+            space = !line.is_empty();
+            continue;
+        }
+        if length >= most {
+            line.push_str(" …");
+            break;
+        }
+        if std::mem::take(&mut space) {
+            line.push(' ');
+            length += 1;
+        }
+        line.push(c);
+        length += 1;
+    }
+    line
+}
+
+/// Whether every key and text of a TOML table can be shown as a name; else what cannot.
+pub(crate) fn check_names(table: &toml::Table) -> Result<(), String> {
+    table.iter().try_for_each(|(key, value)| {
+        check_name(key)?;
+        check_value(value)
+    })
+}
+
+/// No deeper than the parser lets tables be nested.
+fn check_value(value: &toml::Value) -> Result<(), String> {
+    match value {
+        toml::Value::String(text) => check_name(text),
+        toml::Value::Array(values) => values.iter().try_for_each(check_value),
+        toml::Value::Table(table) => check_names(table),
+        _ => Ok(()),
+    }
+}
+
+fn check_name(name: &str) -> Result<(), String> {
+    if name.chars().count() > LONGEST {
+        let begin = excerpt(name);
+        return Err(format!(
+            "\"{begin}\" has more than {LONGEST} characters; shorten it"
+        ));
+    }
+    match name.chars().find(|c| hidden(*c)) {
+        Some(c) => Err(format!(
+            "\"{}\" holds the hidden character {c:?}; leave it out",
+            excerpt(name)
+        )),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn excerpts_are_short_and_in_one_line() {
+        assert_eq!(excerpt(" a\n\u{1b}[31mb\t "), "a [31mb");
+        assert_eq!(excerpt(&"ä".repeat(500)).chars().count(), QUOTED + 2);
+        assert_eq!(excerpt("a\u{202e}b"), "a b");
+        assert_eq!(excerpt(&" ".repeat(500)), "");
+    }
+
+    #[test]
+    fn names_that_cannot_be_shown_are_found_wherever_they_stand() {
+        let check = |text: &str| check_names(&toml::from_str(text).unwrap());
+        assert_eq!(check("a = 1\n[b]\n\"µ.c\" = ['x y', 2.0]"), Ok(()));
+        for bad in [
+            "\"a\\u001B\" = 1",
+            "a = [[{ b = \"\\n\" }]]",
+            "a.\"\\u202E\".b = 1",
+        ] {
+            let problem = check(bad).unwrap_err();
+            assert!(
+                problem.contains("hidden") && !problem.contains(hidden),
+                "{problem}"
+            );
+        }
+        let long = format!("{} = 1", "a".repeat(1001));
+        assert!(check(&long).unwrap_err().contains("more than 1000"));
+    }
+
+    #[test]
+    fn nothing_that_steers_a_terminal_is_printed() {
+        assert_eq!(printable("k1 = 3 µm²\n"), "k1 = 3 µm²\n");
+        let hostile = "\u{1b}[2J \u{9b}31m \u{202e}gpj.exe\r\u{7}\u{feff}";
+        assert!(!printable(hostile).contains(hidden), "{hostile:?}");
+    }
+}
