@@ -50,3 +50,41 @@ fn quoted_messages_are_in_the_sources() {
     }
     assert!(checked > 30, "{checked}");
 }
+
+/// Every `module::Name` in a page is one of the sources: the module, and the name.
+#[test]
+fn names_of_the_code_are_there() {
+    let mut all = String::new();
+    sources(&root().join("src"), &mut all);
+    let mut checked = 0;
+    for page in pages() {
+        for code in super::prose(&read(&page)).1 {
+            let name = code.strip_prefix("truetwin::").unwrap_or(&code);
+            let parts: Vec<&str> = name.split("::").collect();
+            let word = |part: &&str| part.chars().all(|c| c.is_alphanumeric() || c == '_');
+            if parts.len() < 2 || !parts.iter().all(word) {
+                continue;
+            }
+            let last = parts[parts.len() - 1];
+            let kinds = [
+                "fn", "struct", "enum", "trait", "mod", "type", "const", "pub",
+            ];
+            let declared = kinds
+                .iter()
+                .any(|kind| all.contains(&format!("{kind} {last}")));
+            let variant =
+                all.contains(&format!("    {last},")) || all.contains(&format!("    {last} {{"));
+            let exported = all.contains(&format!("{last},")) || all.contains(&format!("{last}}}"));
+            let module = parts[0].chars().next().unwrap().is_uppercase()
+                || root().join("src").join(parts[0]).exists()
+                || root().join(format!("src/{}.rs", parts[0])).exists();
+            assert!(
+                module && (declared || variant || exported),
+                "{}: {code}",
+                page.display()
+            );
+            checked += 1;
+        }
+    }
+    assert!(checked > 40, "{checked}");
+}
