@@ -61,7 +61,9 @@ fn names_of_the_code_are_there() {
         for code in super::prose(&read(&page)).1 {
             let name = code.strip_prefix("truetwin::").unwrap_or(&code);
             let parts: Vec<&str> = name.split("::").collect();
-            let word = |part: &&str| part.chars().all(|c| c.is_alphanumeric() || c == '_');
+            let word = |part: &&str| {
+                !part.is_empty() && part.chars().all(|c| c.is_alphanumeric() || c == '_')
+            };
             if parts.len() < 2 || !parts.iter().all(word) {
                 continue;
             }

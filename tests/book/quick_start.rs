@@ -76,7 +76,7 @@ fn the_quick_start_prints_what_it_shows() {
         let messages = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{call}: {messages}");
         let printed = timeless(&printed);
-        for part in shown
+        for part in format!("\n{shown}")
             .split("\n…\n")
             .map(timeless)
             .filter(|part| !part.is_empty())
