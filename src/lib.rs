@@ -74,7 +74,5 @@ pub mod report;
 
 pub mod cli;
 
-/// The code in the README compiles.
 #[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;
+mod book;

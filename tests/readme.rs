@@ -1,4 +1,4 @@
-//! What the README shows is what there is.
+//! What the README shows is what there is; its links and calls are tested with the book's (`tests/book`).
 
 use std::fs;
 use std::path::Path;
@@ -16,23 +16,4 @@ fn the_code_is_the_template() {
     let template = file("examples/own_twin.rs");
     assert_eq!(code, template);
     assert!(template.lines().count() < 60, "short enough to be read");
-}
-
-/// Files that the README points to exist.
-#[test]
-fn links_lead_somewhere() {
-    let readme = file("README.md");
-    let links = readme
-        .split("](")
-        .skip(1)
-        .map(|rest| rest.split(')').next().unwrap());
-    let local: Vec<&str> = links.filter(|link| !link.starts_with("http")).collect();
-    assert!(local.len() > 10);
-    for link in local {
-        let path = link.split('#').next().unwrap();
-        assert!(
-            Path::new(env!("CARGO_MANIFEST_DIR")).join(path).exists(),
-            "{link}"
-        );
-    }
 }

@@ -1,0 +1,79 @@
+//! The book's contents.
+
+use super::{Piece, pages, pieces, read, root};
+use std::collections::BTreeSet;
+
+/// The table of contents lists every page, once, and no other.
+#[test]
+fn every_page_is_listed() {
+    let summary = read(&root().join("docs/SUMMARY.md"));
+    let listed: Vec<&str> = (summary.split("](").skip(1))
+        .map(|rest| rest.split(')').next().unwrap())
+        .collect();
+    let once: BTreeSet<&str> = listed.iter().copied().collect();
+    assert_eq!(once.len(), listed.len(), "a page is listed twice");
+    let there: BTreeSet<String> = (pages().iter())
+        .map(|page| page.file_name().unwrap().to_str().unwrap().to_owned())
+        .filter(|name| name != "README.md" && name != "SUMMARY.md")
+        .collect();
+    assert_eq!(once, there.iter().map(String::as_str).collect());
+}
+
+/// Rust of the pages is compiled: as a doctest, or as the example that the page includes.
+#[test]
+fn code_is_compiled() {
+    let doctests = read(&root().join("src/book.rs"));
+    let mut checked = 0;
+    for page in pages() {
+        let name = page.file_name().unwrap().to_str().unwrap();
+        for piece in pieces(&read(&page)) {
+            let Piece::Block { language, text } = piece else {
+                continue;
+            };
+            if language == "rust,ignore" {
+                assert!(
+                    text.starts_with("{{#include ../examples/"),
+                    "{name}: {text}"
+                );
+            } else if language.starts_with("rust") && name != "README.md" {
+                assert!(
+                    doctests.contains(&format!("\"../docs/{name}\"")),
+                    "{name} in src/book.rs"
+                );
+            }
+            if let Some(include) = text.trim().strip_prefix("{{#include ../") {
+                let file = include.trim_end_matches("}}").split(':').next().unwrap();
+                assert!(root().join(file).exists(), "{name} includes {file}");
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked > 5);
+}
+
+/// The list of effects is that of the library, which a test of the library holds to the code.
+#[test]
+fn effects_are_those_of_the_library() {
+    let rows = |path: &str, prefix: &str| -> Vec<String> {
+        (read(&root().join(path)).lines())
+            .filter_map(|line| line.strip_prefix(prefix))
+            .filter(|row| row.starts_with("| `"))
+            .map(str::to_owned)
+            .collect()
+    };
+    let library = rows("src/effect/mod.rs", "//! ");
+    assert!(library.len() >= 30);
+    let page = read(&root().join("docs/choosing-effects.md"));
+    let list = page
+        .split("## The list")
+        .nth(1)
+        .unwrap()
+        .split("\n## ")
+        .next()
+        .unwrap();
+    let listed: Vec<&str> = list
+        .lines()
+        .filter(|line| line.starts_with("| `"))
+        .collect();
+    assert_eq!(listed, library);
+}
