@@ -1,60 +1,89 @@
 //! `pretrain`: bank and network, into one file.
 
-use super::args::PretrainArguments;
-use super::{Context, Failure, output};
+use super::args::{PresetArgument, Subject};
+use super::{Context, Failure, Verb, output};
 use crate::bank::file;
 use crate::network::History;
 use crate::shards::{BankPlan, ShardedBank};
 use crate::study::Study;
 use crate::two_stage::{Estimator, PretrainOptions, pretrain, pretrain_on};
+use clap::Args;
 use serde_json::json;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-pub(super) fn run(context: &Context<'_>, options: &PretrainArguments) -> Result<ExitCode, Failure> {
-    output::check_new(&options.out)?;
-    let study = context.study(&options.subject)?;
-    let clock = Instant::now();
-    let settings = PretrainOptions {
-        preset: options.preset.into(),
-        bank_size: options.bank_size,
-        epochs: options.epochs,
-        seed: context.seed,
-    };
-    let (estimator, history) = match &options.bank {
-        None => pretrain(&study, &settings, context.progress)?,
-        Some(path) => from_bank(context, &study, path, &settings)?,
-    };
-    estimator.save(&options.out)?;
-    let seconds = clock.elapsed().as_secs_f64();
-    let bank = estimator.settings().bank_size;
-    let loss = history.training.last().copied().unwrap_or(f64::NAN);
-    if context.json {
-        output::print_json(&json!({
-            "schema": "truetwin.pretrain/1",
-            "twin": study.name(),
-            "estimator": options.out,
-            "preset": estimator.preset(),
-            "bank_size": bank,
-            "features": estimator.network().inputs(),
-            "epochs": history.epochs_run,
-            "loss": if loss.is_finite() { Some(loss) } else { None },
-            "seed": context.seed,
-            "seconds": seconds,
-        }))?;
-    } else {
-        output::print(&format!(
-            "{}: estimator of {} from {bank} simulations, {} features, {} epochs, loss {loss:.4}, {seconds:.1} s\n\
-             next: truetwin estimate RECORD.csv --estimator {}",
-            options.out.display(),
-            study.twin().parameters().names().join(", "),
-            estimator.network().inputs(),
-            history.epochs_run,
-            options.out.display(),
-        ))?;
+/// Simulate a bank from the prior, train the network, write one estimator file.
+#[derive(Debug, Args)]
+pub(super) struct Pretrain {
+    #[command(flatten)]
+    subject: Subject,
+    /// Where to write the estimator.
+    #[arg(long, value_name = "EST")]
+    out: PathBuf,
+    /// Simulations to train on; the preset's unless given.
+    #[arg(long, value_name = "M")]
+    bank_size: Option<usize>,
+    /// A bank to train on, instead of simulating one: a folder of `truetwin bank`, or an .npz or .csv file of theta and features.
+    #[arg(long, value_name = "BANK", conflicts_with = "bank_size")]
+    bank: Option<PathBuf>,
+    /// Passes over the bank; the preset's unless given.
+    #[arg(long)]
+    epochs: Option<usize>,
+    /// Recipe.
+    #[arg(long, value_enum, default_value = "default")]
+    preset: PresetArgument,
+}
+
+impl Verb for Pretrain {
+    fn subject(&self) -> Option<&Subject> {
+        Some(&self.subject)
     }
-    Ok(ExitCode::SUCCESS)
+
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        output::check_new(&self.out)?;
+        let study = context.study(&self.subject)?;
+        let clock = Instant::now();
+        let settings = PretrainOptions {
+            preset: self.preset.into(),
+            bank_size: self.bank_size,
+            epochs: self.epochs,
+            seed: context.seed,
+        };
+        let (estimator, history) = match &self.bank {
+            None => pretrain(&study, &settings, context.progress)?,
+            Some(path) => from_bank(context, &study, path, &settings)?,
+        };
+        estimator.save(&self.out)?;
+        let seconds = clock.elapsed().as_secs_f64();
+        let bank = estimator.settings().bank_size;
+        let loss = history.training.last().copied().unwrap_or(f64::NAN);
+        if context.json {
+            output::print_json(&json!({
+                "schema": "truetwin.pretrain/1",
+                "twin": study.name(),
+                "estimator": self.out,
+                "preset": estimator.preset(),
+                "bank_size": bank,
+                "features": estimator.network().inputs(),
+                "epochs": history.epochs_run,
+                "loss": if loss.is_finite() { Some(loss) } else { None },
+                "seed": context.seed,
+                "seconds": seconds,
+            }))?;
+        } else {
+            output::print(&format!(
+                "{}: estimator of {} from {bank} simulations, {} features, {} epochs, loss {loss:.4}, {seconds:.1} s\n\
+                 next: truetwin estimate RECORD.csv --estimator {}",
+                self.out.display(),
+                study.twin().parameters().names().join(", "),
+                estimator.network().inputs(),
+                history.epochs_run,
+                self.out.display(),
+            ))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
 }
 
 /// Of a bank that is there.
