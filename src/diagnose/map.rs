@@ -7,6 +7,7 @@ const NOTABLE: f64 = 0.1;
 
 /// Where the gap is.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Where {
     /// The most probable place of a structural gap.
     pub target: Option<String>,
@@ -25,6 +26,7 @@ pub struct Where {
 /// How innovations differ from those of simulations, cut in several ways. All p-values are corrected for all cells of all cuts
 /// together; shares add up to at most one in each list.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Maps {
     /// Windows of time, clearest first.
     pub windows: Vec<Window>,
@@ -40,6 +42,7 @@ pub struct Maps {
 
 /// The start of the first block of time that the twin, fitted to all before it, does not foresee.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Onset {
     /// Which record, from 0.
     pub record: usize,
@@ -53,6 +56,7 @@ pub struct Onset {
 
 /// A stretch of time.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Window {
     /// Which record, from 0.
     pub record: usize,
@@ -70,6 +74,7 @@ pub struct Window {
 
 /// A range of a variable.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Region {
     /// State, input, or output as predicted.
     pub variable: String,
@@ -85,6 +90,7 @@ pub struct Region {
 
 /// One output over the whole of all records.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Channel {
     /// Output.
     pub channel: String,
@@ -96,6 +102,7 @@ pub struct Channel {
 
 /// What an innovation still depends on.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Lag {
     /// Output.
     pub channel: String,
@@ -113,6 +120,7 @@ pub struct Lag {
 
 /// A band of frequencies.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Band {
     /// Output.
     pub channel: String,
@@ -128,6 +136,7 @@ pub struct Band {
 
 /// What an equation lacks, as a disturbance there that a smoother follows.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Equation {
     /// The state whose rate, or the output whose value, the equation gives.
     pub equation: String,
@@ -141,6 +150,7 @@ pub struct Equation {
 
 /// The missing term where a variable is in a range.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct TermRange {
     /// State or input.
     pub variable: String,

@@ -58,9 +58,8 @@ mod summary;
 mod variant;
 mod verdict;
 
-pub use gain::{gain_of, held_out_score};
-pub use held_out::SHORTEST_SPLIT;
-pub(crate) use held_out::held_out_from;
+pub(crate) use gain::{gain_of, held_out_score};
+pub(crate) use held_out::{SHORTEST_SPLIT, held_out_from};
 pub use map::{Band, Cell, Channel, Equation, Lag, Maps, Onset, Region, TermRange, Where, Window};
 pub use result::{
     Decision, Detection, Diagnosis, Discovery, EffectFit, FittedNuisance, FittedParameter,
@@ -71,6 +70,7 @@ pub use shrink::Shrinkage;
 
 use crate::filter::FilterError;
 use crate::progress::Cancelled;
+use crate::setting::SettingError;
 use crate::study::Study;
 use crate::twin::{DigitalTwin, EffectError, ParameterError, Record, RecordError, SimulationError};
 use std::fmt;
@@ -121,6 +121,7 @@ impl Default for DiagnoseSettings {
 
 /// Why there is no diagnosis.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum DiagnoseError {
     /// No record.
     #[error("no record was given; give at least one")]
@@ -146,15 +147,8 @@ pub enum DiagnoseError {
         least: usize,
     },
     /// A setting that cannot be used.
-    #[error("{name} = {value}; {remedy}")]
-    Setting {
-        /// Which.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// What it must be.
-        remedy: &'static str,
-    },
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// An effect to leave out that there is not.
     #[error(
         "--without names {0}, which is no effect of this twin; `truetwin effects --twin T` lists them"
@@ -208,6 +202,7 @@ impl DiagnoseError {
 
 /// One of the records that a diagnosis was given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum GivenRecord {
     /// Its place among the records, from 0.
     Measured(usize),

@@ -18,6 +18,7 @@ use super::verdict::absorbing;
 use super::{DiagnoseError, DiagnoseSettings, GivenRecord, Setting};
 use crate::math::six_digits;
 use crate::progress::Progress;
+use crate::setting::SettingError;
 use crate::study::Study;
 use crate::twin::{Noise, Record};
 use std::time::Instant;
@@ -272,30 +273,24 @@ pub(super) fn check(
             });
         }
     }
-    let setting = |name, value, remedy| {
-        Err(DiagnoseError::Setting {
-            name,
-            value,
-            remedy,
-        })
-    };
     let (alpha, replicates) = (settings.alpha, settings.replicates as f64);
-    if !(alpha > 0.0 && alpha < 1.0) {
-        return setting(
-            "alpha",
-            alpha,
-            "choose a level between 0 and 1, such as 0.05",
-        );
-    }
-    if (replicates + 1.0) * alpha <= 1.0 {
-        return setting("replicates", replicates, "take more than 1/alpha");
-    }
-    if settings.unexplained < 50 {
-        return setting(
-            "unexplained",
-            settings.unexplained as f64,
-            "take at least 50",
-        );
-    }
+    SettingError::unless(
+        alpha > 0.0 && alpha < 1.0,
+        "alpha",
+        alpha,
+        "choose a level between 0 and 1, such as 0.05",
+    )?;
+    SettingError::unless(
+        (replicates + 1.0) * alpha > 1.0,
+        "replicates",
+        replicates,
+        "take more than 1/alpha",
+    )?;
+    SettingError::unless(
+        settings.unexplained >= 50,
+        "unexplained",
+        settings.unexplained,
+        "take at least 50",
+    )?;
     Ok(())
 }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// What is wrong with an effect file: which file, where, and what to do.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum EffectFileError {
     /// The file cannot be read.
     #[error("{}: {error}; give the path of an effect file", path.display())]

@@ -15,6 +15,7 @@ use super::{FilterError, Kalman, States};
 ///
 /// Source: Särkkä, *Bayesian Filtering and Smoothing* (2013), chapter 9.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Smoothed {
     /// log p(y | θ), in nats.
     pub log_likelihood: f64,

@@ -94,6 +94,7 @@ fn tail(level: f64) -> Result<f64, BinomialError> {
 
 /// Why there is no interval.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum BinomialError {
     /// More successes than trials.
     #[error("count = {count} of {of}; there cannot be more successes than trials")]

@@ -22,11 +22,13 @@ mod svd;
 mod whitening;
 
 pub use clopper_pearson::{BinomialError, binomial_bounds, clopper_pearson};
-pub use difference::{DifferenceError, Stencil};
-pub use lagged::{Lagged, LaggedSignals};
-pub use least_squares::{Fit, LeastSquares, LeastSquaresError, Regressors};
+pub use difference::DifferenceError;
+pub(crate) use difference::Stencil;
+pub(crate) use lagged::{Lagged, LaggedSignals};
+pub use least_squares::LeastSquaresError;
+pub(crate) use least_squares::{Fit, LeastSquares, Regressors};
 pub use quantile::{QuantileError, median, quantile, rank_p_value};
 pub(crate) use rounding::six_digits;
 pub(crate) use solve::solve_above;
-pub use solve::{SolveError, TruncatedSolution, solve_truncated};
+pub(crate) use solve::{SolveError, solve_truncated};
 pub use whitening::{Whitening, WhiteningError};

@@ -86,6 +86,7 @@ pub fn rank_p_value(null: &[f64], observed: f64) -> f64 {
 
 /// Why there is no quantile.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum QuantileError {
     /// No values.
     #[error("a quantile of no values was asked for; at least one is needed")]

@@ -217,6 +217,7 @@ impl Draws {
 
 /// Why features cannot be whitened.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum WhiteningError {
     /// A covariance needs two draws.
     #[error("samples has {0} draws; a covariance needs at least 2, a good one 16 for each feature")]

@@ -10,9 +10,8 @@
 //! | see the twin beside the record | [`overlay_svg`] |
 //! | hand on, print or draw the scores of many records | [`reproduce_json`], [`reproduce_text`], [`mean_runs_svg`], [`first_run_svg`] |
 //! | hand on, print or show the scores of withheld trials | [`scorecard_json`], [`scorecard_text`], [`scorecard_html`] |
-//! | draw any other lines | [`chart`] |
 
-pub mod chart;
+mod chart;
 mod digits;
 mod estimate_json;
 mod estimate_text;
@@ -45,8 +44,9 @@ pub use gap_figures::{
     gap_terms_svg, gap_time_svg, gap_which_svg,
 };
 pub use gap_html::gap_html;
-pub use gap_json::{NEXT_INPUT, gap_json};
-pub use gap_text::{gap_text, verdict_sentence};
+pub(crate) use gap_json::NEXT_INPUT;
+pub use gap_json::gap_json;
+pub use gap_text::gap_text;
 pub use overlay::overlay_svg;
 pub use reproduce_figures::{first_run_svg, mean_runs_svg};
 pub use reproduce_json::reproduce_json;

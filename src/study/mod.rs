@@ -5,11 +5,10 @@ mod manifest;
 mod plan;
 mod settings;
 
+pub use crate::sample::CloudSampler;
 pub use file::{Library, RecordTable, StudyFile, StudyFileError};
 pub use plan::{DriveSource, InputPlan, Levels, PlanError, RecordPlan};
-pub use settings::{
-    CloudSampler, CloudSettings, Inputs, Preset, PresetName, Settings, SettingsError,
-};
+pub use settings::{CloudSettings, Inputs, Preset, PresetName, Settings};
 
 use crate::feature::{Ar, Arx, FeatureError, FeatureMap, FeatureRecipe, Score};
 use crate::network::{Architecture, Deep, HeadArchitecture, architecture};
@@ -56,7 +55,19 @@ impl std::fmt::Debug for Study {
 }
 
 /// Why there is no such study, or why a record does not belong to it.
+///
+/// ```
+/// use truetwin::study::{RecordPlan, Study, StudyError, StudyFile};
+/// use truetwin::twins::VanDerPol;
+///
+/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 300))?;
+/// let file = StudyFile::parse("twin = 'oscillator'\n[fixed]\nmu = 1.0", "S.toml".as_ref())?;
+/// let error: StudyError = study.configure(&file).unwrap_err();
+/// assert!(error.to_string().contains("mu"), "{error}");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum StudyError {
     /// Of the file.
     #[error(transparent)]

@@ -74,6 +74,16 @@ impl Noise {
 }
 
 /// Draws of one source of noise.
+///
+/// ```
+/// use truetwin::twin::Noise;
+///
+/// let mut source = Noise::new(1, "measured", 0).source("sensor");
+/// let mean = (0..10_000).map(|_| source.normal()).sum::<f64>() / 1e4;
+/// assert!(mean.abs() < 0.05);
+/// assert!((0.0..1.0).contains(&source.uniform()));
+/// assert!(source.happens(1.0));
+/// ```
 #[derive(Debug, Clone)]
 pub struct Source(Option<ChaCha8Rng>);
 

@@ -1,6 +1,7 @@
 //! The pretrained estimator.
 
-use super::{Calibration, Readout};
+use super::calibration::Calibration;
+use super::readout::Readout;
 use crate::bank::FeatureSimulator;
 use crate::feature::{FeatureError, FeatureRecipe};
 use crate::network::{Architecture, Network, NetworkError};
@@ -61,11 +62,6 @@ impl Estimator {
     /// The trained network.
     pub fn network(&self) -> &Arc<dyn Network> {
         self.readout.network()
-    }
-
-    /// The network with what stands around it.
-    pub fn readout(&self) -> &Readout {
-        &self.readout
     }
 
     /// Twin and features, with a call counter of its own.

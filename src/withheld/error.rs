@@ -10,6 +10,7 @@ use std::path::PathBuf;
 
 /// Why there is no scorecard.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum WithheldError {
     /// There is no world of this twin.
     #[error(

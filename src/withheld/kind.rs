@@ -6,6 +6,7 @@ use std::fmt;
 /// What may be wrong with the twin in a trial, and what is the right answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Kind {
     /// Nothing, θ inside the prior: no structural gap.
     None,

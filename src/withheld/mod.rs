@@ -37,4 +37,5 @@ pub use error::WithheldError;
 pub use kind::Kind;
 pub use row::Row;
 pub use run::{Sealed, Settings, Withheld};
-pub use score::{Count, KindScore, LEVEL, Range, Scorecard, StatedBin};
+pub(crate) use score::LEVEL;
+pub use score::{Count, KindScore, Range, Scorecard, StatedBin};

@@ -24,6 +24,7 @@ pub struct WorkFolder {
 
 /// Why a folder of work cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum WorkError {
     /// Something cannot be read or written.
     #[error("{}: {}", path.display(), with_remedy(error))]

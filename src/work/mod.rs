@@ -17,8 +17,9 @@ mod share;
 mod team;
 
 use crew::share_out;
-pub use folder::{NewWork, WorkError, WorkFolder};
-pub use manifest::{Manifest, checksum};
+pub(crate) use folder::NewWork;
+pub use folder::{WorkError, WorkFolder};
+pub(crate) use manifest::{Manifest, checksum};
 pub(crate) use pieces::{Piece, Pieces};
 pub use share::{Share, ShareError};
 pub use team::{Team, TeamError};

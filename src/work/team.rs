@@ -26,6 +26,7 @@ pub struct Team {
 
 /// Why the ranks cannot work together.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum TeamError {
     /// Ranks of a build that knows nothing of each other would all do the same.
     #[error(

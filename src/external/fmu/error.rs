@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 /// Why an FMU cannot be used as a twin.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FmuError {
     /// The file cannot be read.
     #[error("{}: {}", path.display(), with_remedy(error))]

@@ -5,6 +5,7 @@ use crate::study::StudyError;
 
 /// Why a program cannot be used as a twin.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ProgramError {
     /// The line names no program.
     #[error("the program \"{line}\": {problem}")]
