@@ -218,6 +218,8 @@ pub struct GateTest<'a> {
     pub progress: &'a Progress,
 }
 
+debug_by_name!(GateTest<'_>);
+
 impl GateTest<'_> {
     /// Simulates the null at `theta`.
     pub fn at(&self, theta: &[f64]) -> Result<Gate, GateError> {

@@ -91,6 +91,17 @@
     warn(clippy::print_stdout, clippy::print_stderr, clippy::unwrap_used)
 )]
 
+/// `Debug` by name, of types that hold what has no `Debug`: twins, maps, listeners.
+macro_rules! debug_by_name {
+    ($($type:ident $(<$life:lifetime>)?),+ $(,)?) => {
+        $(impl std::fmt::Debug for $type $(<$life>)? {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.debug_struct(stringify!($type)).finish_non_exhaustive()
+            }
+        })+
+    };
+}
+
 // Layers, lowest first; a module uses only what stands above it here (tests/layering.rs holds it so).
 pub mod setting;
 

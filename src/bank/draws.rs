@@ -25,6 +25,7 @@ const HOPELESS: f64 = 0.9;
 /// assert_eq!(draw.drive.samples(), 200);
 /// # Ok::<(), truetwin::twin::DriveError>(())
 /// ```
+#[derive(Debug, Clone)]
 pub struct Draw<'a> {
     /// Parameters.
     pub theta: Vec<f64>,

@@ -32,6 +32,8 @@ pub struct FeatureSimulator {
     map: Arc<dyn FeatureMap>,
 }
 
+debug_by_name!(FeatureSimulator);
+
 /// A twin that counts its calls.
 struct Counted {
     inner: Arc<dyn DigitalTwin>,

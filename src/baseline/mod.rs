@@ -10,13 +10,13 @@ mod dual_ekf;
 mod initialisation;
 mod prediction_error;
 
+pub use crate::optimise::{BoundsError, OptimiseError};
 pub use dual_ekf::{DualFilter, DualFiltered, DualStart};
 pub use initialisation::Initialisation;
 pub use prediction_error::{PredictionErrorFit, PredictionErrorMethod};
 
 use crate::filter::FilterError;
 use crate::math::DifferenceError;
-use crate::optimise::{BoundsError, OptimiseError};
 use crate::setting::SettingError;
 use crate::twin::{ParameterError, RecordError, SimulationError};
 

@@ -1,8 +1,8 @@
 //! The options of all verbs, and those that several share. What a verb has of its own stands in its file.
 
-use super::Command;
+use super::Command as Verbs;
 use crate::study::PresetName;
-use clap::{Args, Parser, ValueEnum};
+use clap::{Args, Command, CommandFactory, Parser, ValueEnum};
 use std::path::PathBuf;
 
 /// Calibrate a digital twin from a measured record, and be told when it cannot be trusted.
@@ -14,12 +14,11 @@ use std::path::PathBuf;
         The main job:   truetwin pretrain --twin tanks --out tanks.est\n                \
         truetwin estimate record.csv --estimator tanks.est --out result\n\
         Your simulator: truetwin check --program 'python3 model.py'   (docs/external-programs.md)\n\n\
-        Records are CSV: t (seconds, uniform), inputs u or u1,u2,…, outputs y or y1,y2,…\n\
-        Exit: 0 done, 2 the call or a file is wrong (one line says what, where and what to do), 1 anything else."
+        Records are CSV: t (seconds, uniform), inputs u or u1,u2,…, outputs y or y1,y2,…"
 )]
 pub(super) struct Arguments {
     #[command(subcommand)]
-    pub command: Command,
+    pub command: Verbs,
     /// Standard output is one JSON object.
     #[arg(long, global = true)]
     pub json: bool,
@@ -31,6 +30,22 @@ pub(super) struct Arguments {
     pub threads: Option<usize>,
     #[command(flatten)]
     pub external: External,
+}
+
+/// How a call ends; every `--help` says so.
+const EXIT: &str = "Exit: 0 done, 2 the call or a file is wrong (one line says what, where and what to do), 130 stopped by Ctrl-C, \
+     1 anything else.";
+
+/// The whole command line.
+pub(super) fn command() -> Command {
+    let with_exit = |command: Command| {
+        let text = match command.get_after_help() {
+            Some(text) => format!("{text}\n\n{EXIT}"),
+            None => EXIT.into(),
+        };
+        command.after_help(text)
+    };
+    with_exit(Arguments::command()).mut_subcommands(with_exit)
 }
 
 /// A twin from outside, for this call alone.

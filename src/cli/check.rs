@@ -2,15 +2,22 @@
 
 use super::args::Subject;
 use super::{Context, Failure, Verb, output};
+use crate::progress::Stage;
 use crate::study::PresetName;
-use crate::twin::Noise;
 use crate::twin::conformance::{Severity, check};
+use crate::twin::{
+    DigitalTwin, Drive, Noise, ParameterSpace, Signal, Signals, SimulationError, StateSpace,
+};
 use clap::Args;
 use serde_json::{Value, json};
 use std::process::ExitCode;
 
 /// Check a twin before any training: repeatable, paired noise, finite, identifiable.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+        truetwin check --twin tanks\n  \
+        truetwin check --program 'python3 model.py'\n\
+        Failures end with exit code 1. Next: truetwin pretrain with the same twin")]
 pub(super) struct Check {
     #[command(flatten)]
     subject: Subject,
@@ -26,7 +33,13 @@ impl Verb for Check {
         let drive = study
             .drives()?
             .draw(Noise::new(context.seed, "check input", 0))?;
-        let mut findings = check(study.twin().as_ref(), &drive, context.seed);
+        let twin = Watched {
+            twin: study.twin().as_ref(),
+            stage: context.progress.stage("runs", runs(study.twin().as_ref())),
+        };
+        let mut findings = check(&twin, &drive, context.seed);
+        twin.stage.finish();
+        context.progress.checkpoint().map_err(Failure::internal)?;
         if findings.iter().all(|f| f.severity < Severity::Failure) {
             findings.push(study.check_features(PresetName::Default, &drive, context.seed)?);
         }
@@ -56,5 +69,40 @@ impl Verb for Check {
         } else {
             ExitCode::SUCCESS
         })
+    }
+}
+
+/// About how many runs the checks make: corners of the prior, differences for each parameter; a black box's free run is the
+/// mean of 32.
+fn runs(twin: &dyn DigitalTwin) -> usize {
+    let d = twin.parameters().len();
+    let free = if twin.state_space().is_some() { 1 } else { 32 };
+    (1 << d.min(6)) + 2 * d * free + 4
+}
+
+/// A twin whose runs are counted on a bar, and can be stopped.
+struct Watched<'a> {
+    twin: &'a dyn DigitalTwin,
+    stage: Stage,
+}
+
+impl DigitalTwin for Watched<'_> {
+    fn parameters(&self) -> ParameterSpace {
+        self.twin.parameters()
+    }
+    fn signals(&self) -> Signals {
+        self.twin.signals()
+    }
+    fn state_space(&self) -> Option<&dyn StateSpace> {
+        self.twin.state_space()
+    }
+    fn simulate(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Signal, SimulationError> {
+        (self.stage.tick()).map_err(|stop| SimulationError::Fatal(stop.into()))?;
+        self.twin.simulate(theta, drive, noise)
     }
 }

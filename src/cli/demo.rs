@@ -15,6 +15,9 @@ const EPOCHS: usize = 40;
 
 /// Calibrate a twin to an embedded record, in seconds, to see what it looks like.
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+        truetwin demo --out demo\n\
+        Next: look at demo/overlay.svg, then truetwin twins")]
 pub(super) struct Demo {
     /// A twin by name; the first one that has a demo unless given.
     #[arg(long)]

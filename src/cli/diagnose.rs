@@ -16,6 +16,10 @@ use std::process::ExitCode;
 /// Needs no training. DIR holds report.json, report.html and, where another record would tell rivals apart,
 /// next-input.csv. Of a twin that shows no equations, only effects of sensors and actuators can be named.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+        truetwin diagnose R.csv --twin tanks --validation V.csv --out gap\n  \
+        truetwin diagnose R1.csv R2.csv --study S.toml --without sensor-bias,state-ceiling@h1 --out gap\n\
+        Next: open gap/report.html; docs/diagnosing-a-gap.md says how to read it")]
 pub(super) struct Diagnose {
     /// Measured records of one system; they share θ, but for unknown starts.
     #[arg(value_name = "R.csv", required = true)]

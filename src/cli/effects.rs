@@ -9,6 +9,9 @@ use std::process::ExitCode;
 
 /// List the effects that a twin may lack, with their targets and magnitudes.
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+        truetwin effects --twin tanks\n\
+        Next: give some to simulate --effect E.toml (docs/choosing-effects.md), or let truetwin diagnose find them")]
 pub(super) struct Effects {
     #[command(flatten)]
     subject: Subject,

@@ -13,6 +13,9 @@ use std::process::ExitCode;
 
 /// Estimate the parameters behind a measured record.
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+        truetwin estimate R.csv --estimator tanks.est --validation V.csv --out result\n\
+        Next, where the calibrated twin does not explain the record: truetwin diagnose R.csv")]
 pub(super) struct Estimate {
     /// The measured record.
     #[arg(value_name = "R.csv")]

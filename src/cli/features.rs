@@ -12,6 +12,8 @@ use std::process::ExitCode;
 
 /// Compress records to features, as a network would see them.
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+        truetwin features R1.csv R2.csv --twin tanks --out X.npy")]
 pub(super) struct Features {
     /// Records, measured or simulated.
     #[arg(value_name = "R.csv", required = true)]
@@ -39,6 +41,7 @@ impl Verb for Features {
         let recipe = &study.preset(self.preset.into()).features;
         let map = study.features(recipe.as_ref())?;
         let mut all = Vec::new();
+        let stage = context.progress.stage("records", self.records.len());
         for path in &self.records {
             let at = |failure: Failure| failure.within(path);
             let record = read_record(path)?;
@@ -47,6 +50,7 @@ impl Verb for Features {
                 .map_err(|error| at(error.into()))?;
             let features = map.extract(record.drive(), record.outputs());
             all.extend(features.map_err(|error| at(error.into()))?);
+            stage.tick().map_err(Failure::internal)?;
         }
         let features = Array2::from_shape_vec((self.records.len(), map.dim()), all)
             .map_err(Failure::internal)?;

@@ -10,6 +10,10 @@ use std::process::ExitCode;
 
 /// Put the banks of a job array together, or turn a bank into one .npz or .csv file.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+        truetwin merge bank-1 bank-2 --out bank\n  \
+        truetwin merge bank --out bank.npz\n\
+        Next: truetwin pretrain with --bank bank")]
 pub(super) struct Merge {
     /// Folders of one call of `truetwin bank`.
     #[arg(value_name = "DIR", required = true)]

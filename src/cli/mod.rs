@@ -41,7 +41,7 @@ use crate::progress::Progress;
 use crate::study::{Study, StudyError, StudyFile};
 use crate::work::{Share, Team};
 use args::{Arguments, Subject};
-use clap::{CommandFactory, FromArgMatches, Subcommand};
+use clap::{FromArgMatches, Subcommand};
 use failure::Failure;
 use std::ffi::OsString;
 use std::path::Path;
@@ -56,6 +56,16 @@ pub fn run<E: Into<StudyError>>(studies: impl IntoIterator<Item = Result<Study, 
 }
 
 /// Runs the command line `arguments`, the program's name first, over `studies`.
+///
+/// ```
+/// use std::process::ExitCode;
+/// use truetwin::study::{RecordPlan, Study};
+/// use truetwin::twins::VanDerPol;
+///
+/// let studies = [Study::new("mine", VanDerPol, RecordPlan::autonomous(0.05, 300))];
+/// let code = truetwin::cli::run_from(studies, ["mine", "twins", "--json"]);
+/// assert_eq!(code, ExitCode::SUCCESS);
+/// ```
 pub fn run_from<E: Into<StudyError>>(
     studies: impl IntoIterator<Item = Result<Study, E>>,
     arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>,
@@ -65,7 +75,7 @@ pub fn run_from<E: Into<StudyError>>(
         Err(error) => return Failure::from(error).report(),
     };
     let words: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
-    let matches = Arguments::command().try_get_matches_from(&words);
+    let matches = args::command().try_get_matches_from(&words);
     let parsed = match matches.and_then(|matches| Arguments::from_arg_matches(&matches)) {
         Ok(parsed) => parsed,
         Err(error) if !error.use_stderr() => {

@@ -15,6 +15,10 @@ use std::time::Instant;
 
 /// Simulate a bank from the prior, train the network, write one estimator file.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+        truetwin pretrain --twin tanks --out tanks.est\n  \
+        truetwin pretrain --study S.toml --bank bank --out mine.est\n\
+        Next: truetwin estimate R.csv --estimator tanks.est")]
 pub(super) struct Pretrain {
     #[command(flatten)]
     subject: Subject,

@@ -157,7 +157,9 @@ impl Verb for Reproduce {
         let json = reproduce_json(study, &plan, estimator.preset(), &scores);
         let text = reproduce_text(study, &plan, estimator.preset(), &scores);
         if let Some(folder) = &folder {
+            let stage = context.progress.stage("figures", 1);
             draw(folder, study, &plan, &runs)?;
+            stage.finish();
             folder.write("table.txt", &text)?;
             // Last: where it is, everything is.
             folder.write("reproduce.json", &format!("{json:#}\n"))?;

@@ -1,9 +1,9 @@
 //! `completions` and `man`: the command line at home in a shell, both made from the options themselves.
 
-use super::args::Arguments;
+use super::args;
 use super::{Context, Failure, Verb, output};
 use clap::builder::PossibleValuesParser;
-use clap::{Args, Command, CommandFactory};
+use clap::{Args, Command};
 use clap_complete::Shell;
 use clap_mangen::Man as Page;
 use serde_json::json;
@@ -106,7 +106,7 @@ fn command(context: &Context<'_>) -> Command {
     let names: Vec<String> = (context.studies.iter())
         .map(|study| study.name().to_owned())
         .collect();
-    (Arguments::command().name(context.program.to_owned())).mut_subcommands(|verb| {
+    (args::command().name(context.program.to_owned())).mut_subcommands(|verb| {
         let takes_twin = verb.get_arguments().any(|option| option.get_id() == "twin");
         match takes_twin {
             true => verb.mut_arg("twin", |option| {

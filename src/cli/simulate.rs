@@ -15,6 +15,10 @@ use std::process::ExitCode;
 
 /// Simulate a record.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+        truetwin simulate --twin van-der-pol --theta nu=3 --out R.csv\n  \
+        truetwin simulate --twin tanks --theta k1=0.6,k2=0.5,k3=0.55,k4=1 --effect E.toml --seed 4 --out R.csv\n\
+        Next: truetwin estimate R.csv --estimator EST, or truetwin diagnose R.csv --twin NAME --out gap")]
 pub(super) struct Simulate {
     #[command(flatten)]
     subject: Subject,

@@ -9,6 +9,9 @@ use std::process::ExitCode;
 
 /// List the twins: parameters, units, prior, bounds, channels.
 #[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+        truetwin twins\n\
+        Next: truetwin check --twin NAME, then truetwin pretrain --twin NAME --out NAME.est")]
 pub(super) struct Twins {}
 
 impl Verb for Twins {

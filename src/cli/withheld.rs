@@ -14,10 +14,10 @@ use std::process::ExitCode;
 /// Records come from simulators written apart from the twins. The SHA-256 of the key file is printed before the first
 /// diagnosis; keys are read once every answer is there. What each score means: docs/withheld.md.
 #[derive(Debug, Args)]
-#[command(
-    after_help = "DIR holds scorecard.json (as --json), scorecard.html, and what it takes to go on: manifest.json, seal.txt,\n\
-        keys.json, records, answers. Interrupted, the same call goes on where it stopped; another call is refused."
-)]
+#[command(after_help = "Example:\n  \
+        truetwin withheld --twin tanks --trials 100 --out trials\n\n\
+        DIR holds scorecard.json (as --json), scorecard.html, and what it takes to go on: manifest.json, seal.txt,\n\
+        keys.json, records, answers. Interrupted, the same call goes on where it stopped; another call is refused.")]
 pub(super) struct Withheld {
     #[command(flatten)]
     subject: Subject,

@@ -7,7 +7,6 @@ const NOTABLE: f64 = 0.1;
 
 /// Where the gap is.
 #[derive(Debug, Clone, PartialEq, Default)]
-#[non_exhaustive]
 pub struct Where {
     /// The most probable place of a structural gap.
     pub target: Option<String>,
@@ -26,7 +25,6 @@ pub struct Where {
 /// How innovations differ from those of simulations, cut in several ways. All p-values are corrected for all cells of all cuts
 /// together; shares add up to at most one in each list.
 #[derive(Debug, Clone, PartialEq, Default)]
-#[non_exhaustive]
 pub struct Maps {
     /// Windows of time, clearest first.
     pub windows: Vec<Window>,
@@ -42,7 +40,6 @@ pub struct Maps {
 
 /// The start of the first block of time that the twin, fitted to all before it, does not foresee.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct Onset {
     /// Which record, from 0.
     pub record: usize,
@@ -56,7 +53,6 @@ pub struct Onset {
 
 /// A stretch of time.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct Window {
     /// Which record, from 0.
     pub record: usize,
@@ -74,7 +70,6 @@ pub struct Window {
 
 /// A range of a variable.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct Region {
     /// State, input, or output as predicted.
     pub variable: String,
@@ -90,7 +85,6 @@ pub struct Region {
 
 /// One output over the whole of all records.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct Channel {
     /// Output.
     pub channel: String,
@@ -102,7 +96,6 @@ pub struct Channel {
 
 /// What an innovation still depends on.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct Lag {
     /// Output.
     pub channel: String,
@@ -120,7 +113,6 @@ pub struct Lag {
 
 /// A band of frequencies.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct Band {
     /// Output.
     pub channel: String,
@@ -136,7 +128,6 @@ pub struct Band {
 
 /// What an equation lacks, as a disturbance there that a smoother follows.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct Equation {
     /// The state whose rate, or the output whose value, the equation gives.
     pub equation: String,
@@ -150,7 +141,6 @@ pub struct Equation {
 
 /// The missing term where a variable is in a range.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct TermRange {
     /// State or input.
     pub variable: String,

@@ -59,7 +59,6 @@ impl Decision {
 
 /// Whether the twin, refitted, can have made the record.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
 pub struct Detection {
     /// p-value of the structural test; with a validation record, of rank and e-value together.
     pub p_value: f64,
@@ -75,7 +74,6 @@ pub struct Detection {
 
 /// One parameter of the twin.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct FittedParameter {
     /// Name.
     pub name: String,
@@ -95,7 +93,6 @@ pub struct FittedParameter {
 
 /// An unknown start, noise level or magnitude that the study itself estimates.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct FittedNuisance {
     /// State, output or magnitude.
     pub name: String,
@@ -109,7 +106,6 @@ pub struct FittedNuisance {
 
 /// A target, and how much speaks for it.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct TargetShare {
     /// State, `sensor`, `actuator` or parameter.
     pub target: String,
@@ -121,7 +117,6 @@ pub struct TargetShare {
 
 /// One listed effect, fitted.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct EffectFit {
     /// Id of the effect.
     pub id: String,
@@ -146,7 +141,6 @@ impl EffectFit {
 
 /// Which effect the twin lacks.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct Which {
     /// What is decided.
     pub decision: Decision,
@@ -166,7 +160,6 @@ pub struct Which {
 
 /// A record to measure next, so that rivals are told apart.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct NextInput {
     /// Inputs and length of it.
     pub drive: Drive,
@@ -182,7 +175,6 @@ pub struct NextInput {
 
 /// What a regression of the missing term found: exploratory, not a test.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct Discovery {
     /// The equation that lacks the term: a state or an output.
     pub equation: String,
@@ -202,7 +194,6 @@ pub struct Discovery {
 
 /// One term of a regression.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct Term {
     /// Such as `h1²` or `u`.
     pub name: String,
@@ -216,7 +207,6 @@ pub struct Term {
 
 /// The smallest magnitude of a listed effect that records like these reveal in 80 of 100 cases.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct Visible {
     /// Id of the effect.
     pub id: String,
@@ -230,7 +220,6 @@ pub struct Visible {
 
 /// Free runs beside a record, for pictures.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct FreeRuns {
     /// Instants, in seconds.
     pub times: Vec<f64>,
@@ -244,7 +233,6 @@ pub struct FreeRuns {
 
 /// Everything that a diagnosis found.
 #[derive(Debug, Clone)]
-#[non_exhaustive]
 pub struct Diagnosis {
     /// Name of the twin.
     pub twin: String,

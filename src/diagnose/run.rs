@@ -94,11 +94,14 @@ pub fn diagnose(
                 locate(&setting, &detected, found, &answer, alpha, noise, progress)?;
             place.after = after;
             if answer.decision == Decision::Class {
+                let stage = progress.stage("next input", 1);
                 next = next_input(bench, found, &answer.class, noise.child("next"))?;
+                stage.tick()?;
             }
         }
+        let stage = progress.stage("how far", 2);
         visible = power(bench, nulls, settings.alpha)?;
-        progress.checkpoint()?;
+        stage.tick()?;
         let found = found.as_deref();
         shrunk = shrinkage(
             &setting,
@@ -109,6 +112,7 @@ pub fn diagnose(
             settings,
             noise,
         )?;
+        stage.tick()?;
     }
     let last = step.as_ref().map_or(bench, |step| &step.bench);
     let space = setting.twin.parameters();

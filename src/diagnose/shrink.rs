@@ -19,7 +19,6 @@ const LEVEL: f64 = 0.9;
 
 /// Free-run errors before and after, on held-out data.
 #[derive(Debug, Clone)]
-#[non_exhaustive]
 pub struct Shrinkage {
     /// What is measured: [`Shrinkage::FREE_RUN`] or [`Shrinkage::LOG_SCORE`].
     pub metric: &'static str,

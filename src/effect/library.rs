@@ -7,6 +7,14 @@ use crate::twin::{
 };
 
 /// What an effect is, for people and tables.
+///
+/// ```
+/// use truetwin::effect::{Description, library};
+///
+/// let lag: Description = library().into_iter().find(|d| d.id == "sensor-lag").ok_or("it is listed")?;
+/// assert_eq!((lag.law.target(), lag.magnitudes[0].name), ("sensor", "tau"));
+/// # Ok::<(), &str>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Description {
@@ -34,6 +42,10 @@ pub fn described(effect: &dyn UnmodelledEffect) -> Description {
 }
 
 /// Every effect of the library, in the order of its table.
+///
+/// ```
+/// assert!(truetwin::effect::library().iter().any(|description| description.id == "state-ceiling"));
+/// ```
 pub fn library() -> Vec<Description> {
     (members().into_iter())
         .map(|member| {
@@ -53,6 +65,15 @@ pub fn library() -> Vec<Description> {
 ///
 /// Targets are the twin's own states and parameters, not the memories and magnitudes of effects already added.
 /// `cubic-stiffness` is offered where a state is the rate of another, which is found by probing the drift.
+///
+/// ```
+/// use truetwin::effect::applicable;
+/// use truetwin::twins::VanDerPol;
+///
+/// let possible = applicable(&VanDerPol);
+/// assert!(possible.iter().any(|effect| effect.target() == "x2"));
+/// assert!(possible.iter().all(|effect| effect.target() != "actuator")); // the oscillator has no input
+/// ```
 pub fn applicable(twin: &dyn DigitalTwin) -> Effects {
     let (equations, signals) = (twin.state_space(), twin.signals());
     let outline = equations.map(|twin| own(twin.outline()));

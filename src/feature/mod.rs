@@ -102,6 +102,8 @@ pub struct Centred {
     pub axes: DMatrix<f64>,
 }
 
+debug_by_name!(Centred);
+
 /// What study and estimator files hold of a feature map: `{ kind = "ar", order = 5 }`.
 ///
 /// Register an own recipe with `#[typetag::serde(name = "…")]`; the name is its `kind`.

@@ -88,6 +88,20 @@ impl Sink for Filtered {
 }
 
 /// Means and covariances of the states at each sample; N samples, n states in the order of the twin's outline.
+///
+/// ```
+/// use truetwin::filter::{FilterSettings, States, smooth};
+/// use truetwin::twin::{DigitalTwin, Drive, Noise, Record};
+/// use truetwin::twins::VanDerPol;
+///
+/// let drive = Drive::autonomous(0.05, 100)?;
+/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
+/// let record = Record::new(drive, outputs)?;
+///
+/// let states: States = smooth(&VanDerPol, &[1.5], &record, &FilterSettings::default())?.states;
+/// assert_eq!((states.means.dim(), states.covariances.dim()), ((100, 2), (100, 2, 2)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct States {

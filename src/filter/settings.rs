@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 /// let record = Record::new(drive, outputs)?;
 ///
 /// let points = FilterSettings::default();
-/// let extended = FilterSettings::default().method(Method::Extended);
+/// let extended = FilterSettings::default().with_method(Method::Extended);
 /// let difference = log_likelihood(&VanDerPol, &[1.5], &record, &points)?
 ///     - log_likelihood(&VanDerPol, &[1.5], &record, &extended)?;
 /// assert!(difference.abs() < 1.0); // little noise: nearly linear
@@ -80,7 +80,8 @@ impl Default for FilterSettings {
 
 impl FilterSettings {
     /// With another method.
-    pub fn method(mut self, method: Method) -> Self {
+    #[must_use]
+    pub fn with_method(mut self, method: Method) -> Self {
         self.method = method;
         self
     }
@@ -145,7 +146,10 @@ mod tests {
     #[test]
     fn files_say_only_what_differs() {
         let settings: FilterSettings = toml::from_str("method = \"extended\"").unwrap();
-        assert_eq!(settings, FilterSettings::default().method(Method::Extended));
+        assert_eq!(
+            settings,
+            FilterSettings::default().with_method(Method::Extended)
+        );
         assert!(toml::from_str::<FilterSettings>("kind = 1").is_err());
     }
 }

@@ -165,6 +165,18 @@ impl Stencil {
 }
 
 /// Why there is no finite-difference Jacobian.
+///
+/// ```
+/// use truetwin::filter::FilterError;
+/// use truetwin::math::DifferenceError;
+///
+/// /// Whether a filter's search failed for want of derivatives.
+/// fn no_derivative(error: &FilterError) -> bool {
+///     matches!(error, FilterError::Difference(_))
+/// }
+/// assert!(!no_derivative(&FilterError::Diverged { at: 3.0 }));
+/// # let _: fn(DifferenceError) -> FilterError = FilterError::from;
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DifferenceError {

@@ -205,6 +205,15 @@ impl<'a, R: Regressors> LeastSquares<'a, R> {
 }
 
 /// Why nothing could be fitted.
+///
+/// ```
+/// use truetwin::feature::FeatureError;
+/// use truetwin::math::LeastSquaresError;
+///
+/// // What features say when their regression fails.
+/// let error = FeatureError::from(LeastSquaresError::NotFinite);
+/// assert!(matches!(error, FeatureError::Regression(_)));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LeastSquaresError {

@@ -216,6 +216,14 @@ impl Draws {
 }
 
 /// Why features cannot be whitened.
+///
+/// ```
+/// use ndarray::Array2;
+/// use truetwin::math::{Whitening, WhiteningError};
+///
+/// let one_row: Result<Whitening, WhiteningError> = Whitening::calibrated(&Array2::zeros((1, 2)));
+/// assert!(one_row.is_err()); // no covariance
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WhiteningError {

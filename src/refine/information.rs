@@ -133,7 +133,7 @@ mod tests {
         ParameterSpace::new([
             Parameter::new("a", "", 0.0, scale),
             Parameter::new("b", "", 0.0, 2.0),
-            Parameter::new("start.x", "", 0.0, 1.0).role(Role::Start),
+            Parameter::new("start.x", "", 0.0, 1.0).with_role(Role::Start),
         ])
     }
 

@@ -32,6 +32,8 @@ pub struct Prior {
     drives: DriveSource,
 }
 
+debug_by_name!(Prior);
+
 impl Prior {
     /// Of a study, seen through features.
     ///

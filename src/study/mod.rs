@@ -169,12 +169,14 @@ impl Study {
     }
 
     /// With another recipe under a preset's name.
+    #[must_use]
     pub fn with_preset(mut self, name: PresetName, preset: Preset) -> Self {
         self.presets.insert(name, preset);
         self
     }
 
     /// With other features, in both presets.
+    #[must_use]
     pub fn with_features(mut self, features: impl FeatureRecipe + 'static) -> Self {
         let features: Arc<dyn FeatureRecipe> = Arc::new(features);
         for preset in self.presets.values_mut() {
@@ -184,6 +186,7 @@ impl Study {
     }
 
     /// With another network, in both presets.
+    #[must_use]
     pub fn with_architecture<A: HeadArchitecture>(mut self) -> Self {
         for preset in self.presets.values_mut() {
             preset.architecture = architecture::<A>();
@@ -192,6 +195,7 @@ impl Study {
     }
 
     /// With other numbers, in the default preset.
+    #[must_use]
     pub fn with_settings(mut self, settings: Settings) -> Self {
         if let Some(preset) = self.presets.get_mut(&PresetName::Default) {
             preset.settings = settings;
@@ -200,6 +204,7 @@ impl Study {
     }
 
     /// With effects that the twin may lack and the library does not have, one for each target.
+    #[must_use]
     pub fn with_effects(
         mut self,
         effects: impl IntoIterator<Item = Arc<dyn UnmodelledEffect>>,
@@ -209,6 +214,7 @@ impl Study {
     }
 
     /// With a record to show the program on.
+    #[must_use]
     pub fn with_demo(mut self, record: Record) -> Self {
         self.demo = Some(Arc::new(record));
         self

@@ -296,7 +296,7 @@ fn unknown(
     let prior = given
         .or(guess)
         .ok_or_else(|| AdaptationError::NoPrior { name: name.into() })?;
-    let mut parameter = Parameter::new(name, "", prior.low(), prior.high()).role(role);
+    let mut parameter = Parameter::new(name, "", prior.low(), prior.high()).with_role(role);
     if let Some(guess) = guess {
         let (low, high) = (guess.low().min(prior.low()), guess.high().max(prior.high()));
         parameter = parameter.within(low, high);

@@ -36,6 +36,7 @@ impl Noise {
     }
 
     /// Another independent value under the same seed and sample: `noise.child("cloud")`.
+    #[must_use]
     pub fn child(self, purpose: &str) -> Self {
         Self {
             key: self
@@ -45,6 +46,7 @@ impl Noise {
     }
 
     /// Sample number `index` of a family that shares this value's key.
+    #[must_use]
     pub fn sample(self, index: u64) -> Self {
         Self {
             key: self

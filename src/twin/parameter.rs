@@ -67,13 +67,15 @@ impl Parameter {
     }
 
     /// With physical bounds `[low, high]`.
+    #[must_use]
     pub fn within(mut self, low: f64, high: f64) -> Self {
         self.bounds = Interval::unchecked(low, high);
         self
     }
 
     /// With another role.
-    pub fn role(mut self, role: Role) -> Self {
+    #[must_use]
+    pub fn with_role(mut self, role: Role) -> Self {
         self.role = role;
         self
     }

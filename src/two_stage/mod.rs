@@ -51,6 +51,7 @@ mod standardiser;
 mod tracking;
 mod tune;
 
+pub use crate::sample::EllipsoidError;
 pub(crate) use estimate::INTERVAL_LEVEL;
 pub use estimate::{Estimate, EstimateError, EstimateOptions, Nuisance, Seconds};
 pub use estimator::Estimator;

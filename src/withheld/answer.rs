@@ -10,7 +10,6 @@ use std::time::Instant;
 /// The answer of a trial.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[non_exhaustive]
 pub struct Answer {
     /// From 0.
     pub trial: usize,
@@ -25,7 +24,6 @@ pub struct Answer {
 /// A diagnosis, as far as it is scored.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[non_exhaustive]
 pub struct Outcome {
     /// Which kind of gap.
     pub verdict: Verdict,
@@ -54,7 +52,6 @@ pub struct Outcome {
 /// An effect that was named.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[non_exhaustive]
 pub struct Named {
     /// `id@target`.
     pub key: String,

@@ -13,7 +13,6 @@ const IMITATES: f64 = 6.0;
 
 /// One trial with its key opened.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct Row {
     /// From 0.
     pub trial: usize,

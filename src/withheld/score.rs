@@ -24,7 +24,6 @@ const STATED: [f64; 6] = [0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
 
 /// So many of so many.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
 pub struct Count {
     /// So many …
     pub count: u64,
@@ -61,7 +60,6 @@ impl Count {
 
 /// Detection within a range of a magnitude.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
 pub struct Range {
     /// From.
     pub low: f64,
@@ -73,7 +71,6 @@ pub struct Range {
 
 /// The trials of one kind.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
 pub struct KindScore {
     /// Which.
     pub kind: Kind,
@@ -85,7 +82,6 @@ pub struct KindScore {
 
 /// Answers of about the same stated probability.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
 pub struct StatedBin {
     /// Mean of what was stated.
     pub stated: f64,
@@ -95,7 +91,6 @@ pub struct StatedBin {
 
 /// All scores. What each is of, and when an answer counts as right, stands in docs/withheld.md.
 #[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
 pub struct Scorecard {
     /// Name of the twin.
     pub twin: String,

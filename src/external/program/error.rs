@@ -4,6 +4,13 @@ use crate::files::with_remedy;
 use crate::study::StudyError;
 
 /// Why a program cannot be used as a twin.
+///
+/// ```
+/// use truetwin::external::program::{ProgramCommand, ProgramError};
+///
+/// let error = ProgramCommand::parse("").unwrap_err();
+/// assert!(matches!(error, ProgramError::Command { .. }));
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProgramError {
