@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Simulate a record.
+/// Simulate a record of a twin: at these parameters, with noise and, if asked for, with effects.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
         truetwin simulate --twin van-der-pol --theta nu=3 --out R.csv\n  \

@@ -53,7 +53,7 @@ pub struct Coverage {
     pub covered: u64,
     /// Runs with an estimate.
     pub of: u64,
-    /// Ends of the exact (Clopper–Pearson) interval of the probability, at [`COVERAGE_LEVEL`].
+    /// Ends of the exact (Clopper–Pearson) interval of the probability, at 95 %.
     pub low: f64,
     /// Upper end.
     pub high: f64,

@@ -3,10 +3,6 @@
 //! | concept | for |
 //! |---|---|
 //! | [`Whitening`] | distances between features, in units of their own scatter |
-//! | [`solve_truncated`] | a least-squares step that leaves out what the data does not determine |
-//! | [`LeastSquares`] | fast regression, well behaved where columns are collinear |
-//! | [`LaggedSignals`] | regressors made of the past of signals, never written out |
-//! | [`Stencil`] | finite-difference Jacobians whose points the caller evaluates, in parallel if it likes |
 //! | [`quantile`], [`median`], [`rank_p_value`] | empirical distributions |
 //! | [`clopper_pearson`], [`binomial_bounds`] | what a count of successes says, and what it may be |
 

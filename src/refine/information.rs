@@ -30,7 +30,7 @@ pub struct Direction {
     pub direction: Vec<f64>,
     /// Standard deviation along it, in prior widths.
     pub std_error: f64,
-    /// Whether the prior knows it better than the record does: worse than [`PRIOR_DEVIATION`].
+    /// Whether the prior knows it better than the record does: worse than 1/√12 of its width.
     pub weak: bool,
     /// In words: `0.58·k1 − 0.58·k2 + 0.57·k4`.
     pub combination: String,

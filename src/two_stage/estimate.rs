@@ -58,7 +58,7 @@ pub struct Estimate {
     pub theta: Vec<f64>,
     /// Standard errors of `theta`.
     pub std_error: Vec<f64>,
-    /// Ends of the interval at [`INTERVAL_LEVEL`], within the bounds.
+    /// Ends of the 90 % interval, within the bounds.
     pub low: Vec<f64>,
     /// Upper ends.
     pub high: Vec<f64>,

@@ -64,6 +64,11 @@ impl Estimator {
         self.readout.network()
     }
 
+    /// The network with what stands around it.
+    pub fn readout(&self) -> &Readout {
+        &self.readout
+    }
+
     /// Twin and features, with a call counter of its own.
     pub fn simulator(&self) -> Result<FeatureSimulator, FeatureError> {
         FeatureSimulator::new(self.study.twin().clone(), self.recipe.as_ref())

@@ -21,6 +21,8 @@
 //! let file = place.path().join("oscillator.est");
 //! estimator.save(&file)?;
 //! let estimator: Estimator = Estimator::load(&file, &[study])?;
+//! let around_the_network: &Readout = estimator.readout();
+//! assert_eq!(around_the_network.targets.mean.len(), 1);
 //!
 //! // A record of ν = 3, outside of the prior [0, 2.5].
 //! let drive = Drive::autonomous(0.05, 200)?;
@@ -57,6 +59,7 @@ pub use estimate::{Estimate, EstimateError, EstimateOptions, Nuisance, Seconds};
 pub use estimator::Estimator;
 pub use file::EstimatorFileError;
 pub use pretrain::{PretrainError, PretrainOptions, pretrain, pretrain_on};
+pub use readout::Readout;
 pub use scaler::Scaler;
 pub use standardiser::Standardiser;
 pub use tracking::Tracking;

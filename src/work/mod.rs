@@ -5,7 +5,7 @@
 //!
 //! | to … | look at |
 //! |---|---|
-//! | keep finished pieces in a folder, and go on with it | [`WorkFolder`], [`Manifest`] |
+//! | keep finished pieces in a folder, and go on with it | [`WorkFolder`] |
 //! | do a part of the pieces: of a job array, of the ranks of a cluster | [`Share`] |
 //! | wait for the other ranks | [`Team`] |
 
