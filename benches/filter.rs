@@ -19,7 +19,7 @@ fn passes(c: &mut Criterion) {
             (twin_outputs(name, theta, &drive)).expect("these parameters can be simulated");
         let record = Record::new(drive, outputs).expect("the outputs are finite");
         for method in [Method::Points, Method::Extended] {
-            let settings = FilterSettings::default().method(method);
+            let settings = FilterSettings::default().with_method(method);
             let kalman = Kalman::new(twin, &record, &settings).expect("the channels agree");
             c.bench_function(&format!("{name}, {method:?}, log-likelihood"), |b| {
                 b.iter(|| kalman.log_likelihood(black_box(theta)))

@@ -16,8 +16,7 @@
 //! ```
 
 use std::process::ExitCode;
-use truetwin::study::{RecordPlan, Study};
-use truetwin::twin::*;
+use truetwin::prelude::*;
 
 /// τ·Ṫ = gain·u − T, solved outside of the framework, as a program of one's own would be; the thermometer is noisy.
 struct Heater;

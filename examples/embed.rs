@@ -5,11 +5,9 @@
 use ndarray::Array2;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use truetwin::progress::{Listener, Progress};
-use truetwin::study::{RecordPlan, Study};
-use truetwin::twin::{DigitalTwin, Drive, Noise, Record};
+use truetwin::prelude::*;
+use truetwin::progress::Listener;
 use truetwin::twins::VanDerPol;
-use truetwin::two_stage::{EstimateOptions, PretrainOptions, pretrain};
 
 /// Where an application would move a progress bar, and look at its stop button.
 #[derive(Default)]

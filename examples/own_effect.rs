@@ -17,7 +17,7 @@
 use serde::{Deserialize, Serialize};
 use std::process::ExitCode;
 use std::sync::Arc;
-use truetwin::study::{RecordPlan, Study, StudyError};
+use truetwin::prelude::*;
 use truetwin::twin::{Given, Law, Magnitude, UnmodelledEffect};
 use truetwin::twins::VanDerPol;
 

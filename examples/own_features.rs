@@ -11,8 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::process::ExitCode;
 use std::sync::Arc;
 use truetwin::feature::{FeatureError, FeatureMap, FeatureRecipe};
-use truetwin::study::{RecordPlan, Study, StudyError};
-use truetwin::twin::*;
+use truetwin::prelude::*;
 
 /// An amplifier that clips softly: y = a·tanh(u/b), and noise of its sensor.
 struct Amplifier;

@@ -4,8 +4,7 @@
 
 use truetwin::feature::Score;
 use truetwin::network::layers::*;
-use truetwin::study::{RecordPlan, Study, StudyError};
-use truetwin::twin::*;
+use truetwin::prelude::*;
 
 /// A leaking tank: area·ḣ = u − k·h.
 struct Tank;

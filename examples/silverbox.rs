@@ -10,8 +10,8 @@
 //! ```
 
 use std::process::ExitCode;
-use truetwin::study::{RecordPlan, Study};
-use truetwin::twin::*;
+use truetwin::prelude::*;
+use truetwin::twin::Integrator;
 
 /// Step of the records: 610.35 Hz.
 const STEP: f64 = 0.0016384;

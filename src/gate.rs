@@ -9,18 +9,56 @@
 //! | [`GateForm::Paper`] | the same K = 150 simulations | 13 % at n = 5, 100 % at n = 128 |
 //!
 //! Source: Lakshminarayanan, Guerrero & Rojas, section IV-A.
+//!
+//! ```
+//! use std::sync::Arc;
+//! use truetwin::bank::FeatureSimulator;
+//! use truetwin::feature::Ar;
+//! use truetwin::gate::{Gate, GateOutcome, GateSettings, GateTest};
+//! use truetwin::progress::Progress;
+//! use truetwin::twin::{DigitalTwin, Drive, Noise, Record};
+//! use truetwin::twins::VanDerPol;
+//!
+//! let simulator = FeatureSimulator::new(Arc::new(VanDerPol), &Ar { order: 2 })?;
+//! let drive = Drive::autonomous(0.05, 200)?;
+//!
+//! let outputs = VanDerPol.simulate(&[3.0], &drive, Noise::new(7, "measured", 0))?;
+//! let features = simulator.observe(&Record::new(drive.clone(), outputs)?)?;
+//! let test = GateTest {
+//!     simulator: &simulator,
+//!     drive: &drive,
+//!     settings: &GateSettings::default(),
+//!     noise: Noise::new(1, "gate", 0),
+//!     progress: &Progress::silent(),
+//! };
+//! let gate: Gate = test.at(&[3.0])?;
+//! let right: GateOutcome = gate.test(&features);
+//! let wrong = test.at(&[1.0])?.test(&features);
+//! assert!(!right.out_of_distribution && wrong.out_of_distribution);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use crate::bank::{BankError, FeatureSimulator};
 use crate::math::{Whitening, WhiteningError, median, rank_p_value};
 use crate::progress::Progress;
+use crate::setting::SettingError;
 use crate::twin::{Drive, Noise};
 use nalgebra::{DMatrix, DVector};
 use ndarray::{Array2, ArrayView1};
 use serde::{Deserialize, Serialize};
 
 /// Which form of the test.
+///
+/// ```
+/// use truetwin::gate::{GateForm, GateSettings};
+///
+/// let paper = GateSettings { form: GateForm::Paper, ..GateSettings::default() };
+/// assert_eq!(paper.whitening_simulations(128), 150); // whatever the number of features
+/// assert_eq!(GateSettings::default().whitening_simulations(128), 16 * 128);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum GateForm {
     /// Rank among fresh simulations: exact for any number of features.
     #[default]
@@ -39,6 +77,13 @@ pub enum GateForm {
 /// | `per_feature` | 16 | ≥ 2 | simulations a feature for μ and S; calibrated only |
 /// | `null` | 199 | ≥ 1/α − 1 | fresh simulations to rank among; calibrated only |
 /// | `epsilon` | 1e-8 | > 0 | added to S, in squared feature units; paper's form only |
+///
+/// ```
+/// use truetwin::gate::GateSettings;
+///
+/// let strict = GateSettings { alpha: 0.01, ..GateSettings::default() };
+/// assert!(strict.check().is_ok());
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct GateSettings {
@@ -69,24 +114,11 @@ impl Default for GateSettings {
     }
 }
 
-/// What is wrong with the settings of the test.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("gate: {field} = {value}; {remedy}")]
-pub struct GateSettingsError {
-    field: &'static str,
-    value: f64,
-    remedy: &'static str,
-}
-
 impl GateSettings {
     /// Whether each field is in its range.
-    pub fn check(&self) -> Result<(), GateSettingsError> {
-        let refuse = |field, value, remedy| {
-            Err(GateSettingsError {
-                field,
-                value,
-                remedy,
-            })
+    pub fn check(&self) -> Result<(), SettingError> {
+        let refuse = |field: &str, value: f64, remedy: &str| {
+            Err(SettingError::new(format!("gate: {field}"), value, remedy))
         };
         if !(self.alpha > 0.0 && self.alpha < 1.0) {
             return refuse("alpha", self.alpha, "choose a rate between 0 and 1");
@@ -137,6 +169,7 @@ impl GateSettings {
 
 /// The test's answer.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct GateOutcome {
     /// s of the record.
     pub statistic: f64,
@@ -149,7 +182,16 @@ pub struct GateOutcome {
 }
 
 /// Why the test could not be made.
+///
+/// ```
+/// use truetwin::bank::BankError;
+/// use truetwin::gate::GateError;
+///
+/// let bank = BankError::Hopeless { failed: 95, tried: 100, reason: "diverged".into() };
+/// assert!(matches!(GateError::from(bank), GateError::Bank(_)));
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum GateError {
     /// The simulations failed.
     #[error(transparent)]
@@ -175,6 +217,8 @@ pub struct GateTest<'a> {
     /// Who listens.
     pub progress: &'a Progress,
 }
+
+debug_by_name!(GateTest<'_>);
 
 impl GateTest<'_> {
     /// Simulates the null at `theta`.

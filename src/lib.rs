@@ -1,32 +1,89 @@
 //! # truetwin
 //!
 //! A simulator ("digital twin") is fitted to the one real system in front of you, told when it cannot be trusted, and
-//! calibrated where its training never went.
+//! calibrated where its training never went. When no parameters fit, it is told what it lacks.
 //!
 //! ```text
 //! prior ─ simulate ─▶ bank ─ features ─▶ train ─▶ estimator            pretrain, once
 //! record ─ features ─▶ estimator ─▶ θ_init ─▶ gate ─ consistent ─▶ θ̂      estimate, each record
 //!                                              │ not
 //!                        Gauss–Newton ─▶ cloud of simulations ─▶ tuned heads ─▶ θ̂ ─▶ gate again
+//! records ─▶ fit ─▶ test by simulation ─ a gap ─▶ where, which effect, how far      diagnose, no training
+//! ```
+//!
+//! ```
+//! use truetwin::prelude::*;
+//! use truetwin::diagnose::Verdict;
+//!
+//! /// A leaking tank: ḣ = u − k·h, with a noisy level sensor.
+//! struct Tank;
+//!
+//! impl StateSpace for Tank {
+//!     fn outline(&self) -> Outline {
+//!         Outline {
+//!             parameters: ParameterSpace::new([Parameter::new("k", "1/s", 0.2, 1.0).within(0.05, 3.0)]),
+//!             states: vec![Quantity::new("h", "m")],
+//!             inputs: vec![Quantity::new("u", "m/s")],
+//!             outputs: vec![Quantity::new("y", "m")],
+//!         }
+//!     }
+//!     fn drift(&self, now: &Now, x: &[f64], dx: &mut [f64]) {
+//!         dx[0] = now.u[0] - now.theta[0] * x[0];
+//!     }
+//!     fn observe(&self, _: &Now, x: &[f64], y: &mut [f64]) {
+//!         y[0] = x[0];
+//!     }
+//!     fn noise(&self, _: &Now, process: &mut [f64], measurement: &mut [f64]) {
+//!         (process[0], measurement[0]) = (0.01, 0.02);
+//!     }
+//! }
+//!
+//! // Records: 200 samples, 0.1 s apart; input levels in [0, 1], each held for 20 samples.
+//! let study = Study::new("tank", Tank, RecordPlan::levels(0.1, 200, 0.0, 1.0, 20))?;
+//! let small = PretrainOptions { bank_size: Some(300), epochs: Some(5), ..PretrainOptions::default() };
+//! let (estimator, _) = pretrain(&study, &small, &Progress::silent())?;
+//!
+//! // The measurement, here of a tank whose k = 1.5 is outside of the prior.
+//! let noise = Noise::new(7, "measured", 0);
+//! let drive = study.drives()?.draw(noise)?;
+//! let outputs = Tank.simulate(&[1.5], &drive, noise)?;
+//! let record = Record::new(drive, outputs)?;
+//!
+//! let estimate = estimator.estimate(&record, &EstimateOptions::default(), &Progress::silent())?;
+//! assert!((estimate.theta[0] - 1.5).abs() < 4.0 * estimate.std_error[0]);
+//!
+//! let settings = DiagnoseSettings { detection_only: true, ..DiagnoseSettings::default() };
+//! let found = diagnose(&study, &[record], None, &settings, &Progress::silent())?;
+//! assert_eq!(found.verdict, Verdict::ParameterGap); // k is not what we thought, and nothing else is wrong
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! | to … | look at |
 //! |---|---|
+//! | have the usual names at hand | [`prelude`] |
 //! | plug in a simulator | [`twin::StateSpace`], [`twin::DigitalTwin`] |
-//! | plug in a program written in any language | [`external::program`] |
+//! | plug in a program written in any language, or an FMU | [`external`] |
 //! | say what records look like and which recipe to use | [`study::Study`] |
-//! | fill a bank on disk, from many processes | [`shards::BankPlan`], [`work`] |
 //! | train, save, load, estimate | [`two_stage::pretrain`], [`two_stage::Estimator`] |
-//! | compress records otherwise | [`feature::FeatureMap`], [`feature::FeatureRecipe`] |
-//! | shape the network | [`network::HeadArchitecture`] |
 //! | learn what a twin lacks | [`diagnose::diagnose`] |
-//! | try a diagnosis where the truth is sealed | [`withheld::Withheld`] |
 //! | add an effect that a twin lacks | [`effect`], [`twin::augment`] |
 //! | give a twin the whole command line | [`cli::run`] |
+//! | compress records otherwise; shape the network | [`feature::FeatureRecipe`], [`network::HeadArchitecture`] |
+//! | filter a record, or take its likelihood | [`filter`] |
+//! | fill a bank on disk, from many processes | [`shards::BankPlan`], [`work`] |
+//! | judge an estimator or a diagnosis | [`experiment`], [`baseline`], [`withheld`] |
+//! | show progress, stop long work | [`progress`] |
+//! | print, draw, hand on results | [`report`] |
 //!
-//! The library never prints, never exits and sets no global thread pool; long work reports to a
-//! [`progress::Progress`] and can be cancelled through it. Source of the method: Lakshminarayanan, Guerrero & Rojas,
-//! "Fine-Tuning a Simulation-Driven Estimator".
+//! The library never prints, never exits and sets no global thread pool. Cargo features, none by default: `mpi` (ranks of
+//! a cluster share work), `fmi` (FMUs as twins), `parquet` (records in Parquet files).
+//!
+//! Public items, the command line and the schemas of files follow semantic versioning; bits of results and hidden items do
+//! not. What raises which number: [docs/architecture.md](../../../docs/architecture.md#versions).
+//!
+//! Examples: each item has one, but for getters, fields and variants; theirs is that of their type or module.
+//!
+//! Source of the method: Lakshminarayanan, Guerrero & Rojas, "Fine-Tuning a Simulation-Driven Estimator".
 
 // The library never prints and never panics on data; tests may.
 #![cfg_attr(
@@ -34,11 +91,24 @@
     warn(clippy::print_stdout, clippy::print_stderr, clippy::unwrap_used)
 )]
 
+/// `Debug` by name, of types that hold what has no `Debug`: twins, maps, listeners.
+macro_rules! debug_by_name {
+    ($($type:ident $(<$life:lifetime>)?),+ $(,)?) => {
+        $(impl std::fmt::Debug for $type $(<$life>)? {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.debug_struct(stringify!($type)).finish_non_exhaustive()
+            }
+        })+
+    };
+}
+
 // Layers, lowest first; a module uses only what stands above it here (tests/layering.rs holds it so).
-pub mod files;
+pub mod setting;
+
+mod files;
 mod foreign;
 pub mod math;
-pub mod optimise;
+mod optimise;
 pub mod progress;
 pub mod work;
 
@@ -56,7 +126,7 @@ pub mod effect;
 pub mod bank;
 pub mod gate;
 pub mod refine;
-pub mod sample;
+mod sample;
 pub mod study;
 
 pub mod external;
@@ -73,6 +143,8 @@ pub mod withheld;
 pub mod report;
 
 pub mod cli;
+
+pub mod prelude;
 
 #[cfg(doctest)]
 mod book;

@@ -6,14 +6,16 @@ use std::path::{Path, PathBuf};
 
 /// The layers of docs/architecture.md, lowest first; within a layer, in order.
 const LAYERS: [&[&str]; 6] = [
-    &["files", "foreign", "math", "optimise", "progress", "work"],
+    &[
+        "setting", "files", "foreign", "math", "optimise", "progress", "work",
+    ],
     &["twin", "filter", "feature", "network"],
     &[
         "twins", "effect", "bank", "gate", "refine", "sample", "study", "shards", "external",
     ],
     &["two_stage", "baseline", "diagnose"],
     &["experiment", "withheld", "report"],
-    &["cli"],
+    &["cli", "prelude"],
 ];
 
 fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {

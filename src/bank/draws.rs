@@ -14,6 +14,18 @@ const ATTEMPTS: usize = 200;
 const HOPELESS: f64 = 0.9;
 
 /// Where to simulate.
+///
+/// ```
+/// use std::borrow::Cow;
+/// use truetwin::bank::Draw;
+/// use truetwin::twin::Drive;
+///
+/// let drive = Drive::autonomous(0.05, 200)?;
+/// let draw = Draw { theta: vec![1.5], drive: Cow::Borrowed(&drive) }; // see `Draws` for its use
+/// assert_eq!(draw.drive.samples(), 200);
+/// # Ok::<(), truetwin::twin::DriveError>(())
+/// ```
+#[derive(Debug, Clone)]
 pub struct Draw<'a> {
     /// Parameters.
     pub theta: Vec<f64>,
@@ -22,6 +34,32 @@ pub struct Draw<'a> {
 }
 
 /// Parameters and the features simulated there, row by row.
+///
+/// ```
+/// use std::borrow::Cow;
+/// use std::sync::Arc;
+/// use truetwin::bank::{Draw, Draws, FeatureSimulator};
+/// use truetwin::feature::Ar;
+/// use truetwin::progress::Progress;
+/// use truetwin::twin::{DigitalTwin, Drive, Noise};
+/// use truetwin::twins::VanDerPol;
+///
+/// let simulator = FeatureSimulator::new(Arc::new(VanDerPol), &Ar { order: 2 })?;
+/// let drive = Drive::autonomous(0.05, 200)?;
+///
+/// let space = simulator.twin().parameters();
+/// let stage = Progress::silent().stage("bank", 20);
+/// let draws: Draws = simulator.draws(
+///     0..20,
+///     |row| Noise::new(1, "bank", row),
+///     |_row, _attempt, noise| {
+///         Ok(Some(Draw { theta: space.draw_prior(noise), drive: Cow::Borrowed(&drive) }))
+///     },
+///     &stage,
+/// )?;
+/// assert_eq!((draws.theta.dim(), draws.features.dim()), ((20, 1), (20, 2)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draws {
     /// Parameters, M × d.

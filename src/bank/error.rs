@@ -5,7 +5,15 @@ use crate::progress::Cancelled;
 use crate::twin::SimulationError;
 
 /// Why one simulation gave no features.
+///
+/// ```
+/// use truetwin::bank::DrawError;
+///
+/// let error = DrawError::Rejected("diverged at t = 3 s".into()); // the next draw may do
+/// assert_eq!(error.to_string(), "diverged at t = 3 s");
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum DrawError {
     /// This point cannot be used; others can.
     #[error("{0}")]
@@ -16,7 +24,15 @@ pub enum DrawError {
 }
 
 /// Why a set of simulations could not be made.
+///
+/// ```
+/// use truetwin::bank::BankError;
+///
+/// let error = BankError::Hopeless { failed: 95, tried: 100, reason: "diverged at t = 3 s".into() };
+/// assert!(error.to_string().starts_with("95 of 100 draws failed"));
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum BankError {
     /// The simulator failed for good.
     #[error(transparent)]

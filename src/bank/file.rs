@@ -33,7 +33,15 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime};
 
 /// Why a file of rows cannot be used.
+///
+/// ```
+/// use std::path::Path;
+/// use truetwin::bank::file::{BankFileError, read};
+///
+/// assert!(matches!(read(Path::new("no-such-bank.npz"), &["k"]), Err(BankFileError::Io { .. })));
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum BankFileError {
     /// Something cannot be read or written.
     #[error("{}: {}", path.display(), with_remedy(error))]
@@ -88,7 +96,7 @@ fn form(path: &Path) -> Result<Form, BankFileError> {
 /// # Errors
 ///
 /// As [`write()`].
-pub fn write_features(path: &Path, features: &Array2<f64>) -> Result<(), BankFileError> {
+pub(crate) fn write_features(path: &Path, features: &Array2<f64>) -> Result<(), BankFileError> {
     let bytes = match path.extension().and_then(|e| e.to_str()) {
         Some("npy") => {
             let mut bytes = Vec::new();
@@ -109,7 +117,7 @@ pub fn write_features(path: &Path, features: &Array2<f64>) -> Result<(), BankFil
 /// # Errors
 ///
 /// Out of memory alone.
-pub fn features_csv_text(features: &Array2<f64>) -> io::Result<String> {
+pub(crate) fn features_csv_text(features: &Array2<f64>) -> io::Result<String> {
     let bytes = csv_text(&features_alone(features), &[])?;
     String::from_utf8(bytes).map_err(io::Error::other)
 }
@@ -123,7 +131,7 @@ fn features_alone(features: &Array2<f64>) -> Draws {
 }
 
 /// Whether a path has the name of a file of rows.
-pub fn is_named(path: &Path) -> bool {
+pub(crate) fn is_named(path: &Path) -> bool {
     form(path).is_ok()
 }
 

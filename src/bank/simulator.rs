@@ -11,10 +11,28 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A twin seen through its features; counts every simulation, also those that the features make.
+///
+/// ```
+/// use std::sync::Arc;
+/// use truetwin::bank::FeatureSimulator;
+/// use truetwin::feature::Ar;
+/// use truetwin::twin::{DigitalTwin, Drive, Noise, Record};
+/// use truetwin::twins::VanDerPol;
+///
+/// let simulator = FeatureSimulator::new(Arc::new(VanDerPol), &Ar { order: 2 })?;
+/// let drive = Drive::autonomous(0.05, 200)?;
+///
+/// let outputs = simulator.twin().simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
+/// let features = simulator.observe(&Record::new(drive, outputs)?)?;
+/// assert_eq!((features.len(), simulator.calls()), (simulator.dim(), 1));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct FeatureSimulator {
     twin: Arc<Counted>,
     map: Arc<dyn FeatureMap>,
 }
+
+debug_by_name!(FeatureSimulator);
 
 /// A twin that counts its calls.
 struct Counted {

@@ -3,13 +3,23 @@
 use super::BaselineError;
 use crate::filter::FilterError;
 use crate::math::Stencil;
+use crate::setting::SettingError;
 use crate::twin::{Interval, Now, ParameterSpace, Record, Signal, StateSpace, Workspace};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 /// Where the states of a [`DualFilter`] start.
+///
+/// ```
+/// use truetwin::baseline::{DualFilter, DualStart};
+///
+/// let known_start = DualFilter { start: DualStart::Twin, ..DualFilter::default() };
+/// assert_eq!(DualFilter::default().start, DualStart::FirstOutput);
+/// assert_ne!(known_start, DualFilter::default());
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum DualStart {
     /// Every state at the first output, as in the authors' code.
     #[default]
@@ -86,7 +96,22 @@ impl Default for DualFilter {
 }
 
 /// What a dual filter found.
+///
+/// ```
+/// use truetwin::baseline::{DualFilter, DualFiltered};
+/// use truetwin::twin::*;
+/// use truetwin::twins::VanDerPol;
+///
+/// let drive = Drive::autonomous(0.05, 300)?;
+/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
+/// let record = Record::new(drive, outputs)?;
+/// let found: DualFiltered = DualFilter::default().run(&VanDerPol, &record, &[1.3])?;
+/// assert_eq!(found.theta, found.trajectory.row(299).to_vec());
+/// assert_eq!(found.covariance.shape(), (1, 1));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct DualFiltered {
     /// θ after the last row, within the bounds.
     pub theta: Vec<f64>,
@@ -117,13 +142,13 @@ impl DualFilter {
             ("state_walk", self.state_walk),
             ("parameter_walk", self.parameter_walk),
         ] {
-            BaselineError::check(name, value, value >= 0.0, "a variance is 0 or more")?;
+            SettingError::unless(value >= 0.0, name, value, "a variance is 0 or more")?;
         }
         let sd = self.measurement;
-        BaselineError::check(
+        SettingError::unless(
+            sd > 0.0,
             "measurement",
             sd,
-            sd > 0.0,
             "it must be positive, such as 0.02",
         )?;
         let outline = twin.outline();

@@ -26,6 +26,7 @@ const GOOD_SPREAD: f64 = 0.1;
 ///
 /// Source: Lakshminarayanan, Guerrero & Rojas, section V; the spread is that of the authors' code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Initialisation {
     /// Near the truth.
     Good,

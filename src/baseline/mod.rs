@@ -2,7 +2,7 @@
 //!
 //! | to … | look at |
 //! |---|---|
-//! | fit the noise-free output, six steps as in the paper or to convergence | [`PredictionError`] |
+//! | fit the noise-free output, six steps as in the paper or to convergence | [`PredictionErrorMethod`] |
 //! | track θ along the record | [`DualFilter`] |
 //! | choose where they start | [`Initialisation`] |
 
@@ -10,17 +10,33 @@ mod dual_ekf;
 mod initialisation;
 mod prediction_error;
 
+pub use crate::optimise::{BoundsError, OptimiseError};
 pub use dual_ekf::{DualFilter, DualFiltered, DualStart};
 pub use initialisation::Initialisation;
-pub use prediction_error::{PredictionError, PredictionErrorFit};
+pub use prediction_error::{PredictionErrorFit, PredictionErrorMethod};
 
 use crate::filter::FilterError;
 use crate::math::DifferenceError;
-use crate::optimise::{BoundsError, OptimiseError};
+use crate::setting::SettingError;
 use crate::twin::{ParameterError, RecordError, SimulationError};
 
 /// Why a baseline gave no estimate.
+///
+/// ```
+/// use truetwin::baseline::{BaselineError, PredictionErrorMethod};
+/// use truetwin::twin::*;
+/// use truetwin::twins::VanDerPol;
+///
+/// let drive = Drive::autonomous(0.05, 300)?;
+/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
+/// let record = Record::new(drive, outputs)?;
+/// let wrong = PredictionErrorMethod { step: 2.0, ..PredictionErrorMethod::default() };
+/// let error = wrong.fit(&VanDerPol, &record, &[1.4]).unwrap_err();
+/// assert!(matches!(error, BaselineError::Setting(_)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum BaselineError {
     /// The record does not fit the twin.
     #[error(transparent)]
@@ -44,32 +60,6 @@ pub enum BaselineError {
     #[error(transparent)]
     Filter(#[from] FilterError),
     /// A setting that cannot be used.
-    #[error("{name} = {value}; {remedy}")]
-    Setting {
-        /// Which.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// What it must be.
-        remedy: &'static str,
-    },
-}
-
-impl BaselineError {
-    /// Fails with `remedy` unless `valid`.
-    fn check(
-        name: &'static str,
-        value: f64,
-        valid: bool,
-        remedy: &'static str,
-    ) -> Result<(), Self> {
-        if valid {
-            return Ok(());
-        }
-        Err(Self::Setting {
-            name,
-            value,
-            remedy,
-        })
-    }
+    #[error(transparent)]
+    Setting(#[from] SettingError),
 }

@@ -3,6 +3,7 @@
 use super::BaselineError;
 use crate::math::Stencil;
 use crate::optimise::{Bounds, EvaluationError, GaussNewton, ResidualProblem};
+use crate::setting::SettingError;
 use crate::twin::{DigitalTwin, ParameterSpace, Record, SimulationError, free_run};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -24,13 +25,13 @@ use serde::{Deserialize, Serialize};
 /// are not modelled, so that the fit is neither efficient nor, in weak directions, safe: it drifts along them.
 ///
 /// ```
-/// use truetwin::baseline::PredictionError;
+/// use truetwin::baseline::PredictionErrorMethod;
 /// use truetwin::twin::*;
 /// use truetwin::twins::VanDerPol;
 ///
 /// let drive = Drive::autonomous(0.05, 300)?;
 /// let record = Record::new(drive.clone(), VanDerPol.simulate(&[1.5], &drive, Noise::OFF)?)?;
-/// let fit = PredictionError::default().fit(&VanDerPol, &record, &[1.4])?;
+/// let fit = PredictionErrorMethod::default().fit(&VanDerPol, &record, &[1.4])?;
 /// assert!((fit.theta[0] - 1.5).abs() < 1e-3);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -39,7 +40,7 @@ use serde::{Deserialize, Serialize};
 /// Lakshminarayanan, Guerrero & Rojas.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct PredictionError {
+pub struct PredictionErrorMethod {
     /// Steps at most.
     pub iterations: u64,
     /// λ; 0 for the search to convergence.
@@ -50,7 +51,7 @@ pub struct PredictionError {
     pub halvings: u32,
 }
 
-impl Default for PredictionError {
+impl Default for PredictionErrorMethod {
     fn default() -> Self {
         Self {
             iterations: 6,
@@ -62,7 +63,21 @@ impl Default for PredictionError {
 }
 
 /// What the prediction-error method found.
+///
+/// ```
+/// use truetwin::baseline::{PredictionErrorFit, PredictionErrorMethod};
+/// use truetwin::twin::*;
+/// use truetwin::twins::VanDerPol;
+///
+/// let drive = Drive::autonomous(0.05, 300)?;
+/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
+/// let record = Record::new(drive, outputs)?;
+/// let fit: PredictionErrorFit = PredictionErrorMethod::converged().fit(&VanDerPol, &record, &[1.4])?;
+/// assert!(fit.rmse < 0.2 && fit.iterations > 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct PredictionErrorFit {
     /// θ, within the bounds.
     pub theta: Vec<f64>,
@@ -72,7 +87,7 @@ pub struct PredictionErrorFit {
     pub iterations: usize,
 }
 
-impl PredictionError {
+impl PredictionErrorMethod {
     /// Without ridge, until nothing is gained any more.
     pub fn converged() -> Self {
         Self {
@@ -94,17 +109,17 @@ impl PredictionError {
         start: &[f64],
     ) -> Result<PredictionErrorFit, BaselineError> {
         let (ridge, step) = (self.ridge, self.step);
-        BaselineError::check(
+        SettingError::unless(
+            ridge >= 0.0,
             "ridge",
             ridge,
-            ridge >= 0.0,
             "it must not be negative, such as 1e-3",
         )?;
         let valid = step > 0.0 && step < 1.0;
-        BaselineError::check(
+        SettingError::unless(
+            valid,
             "step",
             step,
-            valid,
             "it must lie between 0 and 1 prior widths",
         )?;
         record.check_channels(&twin.signals())?;
@@ -251,8 +266,8 @@ mod tests {
         for nu in [0.8, 3.0] {
             let record = noise_free(&VanDerPol, &[nu], drive.clone());
             for (settings, tolerance) in [
-                (PredictionError::default(), 1e-3),
-                (PredictionError::converged(), 1e-6),
+                (PredictionErrorMethod::default(), 1e-3),
+                (PredictionErrorMethod::converged(), 1e-6),
             ] {
                 let fit = settings.fit(&VanDerPol, &record, &[1.03 * nu]).unwrap();
                 let error = (fit.theta[0] - nu).abs();
@@ -273,8 +288,8 @@ mod tests {
         let invariants = |k: &[f64]| [k[0] * k[1], k[2], k[1].powi(2) * k[3]];
         let start = [0.63, 0.48, 0.57, 0.97];
         for (settings, tolerance) in [
-            (PredictionError::default(), 2e-3),
-            (PredictionError::converged(), 1e-4),
+            (PredictionErrorMethod::default(), 2e-3),
+            (PredictionErrorMethod::converged(), 1e-4),
         ] {
             let fit = settings.fit(&CascadedTanks, &record, &start).unwrap();
             for (found, true_value) in invariants(&fit.theta).iter().zip(invariants(&truth)) {
@@ -288,13 +303,16 @@ mod tests {
     fn estimates_stay_in_the_bounds() {
         let drive = Drive::autonomous(0.05, 60).unwrap();
         let record = noise_free(&VanDerPol, &[0.0], drive);
-        for settings in [PredictionError::default(), PredictionError::converged()] {
+        for settings in [
+            PredictionErrorMethod::default(),
+            PredictionErrorMethod::converged(),
+        ] {
             let fit = settings.fit(&VanDerPol, &record, &[9.0]).unwrap();
             assert!((0.0..=7.0).contains(&fit.theta[0]), "{fit:?}");
         }
-        let bad = PredictionError {
+        let bad = PredictionErrorMethod {
             ridge: -1.0,
-            ..PredictionError::default()
+            ..PredictionErrorMethod::default()
         };
         let error = bad.fit(&VanDerPol, &record, &[1.0]).unwrap_err();
         assert!(error.to_string().starts_with("ridge = -1"));

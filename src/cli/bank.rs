@@ -1,59 +1,103 @@
 //! `bank`: simulations onto the disk.
 
-use super::args::BankArguments;
-use super::{Context, Failure, output};
+use super::args::{PresetArgument, Subject, at_least_one};
+use super::{Context, Failure, Verb, output};
 use crate::shards::BankPlan;
+use crate::work::Share;
+use clap::Args;
 use serde_json::json;
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-pub(super) fn run(context: &Context<'_>, options: &BankArguments) -> Result<ExitCode, Failure> {
-    let study = context.study(&options.subject)?;
-    let plan = BankPlan {
-        study: &study,
-        preset: options.preset.into(),
-        size: options.size,
-        seed: context.seed,
-    };
-    let share = context.share(options.shard)?;
-    // What other ranks do counts too; one rank looks.
-    let before = match context.team.leads() {
-        true => plan.finish(&options.out).map_or(0, |filled| filled.rows),
-        false => 0,
-    };
-    context.team.wait();
-    let clock = Instant::now();
-    plan.fill(&options.out, share, context.progress)?;
-    context.team.wait();
-    if !context.team.leads() {
-        return Ok(ExitCode::SUCCESS);
+/// Simulate a bank from the prior onto the disk; run again, it goes on where it stopped.
+///
+/// DIR holds manifest.json and shards/*.npz, each shard with `theta` and `features`, for `pretrain --bank DIR` or numpy.load.
+/// Row i depends on the seed and i alone: any number of threads, jobs (--shard) and ranks (mpirun) makes the same bytes.
+#[derive(Debug, Args)]
+#[command(after_help = "A job array of four, then one bank:\n  \
+        truetwin bank --twin tanks --size 1000000 --shard $I/4 --out bank-$I\n  \
+        truetwin merge bank-1 bank-2 bank-3 bank-4 --out bank\n  \
+        truetwin pretrain --twin tanks --bank bank --out tanks.est\n\
+        On a shared file system all jobs may name one DIR, and nothing is to be merged. See docs/scaling.md.")]
+pub(super) struct Bank {
+    #[command(flatten)]
+    subject: Subject,
+    /// Simulations.
+    #[arg(long, value_name = "M", value_parser = at_least_one)]
+    size: usize,
+    /// A folder for the shards: a new one, or one of this very call to go on with.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Only part i of n of the shards, for job arrays that count from 0 or from 1.
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Share>,
+    /// Whose features.
+    #[arg(long, value_enum, default_value = "default")]
+    preset: PresetArgument,
+}
+
+impl Verb for Bank {
+    fn subject(&self) -> Option<&Subject> {
+        Some(&self.subject)
     }
-    let seconds = clock.elapsed().as_secs_f64();
-    let filled = plan.finish(&options.out)?;
-    let made = filled.rows.saturating_sub(before);
-    let rate = made as f64 / seconds;
-    let folder = options.out.display();
-    if context.json {
-        output::print_json(&json!({
-            "schema": "truetwin.bank/1",
-            "twin": study.name(),
-            "folder": options.out,
-            "size": options.size,
-            "seed": context.seed,
-            "shards": { "there": filled.there, "of": filled.of },
-            "simulated": made,
-            "simulations_per_second": rate,
-            "seconds": seconds,
-        }))?;
-    } else {
-        let next = match filled.there == filled.of {
-            true => format!("next: truetwin pretrain … --bank {folder} --out EST"),
-            false => "the other shards are those of other jobs; put their folders together with truetwin merge".into(),
+
+    fn is_resumed(&self) -> bool {
+        true
+    }
+
+    fn is_shared_out(&self) -> bool {
+        true
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        let study = context.study(&self.subject)?;
+        let plan = BankPlan {
+            study: &study,
+            preset: self.preset.into(),
+            size: self.size,
+            seed: context.seed,
         };
-        output::print(&format!(
-            "{folder}: {} of {} shards, {} of {} simulations; {made} of them now, in {seconds:.1} s ({rate:.0} a second)\n{next}",
-            filled.there, filled.of, filled.rows, options.size,
-        ))?;
+        let share = context.share(self.shard)?;
+        // What other ranks do counts too; one rank looks.
+        let before = match context.team.leads() {
+            true => plan.finish(&self.out).map_or(0, |filled| filled.rows),
+            false => 0,
+        };
+        context.team.wait();
+        let clock = Instant::now();
+        plan.fill(&self.out, share, context.progress)?;
+        context.team.wait();
+        if !context.team.leads() {
+            return Ok(ExitCode::SUCCESS);
+        }
+        let seconds = clock.elapsed().as_secs_f64();
+        let filled = plan.finish(&self.out)?;
+        let made = filled.rows.saturating_sub(before);
+        let rate = made as f64 / seconds;
+        let folder = self.out.display();
+        if context.json {
+            output::print_json(&json!({
+                "schema": "truetwin.bank/1",
+                "twin": study.name(),
+                "folder": self.out,
+                "size": self.size,
+                "seed": context.seed,
+                "shards": { "there": filled.there, "of": filled.of },
+                "simulated": made,
+                "simulations_per_second": rate,
+                "seconds": seconds,
+            }))?;
+        } else {
+            let next = match filled.there == filled.of {
+                true => format!("next: truetwin pretrain … --bank {folder} --out EST"),
+                false => "the other shards are those of other jobs; put their folders together with truetwin merge".into(),
+            };
+            output::print(&format!(
+                "{folder}: {} of {} shards, {} of {} simulations; {made} of them now, in {seconds:.1} s ({rate:.0} a second)\n{next}",
+                filled.there, filled.of, filled.rows, self.size,
+            ))?;
+        }
+        Ok(ExitCode::SUCCESS)
     }
-    Ok(ExitCode::SUCCESS)
 }

@@ -1,46 +1,108 @@
 //! `check`: what is wrong with a twin.
 
 use super::args::Subject;
-use super::{Context, Failure, output};
+use super::{Context, Failure, Verb, output};
+use crate::progress::Stage;
 use crate::study::PresetName;
-use crate::twin::Noise;
 use crate::twin::conformance::{Severity, check};
+use crate::twin::{
+    DigitalTwin, Drive, Noise, ParameterSpace, Signal, Signals, SimulationError, StateSpace,
+};
+use clap::Args;
 use serde_json::{Value, json};
 use std::process::ExitCode;
 
-pub(super) fn run(context: &Context<'_>, subject: &Subject) -> Result<ExitCode, Failure> {
-    let study = context.study(subject)?;
-    let drive = study
-        .drives()?
-        .draw(Noise::new(context.seed, "check input", 0))?;
-    let mut findings = check(study.twin().as_ref(), &drive, context.seed);
-    if findings.iter().all(|f| f.severity < Severity::Failure) {
-        findings.push(study.check_features(PresetName::Default, &drive, context.seed)?);
+/// Check a twin before any training: repeatable, paired noise, finite, identifiable.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+        truetwin check --twin tanks\n  \
+        truetwin check --program 'python3 model.py'\n\
+        Failures end with exit code 1. Next: truetwin pretrain with the same twin")]
+pub(super) struct Check {
+    #[command(flatten)]
+    subject: Subject,
+}
+
+impl Verb for Check {
+    fn subject(&self) -> Option<&Subject> {
+        Some(&self.subject)
     }
-    let word = |severity| match severity {
-        Severity::Pass => "pass",
-        Severity::Warning => "warning",
-        Severity::Failure => "failure",
-    };
-    let failed = findings.iter().any(|f| f.severity == Severity::Failure);
-    if context.json {
-        let findings: Vec<Value> = (findings.iter())
-            .map(
-                |f| json!({ "check": f.check, "severity": word(f.severity), "message": f.message }),
-            )
-            .collect();
-        output::print_json(&json!({
-            "schema": "truetwin.check/1", "twin": study.name(), "passed": !failed, "findings": findings,
-        }))?;
-    } else {
-        let lines: Vec<String> = (findings.iter())
-            .map(|f| format!("{:<8} {:<13} {}", word(f.severity), f.check, f.message))
-            .collect();
-        output::print(&lines.join("\n"))?;
+
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        let study = context.study(&self.subject)?;
+        let drive = study
+            .drives()?
+            .draw(Noise::new(context.seed, "check input", 0))?;
+        let twin = Watched {
+            twin: study.twin().as_ref(),
+            stage: context.progress.stage("runs", runs(study.twin().as_ref())),
+        };
+        let mut findings = check(&twin, &drive, context.seed);
+        twin.stage.finish();
+        context.progress.checkpoint().map_err(Failure::internal)?;
+        if findings.iter().all(|f| f.severity < Severity::Failure) {
+            findings.push(study.check_features(PresetName::Default, &drive, context.seed)?);
+        }
+        let word = |severity| match severity {
+            Severity::Pass => "pass",
+            Severity::Warning => "warning",
+            Severity::Failure => "failure",
+        };
+        let failed = findings.iter().any(|f| f.severity == Severity::Failure);
+        if context.json {
+            let findings: Vec<Value> = (findings.iter())
+                .map(
+                    |f| json!({ "check": f.check, "severity": word(f.severity), "message": f.message }),
+                )
+                .collect();
+            output::print_json(&json!({
+                "schema": "truetwin.check/1", "twin": study.name(), "passed": !failed, "findings": findings,
+            }))?;
+        } else {
+            let lines: Vec<String> = (findings.iter())
+                .map(|f| format!("{:<8} {:<13} {}", word(f.severity), f.check, f.message))
+                .collect();
+            output::print(&lines.join("\n"))?;
+        }
+        Ok(if failed {
+            ExitCode::FAILURE
+        } else {
+            ExitCode::SUCCESS
+        })
     }
-    Ok(if failed {
-        ExitCode::FAILURE
-    } else {
-        ExitCode::SUCCESS
-    })
+}
+
+/// About how many runs the checks make: corners of the prior, differences for each parameter; a black box's free run is the
+/// mean of 32.
+fn runs(twin: &dyn DigitalTwin) -> usize {
+    let d = twin.parameters().len();
+    let free = if twin.state_space().is_some() { 1 } else { 32 };
+    (1 << d.min(6)) + 2 * d * free + 4
+}
+
+/// A twin whose runs are counted on a bar, and can be stopped.
+struct Watched<'a> {
+    twin: &'a dyn DigitalTwin,
+    stage: Stage,
+}
+
+impl DigitalTwin for Watched<'_> {
+    fn parameters(&self) -> ParameterSpace {
+        self.twin.parameters()
+    }
+    fn signals(&self) -> Signals {
+        self.twin.signals()
+    }
+    fn state_space(&self) -> Option<&dyn StateSpace> {
+        self.twin.state_space()
+    }
+    fn simulate(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Signal, SimulationError> {
+        (self.stage.tick()).map_err(|stop| SimulationError::Fatal(stop.into()))?;
+        self.twin.simulate(theta, drive, noise)
+    }
 }

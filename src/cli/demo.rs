@@ -1,62 +1,79 @@
 //! `demo`: the main job on a record that comes with the program.
 
-use super::args::DemoArguments;
 use super::estimate::{show, write_results};
-use super::{Context, Failure, output};
+use super::{Context, Failure, Verb, output};
 use crate::study::{PresetName, Study};
 use crate::twin::{Noise, Record, write_record};
 use crate::two_stage::{EstimateOptions, PretrainOptions, pretrain};
+use clap::Args;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// A small bank and few epochs: seconds, not minutes. The refinement makes up for what the network lacks.
 const BANK: usize = 2000;
 const EPOCHS: usize = 40;
 
-pub(super) fn run(context: &Context<'_>, options: &DemoArguments) -> Result<ExitCode, Failure> {
-    if let Some(out) = &options.out {
-        output::check_new(out)?;
-    }
-    let study = match &options.twin {
-        Some(name) => context.named(name)?,
-        None => (context.studies.iter().find(|s| s.demo().is_some()))
-            .or(context.studies.first())
-            .ok_or_else(|| Failure::user("there is no twin to show"))?,
-    };
-    let (record, origin) = match study.demo() {
-        Some(record) => (record.clone(), "a record made beforehand by this program"),
-        None => (
-            simulated(context, study)?,
-            "a record simulated somewhere in the bounds",
-        ),
-    };
-    output::say(&format!(
-        "demo: {origin}, twin {}; training on {BANK} simulations from the prior",
-        study.name()
-    ));
-    let settings = PretrainOptions {
-        preset: PresetName::Default,
-        bank_size: Some(BANK),
-        epochs: Some(EPOCHS),
-        seed: context.seed,
-    };
-    let (estimator, _) = pretrain(study, &settings, context.progress)?;
-    let settings = EstimateOptions {
-        seed: context.seed,
-        ..EstimateOptions::default()
-    };
-    let estimate = estimator.estimate(&record, &settings, context.progress)?;
-    if let Some(out) = &options.out {
-        let folder = output::NewFolder::new(out)?;
-        write_record(&folder.file("record.csv"), &record)?;
-        write_results(&folder, study, &record, &estimate)?;
-        folder.finish()?;
+/// Calibrate a twin to an embedded record, in seconds, to see what it looks like.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+        truetwin demo --out demo\n\
+        Next: look at demo/overlay.svg, then truetwin twins")]
+pub(super) struct Demo {
+    /// A twin by name; the first one that has a demo unless given.
+    #[arg(long)]
+    twin: Option<String>,
+    /// A new folder for the result, the picture and the record.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+impl Verb for Demo {
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        if let Some(out) = &self.out {
+            output::check_new(out)?;
+        }
+        let study = match &self.twin {
+            Some(name) => context.named(name)?,
+            None => (context.studies.iter().find(|s| s.demo().is_some()))
+                .or(context.studies.first())
+                .ok_or_else(|| Failure::user("there is no twin to show"))?,
+        };
+        let (record, origin) = match study.demo() {
+            Some(record) => (record.clone(), "a record made beforehand by this program"),
+            None => (
+                simulated(context, study)?,
+                "a record simulated somewhere in the bounds",
+            ),
+        };
         output::say(&format!(
-            "demo: {0}/overlay.svg shows measured against twin, {0}/record.csv the record",
-            out.display()
+            "demo: {origin}, twin {}; training on {BANK} simulations from the prior",
+            study.name()
         ));
+        let settings = PretrainOptions {
+            preset: PresetName::Default,
+            bank_size: Some(BANK),
+            epochs: Some(EPOCHS),
+            seed: context.seed,
+        };
+        let (estimator, _) = pretrain(study, &settings, context.progress)?;
+        let settings = EstimateOptions {
+            seed: context.seed,
+            ..EstimateOptions::default()
+        };
+        let estimate = estimator.estimate(&record, &settings, context.progress)?;
+        if let Some(out) = &self.out {
+            let folder = output::NewFolder::new(out)?;
+            write_record(&folder.file("record.csv"), &record)?;
+            write_results(&folder, study, &record, &estimate)?;
+            folder.finish()?;
+            output::say(&format!(
+                "demo: {0}/overlay.svg shows measured against twin, {0}/record.csv the record",
+                out.display()
+            ));
+        }
+        show(context, study, &estimate)?;
+        Ok(ExitCode::SUCCESS)
     }
-    show(context, study, &estimate)?;
-    Ok(ExitCode::SUCCESS)
 }
 
 /// A record of the twin somewhere in its bounds, so most likely outside of the prior.

@@ -1,75 +1,92 @@
 //! `effects`: what a twin may lack.
 
 use super::args::Subject;
-use super::{Context, Failure, output};
+use super::{Context, Failure, Verb, output};
 use crate::effect::{described, library};
+use clap::Args;
 use serde_json::{Value, json};
 use std::process::ExitCode;
 
-pub(super) fn run(context: &Context<'_>, subject: &Subject) -> Result<ExitCode, Failure> {
-    let study = context.study(subject)?;
-    let possible = study.candidates();
-    let mut known = library();
-    for effect in &possible {
-        if known.iter().all(|d| d.id != effect.typetag_name()) {
-            known.push(described(effect.as_ref()));
-        }
+/// List the effects that a twin may lack, with their targets and magnitudes.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+        truetwin effects --twin tanks\n\
+        Next: give some to simulate --effect E.toml (docs/choosing-effects.md), or let truetwin diagnose find them")]
+pub(super) struct Effects {
+    #[command(flatten)]
+    subject: Subject,
+}
+
+impl Verb for Effects {
+    fn subject(&self) -> Option<&Subject> {
+        Some(&self.subject)
     }
-    let described: Vec<_> = (known.into_iter())
-        .filter_map(|description| {
-            let places: Vec<String> = (possible.iter())
-                .filter(|e| e.typetag_name() == description.id)
-                .map(|e| match e.other() {
-                    Some(other) => format!(
-                        "{} ({} {other})",
-                        e.target(),
-                        description.other.unwrap_or("with")
-                    ),
-                    None => e.target().to_owned(),
+
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        let study = context.study(&self.subject)?;
+        let possible = study.candidates();
+        let mut known = library();
+        for effect in &possible {
+            if known.iter().all(|d| d.id != effect.typetag_name()) {
+                known.push(described(effect.as_ref()));
+            }
+        }
+        let described: Vec<_> = (known.into_iter())
+            .filter_map(|description| {
+                let places: Vec<String> = (possible.iter())
+                    .filter(|e| e.typetag_name() == description.id)
+                    .map(|e| match e.other() {
+                        Some(other) => format!(
+                            "{} ({} {other})",
+                            e.target(),
+                            description.other.unwrap_or("with")
+                        ),
+                        None => e.target().to_owned(),
+                    })
+                    .collect();
+                (!places.is_empty()).then_some((description, places))
+            })
+            .collect();
+        if context.json {
+            let effects: Vec<Value> = (described.iter())
+                .map(|(d, places)| {
+                    let magnitudes: Vec<Value> = (d.magnitudes.iter())
+                        .map(|m| {
+                            json!({
+                                "name": m.name, "unit": m.unit, "shape": m.off.is_none(),
+                                "off": m.off.filter(|v| v.is_finite()),
+                                "low": Some(m.limits.low()).filter(|v| v.is_finite()),
+                                "high": Some(m.limits.high()).filter(|v| v.is_finite()),
+                            })
+                        })
+                        .collect();
+                    json!({ "id": d.id, "targets": places, "law": d.formula, "magnitudes": magnitudes })
                 })
                 .collect();
-            (!places.is_empty()).then_some((description, places))
-        })
-        .collect();
-    if context.json {
-        let effects: Vec<Value> = (described.iter())
-            .map(|(d, places)| {
-                let magnitudes: Vec<Value> = (d.magnitudes.iter())
-                    .map(|m| {
-                        json!({
-                            "name": m.name, "unit": m.unit, "shape": m.off.is_none(),
-                            "off": m.off.filter(|v| v.is_finite()),
-                            "low": Some(m.limits.low()).filter(|v| v.is_finite()),
-                            "high": Some(m.limits.high()).filter(|v| v.is_finite()),
+            output::print_json(&json!({
+                "schema": "truetwin.effects/1", "twin": study.name(), "effects": effects,
+            }))?;
+        } else {
+            let lines: Vec<String> = (described.iter())
+                .map(|(d, places)| {
+                    let magnitudes: Vec<String> = (d.magnitudes.iter())
+                        .map(|m| match m.unit {
+                            "" => m.name.to_owned(),
+                            unit => format!("{} [{unit}]", m.name),
                         })
-                    })
-                    .collect();
-                json!({ "id": d.id, "targets": places, "law": d.formula, "magnitudes": magnitudes })
-            })
-            .collect();
-        output::print_json(&json!({
-            "schema": "truetwin.effects/1", "twin": study.name(), "effects": effects,
-        }))?;
-    } else {
-        let lines: Vec<String> = (described.iter())
-            .map(|(d, places)| {
-                let magnitudes: Vec<String> = (d.magnitudes.iter())
-                    .map(|m| match m.unit {
-                        "" => m.name.to_owned(),
-                        unit => format!("{} [{unit}]", m.name),
-                    })
-                    .collect();
-                format!(
-                    "{:<22} {}\n{:<22} on {}; magnitudes {}",
-                    d.id,
-                    d.formula,
-                    "",
-                    places.join(", "),
-                    magnitudes.join(", ")
-                )
-            })
-            .collect();
-        output::print(&lines.join("\n"))?;
+                        .collect();
+                    format!(
+                        "{:<22} {}\n{:<22} on {}; magnitudes {}",
+                        d.id,
+                        d.formula,
+                        "",
+                        places.join(", "),
+                        magnitudes.join(", ")
+                    )
+                })
+                .collect();
+            output::print(&lines.join("\n"))?;
+        }
+        Ok(ExitCode::SUCCESS)
     }
-    Ok(ExitCode::SUCCESS)
 }

@@ -1,50 +1,77 @@
 //! `estimate`: the parameters behind a record.
 
-use super::args::EstimateArguments;
-use super::{Context, Failure, output};
+use super::args::PresetArgument;
+use super::{Context, Failure, Verb, output};
 use crate::bank::file;
 use crate::report::{estimate_json, estimate_text, overlay_svg, trajectories_csv};
 use crate::study::Study;
 use crate::twin::{Record, read_record};
-use crate::two_stage::{Estimate, EstimateOptions, Estimator};
+use crate::two_stage::{self, EstimateOptions, Estimator};
+use clap::Args;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-pub(super) fn run(context: &Context<'_>, options: &EstimateArguments) -> Result<ExitCode, Failure> {
-    if let Some(out) = &options.out {
-        output::check_new(out)?;
+/// Estimate the parameters behind a measured record.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+        truetwin estimate R.csv --estimator tanks.est --validation V.csv --out result\n\
+        Next, where the calibrated twin does not explain the record: truetwin diagnose R.csv")]
+pub(super) struct Estimate {
+    /// The measured record.
+    #[arg(value_name = "R.csv")]
+    record: PathBuf,
+    /// The estimator, from `truetwin pretrain`.
+    #[arg(long, value_name = "EST")]
+    estimator: PathBuf,
+    /// A second record of the same system to score the calibrated twin on.
+    #[arg(long, value_name = "V.csv")]
+    validation: Option<PathBuf>,
+    /// Numbers of the refinement; the estimator's own unless given.
+    #[arg(long, value_enum)]
+    preset: Option<PresetArgument>,
+    /// Refine and tune even where the gate would keep the network's estimate.
+    #[arg(long)]
+    always_refine: bool,
+    /// A new folder for estimate.json, overlay.svg, trajectories.csv and, after a refit, the cloud of simulations (cloud.npz).
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+impl Verb for Estimate {
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        if let Some(out) = &self.out {
+            output::check_new(out)?;
+        }
+        let estimator = Estimator::load(&self.estimator, context.studies)?;
+        let record = read_record(&self.record)?;
+        let settings = EstimateOptions {
+            seed: context.seed,
+            preset: self.preset.map(Into::into),
+            always_refine: self.always_refine,
+            validation: self.validation.as_deref().map(read_record).transpose()?,
+        };
+        if let Some((validation, path)) = settings.validation.as_ref().zip(self.validation.as_ref())
+        {
+            let checked = estimator.study().check_record(validation);
+            checked.map_err(|error| Failure::from(error).within(path))?;
+        }
+        let estimate = (estimator.estimate(&record, &settings, context.progress))
+            .map_err(|error| Failure::from(error).within(&self.record))?;
+        if let Some(out) = &self.out {
+            let folder = output::NewFolder::new(out)?;
+            write_results(&folder, estimator.study(), &record, &estimate)?;
+            folder.finish()?;
+        }
+        show(context, estimator.study(), &estimate)?;
+        Ok(ExitCode::SUCCESS)
     }
-    let estimator = Estimator::load(&options.estimator, context.studies)?;
-    let record = read_record(&options.record)?;
-    let settings = EstimateOptions {
-        seed: context.seed,
-        preset: options.preset.map(Into::into),
-        always_refine: options.always_refine,
-        validation: options.validation.as_deref().map(read_record).transpose()?,
-    };
-    if let Some((validation, path)) = settings
-        .validation
-        .as_ref()
-        .zip(options.validation.as_ref())
-    {
-        let checked = estimator.study().check_record(validation);
-        checked.map_err(|error| Failure::from(error).within(path))?;
-    }
-    let estimate = (estimator.estimate(&record, &settings, context.progress))
-        .map_err(|error| Failure::from(error).within(&options.record))?;
-    if let Some(out) = &options.out {
-        let folder = output::NewFolder::new(out)?;
-        write_results(&folder, estimator.study(), &record, &estimate)?;
-        folder.finish()?;
-    }
-    show(context, estimator.study(), &estimate)?;
-    Ok(ExitCode::SUCCESS)
 }
 
 /// Prints an estimate.
 pub(super) fn show(
     context: &Context<'_>,
     study: &Study,
-    estimate: &Estimate,
+    estimate: &two_stage::Estimate,
 ) -> Result<(), Failure> {
     if context.json {
         output::print_json(&estimate_json(study, estimate))
@@ -58,7 +85,7 @@ pub(super) fn write_results(
     folder: &output::NewFolder,
     study: &Study,
     record: &Record,
-    estimate: &Estimate,
+    estimate: &two_stage::Estimate,
 ) -> Result<(), Failure> {
     let json = serde_json::to_string_pretty(&estimate_json(study, estimate));
     folder.write("estimate.json", &json.map_err(Failure::internal)?)?;

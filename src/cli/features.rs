@@ -1,50 +1,78 @@
 //! `features`: records, compressed.
 
-use super::args::FeaturesArguments;
-use super::{Context, Failure, output};
+use super::args::{PresetArgument, Subject};
+use super::{Context, Failure, Verb, output};
 use crate::bank::file;
 use crate::twin::read_record;
+use clap::Args;
 use ndarray::Array2;
 use serde_json::json;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-pub(super) fn run(context: &Context<'_>, options: &FeaturesArguments) -> Result<ExitCode, Failure> {
-    if let Some(out) = &options.out {
-        output::check_new(out)?;
+/// Compress records to features, as a network would see them.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+        truetwin features R1.csv R2.csv --twin tanks --out X.npy")]
+pub(super) struct Features {
+    /// Records, measured or simulated.
+    #[arg(value_name = "R.csv", required = true)]
+    records: Vec<PathBuf>,
+    #[command(flatten)]
+    subject: Subject,
+    /// Whose features.
+    #[arg(long, value_enum, default_value = "default")]
+    preset: PresetArgument,
+    /// A new .npy, .npz or .csv file, one record a row; standard output, as CSV, unless given.
+    #[arg(long, value_name = "X.npy")]
+    out: Option<PathBuf>,
+}
+
+impl Verb for Features {
+    fn subject(&self) -> Option<&Subject> {
+        Some(&self.subject)
     }
-    let study = context.study(&options.subject)?;
-    let recipe = &study.preset(options.preset.into()).features;
-    let map = study.features(recipe.as_ref())?;
-    let mut all = Vec::new();
-    for path in &options.records {
-        let at = |failure: Failure| failure.within(path);
-        let record = read_record(path)?;
-        study
-            .check_record(&record)
-            .map_err(|error| at(error.into()))?;
-        let features = map.extract(record.drive(), record.outputs());
-        all.extend(features.map_err(|error| at(error.into()))?);
-    }
-    let features = Array2::from_shape_vec((options.records.len(), map.dim()), all)
-        .map_err(Failure::internal)?;
-    if let Some(out) = &options.out {
-        file::write_features(out, &features)?;
-    }
-    match (context.json, &options.out) {
-        (true, _) => {
-            let rows: Vec<Vec<f64>> = features.rows().into_iter().map(|r| r.to_vec()).collect();
-            output::print_json(&json!({
-                "schema": "truetwin.features/1", "twin": study.name(), "features": rows,
-            }))?;
+
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        if let Some(out) = &self.out {
+            output::check_new(out)?;
         }
-        (false, None) => {
-            let text = file::features_csv_text(&features).map_err(Failure::internal)?;
-            output::print(&text)?;
+        let study = context.study(&self.subject)?;
+        let recipe = &study.preset(self.preset.into()).features;
+        let map = study.features(recipe.as_ref())?;
+        let mut all = Vec::new();
+        let stage = context.progress.stage("records", self.records.len());
+        for path in &self.records {
+            let at = |failure: Failure| failure.within(path);
+            let record = read_record(path)?;
+            study
+                .check_record(&record)
+                .map_err(|error| at(error.into()))?;
+            let features = map.extract(record.drive(), record.outputs());
+            all.extend(features.map_err(|error| at(error.into()))?);
+            stage.tick().map_err(Failure::internal)?;
         }
-        (false, Some(out)) => {
-            let (rows, n) = features.dim();
-            output::print(&format!("{}: {rows} × {n} features", out.display()))?;
+        let features = Array2::from_shape_vec((self.records.len(), map.dim()), all)
+            .map_err(Failure::internal)?;
+        if let Some(out) = &self.out {
+            file::write_features(out, &features)?;
         }
+        match (context.json, &self.out) {
+            (true, _) => {
+                let rows: Vec<Vec<f64>> = features.rows().into_iter().map(|r| r.to_vec()).collect();
+                output::print_json(&json!({
+                    "schema": "truetwin.features/1", "twin": study.name(), "features": rows,
+                }))?;
+            }
+            (false, None) => {
+                let text = file::features_csv_text(&features).map_err(Failure::internal)?;
+                output::print(&text)?;
+            }
+            (false, Some(out)) => {
+                let (rows, n) = features.dim();
+                output::print(&format!("{}: {rows} × {n} features", out.display()))?;
+            }
+        }
+        Ok(ExitCode::SUCCESS)
     }
-    Ok(ExitCode::SUCCESS)
 }

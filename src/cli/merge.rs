@@ -1,30 +1,45 @@
 //! `merge`: the banks of a job array as one.
 
-use super::args::MergeArguments;
-use super::{Context, Failure, output};
+use super::{Context, Failure, Verb, output};
 use crate::bank::file;
 use crate::shards::{merge, merge_into_file};
+use clap::Args;
 use serde_json::json;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-pub(super) fn run(context: &Context<'_>, options: &MergeArguments) -> Result<ExitCode, Failure> {
-    output::check_new(&options.out)?;
-    let out = options.out.display();
-    let (what, count) = match file::is_named(&options.out) {
-        true => (
-            "simulations",
-            merge_into_file(&options.from, &options.out, context.progress)?,
-        ),
-        false => (
-            "shards",
-            merge(&options.from, &options.out, context.progress)?,
-        ),
-    };
-    match context.json {
-        true => output::print_json(&json!({
-            "schema": "truetwin.merge/1", "out": options.out, "what": what, "count": count,
-        }))?,
-        false => output::print(&format!("{out}: {count} {what}"))?,
+/// Put the banks of a job array together, or turn a bank into one .npz or .csv file.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+        truetwin merge bank-1 bank-2 --out bank\n  \
+        truetwin merge bank --out bank.npz\n\
+        Next: truetwin pretrain with --bank bank")]
+pub(super) struct Merge {
+    /// Folders of one call of `truetwin bank`.
+    #[arg(value_name = "DIR", required = true)]
+    from: Vec<PathBuf>,
+    /// A new folder for the bank, or a file with the name of an .npz or .csv.
+    #[arg(long, value_name = "OUT")]
+    out: PathBuf,
+}
+
+impl Verb for Merge {
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        output::check_new(&self.out)?;
+        let out = self.out.display();
+        let (what, count) = match file::is_named(&self.out) {
+            true => (
+                "simulations",
+                merge_into_file(&self.from, &self.out, context.progress)?,
+            ),
+            false => ("shards", merge(&self.from, &self.out, context.progress)?),
+        };
+        match context.json {
+            true => output::print_json(&json!({
+                "schema": "truetwin.merge/1", "out": self.out, "what": what, "count": count,
+            }))?,
+            false => output::print(&format!("{out}: {count} {what}"))?,
+        }
+        Ok(ExitCode::SUCCESS)
     }
-    Ok(ExitCode::SUCCESS)
 }

@@ -29,6 +29,7 @@ mod output;
 mod pretrain;
 mod progress;
 mod reproduce;
+mod shell;
 mod simulate;
 mod stop;
 mod twins;
@@ -37,10 +38,11 @@ mod withheld;
 use crate::progress::Progress;
 use crate::study::{Study, StudyError, StudyFile};
 use crate::work::{Share, Team};
-use args::{Arguments, Command, Subject};
-use clap::{CommandFactory, FromArgMatches};
+use args::{Arguments, Subject};
+use clap::{FromArgMatches, Subcommand};
 use failure::Failure;
 use std::ffi::OsString;
+use std::path::Path;
 use std::process::ExitCode;
 
 /// More threads than any machine has cores are a slip of the keyboard.
@@ -52,6 +54,16 @@ pub fn run<E: Into<StudyError>>(studies: impl IntoIterator<Item = Result<Study, 
 }
 
 /// Runs the command line `arguments`, the program's name first, over `studies`.
+///
+/// ```
+/// use std::process::ExitCode;
+/// use truetwin::study::{RecordPlan, Study};
+/// use truetwin::twins::VanDerPol;
+///
+/// let studies = [Study::new("mine", VanDerPol, RecordPlan::autonomous(0.05, 300))];
+/// let code = truetwin::cli::run_from(studies, ["mine", "twins", "--json"]);
+/// assert_eq!(code, ExitCode::SUCCESS);
+/// ```
 pub fn run_from<E: Into<StudyError>>(
     studies: impl IntoIterator<Item = Result<Study, E>>,
     arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>,
@@ -61,7 +73,7 @@ pub fn run_from<E: Into<StudyError>>(
         Err(error) => return Failure::from(error).report(),
     };
     let words: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
-    let matches = Arguments::command().try_get_matches_from(&words);
+    let matches = args::command().try_get_matches_from(&words);
     let parsed = match matches.and_then(|matches| Arguments::from_arg_matches(&matches)) {
         Ok(parsed) => parsed,
         Err(error) if !error.use_stderr() => {
@@ -74,19 +86,27 @@ pub fn run_from<E: Into<StudyError>>(
         }
         Err(error) => return Failure::usage(&error).report_of(&team),
     };
-    if !team.is_alone() && !parsed.command.is_shared_out() {
+    let verb = parsed.command.verb();
+    if !team.is_alone() && !verb.is_shared_out() {
         let failure = Failure::user("this verb runs as one process; start it without mpirun");
         return failure.report_of(&team);
     }
+    let program = (words.first())
+        .and_then(|word| Some(Path::new(word).file_stem()?.to_str()?.to_owned()))
+        .unwrap_or_else(|| "truetwin".into());
     stop::listen();
     let studies: Result<Vec<Study>, E> = studies.into_iter().collect();
     let result = studies
         .map_err(|error| Failure::from(error.into()))
-        .and_then(|studies| in_pool(parsed.threads, || dispatch(&parsed, &studies, &team)));
+        .and_then(|studies| {
+            in_pool(parsed.threads, || {
+                dispatch(&parsed, &program, &studies, &team)
+            })
+        });
     match result {
         Ok(code) => code,
         Err(_) if stop::asked() => {
-            let exit = stop::failure(&parsed.command, &words).report_of(&team);
+            let exit = stop::failure(verb, &words).report_of(&team);
             team.abandon(stop::CODE);
             exit
         }
@@ -117,7 +137,12 @@ fn in_pool<R: Send>(
     }
 }
 
-fn dispatch(arguments: &Arguments, studies: &[Study], team: &Team) -> Result<ExitCode, Failure> {
+fn dispatch(
+    arguments: &Arguments,
+    program: &str,
+    studies: &[Study],
+    team: &Team,
+) -> Result<ExitCode, Failure> {
     let progress = match team.leads() {
         true => progress::bars(),
         false => progress::bars().unshown(),
@@ -127,27 +152,77 @@ fn dispatch(arguments: &Arguments, studies: &[Study], team: &Team) -> Result<Exi
     let context = Context {
         studies: &studies,
         external: external.as_ref(),
+        program,
         json: arguments.json,
         seed: arguments.seed,
         progress: &progress,
         team,
     };
-    let result = match &arguments.command {
-        Command::Twins => twins::run(&context),
-        Command::Effects(subject) => effects::run(&context, subject),
-        Command::Check(subject) => check::run(&context, subject),
-        Command::Simulate(options) => simulate::run(&context, options),
-        Command::Bank(options) => bank::run(&context, options),
-        Command::Features(options) => features::run(&context, options),
-        Command::Merge(options) => merge::run(&context, options),
-        Command::Pretrain(options) => pretrain::run(&context, options),
-        Command::Estimate(options) => estimate::run(&context, options),
-        Command::Diagnose(options) => diagnose::run(&context, options),
-        Command::Reproduce(options) => reproduce::run(&context, options),
-        Command::Withheld(options) => withheld::run(&context, options),
-        Command::Demo(options) => demo::run(&context, options),
-    };
-    result.map_err(|failure| failure.of_study(arguments.command.study()))
+    let verb = arguments.command.verb();
+    let study = verb.subject().and_then(|subject| subject.study.as_deref());
+    (verb.run(&context)).map_err(|failure| failure.of_study(study))
+}
+
+/// The verbs, in the order of `--help`. Each is one file, and three lines here: its `mod`, its variant, its arm.
+#[derive(Debug, Subcommand)]
+enum Command {
+    Twins(twins::Twins),
+    Effects(effects::Effects),
+    Check(check::Check),
+    Simulate(simulate::Simulate),
+    Bank(bank::Bank),
+    Features(features::Features),
+    Merge(merge::Merge),
+    Pretrain(pretrain::Pretrain),
+    Estimate(estimate::Estimate),
+    Diagnose(diagnose::Diagnose),
+    Reproduce(reproduce::Reproduce),
+    Withheld(withheld::Withheld),
+    Demo(demo::Demo),
+    Completions(shell::Completions),
+    Man(shell::Man),
+}
+
+impl Command {
+    fn verb(&self) -> &dyn Verb {
+        match self {
+            Self::Twins(verb) => verb,
+            Self::Effects(verb) => verb,
+            Self::Check(verb) => verb,
+            Self::Simulate(verb) => verb,
+            Self::Bank(verb) => verb,
+            Self::Features(verb) => verb,
+            Self::Merge(verb) => verb,
+            Self::Pretrain(verb) => verb,
+            Self::Estimate(verb) => verb,
+            Self::Diagnose(verb) => verb,
+            Self::Reproduce(verb) => verb,
+            Self::Withheld(verb) => verb,
+            Self::Demo(verb) => verb,
+            Self::Completions(verb) => verb,
+            Self::Man(verb) => verb,
+        }
+    }
+}
+
+/// A verb: the options of a call, and what is done with them.
+trait Verb {
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure>;
+
+    /// Which twin it is about, where it asks.
+    fn subject(&self) -> Option<&Subject> {
+        None
+    }
+
+    /// Whether the same call goes on where this one stopped.
+    fn is_resumed(&self) -> bool {
+        false
+    }
+
+    /// Whether the ranks of a cluster share its work.
+    fn is_shared_out(&self) -> bool {
+        false
+    }
 }
 
 /// What every verb sees.
@@ -156,6 +231,8 @@ struct Context<'a> {
     studies: &'a [Study],
     /// The one that this call brings along.
     external: Option<&'a Study>,
+    /// What the command is called.
+    program: &'a str,
     json: bool,
     seed: u64,
     progress: &'a Progress,

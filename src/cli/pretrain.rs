@@ -1,67 +1,105 @@
 //! `pretrain`: bank and network, into one file.
 
-use super::args::PretrainArguments;
-use super::{Context, Failure, output};
+use super::args::{PresetArgument, Subject, seconds};
+use super::{Context, Failure, Verb, output};
 use crate::bank::{Bank, file};
 use crate::shards::{BankPlan, ShardedBank};
 use crate::study::Study;
 use crate::two_stage::{GivenBank, PretrainOptions, Pretraining};
 use crate::work::checksum;
+use clap::Args;
 use serde_json::json;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-pub(super) fn run(context: &Context<'_>, options: &PretrainArguments) -> Result<ExitCode, Failure> {
-    output::check_folder(&options.out)?;
-    let study = context.study(&options.subject)?;
-    let clock = Instant::now();
-    let settings = PretrainOptions {
-        preset: options.preset.into(),
-        bank_size: options.bank_size,
-        epochs: options.epochs,
-        seed: context.seed,
-    };
-    let pretraining = Pretraining::new(&study, settings).every(options.checkpoint);
-    let (estimator, history) = match &options.bank {
-        None => pretraining.write(&options.out, context.progress)?,
-        Some(path) => {
-            let (bank, checksum) = given(&study, path, &settings)?;
-            let bank = GivenBank {
-                bank: bank.as_ref(),
-                checksum,
-            };
-            pretraining.on(bank).write(&options.out, context.progress)?
-        }
-    };
-    let seconds = clock.elapsed().as_secs_f64();
-    let bank = estimator.settings().bank_size;
-    let loss = history.training.last().copied().unwrap_or(f64::NAN);
-    if context.json {
-        output::print_json(&json!({
-            "schema": "truetwin.pretrain/1",
-            "twin": study.name(),
-            "estimator": options.out,
-            "preset": estimator.preset(),
-            "bank_size": bank,
-            "features": estimator.network().inputs(),
-            "epochs": history.epochs_run,
-            "loss": if loss.is_finite() { Some(loss) } else { None },
-            "seed": context.seed,
-            "seconds": seconds,
-        }))?;
-    } else {
-        output::print(&format!(
-            "{}: estimator of {} from {bank} simulations, {} features, {} epochs, loss {loss:.4}, {seconds:.1} s\n\
-             next: truetwin estimate RECORD.csv --estimator {}",
-            options.out.display(),
-            study.twin().parameters().names().join(", "),
-            estimator.network().inputs(),
-            history.epochs_run,
-            options.out.display(),
-        ))?;
+/// Simulate a bank from the prior, train the network, write one estimator file.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+        truetwin pretrain --twin tanks --out tanks.est\n  \
+        truetwin pretrain --study S.toml --bank bank --out mine.est\n\
+        Stopped or killed, the same call goes on where it was: EST.part keeps bank and training until EST is there.\n\
+        Next: truetwin estimate R.csv --estimator tanks.est")]
+pub(super) struct Pretrain {
+    #[command(flatten)]
+    subject: Subject,
+    /// Where to write the estimator.
+    #[arg(long, value_name = "EST")]
+    out: PathBuf,
+    /// Simulations to train on; the preset's unless given.
+    #[arg(long, value_name = "M")]
+    bank_size: Option<usize>,
+    /// A bank to train on, instead of simulating one: a folder of `truetwin bank`, or an .npz or .csv file of theta and features.
+    #[arg(long, value_name = "BANK", conflicts_with = "bank_size")]
+    bank: Option<PathBuf>,
+    /// Passes over the bank; the preset's unless given.
+    #[arg(long)]
+    epochs: Option<usize>,
+    /// Recipe.
+    #[arg(long, value_enum, default_value = "default")]
+    preset: PresetArgument,
+    /// Seconds after which the training is kept, again and again; 0: after each block of the bank.
+    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = seconds)]
+    checkpoint: Duration,
+}
+
+impl Verb for Pretrain {
+    fn subject(&self) -> Option<&Subject> {
+        Some(&self.subject)
     }
-    Ok(ExitCode::SUCCESS)
+
+    fn is_resumed(&self) -> bool {
+        true
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        output::check_folder(&self.out)?;
+        let study = context.study(&self.subject)?;
+        let clock = Instant::now();
+        let settings = PretrainOptions {
+            preset: self.preset.into(),
+            bank_size: self.bank_size,
+            epochs: self.epochs,
+            seed: context.seed,
+        };
+        let pretraining = Pretraining::new(&study, settings).every(self.checkpoint);
+        let (estimator, history) = match &self.bank {
+            None => pretraining.write(&self.out, context.progress)?,
+            Some(path) => {
+                let (bank, checksum) = given(&study, path, &settings)?;
+                let bank = bank.as_ref();
+                (pretraining.on(GivenBank { bank, checksum })).write(&self.out, context.progress)?
+            }
+        };
+        let seconds = clock.elapsed().as_secs_f64();
+        let bank = estimator.settings().bank_size;
+        let loss = history.training.last().copied().unwrap_or(f64::NAN);
+        if context.json {
+            output::print_json(&json!({
+                "schema": "truetwin.pretrain/1",
+                "twin": study.name(),
+                "estimator": self.out,
+                "preset": estimator.preset(),
+                "bank_size": bank,
+                "features": estimator.network().inputs(),
+                "epochs": history.epochs_run,
+                "loss": if loss.is_finite() { Some(loss) } else { None },
+                "seed": context.seed,
+                "seconds": seconds,
+            }))?;
+        } else {
+            output::print(&format!(
+                "{}: estimator of {} from {bank} simulations, {} features, {} epochs, loss {loss:.4}, {seconds:.1} s\n\
+                 next: truetwin estimate RECORD.csv --estimator {}",
+                self.out.display(),
+                study.twin().parameters().names().join(", "),
+                estimator.network().inputs(),
+                history.epochs_run,
+                self.out.display(),
+            ))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
 }
 
 /// A bank that is there, and its checksum.

@@ -4,21 +4,94 @@ use super::stop;
 use crate::progress::{Listener, Progress};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex};
+use std::io::{IsTerminal, stderr};
+use std::sync::{Arc, Mutex, Weak};
+use std::thread;
 use std::time::{Duration, Instant};
 
 /// A stage shows its bar once it has lasted this long.
 const PATIENCE: Duration = Duration::from_millis(500);
+/// How often stages are looked at that report nothing: one unit of theirs may be long.
+const LOOK: Duration = Duration::from_millis(250);
+
+/// Before the first unit is done, nothing is known of the time left.
+const FIRST: &str = "{prefix:>13} {bar:32} {pos}/{len}  {elapsed} gone";
+const LATER: &str = "{prefix:>13} {bar:32} {pos}/{len}  {elapsed} gone, {eta} to go";
 
 /// Bars with the time left.
 pub(super) fn bars() -> Progress {
-    Progress::new(Arc::new(Bars::default()))
+    let bars = Arc::new(Bars::default());
+    if stderr().is_terminal() {
+        let watched = Arc::downgrade(&bars);
+        // A bar is worth no failure: without this thread, bars come with the first unit.
+        let _ = thread::Builder::new().spawn(move || watch(&watched));
+    }
+    Progress::new(bars)
+}
+
+fn watch(bars: &Weak<Bars>) {
+    loop {
+        thread::sleep(LOOK);
+        match bars.upgrade() {
+            Some(bars) => bars.show_what_lasts(),
+            None => return,
+        }
+    }
 }
 
 #[derive(Default)]
 struct Bars {
     all: MultiProgress,
-    open: Mutex<HashMap<String, (Instant, Option<ProgressBar>)>>,
+    open: Mutex<HashMap<String, Open>>,
+}
+
+/// A stage that has begun.
+struct Open {
+    since: Instant,
+    done: u64,
+    total: u64,
+    bar: Option<ProgressBar>,
+}
+
+impl Open {
+    /// Shows a bar, once the stage has lasted long enough.
+    fn show(&mut self, stage: &str, all: &MultiProgress) {
+        if self.bar.is_some() || self.since.elapsed() < PATIENCE || self.done >= self.total {
+            return;
+        }
+        let bar = ProgressBar::new(self.total).with_elapsed(self.since.elapsed());
+        bar.set_prefix(stage.to_owned());
+        bar.set_position(self.done);
+        let bar = all.add(bar);
+        self.style(&bar);
+        bar.enable_steady_tick(LOOK);
+        self.bar = Some(bar);
+    }
+
+    fn style(&self, bar: &ProgressBar) {
+        let template = if self.done == 0 { FIRST } else { LATER };
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+    }
+}
+
+impl Bars {
+    fn show_what_lasts(&self) {
+        // A poisoned lock means that a thread panicked; bars are not worth another panic.
+        if let Ok(mut open) = self.open.lock() {
+            for (stage, entry) in open.iter_mut() {
+                entry.show(stage, &self.all);
+            }
+        }
+    }
+}
+
+impl Drop for Bars {
+    /// What is left of a stage that failed would stand in the way of the message.
+    fn drop(&mut self) {
+        let _ = self.all.clear();
+    }
 }
 
 impl Listener for Bars {
@@ -27,33 +100,33 @@ impl Listener for Bars {
     }
 
     fn advanced(&self, stage: &str, done: u64, total: u64) {
-        // A poisoned lock means that a thread panicked; bars are not worth another panic.
         let Ok(mut open) = self.open.lock() else {
             return;
         };
         if done == 0 {
-            open.insert(stage.into(), (Instant::now(), None));
+            let entry = Open {
+                since: Instant::now(),
+                done,
+                total,
+                bar: None,
+            };
+            open.insert(stage.into(), entry);
             return;
         }
-        let Some((since, bar)) = open.get_mut(stage) else {
+        let Some(entry) = open.get_mut(stage) else {
             return;
         };
-        if bar.is_none() && since.elapsed() >= PATIENCE && done < total {
-            let style = ProgressStyle::with_template(
-                "{prefix:>13} {bar:32} {pos}/{len}  {elapsed} gone, {eta} to go",
-            );
-            let new = self.all.add(ProgressBar::new(total));
-            new.set_prefix(stage.to_owned());
-            if let Ok(style) = style {
-                new.set_style(style);
+        let first = entry.done == 0;
+        entry.done = done;
+        entry.show(stage, &self.all);
+        if let Some(bar) = &entry.bar {
+            if first {
+                entry.style(bar);
             }
-            *bar = Some(new);
-        }
-        if let Some(bar) = bar {
             bar.set_position(done);
         }
         if done >= total
-            && let Some((_, Some(bar))) = open.remove(stage)
+            && let Some(Open { bar: Some(bar), .. }) = open.remove(stage)
         {
             bar.finish_and_clear();
         }

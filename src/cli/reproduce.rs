@@ -1,89 +1,179 @@
 //! `reproduce`: the paper's table and figures, on any twin.
 
-use super::args::ReproduceArguments;
-use super::{Context, Failure, output};
-use crate::experiment::{Benchmark, FreeRuns, MeanRuns, MonteCarlo, Origin, Run, score};
+use super::args::{PresetArgument, Subject, at_least_one};
+use super::{Context, Failure, Verb, output};
+use crate::experiment::{Benchmark, FreeRuns, MeanRuns, MonteCarlo, Origin, Run, Scenario, score};
 use crate::report::{first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
 use crate::study::Study;
 use crate::two_stage::{Estimator, PretrainError, PretrainOptions, Pretraining, pretrain};
-use crate::work::{WorkError, WorkFolder};
-use std::path::Path;
+use crate::work::{Share, WorkError, WorkFolder};
+use clap::{Args, ValueEnum};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
 /// How often a job looks whether another one has trained the estimator.
 const LOOK: Duration = Duration::from_millis(200);
 
-pub(super) fn run(
-    context: &Context<'_>,
-    options: &ReproduceArguments,
-) -> Result<ExitCode, Failure> {
-    let study = context.study(&options.subject)?;
-    let given = match &options.estimator {
-        Some(path) => Some((path, load(context, path, &study)?)),
-        None => None,
-    };
-    // An estimator carries the setting that it was made for.
-    let study = &(given.as_ref()).map_or(study, |(_, estimator)| estimator.study().clone());
-    let plan = MonteCarlo {
-        benchmark: Benchmark::of(study),
-        scenario: options.scenario.into(),
-        runs: options.runs,
-        seed: context.seed,
-    };
-    plan.check(study)?;
-    let training = PretrainOptions {
-        preset: options.preset.into(),
-        bank_size: options.bank_size,
-        epochs: options.epochs,
-        seed: context.seed,
-    };
-    if options.out.is_none() && !context.team.is_alone() {
-        return Err(Failure::user("ranks meet in a folder; name one with --out"));
-    }
-    let share = context.share(options.shard)?;
-    let folder = match &options.out {
-        Some(out) => {
-            let origin = match &given {
-                Some((path, _)) => Origin::File(path),
-                None => Origin::Trained(&training),
-            };
-            Some(plan.folder(out, study, origin)?)
-        }
-        None => None,
-    };
-    let estimator = match (given, &folder) {
-        (Some((_, estimator)), _) => estimator,
-        (None, None) => pretrain(study, &training, context.progress)?.0,
-        (None, Some(folder)) => kept(context, study, &training, folder)?,
-    };
-    if let (Some(out), Some(folder)) = (&options.out, &folder) {
-        let there = plan
-            .run_share(&estimator, Some(folder), share, context.progress)?
-            .len();
-        if options.shard.is_some() && there < options.runs {
-            return output::print_share(context, out, "records", there, options.runs);
-        }
-        context.team.wait();
-        if !context.team.leads() {
-            return Ok(ExitCode::SUCCESS);
+/// Where true parameters come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ScenarioArgument {
+    /// Drawn from the prior, where the network was trained
+    #[value(name = "0")]
+    Prior,
+    /// The paper's first point outside the prior, that of its table (OOD 1)
+    #[value(name = "1")]
+    First,
+    /// The paper's second point outside the prior, that of its figures (OOD 2)
+    #[value(name = "2")]
+    Second,
+    /// Drawn from the physical bounds
+    #[value(name = "uniform", alias = "3")]
+    Uniform,
+}
+
+impl From<ScenarioArgument> for Scenario {
+    fn from(argument: ScenarioArgument) -> Self {
+        match argument {
+            ScenarioArgument::Prior => Self::InDistribution,
+            ScenarioArgument::First => Self::First,
+            ScenarioArgument::Second => Self::Second,
+            ScenarioArgument::Uniform => Self::Uniform,
         }
     }
-    let runs = plan.run(&estimator, folder.as_ref(), context.progress)?;
-    let scores = score(study, &plan, &runs);
-    let json = reproduce_json(study, &plan, estimator.preset(), &scores);
-    let text = reproduce_text(study, &plan, estimator.preset(), &scores);
-    if let Some(folder) = &folder {
-        draw(folder, study, &plan, &runs)?;
-        folder.write("table.txt", &text)?;
-        // Last: where it is, everything is.
-        folder.write("reproduce.json", &format!("{json:#}\n"))?;
+}
+
+/// Score every method on simulated records: the paper's table and figures.
+///
+/// Methods: the pretrained network (TS-pre), Gauss–Newton (GN), tuned heads (TS-fine), what `estimate` would answer
+/// (final), and as baselines the prediction-error method (PEM) and the dual Kalman filter (dual-EKF), each from a good
+/// start, from TS-pre, and from a bad start. Where the paper has a figure, it stands beside ours. Where records do not
+/// determine all of θ, a second table has the errors of what they do determine.
+///
+/// Run i depends on the seed and i alone. Records run in parallel, each on its share of the threads: for times of one
+/// core, say --threads 1.
+#[derive(Debug, Args)]
+#[command(after_help = "The paper's table and figures:\n  \
+        truetwin reproduce --twin van-der-pol --preset paper --out vdp-1\n  \
+        truetwin reproduce --twin tanks --preset paper --out tanks-1\n  \
+        truetwin reproduce --twin tanks --preset paper --scenario 2 --out tanks-2\n\
+        A twin of your own, over all of its bounds:\n  \
+        truetwin reproduce --study S.toml --scenario uniform --runs 200 --out study\n\n\
+        DIR holds reproduce.json (as --json), table.txt, trajectories.svg (as in the paper: the truth and the mean\n\
+        predictions; scenarios 1 and 2), first-record.svg, and what it takes to go on: manifest.json, estimator.est,\n\
+        runs/0000.json and so on. Interrupted, the same call goes on where it stopped; another call is refused.")]
+pub(super) struct Reproduce {
+    #[command(flatten)]
+    subject: Subject,
+    /// Where the true parameters of the records come from.
+    #[arg(long, value_enum, default_value = "1")]
+    scenario: ScenarioArgument,
+    /// Simulated records; the paper has 100.
+    #[arg(long, default_value_t = 100, value_parser = at_least_one)]
+    runs: usize,
+    /// Recipe.
+    #[arg(long, value_enum, default_value = "default")]
+    preset: PresetArgument,
+    /// An estimator to score, instead of pretraining one.
+    #[arg(long, value_name = "EST", conflicts_with_all = ["preset", "bank_size", "epochs"])]
+    estimator: Option<PathBuf>,
+    /// Simulations to train on; the preset's unless given.
+    #[arg(long, value_name = "M")]
+    bank_size: Option<usize>,
+    /// Passes over the bank; the preset's unless given.
+    #[arg(long)]
+    epochs: Option<usize>,
+    /// A folder for the results: a new one, or one of this very call to go on with.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Only part i of n of the records, for job arrays; once all parts are done, the same call without it ends the work.
+    #[arg(long, value_name = "I/N", requires = "out")]
+    shard: Option<Share>,
+}
+
+impl Verb for Reproduce {
+    fn subject(&self) -> Option<&Subject> {
+        Some(&self.subject)
     }
-    match context.json {
-        true => output::print_json(&json)?,
-        false => output::print(&text)?,
+
+    fn is_resumed(&self) -> bool {
+        self.out.is_some()
     }
-    Ok(ExitCode::SUCCESS)
+
+    fn is_shared_out(&self) -> bool {
+        true
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        let study = context.study(&self.subject)?;
+        let given = match &self.estimator {
+            Some(path) => Some((path, load(context, path, &study)?)),
+            None => None,
+        };
+        // An estimator carries the setting that it was made for.
+        let study = &(given.as_ref()).map_or(study, |(_, estimator)| estimator.study().clone());
+        let plan = MonteCarlo {
+            benchmark: Benchmark::of(study),
+            scenario: self.scenario.into(),
+            runs: self.runs,
+            seed: context.seed,
+        };
+        plan.check(study)?;
+        let training = PretrainOptions {
+            preset: self.preset.into(),
+            bank_size: self.bank_size,
+            epochs: self.epochs,
+            seed: context.seed,
+        };
+        if self.out.is_none() && !context.team.is_alone() {
+            return Err(Failure::user("ranks meet in a folder; name one with --out"));
+        }
+        let share = context.share(self.shard)?;
+        let folder = match &self.out {
+            Some(out) => {
+                let origin = match &given {
+                    Some((path, _)) => Origin::File(path),
+                    None => Origin::Trained(&training),
+                };
+                Some(plan.folder(out, study, origin)?)
+            }
+            None => None,
+        };
+        let estimator = match (given, &folder) {
+            (Some((_, estimator)), _) => estimator,
+            (None, None) => pretrain(study, &training, context.progress)?.0,
+            (None, Some(folder)) => kept(context, study, &training, folder)?,
+        };
+        if let (Some(out), Some(folder)) = (&self.out, &folder) {
+            let there = plan
+                .run_share(&estimator, Some(folder), share, context.progress)?
+                .len();
+            if self.shard.is_some() && there < self.runs {
+                return output::print_share(context, out, "records", there, self.runs);
+            }
+            context.team.wait();
+            if !context.team.leads() {
+                return Ok(ExitCode::SUCCESS);
+            }
+        }
+        let runs = plan.run(&estimator, folder.as_ref(), context.progress)?;
+        let scores = score(study, &plan, &runs);
+        let json = reproduce_json(study, &plan, estimator.preset(), &scores);
+        let text = reproduce_text(study, &plan, estimator.preset(), &scores);
+        if let Some(folder) = &folder {
+            let stage = context.progress.stage("figures", 1);
+            draw(folder, study, &plan, &runs)?;
+            stage.finish();
+            folder.write("table.txt", &text)?;
+            // Last: where it is, everything is.
+            folder.write("reproduce.json", &format!("{json:#}\n"))?;
+        }
+        match context.json {
+            true => output::print_json(&json)?,
+            false => output::print(&text)?,
+        }
+        Ok(ExitCode::SUCCESS)
+    }
 }
 
 /// The estimator of a file, if it is one of this twin.

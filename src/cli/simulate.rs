@@ -1,64 +1,94 @@
 //! `simulate`: a synthetic record.
 
-use super::args::SimulateOptions;
-use super::{Context, Failure, output};
+use super::args::Subject;
+use super::{Context, Failure, Verb, output};
 use crate::effect::read_effects;
 use crate::twin::{
     DigitalTwin, Drive, Noise, ParameterSpace, Record, Role, augment, given_magnitudes, read_drive,
     record_csv_text, write_record,
 };
+use clap::Args;
 use serde_json::json;
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-pub(super) fn run(context: &Context<'_>, options: &SimulateOptions) -> Result<ExitCode, Failure> {
-    if let Some(out) = &options.out {
-        output::check_new(out)?;
+/// Simulate a record of a twin: at these parameters, with noise and, if asked for, with effects.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+        truetwin simulate --twin van-der-pol --theta nu=3 --out R.csv\n  \
+        truetwin simulate --twin tanks --theta k1=0.6,k2=0.5,k3=0.55,k4=1 --effect E.toml --seed 4 --out R.csv\n\
+        Next: truetwin estimate R.csv --estimator EST, or truetwin diagnose R.csv --twin NAME --out gap")]
+pub(super) struct Simulate {
+    #[command(flatten)]
+    subject: Subject,
+    /// Parameters: name=value, separated by commas. Unknown starts and noise levels may be left out.
+    #[arg(long, value_name = "a=..,b=..")]
+    theta: String,
+    /// Effects to add: a TOML file of [[effect]] tables.
+    #[arg(long, value_name = "E.toml")]
+    effect: Option<PathBuf>,
+    /// Time and inputs to simulate with; random levels as in the study unless given.
+    #[arg(long, value_name = "U.csv")]
+    input: Option<PathBuf>,
+    /// Without process and measurement noise.
+    #[arg(long)]
+    noise_free: bool,
+    /// Where to write the record; standard output unless given.
+    #[arg(long, value_name = "R.csv")]
+    out: Option<PathBuf>,
+}
+
+impl Verb for Simulate {
+    fn subject(&self) -> Option<&Subject> {
+        Some(&self.subject)
     }
-    let study = context.study(&options.subject)?;
-    let given = parse_theta(&options.theta)?;
-    let mut twin = study.twin().clone();
-    let mut magnitudes = BTreeMap::new();
-    if let Some(path) = &options.effect {
-        let effects = read_effects(path)?;
-        magnitudes = given_magnitudes(&effects);
-        twin = augment(twin, effects).map_err(|error| Failure::from(error).within(path))?;
+
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        if let Some(out) = &self.out {
+            output::check_new(out)?;
+        }
+        let study = context.study(&self.subject)?;
+        let given = parse_theta(&self.theta)?;
+        let mut twin = study.twin().clone();
+        let mut magnitudes = BTreeMap::new();
+        if let Some(path) = &self.effect {
+            let effects = read_effects(path)?;
+            magnitudes = given_magnitudes(&effects);
+            twin = augment(twin, effects).map_err(|error| Failure::from(error).within(path))?;
+        }
+        let theta = complete(&twin.parameters(), given, &magnitudes)?;
+        let noise = Noise::new(context.seed, "simulate", 0);
+        let drive = match &self.input {
+            Some(path) => read_drive(path)?,
+            None => study.drives()?.draw(noise)?,
+        };
+        check_inputs(twin.as_ref(), &drive, self)?;
+        let noise = if self.noise_free { Noise::OFF } else { noise };
+        let outputs = twin.simulate(&theta, &drive, noise)?;
+        let record = Record::new(drive, outputs)?;
+        match &self.out {
+            Some(out) => write_record(out, &record)?,
+            None if !context.json => output::print(&record_csv_text(&record))?,
+            None => {}
+        }
+        if context.json {
+            let names = twin.parameters();
+            output::print_json(&json!({
+                "schema": "truetwin.simulate/1",
+                "twin": study.name(),
+                "names": names.names(),
+                "theta": theta,
+                "seed": context.seed,
+                "noise_free": self.noise_free,
+                "samples": record.samples(),
+                "step": record.drive().dt(),
+                "record": self.out,
+                "y": if self.out.is_none() { Some(record.outputs().rows().into_iter().map(|r| r.to_vec()).collect::<Vec<_>>()) } else { None },
+            }))?;
+        }
+        Ok(ExitCode::SUCCESS)
     }
-    let theta = complete(&twin.parameters(), given, &magnitudes)?;
-    let noise = Noise::new(context.seed, "simulate", 0);
-    let drive = match &options.input {
-        Some(path) => read_drive(path)?,
-        None => study.drives()?.draw(noise)?,
-    };
-    check_inputs(twin.as_ref(), &drive, options)?;
-    let noise = if options.noise_free {
-        Noise::OFF
-    } else {
-        noise
-    };
-    let outputs = twin.simulate(&theta, &drive, noise)?;
-    let record = Record::new(drive, outputs)?;
-    match &options.out {
-        Some(out) => write_record(out, &record)?,
-        None if !context.json => output::print(&record_csv_text(&record))?,
-        None => {}
-    }
-    if context.json {
-        let names = twin.parameters();
-        output::print_json(&json!({
-            "schema": "truetwin.simulate/1",
-            "twin": study.name(),
-            "names": names.names(),
-            "theta": theta,
-            "seed": context.seed,
-            "noise_free": options.noise_free,
-            "samples": record.samples(),
-            "step": record.drive().dt(),
-            "record": options.out,
-            "y": if options.out.is_none() { Some(record.outputs().rows().into_iter().map(|r| r.to_vec()).collect::<Vec<_>>()) } else { None },
-        }))?;
-    }
-    Ok(ExitCode::SUCCESS)
 }
 
 /// `a=1,b=2` as pairs.
@@ -121,11 +151,7 @@ fn complete(
     }
 }
 
-fn check_inputs(
-    twin: &dyn DigitalTwin,
-    drive: &Drive,
-    options: &SimulateOptions,
-) -> Result<(), Failure> {
+fn check_inputs(twin: &dyn DigitalTwin, drive: &Drive, options: &Simulate) -> Result<(), Failure> {
     let (given, expected) = (drive.inputs().ncols(), twin.signals().inputs.len());
     if given == expected {
         return Ok(());

@@ -1,7 +1,6 @@
 //! Ctrl-C: the work ends at its next step, and says how to go on; a second one ends the process at once.
 
-use super::Failure;
-use super::args::Command;
+use super::{Failure, Verb};
 use std::ffi::OsString;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -27,9 +26,9 @@ pub(super) fn asked() -> bool {
 }
 
 /// What is said of a call that was stopped; `call` is its words.
-pub(super) fn failure(command: &Command, call: &[OsString]) -> Failure {
+pub(super) fn failure(verb: &dyn Verb, call: &[OsString]) -> Failure {
     let words: Vec<_> = call.iter().map(|word| word.to_string_lossy()).collect();
-    let text = match command.is_resumed() {
+    let text = match verb.is_resumed() {
         true => format!(
             "stopped; what is finished is kept, and this goes on: {}",
             shell_words::join(&words)

@@ -1,20 +1,30 @@
 //! `twins`: what there is.
 
-use super::{Context, Failure, output};
+use super::{Context, Failure, Verb, output};
 use crate::study::Study;
 use crate::twin::{Parameter, Quantity};
+use clap::Args;
 use serde_json::{Value, json};
 use std::process::ExitCode;
 
-pub(super) fn run(context: &Context<'_>) -> Result<ExitCode, Failure> {
-    if context.json {
-        let twins: Vec<Value> = context.studies.iter().map(describe).collect();
-        output::print_json(&json!({ "schema": "truetwin.twins/1", "twins": twins }))?;
-    } else {
-        let blocks: Vec<String> = context.studies.iter().map(in_words).collect();
-        output::print(&blocks.join("\n"))?;
+/// List the twins: parameters, units, prior, bounds, channels.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+        truetwin twins\n\
+        Next: truetwin check --twin NAME, then truetwin pretrain --twin NAME --out NAME.est")]
+pub(super) struct Twins {}
+
+impl Verb for Twins {
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        if context.json {
+            let twins: Vec<Value> = context.studies.iter().map(describe).collect();
+            output::print_json(&json!({ "schema": "truetwin.twins/1", "twins": twins }))?;
+        } else {
+            let blocks: Vec<String> = context.studies.iter().map(in_words).collect();
+            output::print(&blocks.join("\n"))?;
+        }
+        Ok(ExitCode::SUCCESS)
     }
-    Ok(ExitCode::SUCCESS)
 }
 
 fn quantities(all: &[Quantity]) -> Vec<Value> {

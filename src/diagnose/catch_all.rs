@@ -36,7 +36,7 @@ pub(super) fn disturbed(
         return super::black_box::disturbed(base, place, memory);
     };
     outline.states.push(Quantity::new("disturbance/0", ""));
-    let sigma = Parameter::new("disturbance", "", 0.01, 1.0).role(Role::Effect);
+    let sigma = Parameter::new("disturbance", "", 0.01, 1.0).with_role(Role::Effect);
     outline.parameters = ParameterSpace::new(outline.parameters.iter().cloned().chain([sigma]));
     Arc::new(Disturbed {
         base,

@@ -2,7 +2,8 @@
 
 use super::DiagnoseError;
 use super::candidate::{Addition, Candidate};
-use super::plan::{Lead, Plan, Planner, product};
+use super::choice::product;
+use super::plan::{Lead, Plan, Planner};
 use super::problem::Problem;
 use super::scales::Scales;
 use super::scan::{Gain, Reference};

@@ -3,8 +3,8 @@
 //! | step | file |
 //! |---|---|
 //! | the way of a diagnosis | `run.rs`, `detect.rs` |
-//! | fit θ with a weak prior | `fit.rs`, `problem.rs`, `base_fit.rs` |
-//! | what each listed effect and each catch-all would gain | `candidate.rs`, `catch_all.rs`, `plan.rs`, `scales.rs`, `variant.rs`, `dictionary.rs`, `scan.rs` |
+//! | fit θ with a weak prior | `fit.rs`, `problem.rs`, `axis.rs`, `base_fit.rs` |
+//! | what each listed effect and each catch-all would gain | `candidate.rs`, `catch_all.rs`, `plan.rs`, `choice.rs`, `scales.rs`, `variant.rs`, `dictionary.rs`, `scan.rs` |
 //! | are the innovations white? | `omnibus.rs` |
 //! | what all of that is where nothing is wrong | `null.rs` |
 //! | what a validation record says | `evalue.rs` |
@@ -20,12 +20,82 @@
 //! | all of that for a twin without equations | `black_box/` |
 //!
 //! See docs/diagnosing-a-gap.md for the mathematics and how to read the answer.
+//!
+//! ```
+//! use std::sync::Arc;
+//! use truetwin::diagnose::*;
+//! use truetwin::effect::QuadraticDrag;
+//! use truetwin::progress::Progress;
+//! use truetwin::study::{RecordPlan, Study};
+//! use truetwin::twin::*;
+//! use truetwin::twins::VanDerPol;
+//!
+//! // The real oscillator has a drag that the twin does not know.
+//! let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 200))?;
+//! let drag = QuadraticDrag { target: "x2".into(), magnitudes: Given::default() };
+//! let real = augment(Arc::new(VanDerPol), vec![Arc::new(drag)])?;
+//! let drive = Drive::autonomous(0.05, 200)?;
+//! let outputs = real.simulate(&[1.5, 0.6], &drive, Noise::new(7, "measured", 0))?;
+//! let record = Record::new(drive, outputs)?;
+//!
+//! let found: Diagnosis =
+//!     diagnose(&study, &[record], None, &DiagnoseSettings::default(), &Progress::silent())?;
+//! let detection: &Detection = &found.detection;
+//! assert_eq!(found.verdict, Verdict::StructuralGap);
+//! assert!(detection.p_value < detection.alpha);
+//! let nu: &FittedParameter = &found.parameters[0];
+//! assert_eq!(nu.name, "nu");
+//! let unknown_starts_and_noise: &[FittedNuisance] = &found.nuisance;
+//! assert!(unknown_starts_and_noise.is_empty());
+//!
+//! // Which effect: one, a class of rivals, or none of the listed.
+//! let which: &Which = &found.which;
+//! assert_ne!(which.decision, Decision::NotNeeded);
+//! let first: &EffectFit = &which.effects[0];
+//! assert!((0.0..=1.0).contains(&first.probability));
+//! let tell_rivals_apart: Option<&NextInput> = which.next_input.as_ref();
+//! assert!(tell_rivals_apart.is_none_or(|next| !next.rivals.is_empty()));
+//!
+//! // Where: in the equations, in time, at which values, at which delays and frequencies.
+//! let place: &Where = &found.place;
+//! let targets: &[TargetShare] = &place.targets;
+//! let equations: &[Equation] = &place.equations;
+//! for equation in equations {
+//!     let ranges: &[TermRange] = &equation.term;
+//!     assert!(ranges.iter().all(|range| range.low <= range.high));
+//! }
+//! let since: Option<&Onset> = place.onset.as_ref();
+//! assert!(since.is_none_or(|onset| onset.time >= 0.0));
+//! let maps: &Maps = &place.maps;
+//! let (windows, regions): (&[Window], &[Region]) = (&maps.windows, &maps.regions);
+//! let (channels, lags, bands): (&[Channel], &[Lag], &[Band]) = (&maps.channels, &maps.lags, &maps.bands);
+//! /// Any of them says how much of the misfit it holds.
+//! fn largest(cells: &[impl Cell]) -> f64 {
+//!     cells.iter().map(Cell::share).fold(0.0, f64::max)
+//! }
+//! assert!([largest(windows), largest(regions), largest(channels)].iter().all(|share| *share <= 1.0));
+//! assert!(lags.len() + bands.len() + targets.len() > 0);
+//!
+//! // How far it closes, what it could depend on, what this record could not have shown.
+//! let closed: Option<&Shrinkage> = found.shrinkage.as_ref();
+//! assert!(closed.is_none_or(|shrinkage| shrinkage.before >= 0.0));
+//! let missing: Option<&Discovery> = found.discovery.as_ref();
+//! let terms: &[Term] = missing.map_or(&[], |discovery| &discovery.terms);
+//! assert!(terms.iter().all(|term| (0.0..=1.0).contains(&term.inclusion)));
+//! let visible: &[Visible] = &found.power;
+//! assert!(visible.iter().all(|effect| !effect.id.is_empty()));
+//! let runs: &FreeRuns = &found.free_runs;
+//! assert_eq!(runs.times.len(), 200);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod attribute;
+mod axis;
 mod base_fit;
 mod black_box;
 mod candidate;
 mod catch_all;
+mod choice;
 mod correlation;
 mod decide;
 mod detect;
@@ -58,9 +128,8 @@ mod summary;
 mod variant;
 mod verdict;
 
-pub use gain::{gain_of, held_out_score};
-pub use held_out::SHORTEST_SPLIT;
-pub(crate) use held_out::held_out_from;
+pub(crate) use gain::{gain_of, held_out_score};
+pub(crate) use held_out::{SHORTEST_SPLIT, held_out_from};
 pub use map::{Band, Cell, Channel, Equation, Lag, Maps, Onset, Region, TermRange, Where, Window};
 pub use result::{
     Decision, Detection, Diagnosis, Discovery, EffectFit, FittedNuisance, FittedParameter,
@@ -71,6 +140,7 @@ pub use shrink::Shrinkage;
 
 use crate::filter::FilterError;
 use crate::progress::Cancelled;
+use crate::setting::SettingError;
 use crate::study::Study;
 use crate::twin::{DigitalTwin, EffectError, ParameterError, Record, RecordError, SimulationError};
 use std::fmt;
@@ -87,6 +157,13 @@ use std::sync::Arc;
 /// | `without` | none | ids, or `id@target` | effects that are not to be named |
 /// | `initial` | none | | θ that an estimator gave, a start of the fit |
 /// | `detection_only` | no | | stop after the verdict: neither where, nor which, nor how far |
+///
+/// ```
+/// use truetwin::diagnose::DiagnoseSettings;
+///
+/// let quick = DiagnoseSettings { detection_only: true, seed: 7, ..DiagnoseSettings::default() };
+/// assert_eq!(quick.alpha, 0.05);
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiagnoseSettings {
     /// Level of every test.
@@ -120,7 +197,20 @@ impl Default for DiagnoseSettings {
 }
 
 /// Why there is no diagnosis.
+///
+/// ```
+/// use truetwin::diagnose::{DiagnoseError, DiagnoseSettings, diagnose};
+/// use truetwin::progress::Progress;
+/// use truetwin::study::{RecordPlan, Study};
+/// use truetwin::twins::VanDerPol;
+///
+/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 200))?;
+/// let nothing = diagnose(&study, &[], None, &DiagnoseSettings::default(), &Progress::silent());
+/// assert!(matches!(nothing, Err(DiagnoseError::NoRecord)));
+/// # Ok::<(), truetwin::study::StudyError>(())
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum DiagnoseError {
     /// No record.
     #[error("no record was given; give at least one")]
@@ -146,15 +236,8 @@ pub enum DiagnoseError {
         least: usize,
     },
     /// A setting that cannot be used.
-    #[error("{name} = {value}; {remedy}")]
-    Setting {
-        /// Which.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// What it must be.
-        remedy: &'static str,
-    },
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// An effect to leave out that there is not.
     #[error(
         "--without names {0}, which is no effect of this twin; `truetwin effects --twin T` lists them"
@@ -207,7 +290,24 @@ impl DiagnoseError {
 }
 
 /// One of the records that a diagnosis was given.
+///
+/// ```
+/// use truetwin::diagnose::{DiagnoseError, DiagnoseSettings, GivenRecord, diagnose};
+/// use truetwin::progress::Progress;
+/// use truetwin::study::{RecordPlan, Study};
+/// use truetwin::twin::*;
+/// use truetwin::twins::VanDerPol;
+///
+/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 200))?;
+/// let drive = Drive::autonomous(0.05, 20)?;
+/// let short = Record::new(drive.clone(), VanDerPol.simulate(&[1.5], &drive, Noise::OFF)?)?;
+/// let error: DiagnoseError =
+///     diagnose(&study, &[short], None, &DiagnoseSettings::default(), &Progress::silent()).unwrap_err();
+/// assert_eq!(error.record(), Some(GivenRecord::Measured(0)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum GivenRecord {
     /// Its place among the records, from 0.
     Measured(usize),

@@ -1,9 +1,11 @@
 //! Where one candidate is looked for: its variants, magnitudes to start from, and how each magnitude moves in a fit.
 
 use super::DiagnoseError;
+use super::axis::Axis;
 use super::candidate::{Addition, Candidate, Kind, with, with_disturbance};
 use super::catch_all::Place;
-use super::problem::{Axis, Problem};
+use super::choice::{Choice, DELAYS, REGISTERS, axis, choices, log_axis, unit, unset_log_axis};
+use super::problem::Problem;
 use super::scales::{Scales, deviation, ends, largest};
 use super::variant::Variant;
 use crate::math::quantile;
@@ -19,10 +21,6 @@ const LEVELS: [usize; 2] = [4, 2];
 /// Nats for a mark that outputs bear, and against an effect that would have left one: other sensors have noise behind them.
 const PRESENT: f64 = 12.0;
 const ABSENT: f64 = -5.0;
-/// Delays in steps, each with a register that just holds it: the shorter the register, the faster the filter.
-const DELAYS: [&[f64]; 3] = [&[0.5, 1.5], &[3.0], &[5.5]];
-const REGISTERS: [usize; 3] = [3, 5, 8];
-
 /// A variant before its points are tried.
 pub(super) struct Plan {
     pub variant: Variant,
@@ -54,38 +52,8 @@ pub(super) struct Planner<'a> {
     pub coarse: bool,
 }
 
-/// Which of an effect's magnitudes are in use.
-struct Choice {
-    /// Magnitudes that are off.
-    off: Vec<usize>,
-    /// Index of the register of a delay.
-    register: Option<usize>,
-}
-
 /// Leads, axis and range of a first magnitude.
 type First = (Vec<Lead>, Axis, (f64, f64));
-
-/// A magnitude that an effect has to have: where it is looked for is the record's business, not the prior's.
-fn axis(bounds: Interval, centre: f64, deviation: f64, width: f64, longest: f64) -> Axis {
-    Axis {
-        bounds,
-        centre,
-        deviation,
-        width,
-        longest,
-        counts: false,
-        held: false,
-    }
-}
-
-fn log_axis(low: f64, high: f64, centre: f64) -> Axis {
-    axis(Interval::unchecked(low, high), centre, 3.0, 1.0, 0.7)
-}
-
-/// A magnitude whose bounds follow once it is known what can be seen of it.
-fn unset_log_axis(centre: f64) -> Axis {
-    log_axis(f64::NAN, f64::NAN, centre)
-}
 
 impl Planner<'_> {
     /// Variants of a candidate, and where to look.
@@ -367,59 +335,4 @@ impl Planner<'_> {
             }
         }
     }
-}
-
-/// The ways to use an effect: as its mark says; one threshold, or all of them; delays by length.
-///
-/// Only filters pay for a long register.
-fn choices(effect: &dyn UnmodelledEffect, mark: &Mark, filtered: bool) -> Vec<Choice> {
-    let magnitudes = effect.magnitudes();
-    let thresholds: Vec<usize> = (0..magnitudes.len())
-        .filter(|&i| magnitudes[i].is_threshold())
-        .collect();
-    let choice = |off, register| Choice { off, register };
-    if let Mark::Present(m) = mark {
-        let off = (0..m.len()).filter(|&i| m[i].is_infinite()).collect();
-        return vec![choice(off, None)];
-    }
-    match thresholds.len() {
-        0 | 1 if filtered && effect.least_memory() < effect.memory() => (0..REGISTERS.len())
-            .map(|i| choice(vec![], Some(i)))
-            .collect(),
-        0 | 1 => vec![choice(vec![], None)],
-        _ => {
-            let others = |i: &usize| thresholds.iter().copied().filter(|j| j != i).collect();
-            (thresholds.iter().map(others).chain([vec![]]))
-                .map(|off| choice(off, None))
-                .collect()
-        }
-    }
-}
-
-/// The size of one unit, of a signal or state of deviation `size`.
-fn unit(name: &str, size: f64, dt: f64) -> f64 {
-    let signal = match name {
-        n if n.starts_with("signal") || n.starts_with("state") => size,
-        _ => 1.0,
-    };
-    match name {
-        "s" => dt,
-        n if n.ends_with("/s") || n.ends_with("·s)") => signal / dt,
-        _ => signal,
-    }
-}
-
-/// Every combination of one value of each list.
-pub(super) fn product(lists: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    lists.iter().fold(vec![vec![]], |all, list| {
-        all.iter()
-            .flat_map(|head| {
-                list.iter().map(move |v| {
-                    let mut next = head.clone();
-                    next.push(*v);
-                    next
-                })
-            })
-            .collect()
-    })
 }

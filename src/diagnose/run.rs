@@ -18,6 +18,7 @@ use super::verdict::absorbing;
 use super::{DiagnoseError, DiagnoseSettings, GivenRecord, Setting};
 use crate::math::six_digits;
 use crate::progress::Progress;
+use crate::setting::SettingError;
 use crate::study::Study;
 use crate::twin::{Noise, Record};
 use std::time::Instant;
@@ -93,11 +94,14 @@ pub fn diagnose(
                 locate(&setting, &detected, found, &answer, alpha, noise, progress)?;
             place.after = after;
             if answer.decision == Decision::Class {
+                let stage = progress.stage("next input", 1);
                 next = next_input(bench, found, &answer.class, noise.child("next"))?;
+                stage.tick()?;
             }
         }
+        let stage = progress.stage("how far", 2);
         visible = power(bench, nulls, settings.alpha)?;
-        progress.checkpoint()?;
+        stage.tick()?;
         let found = found.as_deref();
         shrunk = shrinkage(
             &setting,
@@ -108,6 +112,7 @@ pub fn diagnose(
             settings,
             noise,
         )?;
+        stage.tick()?;
     }
     let last = step.as_ref().map_or(bench, |step| &step.bench);
     let space = setting.twin.parameters();
@@ -272,30 +277,24 @@ pub(super) fn check(
             });
         }
     }
-    let setting = |name, value, remedy| {
-        Err(DiagnoseError::Setting {
-            name,
-            value,
-            remedy,
-        })
-    };
     let (alpha, replicates) = (settings.alpha, settings.replicates as f64);
-    if !(alpha > 0.0 && alpha < 1.0) {
-        return setting(
-            "alpha",
-            alpha,
-            "choose a level between 0 and 1, such as 0.05",
-        );
-    }
-    if (replicates + 1.0) * alpha <= 1.0 {
-        return setting("replicates", replicates, "take more than 1/alpha");
-    }
-    if settings.unexplained < 50 {
-        return setting(
-            "unexplained",
-            settings.unexplained as f64,
-            "take at least 50",
-        );
-    }
+    SettingError::unless(
+        alpha > 0.0 && alpha < 1.0,
+        "alpha",
+        alpha,
+        "choose a level between 0 and 1, such as 0.05",
+    )?;
+    SettingError::unless(
+        (replicates + 1.0) * alpha > 1.0,
+        "replicates",
+        replicates,
+        "take more than 1/alpha",
+    )?;
+    SettingError::unless(
+        settings.unexplained >= 50,
+        "unexplained",
+        settings.unexplained,
+        "take at least 50",
+    )?;
     Ok(())
 }

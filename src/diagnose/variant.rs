@@ -1,6 +1,7 @@
 //! A candidate as a twin, with the axes that its magnitudes move on.
 
-use super::problem::{Axis, Problem};
+use super::axis::Axis;
+use super::problem::Problem;
 use crate::twin::{DigitalTwin, Interval, Magnitude};
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -2,9 +2,10 @@
 
 use super::DiagnoseError;
 use super::attribute::{Explanation, explanations};
+use super::axis::Axis;
 use super::fit::{Fitted, fit};
 use super::null::{Bench, Look};
-use super::problem::{Axis, Problem};
+use super::problem::Problem;
 use super::result::Verdict;
 use crate::progress::Stage;
 use crate::twin::Role;

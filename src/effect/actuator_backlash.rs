@@ -7,6 +7,17 @@ use serde::{Deserialize, Serialize};
 /// Play: v ← clamp(v, u ± width/2). After a reversal nothing moves until the play is used up; v starts at the first u.
 ///
 /// Magnitude: `width` of the play in the unit of the signal, 0 or more, off at 0.
+///
+/// ```
+/// use truetwin::effect::ActuatorBacklash;
+/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+///
+/// let effect = ActuatorBacklash { target: "actuator".into(), magnitudes: Given::default() };
+/// let now = Instant { t: 2.0, dt: 0.5 };
+/// let mut memory = [0.0];
+/// assert_eq!(effect.signal(&[0.5], now, &mut memory, 1.0), 0.75); // half the play is lost
+/// assert_eq!(effect.signal(&[0.5], now, &mut memory, 0.75), 0.75); // and a way back does nothing yet
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ActuatorBacklash {

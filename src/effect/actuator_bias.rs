@@ -6,6 +6,15 @@ use serde::{Deserialize, Serialize};
 /// A constant error of the zero: u + offset.
 ///
 /// Magnitude: `offset` in the unit of the signal, of either sign, off at 0.
+///
+/// ```
+/// use truetwin::effect::ActuatorBias;
+/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+///
+/// let effect = ActuatorBias { target: "actuator".into(), magnitudes: Given::default() };
+/// let now = Instant { t: 2.0, dt: 0.5 };
+/// assert_eq!(effect.signal(&[0.25], now, &mut [], 1.0), 1.25);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ActuatorBias {

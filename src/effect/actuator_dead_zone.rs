@@ -7,6 +7,15 @@ use serde::{Deserialize, Serialize};
 /// Commands inside ±width/2 do nothing, larger ones lose that much: u − clamp(u, ±width/2).
 ///
 /// Magnitude: `width` in the unit of the signal, 0 or more, off at 0.
+///
+/// ```
+/// use truetwin::effect::ActuatorDeadZone;
+/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+///
+/// let effect = ActuatorDeadZone { target: "actuator".into(), magnitudes: Given::default() };
+/// let now = Instant { t: 2.0, dt: 0.5 };
+/// assert_eq!(effect.signal(&[0.5], now, &mut [], 1.0), 0.75);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ActuatorDeadZone {

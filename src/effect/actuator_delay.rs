@@ -7,6 +7,17 @@ use serde::{Deserialize, Serialize};
 /// A dead time: u(t − delay), linear between samples, the first value before the start.
 ///
 /// Magnitude: `delay` in seconds, 0 or more and at most 63 steps, off at 0.
+///
+/// ```
+/// use truetwin::effect::ActuatorDelay;
+/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+///
+/// let effect = ActuatorDelay { target: "actuator".into(), magnitudes: Given::default() };
+/// let now = Instant { t: 2.0, dt: 0.5 };
+/// let mut memory = vec![1.0; effect.memory()];
+/// assert_eq!(effect.signal(&[0.5], now, &mut memory, 3.0), 1.0); // one step late
+/// assert_eq!(effect.signal(&[0.5], now, &mut memory, 5.0), 3.0);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ActuatorDelay {

@@ -6,6 +6,15 @@ use serde::{Deserialize, Serialize};
 /// A relative error of the scale: u·(1 + error).
 ///
 /// Magnitude: `error` without unit, −1 (a dead actuator) or more, off at 0.
+///
+/// ```
+/// use truetwin::effect::ActuatorGain;
+/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+///
+/// let effect = ActuatorGain { target: "actuator".into(), magnitudes: Given::default() };
+/// let now = Instant { t: 2.0, dt: 0.5 };
+/// assert_eq!(effect.signal(&[0.5], now, &mut [], 2.0), 3.0);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ActuatorGain {

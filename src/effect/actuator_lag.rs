@@ -7,6 +7,17 @@ use serde::{Deserialize, Serialize};
 /// A first-order lag: v ← a·v + (1 − a)·u with a = exp(−Δt/τ); v starts at the first u.
 ///
 /// Magnitude: `tau` (τ) in seconds, 0 or more, off at 0.
+///
+/// ```
+/// use truetwin::effect::ActuatorLag;
+/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+///
+/// let effect = ActuatorLag { target: "actuator".into(), magnitudes: Given::default() };
+/// let now = Instant { t: 2.0, dt: 0.5 };
+/// let mut memory = [0.0];
+/// let acts = effect.signal(&[0.5], now, &mut memory, 1.0); // τ is one step
+/// assert!((acts - (1.0 - (-1.0f64).exp())).abs() < 1e-12);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ActuatorLag {

@@ -6,6 +6,16 @@ use serde::{Deserialize, Serialize};
 /// A limited speed: v ← v + clamp(u − v, ±rate·Δt); v starts at the first u.
 ///
 /// Magnitude: `rate` in units of the signal per second, 0 or more, off at +∞.
+///
+/// ```
+/// use truetwin::effect::ActuatorRateLimit;
+/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+///
+/// let effect = ActuatorRateLimit { target: "actuator".into(), magnitudes: Given::default() };
+/// let now = Instant { t: 2.0, dt: 0.5 };
+/// let mut memory = [0.0];
+/// assert_eq!(effect.signal(&[1.0], now, &mut memory, 2.0), 0.5);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ActuatorRateLimit {

@@ -6,6 +6,14 @@ use serde::{Deserialize, Serialize};
 /// A constant push or leak into a state: ẋ + force.
 ///
 /// Magnitude: `force` in units of the state per second, of either sign, off at 0.
+///
+/// ```
+/// use truetwin::effect::ConstantForcing;
+/// use truetwin::twin::{Given, UnmodelledEffect};
+///
+/// let effect = ConstantForcing { target: "x".into(), magnitudes: Given::default() };
+/// assert_eq!(effect.force(&[0.5], 0.0, 2.0, 0.0), 0.5);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConstantForcing {

@@ -7,6 +7,14 @@ use serde::{Deserialize, Serialize};
 /// A loss of constant size against the sign of the state: ẋ − force·sign x, with sign 0 = 0.
 ///
 /// Magnitude: `force` in units of the state per second, 0 or more, off at 0.
+///
+/// ```
+/// use truetwin::effect::CoulombFriction;
+/// use truetwin::twin::{Given, UnmodelledEffect};
+///
+/// let effect = CoulombFriction { target: "x".into(), magnitudes: Given::default() };
+/// assert_eq!(effect.force(&[0.5], 0.0, -2.0, 0.0), 0.5); // against the motion
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CoulombFriction {

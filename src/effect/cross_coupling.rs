@@ -6,6 +6,14 @@ use serde::{Deserialize, Serialize};
 /// Another state acts on this one: ẋ + rate·x_from.
 ///
 /// Magnitude: `rate` in units of the state per second and unit of `from`, of either sign, off at 0.
+///
+/// ```
+/// use truetwin::effect::CrossCoupling;
+/// use truetwin::twin::{Given, UnmodelledEffect};
+///
+/// let effect = CrossCoupling { target: "x".into(), from: "z".into(), magnitudes: Given::default() };
+/// assert_eq!(effect.force(&[0.5], 0.0, 2.0, 3.0), 1.5);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CrossCoupling {

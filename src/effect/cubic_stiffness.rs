@@ -6,6 +6,14 @@ use serde::{Deserialize, Serialize};
 /// A Duffing spring: ẋ − c·x_from³, where `from` is the state whose rate this one is. Below 0 the spring softens.
 ///
 /// Magnitude: `coefficient` (c) in units of the state per second and cubed unit of `from`, of either sign, off at 0.
+///
+/// ```
+/// use truetwin::effect::CubicStiffness;
+/// use truetwin::twin::{Given, UnmodelledEffect};
+///
+/// let effect = CubicStiffness { target: "v".into(), from: "z".into(), magnitudes: Given::default() };
+/// assert_eq!(effect.force(&[0.5], 0.0, 0.0, 2.0), -4.0);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CubicStiffness {

@@ -9,7 +9,15 @@ use std::path::{Path, PathBuf};
 const MOST: u64 = 1 << 20;
 
 /// What is wrong with an effect file: which file, where, and what to do.
+///
+/// ```
+/// use truetwin::effect::{EffectFileError, parse_effects};
+///
+/// let error: EffectFileError = parse_effects("[[effect]]\nid = 'sensor-rust'\ntarget = 'sensor'").unwrap_err();
+/// assert!(error.to_string().contains("sensor-rust"), "{error}");
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum EffectFileError {
     /// The file cannot be read.
     #[error("{}: {error}; give the path of an effect file", path.display())]
@@ -63,6 +71,16 @@ pub fn parse_effects(text: &str) -> Result<Effects, EffectFileError> {
 }
 
 /// Effects from a file.
+///
+/// ```
+/// use truetwin::effect::read_effects;
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("E.toml");
+/// std::fs::write(&path, "[[effect]]\nid = 'sensor-lag'\ntarget = 'sensor'\nmagnitudes = { tau = 2.5 }")?;
+/// assert_eq!(read_effects(&path)?[0].given().get("tau"), Some(2.5));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read_effects(path: &Path) -> Result<Effects, EffectFileError> {
     let text = read_text(path, MOST).map_err(|error| EffectFileError::Io {
         path: path.into(),

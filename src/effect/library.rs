@@ -2,13 +2,21 @@
 
 use super::*;
 use crate::twin::{
-    DigitalTwin, Effects, Given, Law, Magnitude, Noise, Now, Outline, ParameterSpace, Role,
-    StateSpace, targets,
+    DigitalTwin, Effects, Law, Magnitude, Noise, Now, Outline, ParameterSpace, Role, StateSpace,
+    targets,
 };
-use std::sync::Arc;
 
 /// What an effect is, for people and tables.
+///
+/// ```
+/// use truetwin::effect::{Description, library};
+///
+/// let lag: Description = library().into_iter().find(|d| d.id == "sensor-lag").ok_or("it is listed")?;
+/// assert_eq!((lag.law.target(), lag.magnitudes[0].name), ("sensor", "tau"));
+/// # Ok::<(), &str>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Description {
     /// Id, as in files.
     pub id: &'static str,
@@ -20,67 +28,6 @@ pub struct Description {
     pub magnitudes: Vec<Magnitude>,
     /// The law in one line.
     pub formula: &'static str,
-}
-
-/// One line of the library: how to make the effect, and its law in words.
-struct Member {
-    /// From its target and the other state.
-    make: fn(&str, &str) -> Arc<dyn UnmodelledEffect>,
-    other: Option<&'static str>,
-    formula: &'static str,
-}
-
-/// `member!(Type: "formula")`; `member!(Type + from: "formula")` of a law between two states.
-macro_rules! member {
-    ($effect:ident $(+ $other:ident)?: $formula:literal) => {
-        Member {
-            make: |target, _other| {
-                Arc::new($effect {
-                    target: target.into(),
-                    $($other: _other.into(),)?
-                    magnitudes: Given::default(),
-                })
-            },
-            other: [$(stringify!($other),)?].first().copied(),
-            formula: $formula,
-        }
-    };
-}
-
-/// The library, in the order of its table.
-fn members() -> Vec<Member> {
-    vec![
-        member!(SensorBias: "s + offset"),
-        member!(SensorGain: "s·(1 + error)"),
-        member!(SensorDrift: "s + rate·t"),
-        member!(SensorLag: "z ← a·z + (1 − a)·s, a = exp(−Δt/τ)"),
-        member!(SensorDelay: "s(t − delay), linear between samples"),
-        member!(SensorRectification: "(1 − f)·s + f·abs(s)"),
-        member!(SensorNoise: "r² + std² for the variance r² of the twin's own noise"),
-        member!(SensorSaturation: "clamp(s, low, high)"),
-        member!(SensorQuantization: "step·⌊s/step + ½⌋"),
-        member!(SensorOutliers: "s + N(0, scale²) with that probability"),
-        member!(ActuatorGain: "u·(1 + error)"),
-        member!(ActuatorBias: "u + offset"),
-        member!(ActuatorDeadZone: "u − clamp(u, ±width/2)"),
-        member!(ActuatorBacklash: "v ← clamp(v, u ± width/2)"),
-        member!(ActuatorSaturation: "clamp(u, low, high)"),
-        member!(ActuatorRateLimit: "v ← v + clamp(u − v, ±rate·Δt)"),
-        member!(ActuatorLag: "v ← a·v + (1 − a)·u, a = exp(−Δt/τ)"),
-        member!(ActuatorDelay: "u(t − delay), linear between samples"),
-        member!(ConstantForcing: "ẋ + force"),
-        member!(CoulombFriction: "ẋ − force·sign x"),
-        member!(LinearLoss: "ẋ − rate·x"),
-        member!(CrossCoupling + from: "ẋ + rate·x_from"),
-        member!(QuadraticDrag: "ẋ − c·abs(x)·x"),
-        member!(CubicStiffness + from: "ẋ − c·x_from³"),
-        member!(PowerLaw: "ẋ − c·abs(x)^e·sign x"),
-        member!(PeriodicDisturbance: "ẋ + amplitude·sin(2π·f·t + phase)"),
-        member!(StateCeiling + to: "the excess over level is cut; spill × excess is added to `to`"),
-        member!(ProcessNoise: "q² + std² for the variance q² of the twin's own increment a step"),
-        member!(ParameterDrift: "θ·(1 + rate·t)"),
-        member!(ParameterStep: "θ·(1 + size) from that time on"),
-    ]
 }
 
 /// An effect that is not of the library, as far as it describes itself.
@@ -95,6 +42,10 @@ pub fn described(effect: &dyn UnmodelledEffect) -> Description {
 }
 
 /// Every effect of the library, in the order of its table.
+///
+/// ```
+/// assert!(truetwin::effect::library().iter().any(|description| description.id == "state-ceiling"));
+/// ```
 pub fn library() -> Vec<Description> {
     (members().into_iter())
         .map(|member| {
@@ -114,6 +65,15 @@ pub fn library() -> Vec<Description> {
 ///
 /// Targets are the twin's own states and parameters, not the memories and magnitudes of effects already added.
 /// `cubic-stiffness` is offered where a state is the rate of another, which is found by probing the drift.
+///
+/// ```
+/// use truetwin::effect::applicable;
+/// use truetwin::twins::VanDerPol;
+///
+/// let possible = applicable(&VanDerPol);
+/// assert!(possible.iter().any(|effect| effect.target() == "x2"));
+/// assert!(possible.iter().all(|effect| effect.target() != "actuator")); // the oscillator has no input
+/// ```
 pub fn applicable(twin: &dyn DigitalTwin) -> Effects {
     let (equations, signals) = (twin.state_space(), twin.signals());
     let outline = equations.map(|twin| own(twin.outline()));

@@ -6,6 +6,14 @@ use serde::{Deserialize, Serialize};
 /// Leakage, cooling, viscous friction: ẋ − rate·x.
 ///
 /// Magnitude: `rate` in 1/s, 0 or more, off at 0.
+///
+/// ```
+/// use truetwin::effect::LinearLoss;
+/// use truetwin::twin::{Given, UnmodelledEffect};
+///
+/// let effect = LinearLoss { target: "x".into(), magnitudes: Given::default() };
+/// assert_eq!(effect.force(&[0.5], 0.0, 2.0, 0.0), -1.0);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LinearLoss {

@@ -41,10 +41,11 @@
 //!
 //! # Add one
 //!
-//! Copy the nearest neighbour, change the law, and add a line to `library.rs` and to the table above (a test compares
-//! both). Outside of this crate, implement [`UnmodelledEffect`] under an id of your own; files then know it too.
+//! Copy the nearest neighbour, change the law, and name it in `effect/mod.rs`: `mod`, `pub use`, the table above and the list
+//! below (a test compares both). Outside of this crate, implement [`UnmodelledEffect`] under an id of your own; files then know it too.
 
-use crate::twin::UnmodelledEffect;
+use crate::twin::{Given, UnmodelledEffect};
+use std::sync::Arc;
 
 /// What every effect answers from its fields: target, given magnitudes, and the other state where there is one.
 macro_rules! accessors {
@@ -112,7 +113,8 @@ pub use coulomb_friction::CoulombFriction;
 pub use cross_coupling::CrossCoupling;
 pub use cubic_stiffness::CubicStiffness;
 pub use file::{EffectFileError, parse_effects, read_effects};
-pub use library::{Description, applicable, described, library};
+pub(crate) use library::described;
+pub use library::{Description, applicable, library};
 pub use linear_loss::LinearLoss;
 pub use parameter_drift::ParameterDrift;
 pub use parameter_step::ParameterStep;
@@ -131,3 +133,64 @@ pub use sensor_quantization::SensorQuantization;
 pub use sensor_rectification::SensorRectification;
 pub use sensor_saturation::SensorSaturation;
 pub use state_ceiling::StateCeiling;
+
+/// One line of the library: how to make the effect, and its law in words.
+struct Member {
+    /// From its target and the other state.
+    make: fn(&str, &str) -> Arc<dyn UnmodelledEffect>,
+    other: Option<&'static str>,
+    formula: &'static str,
+}
+
+/// `member!(Type: "formula")`; `member!(Type + from: "formula")` of a law between two states.
+macro_rules! member {
+    ($effect:ident $(+ $other:ident)?: $formula:literal) => {
+        Member {
+            make: |target, _other| {
+                Arc::new($effect {
+                    target: target.into(),
+                    $($other: _other.into(),)?
+                    magnitudes: Given::default(),
+                })
+            },
+            other: [$(stringify!($other),)?].first().copied(),
+            formula: $formula,
+        }
+    };
+}
+
+/// The library, in the order of its table.
+fn members() -> Vec<Member> {
+    vec![
+        member!(SensorBias: "s + offset"),
+        member!(SensorGain: "s·(1 + error)"),
+        member!(SensorDrift: "s + rate·t"),
+        member!(SensorLag: "z ← a·z + (1 − a)·s, a = exp(−Δt/τ)"),
+        member!(SensorDelay: "s(t − delay), linear between samples"),
+        member!(SensorRectification: "(1 − f)·s + f·abs(s)"),
+        member!(SensorNoise: "r² + std² for the variance r² of the twin's own noise"),
+        member!(SensorSaturation: "clamp(s, low, high)"),
+        member!(SensorQuantization: "step·⌊s/step + ½⌋"),
+        member!(SensorOutliers: "s + N(0, scale²) with that probability"),
+        member!(ActuatorGain: "u·(1 + error)"),
+        member!(ActuatorBias: "u + offset"),
+        member!(ActuatorDeadZone: "u − clamp(u, ±width/2)"),
+        member!(ActuatorBacklash: "v ← clamp(v, u ± width/2)"),
+        member!(ActuatorSaturation: "clamp(u, low, high)"),
+        member!(ActuatorRateLimit: "v ← v + clamp(u − v, ±rate·Δt)"),
+        member!(ActuatorLag: "v ← a·v + (1 − a)·u, a = exp(−Δt/τ)"),
+        member!(ActuatorDelay: "u(t − delay), linear between samples"),
+        member!(ConstantForcing: "ẋ + force"),
+        member!(CoulombFriction: "ẋ − force·sign x"),
+        member!(LinearLoss: "ẋ − rate·x"),
+        member!(CrossCoupling + from: "ẋ + rate·x_from"),
+        member!(QuadraticDrag: "ẋ − c·abs(x)·x"),
+        member!(CubicStiffness + from: "ẋ − c·x_from³"),
+        member!(PowerLaw: "ẋ − c·abs(x)^e·sign x"),
+        member!(PeriodicDisturbance: "ẋ + amplitude·sin(2π·f·t + phase)"),
+        member!(StateCeiling + to: "the excess over level is cut; spill × excess is added to `to`"),
+        member!(ProcessNoise: "q² + std² for the variance q² of the twin's own increment a step"),
+        member!(ParameterDrift: "θ·(1 + rate·t)"),
+        member!(ParameterStep: "θ·(1 + size) from that time on"),
+    ]
+}

@@ -6,6 +6,14 @@ use serde::{Deserialize, Serialize};
 /// Wear, fouling, warming up: θ·(1 + rate·t).
 ///
 /// Magnitude: `rate` in 1/s, of either sign, off at 0.
+///
+/// ```
+/// use truetwin::effect::ParameterDrift;
+/// use truetwin::twin::{Given, UnmodelledEffect};
+///
+/// let effect = ParameterDrift { target: "k".into(), magnitudes: Given::default() };
+/// assert_eq!(effect.parameter(&[0.5], 1.0, 4.0), 6.0);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ParameterDrift {

@@ -7,6 +7,15 @@ use serde::{Deserialize, Serialize};
 ///
 /// Magnitudes: `size` without unit, −1 (all gone) or more, off at 0; the shape `time` in seconds from the first sample,
 /// 0 or more.
+///
+/// ```
+/// use truetwin::effect::ParameterStep;
+/// use truetwin::twin::{Given, UnmodelledEffect};
+///
+/// let effect = ParameterStep { target: "k".into(), magnitudes: Given::default() };
+/// let at = |t| effect.parameter(&[0.5, 10.0], t, 4.0); // size, time
+/// assert_eq!((at(9.0), at(10.0)), (4.0, 6.0));
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ParameterStep {

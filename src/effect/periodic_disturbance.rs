@@ -8,6 +8,15 @@ use std::f64::consts::TAU;
 ///
 /// Magnitudes: `amplitude` in units of the state per second, 0 or more, off at 0; the shapes `frequency` (f) in Hz, above
 /// 0, and `phase` in radians, in [−2π, 2π].
+///
+/// ```
+/// use truetwin::effect::PeriodicDisturbance;
+/// use truetwin::twin::{Given, UnmodelledEffect};
+///
+/// let effect = PeriodicDisturbance { target: "x".into(), magnitudes: Given::default() };
+/// let force = effect.force(&[0.5, 0.25, 0.0], 1.0, 0.0, 0.0); // a quarter of a period
+/// assert!((force - 0.5).abs() < 1e-12);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PeriodicDisturbance {

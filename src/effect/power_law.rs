@@ -9,6 +9,14 @@ use serde::{Deserialize, Serialize};
 ///
 /// Magnitudes: `coefficient` (c) in units of the state per second at |x| = 1, of either sign, off at 0; the shape
 /// `exponent` (e) in [0, 4].
+///
+/// ```
+/// use truetwin::effect::PowerLaw;
+/// use truetwin::twin::{Given, UnmodelledEffect};
+///
+/// let effect = PowerLaw { target: "x".into(), magnitudes: Given::default() };
+/// assert_eq!(effect.force(&[0.5, 1.5], 0.0, 4.0, 0.0), -4.0);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PowerLaw {

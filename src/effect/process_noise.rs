@@ -6,6 +6,14 @@ use serde::{Deserialize, Serialize};
 /// White noise on a state, an increment N(0, std²) a step, in quadrature with the twin's own.
 ///
 /// Magnitude: `std` of the increment in the unit of the state, 0 or more, off at 0.
+///
+/// ```
+/// use truetwin::effect::ProcessNoise;
+/// use truetwin::twin::{Given, UnmodelledEffect};
+///
+/// let effect = ProcessNoise { target: "x".into(), magnitudes: Given::default() };
+/// assert_eq!(effect.noise_level(&[0.3]), 0.3); // joins the increment of the twin in quadrature
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProcessNoise {

@@ -6,6 +6,14 @@ use serde::{Deserialize, Serialize};
 /// Turbulent drag: ẋ − c·|x|·x.
 ///
 /// Magnitude: `coefficient` (c) in 1/(unit of the state · s), 0 or more, off at 0.
+///
+/// ```
+/// use truetwin::effect::QuadraticDrag;
+/// use truetwin::twin::{Given, UnmodelledEffect};
+///
+/// let effect = QuadraticDrag { target: "x".into(), magnitudes: Given::default() };
+/// assert_eq!(effect.force(&[0.5], 0.0, -2.0, 0.0), 2.0);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct QuadraticDrag {

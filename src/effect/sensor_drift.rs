@@ -6,6 +6,15 @@ use serde::{Deserialize, Serialize};
 /// A zero that moves steadily from the first sample on: s + rate·t.
 ///
 /// Magnitude: `rate` in units of the signal per second, of either sign, off at 0.
+///
+/// ```
+/// use truetwin::effect::SensorDrift;
+/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+///
+/// let effect = SensorDrift { target: "sensor".into(), magnitudes: Given::default() };
+/// let now = Instant { t: 2.0, dt: 0.5 };
+/// assert_eq!(effect.signal(&[0.25], now, &mut [], 1.0), 1.5);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorDrift {

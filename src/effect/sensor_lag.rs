@@ -7,6 +7,17 @@ use serde::{Deserialize, Serialize};
 /// A first-order lag: z ← a·z + (1 − a)·s with a = exp(−Δt/τ); the reading is z, which starts at the first s.
 ///
 /// Magnitude: `tau` (τ) in seconds, 0 or more, off at 0.
+///
+/// ```
+/// use truetwin::effect::SensorLag;
+/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+///
+/// let effect = SensorLag { target: "sensor".into(), magnitudes: Given::default() };
+/// let now = Instant { t: 2.0, dt: 0.5 };
+/// let mut memory = [0.0];
+/// let read = effect.signal(&[0.5], now, &mut memory, 1.0); // τ is one step
+/// assert!((read - (1.0 - (-1.0f64).exp())).abs() < 1e-12);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorLag {

@@ -8,6 +8,14 @@ use serde::{Deserialize, Serialize};
 /// A black box's own noise is already in its outputs; there, independent draws are added, to the same variance.
 ///
 /// Magnitude: `std` in the unit of the signal, 0 or more, off at 0.
+///
+/// ```
+/// use truetwin::effect::SensorNoise;
+/// use truetwin::twin::{Given, UnmodelledEffect};
+///
+/// let effect = SensorNoise { target: "sensor".into(), magnitudes: Given::default() };
+/// assert_eq!(effect.noise_level(&[0.3]), 0.3); // joins the noise of the twin in quadrature
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorNoise {

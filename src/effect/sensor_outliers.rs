@@ -6,6 +6,16 @@ use serde::{Deserialize, Serialize};
 /// Rare large errors after everything else: with the probability, N(0, scale²) is added to a sample.
 ///
 /// Magnitudes: `probability` a sample, in [0, 1], off at 0; the shape `scale` in the unit of the signal, 0 or more.
+///
+/// ```
+/// use truetwin::effect::SensorOutliers;
+/// use truetwin::twin::{Given, UnmodelledEffect};
+///
+/// let effect = SensorOutliers { target: "sensor".into(), magnitudes: Given::default() };
+/// let hits = effect.outliers(&[0.05, 2.0]).ok_or("they are said for filters")?;
+/// assert_eq!((hits.probability, hits.scale), (0.05, 2.0));
+/// # Ok::<(), &str>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorOutliers {

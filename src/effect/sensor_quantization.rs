@@ -7,6 +7,15 @@ use serde::{Deserialize, Serialize};
 /// Rounding to a multiple of the step, halves upwards: step·⌊s/step + ½⌋.
 ///
 /// Magnitude: `step` in the unit of the signal, 0 or more, off at 0.
+///
+/// ```
+/// use truetwin::effect::SensorQuantization;
+/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+///
+/// let effect = SensorQuantization { target: "sensor".into(), magnitudes: Given::default() };
+/// let now = Instant { t: 2.0, dt: 0.5 };
+/// assert_eq!(effect.signal(&[0.5], now, &mut [], 1.2), 1.0);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorQuantization {

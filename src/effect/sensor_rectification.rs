@@ -6,6 +6,15 @@ use serde::{Deserialize, Serialize};
 /// A part f of the signal is rectified: (1 − f)·s + f·|s|.
 ///
 /// Magnitude: `fraction` (f) without unit, in [0, 1], off at 0.
+///
+/// ```
+/// use truetwin::effect::SensorRectification;
+/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+///
+/// let effect = SensorRectification { target: "sensor".into(), magnitudes: Given::default() };
+/// let now = Instant { t: 2.0, dt: 0.5 };
+/// assert_eq!(effect.signal(&[0.5], now, &mut [], -2.0), 0.0);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorRectification {

@@ -8,6 +8,15 @@ use serde::{Deserialize, Serialize};
 /// A limited range, after the noise: clamp(s, low, high).
 ///
 /// Magnitudes: `low` and `high` in the unit of the signal, off at −∞ and +∞. Where low exceeds high, high wins.
+///
+/// ```
+/// use truetwin::effect::SensorSaturation;
+/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+///
+/// let effect = SensorSaturation { target: "sensor".into(), magnitudes: Given::default() };
+/// let now = Instant { t: 2.0, dt: 0.5 };
+/// assert_eq!(effect.signal(&[-1.0, 1.0], now, &mut [], 2.5), 1.0);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorSaturation {

@@ -7,6 +7,16 @@ use serde::{Deserialize, Serialize};
 /// `to`. A twin of one state names itself: then the excess is lost.
 ///
 /// Magnitudes: `level` in the unit of the state, off at +∞; the shape `spill` without unit, in [0, 1].
+///
+/// ```
+/// use truetwin::effect::StateCeiling;
+/// use truetwin::twin::{Given, UnmodelledEffect};
+///
+/// let effect = StateCeiling { target: "x".into(), to: "z".into(), magnitudes: Given::default() };
+/// let (mut x, mut other) = (3.0, 1.0);
+/// effect.limit(&[2.0, 0.5], &mut x, Some(&mut other)); // level, spill
+/// assert_eq!((x, other), (2.0, 1.5));
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StateCeiling {

@@ -13,6 +13,19 @@ const LAYOUT: u32 = 3;
 pub(super) const RUNS: &str = "runs";
 
 /// Where the estimator of a study comes from.
+///
+/// ```
+/// use truetwin::experiment::{Benchmark, MonteCarlo, Origin, Scenario, reference_studies};
+/// use truetwin::two_stage::PretrainOptions;
+///
+/// let study = &reference_studies()?[0];
+/// let plan = MonteCarlo { benchmark: Benchmark::of(study), scenario: Scenario::First, runs: 100, seed: 1 };
+/// let place = tempfile::tempdir()?;
+/// let training = PretrainOptions::default();
+/// let folder = plan.folder(&place.path().join("runs"), study, Origin::Trained(&training))?;
+/// assert!(folder.file("manifest.json").exists()); // another call is refused there
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub enum Origin<'a> {
     /// Trained for it, and kept in the folder.

@@ -7,6 +7,7 @@ use crate::twin::{Record, Signal, free_run};
 
 /// One run's record, and noise-free runs of the twin at the truth and at every answer.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct FreeRuns {
     /// The record, simulated again.
     pub record: Record,
@@ -36,6 +37,7 @@ impl FreeRuns {
 
 /// The mean over runs of the noise-free trajectories, as in the paper's figures.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct MeanRuns {
     /// In seconds.
     pub times: Vec<f64>,

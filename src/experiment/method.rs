@@ -7,6 +7,7 @@ use std::fmt;
 /// What is scored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
+#[non_exhaustive]
 pub enum Method {
     /// The pretrained network.
     TsPre,

@@ -24,7 +24,21 @@ pub struct MonteCarlo {
 }
 
 /// Why there are no scores.
+///
+/// ```
+/// use truetwin::experiment::{Benchmark, MonteCarlo, MonteCarloError, Scenario, ScenarioError};
+/// use truetwin::study::{RecordPlan, Study};
+/// use truetwin::twins::VanDerPol;
+///
+/// // No points of the paper's are known of this twin.
+/// let study = Study::new("mine", VanDerPol, RecordPlan::autonomous(0.05, 150))?;
+/// let plan = MonteCarlo { benchmark: Benchmark::default(), scenario: Scenario::First, runs: 2, seed: 1 };
+/// let error: MonteCarloError = plan.record(&study, 0).unwrap_err();
+/// assert!(matches!(error, MonteCarloError::Scenario(ScenarioError::NoPoint(_))));
+/// # Ok::<(), truetwin::study::StudyError>(())
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MonteCarloError {
     /// The study does not have such a scenario.
     #[error(transparent)]

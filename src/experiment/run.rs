@@ -2,7 +2,7 @@
 
 use super::record::Simulated;
 use super::{Method, MonteCarloError};
-use crate::baseline::{DualFilter, Initialisation, PredictionError};
+use crate::baseline::{DualFilter, Initialisation, PredictionErrorMethod};
 use crate::progress::Progress;
 use crate::two_stage::{Estimate, EstimateOptions, Estimator};
 use serde::{Deserialize, Serialize};
@@ -11,12 +11,13 @@ use std::time::Instant;
 /// What all methods answered on one record; what scores and figures are made of.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Run {
     /// Which, from 0.
     pub run: usize,
     /// True θ.
     pub truth: Vec<f64>,
-    /// The refitted estimate's interval at [`crate::two_stage::INTERVAL_LEVEL`], by parameter; `None` where it has
+    /// The refitted estimate's 90 % interval, by parameter; `None` where it has
     /// no finite ends, empty where the estimate failed.
     pub interval: Vec<Option<[f64; 2]>>,
     /// In the order of [`Method::all`].
@@ -28,6 +29,7 @@ pub struct Run {
 /// What one method answered.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Answer {
     /// Method.
     pub method: Method,
@@ -81,7 +83,9 @@ impl Run {
             let (theta, seconds) = match method {
                 Method::PredictionError(from) => {
                     let fit = start(from).and_then(|start| {
-                        PredictionError::default().fit(twin, record, &start).ok()
+                        PredictionErrorMethod::default()
+                            .fit(twin, record, &start)
+                            .ok()
                     });
                     (fit.map(|fit| fit.theta), None)
                 }

@@ -6,6 +6,7 @@ use crate::twin::{Drive, DriveError, Interval, Noise, Signal};
 
 /// Where true parameters come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Scenario {
     /// Uniform in the prior, where the network was trained.
     InDistribution,
@@ -52,6 +53,15 @@ pub struct Benchmark {
 }
 
 /// One parameter at the test points.
+///
+/// ```
+/// use truetwin::experiment::{Benchmark, TestPoint, reference_studies};
+///
+/// let benchmark = Benchmark::of(&reference_studies()?[0]);
+/// let nu: &TestPoint = &benchmark.points[0];
+/// assert_eq!((nu.name, nu.values), ("nu", [3.0, 5.0]));
+/// # Ok::<(), truetwin::study::StudyError>(())
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct TestPoint {
     /// Parameter.
@@ -61,6 +71,15 @@ pub struct TestPoint {
 }
 
 /// A published figure.
+///
+/// ```
+/// use truetwin::experiment::{Benchmark, Method, Published, reference_studies};
+///
+/// let benchmark = Benchmark::of(&reference_studies()?[0]);
+/// let (method, figures): &(Method, Published) = &benchmark.published[0];
+/// assert_eq!((*method, figures.mse), (Method::TsPre, 0.3204));
+/// # Ok::<(), truetwin::study::StudyError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Published {
     /// Mean squared error.
@@ -70,7 +89,19 @@ pub struct Published {
 }
 
 /// Why no true parameters or inputs can be had.
+///
+/// ```
+/// use truetwin::experiment::{Benchmark, MonteCarlo, Scenario, ScenarioError};
+/// use truetwin::study::{RecordPlan, Study};
+/// use truetwin::twins::VanDerPol;
+///
+/// let study = Study::new("mine", VanDerPol, RecordPlan::autonomous(0.05, 150))?;
+/// let plan = MonteCarlo { benchmark: Benchmark::default(), scenario: Scenario::Second, runs: 2, seed: 1 };
+/// assert!(matches!(plan.check(&study), Err(ScenarioError::NoPoint(_))));
+/// # Ok::<(), truetwin::study::StudyError>(())
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ScenarioError {
     /// There are no test points.
     #[error(

@@ -9,6 +9,7 @@ pub const COVERAGE_LEVEL: f64 = 0.95;
 
 /// What the runs of a study come to.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Scores {
     /// In the order of [`Method::all`].
     pub methods: Vec<MethodScore>,
@@ -20,6 +21,7 @@ pub struct Scores {
 
 /// Error of one method.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct MethodScore {
     /// Method.
     pub method: Method,
@@ -43,6 +45,7 @@ pub struct MethodScore {
 
 /// How often an interval held the true value.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Coverage {
     /// Parameter.
     pub name: String,
@@ -50,7 +53,7 @@ pub struct Coverage {
     pub covered: u64,
     /// Runs with an estimate.
     pub of: u64,
-    /// Ends of the exact (Clopper–Pearson) interval of the probability, at [`COVERAGE_LEVEL`].
+    /// Ends of the exact (Clopper–Pearson) interval of the probability, at 95 %.
     pub low: f64,
     /// Upper end.
     pub high: f64,

@@ -33,6 +33,25 @@ use std::sync::Arc;
 /// A fixed compression h of a trajectory to n numbers.
 ///
 /// Source: Lakshminarayanan, Guerrero & Rojas, section III-A.
+///
+/// ```
+/// use std::sync::Arc;
+/// use truetwin::feature::{Centred, FeatureMap, FeatureRecipe, Score};
+/// use truetwin::twin::{DigitalTwin, Drive, Noise, Record};
+/// use truetwin::twins::VanDerPol;
+///
+/// let twin: Arc<dyn DigitalTwin> = Arc::new(VanDerPol);
+/// let drive = Drive::autonomous(0.05, 200)?;
+/// let outputs = twin.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
+/// let map: Arc<dyn FeatureMap> = Score::default().bind(&twin)?;
+/// assert_eq!(map.extract(&drive, &outputs)?.len(), map.dim());
+///
+/// // Score features find the record's own reference; most others have none.
+/// let record = Record::new(drive, outputs)?;
+/// let centred: Option<Centred> = map.centred(&record, &[1.2], Noise::new(1, "search", 0))?;
+/// assert!((centred.ok_or("there is one")?.theta[0] - 1.5).abs() < 0.1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait FeatureMap: Send + Sync {
     /// Number of features n.
     fn dim(&self) -> usize;
@@ -57,7 +76,23 @@ pub trait FeatureMap: Send + Sync {
 }
 
 /// A map centred on a record, and where the record puts θ.
+///
+/// ```
+/// use std::sync::Arc;
+/// use truetwin::feature::{Ar, Centred, FeatureRecipe};
+/// use truetwin::twin::{DigitalTwin, Drive, Noise, Record};
+/// use truetwin::twins::VanDerPol;
+///
+/// let twin: Arc<dyn DigitalTwin> = Arc::new(VanDerPol);
+/// let drive = Drive::autonomous(0.05, 50)?;
+/// let outputs = twin.simulate(&[1.5], &drive, Noise::OFF)?;
+/// let found: Option<Centred> =
+///     Ar { order: 2 }.bind(&twin)?.centred(&Record::new(drive, outputs)?, &[1.5], Noise::OFF)?;
+/// assert!(found.is_none()); // AR coefficients have no reference
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone)]
+#[non_exhaustive]
 pub struct Centred {
     /// Features about the new reference; as many as before.
     pub map: Arc<dyn FeatureMap>,
@@ -67,9 +102,45 @@ pub struct Centred {
     pub axes: DMatrix<f64>,
 }
 
+debug_by_name!(Centred);
+
 /// What study and estimator files hold of a feature map: `{ kind = "ar", order = 5 }`.
 ///
 /// Register an own recipe with `#[typetag::serde(name = "…")]`; the name is its `kind`.
+///
+/// ```
+/// use serde::{Deserialize, Serialize};
+/// use std::sync::Arc;
+/// use truetwin::feature::{FeatureError, FeatureMap, FeatureRecipe};
+/// use truetwin::twin::{DigitalTwin, Drive, Signal};
+/// use truetwin::twins::VanDerPol;
+///
+/// /// The mean square of the first output.
+/// #[derive(Debug, Serialize, Deserialize)]
+/// struct Power;
+///
+/// #[typetag::serde(name = "power")]
+/// impl FeatureRecipe for Power {
+///     fn bind(&self, _: &Arc<dyn DigitalTwin>) -> Result<Arc<dyn FeatureMap>, FeatureError> {
+///         Ok(Arc::new(Self))
+///     }
+/// }
+///
+/// impl FeatureMap for Power {
+///     fn dim(&self) -> usize {
+///         1
+///     }
+///     fn extract(&self, _: &Drive, outputs: &Signal) -> Result<Vec<f64>, FeatureError> {
+///         let column = outputs.column(0);
+///         Ok(vec![column.dot(&column) / column.len() as f64])
+///     }
+/// }
+///
+/// let twin: Arc<dyn DigitalTwin> = Arc::new(VanDerPol);
+/// let map = Power.bind(&twin)?;
+/// assert_eq!(map.extract(&Drive::autonomous(0.1, 4)?, &Signal::from_elem((4, 1), 3.0))?, [9.0]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[typetag::serde(tag = "kind")]
 pub trait FeatureRecipe: Debug + Send + Sync {
     /// The map for a twin.
@@ -77,7 +148,21 @@ pub trait FeatureRecipe: Debug + Send + Sync {
 }
 
 /// Why there are no features.
+///
+/// ```
+/// use std::sync::Arc;
+/// use truetwin::feature::{Ar, FeatureError, FeatureRecipe};
+/// use truetwin::twin::{DigitalTwin, Drive, Signal};
+/// use truetwin::twins::VanDerPol;
+///
+/// let twin: Arc<dyn DigitalTwin> = Arc::new(VanDerPol);
+/// let map = Ar { order: 5 }.bind(&twin)?;
+/// let error = map.extract(&Drive::autonomous(0.05, 20)?, &Signal::ones((20, 1))).unwrap_err();
+/// assert!(matches!(error, FeatureError::Constant { channel: 1, .. }));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FeatureError {
     /// Orders or sizes that make no sense.
     #[error("features {kind}: {problem}")]

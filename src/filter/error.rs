@@ -2,11 +2,28 @@
 
 use crate::math::DifferenceError;
 use crate::optimise::EvaluationError;
+use crate::setting::SettingError;
 use crate::twin::{ParameterError, RecordError, SimulationError};
 
 /// Why a record could not be filtered. [`Diverged`](Self::Diverged), [`NoSpread`](Self::NoSpread) and a twin that
 /// refuses θ cost this θ alone; the rest ends the work.
+///
+/// ```
+/// use truetwin::filter::{FilterError, FilterSettings, log_likelihood};
+/// use truetwin::twin::{DigitalTwin, Drive, Noise, Record};
+/// use truetwin::twins::VanDerPol;
+///
+/// let drive = Drive::autonomous(0.05, 100)?;
+/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
+/// let record = Record::new(drive, outputs)?;
+///
+/// let settings = FilterSettings { noise_floor: -1.0, ..FilterSettings::default() };
+/// let error = log_likelihood(&VanDerPol, &[1.5], &record, &settings).unwrap_err();
+/// assert!(matches!(error, FilterError::Setting(_)) && !error.is_recoverable());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FilterError {
     /// The record does not fit the twin.
     #[error(transparent)]
@@ -33,15 +50,8 @@ pub enum FilterError {
         at: f64,
     },
     /// A setting that cannot be used.
-    #[error("{name} = {value}; {remedy}")]
-    Setting {
-        /// Which.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// What it must be.
-        remedy: &'static str,
-    },
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// An initial covariance of another size, or none at all.
     #[error(
         "start_covariance is {rows} × {columns}; give a symmetric, non-negative {states} × {states} matrix"

@@ -6,7 +6,27 @@ use crate::twin::Signal;
 use ndarray::{Array3, s};
 
 /// A record as the filter saw it; N samples, p outputs, n states.
+///
+/// ```
+/// use truetwin::filter::{FilterSettings, Filtered, States, filter};
+/// use truetwin::twin::{DigitalTwin, Drive, Noise, Record};
+/// use truetwin::twins::VanDerPol;
+///
+/// let drive = Drive::autonomous(0.05, 100)?;
+/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
+/// let record = Record::new(drive, outputs)?;
+///
+/// let settings = FilterSettings { keep_states: true, ..FilterSettings::default() };
+/// let found: Filtered = filter(&VanDerPol, &[1.5], &record, &settings)?;
+/// assert_eq!(found.innovations.dim(), (100, 1));
+/// let total: f64 = found.log_densities.iter().sum();
+/// assert!((total - found.log_likelihood).abs() < 1e-9 * total.abs());
+/// let states: States = found.states.ok_or("the settings ask for them")?;
+/// assert_eq!(states.means.dim(), (100, 2));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Filtered {
     /// log p(y | θ), in nats.
     pub log_likelihood: f64,
@@ -68,7 +88,22 @@ impl Sink for Filtered {
 }
 
 /// Means and covariances of the states at each sample; N samples, n states in the order of the twin's outline.
+///
+/// ```
+/// use truetwin::filter::{FilterSettings, States, smooth};
+/// use truetwin::twin::{DigitalTwin, Drive, Noise, Record};
+/// use truetwin::twins::VanDerPol;
+///
+/// let drive = Drive::autonomous(0.05, 100)?;
+/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
+/// let record = Record::new(drive, outputs)?;
+///
+/// let states: States = smooth(&VanDerPol, &[1.5], &record, &FilterSettings::default())?.states;
+/// assert_eq!((states.means.dim(), states.covariances.dim()), ((100, 2), (100, 2, 2)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct States {
     /// Means (N × n), in state units.
     pub means: Signal,

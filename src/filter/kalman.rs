@@ -54,6 +54,8 @@ pub struct Kalman<'a> {
     pub(super) start_covariance: Option<Vec<f64>>,
 }
 
+debug_by_name!(Kalman<'_>);
+
 impl<'a> Kalman<'a> {
     /// Prepares a record.
     ///

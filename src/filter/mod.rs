@@ -71,6 +71,21 @@ use crate::twin::{Record, StateSpace};
 /// # Errors
 ///
 /// As [`Kalman::new`] and [`Kalman::filter`].
+///
+/// ```
+/// use truetwin::filter::{FilterSettings, filter};
+/// use truetwin::twin::{DigitalTwin, Drive, Noise, Record};
+/// use truetwin::twins::VanDerPol;
+///
+/// let drive = Drive::autonomous(0.05, 100)?;
+/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
+/// let record = Record::new(drive, outputs)?;
+///
+/// let found = filter(&VanDerPol, &[1.5], &record, &FilterSettings::default())?;
+/// let mean_square = found.standardised.mapv(|z| z * z).mean().ok_or("samples")?;
+/// assert!((mean_square - 1.0).abs() < 0.5); // innovations of the right twin have variance 1
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn filter(
     twin: &dyn StateSpace,
     theta: &[f64],
@@ -85,6 +100,20 @@ pub fn filter(
 /// # Errors
 ///
 /// As [`Kalman::new`] and [`Kalman::log_likelihood`].
+///
+/// ```
+/// use truetwin::filter::{FilterSettings, log_likelihood};
+/// use truetwin::twin::{DigitalTwin, Drive, Noise, Record};
+/// use truetwin::twins::VanDerPol;
+///
+/// let drive = Drive::autonomous(0.05, 100)?;
+/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
+/// let record = Record::new(drive, outputs)?;
+///
+/// let at = |nu: f64| log_likelihood(&VanDerPol, &[nu], &record, &FilterSettings::default());
+/// assert!(at(1.5)? > at(1.7)?);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn log_likelihood(
     twin: &dyn StateSpace,
     theta: &[f64],
@@ -99,6 +128,21 @@ pub fn log_likelihood(
 /// # Errors
 ///
 /// As [`Kalman::new`] and [`Kalman::smooth`].
+///
+/// ```
+/// use truetwin::filter::{FilterSettings, Smoothed, smooth};
+/// use truetwin::twin::{DigitalTwin, Drive, Noise, Record};
+/// use truetwin::twins::VanDerPol;
+///
+/// let drive = Drive::autonomous(0.05, 100)?;
+/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
+/// let record = Record::new(drive, outputs)?;
+///
+/// let smoothed: Smoothed = smooth(&VanDerPol, &[1.5], &record, &FilterSettings::default())?;
+/// let position = smoothed.states.means[[50, 0]];
+/// assert!((position - record.outputs()[[50, 0]]).abs() < 1e-3); // measured without error
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn smooth(
     twin: &dyn StateSpace,
     theta: &[f64],

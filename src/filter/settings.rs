@@ -1,12 +1,31 @@
 //! Which filter, and its few numbers.
 
 use super::FilterError;
+use crate::setting::SettingError;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// How means and covariances are carried through the equations.
+///
+/// ```
+/// use truetwin::filter::{FilterSettings, Method, log_likelihood};
+/// use truetwin::twin::{DigitalTwin, Drive, Noise, Record};
+/// use truetwin::twins::VanDerPol;
+///
+/// let drive = Drive::autonomous(0.05, 100)?;
+/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
+/// let record = Record::new(drive, outputs)?;
+///
+/// let points = FilterSettings::default();
+/// let extended = FilterSettings::default().with_method(Method::Extended);
+/// let difference = log_likelihood(&VanDerPol, &[1.5], &record, &points)?
+///     - log_likelihood(&VanDerPol, &[1.5], &record, &extended)?;
+/// assert!(difference.abs() < 1.0); // little noise: nearly linear
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Method {
     /// Linearised at the mean, Jacobians by central differences; a mean beyond a limit is put onto it. Exact for
     /// linear twins. Off by tens of nats where states touch their limits.
@@ -25,6 +44,16 @@ pub enum Method {
 /// | `noise_floor` | 1e-13 | [0, 1) | least variance of the measurement noise, as a share of the output's variance over the record |
 /// | `start_covariance` | none | symmetric, ≥ 0 | covariance of the first state, in products of state units; none: the start is known |
 /// | `keep_states` | no | | keep filtered means and covariances in [`Filtered`](super::Filtered) |
+///
+/// ```
+/// use truetwin::filter::FilterSettings;
+///
+/// let unsure_of_the_start = FilterSettings {
+///     start_covariance: Some(nalgebra::dmatrix![0.01, 0.0; 0.0, 0.01]),
+///     ..FilterSettings::default()
+/// };
+/// assert!(!unsure_of_the_start.keep_states);
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FilterSettings {
@@ -51,7 +80,8 @@ impl Default for FilterSettings {
 
 impl FilterSettings {
     /// With another method.
-    pub fn method(mut self, method: Method) -> Self {
+    #[must_use]
+    pub fn with_method(mut self, method: Method) -> Self {
         self.method = method;
         self
     }
@@ -59,13 +89,12 @@ impl FilterSettings {
     /// Whether they can be used with a twin of `states` states.
     pub(super) fn check(&self, states: usize) -> Result<(), FilterError> {
         let floor = self.noise_floor;
-        if !(0.0..1.0).contains(&floor) {
-            return Err(FilterError::Setting {
-                name: "noise_floor",
-                value: floor,
-                remedy: "it must lie in [0, 1), such as 1e-13",
-            });
-        }
+        SettingError::unless(
+            (0.0..1.0).contains(&floor),
+            "noise_floor",
+            floor,
+            "it must lie in [0, 1), such as 1e-13",
+        )?;
         let Some(covariance) = &self.start_covariance else {
             return Ok(());
         };
@@ -117,7 +146,10 @@ mod tests {
     #[test]
     fn files_say_only_what_differs() {
         let settings: FilterSettings = toml::from_str("method = \"extended\"").unwrap();
-        assert_eq!(settings, FilterSettings::default().method(Method::Extended));
+        assert_eq!(
+            settings,
+            FilterSettings::default().with_method(Method::Extended)
+        );
         assert!(toml::from_str::<FilterSettings>("kind = 1").is_err());
     }
 }

@@ -93,7 +93,15 @@ fn tail(level: f64) -> Result<f64, BinomialError> {
 }
 
 /// Why there is no interval.
+///
+/// ```
+/// use truetwin::math::{BinomialError, clopper_pearson};
+///
+/// let refused: Result<_, BinomialError> = clopper_pearson(3, 2, 0.95); // three of two
+/// assert!(refused.is_err());
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum BinomialError {
     /// More successes than trials.
     #[error("count = {count} of {of}; there cannot be more successes than trials")]

@@ -18,21 +18,6 @@ use nalgebra::{DMatrix, DVector};
 /// Choose h relative to each parameter's scale: about 6e-6 of it for a smooth function in f64 (the cube root of the
 /// rounding), 0.01 to 0.03 of it for simulators with kinks.
 ///
-/// # Example
-///
-/// ```
-/// use nalgebra::{DVector, dvector};
-/// use rayon::prelude::*;
-/// use truetwin::math::{DifferenceError, Stencil};
-///
-/// let f = |p: &[f64]| dvector![p[0] * p[1], p[1].sin()];
-/// let stencil = Stencil::new(&[2.0, 0.0], &[1e-5, 1e-5], &[0.0, 0.0], &[9.0, 9.0])?;
-/// let values: Vec<DVector<f64>> = stencil.points().par_iter().map(|p| f(p)).collect();
-/// let jacobian = stencil.assemble(&values)?; // rows: outputs, columns: parameters
-/// assert!((jacobian[(0, 1)] - 2.0).abs() < 1e-8);
-/// # Ok::<(), DifferenceError>(())
-/// ```
-///
 /// # Reference
 ///
 /// Nocedal & Wright, *Numerical Optimization*, second edition, section 8.1.
@@ -180,7 +165,20 @@ impl Stencil {
 }
 
 /// Why there is no finite-difference Jacobian.
+///
+/// ```
+/// use truetwin::filter::FilterError;
+/// use truetwin::math::DifferenceError;
+///
+/// /// Whether a filter's search failed for want of derivatives.
+/// fn no_derivative(error: &FilterError) -> bool {
+///     matches!(error, FilterError::Difference(_))
+/// }
+/// assert!(!no_derivative(&FilterError::Diverged { at: 3.0 }));
+/// # let _: fn(DifferenceError) -> FilterError = FilterError::from;
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DifferenceError {
     /// A slice is not as long as θ.
     #[error("{name} has {length} entries for {dimension} parameters; give one for each")]
@@ -240,6 +238,20 @@ pub enum DifferenceError {
 mod tests {
     use super::*;
     use nalgebra::{dmatrix, dvector};
+
+    #[test]
+    fn the_example() -> Result<(), Box<dyn std::error::Error>> {
+        use crate::math::Stencil;
+        use nalgebra::{DVector, dvector};
+        use rayon::prelude::*;
+
+        let f = |p: &[f64]| dvector![p[0] * p[1], p[1].sin()];
+        let stencil = Stencil::new(&[2.0, 0.0], &[1e-5, 1e-5], &[0.0, 0.0], &[9.0, 9.0])?;
+        let values: Vec<DVector<f64>> = stencil.points().par_iter().map(|p| f(p)).collect();
+        let jacobian = stencil.assemble(&values)?; // rows: outputs, columns: parameters
+        assert!((jacobian[(0, 1)] - 2.0).abs() < 1e-8);
+        Ok(())
+    }
 
     const FREE: [f64; 2] = [f64::INFINITY; 2];
     const BELOW: [f64; 2] = [f64::NEG_INFINITY; 2];

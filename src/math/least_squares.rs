@@ -58,19 +58,6 @@ impl Regressors for DMatrix<f64> {
 /// For 336 × 128, the factor costs 26 µs; the Gram matrix and one solve 110 µs and 60 µs with a written Φ, 7 µs and 27 µs
 /// with [`LaggedSignals`](super::LaggedSignals).
 ///
-/// # Example
-///
-/// ```
-/// use nalgebra::dmatrix;
-/// use truetwin::math::LeastSquares;
-///
-/// let phi = dmatrix![1.0, 0.0; 1.0, 1.0; 1.0, 2.0];
-/// let fit = LeastSquares::new(&phi)?.solve(&dmatrix![1.0; 3.0; 5.0])?;
-/// assert!((fit.coefficients - dmatrix![1.0; 2.0]).norm() < 1e-12);
-/// assert!(fit.residual.norm() < 1e-12);
-/// # Ok::<(), truetwin::math::LeastSquaresError>(())
-/// ```
-///
 /// # Reference
 ///
 /// Hanke & Groetsch, "Nonstationary iterated Tikhonov regularization", *J. Optimization Theory and Applications* 98, 1998;
@@ -81,7 +68,6 @@ pub struct LeastSquares<'a, R = DMatrix<f64>> {
     /// The diagonal of D; 0 for a column of zeros, whose coefficient is then 0.
     scale: Vec<f64>,
     factor: Cholesky,
-    ridge: f64,
 }
 
 /// What [`LeastSquares::solve`] found.
@@ -93,6 +79,7 @@ pub struct Fit {
     pub residual: DMatrix<f64>,
 }
 
+#[cfg(test)]
 impl<'a> LeastSquares<'a> {
     /// For the regressors `phi`, m × n.
     ///
@@ -158,21 +145,11 @@ impl<'a, R: Regressors> LeastSquares<'a, R> {
                 column[j] += ridge;
             }
             if let Some(factor) = Cholesky::new(scaled) {
-                return Ok(Self {
-                    phi,
-                    scale,
-                    factor,
-                    ridge,
-                });
+                return Ok(Self { phi, scale, factor });
             }
             ridge *= GROWTH;
         }
         Err(LeastSquaresError::NotGram)
-    }
-
-    /// λ as it was used: more than was asked for where rounding made the matrix indefinite.
-    pub fn ridge(&self) -> f64 {
-        self.ridge
     }
 
     /// Fits each column of `y`, m × right sides.
@@ -228,7 +205,17 @@ impl<'a, R: Regressors> LeastSquares<'a, R> {
 }
 
 /// Why nothing could be fitted.
+///
+/// ```
+/// use truetwin::feature::FeatureError;
+/// use truetwin::math::LeastSquaresError;
+///
+/// // What features say when their regression fails.
+/// let error = FeatureError::from(LeastSquaresError::NotFinite);
+/// assert!(matches!(error, FeatureError::Regression(_)));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum LeastSquaresError {
     /// Shapes disagree.
     #[error("{what} has {rows} rows, the regressors ask for {expected}")]
@@ -257,6 +244,18 @@ mod tests {
     use nalgebra::DVector;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn the_example() -> Result<(), Box<dyn std::error::Error>> {
+        use crate::math::LeastSquares;
+        use nalgebra::dmatrix;
+
+        let phi = dmatrix![1.0, 0.0; 1.0, 1.0; 1.0, 2.0];
+        let fit = LeastSquares::new(&phi)?.solve(&dmatrix![1.0; 3.0; 5.0])?;
+        assert!((fit.coefficients - dmatrix![1.0; 2.0]).norm() < 1e-12);
+        assert!(fit.residual.norm() < 1e-12);
+        Ok(())
+    }
 
     fn random(rows: usize, columns: usize, seed: u64) -> DMatrix<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

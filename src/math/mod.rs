@@ -3,10 +3,6 @@
 //! | concept | for |
 //! |---|---|
 //! | [`Whitening`] | distances between features, in units of their own scatter |
-//! | [`solve_truncated`] | a least-squares step that leaves out what the data does not determine |
-//! | [`LeastSquares`] | fast regression, well behaved where columns are collinear |
-//! | [`LaggedSignals`] | regressors made of the past of signals, never written out |
-//! | [`Stencil`] | finite-difference Jacobians whose points the caller evaluates, in parallel if it likes |
 //! | [`quantile`], [`median`], [`rank_p_value`] | empirical distributions |
 //! | [`clopper_pearson`], [`binomial_bounds`] | what a count of successes says, and what it may be |
 
@@ -22,11 +18,13 @@ mod svd;
 mod whitening;
 
 pub use clopper_pearson::{BinomialError, binomial_bounds, clopper_pearson};
-pub use difference::{DifferenceError, Stencil};
-pub use lagged::{Lagged, LaggedSignals};
-pub use least_squares::{Fit, LeastSquares, LeastSquaresError, Regressors};
+pub use difference::DifferenceError;
+pub(crate) use difference::Stencil;
+pub(crate) use lagged::{Lagged, LaggedSignals};
+pub use least_squares::LeastSquaresError;
+pub(crate) use least_squares::{Fit, LeastSquares, Regressors};
 pub use quantile::{QuantileError, median, quantile, rank_p_value};
 pub(crate) use rounding::six_digits;
 pub(crate) use solve::solve_above;
-pub use solve::{SolveError, TruncatedSolution, solve_truncated};
+pub(crate) use solve::{SolveError, solve_truncated};
 pub use whitening::{Whitening, WhiteningError};

@@ -54,6 +54,13 @@ pub fn quantile(values: &[f64], probability: f64) -> Result<f64, QuantileError> 
 /// # Errors
 ///
 /// As [`quantile`].
+///
+/// ```
+/// use truetwin::math::median;
+///
+/// assert_eq!(median(&[4.0, 1.0, 3.0])?, 3.0);
+/// # Ok::<(), truetwin::math::QuantileError>(())
+/// ```
 pub fn median(values: &[f64]) -> Result<f64, QuantileError> {
     quantile(values, 0.5)
 }
@@ -85,7 +92,14 @@ pub fn rank_p_value(null: &[f64], observed: f64) -> f64 {
 }
 
 /// Why there is no quantile.
+///
+/// ```
+/// use truetwin::math::{QuantileError, median};
+///
+/// assert_eq!(median(&[]), Err(QuantileError::Empty));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum QuantileError {
     /// No values.
     #[error("a quantile of no values was asked for; at least one is needed")]

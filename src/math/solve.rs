@@ -19,19 +19,6 @@ use super::svd::thin_svd;
 ///
 /// [`SolveError`]: lengths that disagree, a cutoff outside [0, 1), entries that are not finite.
 ///
-/// # Example
-///
-/// ```
-/// use nalgebra::{dmatrix, dvector};
-/// use truetwin::math::solve_truncated;
-///
-/// // Only the sum of the two unknowns is seen.
-/// let solution = solve_truncated(&dmatrix![1.0, 1.0; 2.0, 2.0], &dvector![2.0, 4.0], 1e-10)?;
-/// assert_eq!(solution.rank, 1);
-/// assert!((solution.step - dvector![1.0, 1.0]).norm() < 1e-12);
-/// # Ok::<(), truetwin::math::SolveError>(())
-/// ```
-///
 /// # Reference
 ///
 /// Hansen, *Rank-Deficient and Discrete Ill-Posed Problems*, SIAM 1998, chapter 3.
@@ -96,6 +83,7 @@ pub struct TruncatedSolution {
 
 /// Why a least-squares problem has no solution.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SolveError {
     /// The right side does not fit the matrix.
     #[error("matrix has {rows} rows, the right side {length} entries; both need the same number")]
@@ -119,6 +107,18 @@ pub enum SolveError {
 mod tests {
     use super::*;
     use nalgebra::{dmatrix, dvector};
+
+    #[test]
+    fn the_example() -> Result<(), Box<dyn std::error::Error>> {
+        use crate::math::solve_truncated;
+        use nalgebra::{dmatrix, dvector};
+
+        // Only the sum of the two unknowns is seen.
+        let solution = solve_truncated(&dmatrix![1.0, 1.0; 2.0, 2.0], &dvector![2.0, 4.0], 1e-10)?;
+        assert_eq!(solution.rank, 1);
+        assert!((solution.step - dvector![1.0, 1.0]).norm() < 1e-12);
+        Ok(())
+    }
 
     #[test]
     fn full_rank_agrees_with_the_normal_equations() {

@@ -216,7 +216,16 @@ impl Draws {
 }
 
 /// Why features cannot be whitened.
+///
+/// ```
+/// use ndarray::Array2;
+/// use truetwin::math::{Whitening, WhiteningError};
+///
+/// let one_row: Result<Whitening, WhiteningError> = Whitening::calibrated(&Array2::zeros((1, 2)));
+/// assert!(one_row.is_err()); // no covariance
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum WhiteningError {
     /// A covariance needs two draws.
     #[error("samples has {0} draws; a covariance needs at least 2, a good one 16 for each feature")]

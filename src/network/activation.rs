@@ -9,6 +9,14 @@ use std::fmt::Debug;
 ///
 /// dfdx's own [`ReLU`] and [`Tanh`] are activations, and so is [`Leaky`]; each of the three also stands as a layer of
 /// its own in a plain dfdx tuple.
+///
+/// ```
+/// use truetwin::network::layers::{Leaky, Tanh};
+/// use truetwin::network::Activation;
+///
+/// assert_eq!(Leaky::value(-2.0), -0.02);
+/// assert_eq!(Tanh::slope(Tanh::value(0.0)), 1.0);
+/// ```
 pub trait Activation: Debug + Default + Clone + Send + Sync + 'static {
     /// a = f(z).
     fn value(z: f32) -> f32;
@@ -18,6 +26,20 @@ pub trait Activation: Debug + Default + Clone + Send + Sync + 'static {
 }
 
 /// max(z, 0.01·z): PyTorch's leaky ReLU. (dfdx's `LeakyReLU` has the slope 0.05.)
+///
+/// ```
+/// use truetwin::network::layers::*;
+///
+/// struct Small;
+/// impl HeadArchitecture for Small {
+///     const ID: &'static str = "leaky";
+///     type Features = Const<4>;
+///     type Hidden = Const<8>;
+///     type Trunk = Dense<4, 8, Leaky>; // inside of a fused layer
+///     type Head = (Linear<8, 4>, Leaky, Linear<4, 1>); // and as one of its own
+/// }
+/// assert_eq!(truetwin::network::architecture::<Small>().id(), "leaky");
+/// ```
 #[derive(Debug, Default, Clone, Copy)]
 pub struct Leaky;
 

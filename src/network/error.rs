@@ -1,6 +1,7 @@
 //! What can go wrong with a network, each with its remedy.
 
 use crate::progress::Cancelled;
+use crate::setting::SettingError;
 use std::path::PathBuf;
 
 /// Why a network could not be built, trained, evaluated or restored.
@@ -8,15 +9,8 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum NetworkError {
     /// A training setting is outside its range.
-    #[error("{field} = {value}; {remedy}")]
-    Setting {
-        /// The field of [`Training`](super::Training).
-        field: &'static str,
-        /// Its value, as text.
-        value: String,
-        /// What it must be.
-        remedy: String,
-    },
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// The data has more features than the architecture was written for.
     #[error(
         "{features} features, but architecture `{architecture}` takes at most {limit}; \

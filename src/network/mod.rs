@@ -56,7 +56,8 @@ mod train;
 pub use activation::{Activation, Leaky};
 pub use architectures::{Compact, Deep};
 pub use checkpoints::Checkpoints;
-pub use dense::{BuiltDense, BuiltNormDense, Dense, NormDense};
+pub(crate) use dense::{BuiltDense, BuiltNormDense};
+pub use dense::{Dense, NormDense};
 pub use error::NetworkError;
 pub use first_weight::FirstWeight;
 pub use multi_head::architecture;
@@ -92,6 +93,15 @@ pub type TapedBatch<C> = Tensor<(usize, C), f32, Cpu, OwnedTape<f32, Cpu>>;
 /// Layers on a device that map rows of width `I` to rows of width `O`, with and without a tape.
 ///
 /// Implemented for all that qualifies: dfdx layers, fused layers and tuples of them.
+///
+/// ```
+/// use dfdx::prelude::{Const, Cpu};
+/// use truetwin::network::Layers;
+///
+/// /// An own layer qualifies where this compiles.
+/// fn qualifies<T: Layers<Const<4>, Const<2>>>() {}
+/// qualifies::<dfdx::nn::modules::Linear<4, 2, f32, Cpu>>();
+/// ```
 pub trait Layers<I: ConstDim, O: ConstDim>:
     TensorCollection<f32, Cpu, To<f32, Cpu> = Self>
     + Clone
@@ -134,6 +144,15 @@ pub trait HeadArchitecture: Send + Sync + 'static {
 }
 
 /// An architecture behind an object-safe face; made by [`architecture`].
+///
+/// ```
+/// use std::sync::Arc;
+/// use truetwin::network::{Architecture, Compact, NetworkError, architecture};
+///
+/// let compact: Arc<dyn Architecture> = architecture::<Compact>();
+/// assert_eq!((compact.id(), compact.max_features()), ("compact", 16));
+/// assert!(matches!(compact.restore(17, 1, &[]), Err(NetworkError::TooManyFeatures { .. })));
+/// ```
 pub trait Architecture: Send + Sync + Debug {
     /// [`HeadArchitecture::ID`].
     fn id(&self) -> &'static str;
@@ -196,6 +215,30 @@ pub trait Architecture: Send + Sync + Debug {
 }
 
 /// A trained network. It never changes: tuning makes another one.
+///
+/// ```
+/// use ndarray::{Array2, array};
+/// use truetwin::network::{Compact, NamedTensor, Training, architecture};
+/// use truetwin::progress::Progress;
+///
+/// let features = Array2::from_shape_fn((64, 2), |(i, j)| ((i * 7 + j * 5) % 16) as f64 / 8.0 - 1.0);
+/// let targets = features.dot(&array![[1.0], [-0.5]]);
+/// let quick = Training { epochs: 3, ..Training::default() };
+///
+/// let compact = architecture::<Compact>();
+/// let (network, _) = compact.train(&features, &targets, &quick, 1, &Progress::silent())?;
+///
+/// // Weights leave a network by name and come back to the same predictions.
+/// let weights: Vec<NamedTensor> = network.weights();
+/// assert_eq!(weights[0].name, "trunk.0.weight");
+/// let again = compact.restore(2, 1, &weights)?;
+/// assert_eq!(again.predict(&features)?, network.predict(&features)?);
+///
+/// // Tuning leaves the trunk alone and makes another network.
+/// let (tuned, _) = network.tune_heads(&features, &targets, &quick, 1, &Progress::silent())?;
+/// assert_eq!(tuned.hidden(&features)?, network.hidden(&features)?);
+/// # Ok::<(), truetwin::network::NetworkError>(())
+/// ```
 pub trait Network: Send + Sync + Debug {
     /// Number of features, n.
     fn inputs(&self) -> usize;

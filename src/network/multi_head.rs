@@ -16,6 +16,12 @@ use std::marker::PhantomData;
 use std::sync::Arc;
 
 /// Makes `A` usable where types are no longer known.
+///
+/// ```
+/// use truetwin::network::{Deep, architecture};
+///
+/// assert_eq!(architecture::<Deep>().id(), "deep");
+/// ```
 pub fn architecture<A: HeadArchitecture>() -> Arc<dyn Architecture> {
     const {
         assert!(
@@ -71,7 +77,7 @@ impl<A: HeadArchitecture> Architecture for Of<A> {
         checkpoints: &Checkpoints,
         progress: &Progress,
     ) -> Result<(Arc<dyn Network>, History), NetworkError> {
-        settings.validate()?;
+        settings.check()?;
         let network = Self::build(samples.features(), samples.targets(), seed)?;
         let read = |index: usize| {
             let part = samples.part(index);
@@ -175,7 +181,7 @@ impl<A: HeadArchitecture> Network for MultiHead<A> {
         seed: u64,
         progress: &Progress,
     ) -> Result<(Arc<dyn Network>, History), NetworkError> {
-        settings.validate()?;
+        settings.check()?;
         let read = |_: usize| {
             let Data { features, targets } = self.data(features, targets)?;
             Ok(Data {

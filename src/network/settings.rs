@@ -1,11 +1,20 @@
 //! How a network is trained, and what came of it.
 
 use super::NetworkError;
+use crate::setting::SettingError;
 use serde::{Deserialize, Serialize};
 
 /// How the learning rate moves over the epochs e = 0 … E−1.
+///
+/// ```
+/// use truetwin::network::{Schedule, Training};
+///
+/// let settings = Training { schedule: Schedule::Cosine, ..Training::default() };
+/// assert!(settings.check().is_ok());
+/// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Schedule {
     /// The same in every epoch.
     #[default]
@@ -83,17 +92,12 @@ impl Training {
     ///
     /// # Errors
     ///
-    /// [`NetworkError::Setting`] names the first field outside its range, its value and the remedy.
-    pub fn validate(&self) -> Result<(), NetworkError> {
+    /// [`SettingError`] names the first field outside its range, its value and the remedy.
+    pub fn check(&self) -> Result<(), SettingError> {
         let positive = |v: f64| v > 0.0 && v.is_finite();
         let not_negative = |v: f64| v >= 0.0 && v.is_finite();
-        let refuse = |field, value: String, remedy: &str| {
-            Err(NetworkError::Setting {
-                field,
-                value,
-                remedy: remedy.to_owned(),
-            })
-        };
+        let refuse =
+            |field: &str, value: String, remedy: &str| Err(SettingError::new(field, value, remedy));
         if self.epochs == 0 {
             return refuse("epochs", "0".into(), "must be at least 1");
         }
@@ -132,11 +136,12 @@ impl Training {
         match self.target_weights.len() {
             0 => Ok(vec![1.0; outputs]),
             n if n == outputs => Ok(self.target_weights.iter().map(|w| *w as f32).collect()),
-            n => Err(NetworkError::Setting {
-                field: "target_weights",
-                value: format!("{n} weights"),
-                remedy: format!("give {outputs}, one for each target, or none"),
-            }),
+            n => Err(SettingError::new(
+                "target_weights",
+                format!("{n} weights"),
+                format!("give {outputs}, one for each target, or none"),
+            )
+            .into()),
         }
     }
 
@@ -156,8 +161,24 @@ impl Training {
 ///
 /// Both losses are Σ_j w_j·huber_δ, averaged over rows and without the orthogonality penalty, so that they can be
 /// compared; the training loss is measured on the way, with dropout.
+///
+/// ```
+/// use ndarray::{Array2, array};
+/// use truetwin::network::{Compact, History, Training, architecture};
+/// use truetwin::progress::Progress;
+///
+/// let features = Array2::from_shape_fn((64, 2), |(i, j)| ((i * 7 + j * 5) % 16) as f64 / 8.0 - 1.0);
+/// let targets = features.dot(&array![[1.0], [-0.5]]);
+/// let quick = Training { epochs: 3, ..Training::default() };
+///
+/// let compact = architecture::<Compact>();
+/// let (_, history): (_, History) = compact.train(&features, &targets, &quick, 1, &Progress::silent())?;
+/// assert_eq!((history.epochs_run, history.training.len(), history.holdout.len()), (3, 3, 3));
+/// # Ok::<(), truetwin::network::NetworkError>(())
+/// ```
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct History {
     /// Training loss of each epoch.
     pub training: Vec<f64>,
@@ -180,23 +201,23 @@ mod tests {
             ..Training::default()
         };
         assert_eq!(
-            wrong.validate().unwrap_err().to_string(),
+            wrong.check().unwrap_err().to_string(),
             "learning_rate = -1; must be finite and above 0"
         );
         let wrong = Training {
             target_weights: vec![1.0, f64::NAN],
             ..Training::default()
         };
-        let said = wrong.validate().unwrap_err().to_string();
+        let said = wrong.check().unwrap_err().to_string();
         assert!(said.starts_with("target_weights = NaN"), "{said}");
         for holdout in [-0.1, 1.0, f64::NAN] {
             let wrong = Training {
                 holdout,
                 ..Training::default()
             };
-            assert!(wrong.validate().is_err());
+            assert!(wrong.check().is_err());
         }
-        assert_eq!(Training::default().validate(), Ok(()));
+        assert_eq!(Training::default().check(), Ok(()));
     }
 
     #[test]

@@ -3,15 +3,6 @@ use nalgebra::DVector;
 use super::OptimiseError;
 
 /// A box: lower ≤ θ ≤ upper for each parameter, each side finite or not.
-///
-/// ```
-/// use nalgebra::dvector;
-/// use truetwin::optimise::Bounds;
-///
-/// let bounds = Bounds::new(dvector![0.0, f64::NEG_INFINITY], dvector![1.0, 5.0])?;
-/// assert_eq!(bounds.project(&dvector![2.0, -7.0]), dvector![1.0, -7.0]);
-/// # Ok::<(), truetwin::optimise::BoundsError>(())
-/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bounds {
     lower: DVector<f64>,
@@ -46,6 +37,7 @@ impl Bounds {
     }
 
     /// No bounds on `dimension` parameters.
+    #[cfg(test)]
     pub fn unbounded(dimension: usize) -> Self {
         Self {
             lower: DVector::repeat(dimension, f64::NEG_INFINITY),
@@ -81,6 +73,7 @@ impl Bounds {
     }
 
     /// Whether `theta`, of length d, is in the box.
+    #[cfg(test)]
     pub fn contains(&self, theta: &DVector<f64>) -> bool {
         (0..self.dimension()).all(|j| (self.lower[j]..=self.upper[j]).contains(&theta[j]))
     }
@@ -96,6 +89,7 @@ impl Bounds {
 
 /// Why there is no box.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum BoundsError {
     /// Not as many lower as upper bounds.
     #[error("{lower} lower and {upper} upper bounds; give one of each for every parameter")]
@@ -123,6 +117,16 @@ pub enum BoundsError {
 mod tests {
     use super::*;
     use nalgebra::dvector;
+
+    #[test]
+    fn the_example() -> Result<(), Box<dyn std::error::Error>> {
+        use crate::optimise::Bounds;
+        use nalgebra::dvector;
+
+        let bounds = Bounds::new(dvector![0.0, f64::NEG_INFINITY], dvector![1.0, 5.0])?;
+        assert_eq!(bounds.project(&dvector![2.0, -7.0]), dvector![1.0, -7.0]);
+        Ok(())
+    }
 
     #[test]
     fn the_nearest_point_is_in_the_box() {

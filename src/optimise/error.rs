@@ -1,9 +1,11 @@
 use std::error::Error;
 
 use super::EvaluationError;
+use crate::setting::SettingError;
 
 /// Why nothing was minimised.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum OptimiseError {
     /// A vector is not as long as θ.
     #[error("{what} has {length} entries for {dimension} parameters; give one for each")]
@@ -16,15 +18,8 @@ pub enum OptimiseError {
         dimension: usize,
     },
     /// A number that cannot be used.
-    #[error("{name} = {value}; {remedy}")]
-    Setting {
-        /// Which setting.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// What it must be.
-        remedy: &'static str,
-    },
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// Something that needs a box was given a half-space.
     #[error(
         "parameter {index} has no finite bounds; points cannot be spread over it, give it both"
@@ -64,23 +59,6 @@ impl OptimiseError {
             what,
             length,
             dimension,
-        })
-    }
-
-    /// Fails with `remedy` unless `valid`.
-    pub(super) fn check_setting(
-        name: &'static str,
-        value: f64,
-        valid: bool,
-        remedy: &'static str,
-    ) -> Result<(), Self> {
-        if valid {
-            return Ok(());
-        }
-        Err(Self::Setting {
-            name,
-            value,
-            remedy,
         })
     }
 }

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::solver::{DampedGaussNewton, GaussNewtonState, Residuals};
 use super::{Bounds, OptimiseError, ResidualProblem};
+use crate::setting::SettingError;
 
 /// Settings of a bounded, damped Gauss–Newton search for the least ½‖r(θ)‖².
 ///
@@ -31,29 +32,6 @@ use super::{Bounds, OptimiseError, ResidualProblem};
 /// | `max_halvings` | 30 | ≥ 0 | halvings of t before giving up |
 ///
 /// # Example
-///
-/// ```
-/// use nalgebra::{DMatrix, DVector, dmatrix, dvector};
-/// use truetwin::optimise::{Bounds, EvaluationError, GaussNewton, ResidualProblem};
-///
-/// struct Rosenbrock;
-/// impl ResidualProblem for Rosenbrock {
-///     fn dimension(&self) -> usize {
-///         2
-///     }
-///     fn residual(&self, x: &DVector<f64>) -> Result<DVector<f64>, EvaluationError> {
-///         Ok(dvector![10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]])
-///     }
-///     fn jacobian(&self, x: &DVector<f64>) -> Result<DMatrix<f64>, EvaluationError> {
-///         Ok(dmatrix![-20.0 * x[0], 10.0; -1.0, 0.0])
-///     }
-/// }
-///
-/// let (start, bounds, scale) = (dvector![-1.2, 1.0], Bounds::unbounded(2), dvector![1.0, 1.0]);
-/// let minimum = GaussNewton::default().minimise(&Rosenbrock, &start, &bounds, &scale)?;
-/// assert!((minimum.theta - dvector![1.0, 1.0]).norm() < 1e-9);
-/// # Ok::<(), truetwin::optimise::OptimiseError>(())
-/// ```
 ///
 /// # Reference
 ///
@@ -148,7 +126,9 @@ impl GaussNewton {
         OptimiseError::check_length("start", start.len(), dimension)?;
         OptimiseError::check_length("bounds", bounds.dimension(), dimension)?;
         OptimiseError::check_length("scale", scale.len(), dimension)?;
-        let setting = OptimiseError::check_setting;
+        let setting = |name: &str, value: f64, valid: bool, remedy: &str| {
+            SettingError::unless(valid, name, value, remedy)
+        };
         for &value in start {
             setting("start", value, value.is_finite(), "it must be finite")?;
         }
@@ -182,12 +162,12 @@ impl GaussNewton {
             )?;
         }
         let most = self.max_step.unwrap_or(1.0);
-        setting(
+        Ok(setting(
             "max_step",
             most,
             most > 0.0,
             "it must be positive, in scales, or left out",
-        )
+        )?)
     }
 }
 
@@ -250,3 +230,34 @@ impl fmt::Display for StopReason {
 
 #[cfg(test)]
 mod tests;
+
+#[cfg(test)]
+mod examples {
+    #[test]
+    fn the_example() -> Result<(), Box<dyn std::error::Error>> {
+        use crate::optimise::{Bounds, EvaluationError, GaussNewton, ResidualProblem};
+        use nalgebra::{DMatrix, DVector, dmatrix, dvector};
+
+        struct Rosenbrock;
+        impl ResidualProblem for Rosenbrock {
+            fn dimension(&self) -> usize {
+                2
+            }
+            fn residual(&self, x: &DVector<f64>) -> Result<DVector<f64>, EvaluationError> {
+                Ok(dvector![10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]])
+            }
+            fn jacobian(&self, x: &DVector<f64>) -> Result<DMatrix<f64>, EvaluationError> {
+                Ok(dmatrix![-20.0 * x[0], 10.0; -1.0, 0.0])
+            }
+        }
+
+        let (start, bounds, scale) = (
+            dvector![-1.2, 1.0],
+            Bounds::unbounded(2),
+            dvector![1.0, 1.0],
+        );
+        let minimum = GaussNewton::default().minimise(&Rosenbrock, &start, &bounds, &scale)?;
+        assert!((minimum.theta - dvector![1.0, 1.0]).norm() < 1e-9);
+        Ok(())
+    }
+}

@@ -21,16 +21,6 @@ use super::{Bounds, OptimiseError};
 ///
 /// # Example
 ///
-/// ```
-/// use nalgebra::dvector;
-/// use truetwin::optimise::{Bounds, space_filling};
-///
-/// let bounds = Bounds::new(dvector![0.1, 1.0], dvector![1.5, 2.0])?;
-/// let points = space_filling(&bounds, 16, 1)?;
-/// assert!(points.iter().all(|p| bounds.contains(p)));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-///
 /// # Reference
 ///
 /// Owen, "A randomized Halton algorithm in R", arXiv:1706.02808, 2017.
@@ -74,6 +64,17 @@ fn primes() -> impl Iterator<Item = usize> {
 mod tests {
     use super::*;
     use nalgebra::dvector;
+
+    #[test]
+    fn the_example() -> Result<(), Box<dyn std::error::Error>> {
+        use crate::optimise::{Bounds, space_filling};
+        use nalgebra::dvector;
+
+        let bounds = Bounds::new(dvector![0.1, 1.0], dvector![1.5, 2.0])?;
+        let points = space_filling(&bounds, 16, 1)?;
+        assert!(points.iter().all(|p| bounds.contains(p)));
+        Ok(())
+    }
 
     fn unit_cube(dimension: usize) -> Bounds {
         Bounds::new(DVector::zeros(dimension), DVector::repeat(dimension, 1.0)).unwrap()

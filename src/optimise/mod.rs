@@ -18,6 +18,6 @@ mod solver;
 
 pub use bounds::{Bounds, BoundsError};
 pub use error::OptimiseError;
-pub use gauss_newton::{GaussNewton, Minimum, StopReason};
+pub use gauss_newton::GaussNewton;
 pub use halton::space_filling;
 pub use problem::{EvaluationError, ResidualProblem};

@@ -27,6 +27,7 @@ pub trait ResidualProblem {
 
 /// Why a function has no value at θ, and whether that matters elsewhere.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum EvaluationError {
     /// There is nothing at *this* θ, as when the twin diverged. The search goes on elsewhere.
     #[error("no value at this point: {0}")]

@@ -4,7 +4,8 @@ use argmin::core::{
 use nalgebra::{DMatrix, DVector};
 
 use super::box_step::box_step;
-use super::{Bounds, EvaluationError, GaussNewton, ResidualProblem, StopReason};
+use super::gauss_newton::StopReason;
+use super::{Bounds, EvaluationError, GaussNewton, ResidualProblem};
 
 /// Armijo's constant: the part of the slope that a step must deliver.
 const SUFFICIENT: f64 = 1e-4;

@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 ///
 /// Source: Lakshminarayanan, Guerrero & Rojas, section IV-B.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Information {
     /// G, d × d, inverse squared parameter units.
     pub matrix: DMatrix<f64>,
@@ -23,18 +24,31 @@ pub struct Information {
 
 /// A combination of parameters and how well it is known.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Direction {
     /// Unit vector in (θ over the prior's width), physical parameters only.
     pub direction: Vec<f64>,
     /// Standard deviation along it, in prior widths.
     pub std_error: f64,
-    /// Whether the prior knows it better than the record does: worse than [`PRIOR_DEVIATION`].
+    /// Whether the prior knows it better than the record does: worse than 1/√12 of its width.
     pub weak: bool,
     /// In words: `0.58·k1 − 0.58·k2 + 0.57·k4`.
     pub combination: String,
 }
 
 /// Why there is no information matrix.
+///
+/// ```
+/// use nalgebra::dmatrix;
+/// use truetwin::refine::{Information, InformationError};
+/// use truetwin::twin::{Parameter, ParameterSpace};
+///
+/// // The only feature does not move with b.
+/// let space = ParameterSpace::new([Parameter::new("a", "-", 0.0, 1.0), Parameter::new("b", "-", 0.0, 1.0)]);
+/// let refused: Result<Information, InformationError> = Information::new(&dmatrix![1.0, 0.0], &space, 0.0, 64);
+/// assert!(refused.is_err());
+/// assert!(Information::new(&dmatrix![1.0, 0.0], &space, 1e-3, 64).is_ok()); // the prior's share
+/// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
     "the features hold no information on {0} at the estimate; fix this parameter, or choose other features"
@@ -119,7 +133,7 @@ mod tests {
         ParameterSpace::new([
             Parameter::new("a", "", 0.0, scale),
             Parameter::new("b", "", 0.0, 2.0),
-            Parameter::new("start.x", "", 0.0, 1.0).role(Role::Start),
+            Parameter::new("start.x", "", 0.0, 1.0).with_role(Role::Start),
         ])
     }
 

@@ -10,20 +10,51 @@
 //!
 //! Source: Lakshminarayanan, Guerrero & Rojas, section IV-B; Wood, "Statistical inference for noisy nonlinear
 //! ecological dynamic systems", Nature 466 (2010), for the synthetic likelihood.
+//!
+//! ```
+//! use std::sync::Arc;
+//! use truetwin::bank::FeatureSimulator;
+//! use truetwin::feature::Ar;
+//! use truetwin::gate::GateSettings;
+//! use truetwin::progress::Progress;
+//! use truetwin::refine::{Direction, Information, RefineSettings, Refined, Refinement};
+//! use truetwin::twin::{DigitalTwin, Drive, Noise, Record};
+//! use truetwin::twins::VanDerPol;
+//!
+//! let simulator = FeatureSimulator::new(Arc::new(VanDerPol), &Ar { order: 5 })?;
+//! let drive = Drive::autonomous(0.05, 200)?;
+//! let outputs = VanDerPol.simulate(&[3.0], &drive, Noise::new(7, "measured", 0))?;
+//! let observed = simulator.observe(&Record::new(drive.clone(), outputs)?)?;
+//! let few = RefineSettings { starts: 2, ..RefineSettings::default() };
+//! let refined: Refined = Refinement {
+//!     simulator: &simulator,
+//!     drive: &drive,
+//!     observed: &observed,
+//!     settings: &few,
+//!     gate: &GateSettings::default(),
+//!     noise: Noise::new(1, "refine", 0),
+//!     progress: &Progress::silent(),
+//! }
+//! .run(&[2.0])?;
+//! let information: &Information = &refined.information;
+//! assert!((refined.theta[0] - 3.0).abs() < 0.5);
+//! let least_known: &Direction = &information.directions[0];
+//! assert!(!least_known.weak);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod information;
 mod problem;
 mod settings;
 
+pub use crate::optimise::OptimiseError;
 pub use information::{Direction, Information, InformationError};
-pub use settings::{RefineSettings, RefineSettingsError};
+pub use settings::RefineSettings;
 
 use crate::bank::{BankError, FeatureSimulator};
 use crate::gate::{GateError, GateSettings};
 use crate::math::Whitening;
-use crate::optimise::{
-    Bounds, EvaluationError, GaussNewton, OptimiseError, ResidualProblem, space_filling,
-};
+use crate::optimise::{Bounds, EvaluationError, GaussNewton, ResidualProblem, space_filling};
 use crate::progress::{Cancelled, Progress};
 use crate::twin::{Drive, Noise, ParameterSpace};
 use nalgebra::{DMatrix, DVector};
@@ -31,6 +62,7 @@ use problem::FeatureResidual;
 
 /// The refined estimate, with what was simulated around it.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Refined {
     /// θ_GN.
     pub theta: DVector<f64>,
@@ -66,7 +98,15 @@ impl Refined {
 }
 
 /// Why the refinement failed.
+///
+/// ```
+/// use truetwin::progress::Cancelled;
+/// use truetwin::refine::RefineError;
+///
+/// assert_eq!(RefineError::from(Cancelled).to_string(), "cancelled");
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RefineError {
     /// The simulations failed.
     #[error(transparent)]
@@ -124,6 +164,8 @@ pub struct Refinement<'a> {
     /// Who listens; asked at every simulation.
     pub progress: &'a Progress,
 }
+
+debug_by_name!(Refinement<'_>);
 
 /// Where one start has come to.
 struct Candidate {

@@ -1,5 +1,6 @@
 //! The numbers of the refinement.
 
+use crate::setting::SettingError;
 use serde::{Deserialize, Serialize};
 
 /// Settings of the refinement.
@@ -16,6 +17,14 @@ use serde::{Deserialize, Serialize};
 /// | `ridge` | 1 | ≥ 0 | λ added to JᵀJ in G, θ in units of the prior's width |
 /// | `step` | 0.01 | > 0 | finite-difference step, in prior widths |
 /// | `cutoff` | 1e-3 | [0, 1) | singular values of J below this part of the largest are left out of a step |
+///
+/// ```
+/// use truetwin::refine::RefineSettings;
+///
+/// let quick = RefineSettings { starts: 2, seeds: 8, ..RefineSettings::default() };
+/// assert!(quick.check().is_ok());
+/// assert!(RefineSettings { rounds: 0, ..quick }.check().is_err());
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RefineSettings {
@@ -58,15 +67,6 @@ impl Default for RefineSettings {
     }
 }
 
-/// A setting out of its range.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("refine: {field} = {value}; {remedy}")]
-pub struct RefineSettingsError {
-    field: &'static str,
-    value: f64,
-    remedy: &'static str,
-}
-
 /// Iterations about features that were centred on the record.
 const CENTRED_ITERATIONS: u64 = 3;
 
@@ -83,7 +83,7 @@ impl RefineSettings {
     }
 
     /// Whether each field is in its range.
-    pub fn check(&self) -> Result<(), RefineSettingsError> {
+    pub fn check(&self) -> Result<(), SettingError> {
         let counts = [
             ("starts", self.starts),
             ("rounds", self.rounds),
@@ -92,12 +92,8 @@ impl RefineSettings {
             ("centred_seeds", self.centred_seeds),
             ("survey_seeds", self.survey_seeds),
         ];
-        let refuse = |field, value, remedy| {
-            Err(RefineSettingsError {
-                field,
-                value,
-                remedy,
-            })
+        let refuse = |field: &str, value: f64, remedy: &str| {
+            Err(SettingError::new(format!("refine: {field}"), value, remedy))
         };
         for (field, value) in counts {
             if value == 0 {

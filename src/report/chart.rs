@@ -4,19 +4,6 @@
 //! and a line need none. Text is text in the reader's own font; colours are told apart by colour-blind people (Okabe &
 //! Ito) and lines by their dashes as well; the picture scales to the width that it is given and stands on white, so
 //! that it reads on light and dark pages.
-//!
-//! ```
-//! use truetwin::report::chart::{Chart, Panel, Series, Style};
-//! let chart = Chart {
-//!     title: "Step response".into(),
-//!     description: "The level rises to 2 V within 3 s.".into(),
-//!     x: "t in s".into(),
-//!     panels: vec![Panel::new("level in V", vec![
-//!         Series::new("measured", Style::RECORD, (0..4).map(|k| (k as f64, 2.0 - 0.5f64.powi(k)))),
-//!     ])],
-//! };
-//! assert!(chart.svg().starts_with("<svg"));
-//! ```
 
 mod axes;
 mod bars;
@@ -285,3 +272,25 @@ fn widest(ticks: &Ticks) -> f64 {
 
 #[cfg(test)]
 mod tests;
+
+#[cfg(test)]
+mod examples {
+    #[test]
+    fn the_example() {
+        use crate::report::chart::{Chart, Panel, Series, Style};
+        let chart = Chart {
+            title: "Step response".into(),
+            description: "The level rises to 2 V within 3 s.".into(),
+            x: "t in s".into(),
+            panels: vec![Panel::new(
+                "level in V",
+                vec![Series::new(
+                    "measured",
+                    Style::RECORD,
+                    (0..4).map(|k| (k as f64, 2.0 - 0.5f64.powi(k))),
+                )],
+            )],
+        };
+        assert!(chart.svg().starts_with("<svg"));
+    }
+}

@@ -10,9 +10,76 @@
 //! | see the twin beside the record | [`overlay_svg`] |
 //! | hand on, print or draw the scores of many records | [`reproduce_json`], [`reproduce_text`], [`mean_runs_svg`], [`first_run_svg`] |
 //! | hand on, print or show the scores of withheld trials | [`scorecard_json`], [`scorecard_text`], [`scorecard_html`] |
-//! | draw any other lines | [`chart`] |
+//!
+//! ```
+//! use truetwin::diagnose::{DiagnoseSettings, diagnose};
+//! use truetwin::progress::Progress;
+//! use truetwin::report::*;
+//! use truetwin::study::{RecordPlan, Study};
+//! use truetwin::twin::*;
+//! use truetwin::twins::VanDerPol;
+//!
+//! let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 200))?;
+//! let drive = Drive::autonomous(0.05, 200)?;
+//! let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(7, "measured", 0))?;
+//! let record = Record::new(drive, outputs)?;
+//! let found = diagnose(&study, &[record], None, &DiagnoseSettings::default(), &Progress::silent())?;
+//!
+//! assert_eq!(gap_json(&found)["schema"], "truetwin.gap/1");
+//! assert!(gap_text(&found).starts_with("No gap"));
+//! assert!(gap_html(&study, &found).starts_with("<!doctype html>"));
+//! // Pictures: each where there is something to show.
+//! let pictures = [
+//!     gap_runs_svg(&study, &found, false), gap_time_svg(&found), gap_equations_svg(&study, &found),
+//!     gap_targets_svg(&found), gap_regions_svg(&study, &found), gap_channels_svg(&study, &found),
+//!     gap_lags_svg(&found), gap_bands_svg(&found), gap_which_svg(&found), gap_shrinkage_svg(&found),
+//!     gap_terms_svg(&study, &found), gap_missing_svg(&study, &found), gap_next_input_svg(&study, &found),
+//! ];
+//! assert!(pictures[0].is_some());
+//! assert!(pictures.iter().flatten().all(|svg| svg.starts_with("<svg")));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! ```
+//! use truetwin::experiment::{Benchmark, FreeRuns, MeanRuns, MonteCarlo, Scenario, reference_studies, score};
+//! use truetwin::progress::Progress;
+//! use truetwin::report::*;
+//! use truetwin::two_stage::{EstimateOptions, PretrainOptions, pretrain};
+//!
+//! let study = &reference_studies()?[0];
+//! let small = PretrainOptions { bank_size: Some(200), epochs: Some(2), ..PretrainOptions::default() };
+//! let (estimator, _) = pretrain(study, &small, &Progress::silent())?;
+//! let record = study.demo().ok_or("a record comes with it")?;
+//! let estimate = estimator.estimate(record, &EstimateOptions::default(), &Progress::silent())?;
+//! assert_eq!(estimate_json(study, &estimate)["schema"], "truetwin.estimate/1");
+//! assert!(estimate_text(study, &estimate).contains("nu"));
+//! let after = &estimate.tracking.as_ref().ok_or("the free run is finite")?.outputs;
+//! assert!(overlay_svg(study, record, None, after).starts_with("<svg"));
+//! assert!(trajectories_csv(record, None, after).starts_with("t,"));
+//!
+//! // Many records.
+//! let plan = MonteCarlo { benchmark: Benchmark::of(study), scenario: Scenario::First, runs: 1, seed: 1 };
+//! let runs = plan.run(&estimator, None, &Progress::silent())?;
+//! let scores = score(study, &plan, &runs);
+//! assert_eq!(reproduce_json(study, &plan, estimator.preset(), &scores)["schema"], "truetwin.reproduce/1");
+//! assert!(reproduce_text(study, &plan, estimator.preset(), &scores).contains("TS-fine"));
+//! assert!(first_run_svg(study, &FreeRuns::of(study, &plan, &runs[0])?).starts_with("<svg"));
+//! let means = MeanRuns::of(study, &plan, &runs)?.ok_or("all records have the same truth")?;
+//! assert!(mean_runs_svg(study, &means).is_some());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! ```
+//! use truetwin::report::{scorecard_html, scorecard_json, scorecard_text};
+//! use truetwin::withheld::Scorecard;
+//!
+//! let card = Scorecard::new("tanks", 1, 0.05, "0f1e", vec![]); // of no trial yet
+//! assert_eq!(scorecard_json(&card)["schema"], "truetwin.scorecard/1");
+//! assert!(scorecard_text(&card).starts_with("tanks: 0 withheld trials"));
+//! assert!(scorecard_html(&card).contains("Reliability"));
+//! ```
 
-pub mod chart;
+mod chart;
 mod digits;
 mod estimate_json;
 mod estimate_text;
@@ -45,8 +112,9 @@ pub use gap_figures::{
     gap_terms_svg, gap_time_svg, gap_which_svg,
 };
 pub use gap_html::gap_html;
-pub use gap_json::{NEXT_INPUT, gap_json};
-pub use gap_text::{gap_text, verdict_sentence};
+pub(crate) use gap_json::NEXT_INPUT;
+pub use gap_json::gap_json;
+pub use gap_text::gap_text;
 pub use overlay::overlay_svg;
 pub use reproduce_figures::{first_run_svg, mean_runs_svg};
 pub use reproduce_json::reproduce_json;

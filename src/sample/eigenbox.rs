@@ -4,6 +4,9 @@ use super::Sampler;
 use crate::twin::Noise;
 use nalgebra::{DMatrix, DVector};
 
+/// Half-width of the box, in standard deviations of a cloud of spread 1.
+const BOX_REACH: f64 = 1.8;
+
 /// θ = centre + A·u, u uniform in [−reach, reach]^d, where the columns of A are principal axes one standard deviation
 /// long. A training set that is flat over the region teaches an estimator that is the same everywhere in it.
 #[derive(Debug, Clone)]
@@ -21,6 +24,12 @@ impl EigenBox {
             axes,
             reach,
         }
+    }
+
+    /// The box of a cloud of this spread around `centre`.
+    pub fn of_spread(centre: &[f64], axes: &DMatrix<f64>, spread: f64) -> Self {
+        let centre = DVector::from_column_slice(centre);
+        Self::new(centre, axes.clone(), BOX_REACH * spread)
     }
 }
 

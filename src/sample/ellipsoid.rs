@@ -15,17 +15,6 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 /// and `(θ − centre)ᵀ G (θ − centre)` follows χ² with `d` degrees of freedom. No inverse is formed: one
 /// triangular solve a draw, O(d²).
 ///
-/// ```
-/// use nalgebra::{DMatrix, DVector};
-/// use truetwin::sample::{Ellipsoid, Sampler};
-/// use truetwin::twin::Noise;
-///
-/// let information = DMatrix::from_diagonal(&DVector::from_vec(vec![100.0, 4.0]));
-/// let ellipsoid = Ellipsoid::new(DVector::zeros(2), information)?;
-/// assert_eq!(ellipsoid.draw(0, Noise::new(1, "cloud", 0)).len(), 2);
-/// # Ok::<(), truetwin::sample::EllipsoidError>(())
-/// ```
-///
 /// Source: Lakshminarayanan, Guerrero & Rojas, section IV-B, confidence-set sampling.
 #[derive(Debug, Clone)]
 pub struct Ellipsoid {
@@ -91,6 +80,18 @@ impl Sampler for Ellipsoid {
 mod tests {
     use super::*;
     use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+    #[test]
+    fn the_example() -> Result<(), Box<dyn std::error::Error>> {
+        use crate::sample::{Ellipsoid, Sampler};
+        use crate::twin::Noise;
+        use nalgebra::{DMatrix, DVector};
+
+        let information = DMatrix::from_diagonal(&DVector::from_vec(vec![100.0, 4.0]));
+        let ellipsoid = Ellipsoid::new(DVector::zeros(2), information)?;
+        assert_eq!(ellipsoid.draw(0, Noise::new(1, "cloud", 0)).len(), 2);
+        Ok(())
+    }
 
     fn correlated() -> DMatrix<f64> {
         DMatrix::from_row_slice(2, 2, &[50.0, -30.0, -30.0, 20.0])

@@ -32,6 +32,7 @@ impl Sensitivity {
     }
 
     /// rⱼ, in parameter units.
+    #[cfg(test)]
     pub fn radii(&self) -> &[f64] {
         &self.radii
     }

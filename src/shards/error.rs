@@ -7,7 +7,22 @@ use crate::work::WorkError;
 use std::path::PathBuf;
 
 /// Why a bank on disk cannot be made or used.
+///
+/// ```
+/// use truetwin::progress::Progress;
+/// use truetwin::shards::{BankPlan, ShardsError};
+/// use truetwin::study::{PresetName, RecordPlan, Study};
+/// use truetwin::twins::VanDerPol;
+/// use truetwin::work::Share;
+///
+/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 100))?;
+/// let none = BankPlan { study: &study, preset: PresetName::Default, size: 0, seed: 1 };
+/// let error = none.fill("nowhere".as_ref(), Share::WHOLE, &Progress::silent()).unwrap_err();
+/// assert!(matches!(error, ShardsError::Size(0)));
+/// # Ok::<(), truetwin::study::StudyError>(())
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ShardsError {
     /// No rows.
     #[error("a bank of {0} simulations; choose between 1 and {most}", most = super::plan::MOST)]

@@ -55,6 +55,7 @@ pub struct BankPlan<'a> {
 
 /// How far a bank on disk has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Filled {
     /// Shards in the folder.
     pub there: usize,

@@ -11,11 +11,28 @@ use std::ops::Range;
 /// Draws from a study's prior: θ uniform in the prior, each with noise and, where the study draws inputs, an input of its own.
 ///
 /// Source: Lakshminarayanan, Guerrero & Rojas, section III.
+///
+/// ```
+/// use truetwin::feature::Ar;
+/// use truetwin::progress::Progress;
+/// use truetwin::shards::Prior;
+/// use truetwin::study::{RecordPlan, Study};
+/// use truetwin::twins::VanDerPol;
+///
+/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 100))?;
+/// let prior = Prior::new(&study, &Ar { order: 2 })?;
+/// let stage = Progress::silent().stage("bank", 10);
+/// let draws = prior.rows(0..10, 1, "bank", &stage)?;
+/// assert!(draws.theta.iter().all(|nu| (0.0..=2.5).contains(nu)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Prior {
     simulator: FeatureSimulator,
     space: ParameterSpace,
     drives: DriveSource,
 }
+
+debug_by_name!(Prior);
 
 impl Prior {
     /// Of a study, seen through features.
@@ -65,7 +82,19 @@ impl Prior {
 }
 
 /// Why a study's prior cannot be simulated.
+///
+/// ```
+/// use truetwin::feature::Ar;
+/// use truetwin::shards::{Prior, PriorError};
+/// use truetwin::study::{RecordPlan, Study};
+/// use truetwin::twins::VanDerPol;
+///
+/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 100))?;
+/// assert!(matches!(Prior::new(&study, &Ar { order: 0 }), Err(PriorError::Feature(_))));
+/// # Ok::<(), truetwin::study::StudyError>(())
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PriorError {
     /// Of the features.
     #[error(transparent)]

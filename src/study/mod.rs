@@ -5,11 +5,10 @@ mod manifest;
 mod plan;
 mod settings;
 
+pub use crate::sample::CloudSampler;
 pub use file::{Library, RecordTable, StudyFile, StudyFileError};
 pub use plan::{DriveSource, InputPlan, Levels, PlanError, RecordPlan};
-pub use settings::{
-    CloudSampler, CloudSettings, Inputs, Preset, PresetName, Settings, SettingsError,
-};
+pub use settings::{CloudSettings, Inputs, Preset, PresetName, Settings};
 
 use crate::feature::{Ar, Arx, FeatureError, FeatureMap, FeatureRecipe, Score};
 use crate::network::{Architecture, Deep, HeadArchitecture, architecture};
@@ -56,7 +55,19 @@ impl std::fmt::Debug for Study {
 }
 
 /// Why there is no such study, or why a record does not belong to it.
+///
+/// ```
+/// use truetwin::study::{RecordPlan, Study, StudyError, StudyFile};
+/// use truetwin::twins::VanDerPol;
+///
+/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 300))?;
+/// let file = StudyFile::parse("twin = 'oscillator'\n[fixed]\nmu = 1.0", "S.toml".as_ref())?;
+/// let error: StudyError = study.configure(&file).unwrap_err();
+/// assert!(error.to_string().contains("mu"), "{error}");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum StudyError {
     /// Of the file.
     #[error(transparent)]
@@ -158,12 +169,14 @@ impl Study {
     }
 
     /// With another recipe under a preset's name.
+    #[must_use]
     pub fn with_preset(mut self, name: PresetName, preset: Preset) -> Self {
         self.presets.insert(name, preset);
         self
     }
 
     /// With other features, in both presets.
+    #[must_use]
     pub fn with_features(mut self, features: impl FeatureRecipe + 'static) -> Self {
         let features: Arc<dyn FeatureRecipe> = Arc::new(features);
         for preset in self.presets.values_mut() {
@@ -173,6 +186,7 @@ impl Study {
     }
 
     /// With another network, in both presets.
+    #[must_use]
     pub fn with_architecture<A: HeadArchitecture>(mut self) -> Self {
         for preset in self.presets.values_mut() {
             preset.architecture = architecture::<A>();
@@ -181,6 +195,7 @@ impl Study {
     }
 
     /// With other numbers, in the default preset.
+    #[must_use]
     pub fn with_settings(mut self, settings: Settings) -> Self {
         if let Some(preset) = self.presets.get_mut(&PresetName::Default) {
             preset.settings = settings;
@@ -189,6 +204,7 @@ impl Study {
     }
 
     /// With effects that the twin may lack and the library does not have, one for each target.
+    #[must_use]
     pub fn with_effects(
         mut self,
         effects: impl IntoIterator<Item = Arc<dyn UnmodelledEffect>>,
@@ -198,6 +214,7 @@ impl Study {
     }
 
     /// With a record to show the program on.
+    #[must_use]
     pub fn with_demo(mut self, record: Record) -> Self {
         self.demo = Some(Arc::new(record));
         self

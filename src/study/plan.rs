@@ -11,11 +11,19 @@ use std::path::{Path, PathBuf};
 const MOST_SAMPLES: usize = 50_000_000;
 
 /// Where the inputs of simulated records come from.
+///
+/// ```
+/// use truetwin::study::{InputPlan, RecordPlan};
+///
+/// let plan = RecordPlan::levels(0.5, 100, 0.0, 3.0, 30);
+/// assert!(matches!(plan.input, Some(InputPlan::Levels(levels)) if levels.hold == 30));
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(
     untagged,
     expecting = "expected { levels = [low, high], hold = n } with low < high, or the name of a CSV file"
 )]
+#[non_exhaustive]
 pub enum InputPlan {
     /// Each input an independent staircase: levels uniform in `levels`, each held for `hold` samples; fresh for each
     /// record.
@@ -25,6 +33,16 @@ pub enum InputPlan {
 }
 
 /// A staircase of random levels.
+///
+/// ```
+/// use truetwin::study::{InputPlan, Levels, RecordPlan};
+/// use truetwin::twin::Interval;
+///
+/// let levels = Levels { levels: Interval::new(0.0, 3.0)?, hold: 30 };
+/// let plan = RecordPlan { step: 0.5, samples: 100, input: Some(InputPlan::Levels(levels)) };
+/// assert_eq!(plan, RecordPlan::levels(0.5, 100, 0.0, 3.0, 30));
+/// # Ok::<(), truetwin::twin::IntervalError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Levels {
@@ -35,6 +53,14 @@ pub struct Levels {
 }
 
 /// Step, length and input of simulated records.
+///
+/// ```
+/// use truetwin::study::RecordPlan;
+///
+/// let with_input = RecordPlan::levels(0.1, 300, 0.0, 1.0, 20); // levels in [0, 1], each for 20 samples
+/// let without = RecordPlan::autonomous(0.1, 300);
+/// assert!(with_input.input.is_some() && without.input.is_none());
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordPlan {
     /// Step Δt in seconds.
@@ -46,7 +72,17 @@ pub struct RecordPlan {
 }
 
 /// Why no input can be made, or why a record does not fit.
+///
+/// ```
+/// use truetwin::study::{PlanError, RecordPlan};
+/// use truetwin::twin::Signals;
+///
+/// // The twin has one input, and nothing says what it looks like.
+/// let error = RecordPlan::autonomous(0.1, 300).prepare(&Signals::default()).err();
+/// assert!(matches!(error, Some(PlanError::NoInput(1))));
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PlanError {
     /// Step or samples that make no record.
     #[error(transparent)]
@@ -179,6 +215,17 @@ impl RecordPlan {
 }
 
 /// Draws the inputs of simulated records.
+///
+/// ```
+/// use truetwin::study::{DriveSource, RecordPlan};
+/// use truetwin::twin::{Noise, Signals};
+///
+/// let source: DriveSource = RecordPlan::levels(0.1, 300, 0.0, 1.0, 20).prepare(&Signals::default())?;
+/// let drive = source.draw(Noise::new(1, "input", 0))?;
+/// assert_eq!(drive.inputs()[[0, 0]], drive.inputs()[[19, 0]]);
+/// assert_eq!(drive, source.draw(Noise::new(1, "input", 0))?); // the same seed, the same levels
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct DriveSource {
     plan: RecordPlan,

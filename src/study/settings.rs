@@ -1,9 +1,11 @@
 //! How an estimator is trained and refined.
 
 use crate::feature::FeatureRecipe;
-use crate::gate::{GateForm, GateSettings, GateSettingsError};
-use crate::network::{Architecture, NetworkError, Training};
-use crate::refine::{RefineSettings, RefineSettingsError};
+use crate::gate::{GateForm, GateSettings};
+use crate::network::{Architecture, Training};
+use crate::refine::RefineSettings;
+use crate::sample::CloudSampler;
+use crate::setting::SettingError;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -11,8 +13,16 @@ use std::sync::Arc;
 const MOST_SIMULATIONS: usize = 1_000_000_000_000;
 
 /// Which of a study's two recipes.
+///
+/// ```
+/// use truetwin::study::PresetName;
+///
+/// assert_eq!(PresetName::default().to_string(), "default");
+/// assert_eq!(PresetName::Paper.to_string(), "paper");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum PresetName {
     /// As in the paper, with what its text leaves open from the authors' code.
     Paper,
@@ -31,6 +41,24 @@ impl std::fmt::Display for PresetName {
 }
 
 /// A recipe: features, network, and every number of the method.
+///
+/// ```
+/// use std::sync::Arc;
+/// use truetwin::feature::Ar;
+/// use truetwin::network::{Compact, architecture};
+/// use truetwin::study::{Preset, PresetName, RecordPlan, Settings, Study};
+/// use truetwin::twins::VanDerPol;
+///
+/// let preset = Preset {
+///     features: Arc::new(Ar { order: 5 }),
+///     architecture: architecture::<Compact>(),
+///     settings: Settings { bank_size: 2000, ..Settings::default() },
+/// };
+/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 300))?
+///     .with_preset(PresetName::Default, preset);
+/// assert_eq!(study.preset(PresetName::Default).settings.bank_size, 2000);
+/// # Ok::<(), truetwin::study::StudyError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Preset {
     /// Stage 1.
@@ -39,21 +67,6 @@ pub struct Preset {
     pub architecture: Arc<dyn Architecture>,
     /// The numbers.
     pub settings: Settings,
-}
-
-/// Which sampler draws the cloud.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum CloudSampler {
-    /// The confidence ellipsoid alone.
-    #[default]
-    Ellipsoid,
-    /// Along sensitivities alone.
-    Sensitivity,
-    /// The paper's alternation of both.
-    Hybrid,
-    /// Uniform in the box of the principal axes, ±1.8·`spread` standard deviations: flat over the region.
-    Box,
 }
 
 /// The cloud of fresh simulations around θ_GN.
@@ -66,6 +79,14 @@ pub enum CloudSampler {
 /// | `spread` | 2 | > 0 | standard deviations of the ellipsoid over those of the estimate; 1 in the paper |
 /// | `quadratic` | true | | a quadratic layer beside the tuned heads; not in the paper |
 /// | `rescale` | true | | standardise features and targets anew on the cloud; not in the paper |
+///
+/// ```
+/// use truetwin::study::{CloudSampler, CloudSettings};
+///
+/// let wide = CloudSettings { spread: 4.0, sampler: CloudSampler::Box, ..CloudSettings::default() };
+/// assert_eq!(wide.draws(1), 400);
+/// assert_eq!(wide.draws(10), 1000); // `size` is the most
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CloudSettings {
@@ -97,8 +118,16 @@ impl Default for CloudSettings {
 }
 
 /// How features become network inputs.
+///
+/// ```
+/// use truetwin::study::{Inputs, Settings};
+///
+/// let settings = Settings { inputs: Inputs::Each, ..Settings::default() };
+/// assert!(settings.check().is_ok());
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Inputs {
     /// Each to unit deviation, as in the paper.
     Each,
@@ -115,6 +144,17 @@ impl CloudSettings {
 }
 
 /// Every number of the method.
+///
+/// ```
+/// use truetwin::study::Settings;
+///
+/// let mut settings = Settings::default();
+/// settings.gate.alpha = 0.05;
+/// settings.training.epochs = 50;
+/// assert!(settings.check().is_ok());
+/// settings.bank_size = 10;
+/// assert_eq!(settings.check().unwrap_err().name(), "bank size");
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
@@ -132,30 +172,6 @@ pub struct Settings {
     pub cloud: CloudSettings,
     /// Tuning of the heads.
     pub tuning: Training,
-}
-
-/// A setting out of its range.
-#[derive(Debug, thiserror::Error)]
-pub enum SettingsError {
-    /// Of training or tuning.
-    #[error(transparent)]
-    Training(#[from] NetworkError),
-    /// Of the gate.
-    #[error(transparent)]
-    Gate(#[from] GateSettingsError),
-    /// Of the refinement.
-    #[error(transparent)]
-    Refine(#[from] RefineSettingsError),
-    /// Of the bank or the cloud.
-    #[error("{field} = {value}; {remedy}")]
-    Size {
-        /// Field.
-        field: &'static str,
-        /// Value.
-        value: f64,
-        /// What it must be.
-        remedy: &'static str,
-    },
 }
 
 impl Default for Settings {
@@ -229,18 +245,13 @@ impl Settings {
     }
 
     /// Whether each number is in its range.
-    pub fn check(&self) -> Result<(), SettingsError> {
-        self.training.validate()?;
-        self.tuning.validate()?;
+    pub fn check(&self) -> Result<(), SettingError> {
+        self.training.check()?;
+        self.tuning.check()?;
         self.gate.check()?;
         self.refine.check()?;
-        let refuse = |field, value, remedy| {
-            Err(SettingsError::Size {
-                field,
-                value,
-                remedy,
-            })
-        };
+        let refuse =
+            |field: &str, value: f64, remedy: &str| Err(SettingError::new(field, value, remedy));
         if self.bank_size < 100 {
             let value = self.bank_size as f64;
             return refuse("bank size", value, "train on at least 100 simulations");

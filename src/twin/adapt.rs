@@ -9,8 +9,19 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// A number that is either known or to be estimated; files write `0.1` or `"estimate"`.
+///
+/// ```
+/// use truetwin::study::StudyFile;
+/// use truetwin::twin::Level;
+///
+/// let file = StudyFile::parse("twin = 'tanks'\n[noise]\nh1 = 0.1\ny = 'estimate'", "S.toml".as_ref())?;
+/// assert_eq!(file.noise["h1"], Level::Known(0.1));
+/// assert_eq!(file.noise["y"], Level::Estimate);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(from = "LevelText", into = "LevelText")]
+#[non_exhaustive]
 pub enum Level {
     /// Known.
     Known(f64),
@@ -53,6 +64,22 @@ impl From<Level> for LevelText {
 ///
 /// An unknown start or noise level lengthens θ by a parameter `start.<state>` or `noise.<state or output>`. Its
 /// prior is `prior["start.h1"]`, or else the state's limits; for noise, a tenth to three times the twin's own level.
+///
+/// ```
+/// use std::sync::Arc;
+/// use truetwin::twin::{Adaptation, AdaptationError, DigitalTwin, Level, adapt};
+/// use truetwin::twins::CascadedTanks;
+///
+/// let mut adaptation = Adaptation::default();
+/// adaptation.start.insert("h1".into(), Level::Estimate);
+/// let twin = adapt(Arc::new(CascadedTanks), &adaptation, 4.0)?;
+/// assert_eq!(twin.parameters().names(), ["k1", "k2", "k3", "k4", "start.h1"]);
+///
+/// adaptation.start.insert("h3".into(), Level::Known(0.0));
+/// let refused = adapt(Arc::new(CascadedTanks), &adaptation, 4.0).err().ok_or("h3 is no state")?;
+/// assert!(matches!(refused, AdaptationError::Unknown { .. }));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Adaptation {
     /// Prior box by parameter.
@@ -68,7 +95,15 @@ pub struct Adaptation {
 }
 
 /// Why a twin cannot be changed so.
+///
+/// ```
+/// use truetwin::twin::AdaptationError;
+///
+/// let error = AdaptationError::NoPrior { name: "start.h1".into() };
+/// assert!(error.to_string().ends_with("add [prior] \"start.h1\" = [low, high]"));
+/// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum AdaptationError {
     /// A name that the twin does not have.
     #[error("[{table}] names {name}, the twin has {known}; use one of these")]
@@ -113,6 +148,18 @@ pub enum AdaptationError {
 
 /// The twin in another setting; θ is the twin's, then unknown noise levels, then unknown starts. `step` is the Δt, in
 /// seconds, at which the twin's own noise levels are taken.
+///
+/// ```
+/// use std::sync::Arc;
+/// use truetwin::twin::{Adaptation, DigitalTwin, Interval, adapt};
+/// use truetwin::twins::VanDerPol;
+///
+/// let mut adaptation = Adaptation::default();
+/// adaptation.prior.insert("nu".into(), Interval::new(1.0, 2.0)?);
+/// let twin = adapt(Arc::new(VanDerPol), &adaptation, 0.05)?;
+/// assert_eq!(twin.parameters().centre(), [1.5]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn adapt(
     base: Arc<dyn DigitalTwin>,
     adaptation: &Adaptation,
@@ -249,7 +296,7 @@ fn unknown(
     let prior = given
         .or(guess)
         .ok_or_else(|| AdaptationError::NoPrior { name: name.into() })?;
-    let mut parameter = Parameter::new(name, "", prior.low(), prior.high()).role(role);
+    let mut parameter = Parameter::new(name, "", prior.low(), prior.high()).with_role(role);
     if let Some(guess) = guess {
         let (low, high) = (guess.low().min(prior.low()), guess.high().max(prior.high()));
         parameter = parameter.within(low, high);

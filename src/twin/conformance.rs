@@ -1,4 +1,15 @@
-//! What is wrong with a new twin, found before any training.
+//! What is wrong with a new twin, found before any training: [`check`] in a test, `truetwin check` in a shell.
+//!
+//! ```
+//! use truetwin::twin::Drive;
+//! use truetwin::twin::conformance::{Finding, Severity, check};
+//! use truetwin::twins::CascadedTanks;
+//!
+//! let drive = Drive::new(4.0, ndarray::Array2::ones((50, 1)))?;
+//! let worst = check(&CascadedTanks, &drive, 1).into_iter().max_by_key(|f: &Finding| f.severity);
+//! assert!(worst.is_some_and(|finding| finding.severity < Severity::Failure));
+//! # Ok::<(), truetwin::twin::DriveError>(())
+//! ```
 
 use super::{
     DigitalTwin, Drive, Noise, PRIOR_DEVIATION, Signal, SimulationError, combination, free_run,
@@ -18,6 +29,7 @@ pub enum Severity {
 
 /// The outcome of one check.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Finding {
     /// Short name of the check.
     pub check: &'static str,
@@ -53,7 +65,17 @@ const PAIRED: f64 = 1e-2;
 /// 7. *identifiable*: no direction in θ leaves the free run unchanged, or moves it less than the noise does over the whole
 ///    prior (first order, centre of the prior, noise taken as white).
 ///
-/// In a test: `assert!(check(&twin, &drive, 1).iter().all(|f| f.severity < Severity::Failure))`.
+///
+/// ```
+/// use truetwin::twin::Drive;
+/// use truetwin::twin::conformance::{Finding, Severity, check};
+/// use truetwin::twins::VanDerPol;
+///
+/// let findings: Vec<Finding> = check(&VanDerPol, &Drive::autonomous(0.05, 100)?, 1);
+/// assert!(findings.iter().all(|finding| finding.severity < Severity::Failure));
+/// assert_eq!(findings[0].check, "parameters");
+/// # Ok::<(), truetwin::twin::DriveError>(())
+/// ```
 pub fn check(twin: &dyn DigitalTwin, drive: &Drive, seed: u64) -> Vec<Finding> {
     let space = twin.parameters();
     let mut findings = Vec::new();

@@ -70,6 +70,13 @@ pub trait DigitalTwin: Send + Sync {
 }
 
 /// A named physical quantity with its unit.
+///
+/// ```
+/// use truetwin::twin::Quantity;
+///
+/// let level = Quantity::new("h", "m");
+/// assert_eq!((level.name.as_str(), level.unit.as_str()), ("h", "m"));
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Quantity {
     /// Name.
@@ -89,6 +96,14 @@ impl Quantity {
 }
 
 /// The channels of a twin.
+///
+/// ```
+/// use truetwin::twin::{DigitalTwin, Signals};
+/// use truetwin::twins::VanDerPol;
+///
+/// assert!(VanDerPol.signals().inputs.is_empty());
+/// assert_eq!(Signals::default().outputs[0].name, "y"); // of a black box that says nothing else
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Signals {
     /// Inputs, in the order of a drive's columns.
@@ -107,7 +122,18 @@ impl Default for Signals {
 }
 
 /// Why a simulation gave no outputs.
+///
+/// ```
+/// use truetwin::twin::{DigitalTwin, Drive, Noise, SimulationError};
+/// use truetwin::twins::VanDerPol;
+///
+/// let drive = Drive::autonomous(1.0, 50)?; // far too large a step
+/// let error = VanDerPol.simulate(&[5.0], &drive, Noise::OFF).unwrap_err();
+/// assert!(matches!(error, SimulationError::Diverged { .. }) && error.costs_one_run());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SimulationError {
     /// The trajectory left the finite numbers: these parameters are not for this input.
     #[error("the simulation diverged at t = {at} s")]

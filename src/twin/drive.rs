@@ -20,7 +20,15 @@ pub struct Drive {
 }
 
 /// Why there is no such drive.
+///
+/// ```
+/// use truetwin::twin::{Drive, DriveError};
+///
+/// let error: DriveError = Drive::autonomous(-0.1, 20).unwrap_err();
+/// assert!(error.to_string().contains("-0.1"), "{error}");
+/// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DriveError {
     /// A step that is no positive number.
     #[error("step = {0} s; the step must be a positive number of seconds")]

@@ -13,6 +13,14 @@ pub type Effects = Vec<Arc<dyn UnmodelledEffect>>;
 pub const NOISE_ENTERS: u32 = 70;
 
 /// Magnitudes as a file gives them: `magnitudes = { tau = 2.5 }`. What is not given is free, a part of θ.
+///
+/// ```
+/// use truetwin::twin::Given;
+///
+/// let given = Given::new([("tau", 2.5)]);
+/// assert_eq!(given.get("tau"), Some(2.5));
+/// assert_eq!(given.get("offset"), None); // free: a part of θ
+/// ```
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Given(BTreeMap<String, f64>);
@@ -30,6 +38,16 @@ impl Given {
 }
 
 /// One number of an effect's law.
+///
+/// ```
+/// use truetwin::twin::Magnitude;
+///
+/// let width = Magnitude::positive("width", "signal", &[0.1, 0.4]);
+/// assert_eq!(width.off, Some(0.0));
+/// assert!(!width.limits.contains(-1.0));
+/// let level = Magnitude::signed("level", "state", &[1.0]).off(f64::INFINITY);
+/// assert!(level.is_threshold());
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Magnitude {
     /// Name, as in effect files.
@@ -89,7 +107,15 @@ impl Magnitude {
 }
 
 /// Which law of the twin an effect bends, and so what its target names.
+///
+/// ```
+/// use truetwin::twin::Law;
+///
+/// assert_eq!(Law::MeasurementNoise.target(), "sensor");
+/// assert_eq!(Law::Force.target(), "state");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Law {
     /// An output signal; target `sensor`, or `sensor1`… where there are several.
     Sensor,
@@ -122,7 +148,19 @@ impl Law {
 }
 
 /// What outputs themselves show of an effect, whatever the twin: values that pile up where it would pile them up.
+///
+/// ```
+/// use truetwin::effect::SensorQuantization;
+/// use truetwin::twin::{Given, Mark, UnmodelledEffect};
+///
+/// let rounding = SensorQuantization { target: "sensor".into(), magnitudes: Given::default() };
+/// let smooth: Vec<f64> = (0..99).map(|k| f64::from(k).sin()).collect();
+/// let rounded: Vec<f64> = smooth.iter().map(|v| (v / 0.3).round() * 0.3).collect();
+/// assert_eq!(rounding.mark(&smooth), Mark::Absent);
+/// assert!(matches!(rounding.mark(&rounded), Mark::Present(step) if (step[0] - 0.3).abs() < 1e-6));
+/// ```
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Mark {
     /// The effect leaves none.
     Unmarked,
@@ -133,6 +171,15 @@ pub enum Mark {
 }
 
 /// Time of a sample, and the step, in seconds.
+///
+/// ```
+/// use truetwin::effect::SensorDrift;
+/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+///
+/// let drift = SensorDrift { target: "sensor".into(), magnitudes: Given::default() };
+/// let now = Instant { t: 10.0, dt: 0.5 };
+/// assert_eq!(drift.signal(&[0.1], now, &mut [], 2.0), 3.0);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Instant {
     /// Seconds from the first sample.
@@ -148,6 +195,42 @@ pub struct Instant {
 ///
 /// `m` holds the magnitudes in the order of [`magnitudes`](Self::magnitudes). At the off values an effect must
 /// change no bit of a trajectory.
+///
+/// ```
+/// use serde::{Deserialize, Serialize};
+/// use truetwin::twin::{Given, Law, Magnitude, UnmodelledEffect};
+///
+/// /// A push that grows with the square of time.
+/// #[derive(Debug, Serialize, Deserialize)]
+/// struct Thrust {
+///     target: String,
+///     #[serde(default)]
+///     magnitudes: Given,
+/// }
+///
+/// #[typetag::serde(name = "thrust")]
+/// impl UnmodelledEffect for Thrust {
+///     fn target(&self) -> &str {
+///         &self.target
+///     }
+///     fn given(&self) -> &Given {
+///         &self.magnitudes
+///     }
+///     fn law(&self) -> Law {
+///         Law::Force
+///     }
+///     fn magnitudes(&self) -> Vec<Magnitude> {
+///         vec![Magnitude::signed("growth", "state/s³", &[0.1])]
+///     }
+///     fn force(&self, m: &[f64], t: f64, _x: f64, _other: f64) -> f64 {
+///         m[0] * t * t
+///     }
+/// }
+///
+/// let effects = truetwin::effect::parse_effects("[[effect]]\nid = 'thrust'\ntarget = 'x2'")?;
+/// assert_eq!(effects[0].force(&[0.5], 2.0, 0.0, 0.0), 2.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[typetag::serde(tag = "id")]
 pub trait UnmodelledEffect: Debug + Send + Sync {
     /// What is bent: `sensor`, `actuator`, a state or a parameter.
@@ -235,7 +318,21 @@ pub trait UnmodelledEffect: Debug + Send + Sync {
 }
 
 /// Why an effect cannot be added to a twin.
+///
+/// ```
+/// use std::sync::Arc;
+/// use truetwin::effect::LinearLoss;
+/// use truetwin::twin::{EffectError, Given, augment};
+/// use truetwin::twins::VanDerPol;
+///
+/// let loss = LinearLoss { target: "x3".into(), magnitudes: Given::default() };
+/// let error = augment(Arc::new(VanDerPol), vec![Arc::new(loss)]).err().ok_or("there is no x3")?;
+/// assert!(matches!(error, EffectError::Target { .. }));
+/// assert!(error.to_string().contains("choose one of x1, x2"), "{error}");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum EffectError {
     /// The target, or the other state, is not there.
     #[error("effect {id}: the twin has no {what} \"{name}\"; choose one of {known}")]

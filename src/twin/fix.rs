@@ -15,6 +15,18 @@ use std::sync::Arc;
 ///
 /// [`ParameterError`] for an unknown name, or when nothing is left to estimate. Whether values make sense is the
 /// caller's to check: a magnitude may be held at infinity.
+///
+/// ```
+/// use std::collections::BTreeMap;
+/// use std::sync::Arc;
+/// use truetwin::twin::{DigitalTwin, fix};
+/// use truetwin::twins::CascadedTanks;
+///
+/// let held = BTreeMap::from([("k4".to_owned(), 1.0)]);
+/// let twin = fix(Arc::new(CascadedTanks), &held)?;
+/// assert_eq!(twin.parameters().names(), ["k1", "k2", "k3"]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn fix(
     base: Arc<dyn DigitalTwin>,
     values: &BTreeMap<String, f64>,

@@ -5,7 +5,17 @@ use super::{DigitalTwin, Drive, Noise, Signal, SimulationError};
 /// Runs that a black box's free run is the mean of: its noise cannot be switched off from outside.
 pub const BLACK_BOX_SEEDS: u64 = 32;
 
-/// Outputs of a run without noise (N × channels); of a black box, the mean of [`BLACK_BOX_SEEDS`] runs.
+/// Outputs of a run without noise (N × channels); of a black box, the mean of 32 runs.
+///
+/// ```
+/// use truetwin::twin::{DigitalTwin, Drive, Noise, free_run};
+/// use truetwin::twins::VanDerPol;
+///
+/// let drive = Drive::autonomous(0.05, 10)?;
+/// let silent = VanDerPol.simulate(&[1.0], &drive, Noise::OFF)?;
+/// assert_eq!(free_run(&VanDerPol, &[1.0], &drive)?, silent);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn free_run(
     twin: &dyn DigitalTwin,
     theta: &[f64],

@@ -19,6 +19,13 @@ pub struct Interval {
 }
 
 /// An interval that is turned inside out.
+///
+/// ```
+/// use truetwin::twin::{Interval, IntervalError};
+///
+/// let error: IntervalError = Interval::new(2.0, 1.0).unwrap_err();
+/// assert!(error.to_string().contains('2'), "{error}");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("[{low}, {high}] is turned inside out; write [low, high] with low < high")]
 pub struct IntervalError {

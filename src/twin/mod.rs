@@ -31,22 +31,23 @@ mod record_parquet;
 mod state_space;
 
 pub use adapt::{Adaptation, AdaptationError, Level, adapt};
-pub use advance::{Advance, Points};
+pub(crate) use advance::{Advance, Points};
 pub(crate) use augment::augment_short;
 pub use augment::{augment, given_magnitudes};
 pub use digital_twin::{DigitalTwin, Quantity, Signals, SimulationError};
-pub use direction::{combination, oriented};
+pub(crate) use direction::{combination, oriented};
 pub use drive::{Drive, DriveError, Signal};
 pub use effect::{
     EffectError, Effects, Given, Instant, Law, Magnitude, Mark, NOISE_ENTERS, UnmodelledEffect,
-    check_effects, targets,
 };
+pub(crate) use effect::{check_effects, targets};
 pub use fix::fix;
-pub use free_run::{BLACK_BOX_SEEDS, free_run};
+pub use free_run::free_run;
 pub use integrator::{Integrator, Workspace};
 pub use interval::{Interval, IntervalError};
 pub use noise::{Noise, Source};
-pub use parameter::{PRIOR_DEVIATION, Parameter, ParameterError, ParameterSpace, Role};
+pub(crate) use parameter::PRIOR_DEVIATION;
+pub use parameter::{Parameter, ParameterError, ParameterSpace, Role};
 pub use record::{Record, RecordError};
 pub use record_csv::{
     CsvError, drive_csv_text, parse_record, read_drive, read_record, record_csv_text, write_record,

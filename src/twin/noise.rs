@@ -36,6 +36,7 @@ impl Noise {
     }
 
     /// Another independent value under the same seed and sample: `noise.child("cloud")`.
+    #[must_use]
     pub fn child(self, purpose: &str) -> Self {
         Self {
             key: self
@@ -45,6 +46,7 @@ impl Noise {
     }
 
     /// Sample number `index` of a family that shares this value's key.
+    #[must_use]
     pub fn sample(self, index: u64) -> Self {
         Self {
             key: self
@@ -74,6 +76,16 @@ impl Noise {
 }
 
 /// Draws of one source of noise.
+///
+/// ```
+/// use truetwin::twin::Noise;
+///
+/// let mut source = Noise::new(1, "measured", 0).source("sensor");
+/// let mean = (0..10_000).map(|_| source.normal()).sum::<f64>() / 1e4;
+/// assert!(mean.abs() < 0.05);
+/// assert!((0.0..1.0).contains(&source.uniform()));
+/// assert!(source.happens(1.0));
+/// ```
 #[derive(Debug, Clone)]
 pub struct Source(Option<ChaCha8Rng>);
 

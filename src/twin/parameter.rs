@@ -9,8 +9,15 @@ use std::collections::BTreeSet;
 pub const PRIOR_DEVIATION: f64 = 0.288_675_134_594_812_9;
 
 /// What a parameter stands for.
+///
+/// ```
+/// use truetwin::twin::{Parameter, Role};
+///
+/// assert_eq!(Parameter::new("k", "1/s", 0.1, 1.0).role, Role::Physical);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Role {
     /// A parameter of the twin's own equations; what the user wants to know.
     #[default]
@@ -24,6 +31,14 @@ pub enum Role {
 }
 
 /// One parameter.
+///
+/// ```
+/// use truetwin::twin::Parameter;
+///
+/// // The network is trained where k lies in [0.1, 1]; nature allows [0, 3].
+/// let k = Parameter::new("k", "1/s", 0.1, 1.0).within(0.0, 3.0);
+/// assert_eq!((k.prior.low(), k.bounds.high()), (0.1, 3.0));
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
     /// Short name, as on the command line and in study files.
@@ -52,13 +67,15 @@ impl Parameter {
     }
 
     /// With physical bounds `[low, high]`.
+    #[must_use]
     pub fn within(mut self, low: f64, high: f64) -> Self {
         self.bounds = Interval::unchecked(low, high);
         self
     }
 
     /// With another role.
-    pub fn role(mut self, role: Role) -> Self {
+    #[must_use]
+    pub fn with_role(mut self, role: Role) -> Self {
         self.role = role;
         self
     }
@@ -78,7 +95,15 @@ impl Parameter {
 pub struct ParameterSpace(Vec<Parameter>);
 
 /// What is wrong with parameters, or with a point.
+///
+/// ```
+/// use truetwin::twin::{Parameter, ParameterError, ParameterSpace};
+///
+/// let twice = ParameterSpace::new([Parameter::new("k", "-", 0.0, 1.0), Parameter::new("k", "-", 0.0, 1.0)]);
+/// assert_eq!(twice.check(), Err(ParameterError::Duplicate("k".into())));
+/// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ParameterError {
     /// No parameter at all.
     #[error("the twin has no parameter to estimate; declare or free at least one")]

@@ -18,7 +18,17 @@ pub struct Record {
 }
 
 /// Why there is no such record, or why it does not fit a twin.
+///
+/// ```
+/// use truetwin::twin::{Drive, Record, RecordError, Signal};
+///
+/// let drive = Drive::autonomous(0.1, 5)?;
+/// let error = Record::new(drive, Signal::zeros((4, 1))).unwrap_err();
+/// assert_eq!(error, RecordError::Lengths { inputs: 5, outputs: 4 });
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RecordError {
     /// A bad time grid or input.
     #[error(transparent)]

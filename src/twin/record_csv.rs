@@ -16,7 +16,17 @@ const MOST_SAMPLES: usize = 50_000_000;
 const MOST_COLUMNS: usize = 2001;
 
 /// What is wrong with a file: which file, where, which value, and what to do.
+///
+/// ```
+/// use std::path::Path;
+/// use truetwin::twin::{CsvError, parse_record};
+///
+/// let error: CsvError = parse_record("t,y\n0,1\n0.1,\n", Path::new("R.csv")).unwrap_err();
+/// let message = error.to_string();
+/// assert!(message.contains("R.csv") && message.contains("column y"), "{message}");
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CsvError {
     /// The file cannot be read or written.
     #[error("{}: {}", path.display(), with_remedy(error))]
@@ -99,11 +109,33 @@ pub enum CsvError {
 }
 
 /// Reads a measured record.
+///
+/// ```
+/// use truetwin::twin::{Drive, Record, Signal, read_record, write_record};
+///
+/// let record = Record::new(Drive::new(0.5, Signal::ones((3, 1)))?, Signal::zeros((3, 1)))?;
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("R.csv");
+/// write_record(&path, &record)?;
+/// assert_eq!(read_record(&path)?, record);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read_record(path: &Path) -> Result<Record, CsvError> {
     Table::read(path)?.record(path)
 }
 
 /// Reads time and inputs to simulate with; outputs, if the file is a record, are ignored.
+///
+/// ```
+/// use truetwin::twin::{Drive, Record, Signal, read_drive, write_record};
+///
+/// let record = Record::new(Drive::new(0.5, Signal::ones((3, 1)))?, Signal::zeros((3, 1)))?;
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("R.csv");
+/// write_record(&path, &record)?;
+/// assert_eq!(read_drive(&path)?, *record.drive());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read_drive(path: &Path) -> Result<Drive, CsvError> {
     let table = Table::read(path)?;
     Drive::new(table.dt, table.inputs).map_err(|error: DriveError| CsvError::Record {
@@ -113,16 +145,41 @@ pub fn read_drive(path: &Path) -> Result<Drive, CsvError> {
 }
 
 /// Parses the text of a record that stands in the program itself; `path` is for messages.
+///
+/// ```
+/// use std::path::Path;
+/// use truetwin::twin::parse_record;
+///
+/// let record = parse_record("t,u,y\n0,1,0\n0.5,1,0.2\n1,0,0.3\n", Path::new("embedded.csv"))?;
+/// assert_eq!((record.samples(), record.drive().dt()), (3, 0.5));
+/// # Ok::<(), truetwin::twin::CsvError>(())
+/// ```
 pub fn parse_record(text: &str, path: &Path) -> Result<Record, CsvError> {
     Table::parse(text.as_bytes(), path)?.record(path)
 }
 
 /// The text of an input file, as [`read_drive`] reads it.
+///
+/// ```
+/// use truetwin::twin::{Drive, Signal, drive_csv_text};
+///
+/// let drive = Drive::new(0.5, Signal::ones((2, 1)))?;
+/// assert_eq!(drive_csv_text(&drive), "t,u\n0,1\n0.5,1\n");
+/// # Ok::<(), truetwin::twin::DriveError>(())
+/// ```
 pub fn drive_csv_text(drive: &Drive) -> String {
     csv_text(drive, &Signal::zeros((drive.samples(), 0)))
 }
 
 /// The text of a record file; reading it gives the same bits of u and y.
+///
+/// ```
+/// use truetwin::twin::{Drive, Record, Signal, record_csv_text};
+///
+/// let record = Record::new(Drive::new(0.5, Signal::ones((3, 1)))?, Signal::zeros((3, 1)))?;
+/// assert_eq!(record_csv_text(&record), "t,u,y\n0,1,0\n0.5,1,0\n1,1,0\n");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn record_csv_text(record: &Record) -> String {
     csv_text(record.drive(), record.outputs())
 }
@@ -144,6 +201,17 @@ fn csv_text(drive: &Drive, outputs: &Signal) -> String {
 }
 
 /// Writes a record to a new file, which appears whole or not at all.
+///
+/// ```
+/// use truetwin::twin::{Drive, Record, Signal, write_record};
+///
+/// let record = Record::new(Drive::new(0.5, Signal::ones((3, 1)))?, Signal::zeros((3, 1)))?;
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("R.csv");
+/// write_record(&path, &record)?;
+/// assert!(write_record(&path, &record).is_err()); // nothing is overwritten
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write_record(path: &Path, record: &Record) -> Result<(), CsvError> {
     write_new(path, record_csv_text(record).as_bytes()).map_err(|error| CsvError::Io {
         path: path.into(),

@@ -99,6 +99,14 @@ pub trait StateSpace: Advance + Send + Sync {
 }
 
 /// Rare large errors: with this probability, N(0, scale²) is added to a sample.
+///
+/// ```
+/// use truetwin::effect::SensorOutliers;
+/// use truetwin::twin::{Given, Outliers, UnmodelledEffect};
+///
+/// let effect = SensorOutliers { target: "sensor".into(), magnitudes: Given::default() };
+/// assert_eq!(effect.outliers(&[0.05, 2.0]), Some(Outliers { probability: 0.05, scale: 2.0 }));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Outliers {
     /// Probability of each sample.
@@ -108,6 +116,16 @@ pub struct Outliers {
 }
 
 /// Where the equations are evaluated.
+///
+/// ```
+/// use truetwin::twin::{Now, StateSpace};
+/// use truetwin::twins::VanDerPol;
+///
+/// let now = Now { t: 0.0, dt: 0.05, u: &[], theta: &[1.0] };
+/// let mut rates = [0.0; 2];
+/// VanDerPol.drift(&now, &[2.0, 0.0], &mut rates);
+/// assert_eq!(rates[1], -2.0); // ν·(1 − x₁²)·x₂ − x₁
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Now<'a> {
     /// Time in seconds from the first sample.
@@ -121,6 +139,15 @@ pub struct Now<'a> {
 }
 
 /// Names and units of everything in the equations.
+///
+/// ```
+/// use truetwin::twin::StateSpace;
+/// use truetwin::twins::CascadedTanks;
+///
+/// let outline = CascadedTanks.outline();
+/// assert_eq!(outline.parameters.names(), ["k1", "k2", "k3", "k4"]);
+/// assert_eq!((outline.states.len(), outline.inputs.len(), outline.outputs.len()), (2, 1, 1));
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outline {
     /// Parameters, in the order of θ.

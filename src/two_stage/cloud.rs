@@ -3,13 +3,11 @@
 use super::EstimateError;
 use crate::bank::{Draw, Draws, FeatureSimulator};
 use crate::feature::Centred;
-use crate::math::median;
 use crate::progress::Progress;
 use crate::refine::Refined;
-use crate::sample::{EigenBox, Ellipsoid, Hybrid, Sampler, Sensitivity};
-use crate::study::{CloudSampler, Settings};
-use crate::twin::{Drive, Interval, Noise, ParameterSpace};
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use crate::sample::{EigenBox, Sampler};
+use crate::study::Settings;
+use crate::twin::{Drive, Interval, Noise};
 use std::borrow::Cow;
 
 /// Draws out of bounds before a draw is reflected at them: where the estimate lies in a corner of many dimensions, hardly
@@ -44,11 +42,16 @@ pub fn cloud(
     let Around {
         simulator,
         drive,
+        refined,
         settings,
         ..
     } = *around;
     let space = simulator.twin().parameters();
-    let sampler = sampler(&space, around)?;
+    let spread = settings.cloud.spread;
+    let sampler: Box<dyn Sampler> = match around.region {
+        Some(region) => Box::new(EigenBox::of_spread(&region.theta, &region.axes, spread)),
+        None => settings.cloud.sampler.around(refined, &space, spread)?,
+    };
     let size = settings.cloud.draws(space.len());
     let size = size + (size / CALIBRATION_SHARE).max(CALIBRATION);
     let stage = progress.stage("cloud", size);
@@ -84,45 +87,6 @@ fn reflect(theta: &mut [f64], bounds: &[Interval]) {
         // Rounding may leave the box by a bit.
         *value = bounds.clamp(inside);
     }
-}
-
-/// Half-width of the box, in standard deviations of a cloud of spread 1.
-const BOX_REACH: f64 = 1.8;
-
-/// The sampler of the settings around the estimate.
-fn sampler(space: &ParameterSpace, around: &Around<'_>) -> Result<Box<dyn Sampler>, EstimateError> {
-    let Around {
-        refined, settings, ..
-    } = *around;
-    let reach = BOX_REACH * settings.cloud.spread;
-    if let Some(region) = around.region {
-        let centre = DVector::from_column_slice(&region.theta);
-        return Ok(Box::new(EigenBox::new(centre, region.axes.clone(), reach)));
-    }
-    let centre = refined.theta.clone();
-    let ellipsoid = || {
-        let information = &refined.information.matrix / settings.cloud.spread.powi(2);
-        Ellipsoid::new(centre.clone(), information)
-    };
-    let sensitivity = || {
-        let jacobian = refined.whitened_jacobian();
-        let sensitivities: Vec<f64> = jacobian.column_iter().map(|c| c.norm()).collect();
-        let typical = median(&refined.spread).unwrap_or(1.0);
-        let reach: Vec<f64> = space.bounds().iter().map(|b| 0.5 * b.width()).collect();
-        let spread = typical * refined.residual.norm();
-        Sensitivity::new(centre.clone(), &sensitivities, spread, &reach)
-    };
-    Ok(match settings.cloud.sampler {
-        CloudSampler::Ellipsoid => Box::new(ellipsoid()?),
-        CloudSampler::Sensitivity => Box::new(sensitivity()),
-        CloudSampler::Box => {
-            let eigen = SymmetricEigen::new(refined.information.covariance.clone());
-            let lengths = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
-            let axes = eigen.eigenvectors * DMatrix::from_diagonal(&lengths);
-            Box::new(EigenBox::new(centre, axes, reach))
-        }
-        CloudSampler::Hybrid => Box::new(Hybrid::new(ellipsoid()?, sensitivity())),
-    })
 }
 
 #[cfg(test)]

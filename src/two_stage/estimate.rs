@@ -1,8 +1,10 @@
 //! From a measured record to a calibrated twin.
 
+use super::calibration::Spread;
 use super::cloud::{Around, cloud};
+use super::tracking::track;
 use super::tune::tune;
-use super::{Estimator, Spread, Tracking, track};
+use super::{Estimator, Tracking};
 use crate::bank::{BankError, Draws, FeatureSimulator};
 use crate::feature::FeatureError;
 use crate::gate::{GateError, GateForm, GateOutcome, GateTest};
@@ -10,7 +12,8 @@ use crate::network::NetworkError;
 use crate::progress::{Cancelled, Progress};
 use crate::refine::{Information, RefineError, RefineSettings, Refined, Refinement};
 use crate::sample::EllipsoidError;
-use crate::study::{PresetName, Settings, SettingsError, StudyError};
+use crate::setting::SettingError;
+use crate::study::{PresetName, Settings, StudyError};
 use crate::twin::{Noise, Record, Role};
 use nalgebra::DVector;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -36,6 +39,7 @@ pub struct EstimateOptions {
 
 /// What an estimate is made of. Skipped stages are `None`.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Estimate {
     /// Names of θ: the twin's parameters, then unknown noise levels, starts and magnitudes.
     pub names: Vec<String>,
@@ -54,7 +58,7 @@ pub struct Estimate {
     pub theta: Vec<f64>,
     /// Standard errors of `theta`.
     pub std_error: Vec<f64>,
-    /// Ends of the interval at [`INTERVAL_LEVEL`], within the bounds.
+    /// Ends of the 90 % interval, within the bounds.
     pub low: Vec<f64>,
     /// Upper ends.
     pub high: Vec<f64>,
@@ -80,6 +84,7 @@ pub struct Estimate {
 
 /// Wall-clock seconds of each stage; `None` for skipped ones.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Seconds {
     /// Features and network.
     pub predict: f64,
@@ -97,6 +102,7 @@ pub struct Seconds {
 
 /// A parameter that is estimated without being asked for.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Nuisance {
     /// State, output, or `id@target.magnitude`.
     pub name: String,
@@ -109,7 +115,15 @@ pub struct Nuisance {
 }
 
 /// Why there is no estimate.
+///
+/// ```
+/// use truetwin::progress::Cancelled;
+/// use truetwin::two_stage::EstimateError;
+///
+/// assert_eq!(EstimateError::from(Cancelled).to_string(), "cancelled");
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum EstimateError {
     /// The record is not one of this study.
     #[error(transparent)]
@@ -119,7 +133,7 @@ pub enum EstimateError {
     Feature(#[from] FeatureError),
     /// A setting is out of range.
     #[error(transparent)]
-    Settings(#[from] SettingsError),
+    Settings(#[from] SettingError),
     /// Simulations failed.
     #[error(transparent)]
     Bank(#[from] BankError),

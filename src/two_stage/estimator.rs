@@ -1,6 +1,7 @@
 //! The pretrained estimator.
 
-use super::{Calibration, Readout};
+use super::calibration::Calibration;
+use super::readout::Readout;
 use crate::bank::FeatureSimulator;
 use crate::feature::{FeatureError, FeatureRecipe};
 use crate::network::{Architecture, Network, NetworkError};

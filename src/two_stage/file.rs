@@ -4,8 +4,9 @@
 //! weights; what is not a tensor stands as one JSON text under the metadata key `truetwin`. The SHA-256 of that text
 //! (checksum empty) and of all tensors is checked before anything is used. It holds data only, never code.
 
+use super::calibration::Calibration;
 use super::readout::Readout;
-use super::{Calibration, Estimator, Scaler, Standardiser};
+use super::{Estimator, Scaler, Standardiser};
 use crate::feature::{FeatureError, FeatureRecipe};
 use crate::files::{replace, with_remedy, write_new};
 use crate::foreign::{MESSAGE, one_line, read};
@@ -48,7 +49,15 @@ struct Header {
 }
 
 /// Why an estimator file cannot be used.
+///
+/// ```
+/// use truetwin::two_stage::{Estimator, EstimatorFileError};
+///
+/// let error = Estimator::load("no-such.est".as_ref(), &[]).unwrap_err();
+/// assert!(matches!(error, EstimatorFileError::Io { .. }));
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum EstimatorFileError {
     /// It cannot be read or written.
     #[error("{}: {}", path.display(), with_remedy(error))]

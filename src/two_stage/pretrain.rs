@@ -1,15 +1,17 @@
 //! Bank and training.
 
+use super::calibration::Calibration;
 use super::readout::Readout;
-use super::{Calibration, Estimator, EstimatorFileError, Scaler, Standardiser};
+use super::{Estimator, EstimatorFileError, Scaler, Standardiser};
 use crate::bank::file::BankFileError;
 use crate::bank::{Bank, BankError, Draws};
 use crate::feature::FeatureError;
 use crate::math::WhiteningError;
 use crate::network::{Checkpoints, History, NetworkError, Part, Samples};
 use crate::progress::Progress;
+use crate::setting::SettingError;
 use crate::shards::{Prior, PriorError, ShardsError};
-use crate::study::{Inputs, PlanError, PresetName, Settings, SettingsError, Study};
+use crate::study::{Inputs, PlanError, PresetName, Settings, Study};
 use crate::work::WorkError;
 use ndarray::Array2;
 use std::borrow::Cow;
@@ -39,11 +41,25 @@ pub struct PretrainOptions {
 }
 
 /// Why there is no estimator.
+///
+/// ```
+/// use truetwin::progress::Progress;
+/// use truetwin::study::{RecordPlan, Study};
+/// use truetwin::twins::VanDerPol;
+/// use truetwin::two_stage::{PretrainError, PretrainOptions, pretrain};
+///
+/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 200))?;
+/// let too_few = PretrainOptions { bank_size: Some(3), ..PretrainOptions::default() };
+/// let error = pretrain(&study, &too_few, &Progress::silent()).unwrap_err();
+/// assert!(matches!(error, PretrainError::Settings(_)));
+/// # Ok::<(), truetwin::study::StudyError>(())
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PretrainError {
     /// Of the recipe.
     #[error(transparent)]
-    Settings(#[from] SettingsError),
+    Settings(#[from] SettingError),
     /// Of step, length, input.
     #[error(transparent)]
     Plan(#[from] PlanError),
@@ -138,6 +154,24 @@ pub fn pretrain(
 /// # Errors
 ///
 /// [`PretrainError`]; also for rows of another width.
+///
+/// ```
+/// use truetwin::progress::Progress;
+/// use truetwin::shards::Prior;
+/// use truetwin::study::{PresetName, RecordPlan, Study};
+/// use truetwin::twins::VanDerPol;
+/// use truetwin::two_stage::{PretrainOptions, pretrain_on};
+///
+/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 100))?;
+/// let features = &study.preset(PresetName::Default).features;
+/// let stage = Progress::silent().stage("bank", 150);
+/// let bank = Prior::new(&study, features.as_ref())?.rows(0..150, 1, "bank", &stage)?;
+///
+/// let short = PretrainOptions { epochs: Some(2), ..PretrainOptions::default() };
+/// let (estimator, history) = pretrain_on(&study, &bank, &short, &Progress::silent())?;
+/// assert_eq!((estimator.settings().bank_size, history.epochs_run), (150, 2));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn pretrain_on(
     study: &Study,
     bank: &dyn Bank,

@@ -161,3 +161,5 @@ fn beside(path: &Path) -> PathBuf {
     name.push(ENDING);
     name.into()
 }
+
+debug_by_name!(Pretraining<'_>, GivenBank<'_>);

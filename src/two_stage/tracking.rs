@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// A free run beside a record.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Tracking {
     /// Outputs of the free run, N × channels.
     pub outputs: Signal,

@@ -1,11 +1,12 @@
 //! Heads tuned on the cloud.
 
+use super::calibration::{Calibration, Spread};
 use super::estimate::INTERVAL_LEVEL;
 use super::estimator::one_row;
 use super::readout::{Layer, Readout};
-use super::{Calibration, EstimateError, Estimator, Scaler, Spread, Standardiser};
+use super::{EstimateError, Estimator, Scaler, Standardiser};
 use crate::bank::Draws;
-use crate::network::{History, Training};
+use crate::network::Training;
 use crate::progress::Progress;
 use crate::refine::Refined;
 use crate::study::Settings;
@@ -22,10 +23,6 @@ pub struct Tuned {
     pub theta: Vec<f64>,
     /// Errors to expect, measured on a part of the cloud that the heads never saw.
     pub spread: Option<Spread>,
-    /// Static heads on the frozen trunk, with what stands around them.
-    pub readout: Readout,
-    /// Losses.
-    pub history: History,
 }
 
 /// Tunes the heads on a cloud, the trunk frozen, and reads the record with them.
@@ -64,7 +61,7 @@ pub fn tune(
     let goal = layer
         .as_ref()
         .map_or_else(|| y.clone(), |layer| layer.rest(&z, &y));
-    let (network, history) = estimator.readout.network.tune_heads(
+    let (network, _) = estimator.readout.network.tune_heads(
         &z,
         &goal,
         &Training {
@@ -99,8 +96,6 @@ pub fn tune(
     Ok(Tuned {
         spread: calibration.spread(&theta, &readout.targets.scale, INTERVAL_LEVEL),
         theta,
-        readout,
-        history,
     })
 }
 

@@ -9,7 +9,20 @@ use crate::work::WorkError;
 use std::path::PathBuf;
 
 /// Why there is no scorecard.
+///
+/// ```
+/// use truetwin::study::{RecordPlan, Study};
+/// use truetwin::twins::VanDerPol;
+/// use truetwin::withheld::{Settings, Withheld, WithheldError};
+///
+/// let study = Study::new("van-der-pol", VanDerPol, RecordPlan::autonomous(0.05, 300))?;
+/// let none = Settings { trials: 0, ..Settings::default() };
+/// let refused: Option<WithheldError> = Withheld::new(&study, none).err();
+/// assert!(refused.is_some());
+/// # Ok::<(), truetwin::study::StudyError>(())
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum WithheldError {
     /// There is no world of this twin.
     #[error(

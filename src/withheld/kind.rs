@@ -4,8 +4,16 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// What may be wrong with the twin in a trial, and what is the right answer.
+///
+/// ```
+/// use truetwin::withheld::Kind;
+///
+/// assert!(Kind::ALL.iter().all(|kind| Kind::named(kind.id()) == Some(*kind)));
+/// assert!(!Kind::None.is_structural());
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Kind {
     /// Nothing, θ inside the prior: no structural gap.
     None,

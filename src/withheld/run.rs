@@ -77,6 +77,8 @@ pub struct Withheld<'a> {
     settings: Settings,
 }
 
+debug_by_name!(Withheld<'_>);
+
 impl<'a> Withheld<'a> {
     /// Trials of a study of a reference twin.
     ///
@@ -155,6 +157,8 @@ pub struct Sealed<'a> {
     trials: Withheld<'a>,
     folder: Folder,
 }
+
+debug_by_name!(Sealed<'_>);
 
 impl Sealed<'_> {
     /// SHA-256 of the key file: publish it before [`score`](Self::score).

@@ -51,7 +51,7 @@ impl Count {
         (self.of > 0).then(|| self.count as f64 / self.of as f64)
     }
 
-    /// Clopper–Pearson interval of the probability, at [`LEVEL`].
+    /// Clopper–Pearson interval of the probability, at 95 %.
     pub fn interval(self) -> (f64, f64) {
         // A count is never more than what it is of.
         clopper_pearson(self.count, self.of, LEVEL).unwrap_or((0.0, 1.0))

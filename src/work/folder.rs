@@ -20,13 +20,51 @@ const MOST: u64 = 1 << 28;
 /// | `manifest.json` | what the pieces depend on; another call that differs is refused |
 /// | `PART/0000.json`, … | a piece each; appears whole when it is done |
 /// | anything else | what the work starts from, and results made of the pieces |
+///
+/// ```
+/// use truetwin::experiment::{Benchmark, MonteCarlo, Origin, Scenario, reference_studies};
+/// use truetwin::two_stage::PretrainOptions;
+/// use truetwin::work::{WorkError, WorkFolder};
+///
+/// let study = &reference_studies()?[0];
+/// let place = tempfile::tempdir()?;
+/// let training = PretrainOptions::default();
+/// let open = |seed| -> Result<WorkFolder, _> {
+///     let plan = MonteCarlo { benchmark: Benchmark::of(study), scenario: Scenario::First, runs: 10, seed };
+///     plan.folder(&place.path().join("runs"), study, Origin::Trained(&training))
+/// };
+/// open(1)?;
+/// open(1)?; // the same call goes on
+/// let error: WorkError = open(2).err().ok_or("another call is refused")?;
+/// assert!(error.to_string().contains("seed"), "{error}");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct WorkFolder {
     path: PathBuf,
 }
 
 /// Why a folder of work cannot be used.
+///
+/// ```
+/// use truetwin::progress::Progress;
+/// use truetwin::shards::{BankPlan, ShardsError};
+/// use truetwin::study::{PresetName, RecordPlan, Study};
+/// use truetwin::twins::VanDerPol;
+/// use truetwin::work::{Share, WorkError};
+///
+/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 100))?;
+/// let plan = BankPlan { study: &study, preset: PresetName::Paper, size: 10, seed: 1 };
+/// let error = plan.fill("no/such/place".as_ref(), Share::WHOLE, &Progress::silent()).unwrap_err();
+/// let of_the_folder: Option<&WorkError> = match &error {
+///     ShardsError::Work(error) => Some(error),
+///     _ => None,
+/// };
+/// assert!(of_the_folder.is_some(), "{error}");
+/// # Ok::<(), truetwin::study::StudyError>(())
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum WorkError {
     /// Something cannot be read or written.
     #[error("{}: {}", path.display(), with_remedy(error))]
@@ -91,7 +129,7 @@ impl WorkError {
 }
 
 /// A folder of work that is not in its place yet.
-pub struct NewWork<'a> {
+pub(crate) struct NewWork<'a> {
     filling: NewFolder,
     place: &'a Path,
 }
@@ -116,7 +154,7 @@ impl WorkFolder {
     /// # Errors
     ///
     /// [`WorkError`]: a path that is taken, a folder of another call, a place that cannot be written; and those of `fill`.
-    pub fn open<E: From<WorkError>>(
+    pub(crate) fn open<E: From<WorkError>>(
         path: &Path,
         manifest: &Manifest,
         parts: &[&str],
@@ -149,7 +187,7 @@ impl WorkFolder {
     /// # Errors
     ///
     /// [`WorkError`]: no folder of this verb, a folder of another call.
-    pub fn resume(path: &Path, manifest: &Manifest) -> Result<Self, WorkError> {
+    pub(crate) fn resume(path: &Path, manifest: &Manifest) -> Result<Self, WorkError> {
         let (found, there) = Self::find(path, manifest.verb())?;
         match manifest.differs(&there) {
             None => Ok(found),
@@ -165,7 +203,7 @@ impl WorkFolder {
     /// # Errors
     ///
     /// [`WorkError::Foreign`] for anything else.
-    pub fn find(path: &Path, verb: &'static str) -> Result<(Self, Manifest), WorkError> {
+    pub(crate) fn find(path: &Path, verb: &'static str) -> Result<(Self, Manifest), WorkError> {
         let text = read_kept_text(&path.join(MANIFEST), MOST).ok();
         let found = text.and_then(|text| Manifest::parse(verb, &text));
         let path = path.to_owned();
@@ -190,7 +228,7 @@ impl WorkFolder {
     /// # Errors
     ///
     /// [`WorkError::Io`].
-    pub fn write(&self, name: &str, text: &str) -> Result<(), WorkError> {
+    pub(crate) fn write(&self, name: &str, text: &str) -> Result<(), WorkError> {
         let path = self.file(name);
         replace(&path, text.as_bytes()).map_err(|error| WorkError::io(&path, error))
     }
@@ -200,7 +238,7 @@ impl WorkFolder {
     /// # Errors
     ///
     /// [`WorkError::Io`].
-    pub fn remove(self) -> Result<(), WorkError> {
+    pub(crate) fn remove(self) -> Result<(), WorkError> {
         std::fs::remove_dir_all(&self.path).map_err(|error| WorkError::io(&self.path, error))
     }
 
@@ -209,7 +247,7 @@ impl WorkFolder {
     /// # Errors
     ///
     /// [`WorkError::Io`].
-    pub fn finish(&self, manifest: &Manifest, checksums: Value) -> Result<(), WorkError> {
+    pub(crate) fn finish(&self, manifest: &Manifest, checksums: Value) -> Result<(), WorkError> {
         self.write(MANIFEST, &manifest.clone().finished(checksums).text())
     }
 
@@ -218,7 +256,7 @@ impl WorkFolder {
     /// # Errors
     ///
     /// [`WorkError::Io`].
-    pub fn read(&self, name: &str) -> Result<String, WorkError> {
+    pub(crate) fn read(&self, name: &str) -> Result<String, WorkError> {
         let path = self.file(name);
         read_kept_text(&path, MOST).map_err(|error| WorkError::io(&path, error))
     }
@@ -228,7 +266,7 @@ impl WorkFolder {
     /// # Errors
     ///
     /// [`WorkError::Io`].
-    pub fn part(&self, part: &str) -> Result<PathBuf, WorkError> {
+    pub(crate) fn part(&self, part: &str) -> Result<PathBuf, WorkError> {
         let path = self.file(part);
         check_folder(&path).map_err(|error| WorkError::io(&path, error))?;
         Ok(path)
@@ -243,7 +281,7 @@ impl WorkFolder {
     /// # Errors
     ///
     /// [`WorkError::Io`]; [`WorkError::Piece`] for a file that is no such piece.
-    pub fn kept<T: DeserializeOwned>(
+    pub(crate) fn kept<T: DeserializeOwned>(
         &self,
         part: &str,
         number: usize,
@@ -269,7 +307,7 @@ impl WorkFolder {
     /// # Errors
     ///
     /// [`WorkError::Io`].
-    pub fn keep<T: Serialize>(
+    pub(crate) fn keep<T: Serialize>(
         &self,
         part: &str,
         number: usize,

@@ -10,7 +10,7 @@ const FILE: &str = "lock";
 ///
 /// For work whose steps follow one another; numbered pieces need none.
 #[derive(Debug)]
-pub struct Lock {
+pub(crate) struct Lock {
     /// The system gives the lock back when the file is closed, however the process ends.
     _file: File,
 }
@@ -23,7 +23,7 @@ impl WorkFolder {
     /// # Errors
     ///
     /// [`WorkError::Busy`] where another process is at work, [`WorkError::Io`].
-    pub fn lock(&self) -> Result<Lock, WorkError> {
+    pub(crate) fn lock(&self) -> Result<Lock, WorkError> {
         let path = self.file(FILE);
         let mut options = OpenOptions::new();
         let file = (options.create(true).append(true).open(&path))

@@ -1,6 +1,7 @@
 //! What a folder of work is about: what another call must say to go on with it.
 
 use super::WorkError;
+use crate::files::sha256;
 use crate::files::sha256_of;
 use crate::foreign::excerpt;
 use serde_json::{Map, Value};
@@ -63,7 +64,7 @@ impl Manifest {
     }
 
     /// SHA-256 of all of it, in hexadecimal digits.
-    pub fn checksum(&self) -> String {
+    pub(crate) fn checksum(&self) -> String {
         sha256(self.text().as_bytes())
     }
 

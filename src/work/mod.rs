@@ -5,8 +5,7 @@
 //!
 //! | to … | look at |
 //! |---|---|
-//! | keep finished pieces in a folder, and go on with it | [`WorkFolder`], [`Manifest`] |
-//! | keep other processes out of a folder | [`Lock`] |
+//! | keep finished pieces in a folder, and go on with it | [`WorkFolder`] |
 //! | do a part of the pieces: of a job array, of the ranks of a cluster | [`Share`] |
 //! | wait for the other ranks | [`Team`] |
 
@@ -19,9 +18,9 @@ mod share;
 mod team;
 
 use crew::share_out;
-pub use folder::{NewWork, WorkError, WorkFolder};
-pub use lock::Lock;
-pub use manifest::{Manifest, checksum};
+pub(crate) use folder::NewWork;
+pub use folder::{WorkError, WorkFolder};
+pub(crate) use manifest::{Manifest, checksum};
 pub(crate) use pieces::{Piece, Pieces};
 pub use share::{Share, ShareError};
 pub use team::{Team, TeamError};

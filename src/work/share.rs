@@ -21,6 +21,13 @@ pub struct Share {
 }
 
 /// What is no share.
+///
+/// ```
+/// use truetwin::work::{Share, ShareError};
+///
+/// let error: ShareError = Share::new(5, 4).unwrap_err();
+/// assert!(error.to_string().contains('4'), "{error}");
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("\"{0}\" is no share; write i/n: part i of n, such as 1/4")]
 pub struct ShareError(String);

@@ -17,6 +17,13 @@ const SIZES: [&str; 4] = [
 ///
 /// Alone unless the process was started by an MPI launcher (`mpirun`, `srun --mpi=…`), and then only in a build with the
 /// feature `mpi`.
+///
+/// ```
+/// use truetwin::work::Team;
+///
+/// let team = Team::alone();
+/// assert!(team.is_alone() && team.leads() && team.share().takes(7));
+/// ```
 pub struct Team {
     share: Share,
     leads: bool,
@@ -24,8 +31,18 @@ pub struct Team {
     universe: Option<mpi::environment::Universe>,
 }
 
+debug_by_name!(Team);
+
 /// Why the ranks cannot work together.
+///
+/// ```
+/// use truetwin::work::TeamError;
+///
+/// let error = TeamError::NoMpi { ranks: 4 };
+/// assert!(error.to_string().contains("--features mpi"));
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum TeamError {
     /// Ranks of a build that knows nothing of each other would all do the same.
     #[error(

@@ -2,6 +2,7 @@
 
 mod diagnose;
 mod reproduce;
+mod shell;
 mod withheld;
 
 use std::fs;

@@ -238,7 +238,7 @@ fn starts_are_of_each_record() {
     impl DigitalTwin for Warm {
         fn parameters(&self) -> ParameterSpace {
             let start = Parameter::new("start.y", "K", -1.0, 1.0).within(-5.0, 5.0);
-            let start = start.role(truetwin::twin::Role::Start);
+            let start = start.with_role(truetwin::twin::Role::Start);
             ParameterSpace::new(Heater.parameters().iter().cloned().chain([start]))
         }
         fn simulate(

@@ -64,7 +64,7 @@ fn limits_are_felt_as_a_particle_filter_feels_them() {
         [0.4, 0.7, 0.4, 1.2],
     ] {
         let of = |method: Method, record: &Record| {
-            let settings = FilterSettings::default().method(method);
+            let settings = FilterSettings::default().with_method(method);
             log_likelihood(&CascadedTanks, &theta, record, &settings).unwrap()
         };
         let differences: Vec<[f64; 2]> = (0..8)

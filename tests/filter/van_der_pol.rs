@@ -33,7 +33,7 @@ fn likelihood_and_score_are_the_closed_form() {
     for (nu, run) in [(0.7, 0), (3.0, 1), (5.0, 2)] {
         let record = simulated(nu, run);
         for method in [Method::Points, Method::Extended] {
-            let settings = FilterSettings::default().method(method);
+            let settings = FilterSettings::default().with_method(method);
             let kalman = Kalman::new(&VanDerPol, &record, &settings).unwrap();
             let filtered = kalman.filter(&[nu]).unwrap();
             let (value, _, information, best) = closed_form(&record, nu);

@@ -5,7 +5,15 @@ use crate::study::StudyError;
 use std::path::PathBuf;
 
 /// Why an FMU cannot be used as a twin.
+///
+/// ```
+/// use truetwin::external::fmu::{FmuError, FmuSettings, FmuTwin};
+///
+/// let error = FmuTwin::open("no-such.fmu".as_ref(), FmuSettings::default()).err();
+/// assert!(matches!(error, Some(FmuError::Io { .. })));
+/// ```
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FmuError {
     /// The file cannot be read.
     #[error("{}: {}", path.display(), with_remedy(error))]

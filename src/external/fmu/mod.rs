@@ -30,6 +30,13 @@ use worker::{References, Worker};
 /// |---|---|---|
 /// | `variables` | all | names of the parameters to estimate, of inputs and outputs; of a kind that none is named of, all are used |
 /// | `workers` | as many as threads simulate | instances at once; 1 of an FMU that allows no more |
+///
+/// ```
+/// use truetwin::external::fmu::FmuSettings;
+///
+/// let some = FmuSettings { variables: vec!["stiffness".into(), "y".into()], ..FmuSettings::default() };
+/// assert_eq!(some.workers, None);
+/// ```
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct FmuSettings {
     /// Names of the real parameters, inputs and outputs that the twin has; the others keep their start.

@@ -17,6 +17,14 @@ const LONGEST: Duration = Duration::from_secs(366 * 24 * 3600);
 /// | `workers` | as many as threads simulate | 1 … 1024 | copies of the program that run at once |
 /// | `timeout` | 60 s | above 0, at most a year | for one answer; to start and describe itself, a copy has at least 30 s |
 /// | `retries` | 2 | 0 … 100 | attempts on a fresh copy after one that ended or was late |
+///
+/// ```
+/// use std::time::Duration;
+/// use truetwin::external::program::ProgramSettings;
+///
+/// let patient = ProgramSettings { timeout: Duration::from_secs(600), workers: Some(2), ..ProgramSettings::default() };
+/// assert_eq!(patient.retries, 2);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ProgramSettings {
     /// Copies of the program that run at once; `None`: one for each thread of the rayon pool that starts the twin.

@@ -14,20 +14,6 @@ const GAP: f64 = 8.0;
 const NAMES: f64 = 0.46 * ROOM;
 
 /// Groups of bars. Scales begin at zero.
-///
-/// ```
-/// use truetwin::report::chart::{Bar, BarChart, BarGroup};
-/// let chart = BarChart {
-///     title: "Error".into(),
-///     description: "0.3 before, 0.1 after.".into(),
-///     groups: vec![BarGroup {
-///         label: "free run".into(),
-///         full: None,
-///         bars: vec![Bar::new("before", 0.3, "0.300"), Bar::new("after", 0.1, "0.100").clear(true)],
-///     }],
-/// };
-/// assert!(chart.svg().contains(">0.300<"));
-/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct BarChart {
     /// Heading, also for screen readers.
@@ -179,5 +165,26 @@ impl Bar {
             end = end.max(high);
         }
         text(out, (end + GAP, baseline), "start", TEXT, false, &self.note);
+    }
+}
+
+#[cfg(test)]
+mod examples {
+    #[test]
+    fn the_example() {
+        use crate::report::chart::{Bar, BarChart, BarGroup};
+        let chart = BarChart {
+            title: "Error".into(),
+            description: "0.3 before, 0.1 after.".into(),
+            groups: vec![BarGroup {
+                label: "free run".into(),
+                full: None,
+                bars: vec![
+                    Bar::new("before", 0.3, "0.300"),
+                    Bar::new("after", 0.1, "0.100").clear(true),
+                ],
+            }],
+        };
+        assert!(chart.svg().contains(">0.300<"));
     }
 }

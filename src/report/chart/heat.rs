@@ -18,31 +18,6 @@ const GAP: f64 = 8.0;
 const NAMES: f64 = 0.34 * ROOM;
 
 /// Groups of rows above each other along one x axis.
-///
-/// ```
-/// use truetwin::report::chart::{Edge, HeatGroup, HeatMap, HeatRow, Span};
-/// let cell = |from: f64, share: f64, edge| Span {
-///     from,
-///     to: from + 5.0,
-///     label: format!("{:.0} %", 100.0 * share),
-///     weight: share,
-///     edge,
-/// };
-/// let map = HeatMap {
-///     title: "Where in time".into(),
-///     description: "80 % from 5 s on.".into(),
-///     x: "t in s".into(),
-///     groups: vec![HeatGroup {
-///         label: "twin, refitted".into(),
-///         rows: vec![HeatRow {
-///             label: "y".into(),
-///             cells: vec![cell(0.0, 0.2, Edge::Bare), cell(5.0, 0.8, Edge::Unbroken)],
-///             mark: None,
-///         }],
-///     }],
-/// };
-/// assert!(map.svg().contains(">80 %<"));
-/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeatMap {
     /// Heading, also for screen readers.
@@ -154,5 +129,34 @@ impl HeatGroup {
             y += ROW;
         }
         y + 4.0
+    }
+}
+
+#[cfg(test)]
+mod examples {
+    #[test]
+    fn the_example() {
+        use crate::report::chart::{Edge, HeatGroup, HeatMap, HeatRow, Span};
+        let cell = |from: f64, share: f64, edge| Span {
+            from,
+            to: from + 5.0,
+            label: format!("{:.0} %", 100.0 * share),
+            weight: share,
+            edge,
+        };
+        let map = HeatMap {
+            title: "Where in time".into(),
+            description: "80 % from 5 s on.".into(),
+            x: "t in s".into(),
+            groups: vec![HeatGroup {
+                label: "twin, refitted".into(),
+                rows: vec![HeatRow {
+                    label: "y".into(),
+                    cells: vec![cell(0.0, 0.2, Edge::Bare), cell(5.0, 0.8, Edge::Unbroken)],
+                    mark: None,
+                }],
+            }],
+        };
+        assert!(map.svg().contains(">80 %<"));
     }
 }

@@ -16,24 +16,6 @@ const ACROSS: usize = 3;
 const GAP: f64 = 18.0;
 
 /// Rows of facets; each row has its own quantity and y axis, each facet its own x axis.
-///
-/// ```
-/// use truetwin::report::chart::{Facet, FacetRow, Multiples, Step};
-/// let steps = vec![
-///     Step { low: 0.0, high: 1.0, mean: 0.1, error: 0.2 },
-///     Step { low: 1.0, high: 2.0, mean: -0.9, error: 0.2 },
-/// ];
-/// let picture = Multiples {
-///     title: "What is missing".into(),
-///     description: "A loss above 1 V.".into(),
-///     rows: vec![FacetRow {
-///         label: "rate of h in V/s".into(),
-///         clear: true,
-///         facets: vec![Facet { x: "h in V".into(), steps }],
-///     }],
-/// };
-/// assert!(picture.svg().contains("h in V"));
-/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Multiples {
     /// Heading, also for screen readers.
@@ -197,5 +179,40 @@ impl Facet {
             false,
             &clipped(&self.x, TEXT, room),
         );
+    }
+}
+
+#[cfg(test)]
+mod examples {
+    #[test]
+    fn the_example() {
+        use crate::report::chart::{Facet, FacetRow, Multiples, Step};
+        let steps = vec![
+            Step {
+                low: 0.0,
+                high: 1.0,
+                mean: 0.1,
+                error: 0.2,
+            },
+            Step {
+                low: 1.0,
+                high: 2.0,
+                mean: -0.9,
+                error: 0.2,
+            },
+        ];
+        let picture = Multiples {
+            title: "What is missing".into(),
+            description: "A loss above 1 V.".into(),
+            rows: vec![FacetRow {
+                label: "rate of h in V/s".into(),
+                clear: true,
+                facets: vec![Facet {
+                    x: "h in V".into(),
+                    steps,
+                }],
+            }],
+        };
+        assert!(picture.svg().contains("h in V"));
     }
 }

@@ -24,6 +24,23 @@ use std::sync::Arc;
 /// # Errors
 ///
 /// [`EffectError`] where a target, a magnitude or the equations are missing.
+///
+/// ```
+/// use std::sync::Arc;
+/// use truetwin::effect::SensorBias;
+/// use truetwin::twin::{DigitalTwin, Drive, Given, Noise, augment};
+/// use truetwin::twins::VanDerPol;
+///
+/// let bias = SensorBias { target: "sensor".into(), magnitudes: Given::default() };
+/// let twin = augment(Arc::new(VanDerPol), vec![Arc::new(bias)])?;
+/// assert_eq!(twin.parameters().names(), ["nu", "sensor-bias@sensor.offset"]);
+///
+/// let drive = Drive::autonomous(0.05, 10)?;
+/// let plain = VanDerPol.simulate(&[1.0], &drive, Noise::OFF)?;
+/// let biased = twin.simulate(&[1.0, 0.5], &drive, Noise::OFF)?;
+/// assert_eq!(biased, plain + 0.5);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn augment(
     base: Arc<dyn DigitalTwin>,
     effects: Effects,
@@ -53,6 +70,16 @@ pub(crate) fn augment_short(
 }
 
 /// Magnitudes that effects' files give, by the names that [`augment`] gives their parameters.
+///
+/// ```
+/// use std::sync::Arc;
+/// use truetwin::effect::SensorBias;
+/// use truetwin::twin::{Effects, Given, given_magnitudes};
+///
+/// let bias = SensorBias { target: "sensor".into(), magnitudes: Given::new([("offset", 0.5)]) };
+/// let effects: Effects = vec![Arc::new(bias)];
+/// assert_eq!(given_magnitudes(&effects)["sensor-bias@sensor.offset"], 0.5);
+/// ```
 pub fn given_magnitudes(effects: &[Arc<dyn UnmodelledEffect>]) -> BTreeMap<String, f64> {
     let named = effects.iter().flat_map(|effect| {
         effect.magnitudes().into_iter().filter_map(move |m| {
