@@ -241,7 +241,7 @@ mod tests {
 
     #[test]
     fn the_example() -> Result<(), Box<dyn std::error::Error>> {
-        use crate::math::{DifferenceError, Stencil};
+        use crate::math::Stencil;
         use nalgebra::{DVector, dvector};
         use rayon::prelude::*;
 
