@@ -163,11 +163,11 @@ where
     Ok(stopped?)
 }
 
-/// Where a training begins: with what was kept of it, else anew. Weights that were best so far come last.
-fn begin<I, K, T, H>(
-    model: &mut Model<I, K, T, H>,
-    course: &Course<'_>,
-) -> (Position, Adam, Option<Model<I, K, T, H>>)
+/// Where a training begins, Adam, and the weights that were best so far.
+type Begun<M> = (Position, Adam, Option<M>);
+
+/// Begins with what was kept, else anew.
+fn begin<I, K, T, H>(model: &mut Model<I, K, T, H>, course: &Course<'_>) -> Begun<Model<I, K, T, H>>
 where
     I: ConstDim,
     K: ConstDim,

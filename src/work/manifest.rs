@@ -1,8 +1,7 @@
 //! What a folder of work is about: what another call must say to go on with it.
 
 use super::WorkError;
-use crate::files::sha256;
-use crate::files::sha256_of;
+use crate::files::{sha256, sha256_of};
 use crate::foreign::excerpt;
 use serde_json::{Map, Value};
 use std::path::Path;

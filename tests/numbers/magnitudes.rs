@@ -1,7 +1,7 @@
 //! The same system in other units: the same answers, up to the units.
 
 use crate::chain::{Chain, Units};
-use truetwin::baseline::{DualFilter, DualStart, PredictionError};
+use truetwin::baseline::{DualFilter, DualStart, PredictionErrorMethod};
 use truetwin::diagnose::{DiagnoseSettings, Diagnosis, diagnose};
 use truetwin::progress::Progress;
 use truetwin::twin::{Record, Signal};
@@ -106,9 +106,9 @@ fn baselines_do_not_depend_on_units() {
         let chain = Chain::pair(units);
         let record = chain.record(1.5, SAMPLES, 6);
         let start: Vec<f64> = (0..2).map(|i| chain.rate(i)).collect();
-        let converged = PredictionError::converged();
-        let few = PredictionError::default();
-        let few = PredictionError {
+        let converged = PredictionErrorMethod::converged();
+        let few = PredictionErrorMethod::default();
+        let few = PredictionErrorMethod {
             ridge: few.ridge * (units.outputs / units.parameters).powi(2),
             ..few
         };

@@ -8,6 +8,9 @@ use truetwin::two_stage::{EstimateOptions, PretrainOptions, pretrain};
 
 const SAMPLES: usize = 200;
 
+/// What becomes of sample k.
+type Change = fn(usize, f64) -> f64;
+
 #[test]
 fn odd_records_give_numbers_or_reasons() {
     let chain = Chain::pair(Units::PLAIN);
@@ -20,7 +23,7 @@ fn odd_records_give_numbers_or_reasons() {
     let silent = Progress::silent();
     let (estimator, _) = pretrain(&study, &options, &silent).unwrap();
     let plain = chain.record(1.0, SAMPLES, 1);
-    let odd: [(&str, fn(usize, f64) -> f64); 9] = [
+    let odd: [(&str, Change); 9] = [
         ("zero", |_, _| 0.0),
         ("constant", |_, _| 7.0),
         ("tiny", |_, y| y * 1e-300),
