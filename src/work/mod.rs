@@ -11,6 +11,8 @@
 
 mod crew;
 mod folder;
+#[doc(hidden)]
+pub mod fuzzing;
 mod lock;
 mod manifest;
 mod pieces;

@@ -21,7 +21,7 @@ use truetwin::study::{RecordPlan, Study, StudyFile};
 use truetwin::twin::{augment, read_drive, read_record};
 use truetwin::twins::VanDerPol;
 use truetwin::two_stage::Estimator;
-use truetwin::work::WorkFolder;
+use truetwin::work::fuzzing as work;
 
 /// What reads bytes: `Ok`, or the message that a user would see.
 pub type Reader = fn(&[u8]) -> Result<(), String>;
@@ -174,7 +174,7 @@ pub fn manifest(data: &[u8]) -> Result<(), String> {
         }
     }
     for verb in ["reproduce", "withheld"] {
-        hold_message("manifest", WorkFolder::find(&folder, verb));
+        hold_message("manifest", work::manifest(&folder, verb));
     }
     let from = [folder.clone()];
     let out = place().join("merged");
@@ -208,9 +208,7 @@ pub fn piece(data: &[u8]) -> Result<(), String> {
         fs::write(folder.join("manifest.json"), manifest).map_err(text)?;
     }
     fs::write(folder.join("runs/0000.json"), data).map_err(text)?;
-    let (folder, _) = WorkFolder::find(&folder, "reproduce").map_err(text)?;
-    let kept = folder.kept::<Run>("runs", 0, |_| Ok(()));
-    kept.map(|_| ()).map_err(text)
+    work::piece::<Run>(&folder, "reproduce", "runs").map_err(text)
 }
 
 /// A bank in one file: an archive, an array that is put into one, or a table.
