@@ -23,9 +23,9 @@
 //!
 //! let simulator = FeatureSimulator::new(Arc::new(VanDerPol), &Ar { order: 5 })?;
 //! let drive = Drive::autonomous(0.05, 200)?;
-//! let outputs = VanDerPol.simulate(&[3.0], &drive, Noise::new(7, "measured", 0))?;
+//! let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(7, "measured", 0))?;
 //! let observed = simulator.observe(&Record::new(drive.clone(), outputs)?)?;
-//! let few = RefineSettings { starts: 2, ..RefineSettings::default() };
+//! let few = RefineSettings { starts: 1, ..RefineSettings::default() };
 //! let refined: Refined = Refinement {
 //!     simulator: &simulator,
 //!     drive: &drive,
@@ -35,9 +35,9 @@
 //!     noise: Noise::new(1, "refine", 0),
 //!     progress: &Progress::silent(),
 //! }
-//! .run(&[2.0])?;
+//! .run(&[1.2])?;
 //! let information: &Information = &refined.information;
-//! assert!((refined.theta[0] - 3.0).abs() < 0.5);
+//! assert!((refined.theta[0] - 1.5).abs() < 0.5);
 //! let least_known: &Direction = &information.directions[0];
 //! assert!(!least_known.weak);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
