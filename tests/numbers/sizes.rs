@@ -3,7 +3,9 @@
 use crate::chain::{Chain, Units};
 use std::time::Instant;
 use truetwin::diagnose::{DiagnoseSettings, diagnose};
+use truetwin::feature::Arx;
 use truetwin::progress::Progress;
+use truetwin::study::Study;
 use truetwin::two_stage::{EstimateOptions, PretrainOptions, pretrain};
 
 const MANY: Chain = Chain {
@@ -13,8 +15,7 @@ const MANY: Chain = Chain {
 };
 
 /// From bank to estimate.
-fn estimated(chain: Chain, samples: usize, bank: usize) {
-    let study = chain.study(samples);
+fn estimated(chain: Chain, study: Study, samples: usize, bank: usize) {
     let options = PretrainOptions {
         bank_size: Some(bank),
         epochs: Some(20),
@@ -56,12 +57,18 @@ fn tested(chain: Chain, samples: usize) {
 
 #[test]
 fn twenty_parameters_and_ten_outputs() {
-    estimated(MANY, 400, 1000);
+    // The score of twenty parameters takes forty passes of a filter of twenty states: seconds a simulation.
+    let lags = Arx {
+        outputs: 3,
+        inputs: 3,
+    };
+    estimated(MANY, MANY.study(400).with_features(lags), 400, 2000);
 }
 
 #[test]
 fn fifty_thousand_samples() {
-    estimated(Chain::pair(Units::PLAIN), 50_000, 150);
+    let chain = Chain::pair(Units::PLAIN);
+    estimated(chain, chain.study(50_000), 50_000, 150);
 }
 
 /// `cargo test --release --test numbers -- --ignored --nocapture`
