@@ -102,10 +102,13 @@ fn handed_on(text: &str) -> Vec<String> {
     found
 }
 
-/// `pub mod x;` of a module.
+/// `pub mod x;` of a module, unless its documentation is hidden.
 fn public_modules(text: &str) -> Vec<&str> {
-    (text.lines())
-        .filter_map(|line| line.strip_prefix("pub mod ")?.strip_suffix(';'))
+    let lines: Vec<&str> = text.lines().collect();
+    let before = std::iter::once("").chain(lines.iter().copied());
+    (lines.iter().zip(before))
+        .filter(|(_, before)| *before != "#[doc(hidden)]")
+        .filter_map(|(line, _)| line.strip_prefix("pub mod ")?.strip_suffix(';'))
         .collect()
 }
 

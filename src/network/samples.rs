@@ -15,7 +15,7 @@ pub type Part<'a> = (Cow<'a, Array2<f64>>, Cow<'a, Array2<f64>>);
 /// use ndarray::Array2;
 /// use std::borrow::Cow;
 /// use std::error::Error;
-/// use truetwin::network::{Compact, Part, Samples, Training, architecture};
+/// use truetwin::network::{Checkpoints, Compact, Part, Samples, Training, architecture};
 /// use truetwin::progress::Progress;
 ///
 /// /// Four parts of 50 rows, made when asked for: y = x₁ − x₂.
@@ -37,7 +37,7 @@ pub type Part<'a> = (Cow<'a, Array2<f64>>, Cow<'a, Array2<f64>>);
 ///     }
 /// }
 /// let quick = Training { epochs: 2, ..Training::default() };
-/// let (network, _) = architecture::<Compact>().train_on(&Made, &quick, 1, &Progress::silent())?;
+/// let (network, _) = architecture::<Compact>().train_on(&Made, &quick, 1, &Checkpoints::none(), &Progress::silent())?;
 /// assert_eq!(network.inputs(), 2);
 /// # Ok::<(), truetwin::network::NetworkError>(())
 /// ```

@@ -227,7 +227,7 @@ pub(super) fn settings(
 }
 
 /// The prior through the preset's features, which the network must take.
-fn prior(study: &Study, options: &PretrainOptions) -> Result<Prior, PretrainError> {
+pub(super) fn prior(study: &Study, options: &PretrainOptions) -> Result<Prior, PretrainError> {
     let preset = study.preset(options.preset);
     let prior = Prior::new(study, preset.features.as_ref())?;
     let most = preset.architecture.max_features();

@@ -1,6 +1,6 @@
 //! A pretraining that can be interrupted.
 
-use super::pretrain::{fits_into_memory, pretrain_from, settings};
+use super::pretrain::{fits_into_memory, pretrain_from, prior, settings};
 use super::{Estimator, PretrainError, PretrainOptions};
 use crate::bank::{Bank, Draws};
 use crate::network::{Checkpoints, History};
@@ -50,6 +50,28 @@ pub struct Pretraining<'a> {
 }
 
 /// A bank to train on that is there.
+///
+/// ```
+/// use truetwin::experiment::reference_studies;
+/// use truetwin::progress::Progress;
+/// use truetwin::shards::{BankPlan, ShardedBank};
+/// use truetwin::study::PresetName;
+/// use truetwin::two_stage::{GivenBank, PretrainOptions, Pretraining};
+/// use truetwin::work::Share;
+///
+/// let study = &reference_studies()?[0];
+/// let (place, silent) = (tempfile::tempdir()?, Progress::silent());
+/// let folder = place.path().join("bank");
+/// let plan = BankPlan { study, preset: PresetName::Default, size: 100, seed: 1 };
+/// plan.fill(&folder, Share::WHOLE, &silent)?;
+/// let bank = ShardedBank::open(&folder)?;
+/// let given = GivenBank { bank: &bank, checksum: bank.checksum() };
+/// let options = PretrainOptions { epochs: Some(1), ..PretrainOptions::default() };
+/// let pretraining = Pretraining::new(study, options).on(given);
+/// let (estimator, _) = pretraining.write(&place.path().join("first.est"), &silent)?;
+/// assert_eq!(estimator.settings().bank_size, 100);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct GivenBank<'a> {
     /// Its rows.
     pub bank: &'a dyn Bank,
@@ -123,6 +145,8 @@ impl<'a> Pretraining<'a> {
     fn simulated(&self, path: &Path, progress: &Progress) -> Result<Draws, PretrainError> {
         let size = settings(self.study, &self.options)?.bank_size;
         fits_into_memory(size)?;
+        // What the network cannot take is said before anything is simulated.
+        prior(self.study, &self.options)?;
         let plan = BankPlan {
             study: self.study,
             preset: self.options.preset,
