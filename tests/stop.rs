@@ -86,8 +86,8 @@ fn a_training_that_is_stopped_says_how_to_go_on() {
     let place = tempfile::tempdir().unwrap();
     let at = place.path();
     let call = "pretrain --twin van-der-pol --bank-size 20000 --epochs 5000 --out v.est";
-    let training = at.join("v.est.part");
-    let output = interrupted(at, call, "-INT", || training.exists());
+    let shards = at.join("v.est.part/bank/shards");
+    let output = interrupted(at, call, "-INT", || entries(&shards) > 0);
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(130), "{said}");
     assert!(said.contains("goes on: ") && said.contains(call), "{said}");
@@ -103,9 +103,10 @@ fn a_training_that_is_stopped_says_how_to_go_on() {
     );
 }
 
-/// Moments in milliseconds up to `longest`, drawn once and for all.
+/// Moments in milliseconds up to `longest`, drawn once and for all; others with `TRUETWIN_MOMENTS=1`, 2, …
 fn moments(longest: u64) -> impl Iterator<Item = u64> {
-    let mut state = 7u64;
+    let others = std::env::var("TRUETWIN_MOMENTS").ok();
+    let mut state: u64 = others.map_or(7, |seed| seed.parse().unwrap());
     std::iter::repeat_with(move || {
         state =
             (state.wrapping_mul(6_364_136_223_846_793_005)).wrapping_add(1_442_695_040_888_963_407);
@@ -182,6 +183,21 @@ fn a_pretraining_survives_kills_at_any_moment() {
     assert!(killed == whole, "other bytes after {kills} kills");
     assert_eq!(entries(at), 2);
     println!("{kills} kills survived");
+}
+
+#[test]
+fn a_pretraining_that_cannot_begin_leaves_nothing() {
+    let place = tempfile::tempdir().unwrap();
+    let at = place.path();
+    let call = "pretrain --twin van-der-pol --bank-size 5 --out v.est";
+    let output = start(at, call).wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    let study = "twin = 'tanks'\n[features]\nkind = 'arx'\noutputs = 300\ninputs = 300\n";
+    fs::write(at.join("high.toml"), study).unwrap();
+    let call = "pretrain --study high.toml --out v.est";
+    let output = start(at, call).wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(entries(at), 1, "the study alone");
 }
 
 #[test]

@@ -246,6 +246,12 @@ impl ShardedBank {
         Ok(Self { shards, seed })
     }
 
+    /// Whether there is any shard in a folder.
+    pub(crate) fn is_begun(path: &Path) -> bool {
+        let shards = std::fs::read_dir(path.join(SHARDS));
+        shards.is_ok_and(|mut shards| shards.next().is_some())
+    }
+
     /// Simulations, M.
     pub fn size(&self) -> usize {
         self.shards.size

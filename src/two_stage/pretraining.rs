@@ -3,7 +3,7 @@
 use super::pretrain::{fits_into_memory, pretrain_from, prior, settings};
 use super::{Estimator, PretrainError, PretrainOptions};
 use crate::bank::{Bank, Draws};
-use crate::network::{Checkpoints, History};
+use crate::network::{Checkpoints, History, NetworkError};
 use crate::progress::Progress;
 use crate::shards::{BankPlan, ShardedBank};
 use crate::study::Study;
@@ -123,21 +123,36 @@ impl<'a> Pretraining<'a> {
         }
         let folder = WorkFolder::open::<PretrainError>(&place, &manifest, &[], |_| Ok(()))?;
         let lock = folder.lock()?;
+        let made = self.made(&folder, progress).and_then(|made| {
+            made.0.save_again(path)?;
+            Ok(made)
+        });
+        drop(lock);
+        match &made {
+            Ok(_) => folder.remove()?,
+            // It would only stand in the way of the next call. What is wrong is said, not that it cannot be removed either.
+            Err(error) if ends_for_good(error) || is_bare(&folder) => drop(folder.remove()),
+            Err(_) => {}
+        }
+        made
+    }
+
+    /// The estimator, by what is in the folder and what is still to be done.
+    fn made(
+        &self,
+        folder: &WorkFolder,
+        progress: &Progress,
+    ) -> Result<(Estimator, History), PretrainError> {
         let checkpoints = Checkpoints::new(folder.file(TRAINING), self.every);
-        let made;
+        let simulated;
         let bank = match &self.bank {
             Some(given) => given.bank,
             None => {
-                made = self.simulated(&folder.file(BANK), progress)?;
-                &made
+                simulated = self.simulated(&folder.file(BANK), progress)?;
+                &simulated
             }
         };
-        let (estimator, history) =
-            pretrain_from(self.study, bank, &self.options, &checkpoints, progress)?;
-        estimator.save_again(path)?;
-        drop(lock);
-        folder.remove()?;
-        Ok((estimator, history))
+        pretrain_from(self.study, bank, &self.options, &checkpoints, progress)
     }
 
     /// The bank in the folder, made as far as it is missing, as one part: rows in the order in which they would be without a
@@ -177,6 +192,25 @@ impl<'a> Pretraining<'a> {
             .with("bank", bank)
             .with("seed", self.options.seed))
     }
+}
+
+/// Whether the same call would end with the same error again.
+fn ends_for_good(error: &PretrainError) -> bool {
+    matches!(
+        error,
+        PretrainError::Settings(_)
+            | PretrainError::Plan(_)
+            | PretrainError::Feature(_)
+            | PretrainError::Width { .. }
+            | PretrainError::TooManyFeatures { .. }
+            | PretrainError::Standardise(_)
+            | PretrainError::Network(NetworkError::Diverged { .. })
+    )
+}
+
+/// Whether nothing is kept in the folder yet.
+fn is_bare(folder: &WorkFolder) -> bool {
+    !folder.file(TRAINING).exists() && !ShardedBank::is_begun(&folder.file(BANK))
 }
 
 /// Where the work on the estimator at `path` is kept.

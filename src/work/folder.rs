@@ -93,7 +93,7 @@ pub enum WorkError {
     },
     /// The folder is of another call.
     #[error(
-        "{} holds the work of another call: {difference}; repeat that call to go on with it, or choose another --out",
+        "{} holds the work of another call: {difference}; repeat that call to go on with it, choose another --out, or remove it",
         path.display()
     )]
     Other {
