@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// How names of files and folders begin that are not in their place yet.
-const PREFIX: &str = ".truetwin-";
+pub(crate) const PREFIX: &str = ".truetwin-";
 
 /// Writes a new file: the bytes go to a temporary file beside it, which is then put in its place.
 ///

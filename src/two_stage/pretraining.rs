@@ -118,6 +118,7 @@ impl<'a> Pretraining<'a> {
     ) -> Result<(Estimator, History), PretrainError> {
         let manifest = self.manifest()?;
         let place = beside(path);
+        WorkFolder::sweep_removed(&place)?;
         if path.symlink_metadata().is_ok() && WorkFolder::resume(&place, &manifest).is_err() {
             return Err(PretrainError::Taken(path.into()));
         }

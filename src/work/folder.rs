@@ -1,7 +1,7 @@
 //! A folder that keeps finished pieces of long work.
 
 use super::Manifest;
-use crate::files::{NewFolder, folder, replace, sweep, with_remedy, write_new};
+use crate::files::{NewFolder, PREFIX, folder, replace, sweep, with_remedy, write_new};
 use crate::foreign::{MESSAGE, check_folder, one_line, read_kept_text};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -235,11 +235,30 @@ impl WorkFolder {
 
     /// Removes the folder with all that is in it: the work is done, and its result is elsewhere.
     ///
+    /// It goes from its place at once, so that nobody ever meets a half of it.
+    ///
     /// # Errors
     ///
     /// [`WorkError::Io`].
     pub(crate) fn remove(self) -> Result<(), WorkError> {
-        std::fs::remove_dir_all(&self.path).map_err(|error| WorkError::io(&self.path, error))
+        let gone = removed(&self.path);
+        std::fs::rename(&self.path, &gone).map_err(|error| WorkError::io(&self.path, error))?;
+        Self::sweep_removed(&self.path)
+    }
+
+    /// Ends the removal of a folder that was at `path`, where a process died in the middle of it.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError::Io`].
+    pub(crate) fn sweep_removed(path: &Path) -> Result<(), WorkError> {
+        let gone = removed(path);
+        match std::fs::remove_dir_all(&gone) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                Err(WorkError::io(&gone, error))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Puts the checksums of all pieces into the manifest: the work is finished.
@@ -330,6 +349,12 @@ impl WorkFolder {
     }
 }
 
+/// What the folder at a path is called while it is removed.
+fn removed(path: &Path) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!("{PREFIX}{name}"))
+}
+
 /// Whether another process was faster to put a folder in its place.
 fn taken(error: &io::Error) -> bool {
     matches!(
@@ -373,6 +398,19 @@ mod tests {
         fs::write(path.join("runs/0001.json"), "[1, ").unwrap();
         let error = again.kept("runs", 1, any).unwrap_err().to_string();
         assert!(error.contains("remove it"), "{error}");
+    }
+
+    #[test]
+    fn a_folder_is_removed_whole_and_a_removal_is_ended() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("work");
+        let left = removed(&path);
+        fs::create_dir(&left).unwrap();
+        fs::write(left.join("half.txt"), "").unwrap();
+        WorkFolder::sweep_removed(&path).unwrap();
+        open(&path, 2).unwrap().remove().unwrap();
+        WorkFolder::sweep_removed(&path).unwrap();
+        assert_eq!(fs::read_dir(place.path()).unwrap().count(), 0);
     }
 
     #[test]
