@@ -62,13 +62,14 @@ impl Verb for Pretrain {
             epochs: self.epochs,
             seed: context.seed,
         };
-        let pretraining = Pretraining::new(&study, settings).every(self.checkpoint);
+        let pretraining = Pretraining::new(&study, settings).with_checkpoints(self.checkpoint);
         let (estimator, history) = match &self.bank {
             None => pretraining.write(&self.out, context.progress)?,
             Some(path) => {
                 let (bank, checksum) = given(&study, path, &settings)?;
                 let bank = bank.as_ref();
-                (pretraining.on(GivenBank { bank, checksum })).write(&self.out, context.progress)?
+                (pretraining.with_bank(GivenBank { bank, checksum }))
+                    .write(&self.out, context.progress)?
             }
         };
         let seconds = clock.elapsed().as_secs_f64();

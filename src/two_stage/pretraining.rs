@@ -67,7 +67,7 @@ pub struct Pretraining<'a> {
 /// let bank = ShardedBank::open(&folder)?;
 /// let given = GivenBank { bank: &bank, checksum: bank.checksum() };
 /// let options = PretrainOptions { epochs: Some(1), ..PretrainOptions::default() };
-/// let pretraining = Pretraining::new(study, options).on(given);
+/// let pretraining = Pretraining::new(study, options).with_bank(given);
 /// let (estimator, _) = pretraining.write(&place.path().join("first.est"), &silent)?;
 /// assert_eq!(estimator.settings().bank_size, 100);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -91,7 +91,8 @@ impl<'a> Pretraining<'a> {
     }
 
     /// On a bank that is there; [`PretrainOptions::bank_size`] says nothing then.
-    pub fn on(self, bank: GivenBank<'a>) -> Self {
+    #[must_use]
+    pub fn with_bank(self, bank: GivenBank<'a>) -> Self {
         Self {
             bank: Some(bank),
             ..self
@@ -99,7 +100,8 @@ impl<'a> Pretraining<'a> {
     }
 
     /// Keeps the state of the training so often, instead of each [`CHECKPOINT`].
-    pub fn every(self, every: Duration) -> Self {
+    #[must_use]
+    pub fn with_checkpoints(self, every: Duration) -> Self {
         Self { every, ..self }
     }
 
