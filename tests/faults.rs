@@ -73,58 +73,44 @@ fn prepare(at: &Path) {
     fs::create_dir(at.join("disk")).unwrap();
 }
 
-#[test]
-fn a_full_disk_is_said_and_leaves_nothing_half_written() {
+/// Each verb refuses to write onto a disk that `mount` makes, in one line that says this, and leaves nothing there but `left`.
+fn each_writer_says(mount: &str, words: &[&str], left: &str) {
     let place = tempfile::tempdir().unwrap();
     prepare(place.path());
-    for words in WRITERS {
+    for call in WRITERS {
         let script = format!(
-            "mount -t tmpfs -o size=4k none disk; head -c 4096 /dev/zero > disk/all
-             $TRUETWIN {words} > out.txt 2> err.txt && code=0 || code=$?
+            "{mount}
+             $TRUETWIN {call} > out.txt 2> err.txt && code=0 || code=$?
              echo $code; ls -A disk"
         );
         let Some(output) = in_name_space(place.path(), &script) else {
             return;
         };
         let told = String::from_utf8_lossy(&output.stdout);
-        assert!(told.starts_with("2\nall\n"), "{words}: {output:?}");
-        assert!(!told.contains(".truetwin-"), "{words}: {told}");
+        assert!(
+            told.starts_with(&format!("2\n{left}")),
+            "{call}: {output:?}"
+        );
+        assert!(!told.contains(".truetwin-"), "{call}: {told}");
         let error = fs::read(place.path().join("err.txt")).unwrap();
-        let last = error
-            .trim_ascii_end()
-            .rsplit(|b| *b == b'\n')
-            .next()
-            .unwrap();
-        said(last, &["error: disk/new", "make room"]);
+        let mut lines = error.trim_ascii_end().rsplit(|b| *b == b'\n');
+        said(
+            lines.next().unwrap(),
+            &[&["error: disk/new"], words].concat(),
+        );
     }
 }
 
 #[test]
+fn a_full_disk_is_said_and_leaves_nothing_half_written() {
+    let full = "mount -t tmpfs -o size=4k none disk; head -c 4096 /dev/zero > disk/all";
+    each_writer_says(full, &["make room"], "all\n");
+}
+
+#[test]
 fn a_folder_that_cannot_be_written_is_said() {
-    let place = tempfile::tempdir().unwrap();
-    prepare(place.path());
-    for words in WRITERS {
-        let script = format!(
-            "mount -t tmpfs -o ro none disk
-             $TRUETWIN {words} > out.txt 2> err.txt && code=0 || code=$?
-             echo $code"
-        );
-        let Some(output) = in_name_space(place.path(), &script) else {
-            return;
-        };
-        let told = String::from_utf8_lossy(&output.stdout);
-        assert_eq!(told.trim(), "2", "{words}: {output:?}");
-        let error = fs::read(place.path().join("err.txt")).unwrap();
-        let last = error
-            .trim_ascii_end()
-            .rsplit(|b| *b == b'\n')
-            .next()
-            .unwrap();
-        said(
-            last,
-            &["error: disk/new", "read-only", "choose another place"],
-        );
-    }
+    let read_only = "mount -t tmpfs -o ro none disk";
+    each_writer_says(read_only, &["ead-only", "choose another place"], "");
 }
 
 /// The disk fills up in the middle; with more room the same call ends the work, with the bytes of one that was never disturbed.

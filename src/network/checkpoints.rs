@@ -3,6 +3,7 @@
 use super::adam::{Adam, Moments};
 use super::{History, NamedTensor, NetworkError};
 use crate::files::{replace, sha256, with_remedy};
+use crate::foreign::read_kept;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -12,6 +13,8 @@ use std::time::{Duration, Instant};
 
 /// Key of what is not a tensor, in the container's metadata.
 const KEY: &str = "training";
+/// Longest file: four times that of an estimator, for weights, moments and the best weights.
+const MOST: u64 = 4 << 30;
 /// Length of the checksum before the container.
 const DIGITS: usize = 64;
 /// Prefixes of the tensors' names.
@@ -87,7 +90,7 @@ impl Checkpoints {
 
     /// What was kept, if it can be used.
     pub(super) fn load(&self, weight_decay: f64) -> Option<State> {
-        let bytes = std::fs::read(&self.0.as_ref()?.path).ok()?;
+        let bytes = read_kept(&self.0.as_ref()?.path, MOST).ok()?;
         State::parse(&bytes, weight_decay)
     }
 

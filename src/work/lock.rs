@@ -1,6 +1,7 @@
 //! One process at a time.
 
 use super::{WorkError, WorkFolder};
+use crate::foreign::check_file;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io;
 
@@ -25,6 +26,9 @@ impl WorkFolder {
     /// [`WorkError::Busy`] where another process is at work, [`WorkError::Io`].
     pub(crate) fn lock(&self) -> Result<Lock, WorkError> {
         let path = self.file(FILE);
+        if path.symlink_metadata().is_ok() {
+            check_file(&path).map_err(|error| WorkError::io(&path, error))?;
+        }
         let mut options = OpenOptions::new();
         let file = (options.create(true).append(true).open(&path))
             .map_err(|error| WorkError::io(&path, error))?;
@@ -57,5 +61,18 @@ mod tests {
         assert!(matches!(refused, WorkError::Busy { .. }), "{refused}");
         drop(first);
         open().lock().unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_lock_that_leads_elsewhere_is_refused() {
+        let place = tempfile::tempdir().unwrap();
+        let manifest = Manifest::new("pretrain", 1);
+        let path = place.path().join("work");
+        let folder = WorkFolder::open::<WorkError>(&path, &manifest, &[], |_| Ok(())).unwrap();
+        let elsewhere = place.path().join("elsewhere");
+        std::os::unix::fs::symlink(&elsewhere, folder.file("lock")).unwrap();
+        assert!(folder.lock().is_err());
+        assert!(!elsewhere.exists());
     }
 }
