@@ -9,22 +9,16 @@ use truetwin::two_stage::{Estimate, EstimateOptions, Estimator, PretrainOptions,
 
 const SAMPLES: usize = 240;
 
-/// Parameters around 1e-9 and 1e9, outputs around 1e-6 and 1e6, and everything at once, steps of nanoseconds and of years included.
-const UNITS: [Units; 6] = [
+/// Parameters around 1e-9 and 1e9, outputs around 1e-6 and 1e6; and everything at once, steps of nanoseconds and of months included.
+const UNITS: [Units; 4] = [
     Units {
         parameters: 1e-9,
+        outputs: 1e6,
         ..Units::PLAIN
     },
     Units {
         parameters: 1e9,
-        ..Units::PLAIN
-    },
-    Units {
         outputs: 1e-6,
-        ..Units::PLAIN
-    },
-    Units {
-        outputs: 1e6,
         ..Units::PLAIN
     },
     Units {
