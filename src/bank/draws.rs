@@ -3,7 +3,7 @@
 use super::{BankError, DrawError, FeatureSimulator};
 use crate::progress::Stage;
 use crate::twin::{Drive, Noise};
-use ndarray::{Array2, Axis, concatenate, s};
+use ndarray::{Array2, s};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -71,24 +71,39 @@ pub struct Draws {
 }
 
 impl Draws {
-    /// The rows of several parts, one after another, `most` of them at most.
-    pub(crate) fn stacked(parts: &[Cow<'_, Self>], most: usize) -> Self {
-        let stack = |of: fn(&Self) -> &Array2<f64>| {
-            let mut left = most;
-            let views: Vec<_> = (parts.iter())
-                .map(|part| {
-                    let rows = of(part).nrows().min(left);
-                    left -= rows;
-                    of(part).slice(s![..rows, ..])
-                })
-                .collect();
-            concatenate(Axis(0), &views).unwrap_or_default()
-        };
-        Self {
-            theta: stack(|draws| &draws.theta),
-            features: stack(|draws| &draws.features),
-            redrawn: parts.iter().map(|part| part.redrawn).sum(),
+    /// The rows of several parts, one after another, `rows` of them at most; parts beyond these are not asked for. `odd` is the
+    /// error of a part whose rows have another width than those of the first.
+    pub(crate) fn stacked<'a, E>(
+        rows: usize,
+        parts: impl IntoIterator<Item = Result<Cow<'a, Self>, E>>,
+        odd: impl Fn(usize) -> E,
+    ) -> Result<Self, E> {
+        let mut all: Option<[Array2<f64>; 2]> = None;
+        let (mut filled, mut redrawn) = ([0; 2], 0);
+        for (index, part) in parts.into_iter().enumerate() {
+            let part = part?;
+            let sources = [&part.theta, &part.features];
+            let all = all.get_or_insert_with(|| sources.map(|m| Array2::zeros((rows, m.ncols()))));
+            for ((all, source), filled) in all.iter_mut().zip(sources).zip(&mut filled) {
+                if source.ncols() != all.ncols() {
+                    return Err(odd(index));
+                }
+                let to = rows.min(*filled + source.nrows());
+                let taken = source.slice(s![..to - *filled, ..]);
+                all.slice_mut(s![*filled..to, ..]).assign(&taken);
+                *filled = to;
+            }
+            redrawn += part.redrawn;
+            if filled[0] == rows {
+                break;
+            }
         }
+        let [theta, features] = all.unwrap_or_default();
+        Ok(Self {
+            theta: theta.slice_move(s![..filled[0], ..]),
+            features: features.slice_move(s![..filled[1], ..]),
+            redrawn,
+        })
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::adam::{Adam, Moments};
 use super::{History, NamedTensor, NetworkError};
+use super::{bytes_of, values_of};
 use crate::files::{replace, sha256, with_remedy};
 use crate::foreign::read_kept;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
@@ -61,8 +62,6 @@ pub(super) struct Position {
     pub history: History,
     /// Error and epoch of the weights that were best.
     pub best: Option<(f64, usize)>,
-    /// Steps of Adam.
-    adam: i32,
 }
 
 /// All that the rest of a training depends on.
@@ -120,10 +119,6 @@ impl Checkpoints {
 
 impl State {
     fn bytes(&self) -> Result<Vec<u8>, String> {
-        let position = Position {
-            adam: self.adam.steps,
-            ..self.position.clone()
-        };
         let mut tensors = Vec::new();
         for (prefix, list) in [(WEIGHTS, &self.weights), (BEST, &self.best)] {
             for tensor in list {
@@ -143,7 +138,7 @@ impl State {
             })
             .collect::<Result<Vec<_>, safetensors::SafeTensorError>>()
             .map_err(|error| format!("{error:?}"))?;
-        let text = serde_json::to_string(&position).map_err(|error| error.to_string())?;
+        let text = serde_json::to_string(&self.position).map_err(|error| error.to_string())?;
         let metadata = Some(HashMap::from([(KEY.to_owned(), text)]));
         let container =
             safetensors::serialize(views, &metadata).map_err(|error| format!("{error:?}"))?;
@@ -177,7 +172,8 @@ impl State {
             Some(values_of(view.data()))
         };
         let mut adam = Adam::new(weight_decay);
-        adam.steps = position.adam;
+        // A step a batch.
+        adam.steps = i32::try_from(position.step).ok()?;
         while let (Some(first), Some(second)) = (
             moment(FIRST, adam.moments.len()),
             moment(SECOND, adam.moments.len()),
@@ -191,17 +187,4 @@ impl State {
             adam,
         })
     }
-}
-
-fn bytes_of(values: &[f32]) -> Vec<u8> {
-    values
-        .iter()
-        .flat_map(|value| value.to_le_bytes())
-        .collect()
-}
-
-fn values_of(bytes: &[u8]) -> Vec<f32> {
-    (bytes.chunks_exact(4))
-        .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
-        .collect()
 }

@@ -64,6 +64,7 @@ pub use multi_head::architecture;
 pub use samples::{Part, Samples};
 pub use settings::{History, Schedule, Training};
 pub use tensors::NamedTensor;
+pub(crate) use tensors::{bytes_of, values_of};
 
 use crate::progress::Progress;
 use dfdx::prelude::{

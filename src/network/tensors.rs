@@ -32,6 +32,18 @@ pub struct NamedTensor {
     pub values: Vec<f32>,
 }
 
+/// Numbers as files hold them: 32 bits each, the lowest byte first.
+pub(crate) fn bytes_of(values: &[f32]) -> Vec<u8> {
+    values.iter().flat_map(|v| v.to_le_bytes()).collect()
+}
+
+/// The numbers of [`bytes_of`].
+pub(crate) fn values_of(bytes: &[u8]) -> Vec<f32> {
+    (bytes.chunks_exact(4))
+        .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+        .collect()
+}
+
 /// What a visitor of tensors returns: it builds nothing.
 type Visited<S> = Result<Option<Tensor<S, f32, Cpu>>, NetworkError>;
 

@@ -7,7 +7,6 @@ use crate::bank::{Bank, Draws};
 use crate::files::{sha256, sweep, write_new};
 use crate::foreign::{MESSAGE, MOST_NUMBERS, one_line, read_kept};
 use crate::work::{Manifest, WorkError, WorkFolder};
-use ndarray::{Array2, s};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -25,7 +24,8 @@ const AGAIN: &str = "run the same `truetwin bank` call again, and it is made aga
 pub(super) struct Shards {
     folder: WorkFolder,
     manifest: Manifest,
-    size: usize,
+    /// Simulations of the whole bank.
+    pub size: usize,
     rows: usize,
     /// Names of the parameters.
     pub names: Vec<String>,
@@ -148,6 +148,11 @@ impl Shards {
             }
         });
         checked.map_err(|reason| damaged(self.place(number), &reason).into())
+    }
+
+    /// Of a shard whose rows are wider or narrower than those of the first.
+    pub fn odd(&self, number: usize) -> BankFileError {
+        damaged(self.place(number), "another number of features")
     }
 
     /// Whether a shard is there and is what it was.
@@ -273,30 +278,8 @@ impl ShardedBank {
     ///
     /// [`BankFileError`]: a shard that cannot be read, or is not what it was.
     pub fn read(&self) -> Result<Draws, BankFileError> {
-        let mut all: Option<Draws> = None;
-        let mut from = 0;
-        for index in 0..self.shards.of {
-            let part = self.part(index)?;
-            let size = |matrix: &Array2<f64>| Array2::zeros((self.rows(), matrix.ncols()));
-            let all = all.get_or_insert_with(|| Draws {
-                theta: size(&part.theta),
-                features: size(&part.features),
-                redrawn: 0,
-            });
-            let to = from + part.theta.nrows();
-            for (all, part) in [
-                (&mut all.theta, &part.theta),
-                (&mut all.features, &part.features),
-            ] {
-                if part.ncols() != all.ncols() {
-                    let place = self.shards.place(index);
-                    return Err(damaged(place, "another number of features"));
-                }
-                all.slice_mut(s![from..to, ..]).assign(part);
-            }
-            from = to;
-        }
-        all.ok_or_else(|| damaged(self.path().into(), "it has no rows"))
+        let parts = (0..self.shards.of).map(|index| self.part(index));
+        Draws::stacked(self.size(), parts, |index| self.shards.odd(index))
     }
 
     /// What tells this bank from any other.

@@ -58,12 +58,14 @@ pub fn merge_into_file(
     };
     let holders = holders(&all, first.of)?;
     let stage = progress.stage("merge", holders.len());
-    let mut parts = Vec::with_capacity(holders.len());
-    for (number, holder) in holders.into_iter().enumerate() {
-        parts.push(Cow::Owned(holder.draws(number)?));
+    let parts = holders.iter().enumerate().map(|(number, holder)| {
+        let draws = holder.draws(number)?;
         stage.tick().map_err(BankError::from)?;
-    }
-    let draws = Draws::stacked(&parts, usize::MAX);
+        Ok::<_, ShardsError>(Cow::Owned(draws))
+    });
+    let draws = Draws::stacked(first.size, parts, |number| {
+        holders[number].odd(number).into()
+    })?;
     let names: Vec<&str> = first.names.iter().map(String::as_str).collect();
     file::write(out, &draws, &names)?;
     Ok(draws.theta.nrows())

@@ -91,7 +91,7 @@ impl BankPlan<'_> {
         let prior = Prior::new(self.study, self.study.preset(self.preset).features.as_ref())?;
         let manifest = self.manifest()?;
         let folder = WorkFolder::open::<ShardsError>(path, &manifest, &[SHARDS], |_| Ok(()))?;
-        let shards = Shards::list(folder, manifest)?;
+        let shards = Shards::list(folder, manifest.clone())?;
         let mine = || (0..shards.of).filter(|number| share.takes(*number));
         let stage = progress.stage("kept shards", mine().count());
         let mut missing = Vec::new();
@@ -110,7 +110,7 @@ impl BankPlan<'_> {
                 npz(&draws).map_err(|error| BankFileError::io(path, io::Error::other(error)))?;
             shards.add(number, &bytes)?;
         }
-        self.finish(path)
+        finish(path, manifest)
     }
 
     /// How far the folder has come; one that is whole gets the checksums of its shards.
@@ -119,14 +119,7 @@ impl BankPlan<'_> {
     ///
     /// [`ShardsError`]: no folder of this call.
     pub fn finish(&self, path: &Path) -> Result<Filled, ShardsError> {
-        let manifest = self.manifest()?;
-        let shards = Shards::list(WorkFolder::resume(path, &manifest)?, manifest)?;
-        shards.finish()?;
-        Ok(Filled {
-            there: shards.there.len(),
-            of: shards.of,
-            rows: shards.there.keys().map(|n| shards.rows(*n).count()).sum(),
-        })
+        finish(path, self.manifest()?)
     }
 
     /// Everything that the rows depend on.
@@ -154,4 +147,15 @@ impl BankPlan<'_> {
             }),
         }
     }
+}
+
+/// How far a folder of this manifest has come, which takes a simulation to make.
+fn finish(path: &Path, manifest: Manifest) -> Result<Filled, ShardsError> {
+    let shards = Shards::list(WorkFolder::resume(path, &manifest)?, manifest)?;
+    shards.finish()?;
+    Ok(Filled {
+        there: shards.there.len(),
+        of: shards.of,
+        rows: shards.there.keys().map(|n| shards.rows(*n).count()).sum(),
+    })
 }

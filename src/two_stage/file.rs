@@ -10,7 +10,7 @@ use super::{Estimator, Scaler, Standardiser};
 use crate::feature::{FeatureError, FeatureRecipe};
 use crate::files::{replace, with_remedy, write_new};
 use crate::foreign::{MESSAGE, one_line, read};
-use crate::network::{NamedTensor, NetworkError};
+use crate::network::{NamedTensor, NetworkError, bytes_of, values_of};
 use crate::study::{PresetName, Settings, Study, StudyError, StudyFile, StudyFileError};
 use ndarray::Array2;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
@@ -318,7 +318,7 @@ impl Estimator {
                 RawTensor {
                     dtype: Dtype::F32,
                     shape: tensor.shape,
-                    bytes: tensor.values.iter().flat_map(|v| v.to_le_bytes()).collect(),
+                    bytes: bytes_of(&tensor.values),
                 },
             );
         }
@@ -372,9 +372,7 @@ fn weights(tensors: &BTreeMap<String, RawTensor>) -> Vec<NamedTensor> {
             Some(NamedTensor {
                 name: name.strip_prefix(NETWORK)?.to_owned(),
                 shape: tensor.shape.clone(),
-                values: (tensor.bytes.chunks_exact(4))
-                    .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
-                    .collect(),
+                values: values_of(&tensor.bytes),
             })
         })
         .collect()

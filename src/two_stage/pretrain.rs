@@ -312,16 +312,14 @@ fn train(
 
 /// The first [`STANDARD`] rows of a bank, or all: rows are alike, and so many tell means and deviations well enough.
 fn first_rows(bank: &dyn Bank) -> Result<Draws, BankFileError> {
-    let mut parts = Vec::new();
-    let mut rows = 0;
-    for (index, count) in bank.parts().into_iter().enumerate() {
-        if rows >= STANDARD {
-            break;
-        }
-        parts.push(bank.part(index)?);
-        rows += count;
-    }
-    Ok(Draws::stacked(&parts, STANDARD))
+    let sizes = bank.parts();
+    let rows = sizes.iter().sum::<usize>().min(STANDARD);
+    let parts = (0..sizes.len()).map(|index| bank.part(index));
+    Draws::stacked(rows, parts, |index| BankFileError::Content {
+        path: format!("part {index} of the bank").into(),
+        reason: "another number of features".into(),
+        remedy: "make the bank again",
+    })
 }
 
 /// A bank as the network sees it.
