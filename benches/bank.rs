@@ -5,11 +5,12 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use rayon::prelude::*;
 use std::hint::black_box;
 use std::time::Duration;
+use truetwin::estimator::shards::Prior;
 use truetwin::feature::{Ar, Arx, FeatureRecipe};
 use truetwin::progress::Progress;
-use truetwin::shards::Prior;
+use truetwin::record::Drive;
 use truetwin::study::{RecordPlan, Study};
-use truetwin::twin::{DigitalTwin, Drive, Noise};
+use truetwin::twin::{DigitalTwin, Noise};
 use truetwin::twins::{CascadedTanks, VanDerPol};
 
 /// Simulations an iteration.

@@ -3,13 +3,13 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use std::time::Duration;
-use truetwin::bank::FeatureSimulator;
-use truetwin::experiment::{Benchmark, MonteCarlo, Scenario, reference_studies};
-use truetwin::gate::GateTest;
+use truetwin::estimator::bank::FeatureSimulator;
+use truetwin::estimator::gate::GateTest;
+use truetwin::estimator::{EstimateOptions, PretrainOptions, pretrain};
+use truetwin::evaluate::paper::{Benchmark, MonteCarlo, Scenario, reference_studies};
 use truetwin::progress::Progress;
 use truetwin::study::PresetName;
 use truetwin::twin::Noise;
-use truetwin::two_stage::{EstimateOptions, PretrainOptions, pretrain};
 
 fn estimates(c: &mut Criterion) {
     let silent = Progress::silent();

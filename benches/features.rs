@@ -4,7 +4,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Duration;
-use truetwin::experiment::reference_studies;
+use truetwin::evaluate::paper::reference_studies;
 use truetwin::feature::{Ar, Armax, Arx, Deviation, FeatureRecipe, Score};
 use truetwin::twin::Noise;
 

@@ -2,8 +2,9 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
-use truetwin::filter::{Coordinates, FilterSettings, Kalman, Method, Score};
-use truetwin::twin::{DigitalTwin, Drive, Noise, Record, Signal, StateSpace};
+use truetwin::likelihood::kalman::{Coordinates, FilterSettings, Kalman, Method, Score};
+use truetwin::record::{Drive, Record, Signal};
+use truetwin::twin::{DigitalTwin, Noise, StateSpace};
 use truetwin::twins::{CascadedTanks, VanDerPol};
 
 fn passes(c: &mut Criterion) {

@@ -17,8 +17,8 @@
 use serde::{Deserialize, Serialize};
 use std::process::ExitCode;
 use std::sync::Arc;
+use truetwin::effect::{Given, Law, Magnitude, UnmodelledEffect};
 use truetwin::prelude::*;
-use truetwin::twin::{Given, Law, Magnitude, UnmodelledEffect};
 use truetwin::twins::VanDerPol;
 
 /// ẋ − strength·x·exp(−x²): a force on a state's rate, off at 0.

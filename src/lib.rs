@@ -64,14 +64,14 @@
 //! | plug in a simulator | [`twin::StateSpace`], [`twin::DigitalTwin`] |
 //! | plug in a program written in any language, or an FMU | [`external`] |
 //! | say what records look like and which recipe to use | [`study::Study`] |
-//! | train, save, load, estimate | [`two_stage::pretrain`], [`two_stage::Estimator`] |
+//! | train, save, load, estimate | [`estimator::pretrain`], [`estimator::Estimator`] |
 //! | learn what a twin lacks | [`diagnose::diagnose`] |
-//! | add an effect that a twin lacks | [`effect`], [`twin::augment`] |
+//! | add an effect that a twin lacks | [`effect`], [`effect::augment`] |
 //! | give a twin the whole command line | [`cli::run`] |
 //! | compress records otherwise; shape the network | [`feature::FeatureRecipe`], [`network::HeadArchitecture`] |
-//! | filter a record, or take its likelihood | [`filter`] |
-//! | fill a bank on disk, from many processes | [`shards::BankPlan`], [`work`] |
-//! | judge an estimator or a diagnosis | [`experiment`], [`baseline`], [`withheld`] |
+//! | filter a record, or take its likelihood | [`likelihood`] |
+//! | fill a bank on disk, from many processes | [`estimator::shards::BankPlan`], [`storage::work`] |
+//! | judge an estimator or a diagnosis | [`evaluate`] |
 //! | show progress, stop long work | [`progress`] |
 //! | print, draw, hand on results | [`report`] |
 //!
@@ -102,43 +102,35 @@ macro_rules! debug_by_name {
     };
 }
 
-// Layers, lowest first; a module uses only what stands above it here (tests/layering.rs holds it so).
+// Rooms, lowest first; a room uses only what stands above it here (tests/layering.rs holds it so).
 pub mod setting;
 
-mod files;
-mod foreign;
 pub mod math;
-mod optimise;
 pub mod progress;
-pub mod work;
+pub mod storage;
+
+pub mod record;
 
 pub mod twin;
-
-pub mod filter;
-
-pub mod feature;
-pub mod network;
-
 pub mod twins;
 
 pub mod effect;
 
-pub mod bank;
-pub mod gate;
-pub mod refine;
-mod sample;
+mod fit;
+pub mod likelihood;
+
+pub mod feature;
+pub mod network;
+
 pub mod study;
 
 pub mod external;
-pub mod shards;
 
-pub mod two_stage;
+pub mod estimator;
 
-pub mod baseline;
 pub mod diagnose;
 
-pub mod experiment;
-pub mod withheld;
+pub mod evaluate;
 
 pub mod report;
 

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 use truetwin::study::StudyError;
 
 fn main() -> ExitCode {
-    match truetwin::experiment::reference_studies() {
+    match truetwin::evaluate::paper::reference_studies() {
         Ok(studies) => truetwin::cli::run(studies.into_iter().map(Ok::<_, StudyError>)),
         Err(error) => truetwin::cli::run([Err(error)]),
     }

@@ -1,7 +1,7 @@
 //! One way to refuse a setting: which, its value, and what it must be.
 //!
 //! ```
-//! use truetwin::gate::GateSettings;
+//! use truetwin::estimator::gate::GateSettings;
 //! use truetwin::setting::SettingError;
 //!
 //! let gate = GateSettings { alpha: 2.0, ..GateSettings::default() };

@@ -4,11 +4,9 @@
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 use truetwin::feature::{Ar, Armax, Arx, FeatureRecipe};
+use truetwin::record::{Drive, Quantity, Signal, Signals};
 use truetwin::study::RecordPlan;
-use truetwin::twin::{
-    DigitalTwin, Drive, Noise, Parameter, ParameterSpace, Quantity, Signal, Signals,
-    SimulationError,
-};
+use truetwin::twin::{DigitalTwin, Noise, Parameter, ParameterSpace, SimulationError};
 
 const SIMULATIONS: u64 = 1000;
 

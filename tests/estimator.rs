@@ -5,13 +5,15 @@ use std::fs;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
-use truetwin::experiment::reference_studies;
+use truetwin::estimator::{EstimateOptions, Estimator, PretrainError, PretrainOptions, pretrain};
+use truetwin::evaluate::paper::reference_studies;
 use truetwin::progress::{Listener, Progress};
+use truetwin::record::Signals;
+use truetwin::record::{Drive, Record, Signal};
 use truetwin::study::{RecordPlan, Study};
-use truetwin::twin::{DigitalTwin, Signals};
-use truetwin::twin::{Drive, Noise, Parameter, ParameterSpace, Record, Signal, SimulationError};
+use truetwin::twin::DigitalTwin;
+use truetwin::twin::{Noise, Parameter, ParameterSpace, SimulationError};
 use truetwin::twins::VanDerPol;
-use truetwin::two_stage::{EstimateOptions, Estimator, PretrainError, PretrainOptions, pretrain};
 
 fn studies() -> Vec<Study> {
     reference_studies().unwrap()
@@ -40,7 +42,7 @@ fn record(nu: f64, seed: u64) -> Record {
     Record::new(drive, outputs).unwrap()
 }
 
-fn estimate(nu: f64, seed: u64) -> truetwin::two_stage::Estimate {
+fn estimate(nu: f64, seed: u64) -> truetwin::estimator::Estimate {
     let options = EstimateOptions {
         seed,
         ..EstimateOptions::default()

@@ -5,13 +5,13 @@
 
 use nalgebra::DVector;
 use rayon::prelude::*;
-use truetwin::bank::FeatureSimulator;
-use truetwin::experiment::reference_studies;
+use truetwin::estimator::bank::FeatureSimulator;
+use truetwin::estimator::gate::{GateForm, GateSettings, GateTest};
+use truetwin::estimator::refine::{RefineSettings, Refinement};
+use truetwin::evaluate::paper::reference_studies;
 use truetwin::feature::{Ar, Arx, FeatureRecipe};
-use truetwin::gate::{GateForm, GateSettings, GateTest};
 use truetwin::math::binomial_bounds;
 use truetwin::progress::Progress;
-use truetwin::refine::{RefineSettings, Refinement};
 use truetwin::study::{PresetName, Study};
 use truetwin::twin::Noise;
 

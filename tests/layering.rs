@@ -6,15 +6,11 @@ use std::path::{Path, PathBuf};
 
 /// The layers of docs/architecture.md, lowest first; within a layer, in order.
 const LAYERS: [&[&str]; 6] = [
-    &[
-        "setting", "files", "foreign", "math", "optimise", "progress", "work",
-    ],
-    &["twin", "filter", "feature", "network"],
-    &[
-        "twins", "effect", "bank", "gate", "refine", "sample", "study", "shards", "external",
-    ],
-    &["two_stage", "baseline", "diagnose"],
-    &["experiment", "withheld", "report"],
+    &["setting", "math", "progress", "storage"],
+    &["record", "twin", "twins", "effect"],
+    &["fit", "likelihood", "feature", "network"],
+    &["study", "external", "estimator", "diagnose"],
+    &["evaluate", "report"],
     &["cli", "prelude"],
 ];
 
@@ -123,7 +119,7 @@ fn large_dependencies_have_one_room() {
     rust_files(&root, &mut files);
     for (library, room) in [
         ("dfdx::", "network"),
-        ("argmin::", "optimise"),
+        ("argmin::", "fit"),
         ("fmi::", "external/fmu"),
     ] {
         for path in &files {

@@ -7,7 +7,7 @@ use parquet::schema::parser::parse_message_type;
 use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
-use truetwin::twin::read_record;
+use truetwin::record::read_record;
 
 /// Columns t and y of doubles, and u of integers.
 fn write(path: &Path, t: &[f64], y: &[f64]) {

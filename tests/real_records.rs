@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 use truetwin::diagnose::{Decision, DiagnoseSettings, Diagnosis, FreeRuns, Verdict, diagnose};
-use truetwin::experiment::reference_studies;
+use truetwin::estimator::{EstimateOptions, PretrainOptions, pretrain};
+use truetwin::evaluate::paper::reference_studies;
 use truetwin::progress::Progress;
+use truetwin::record::{Record, Signal, read_record};
 use truetwin::report::{
     gap_regions_svg, gap_runs_svg, gap_shrinkage_svg, gap_targets_svg, gap_which_svg,
 };
 use truetwin::study::{Study, StudyFile};
-use truetwin::twin::{Record, Signal, read_record};
-use truetwin::two_stage::{EstimateOptions, PretrainOptions, pretrain};
 
 fn data(name: &str) -> Option<PathBuf> {
     let folder = std::env::var_os("TRUETWIN_DATA").map_or_else(

@@ -2,8 +2,8 @@
 
 use super::args::{PresetArgument, Subject, at_least_one};
 use super::{Context, Failure, Verb, output};
-use crate::shards::BankPlan;
-use crate::work::Share;
+use crate::estimator::shards::BankPlan;
+use crate::storage::work::Share;
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;

@@ -3,11 +3,10 @@
 use super::args::Subject;
 use super::{Context, Failure, Verb, output};
 use crate::progress::Stage;
+use crate::record::{Drive, Signal, Signals};
 use crate::study::PresetName;
 use crate::twin::conformance::{Severity, check};
-use crate::twin::{
-    DigitalTwin, Drive, Noise, ParameterSpace, Signal, Signals, SimulationError, StateSpace,
-};
+use crate::twin::{DigitalTwin, Noise, ParameterSpace, SimulationError, StateSpace};
 use clap::Args;
 use serde_json::{Value, json};
 use std::process::ExitCode;

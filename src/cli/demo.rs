@@ -2,9 +2,10 @@
 
 use super::estimate::{show, write_results};
 use super::{Context, Failure, Verb, output};
+use crate::estimator::{EstimateOptions, PretrainOptions, pretrain};
+use crate::record::{Record, write_record};
 use crate::study::{PresetName, Study};
-use crate::twin::{Noise, Record, write_record};
-use crate::two_stage::{EstimateOptions, PretrainOptions, pretrain};
+use crate::twin::Noise;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -3,10 +3,10 @@
 use super::args::Subject;
 use super::{Context, Failure, Verb, output};
 use crate::diagnose::{DiagnoseSettings, GivenRecord, diagnose};
+use crate::estimator::Estimator;
+use crate::record::{Record, drive_csv_text, read_record};
 use crate::report::{NEXT_INPUT, gap_html, gap_json, gap_text};
 use crate::study::Study;
-use crate::twin::{Record, drive_csv_text, read_record};
-use crate::two_stage::Estimator;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

@@ -2,11 +2,11 @@
 
 use super::args::PresetArgument;
 use super::{Context, Failure, Verb, output};
-use crate::bank::file;
+use crate::estimator::bank::file;
+use crate::estimator::{self, EstimateOptions, Estimator};
+use crate::record::{Record, read_record};
 use crate::report::{estimate_json, estimate_text, overlay_svg, trajectories_csv};
 use crate::study::Study;
-use crate::twin::{Record, read_record};
-use crate::two_stage::{self, EstimateOptions, Estimator};
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -71,7 +71,7 @@ impl Verb for Estimate {
 pub(super) fn show(
     context: &Context<'_>,
     study: &Study,
-    estimate: &two_stage::Estimate,
+    estimate: &estimator::Estimate,
 ) -> Result<(), Failure> {
     if context.json {
         output::print_json(&estimate_json(study, estimate))
@@ -85,7 +85,7 @@ pub(super) fn write_results(
     folder: &output::NewFolder,
     study: &Study,
     record: &Record,
-    estimate: &two_stage::Estimate,
+    estimate: &estimator::Estimate,
 ) -> Result<(), Failure> {
     let json = serde_json::to_string_pretty(&estimate_json(study, estimate));
     folder.write("estimate.json", &json.map_err(Failure::internal)?)?;

@@ -1,24 +1,23 @@
 //! From any error to one line and an exit code.
 
 use super::output;
-use crate::bank::BankError;
-use crate::bank::file::BankFileError;
 use crate::diagnose::DiagnoseError;
+use crate::effect::EffectError;
 use crate::effect::EffectFileError;
-use crate::experiment::{MonteCarloError, ScenarioError};
+use crate::estimator::bank::BankError;
+use crate::estimator::bank::file::BankFileError;
+use crate::estimator::gate::GateError;
+use crate::estimator::refine::RefineError;
+use crate::estimator::shards::{PriorError, ShardsError};
+use crate::estimator::{EstimateError, EstimatorFileError, PretrainError};
+use crate::evaluate::paper::{MonteCarloError, ScenarioError};
+use crate::evaluate::trials::WithheldError;
 use crate::feature::FeatureError;
-use crate::gate::GateError;
 use crate::network::NetworkError;
-use crate::refine::RefineError;
-use crate::shards::{PriorError, ShardsError};
+use crate::record::{CsvError, DriveError, RecordError};
+use crate::storage::work::{Team, TeamError, WorkError};
 use crate::study::{PlanError, StudyError};
-use crate::twin::{
-    AdaptationError, CsvError, DriveError, EffectError, ParameterError, RecordError,
-    SimulationError,
-};
-use crate::two_stage::{EstimateError, EstimatorFileError, PretrainError};
-use crate::withheld::WithheldError;
-use crate::work::{Team, TeamError, WorkError};
+use crate::twin::{AdaptationError, ParameterError, SimulationError};
 use std::fmt::Display;
 use std::path::Path;
 use std::process::ExitCode;

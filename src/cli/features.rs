@@ -2,8 +2,8 @@
 
 use super::args::{PresetArgument, Subject};
 use super::{Context, Failure, Verb, output};
-use crate::bank::file;
-use crate::twin::read_record;
+use crate::estimator::bank::file;
+use crate::record::read_record;
 use clap::Args;
 use ndarray::Array2;
 use serde_json::json;

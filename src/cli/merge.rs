@@ -1,8 +1,8 @@
 //! `merge`: the banks of a job array as one.
 
 use super::{Context, Failure, Verb, output};
-use crate::bank::file;
-use crate::shards::{merge, merge_into_file};
+use crate::estimator::bank::file;
+use crate::estimator::shards::{merge, merge_into_file};
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;

@@ -36,8 +36,8 @@ mod twins;
 mod withheld;
 
 use crate::progress::Progress;
+use crate::storage::work::{Share, Team};
 use crate::study::{Study, StudyError, StudyFile};
-use crate::work::{Share, Team};
 use args::{Arguments, Subject};
 use clap::{FromArgMatches, Subcommand};
 use failure::Failure;

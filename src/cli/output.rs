@@ -1,8 +1,8 @@
 //! Results: standard output, files that appear whole, folders that appear whole.
 
 use super::{Context, Failure};
-use crate::files::{self, folder, with_remedy};
-use crate::foreign::{hidden, printable};
+use crate::storage::files::{self, folder, with_remedy};
+use crate::storage::untrusted::{hidden, printable};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::fs;

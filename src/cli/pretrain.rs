@@ -2,11 +2,11 @@
 
 use super::args::{PresetArgument, Subject, seconds};
 use super::{Context, Failure, Verb, output};
-use crate::bank::{Bank, file};
-use crate::shards::{BankPlan, ShardedBank};
+use crate::estimator::bank::{Bank, file};
+use crate::estimator::shards::{BankPlan, ShardedBank};
+use crate::estimator::{GivenBank, PretrainOptions, Pretraining};
+use crate::storage::work::checksum;
 use crate::study::Study;
-use crate::two_stage::{GivenBank, PretrainOptions, Pretraining};
-use crate::work::checksum;
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};

@@ -2,11 +2,13 @@
 
 use super::args::{PresetArgument, Subject, at_least_one};
 use super::{Context, Failure, Verb, output};
-use crate::experiment::{Benchmark, FreeRuns, MeanRuns, MonteCarlo, Origin, Run, Scenario, score};
+use crate::estimator::{Estimator, PretrainError, PretrainOptions, Pretraining, pretrain};
+use crate::evaluate::paper::{
+    Benchmark, FreeRuns, MeanRuns, MonteCarlo, Origin, Run, Scenario, score,
+};
 use crate::report::{first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
+use crate::storage::work::{Share, WorkError, WorkFolder};
 use crate::study::Study;
-use crate::two_stage::{Estimator, PretrainError, PretrainOptions, Pretraining, pretrain};
-use crate::work::{Share, WorkError, WorkFolder};
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

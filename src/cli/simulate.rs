@@ -3,10 +3,9 @@
 use super::args::Subject;
 use super::{Context, Failure, Verb, output};
 use crate::effect::read_effects;
-use crate::twin::{
-    DigitalTwin, Drive, Noise, ParameterSpace, Record, Role, augment, given_magnitudes, read_drive,
-    record_csv_text, write_record,
-};
+use crate::effect::{augment, given_magnitudes};
+use crate::record::{Drive, Record, read_drive, record_csv_text, write_record};
+use crate::twin::{DigitalTwin, Noise, ParameterSpace, Role};
 use clap::Args;
 use serde_json::json;
 use std::collections::BTreeMap;

@@ -1,8 +1,9 @@
 //! `twins`: what there is.
 
 use super::{Context, Failure, Verb, output};
+use crate::record::Quantity;
 use crate::study::Study;
-use crate::twin::{Parameter, Quantity};
+use crate::twin::Parameter;
 use clap::Args;
 use serde_json::{Value, json};
 use std::process::ExitCode;

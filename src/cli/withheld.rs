@@ -2,9 +2,9 @@
 
 use super::args::{Subject, at_least_one};
 use super::{Context, Failure, Verb, output};
+use crate::evaluate::trials::{self, Kind, Settings};
 use crate::report::{scorecard_html, scorecard_json, scorecard_text};
-use crate::withheld::{self, Kind, Settings};
-use crate::work::Share;
+use crate::storage::work::Share;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -67,8 +67,7 @@ impl Verb for Withheld {
             validation: self.validation,
             detection_only: self.detection_only,
         };
-        let sealed =
-            withheld::Withheld::new(&study, settings)?.seal(&self.out, context.progress)?;
+        let sealed = trials::Withheld::new(&study, settings)?.seal(&self.out, context.progress)?;
         if context.team.leads() {
             // Published before the first diagnosis.
             output::say(&format!("keys sealed: sha256 {}", sealed.seal()));

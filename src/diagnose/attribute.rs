@@ -10,9 +10,10 @@ use super::null::{Bench, Look};
 use super::problem::Problem;
 use super::scan::{Gain, Reference};
 use super::variant::Variant;
-use crate::filter::{FilterError, recoverable};
+use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::progress::Stage;
-use crate::twin::{Noise, Record};
+use crate::record::Record;
+use crate::twin::Noise;
 use rayon::prelude::*;
 
 /// Points of the dictionary that a fit starts from, per candidate; thresholds have more.

@@ -4,7 +4,7 @@ use super::DiagnoseSettings;
 use super::black_box;
 use super::fit::{Fitted, fit};
 use super::problem::Problem;
-use crate::filter::{FilterError, recoverable};
+use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::twin::Noise;
 use rayon::prelude::*;
 

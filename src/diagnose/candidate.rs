@@ -2,10 +2,10 @@
 
 use super::DiagnoseError;
 use super::catch_all::{Place, disturbed};
+use crate::effect::{Law, Magnitude, UnmodelledEffect, augment_short};
+use crate::record::Signals;
 use crate::study::Study;
-use crate::twin::{
-    DigitalTwin, Law, Magnitude, Outline, Role, Signals, UnmodelledEffect, augment_short, fix,
-};
+use crate::twin::{DigitalTwin, Outline, Role, fix};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

@@ -1,8 +1,9 @@
 //! Disturbances that stand for whatever is not in the library.
 
+use crate::record::{Quantity, Signal};
 use crate::twin::{
-    DigitalTwin, Integrator, Interval, Now, Outliers, Outline, Parameter, ParameterSpace, Quantity,
-    Role, Signal, SimulationError, StateSpace,
+    DigitalTwin, Integrator, Interval, Now, Outliers, Outline, Parameter, ParameterSpace, Role,
+    SimulationError, StateSpace,
 };
 use smallvec::SmallVec;
 use std::sync::Arc;
@@ -159,7 +160,8 @@ impl StateSpace for Disturbed {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::{Drive, Noise};
+    use crate::record::Drive;
+    use crate::twin::Noise;
     use crate::twins::CascadedTanks;
 
     /// Without strength, nothing changes; with it, the disturbance has the standard deviation that σ says.

@@ -1,7 +1,8 @@
 //! What a plan is made of: which magnitudes of an effect are in use, how each moves, and what its unit is worth.
 
 use super::axis::Axis;
-use crate::twin::{Interval, Mark, UnmodelledEffect};
+use crate::effect::{Mark, UnmodelledEffect};
+use crate::twin::Interval;
 
 /// Delays in steps, each with a register that just holds it: the shorter the register, the faster the filter.
 pub(super) const DELAYS: [&[f64]; 3] = [&[0.5, 1.5], &[3.0], &[5.5]];

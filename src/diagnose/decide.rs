@@ -13,8 +13,10 @@ use super::scan::Reference;
 use super::several::{promises, several};
 use super::shrink::{Runner, closed};
 use super::{DiagnoseError, DiagnoseSettings, Setting};
+use crate::effect::Law;
 use crate::progress::Stage;
-use crate::twin::{Law, Noise, Signal};
+use crate::record::Signal;
+use crate::twin::Noise;
 
 /// The structural test with the effect added: what is left below this is unexplained.
 const UNEXPLAINED: f64 = 0.02;

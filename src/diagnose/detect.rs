@@ -11,7 +11,8 @@ use super::result::{Detection, Verdict};
 use super::verdict::{left_the_prior, verdict};
 use super::{DiagnoseError, DiagnoseSettings, Setting};
 use crate::progress::Progress;
-use crate::twin::{DigitalTwin, Noise, Now, Record, Role};
+use crate::record::Record;
+use crate::twin::{DigitalTwin, Noise, Now, Role};
 
 /// The twin, fitted and tested.
 pub(super) struct Detected<'a> {

@@ -8,7 +8,7 @@ use super::problem::Problem;
 use super::scales::Scales;
 use super::scan::{Gain, Reference};
 use super::variant::Variant;
-use crate::filter::{FilterError, recoverable};
+use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::twin::DigitalTwin;
 use rayon::prelude::*;
 use std::sync::Arc;

@@ -14,7 +14,8 @@
 use super::missing_term::{MissingTerm, Smoothed};
 use super::result::{Discovery, Term};
 use crate::math::quantile;
-use crate::twin::{Noise, Record, Signal};
+use crate::record::{Record, Signal};
+use crate::twin::Noise;
 use nalgebra::{DMatrix, DVector};
 
 /// Resampled records.
@@ -300,7 +301,7 @@ fn correlation_time(series: &[Vec<f64>]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::Drive;
+    use crate::record::Drive;
 
     /// Of d = 0.3·x² + noise with correlation, x² is in nearly every resampled record, and hardly anything else.
     #[test]

@@ -1,7 +1,7 @@
 //! The most probable θ of a twin, given its records and a weak prior.
 
 use super::problem::{Problem, Slope};
-use crate::filter::{FilterError, recoverable};
+use crate::likelihood::kalman::{FilterError, recoverable};
 use nalgebra::{DMatrix, DVector};
 
 /// Where a fit ended.

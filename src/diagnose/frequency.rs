@@ -2,7 +2,7 @@
 
 use super::null::Bench;
 use super::scan::Reference;
-use crate::filter::{FilterError, recoverable};
+use crate::likelihood::kalman::{FilterError, recoverable};
 
 /// Frequencies a cycle of the record.
 const FINENESS: f64 = 2.0;

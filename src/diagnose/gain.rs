@@ -9,8 +9,9 @@ use super::problem::Problem;
 use super::run::check;
 use super::{DiagnoseError, DiagnoseSettings, Setting};
 use crate::progress::Progress;
+use crate::record::Record;
 use crate::study::Study;
-use crate::twin::{Noise, Record};
+use crate::twin::Noise;
 
 /// Nats over the refitted twin that the listed effects `id@target` gain together on the records and, if there is one, on the
 /// validation record, each fitted with θ as the explanations of a diagnosis are. `None` where the study does not list one of

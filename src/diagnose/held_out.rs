@@ -9,8 +9,9 @@ use super::posterior::posterior;
 use super::problem::Problem;
 use super::shrink::{Runner, Shrinkage, closed, interval, root};
 use super::{DiagnoseError, DiagnoseSettings, Setting};
-use crate::filter::{FilterError, recoverable};
-use crate::twin::{Drive, Noise, Record, RecordError, Role};
+use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::record::{Drive, Record, RecordError};
+use crate::twin::{Noise, Role};
 use ndarray::s;
 use rayon::prelude::*;
 

@@ -7,9 +7,10 @@ use super::localise::edges;
 use super::map::{Equation, TermRange};
 use super::null::{Bench, Test};
 use super::{DiagnoseError, Setting};
-use crate::filter::{FilterError, FilterSettings, Kalman, recoverable};
+use crate::likelihood::kalman::{FilterError, FilterSettings, Kalman, recoverable};
 use crate::progress::Stage;
-use crate::twin::{Record, Signal, StateSpace};
+use crate::record::{Record, Signal};
+use crate::twin::StateSpace;
 
 /// Pieces of a record that the spread of a mean is taken from.
 const BLOCKS: usize = 20;

@@ -27,6 +27,8 @@
 //! use truetwin::effect::QuadraticDrag;
 //! use truetwin::progress::Progress;
 //! use truetwin::study::{RecordPlan, Study};
+//! use truetwin::effect::*;
+//! use truetwin::record::*;
 //! use truetwin::twin::*;
 //! use truetwin::twins::VanDerPol;
 //!
@@ -138,11 +140,13 @@ pub use result::{
 pub use run::diagnose;
 pub use shrink::Shrinkage;
 
-use crate::filter::FilterError;
+use crate::effect::EffectError;
+use crate::likelihood::kalman::FilterError;
 use crate::progress::Cancelled;
+use crate::record::{Record, RecordError};
 use crate::setting::SettingError;
 use crate::study::Study;
-use crate::twin::{DigitalTwin, EffectError, ParameterError, Record, RecordError, SimulationError};
+use crate::twin::{DigitalTwin, ParameterError, SimulationError};
 use std::fmt;
 use std::sync::Arc;
 
@@ -295,6 +299,8 @@ impl DiagnoseError {
 /// use truetwin::diagnose::{DiagnoseError, DiagnoseSettings, GivenRecord, diagnose};
 /// use truetwin::progress::Progress;
 /// use truetwin::study::{RecordPlan, Study};
+/// use truetwin::effect::*;
+/// use truetwin::record::*;
 /// use truetwin::twin::*;
 /// use truetwin::twins::VanDerPol;
 ///

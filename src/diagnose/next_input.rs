@@ -14,8 +14,9 @@ use super::null::Bench;
 use super::problem::Problem;
 use super::result::NextInput;
 use super::scan::Reference;
-use crate::filter::recoverable;
-use crate::twin::{Drive, Noise, Record, RecordError, Signal};
+use crate::likelihood::kalman::recoverable;
+use crate::record::{Drive, Record, RecordError, Signal};
+use crate::twin::Noise;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 

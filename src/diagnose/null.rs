@@ -8,10 +8,11 @@ use super::localise::{Bins, local};
 use super::omnibus::omnibus;
 use super::problem::Problem;
 use super::scan::{Gain, Reference};
-use crate::filter::FilterError;
+use crate::likelihood::kalman::FilterError;
 use crate::math::{quantile, rank_p_value};
 use crate::progress::Stage;
-use crate::twin::{Noise, Record};
+use crate::record::Record;
+use crate::twin::Noise;
 use rayon::prelude::*;
 use std::sync::Arc;
 

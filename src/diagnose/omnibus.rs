@@ -1,8 +1,8 @@
 //! Whether innovations look like white noise: what sees gaps that no candidate imitates.
 
 use super::correlation::{centred, correlation};
-use crate::filter::Filtered;
-use crate::twin::{Record, Signal};
+use crate::likelihood::kalman::Filtered;
+use crate::record::{Record, Signal};
 
 /// Lags of innovations, of their squares, and of inputs.
 const LAGS: usize = 20;

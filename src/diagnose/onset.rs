@@ -13,9 +13,10 @@ use super::localise::level;
 use super::map::Onset;
 use super::null::{Bench, largest, standardised};
 use super::problem::Problem;
-use crate::filter::{FilterError, recoverable};
+use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::math::rank_p_value;
-use crate::twin::{Noise, Record};
+use crate::record::Record;
+use crate::twin::Noise;
 use rayon::prelude::*;
 
 /// Blocks of a record, and those before the first that is to be foreseen.

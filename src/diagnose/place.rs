@@ -11,7 +11,7 @@ use super::null::{Bench, Test};
 use super::onset::onset;
 use super::result::{Decision, Discovery, TargetShare};
 use super::{DiagnoseError, Setting};
-use crate::filter::{Filtered, recoverable};
+use crate::likelihood::kalman::{Filtered, recoverable};
 use crate::progress::Progress;
 use crate::twin::Noise;
 

@@ -8,8 +8,9 @@ use super::choice::{Choice, DELAYS, REGISTERS, axis, choices, log_axis, unit, un
 use super::problem::Problem;
 use super::scales::{Scales, deviation, ends, largest};
 use super::variant::Variant;
+use crate::effect::{Law, Magnitude, Mark, UnmodelledEffect};
 use crate::math::quantile;
-use crate::twin::{DigitalTwin, Interval, Law, Magnitude, Mark, UnmodelledEffect};
+use crate::twin::{DigitalTwin, Interval};
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
@@ -115,7 +116,7 @@ impl Planner<'_> {
     fn values(&self, effect: &dyn UnmodelledEffect) -> Vec<f64> {
         let outline = self.study.state_space().map(|t| t.outline());
         let law = effect.law();
-        let known = crate::twin::targets(law, outline.as_ref(), &self.study.signals());
+        let known = crate::effect::targets(law, outline.as_ref(), &self.study.signals());
         let target = known.iter().position(|k| k == effect.target()).unwrap_or(0);
         self.scales.columns(law, target)
     }

@@ -2,7 +2,7 @@
 
 use super::fit::Fitted;
 use super::problem::Problem;
-use crate::filter::{FilterError, recoverable};
+use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::twin::{Noise, Source};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;

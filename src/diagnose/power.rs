@@ -16,8 +16,8 @@ use super::null::{Bench, Nulls};
 use super::result::Visible;
 use super::scan::Reference;
 use super::variant::Variant;
-use crate::filter::{FilterError, recoverable};
-use crate::twin::Magnitude;
+use crate::effect::Magnitude;
+use crate::likelihood::kalman::{FilterError, recoverable};
 use rayon::prelude::*;
 
 /// The normal quantile of 80 %.

@@ -2,8 +2,11 @@
 
 use super::axis::Axis;
 use super::black_box::{self, Predictor};
-use crate::filter::{Coordinates, FilterError, FilterSettings, Filtered, Kalman, Score};
-use crate::twin::{DigitalTwin, Outline, Parameter, ParameterSpace, Record, Role, Signal};
+use crate::likelihood::kalman::{
+    Coordinates, FilterError, FilterSettings, Filtered, Kalman, Score,
+};
+use crate::record::{Record, Signal};
+use crate::twin::{DigitalTwin, Outline, Parameter, ParameterSpace, Role};
 use nalgebra::{DMatrix, DVector};
 use std::sync::{Arc, Mutex};
 

@@ -2,7 +2,8 @@
 
 use super::map::Where;
 use super::shrink::Shrinkage;
-use crate::twin::{Drive, Interval, Signal};
+use crate::record::{Drive, Signal};
+use crate::twin::Interval;
 use serde::{Deserialize, Serialize};
 
 /// Which kind of gap there is.

@@ -18,9 +18,10 @@ use super::verdict::absorbing;
 use super::{DiagnoseError, DiagnoseSettings, GivenRecord, Setting};
 use crate::math::six_digits;
 use crate::progress::Progress;
+use crate::record::Record;
 use crate::setting::SettingError;
 use crate::study::Study;
-use crate::twin::{Noise, Record};
+use crate::twin::Noise;
 use std::time::Instant;
 
 /// Shortest record.
@@ -36,6 +37,8 @@ const LEAST: usize = 50;
 /// use truetwin::diagnose::{DiagnoseSettings, Verdict, diagnose};
 /// use truetwin::progress::Progress;
 /// use truetwin::study::{RecordPlan, Study};
+/// use truetwin::effect::*;
+/// use truetwin::record::*;
 /// use truetwin::twin::*;
 /// use truetwin::twins::VanDerPol;
 ///

@@ -1,6 +1,7 @@
 //! What a record's units are: sizes of its signals and states.
 
-use crate::twin::{Law, Record, Signal};
+use crate::effect::Law;
+use crate::record::{Record, Signal};
 
 /// What the dictionary's units are taken from.
 pub(super) struct Scales<'a> {

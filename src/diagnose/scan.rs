@@ -11,7 +11,7 @@
 //! gain = ½·(r·d⊥)²/(d⊥·d⊥), in nats. Δ is a secant to a point of a dictionary, so thresholds have one too.
 
 use super::problem::Problem;
-use crate::filter::{FilterError, Filtered, recoverable};
+use crate::likelihood::kalman::{FilterError, Filtered, recoverable};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// A direction that θ imitates up to this share of its square is no direction of its own.

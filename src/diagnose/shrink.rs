@@ -3,9 +3,10 @@
 use super::DiagnoseError;
 use super::candidate::{Addition, with};
 use super::result::FreeRuns;
+use crate::estimator::track;
 use crate::math::{median, quantile};
-use crate::twin::{DigitalTwin, Noise, Record, Signal, free_run};
-use crate::two_stage::track;
+use crate::record::{Record, Signal};
+use crate::twin::{DigitalTwin, Noise, free_run};
 use rayon::prelude::*;
 use std::sync::Arc;
 

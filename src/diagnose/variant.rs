@@ -2,7 +2,8 @@
 
 use super::axis::Axis;
 use super::problem::Problem;
-use crate::twin::{DigitalTwin, Interval, Magnitude};
+use crate::effect::Magnitude;
+use crate::twin::{DigitalTwin, Interval};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

@@ -1,6 +1,6 @@
 //! An actuator whose zero is off.
 
-use crate::twin::{Given, Instant, Law, Magnitude, UnmodelledEffect};
+use crate::effect::{Given, Instant, Law, Magnitude, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// A constant error of the zero: u + offset.
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::ActuatorBias;
-/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+/// use truetwin::effect::{Given, Instant, UnmodelledEffect};
 ///
 /// let effect = ActuatorBias { target: "actuator".into(), magnitudes: Given::default() };
 /// let now = Instant { t: 2.0, dt: 0.5 };

@@ -1,7 +1,7 @@
 //! An actuator that ignores small commands.
 
 use super::laws::clamp;
-use crate::twin::{Given, Instant, Law, Magnitude, UnmodelledEffect};
+use crate::effect::{Given, Instant, Law, Magnitude, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// Commands inside ±width/2 do nothing, larger ones lose that much: u − clamp(u, ±width/2).
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::ActuatorDeadZone;
-/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+/// use truetwin::effect::{Given, Instant, UnmodelledEffect};
 ///
 /// let effect = ActuatorDeadZone { target: "actuator".into(), magnitudes: Given::default() };
 /// let now = Instant { t: 2.0, dt: 0.5 };

@@ -1,7 +1,7 @@
 //! An actuator that acts late.
 
 use super::laws::{DELAY, DELAY_SAMPLES, check_delay, delay};
-use crate::twin::{Given, Instant, Law, Magnitude, UnmodelledEffect};
+use crate::effect::{Given, Instant, Law, Magnitude, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// A dead time: u(t − delay), linear between samples, the first value before the start.
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::ActuatorDelay;
-/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+/// use truetwin::effect::{Given, Instant, UnmodelledEffect};
 ///
 /// let effect = ActuatorDelay { target: "actuator".into(), magnitudes: Given::default() };
 /// let now = Instant { t: 2.0, dt: 0.5 };

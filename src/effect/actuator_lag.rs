@@ -1,7 +1,7 @@
 //! An actuator that follows slowly.
 
 use super::laws::{TAU, lag};
-use crate::twin::{Given, Instant, Law, Magnitude, UnmodelledEffect};
+use crate::effect::{Given, Instant, Law, Magnitude, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// A first-order lag: v ← a·v + (1 − a)·u with a = exp(−Δt/τ); v starts at the first u.
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::ActuatorLag;
-/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+/// use truetwin::effect::{Given, Instant, UnmodelledEffect};
 ///
 /// let effect = ActuatorLag { target: "actuator".into(), magnitudes: Given::default() };
 /// let now = Instant { t: 2.0, dt: 0.5 };

@@ -1,6 +1,6 @@
 //! An actuator with a limited speed.
 
-use crate::twin::{Given, Instant, Law, Magnitude, UnmodelledEffect};
+use crate::effect::{Given, Instant, Law, Magnitude, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// A limited speed: v ← v + clamp(u − v, ±rate·Δt); v starts at the first u.
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::ActuatorRateLimit;
-/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+/// use truetwin::effect::{Given, Instant, UnmodelledEffect};
 ///
 /// let effect = ActuatorRateLimit { target: "actuator".into(), magnitudes: Given::default() };
 /// let now = Instant { t: 2.0, dt: 0.5 };

@@ -1,6 +1,6 @@
 //! A constant push.
 
-use crate::twin::{Given, Law, Magnitude, UnmodelledEffect};
+use crate::effect::{Given, Law, Magnitude, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// A constant push or leak into a state: ẋ + force.
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::ConstantForcing;
-/// use truetwin::twin::{Given, UnmodelledEffect};
+/// use truetwin::effect::{Given, UnmodelledEffect};
 ///
 /// let effect = ConstantForcing { target: "x".into(), magnitudes: Given::default() };
 /// assert_eq!(effect.force(&[0.5], 0.0, 2.0, 0.0), 0.5);

@@ -1,7 +1,7 @@
 //! Dry friction.
 
 use super::laws::sign;
-use crate::twin::{Given, Law, Magnitude, UnmodelledEffect};
+use crate::effect::{Given, Law, Magnitude, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// A loss of constant size against the sign of the state: ẋ − force·sign x, with sign 0 = 0.
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::CoulombFriction;
-/// use truetwin::twin::{Given, UnmodelledEffect};
+/// use truetwin::effect::{Given, UnmodelledEffect};
 ///
 /// let effect = CoulombFriction { target: "x".into(), magnitudes: Given::default() };
 /// assert_eq!(effect.force(&[0.5], 0.0, -2.0, 0.0), 0.5); // against the motion

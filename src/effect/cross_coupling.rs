@@ -1,6 +1,6 @@
 //! A path from one state to another.
 
-use crate::twin::{Given, Law, Magnitude, UnmodelledEffect};
+use crate::effect::{Given, Law, Magnitude, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// Another state acts on this one: ẋ + rate·x_from.
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::CrossCoupling;
-/// use truetwin::twin::{Given, UnmodelledEffect};
+/// use truetwin::effect::{Given, UnmodelledEffect};
 ///
 /// let effect = CrossCoupling { target: "x".into(), from: "z".into(), magnitudes: Given::default() };
 /// assert_eq!(effect.force(&[0.5], 0.0, 2.0, 3.0), 1.5);

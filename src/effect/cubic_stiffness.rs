@@ -1,6 +1,6 @@
 //! A spring that hardens.
 
-use crate::twin::{Given, Law, Magnitude, UnmodelledEffect};
+use crate::effect::{Given, Law, Magnitude, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// A Duffing spring: ẋ − c·x_from³, where `from` is the state whose rate this one is. Below 0 the spring softens.
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::CubicStiffness;
-/// use truetwin::twin::{Given, UnmodelledEffect};
+/// use truetwin::effect::{Given, UnmodelledEffect};
 ///
 /// let effect = CubicStiffness { target: "v".into(), from: "z".into(), magnitudes: Given::default() };
 /// assert_eq!(effect.force(&[0.5], 0.0, 0.0, 2.0), -4.0);

@@ -1,7 +1,7 @@
 //! Effects from files.
 
-use crate::foreign::{MESSAGE, check_names, one_line, read_text};
-use crate::twin::{Effects, UnmodelledEffect};
+use crate::effect::{Effects, UnmodelledEffect};
+use crate::storage::untrusted::{MESSAGE, check_names, one_line, read_text};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,6 @@
 //! Laws, and the magnitudes that go with them, that sensors and actuators share.
 
-use crate::twin::Magnitude;
+use crate::effect::Magnitude;
 
 /// Samples that a delay keeps: the present one and 63 before it. Each is a state for whoever simulates or filters
 /// the twin, so there are no more of them than delays in practice need.

@@ -1,10 +1,8 @@
 //! All effects of the library, and where in a twin each can stand.
 
 use super::*;
-use crate::twin::{
-    DigitalTwin, Effects, Law, Magnitude, Noise, Now, Outline, ParameterSpace, Role, StateSpace,
-    targets,
-};
+use crate::effect::{Effects, Law, Magnitude, targets};
+use crate::twin::{DigitalTwin, Noise, Now, Outline, ParameterSpace, Role, StateSpace};
 
 /// What an effect is, for people and tables.
 ///

@@ -1,6 +1,6 @@
 //! A loss in proportion to the state.
 
-use crate::twin::{Given, Law, Magnitude, UnmodelledEffect};
+use crate::effect::{Given, Law, Magnitude, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// Leakage, cooling, viscous friction: ẋ − rate·x.
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::LinearLoss;
-/// use truetwin::twin::{Given, UnmodelledEffect};
+/// use truetwin::effect::{Given, UnmodelledEffect};
 ///
 /// let effect = LinearLoss { target: "x".into(), magnitudes: Given::default() };
 /// assert_eq!(effect.force(&[0.5], 0.0, 2.0, 0.0), -1.0);

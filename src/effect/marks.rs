@@ -1,6 +1,6 @@
 //! Marks that signal effects leave on measured outputs.
 
-use crate::twin::Mark;
+use crate::effect::Mark;
 
 /// Equal values at an end that noise does not bring about, and how many times more often than a usual value they come.
 const TIES: usize = 4;

@@ -44,7 +44,6 @@
 //! Copy the nearest neighbour, change the law, and name it in `effect/mod.rs`: `mod`, `pub use`, the table above and the list
 //! below (a test compares both). Outside of this crate, implement [`UnmodelledEffect`] under an id of your own; files then know it too.
 
-use crate::twin::{Given, UnmodelledEffect};
 use std::sync::Arc;
 
 /// What every effect answers from its fields: target, given magnitudes, and the other state where there is one.
@@ -73,6 +72,7 @@ mod actuator_gain;
 mod actuator_lag;
 mod actuator_rate_limit;
 mod actuator_saturation;
+mod augment;
 mod constant_forcing;
 mod coulomb_friction;
 mod cross_coupling;
@@ -99,6 +99,7 @@ mod sensor_quantization;
 mod sensor_rectification;
 mod sensor_saturation;
 mod state_ceiling;
+mod unmodelled;
 
 pub use actuator_backlash::ActuatorBacklash;
 pub use actuator_bias::ActuatorBias;
@@ -108,6 +109,8 @@ pub use actuator_gain::ActuatorGain;
 pub use actuator_lag::ActuatorLag;
 pub use actuator_rate_limit::ActuatorRateLimit;
 pub use actuator_saturation::ActuatorSaturation;
+pub(crate) use augment::augment_short;
+pub use augment::{augment, given_magnitudes};
 pub use constant_forcing::ConstantForcing;
 pub use coulomb_friction::CoulombFriction;
 pub use cross_coupling::CrossCoupling;
@@ -133,6 +136,10 @@ pub use sensor_quantization::SensorQuantization;
 pub use sensor_rectification::SensorRectification;
 pub use sensor_saturation::SensorSaturation;
 pub use state_ceiling::StateCeiling;
+pub use unmodelled::{
+    EffectError, Effects, Given, Instant, Law, Magnitude, Mark, NOISE_ENTERS, UnmodelledEffect,
+};
+pub(crate) use unmodelled::{check_effects, targets};
 
 /// One line of the library: how to make the effect, and its law in words.
 struct Member {

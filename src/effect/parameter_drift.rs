@@ -1,6 +1,6 @@
 //! A parameter that wears off.
 
-use crate::twin::{Given, Law, Magnitude, UnmodelledEffect};
+use crate::effect::{Given, Law, Magnitude, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// Wear, fouling, warming up: θ·(1 + rate·t).
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::ParameterDrift;
-/// use truetwin::twin::{Given, UnmodelledEffect};
+/// use truetwin::effect::{Given, UnmodelledEffect};
 ///
 /// let effect = ParameterDrift { target: "k".into(), magnitudes: Given::default() };
 /// assert_eq!(effect.parameter(&[0.5], 1.0, 4.0), 6.0);

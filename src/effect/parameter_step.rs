@@ -1,6 +1,6 @@
 //! A parameter that jumps.
 
-use crate::twin::{Given, Law, Magnitude, UnmodelledEffect};
+use crate::effect::{Given, Law, Magnitude, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// A fault or a switch: θ·(1 + size) from a time on, that instant included.
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::ParameterStep;
-/// use truetwin::twin::{Given, UnmodelledEffect};
+/// use truetwin::effect::{Given, UnmodelledEffect};
 ///
 /// let effect = ParameterStep { target: "k".into(), magnitudes: Given::default() };
 /// let at = |t| effect.parameter(&[0.5, 10.0], t, 4.0); // size, time

@@ -1,6 +1,6 @@
 //! A push that comes and goes.
 
-use crate::twin::{Given, Law, Magnitude, UnmodelledEffect};
+use crate::effect::{Given, Law, Magnitude, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 ///
 /// ```
 /// use truetwin::effect::PeriodicDisturbance;
-/// use truetwin::twin::{Given, UnmodelledEffect};
+/// use truetwin::effect::{Given, UnmodelledEffect};
 ///
 /// let effect = PeriodicDisturbance { target: "x".into(), magnitudes: Given::default() };
 /// let force = effect.force(&[0.5, 0.25, 0.0], 1.0, 0.0, 0.0); // a quarter of a period

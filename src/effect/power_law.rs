@@ -1,7 +1,7 @@
 //! A loss with an unknown power of the state.
 
 use super::laws::sign;
-use crate::twin::{Given, Law, Magnitude, UnmodelledEffect};
+use crate::effect::{Given, Law, Magnitude, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// An outflow or friction law that the twin lacks: ẋ − c·|x|^e·sign x, with sign 0 = 0. Below 0 it corrects a law that takes
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::PowerLaw;
-/// use truetwin::twin::{Given, UnmodelledEffect};
+/// use truetwin::effect::{Given, UnmodelledEffect};
 ///
 /// let effect = PowerLaw { target: "x".into(), magnitudes: Given::default() };
 /// assert_eq!(effect.force(&[0.5, 1.5], 0.0, 4.0, 0.0), -4.0);

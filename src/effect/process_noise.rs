@@ -1,6 +1,6 @@
 //! A process noisier than the twin says.
 
-use crate::twin::{Given, Law, Magnitude, UnmodelledEffect};
+use crate::effect::{Given, Law, Magnitude, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// White noise on a state, an increment N(0, std²) a step, in quadrature with the twin's own.
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::ProcessNoise;
-/// use truetwin::twin::{Given, UnmodelledEffect};
+/// use truetwin::effect::{Given, UnmodelledEffect};
 ///
 /// let effect = ProcessNoise { target: "x".into(), magnitudes: Given::default() };
 /// assert_eq!(effect.noise_level(&[0.3]), 0.3); // joins the increment of the twin in quadrature

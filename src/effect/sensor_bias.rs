@@ -1,6 +1,6 @@
 //! A sensor whose zero is off.
 
-use crate::twin::{Given, Instant, Law, Magnitude, UnmodelledEffect};
+use crate::effect::{Given, Instant, Law, Magnitude, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// A constant error of the zero: s + offset.
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::SensorBias;
-/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+/// use truetwin::effect::{Given, Instant, UnmodelledEffect};
 ///
 /// let effect = SensorBias { target: "sensor".into(), magnitudes: Given::default() };
 /// let now = Instant { t: 2.0, dt: 0.5 };

@@ -1,7 +1,7 @@
 //! A sensor that reports late.
 
 use super::laws::{DELAY, DELAY_SAMPLES, check_delay, delay};
-use crate::twin::{Given, Instant, Law, Magnitude, UnmodelledEffect};
+use crate::effect::{Given, Instant, Law, Magnitude, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// A dead time: s(t − delay), linear between samples, the first value before the start.
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::SensorDelay;
-/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+/// use truetwin::effect::{Given, Instant, UnmodelledEffect};
 ///
 /// let effect = SensorDelay { target: "sensor".into(), magnitudes: Given::default() };
 /// let now = Instant { t: 2.0, dt: 0.5 };
@@ -64,7 +64,9 @@ impl UnmodelledEffect for SensorDelay {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::{DigitalTwin, Drive, Noise, Signal, augment, augment_short};
+    use crate::effect::{augment, augment_short};
+    use crate::record::{Drive, Signal};
+    use crate::twin::{DigitalTwin, Noise};
     use crate::twins::CascadedTanks;
     use std::sync::Arc;
 

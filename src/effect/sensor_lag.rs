@@ -1,7 +1,7 @@
 //! A sensor that follows slowly.
 
 use super::laws::{TAU, lag};
-use crate::twin::{Given, Instant, Law, Magnitude, UnmodelledEffect};
+use crate::effect::{Given, Instant, Law, Magnitude, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// A first-order lag: z ← a·z + (1 − a)·s with a = exp(−Δt/τ); the reading is z, which starts at the first s.
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::SensorLag;
-/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+/// use truetwin::effect::{Given, Instant, UnmodelledEffect};
 ///
 /// let effect = SensorLag { target: "sensor".into(), magnitudes: Given::default() };
 /// let now = Instant { t: 2.0, dt: 0.5 };

@@ -1,6 +1,6 @@
 //! A sensor noisier than the twin says.
 
-use crate::twin::{Given, Law, Magnitude, NOISE_ENTERS, UnmodelledEffect};
+use crate::effect::{Given, Law, Magnitude, NOISE_ENTERS, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// White measurement noise that joins the twin's in quadrature: variance r² + std².
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::SensorNoise;
-/// use truetwin::twin::{Given, UnmodelledEffect};
+/// use truetwin::effect::{Given, UnmodelledEffect};
 ///
 /// let effect = SensorNoise { target: "sensor".into(), magnitudes: Given::default() };
 /// assert_eq!(effect.noise_level(&[0.3]), 0.3); // joins the noise of the twin in quadrature

@@ -1,6 +1,7 @@
 //! A sensor that is now and then wrong.
 
-use crate::twin::{Given, Law, Magnitude, Outliers, Source, UnmodelledEffect};
+use crate::effect::{Given, Law, Magnitude, UnmodelledEffect};
+use crate::twin::{Outliers, Source};
 use serde::{Deserialize, Serialize};
 
 /// Rare large errors after everything else: with the probability, N(0, scale²) is added to a sample.
@@ -9,7 +10,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::SensorOutliers;
-/// use truetwin::twin::{Given, UnmodelledEffect};
+/// use truetwin::effect::{Given, UnmodelledEffect};
 ///
 /// let effect = SensorOutliers { target: "sensor".into(), magnitudes: Given::default() };
 /// let hits = effect.outliers(&[0.05, 2.0]).ok_or("they are said for filters")?;

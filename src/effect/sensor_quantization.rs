@@ -1,7 +1,7 @@
 //! A sensor with coarse digits.
 
 use super::marks::rounded;
-use crate::twin::{Given, Instant, Law, Magnitude, Mark, UnmodelledEffect};
+use crate::effect::{Given, Instant, Law, Magnitude, Mark, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// Rounding to a multiple of the step, halves upwards: step·⌊s/step + ½⌋.
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::SensorQuantization;
-/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+/// use truetwin::effect::{Given, Instant, UnmodelledEffect};
 ///
 /// let effect = SensorQuantization { target: "sensor".into(), magnitudes: Given::default() };
 /// let now = Instant { t: 2.0, dt: 0.5 };

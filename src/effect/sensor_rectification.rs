@@ -1,6 +1,6 @@
 //! A sensor that loses the sign.
 
-use crate::twin::{Given, Instant, Law, Magnitude, UnmodelledEffect};
+use crate::effect::{Given, Instant, Law, Magnitude, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// A part f of the signal is rectified: (1 − f)·s + f·|s|.
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::SensorRectification;
-/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+/// use truetwin::effect::{Given, Instant, UnmodelledEffect};
 ///
 /// let effect = SensorRectification { target: "sensor".into(), magnitudes: Given::default() };
 /// let now = Instant { t: 2.0, dt: 0.5 };

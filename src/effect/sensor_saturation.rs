@@ -2,7 +2,7 @@
 
 use super::laws::{HIGH, LOW, clamp};
 use super::marks::clipped;
-use crate::twin::{Given, Instant, Law, Magnitude, Mark, UnmodelledEffect};
+use crate::effect::{Given, Instant, Law, Magnitude, Mark, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// A limited range, after the noise: clamp(s, low, high).
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::SensorSaturation;
-/// use truetwin::twin::{Given, Instant, UnmodelledEffect};
+/// use truetwin::effect::{Given, Instant, UnmodelledEffect};
 ///
 /// let effect = SensorSaturation { target: "sensor".into(), magnitudes: Given::default() };
 /// let now = Instant { t: 2.0, dt: 0.5 };

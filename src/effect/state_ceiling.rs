@@ -1,6 +1,6 @@
 //! A vessel that overflows.
 
-use crate::twin::{Given, Law, Magnitude, UnmodelledEffect};
+use crate::effect::{Given, Law, Magnitude, UnmodelledEffect};
 use serde::{Deserialize, Serialize};
 
 /// A ceiling on a state, after each step: what exceeds the level is cut, and the part spill of it is added to the state
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// use truetwin::effect::StateCeiling;
-/// use truetwin::twin::{Given, UnmodelledEffect};
+/// use truetwin::effect::{Given, UnmodelledEffect};
 ///
 /// let effect = StateCeiling { target: "x".into(), to: "z".into(), magnitudes: Given::default() };
 /// let (mut x, mut other) = (3.0, 1.0);

@@ -1,6 +1,6 @@
 //! Names that come from outside: of twins, parameters and channels.
 
-use crate::foreign::hidden;
+use crate::storage::untrusted::hidden;
 
 /// Longest name or unit, in characters.
 const LONGEST: usize = 100;

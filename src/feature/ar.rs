@@ -2,7 +2,8 @@
 
 use super::regression::coefficients;
 use super::{FeatureError, FeatureMap, FeatureRecipe};
-use crate::twin::{DigitalTwin, Drive, Signal};
+use crate::record::{Drive, Signal};
+use crate::twin::DigitalTwin;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -19,7 +20,8 @@ use std::sync::Arc;
 /// ```
 /// use std::sync::Arc;
 /// use truetwin::feature::{Ar, FeatureRecipe};
-/// use truetwin::twin::{DigitalTwin, Drive, Signal};
+/// use truetwin::record::{Drive, Signal};
+/// use truetwin::twin::DigitalTwin;
 /// use truetwin::twins::VanDerPol;
 ///
 /// let twin: Arc<dyn DigitalTwin> = Arc::new(VanDerPol);

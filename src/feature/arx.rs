@@ -2,7 +2,8 @@
 
 use super::regression::coefficients;
 use super::{FeatureError, FeatureMap, FeatureRecipe};
-use crate::twin::{DigitalTwin, Drive, Signal};
+use crate::record::{Drive, Signal};
+use crate::twin::DigitalTwin;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -19,7 +20,8 @@ use std::sync::Arc;
 /// ```
 /// use std::sync::Arc;
 /// use truetwin::feature::{Arx, FeatureRecipe};
-/// use truetwin::twin::{DigitalTwin, Drive, Noise};
+/// use truetwin::record::Drive;
+/// use truetwin::twin::{DigitalTwin, Noise};
 /// use truetwin::twins::CascadedTanks;
 ///
 /// let twin: Arc<dyn DigitalTwin> = Arc::new(CascadedTanks);
@@ -86,7 +88,8 @@ impl FeatureMap for Bound {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::{Noise, Now, Outline, Parameter, ParameterSpace, Quantity, StateSpace};
+    use crate::record::Quantity;
+    use crate::twin::{Noise, Now, Outline, Parameter, ParameterSpace, StateSpace};
 
     /// Two inputs and two outputs: y₁ ← 0.7·y₁ + u₁ − 2·u₂, y₂ ← 0.2·y₂ + 3·u₁.
     struct Linear;

@@ -1,7 +1,8 @@
 //! The output's deviation from a reference run, in block means.
 
 use super::{FeatureError, FeatureMap, FeatureRecipe};
-use crate::twin::{DigitalTwin, Drive, Signal, free_run};
+use crate::record::{Drive, Signal};
+use crate::twin::{DigitalTwin, free_run};
 use serde::{Deserialize, Serialize};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -19,7 +20,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// ```
 /// use std::sync::Arc;
 /// use truetwin::feature::{Deviation, FeatureRecipe};
-/// use truetwin::twin::{DigitalTwin, Drive, Noise};
+/// use truetwin::record::Drive;
+/// use truetwin::twin::{DigitalTwin, Noise};
 /// use truetwin::twins::VanDerPol;
 ///
 /// let twin: Arc<dyn DigitalTwin> = Arc::new(VanDerPol);

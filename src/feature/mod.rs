@@ -23,9 +23,10 @@ pub use arx::Arx;
 pub use deviation::Deviation;
 pub use score::Score;
 
-use crate::filter::FilterError;
+use crate::likelihood::kalman::FilterError;
 use crate::math::LeastSquaresError;
-use crate::twin::{DigitalTwin, Drive, Noise, Record, Signal, SimulationError};
+use crate::record::{Drive, Record, Signal};
+use crate::twin::{DigitalTwin, Noise, SimulationError};
 use nalgebra::DMatrix;
 use std::fmt::Debug;
 use std::sync::Arc;
@@ -37,7 +38,8 @@ use std::sync::Arc;
 /// ```
 /// use std::sync::Arc;
 /// use truetwin::feature::{Centred, FeatureMap, FeatureRecipe, Score};
-/// use truetwin::twin::{DigitalTwin, Drive, Noise, Record};
+/// use truetwin::record::{Drive, Record};
+/// use truetwin::twin::{DigitalTwin, Noise};
 /// use truetwin::twins::VanDerPol;
 ///
 /// let twin: Arc<dyn DigitalTwin> = Arc::new(VanDerPol);
@@ -80,7 +82,8 @@ pub trait FeatureMap: Send + Sync {
 /// ```
 /// use std::sync::Arc;
 /// use truetwin::feature::{Ar, Centred, FeatureRecipe};
-/// use truetwin::twin::{DigitalTwin, Drive, Noise, Record};
+/// use truetwin::record::{Drive, Record};
+/// use truetwin::twin::{DigitalTwin, Noise};
 /// use truetwin::twins::VanDerPol;
 ///
 /// let twin: Arc<dyn DigitalTwin> = Arc::new(VanDerPol);
@@ -112,7 +115,8 @@ debug_by_name!(Centred);
 /// use serde::{Deserialize, Serialize};
 /// use std::sync::Arc;
 /// use truetwin::feature::{FeatureError, FeatureMap, FeatureRecipe};
-/// use truetwin::twin::{DigitalTwin, Drive, Signal};
+/// use truetwin::record::{Drive, Signal};
+/// use truetwin::twin::DigitalTwin;
 /// use truetwin::twins::VanDerPol;
 ///
 /// /// The mean square of the first output.
@@ -152,7 +156,8 @@ pub trait FeatureRecipe: Debug + Send + Sync {
 /// ```
 /// use std::sync::Arc;
 /// use truetwin::feature::{Ar, FeatureError, FeatureRecipe};
-/// use truetwin::twin::{DigitalTwin, Drive, Signal};
+/// use truetwin::record::{Drive, Signal};
+/// use truetwin::twin::DigitalTwin;
 /// use truetwin::twins::VanDerPol;
 ///
 /// let twin: Arc<dyn DigitalTwin> = Arc::new(VanDerPol);
@@ -222,7 +227,8 @@ fn check_varies(outputs: &Signal) -> Result<(), FeatureError> {
 
 #[cfg(test)]
 mod testing {
-    use crate::twin::{Now, Outline, Parameter, ParameterSpace, Quantity, StateSpace};
+    use crate::record::Quantity;
+    use crate::twin::{Now, Outline, Parameter, ParameterSpace, StateSpace};
 
     /// One state, `inputs` inputs, one output: ẋ = −k·x + Σu.
     pub(super) struct Tank(pub usize);

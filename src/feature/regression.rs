@@ -2,7 +2,7 @@
 
 use super::{FeatureError, check_varies};
 use crate::math::{Fit, Lagged, LaggedSignals, LeastSquares, LeastSquaresError};
-use crate::twin::Signal;
+use crate::record::Signal;
 use nalgebra::DMatrix;
 
 /// Coefficients of each output on its own last `p` values and the last `q` of each input:

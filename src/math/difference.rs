@@ -167,7 +167,7 @@ impl Stencil {
 /// Why there is no finite-difference Jacobian.
 ///
 /// ```
-/// use truetwin::filter::FilterError;
+/// use truetwin::likelihood::kalman::FilterError;
 /// use truetwin::math::DifferenceError;
 ///
 /// /// Whether a filter's search failed for want of derivatives.

@@ -3,8 +3,8 @@
 use super::adam::{Adam, Moments};
 use super::{History, NamedTensor, NetworkError};
 use super::{bytes_of, values_of};
-use crate::files::{replace, sha256, with_remedy};
-use crate::foreign::read_kept;
+use crate::storage::files::{replace, sha256, with_remedy};
+use crate::storage::untrusted::read_kept;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;

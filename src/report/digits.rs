@@ -1,6 +1,6 @@
 //! Numbers for people: as many digits as they are worth.
 
-use crate::twin::Quantity;
+use crate::record::Quantity;
 
 /// Significant digits of a standard error, and of a number without one.
 const OF_ERROR: i32 = 2;

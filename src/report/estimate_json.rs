@@ -1,8 +1,8 @@
 //! An estimate as JSON, `truetwin.estimate/1`.
 
-use crate::refine::Direction;
+use crate::estimator::refine::Direction;
+use crate::estimator::{Estimate, INTERVAL_LEVEL};
 use crate::study::Study;
-use crate::two_stage::{Estimate, INTERVAL_LEVEL};
 use serde_json::{Value, json};
 
 /// The estimate as one JSON object, `truetwin.estimate/1`.

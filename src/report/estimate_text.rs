@@ -1,9 +1,9 @@
 //! An estimate as a person reads it on the terminal.
 
 use super::digits::{self, Digits, probability, short, unit_suffix};
+use crate::estimator::{Estimate, INTERVAL_LEVEL};
 use crate::study::Study;
 use crate::twin::{Parameter, Role};
-use crate::two_stage::{Estimate, INTERVAL_LEVEL};
 
 /// Columns and lines that an estimate takes at most.
 const COLUMNS: usize = 100;

@@ -8,12 +8,13 @@ use crate::diagnose::{
     Equation, FittedNuisance, FittedParameter, FreeRuns, Lag, Maps, NextInput, Onset, Region,
     Shrinkage, TargetShare, Term, TermRange, Verdict, Visible, Where, Which, Window, diagnose,
 };
+use crate::estimator::{Estimate, EstimateOptions, PretrainOptions, pretrain};
+use crate::evaluate::trials::{Kind, Named, Outcome, Row, Scorecard};
 use crate::progress::Progress;
+use crate::record::{Drive, Record, Signal};
 use crate::study::{RecordPlan, Study, StudyFile};
-use crate::twin::{Drive, Interval, Noise, Record, Signal};
+use crate::twin::{Interval, Noise};
 use crate::twins::VanDerPol;
-use crate::two_stage::{Estimate, EstimateOptions, PretrainOptions, pretrain};
-use crate::withheld::{Kind, Named, Outcome, Row, Scorecard};
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -56,7 +57,7 @@ pub(super) fn oscillator() -> Study {
 
 /// The study of [`made::tanks_class`].
 pub(super) fn tanks() -> Study {
-    let studies = crate::experiment::reference_studies().unwrap();
+    let studies = crate::evaluate::paper::reference_studies().unwrap();
     studies.into_iter().find(|s| s.name() == "tanks").unwrap()
 }
 
@@ -67,7 +68,7 @@ pub(super) fn diagnoses() -> &'static [Diagnosis] {
         let study = oscillator();
         let effects = "[[effect]]\nid = 'cubic-stiffness'\ntarget = 'x2'\nfrom = 'x1'\n";
         let effects = crate::effect::parse_effects(effects).unwrap();
-        let stiff = crate::twin::augment(study.twin().clone(), effects).unwrap();
+        let stiff = crate::effect::augment(study.twin().clone(), effects).unwrap();
         let stiff_record = |sample| {
             let noise = Noise::new(7, "report", sample);
             let drive = study.drives().unwrap().draw(noise).unwrap();

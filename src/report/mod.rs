@@ -16,6 +16,8 @@
 //! use truetwin::progress::Progress;
 //! use truetwin::report::*;
 //! use truetwin::study::{RecordPlan, Study};
+//! use truetwin::effect::*;
+//! use truetwin::record::*;
 //! use truetwin::twin::*;
 //! use truetwin::twins::VanDerPol;
 //!
@@ -41,10 +43,10 @@
 //! ```
 //!
 //! ```
-//! use truetwin::experiment::{Benchmark, FreeRuns, MeanRuns, MonteCarlo, Scenario, reference_studies, score};
+//! use truetwin::evaluate::paper::{Benchmark, FreeRuns, MeanRuns, MonteCarlo, Scenario, reference_studies, score};
 //! use truetwin::progress::Progress;
 //! use truetwin::report::*;
-//! use truetwin::two_stage::{EstimateOptions, PretrainOptions, pretrain};
+//! use truetwin::estimator::{EstimateOptions, PretrainOptions, pretrain};
 //!
 //! let study = &reference_studies()?[0];
 //! let small = PretrainOptions { bank_size: Some(200), epochs: Some(2), ..PretrainOptions::default() };
@@ -71,7 +73,7 @@
 //!
 //! ```
 //! use truetwin::report::{scorecard_html, scorecard_json, scorecard_text};
-//! use truetwin::withheld::Scorecard;
+//! use truetwin::evaluate::trials::Scorecard;
 //!
 //! let card = Scorecard::new("tanks", 1, 0.05, "0f1e", vec![]); // of no trial yet
 //! assert_eq!(scorecard_json(&card)["schema"], "truetwin.scorecard/1");

@@ -2,8 +2,8 @@
 
 use super::chart::{Chart, Panel, Series, Style};
 use super::digits::{short, unit_suffix};
+use crate::record::{Quantity, Record, Signal};
 use crate::study::Study;
-use crate::twin::{Quantity, Record, Signal};
 
 /// Height of a panel of residuals over that of one of outputs.
 const RESIDUAL_HEIGHT: f64 = 110.0;
@@ -12,7 +12,7 @@ const RESIDUAL_HEIGHT: f64 = 110.0;
 /// below what is left, record − twin. Root mean squares of that, per output, stand in the legends.
 ///
 /// `before` is the run at the network's first estimate (`None` where it was kept), `after` the run at the calibrated
-/// θ; both N × channels, as [`crate::two_stage::Tracking::outputs`].
+/// θ; both N × channels, as [`crate::estimator::Tracking::outputs`].
 pub fn overlay_svg(
     study: &Study,
     record: &Record,
@@ -107,11 +107,10 @@ fn panels(record: &Record, channel: usize, quantity: &Quantity, runs: &[Run<'_>]
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::{Drive, Signals};
     use crate::report::fixture::estimates;
     use crate::study::RecordPlan;
-    use crate::twin::{
-        DigitalTwin, Drive, Noise, Parameter, ParameterSpace, Signals, SimulationError,
-    };
+    use crate::twin::{DigitalTwin, Noise, Parameter, ParameterSpace, SimulationError};
 
     #[test]
     fn before_and_after_are_told_apart_with_their_errors() {

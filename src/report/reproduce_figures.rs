@@ -2,10 +2,10 @@
 
 use super::chart::{Chart, Panel, Series, Style, roomy};
 use super::digits::named;
-use crate::baseline::Initialisation::Bad;
-use crate::experiment::{FreeRuns, MeanRuns, Method};
+use crate::evaluate::baseline::Initialisation::Bad;
+use crate::evaluate::paper::{FreeRuns, MeanRuns, Method};
+use crate::record::Signal;
 use crate::study::Study;
-use crate::twin::Signal;
 
 /// Which methods a panel shows.
 type Belongs = fn(Method) -> bool;

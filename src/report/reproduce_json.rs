@@ -1,8 +1,8 @@
 //! Scores over many records as JSON, `truetwin.reproduce/1`.
 
-use crate::experiment::{COVERAGE_LEVEL, MethodScore, MonteCarlo, Scenario, Scores};
+use crate::estimator::INTERVAL_LEVEL;
+use crate::evaluate::paper::{COVERAGE_LEVEL, MethodScore, MonteCarlo, Scenario, Scores};
 use crate::study::{PresetName, Study};
-use crate::two_stage::INTERVAL_LEVEL;
 use serde_json::{Map, Value, json};
 
 /// The scores as one JSON object, `truetwin.reproduce/1`.

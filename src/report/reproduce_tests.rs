@@ -2,13 +2,13 @@
 
 use super::fixture::validator;
 use super::{first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
-use crate::experiment::{
+use crate::estimator::{PretrainOptions, pretrain};
+use crate::evaluate::paper::{
     Benchmark, FreeRuns, MeanRuns, Method, MonteCarlo, Run, Scenario, Scores, reference_studies,
     score,
 };
 use crate::progress::Progress;
 use crate::study::{PresetName, Study};
-use crate::two_stage::{PretrainOptions, pretrain};
 use std::sync::OnceLock;
 
 struct Made {

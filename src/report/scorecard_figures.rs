@@ -2,7 +2,7 @@
 
 use super::chart::{Bar, BarChart, BarGroup, Chart, Dot, Dots, Panel, Series, Style};
 use super::scorecard_html::of;
-use crate::withheld::{Count, Range, Scorecard};
+use crate::evaluate::trials::{Count, Range, Scorecard};
 
 /// Detection by strength; `None` without trials.
 pub(super) fn strengths_svg(card: &Scorecard) -> Option<String> {

@@ -6,7 +6,7 @@ use super::page::Column::{Number, Text};
 use super::page::{Section, Shade, figure, folded, matrix, page, paragraph, table};
 use super::scorecard_figures::{gains_svg, nats, reliability_svg, strengths_svg};
 use super::scorecard_text::{named_scores, rule};
-use crate::withheld::{Count, Row, Scorecard};
+use crate::evaluate::trials::{Count, Row, Scorecard};
 use std::collections::BTreeMap;
 
 /// The scorecard as a self-contained page: scores with intervals, kinds, detection against magnitude, reliability, the

@@ -1,6 +1,6 @@
 //! Scores of withheld trials as JSON, `truetwin.scorecard/1`.
 
-use crate::withheld::{Count, LEVEL, Range, Row, Scorecard};
+use crate::evaluate::trials::{Count, LEVEL, Range, Row, Scorecard};
 use serde_json::{Value, json};
 
 /// The scorecard as one JSON object, `truetwin.scorecard/1`.

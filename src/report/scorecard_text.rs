@@ -1,7 +1,7 @@
 //! Scores of withheld trials on the terminal.
 
 use super::table::table;
-use crate::withheld::{Count, Kind, Scorecard};
+use crate::evaluate::trials::{Count, Kind, Scorecard};
 
 /// The scorecard: the scores, then each kind of truth.
 pub fn scorecard_text(card: &Scorecard) -> String {

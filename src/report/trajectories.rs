@@ -1,6 +1,6 @@
 //! The trajectories behind the overlay, as a table.
 
-use crate::twin::{Record, Signal};
+use crate::record::{Record, Signal};
 
 /// CSV with a row a sample: `t`, then for each output what was measured, and what the twin shows without noise before
 /// (where it is given) and after calibration: `y`, `before`, `after`, numbered where there are several outputs.
@@ -33,7 +33,7 @@ pub fn trajectories_csv(record: &Record, before: Option<&Signal>, after: &Signal
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::Drive;
+    use crate::record::Drive;
 
     #[test]
     fn one_column_a_line_of_the_picture() {

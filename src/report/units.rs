@@ -2,8 +2,9 @@
 
 use super::digits::{short, unit_suffix};
 use crate::diagnose::EffectFit;
+use crate::effect::{Effects, Law, UnmodelledEffect};
+use crate::record::Quantity;
 use crate::study::Study;
-use crate::twin::{Effects, Law, Quantity, UnmodelledEffect};
 
 /// The quantities of a twin, and the effects that it may lack.
 pub(super) struct Units {
@@ -130,7 +131,7 @@ fn channel<'a>(channels: &'a [Quantity], target: &str) -> &'a str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::experiment::reference_studies;
+    use crate::evaluate::paper::reference_studies;
 
     fn fit(id: &str, target: &str, magnitudes: &[(&str, f64)]) -> EffectFit {
         EffectFit {

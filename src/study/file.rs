@@ -1,10 +1,12 @@
 //! The study file: a twin in the user's own setting.
 
+use crate::effect::Effects;
 use crate::feature::FeatureRecipe;
-use crate::files::{folder, with_remedy};
-use crate::foreign::{MESSAGE, check_names, one_line, read_text};
+use crate::record::{CsvError, read_drive};
+use crate::storage::files::{folder, with_remedy};
+use crate::storage::untrusted::{MESSAGE, check_names, one_line, read_text};
 use crate::study::plan::InputPlan;
-use crate::twin::{CsvError, Effects, Interval, Level, read_drive};
+use crate::twin::{Interval, Level};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,9 +1,9 @@
 //! What work over a study depends on, as far as the study decides it.
 
 use super::{InputPlan, Study};
-use crate::files::sha256;
+use crate::storage::files::sha256;
+use crate::storage::work::{Manifest, WorkError, checksum};
 use crate::twin::Noise;
-use crate::work::{Manifest, WorkError, checksum};
 use serde_json::{Value, json};
 
 impl Study {

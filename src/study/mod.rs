@@ -5,18 +5,17 @@ mod manifest;
 mod plan;
 mod settings;
 
-pub use crate::sample::CloudSampler;
+pub use crate::estimator::sample::CloudSampler;
 pub use file::{Library, RecordTable, StudyFile, StudyFileError};
 pub use plan::{DriveSource, InputPlan, Levels, PlanError, RecordPlan};
 pub use settings::{CloudSettings, Inputs, Preset, PresetName, Settings};
 
+use crate::effect::{EffectError, Effects, UnmodelledEffect, augment, given_magnitudes};
 use crate::feature::{Ar, Arx, FeatureError, FeatureMap, FeatureRecipe, Score};
 use crate::network::{Architecture, Deep, HeadArchitecture, architecture};
+use crate::record::{CsvError, Drive, Record, RecordError};
 use crate::twin::conformance::{Finding, Severity};
-use crate::twin::{
-    Adaptation, AdaptationError, CsvError, DigitalTwin, Drive, EffectError, Effects, Noise,
-    ParameterError, Record, RecordError, UnmodelledEffect, adapt, augment, fix, given_magnitudes,
-};
+use crate::twin::{Adaptation, AdaptationError, DigitalTwin, Noise, ParameterError, adapt, fix};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

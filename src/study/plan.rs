@@ -1,9 +1,8 @@
 //! What a simulated record looks like: step, length, input.
 
-use crate::foreign::MOST_NUMBERS;
-use crate::twin::{
-    CsvError, Drive, DriveError, Interval, Noise, Record, Signal, Signals, read_drive,
-};
+use crate::record::{CsvError, Drive, DriveError, Record, Signal, Signals, read_drive};
+use crate::storage::untrusted::MOST_NUMBERS;
+use crate::twin::{Interval, Noise};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -75,7 +74,7 @@ pub struct RecordPlan {
 ///
 /// ```
 /// use truetwin::study::{PlanError, RecordPlan};
-/// use truetwin::twin::Signals;
+/// use truetwin::record::Signals;
 ///
 /// // The twin has one input, and nothing says what it looks like.
 /// let error = RecordPlan::autonomous(0.1, 300).prepare(&Signals::default()).err();
@@ -218,7 +217,8 @@ impl RecordPlan {
 ///
 /// ```
 /// use truetwin::study::{DriveSource, RecordPlan};
-/// use truetwin::twin::{Noise, Signals};
+/// use truetwin::record::Signals;
+/// use truetwin::twin::Noise;
 ///
 /// let source: DriveSource = RecordPlan::levels(0.1, 300, 0.0, 1.0, 20).prepare(&Signals::default())?;
 /// let drive = source.draw(Noise::new(1, "input", 0))?;

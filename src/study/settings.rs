@@ -1,10 +1,10 @@
 //! How an estimator is trained and refined.
 
+use crate::estimator::gate::{GateForm, GateSettings};
+use crate::estimator::refine::RefineSettings;
+use crate::estimator::sample::CloudSampler;
 use crate::feature::FeatureRecipe;
-use crate::gate::{GateForm, GateSettings};
 use crate::network::{Architecture, Training};
-use crate::refine::RefineSettings;
-use crate::sample::CloudSampler;
 use crate::setting::SettingError;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;

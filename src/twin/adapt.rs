@@ -1,8 +1,9 @@
 //! A twin in another setting: prior, bounds, limits, noise and start changed from outside.
 
-use super::{
-    DigitalTwin, Drive, Integrator, Interval, Noise, Now, Outliers, Outline, Parameter,
-    ParameterError, ParameterSpace, Role, Signal, Signals, SimulationError, StateSpace,
+use crate::record::{Drive, Signal, Signals};
+use crate::twin::{
+    DigitalTwin, Integrator, Interval, Noise, Now, Outliers, Outline, Parameter, ParameterError,
+    ParameterSpace, Role, SimulationError, StateSpace,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -1,6 +1,6 @@
 //! One step of any equations: of one state, or of all points of a filter at once.
 
-use super::{Interval, Now, StateSpace, Workspace};
+use crate::twin::{Interval, Now, StateSpace, Workspace};
 
 /// What every twin with equations can do, and none in its own way: the step.
 ///

@@ -1,19 +1,18 @@
 //! What is wrong with a new twin, found before any training: [`check`] in a test, `truetwin check` in a shell.
 //!
 //! ```
-//! use truetwin::twin::Drive;
+//! use truetwin::record::Drive;
 //! use truetwin::twin::conformance::{Finding, Severity, check};
 //! use truetwin::twins::CascadedTanks;
 //!
 //! let drive = Drive::new(4.0, ndarray::Array2::ones((50, 1)))?;
 //! let worst = check(&CascadedTanks, &drive, 1).into_iter().max_by_key(|f: &Finding| f.severity);
 //! assert!(worst.is_some_and(|finding| finding.severity < Severity::Failure));
-//! # Ok::<(), truetwin::twin::DriveError>(())
+//! # Ok::<(), truetwin::record::DriveError>(())
 //! ```
 
-use super::{
-    DigitalTwin, Drive, Noise, PRIOR_DEVIATION, Signal, SimulationError, combination, free_run,
-};
+use crate::record::{Drive, Signal};
+use crate::twin::{DigitalTwin, Noise, PRIOR_DEVIATION, SimulationError, combination, free_run};
 use nalgebra::DMatrix;
 
 /// How bad a finding is.
@@ -67,14 +66,14 @@ const PAIRED: f64 = 1e-2;
 ///
 ///
 /// ```
-/// use truetwin::twin::Drive;
+/// use truetwin::record::Drive;
 /// use truetwin::twin::conformance::{Finding, Severity, check};
 /// use truetwin::twins::VanDerPol;
 ///
 /// let findings: Vec<Finding> = check(&VanDerPol, &Drive::autonomous(0.05, 100)?, 1);
 /// assert!(findings.iter().all(|finding| finding.severity < Severity::Failure));
 /// assert_eq!(findings[0].check, "parameters");
-/// # Ok::<(), truetwin::twin::DriveError>(())
+/// # Ok::<(), truetwin::record::DriveError>(())
 /// ```
 pub fn check(twin: &dyn DigitalTwin, drive: &Drive, seed: u64) -> Vec<Finding> {
     let space = twin.parameters();
@@ -319,7 +318,8 @@ fn free_run_jacobian(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::{Parameter, ParameterSpace, Quantity, Signals};
+    use crate::record::{Quantity, Signals};
+    use crate::twin::{Parameter, ParameterSpace};
     use std::sync::atomic::{AtomicU64, Ordering};
 
     /// y = a·b·k/10 + noise, with a flaw.

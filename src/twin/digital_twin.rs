@@ -1,6 +1,7 @@
 //! The one trait that every simulator has.
 
-use super::{Drive, Noise, ParameterSpace, Signal, StateSpace};
+use crate::record::{Drive, Signal, Signals};
+use crate::twin::{Noise, ParameterSpace, StateSpace};
 use std::error::Error;
 
 /// A simulator of a physical system: parameters and inputs in, outputs out.
@@ -17,6 +18,8 @@ use std::error::Error;
 /// - [`crate::twin::conformance`] tells whether a twin keeps to this.
 ///
 /// ```
+/// use truetwin::effect::*;
+/// use truetwin::record::*;
 /// use truetwin::twin::*;
 ///
 /// /// y = a·u + noise.
@@ -69,62 +72,11 @@ pub trait DigitalTwin: Send + Sync {
     }
 }
 
-/// A named physical quantity with its unit.
-///
-/// ```
-/// use truetwin::twin::Quantity;
-///
-/// let level = Quantity::new("h", "m");
-/// assert_eq!((level.name.as_str(), level.unit.as_str()), ("h", "m"));
-/// ```
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Quantity {
-    /// Name.
-    pub name: String,
-    /// Unit, for people.
-    pub unit: String,
-}
-
-impl Quantity {
-    /// `name` in `unit`.
-    pub fn new(name: &str, unit: &str) -> Self {
-        Self {
-            name: name.into(),
-            unit: unit.into(),
-        }
-    }
-}
-
-/// The channels of a twin.
-///
-/// ```
-/// use truetwin::twin::{DigitalTwin, Signals};
-/// use truetwin::twins::VanDerPol;
-///
-/// assert!(VanDerPol.signals().inputs.is_empty());
-/// assert_eq!(Signals::default().outputs[0].name, "y"); // of a black box that says nothing else
-/// ```
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Signals {
-    /// Inputs, in the order of a drive's columns.
-    pub inputs: Vec<Quantity>,
-    /// Outputs, in the order of a record's columns.
-    pub outputs: Vec<Quantity>,
-}
-
-impl Default for Signals {
-    fn default() -> Self {
-        Self {
-            inputs: vec![Quantity::new("u", "")],
-            outputs: vec![Quantity::new("y", "")],
-        }
-    }
-}
-
 /// Why a simulation gave no outputs.
 ///
 /// ```
-/// use truetwin::twin::{DigitalTwin, Drive, Noise, SimulationError};
+/// use truetwin::record::Drive;
+/// use truetwin::twin::{DigitalTwin, Noise, SimulationError};
 /// use truetwin::twins::VanDerPol;
 ///
 /// let drive = Drive::autonomous(1.0, 50)?; // far too large a step

@@ -1,9 +1,10 @@
 //! A twin with some parameters held at known values.
 
 use super::state_space::check_parameters;
-use super::{
-    DigitalTwin, Drive, Integrator, Interval, Noise, Now, Outliers, Outline, ParameterError,
-    ParameterSpace, Signal, Signals, SimulationError, StateSpace,
+use crate::record::{Drive, Signal, Signals};
+use crate::twin::{
+    DigitalTwin, Integrator, Interval, Noise, Now, Outliers, Outline, ParameterError,
+    ParameterSpace, SimulationError, StateSpace,
 };
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
@@ -193,7 +194,8 @@ impl DigitalTwin for FixedBlackBox {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::{Parameter, Quantity};
+    use crate::record::Quantity;
+    use crate::twin::Parameter;
 
     /// y = a + 10·b.
     struct Sum;

@@ -1,6 +1,7 @@
 //! The trajectory that a twin would show without noise.
 
-use super::{DigitalTwin, Drive, Noise, Signal, SimulationError};
+use crate::record::{Drive, Signal};
+use crate::twin::{DigitalTwin, Noise, SimulationError};
 
 /// Runs that a black box's free run is the mean of: its noise cannot be switched off from outside.
 pub const BLACK_BOX_SEEDS: u64 = 32;
@@ -8,7 +9,8 @@ pub const BLACK_BOX_SEEDS: u64 = 32;
 /// Outputs of a run without noise (N × channels); of a black box, the mean of 32 runs.
 ///
 /// ```
-/// use truetwin::twin::{DigitalTwin, Drive, Noise, free_run};
+/// use truetwin::record::Drive;
+/// use truetwin::twin::{DigitalTwin, Noise, free_run};
 /// use truetwin::twins::VanDerPol;
 ///
 /// let drive = Drive::autonomous(0.05, 10)?;

@@ -1,11 +1,13 @@
 //! Fixed-step integrators that carry the equations from one sample to the next.
 
-use super::Now;
+use crate::twin::Now;
 use serde::{Deserialize, Serialize};
 
 /// How the state is carried over one step Δt, the input held.
 ///
 /// ```
+/// use truetwin::effect::*;
+/// use truetwin::record::*;
 /// use truetwin::twin::*;
 ///
 /// /// ẋ = −k·x, exactly x(0)·exp(−k·t).

@@ -1,6 +1,6 @@
 //! What is estimated: names, units, prior box and physical bounds.
 
-use super::{Interval, Noise};
+use crate::twin::{Interval, Noise};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 

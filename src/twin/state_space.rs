@@ -1,8 +1,8 @@
 //! Twins that can show their equations, and the loop that simulates them.
 
-use super::{
-    Advance, DigitalTwin, Drive, Integrator, Interval, Noise, ParameterSpace, Quantity, Signal,
-    SimulationError, Workspace,
+use crate::record::{Drive, Quantity, Signal};
+use crate::twin::{
+    Advance, DigitalTwin, Integrator, Interval, Noise, ParameterSpace, SimulationError, Workspace,
 };
 
 /// A twin given by its equations
@@ -22,6 +22,8 @@ use super::{
 /// [`constrain`](Self::constrain), [`limits`](Self::limits). Row 0 is the start.
 ///
 /// ```
+/// use truetwin::effect::*;
+/// use truetwin::record::*;
 /// use truetwin::twin::*;
 ///
 /// /// A leaking tank: ḣ = u − k·h.
@@ -102,7 +104,8 @@ pub trait StateSpace: Advance + Send + Sync {
 ///
 /// ```
 /// use truetwin::effect::SensorOutliers;
-/// use truetwin::twin::{Given, Outliers, UnmodelledEffect};
+/// use truetwin::effect::{Given, UnmodelledEffect};
+/// use truetwin::twin::Outliers;
 ///
 /// let effect = SensorOutliers { target: "sensor".into(), magnitudes: Given::default() };
 /// assert_eq!(effect.outliers(&[0.05, 2.0]), Some(Outliers { probability: 0.05, scale: 2.0 }));

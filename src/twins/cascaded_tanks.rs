@@ -1,6 +1,7 @@
 //! Two water tanks, one above the other.
 
-use crate::twin::{Interval, Now, Outline, Parameter, ParameterSpace, Quantity, StateSpace};
+use crate::record::Quantity;
+use crate::twin::{Interval, Now, Outline, Parameter, ParameterSpace, StateSpace};
 
 /// Below this level the outflow law √h is evaluated here, so that its slope stays finite.
 const SMALLEST_LEVEL: f64 = 1e-6;
@@ -19,7 +20,8 @@ const SMALLEST_LEVEL: f64 = 1e-6;
 /// standard deviation is that of the authors' code.
 ///
 /// ```
-/// use truetwin::twin::{DigitalTwin, Drive, Noise, Signal};
+/// use truetwin::record::{Drive, Signal};
+/// use truetwin::twin::{DigitalTwin, Noise};
 /// use truetwin::twins::CascadedTanks;
 ///
 /// let drive = Drive::new(0.5, Signal::from_elem((2000, 1), 1.5))?;
@@ -78,7 +80,8 @@ impl StateSpace for CascadedTanks {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::{DigitalTwin, Drive, Noise, Signal};
+    use crate::record::{Drive, Signal};
+    use crate::twin::{DigitalTwin, Noise};
 
     fn step_response(theta: &[f64]) -> Signal {
         let drive = Drive::new(0.5, Signal::from_elem((2000, 1), 1.5)).unwrap();

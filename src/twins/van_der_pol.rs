@@ -1,6 +1,7 @@
 //! The van der Pol oscillator.
 
-use crate::twin::{Now, Outline, Parameter, ParameterSpace, Quantity, StateSpace};
+use crate::record::Quantity;
+use crate::twin::{Now, Outline, Parameter, ParameterSpace, StateSpace};
 
 /// Van der Pol oscillator with unknown damping ν:
 ///
@@ -14,7 +15,8 @@ use crate::twin::{Now, Outline, Parameter, ParameterSpace, Quantity, StateSpace}
 /// Source: Lakshminarayanan, Guerrero & Rojas, section V-A.
 ///
 /// ```
-/// use truetwin::twin::{DigitalTwin, Drive, Noise};
+/// use truetwin::record::Drive;
+/// use truetwin::twin::{DigitalTwin, Noise};
 /// use truetwin::twins::VanDerPol;
 ///
 /// let y = VanDerPol.simulate(&[1.0], &Drive::autonomous(0.05, 300)?, Noise::OFF)?;
@@ -59,7 +61,8 @@ impl StateSpace for VanDerPol {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::{DigitalTwin, Drive, Noise};
+    use crate::record::Drive;
+    use crate::twin::{DigitalTwin, Noise};
 
     /// For large t the amplitude of the limit cycle is close to 2, whatever ν.
     #[test]

@@ -8,12 +8,12 @@ mod training;
 use files::files;
 use std::fs;
 use std::path::{Path, PathBuf};
-use truetwin::bank::Bank;
+use truetwin::estimator::bank::Bank;
+use truetwin::estimator::shards::{BankPlan, ShardedBank, ShardsError, merge, merge_into_file};
 use truetwin::progress::{Listener, Progress};
-use truetwin::shards::{BankPlan, ShardedBank, ShardsError, merge, merge_into_file};
+use truetwin::storage::work::Share;
 use truetwin::study::{PresetName, RecordPlan, Study};
 use truetwin::twins::VanDerPol;
-use truetwin::work::Share;
 
 fn oscillator() -> Study {
     Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 60)).unwrap()
@@ -196,7 +196,7 @@ fn a_bank_becomes_one_file() {
     for name in ["bank.npz", "bank.csv"] {
         let rows = merge_into_file(&[at("bank")], &at(name), &Progress::silent());
         assert_eq!(rows.unwrap(), 40);
-        let one = truetwin::bank::file::read(&at(name), &["nu"]).unwrap();
+        let one = truetwin::estimator::bank::file::read(&at(name), &["nu"]).unwrap();
         let bank = ShardedBank::open(&at("bank")).unwrap();
         assert_eq!(
             one.theta.row(39),

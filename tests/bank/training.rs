@@ -4,13 +4,13 @@ use super::{fill, oscillator, plan};
 use ndarray::Array2;
 use std::borrow::Cow;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use truetwin::bank::Bank;
-use truetwin::bank::Draws;
-use truetwin::bank::file::BankFileError;
+use truetwin::estimator::bank::Bank;
+use truetwin::estimator::bank::Draws;
+use truetwin::estimator::bank::file::BankFileError;
+use truetwin::estimator::shards::ShardedBank;
+use truetwin::estimator::{PretrainOptions, pretrain, pretrain_on};
 use truetwin::progress::Progress;
-use truetwin::shards::ShardedBank;
 use truetwin::study::PresetName;
-use truetwin::two_stage::{PretrainOptions, pretrain, pretrain_on};
 
 fn options(size: usize) -> PretrainOptions {
     PretrainOptions {
@@ -30,7 +30,7 @@ fn a_bank_on_disk_gives_the_estimator_of_one_in_memory() {
     let silent = Progress::silent();
     let (streamed, _) = pretrain_on(&study, &bank, &options(1), &silent).unwrap();
     let (in_memory, _) = pretrain(&study, &options(300), &silent).unwrap();
-    let saved = |estimator: &truetwin::two_stage::Estimator, name: &str| {
+    let saved = |estimator: &truetwin::estimator::Estimator, name: &str| {
         let path = place.path().join(name);
         estimator.save(&path).unwrap();
         std::fs::read(path).unwrap()

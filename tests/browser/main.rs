@@ -21,13 +21,12 @@ use truetwin::diagnose::{
     FittedParameter, FreeRuns, Lag, Maps, NextInput, Onset, Region, Shrinkage, TargetShare, Term,
     TermRange, Verdict, Visible, Where, Which, Window,
 };
-use truetwin::experiment::reference_studies;
+use truetwin::evaluate::paper::reference_studies;
+use truetwin::evaluate::trials::{Kind, Named, Outcome, Row, Scorecard};
+use truetwin::record::{Drive, Quantity, Signal};
 use truetwin::report::{gap_html, scorecard_html};
 use truetwin::study::{RecordPlan, Study};
-use truetwin::twin::{
-    Drive, Interval, Now, Outline, Parameter, ParameterSpace, Quantity, Signal, StateSpace,
-};
-use truetwin::withheld::{Kind, Named, Outcome, Row, Scorecard};
+use truetwin::twin::{Interval, Now, Outline, Parameter, ParameterSpace, StateSpace};
 
 /// Phone, tablet, desktop.
 const WIDTHS: [u32; 3] = [360, 800, 1280];

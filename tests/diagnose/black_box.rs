@@ -5,10 +5,9 @@ use std::sync::Arc;
 use truetwin::diagnose::{Decision, DiagnoseSettings, Diagnosis, Verdict, diagnose};
 use truetwin::math::binomial_bounds;
 use truetwin::progress::Progress;
+use truetwin::record::{Drive, Record, Signal};
 use truetwin::study::{RecordPlan, Study};
-use truetwin::twin::{
-    DigitalTwin, Drive, Noise, Parameter, ParameterSpace, Record, Signal, SimulationError,
-};
+use truetwin::twin::{DigitalTwin, Noise, Parameter, ParameterSpace, SimulationError};
 
 /// A record of the boxed twin of that name with an effect, and its study.
 fn affected(name: &str, effect: &str, theta: &[f64], noise: Noise) -> (Study, Record) {

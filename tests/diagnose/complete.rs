@@ -4,8 +4,9 @@ use crate::trials::*;
 use truetwin::diagnose::{Cell, Decision, DiagnoseSettings, Diagnosis, Verdict, diagnose};
 use truetwin::math::binomial_bounds;
 use truetwin::progress::Progress;
+use truetwin::record::Record;
 use truetwin::study::Study;
-use truetwin::twin::{Noise, Record};
+use truetwin::twin::Noise;
 
 fn with_settings(study: &Study, record: Record, settings: &DiagnoseSettings) -> Diagnosis {
     diagnose(study, &[record], None, settings, &Progress::silent()).unwrap()

@@ -10,7 +10,8 @@ use trials::*;
 use truetwin::diagnose::{Decision, DiagnoseSettings, Verdict, diagnose};
 use truetwin::math::binomial_bounds;
 use truetwin::progress::{Listener, Progress};
-use truetwin::twin::{DigitalTwin, Drive, Noise, Record, Signal};
+use truetwin::record::{Drive, Record, Signal};
+use truetwin::twin::{DigitalTwin, Noise};
 
 /// Records of the twin itself, half of them with θ outside the prior: alarms stay within the binomial bound.
 #[test]

@@ -3,7 +3,8 @@
 use crate::trials::*;
 use std::sync::Arc;
 use truetwin::diagnose::{Decision, Verdict};
-use truetwin::twin::{DigitalTwin, Noise, Record};
+use truetwin::record::Record;
+use truetwin::twin::{DigitalTwin, Noise};
 
 fn number(name: &str, or: u64) -> u64 {
     std::env::var(name)

@@ -3,12 +3,13 @@
 use std::sync::Arc;
 use truetwin::diagnose::{DiagnoseSettings, Diagnosis, diagnose};
 use truetwin::effect::parse_effects;
-use truetwin::experiment::reference_studies;
+use truetwin::effect::{augment, given_magnitudes};
+use truetwin::evaluate::paper::reference_studies;
 use truetwin::progress::Progress;
+use truetwin::record::{Drive, Record, Signal, Signals};
 use truetwin::study::Study;
 use truetwin::twin::{
-    DigitalTwin, Drive, Noise, Now, Outline, ParameterSpace, Record, Signal, Signals,
-    SimulationError, StateSpace, augment, given_magnitudes,
+    DigitalTwin, Noise, Now, Outline, ParameterSpace, SimulationError, StateSpace,
 };
 
 pub fn study(name: &str) -> Study {

@@ -5,8 +5,9 @@ use rayon::prelude::*;
 use std::fs;
 use std::time::Duration;
 use truetwin::external::program::{ProgramCommand, ProgramSettings, ProgramTwin};
+use truetwin::record::Signal;
 use truetwin::twin::conformance::{Severity, check};
-use truetwin::twin::{DigitalTwin, Noise, Signal};
+use truetwin::twin::{DigitalTwin, Noise};
 
 fn workers(number: usize) -> ProgramSettings {
     ProgramSettings {
@@ -142,7 +143,7 @@ fn a_large_request_and_a_large_answer_pass() {
     }
     let twin = twin("large.py", "pass", workers(1));
     let inputs = Signal::from_shape_fn((50_000, 1), |(k, _)| (k as f64).sin());
-    let drive = truetwin::twin::Drive::new(0.1, inputs).unwrap();
+    let drive = truetwin::record::Drive::new(0.1, inputs).unwrap();
     let y = twin
         .simulate(&[2.0, 1.0], &drive, Noise::new(1, "t", 0))
         .unwrap();

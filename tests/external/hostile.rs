@@ -4,11 +4,12 @@ use super::{drive, impatient, lag, python, run, started, twin};
 use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use truetwin::bank::{Draw, FeatureSimulator};
+use truetwin::estimator::bank::{Draw, FeatureSimulator};
 use truetwin::external::program::ProgramSettings;
 use truetwin::feature::Arx;
 use truetwin::progress::Progress;
-use truetwin::twin::{DigitalTwin, Drive, Noise, Signal, SimulationError};
+use truetwin::record::{Drive, Signal};
+use truetwin::twin::{DigitalTwin, Noise, SimulationError};
 
 /// Runs until the twin is given up; how many runs that took, and the message.
 fn given_up(name: &str, before: &str, settings: ProgramSettings) -> (usize, String) {

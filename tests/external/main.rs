@@ -9,7 +9,8 @@ use std::process::Command;
 use std::sync::OnceLock;
 use std::time::Duration;
 use truetwin::external::program::{ProgramCommand, ProgramError, ProgramSettings, ProgramTwin};
-use truetwin::twin::{DigitalTwin, Drive, Noise, Signal, SimulationError};
+use truetwin::record::{Drive, Signal};
+use truetwin::twin::{DigitalTwin, Noise, SimulationError};
 
 /// Python 3, if there is one.
 fn python() -> Option<&'static str> {

@@ -11,8 +11,9 @@ mod tanks;
 mod van_der_pol;
 
 use nalgebra::DVector;
-use truetwin::filter::{Coordinates, FilterSettings, Kalman, Score};
-use truetwin::twin::{DigitalTwin, Drive, Noise, Record, StateSpace};
+use truetwin::likelihood::kalman::{Coordinates, FilterSettings, Kalman, Score};
+use truetwin::record::{Drive, Record};
+use truetwin::twin::{DigitalTwin, Noise, StateSpace};
 
 /// A record of `twin` at `theta`, number `run`.
 fn record(twin: &dyn DigitalTwin, theta: &[f64], drive: Drive, run: u64) -> Record {

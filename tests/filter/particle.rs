@@ -3,7 +3,8 @@
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use truetwin::twin::{Now, Record, StateSpace, Workspace};
+use truetwin::record::Record;
+use truetwin::twin::{Now, StateSpace, Workspace};
 
 /// log p(y | θ) with `count` particles, for one output with measurement noise; resampled systematically at each row.
 pub fn log_likelihood(

@@ -4,8 +4,12 @@ use crate::{maximum_likelihood, mean, particle, record};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use truetwin::effect::*;
 use truetwin::effect::{ActuatorLag, SensorLag, SensorOutliers, StateCeiling};
-use truetwin::filter::{FilterSettings, Kalman, Method, Score, filter, log_likelihood, smooth};
+use truetwin::likelihood::kalman::{
+    FilterSettings, Kalman, Method, Score, filter, log_likelihood, smooth,
+};
+use truetwin::record::*;
 use truetwin::twin::*;
 use truetwin::twins::CascadedTanks;
 

@@ -1,8 +1,8 @@
 //! The position is measured exactly, so that second differences give the likelihood in closed form.
 
 use crate::{maximum_likelihood, mean, record};
-use truetwin::filter::{FilterSettings, Kalman, Method, Score, smooth};
-use truetwin::twin::{Drive, Record};
+use truetwin::likelihood::kalman::{FilterSettings, Kalman, Method, Score, smooth};
+use truetwin::record::{Drive, Record};
 use truetwin::twins::VanDerPol;
 
 const DT: f64 = 0.05;

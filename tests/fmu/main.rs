@@ -7,10 +7,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 use truetwin::external::fmu::{FmuError, FmuSettings, FmuTwin};
+use truetwin::record::{Drive, Quantity, Signal};
 use truetwin::twin::conformance::{Severity, check};
-use truetwin::twin::{
-    DigitalTwin, Drive, Interval, Noise, Parameter, Quantity, Signal, SimulationError,
-};
+use truetwin::twin::{DigitalTwin, Interval, Noise, Parameter, SimulationError};
 
 const TWO: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="Spring" guid="{spring &amp; mass}">

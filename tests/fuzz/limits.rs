@@ -3,9 +3,9 @@
 use crate::{memory, readers};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use truetwin::bank::file as bank;
+use truetwin::estimator::bank::file as bank;
+use truetwin::record::read_record;
 use truetwin::study::StudyFile;
-use truetwin::twin::read_record;
 
 /// The message of a refusal, which may hold so many bytes.
 fn refused<T, E: ToString>(most: usize, work: impl FnOnce() -> Result<T, E>) -> String {

@@ -108,10 +108,10 @@ fuzzed!(
 #[test]
 #[ignore = "writes into tests/fuzz/seeds"]
 fn seeds_that_are_not_text() {
+    use truetwin::estimator::shards::BankPlan;
+    use truetwin::estimator::{PretrainOptions, pretrain};
     use truetwin::progress::Progress;
-    use truetwin::shards::BankPlan;
     use truetwin::study::PresetName;
-    use truetwin::two_stage::{PretrainOptions, pretrain};
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/seeds");
     let new = |name: &str| {
         let path = root.join(name);

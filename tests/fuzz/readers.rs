@@ -9,19 +9,20 @@ use std::fs;
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
-use truetwin::bank::{Bank, Draws, file as bank_file};
+use truetwin::effect::augment;
 use truetwin::effect::read_effects;
-use truetwin::experiment::{Run, reference_studies};
+use truetwin::estimator::Estimator;
+use truetwin::estimator::bank::{Bank, Draws, file as bank_file};
+use truetwin::estimator::shards::{ShardedBank, merge, merge_into_file};
+use truetwin::evaluate::paper::{Run, reference_studies};
 use truetwin::external::program::fuzzing as program;
 use truetwin::network::HeadArchitecture;
 use truetwin::network::layers::*;
 use truetwin::progress::Progress;
-use truetwin::shards::{ShardedBank, merge, merge_into_file};
+use truetwin::record::{read_drive, read_record};
+use truetwin::storage::work::fuzzing as work;
 use truetwin::study::{RecordPlan, Study, StudyFile};
-use truetwin::twin::{augment, read_drive, read_record};
 use truetwin::twins::VanDerPol;
-use truetwin::two_stage::Estimator;
-use truetwin::work::fuzzing as work;
 
 /// What reads bytes: `Ok`, or the message that a user would see.
 pub type Reader = fn(&[u8]) -> Result<(), String>;

@@ -6,13 +6,13 @@
 use super::{SEED, mean, records, runs, square, study};
 use ndarray::{Array2, Axis, concatenate};
 use std::borrow::Cow;
-use truetwin::bank::{Draw, Draws, FeatureSimulator};
-use truetwin::experiment::Scenario;
+use truetwin::estimator::bank::{Draw, Draws, FeatureSimulator};
+use truetwin::estimator::{Scaler, Standardiser};
+use truetwin::evaluate::paper::Scenario;
 use truetwin::network::{Deep, Network, architecture};
 use truetwin::progress::Progress;
 use truetwin::study::{PresetName, Study};
 use truetwin::twin::Noise;
-use truetwin::two_stage::{Scaler, Standardiser};
 
 /// Step of the differences that give the sign of the gradient.
 const DIFFERENCE: f64 = 1e-2;

@@ -10,13 +10,14 @@
 use super::{mean, pretrained, records, refined, runs, square, study};
 use ndarray::Array2;
 use rayon::prelude::*;
-use truetwin::experiment::Scenario;
-use truetwin::gate::GateSettings;
+use truetwin::estimator::Estimator;
+use truetwin::estimator::gate::GateSettings;
+use truetwin::estimator::refine::{RefineSettings, Refinement};
+use truetwin::evaluate::paper::Scenario;
 use truetwin::network::Training;
 use truetwin::progress::Progress;
-use truetwin::refine::{RefineSettings, Refinement};
-use truetwin::twin::{Noise, Record};
-use truetwin::two_stage::Estimator;
+use truetwin::record::Record;
+use truetwin::twin::Noise;
 
 const ROUNDS: usize = 8;
 /// Longest step, in widths of the prior.

@@ -2,10 +2,10 @@
 
 use super::{mean, pretrained, records, refined, runs, square, study};
 use rayon::prelude::*;
-use truetwin::experiment::Scenario;
-use truetwin::filter::{Coordinates, FilterSettings, Kalman, Score};
+use truetwin::evaluate::paper::Scenario;
+use truetwin::likelihood::kalman::{Coordinates, FilterSettings, Kalman, Score};
+use truetwin::record::Record;
 use truetwin::study::Study;
-use truetwin::twin::Record;
 
 /// Fisher scoring on the filter's likelihood from the truth, within the bounds.
 fn maximum_likelihood(study: &Study, record: &Record, truth: &[f64]) -> Vec<f64> {

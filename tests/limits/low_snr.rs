@@ -3,7 +3,7 @@
 use super::likelihood::cramer_rao;
 use super::{mean, pretrained, records, refined, runs, square, study};
 use rayon::prelude::*;
-use truetwin::experiment::Scenario;
+use truetwin::evaluate::paper::Scenario;
 
 /// Noise levels of each twin, to be multiplied.
 fn noise(twin: &str, factor: f64) -> String {

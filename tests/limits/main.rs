@@ -11,11 +11,11 @@ mod likelihood;
 mod low_snr;
 
 use std::path::Path;
-use truetwin::experiment::{Benchmark, MonteCarlo, Scenario, reference_studies};
+use truetwin::estimator::{Estimate, EstimateOptions, Estimator, PretrainOptions, pretrain};
+use truetwin::evaluate::paper::{Benchmark, MonteCarlo, Scenario, reference_studies};
 use truetwin::progress::Progress;
+use truetwin::record::Record;
 use truetwin::study::{Study, StudyFile};
-use truetwin::twin::Record;
-use truetwin::two_stage::{Estimate, EstimateOptions, Estimator, PretrainOptions, pretrain};
 
 /// Seed of records; another one chose the recipe.
 const SEED: u64 = 101;

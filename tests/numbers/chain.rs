@@ -1,5 +1,6 @@
 //! A chain of leaking tanks in units of anybody's choice.
 
+use truetwin::record::*;
 use truetwin::study::{RecordPlan, Study};
 use truetwin::twin::*;
 

@@ -1,11 +1,11 @@
 //! The same system in other units: the same answers, up to the units.
 
 use crate::chain::{Chain, Units};
-use truetwin::baseline::{DualFilter, DualStart, PredictionErrorMethod};
 use truetwin::diagnose::{DiagnoseSettings, Diagnosis, diagnose};
+use truetwin::estimator::{Estimate, EstimateOptions, Estimator, PretrainOptions, pretrain};
+use truetwin::evaluate::baseline::{DualFilter, DualStart, PredictionErrorMethod};
 use truetwin::progress::Progress;
-use truetwin::twin::{Record, Signal};
-use truetwin::two_stage::{Estimate, EstimateOptions, Estimator, PretrainOptions, pretrain};
+use truetwin::record::{Record, Signal};
 
 const SAMPLES: usize = 240;
 

@@ -2,9 +2,9 @@
 
 use crate::chain::{Chain, Units};
 use truetwin::diagnose::{DiagnoseSettings, diagnose};
+use truetwin::estimator::{EstimateOptions, PretrainOptions, pretrain};
 use truetwin::progress::Progress;
-use truetwin::twin::{Record, Signal};
-use truetwin::two_stage::{EstimateOptions, PretrainOptions, pretrain};
+use truetwin::record::{Record, Signal};
 
 const SAMPLES: usize = 200;
 

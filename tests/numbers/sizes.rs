@@ -3,10 +3,10 @@
 use crate::chain::{Chain, Units};
 use std::time::Instant;
 use truetwin::diagnose::{DiagnoseSettings, diagnose};
+use truetwin::estimator::{EstimateOptions, PretrainOptions, pretrain};
 use truetwin::feature::Arx;
 use truetwin::progress::Progress;
 use truetwin::study::Study;
-use truetwin::two_stage::{EstimateOptions, PretrainOptions, pretrain};
 
 const MANY: Chain = Chain {
     tanks: 20,

@@ -1,9 +1,8 @@
 //! Disturbances of a black box's signals: what stands for an effect that nobody listed.
 
 use crate::diagnose::catch_all::{Place, share};
-use crate::twin::{
-    DigitalTwin, Drive, Noise, Parameter, ParameterSpace, Role, Signal, Signals, SimulationError,
-};
+use crate::record::{Drive, Signal, Signals};
+use crate::twin::{DigitalTwin, Noise, Parameter, ParameterSpace, Role, SimulationError};
 use std::sync::Arc;
 
 /// The twin with an Ornstein–Uhlenbeck disturbance on an output or an input, θ longer by its strength σ.

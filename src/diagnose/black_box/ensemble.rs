@@ -1,6 +1,7 @@
 //! Runs of a twin at one θ under one drive, with draws that are the same at every θ.
 
-use crate::twin::{DigitalTwin, Drive, Noise, Signal, SimulationError};
+use crate::record::{Drive, Signal};
+use crate::twin::{DigitalTwin, Noise, SimulationError};
 use rayon::prelude::*;
 
 /// Runs of an ensemble. A row is predicted from a few numbers, each of which costs one of as many degrees of freedom.

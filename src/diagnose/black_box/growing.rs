@@ -7,8 +7,9 @@ use crate::diagnose::DiagnoseSettings;
 use crate::diagnose::fit::{Fitted, climb};
 use crate::diagnose::held_out::first_part;
 use crate::diagnose::problem::Problem;
-use crate::filter::{FilterError, recoverable};
-use crate::twin::{Noise, Record, RecordError};
+use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::record::{Record, RecordError};
+use crate::twin::Noise;
 use rayon::prelude::*;
 
 /// Shares of the records, and how many of the best fits go on to the next.

@@ -33,8 +33,9 @@ pub(super) use shared::Shared;
 pub(super) use silent::{dithered, measured};
 pub(super) use slope::slope;
 
-use crate::filter::{FilterError, Filtered};
-use crate::twin::{DigitalTwin, Outline, Record};
+use crate::likelihood::kalman::{FilterError, Filtered};
+use crate::record::Record;
+use crate::twin::{DigitalTwin, Outline};
 use ensemble::Ensemble;
 
 /// A record as the ensemble at θ sees it.

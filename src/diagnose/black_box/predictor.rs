@@ -14,9 +14,9 @@
 
 use super::ensemble::Ensemble;
 use super::tail::Tail;
-use crate::filter::Filtered;
+use crate::likelihood::kalman::Filtered;
 use crate::math::quantile;
-use crate::twin::Signal;
+use crate::record::Signal;
 use nalgebra::{DMatrix, DVector};
 use ndarray::Array3;
 
@@ -195,8 +195,9 @@ fn row(ensemble: &Ensemble, k: usize, lags: usize, floors: &[f64]) -> Row {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::filter::{FilterSettings, filter};
-    use crate::twin::{DigitalTwin, Drive, Noise, Record};
+    use crate::likelihood::kalman::{FilterSettings, filter};
+    use crate::record::{Drive, Record};
+    use crate::twin::{DigitalTwin, Noise};
     use crate::twins::CascadedTanks;
 
     /// Where a filter can tell what the best prediction is, the ensemble's is nearly as good.

@@ -16,8 +16,8 @@ use crate::diagnose::null::{Bench, Look};
 use crate::diagnose::omnibus::omnibus;
 use crate::diagnose::problem::Problem;
 use crate::diagnose::scan::{Gain, Reference, weak};
-use crate::filter::{FilterError, Filtered, recoverable};
-use crate::twin::{Record, Signal};
+use crate::likelihood::kalman::{FilterError, Filtered, recoverable};
+use crate::record::{Record, Signal};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 

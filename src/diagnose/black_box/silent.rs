@@ -5,10 +5,8 @@
 
 use super::ensemble::run;
 use crate::diagnose::scales::{deviation, largest};
-use crate::twin::{
-    DigitalTwin, Drive, Interval, Noise, Parameter, ParameterSpace, Record, RecordError, Role,
-    Signal, Signals, SimulationError,
-};
+use crate::record::{Drive, Record, RecordError, Signal, Signals};
+use crate::twin::{DigitalTwin, Interval, Noise, Parameter, ParameterSpace, Role, SimulationError};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 

@@ -5,7 +5,7 @@
 
 use crate::diagnose::problem::{Problem, Slope};
 use crate::diagnose::scan::Reference;
-use crate::filter::{FilterError, Filtered};
+use crate::likelihood::kalman::{FilterError, Filtered};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 

@@ -1,8 +1,9 @@
 //! How records are cut into windows, regions, lags and bands.
 
-use crate::filter::Filtered;
+use crate::likelihood::kalman::Filtered;
 use crate::math::quantile;
-use crate::twin::{Outline, Record, Signal};
+use crate::record::{Record, Signal};
+use crate::twin::Outline;
 
 /// Windows of a record.
 const WINDOWS: usize = 8;

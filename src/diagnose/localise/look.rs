@@ -2,8 +2,8 @@
 
 use super::cut::{Bins, Cut, Past};
 use crate::diagnose::correlation::{centred, correlation};
-use crate::filter::Filtered;
-use crate::twin::{Record, Signal};
+use crate::likelihood::kalman::Filtered;
+use crate::record::{Record, Signal};
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 

@@ -2,8 +2,8 @@
 
 use super::cut::{Bins, Cut};
 use super::look::excess;
-use crate::filter::Filtered;
-use crate::twin::{Record, Signal};
+use crate::likelihood::kalman::Filtered;
+use crate::record::{Record, Signal};
 
 /// The share of each cut in its family: windows and regions in what an explanation gains, or else in what the innovations
 /// exceed chance by, as outputs, lags and bands do. Losses count as nothing; each family adds up to at most one.

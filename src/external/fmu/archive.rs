@@ -3,7 +3,7 @@
 use super::FmuError;
 use super::description::{ModelDescription, Version};
 use super::unpack::{MOST_BYTES, unpack};
-use crate::foreign::read;
+use crate::storage::untrusted::read;
 use fmi::fmi2::import::Fmi2Import;
 use fmi::fmi3::import::Fmi3Import;
 use fmi::traits::FmiImport;

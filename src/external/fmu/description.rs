@@ -1,8 +1,9 @@
 //! What a model description says, of either version of the standard.
 
-use crate::foreign::{MESSAGE, one_line};
+use crate::record::Quantity;
+use crate::storage::untrusted::{MESSAGE, one_line};
 use crate::study::{InputPlan, Levels, RecordPlan};
-use crate::twin::{Interval, Parameter, Quantity};
+use crate::twin::{Interval, Parameter};
 use roxmltree::{Document, Node};
 use std::collections::BTreeMap;
 

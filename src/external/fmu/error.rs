@@ -1,6 +1,6 @@
 //! Why a file is no twin.
 
-use crate::files::with_remedy;
+use crate::storage::files::with_remedy;
 use crate::study::StudyError;
 use std::path::PathBuf;
 

@@ -15,8 +15,9 @@ pub use error::FmuError;
 
 use super::lending::Lending;
 use super::name;
+use crate::record::{Drive, Signal, Signals};
 use crate::study::{RecordPlan, Study};
-use crate::twin::{DigitalTwin, Drive, Noise, ParameterSpace, Signal, Signals, SimulationError};
+use crate::twin::{DigitalTwin, Noise, ParameterSpace, SimulationError};
 use archive::Archive;
 use description::Variable;
 use instance::Instance;

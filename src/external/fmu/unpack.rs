@@ -1,6 +1,6 @@
 //! Unpacking an archive from elsewhere: into its folder alone, and no more than a disk can take.
 
-use crate::foreign::excerpt;
+use crate::storage::untrusted::excerpt;
 use std::fs::{self, File};
 use std::io::{self, Read, Seek};
 use std::path::Path;

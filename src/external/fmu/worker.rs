@@ -2,7 +2,8 @@
 
 use super::archive::Archive;
 use super::instance::{Instance, Refusal, Step};
-use crate::twin::{Drive, Signal, SimulationError};
+use crate::record::{Drive, Signal};
+use crate::twin::SimulationError;
 use std::sync::Arc;
 use std::sync::mpsc::{Sender, channel};
 use std::thread::{self, JoinHandle};

@@ -1,9 +1,10 @@
 //! What a program says about itself.
 
 use super::super::name;
-use crate::foreign::{MESSAGE, one_line};
+use crate::record::{Quantity, Signals};
+use crate::storage::untrusted::{MESSAGE, one_line};
 use crate::study::{InputPlan, RecordPlan, RecordTable};
-use crate::twin::{Interval, Parameter, ParameterSpace, Quantity, Signals};
+use crate::twin::{Interval, Parameter, ParameterSpace};
 use serde::Deserialize;
 
 /// Most parameters, inputs or outputs of one program.

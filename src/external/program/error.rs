@@ -1,6 +1,6 @@
 //! Why a program is no twin.
 
-use crate::files::with_remedy;
+use crate::storage::files::with_remedy;
 use crate::study::StudyError;
 
 /// Why a program cannot be used as a twin.

@@ -2,7 +2,7 @@
 
 use super::description::Description;
 use super::protocol;
-use crate::twin::{Drive, Signals};
+use crate::record::{Drive, Signals};
 
 /// Reads a line as a program's description.
 pub fn description(line: &str) -> Result<(), String> {

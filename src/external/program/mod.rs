@@ -34,8 +34,9 @@ pub use command::ProgramCommand;
 pub use error::ProgramError;
 pub use settings::ProgramSettings;
 
+use crate::record::{Drive, Signal, Signals};
 use crate::study::{RecordPlan, Study};
-use crate::twin::{DigitalTwin, Drive, Noise, ParameterSpace, Signal, Signals, SimulationError};
+use crate::twin::{DigitalTwin, Noise, ParameterSpace, SimulationError};
 use description::Description;
 use health::Health;
 use pool::{Pool, introduce};

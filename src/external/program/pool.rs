@@ -5,7 +5,7 @@ use super::command::ProgramCommand;
 use super::description::Description;
 use super::protocol::{self, LONGEST_DESCRIPTION};
 use super::worker::{Trouble, Worker};
-use crate::foreign::excerpt;
+use crate::storage::untrusted::excerpt;
 use std::time::{Duration, Instant};
 
 /// Least time for a start: imports and licences take longer than a simulation.

@@ -1,7 +1,7 @@
 //! The lines that go to a program and come from it.
 
-use crate::foreign::{MESSAGE, excerpt, one_line};
-use crate::twin::{Drive, Quantity, Signal, Signals};
+use crate::record::{Drive, Quantity, Signal, Signals};
+use crate::storage::untrusted::{MESSAGE, excerpt, one_line};
 use serde::{Deserialize, Serialize, Serializer};
 use std::collections::BTreeMap;
 

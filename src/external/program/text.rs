@@ -1,6 +1,6 @@
 //! Pieces of foreign text, fit for a one-line message.
 
-use crate::foreign::hidden;
+use crate::storage::untrusted::hidden;
 
 /// Longest end of standard error that a message quotes, in characters.
 const LAST_WORDS: usize = 400;

@@ -2,7 +2,7 @@
 
 use super::command::ProgramCommand;
 use super::text::last_words;
-use crate::foreign::excerpt;
+use crate::storage::untrusted::excerpt;
 use std::io::{self, Read, Write};
 use std::process::{Child, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};

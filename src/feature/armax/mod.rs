@@ -3,7 +3,8 @@
 mod hannan_rissanen;
 
 use super::{FeatureError, FeatureMap, FeatureRecipe, check_varies};
-use crate::twin::{DigitalTwin, Drive, Signal};
+use crate::record::{Drive, Signal};
+use crate::twin::DigitalTwin;
 use hannan_rissanen::{Model, Orders, estimate};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -29,7 +30,8 @@ use std::sync::Arc;
 ///
 /// ```
 /// use truetwin::feature::{Armax, FeatureRecipe};
-/// use truetwin::twin::{DigitalTwin, Drive, Noise, Signal};
+/// use truetwin::record::{Drive, Signal};
+/// use truetwin::twin::{DigitalTwin, Noise};
 /// use truetwin::twins::CascadedTanks;
 ///
 /// let twin: std::sync::Arc<dyn DigitalTwin> = std::sync::Arc::new(CascadedTanks);

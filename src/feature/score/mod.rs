@@ -3,8 +3,11 @@
 mod posterior;
 
 use super::{Centred, FeatureError, FeatureMap, FeatureRecipe};
-use crate::filter::{Coordinates, FilterError, FilterSettings, Kalman, Score as Gradient};
-use crate::twin::{DigitalTwin, Drive, Noise, ParameterSpace, Record, Signal};
+use crate::likelihood::kalman::{
+    Coordinates, FilterError, FilterSettings, Kalman, Score as Gradient,
+};
+use crate::record::{Drive, Record, Signal};
+use crate::twin::{DigitalTwin, Noise, ParameterSpace};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -26,7 +29,8 @@ use std::sync::Arc;
 /// ```
 /// use std::sync::Arc;
 /// use truetwin::feature::{Score, FeatureRecipe};
-/// use truetwin::twin::{DigitalTwin, Drive, Noise};
+/// use truetwin::record::Drive;
+/// use truetwin::twin::{DigitalTwin, Noise};
 /// use truetwin::twins::VanDerPol;
 ///
 /// let twin: Arc<dyn DigitalTwin> = Arc::new(VanDerPol);

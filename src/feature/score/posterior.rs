@@ -1,6 +1,6 @@
 //! Where the likelihood of a record lies: Fisher scoring from several starts, then importance sampling. No simulations.
 
-use crate::filter::{Coordinates, FilterError, Kalman, Score, recoverable};
+use crate::likelihood::kalman::{Coordinates, FilterError, Kalman, Score, recoverable};
 use crate::twin::{Noise, ParameterSpace};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rayon::prelude::*;

@@ -1,9 +1,10 @@
 use super::*;
-use crate::gate::GateOutcome;
-use crate::refine::Direction;
+use crate::estimator::gate::GateOutcome;
+use crate::estimator::refine::Direction;
+use crate::record::{Drive, Signal};
 use crate::report::fixture::estimates;
 use crate::study::RecordPlan;
-use crate::twin::{DigitalTwin, Drive, Noise, ParameterSpace, Signal, SimulationError};
+use crate::twin::{DigitalTwin, Noise, ParameterSpace, SimulationError};
 
 fn fits(text: &str) {
     assert!(text.lines().count() <= LINES, "{text}");

@@ -1,6 +1,7 @@
 //! What to do next.
 
 use crate::diagnose::{Decision, Diagnosis, EffectFit, NextInput, Verdict};
+use crate::effect::Law;
 use crate::math::six_digits;
 use crate::report::digits::short;
 use crate::report::gap_figures::gap_next_input_svg;
@@ -8,7 +9,6 @@ use crate::report::gap_json::NEXT_INPUT;
 use crate::report::page::{Section, figure, list, paragraph, preformatted, subheading};
 use crate::report::units::Units;
 use crate::study::Study;
-use crate::twin::Law;
 
 pub(super) fn section_of(study: &Study, units: &Units, found: &Diagnosis) -> Section {
     let mut body = list(&steps(found));

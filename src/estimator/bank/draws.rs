@@ -1,0 +1,316 @@
+//! Many simulations, row by row.
+
+use super::{BankError, DrawError, FeatureSimulator};
+use crate::progress::Stage;
+use crate::record::Drive;
+use crate::twin::Noise;
+use ndarray::{Array2, s};
+use rayon::prelude::*;
+use std::borrow::Cow;
+use std::ops::Range;
+
+/// Failures of one sample before the draws count as hopeless; a twin that fails nine times in ten passes.
+const ATTEMPTS: usize = 200;
+/// Share of failed draws beyond which the work stops.
+const HOPELESS: f64 = 0.9;
+
+/// Where to simulate.
+///
+/// ```
+/// use std::borrow::Cow;
+/// use truetwin::estimator::bank::Draw;
+/// use truetwin::record::Drive;
+///
+/// let drive = Drive::autonomous(0.05, 200)?;
+/// let draw = Draw { theta: vec![1.5], drive: Cow::Borrowed(&drive) }; // see `Draws` for its use
+/// assert_eq!(draw.drive.samples(), 200);
+/// # Ok::<(), truetwin::record::DriveError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Draw<'a> {
+    /// Parameters.
+    pub theta: Vec<f64>,
+    /// Time grid and inputs.
+    pub drive: Cow<'a, Drive>,
+}
+
+/// Parameters and the features simulated there, row by row.
+///
+/// ```
+/// use std::borrow::Cow;
+/// use std::sync::Arc;
+/// use truetwin::estimator::bank::{Draw, Draws, FeatureSimulator};
+/// use truetwin::feature::Ar;
+/// use truetwin::progress::Progress;
+/// use truetwin::record::Drive;
+/// use truetwin::twin::{DigitalTwin, Noise};
+/// use truetwin::twins::VanDerPol;
+///
+/// let simulator = FeatureSimulator::new(Arc::new(VanDerPol), &Ar { order: 2 })?;
+/// let drive = Drive::autonomous(0.05, 200)?;
+///
+/// let space = simulator.twin().parameters();
+/// let stage = Progress::silent().stage("bank", 20);
+/// let draws: Draws = simulator.draws(
+///     0..20,
+///     |row| Noise::new(1, "bank", row),
+///     |_row, _attempt, noise| {
+///         Ok(Some(Draw { theta: space.draw_prior(noise), drive: Cow::Borrowed(&drive) }))
+///     },
+///     &stage,
+/// )?;
+/// assert_eq!((draws.theta.dim(), draws.features.dim()), ((20, 1), (20, 2)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Draws {
+    /// Parameters, M × d.
+    pub theta: Array2<f64>,
+    /// Features, M × n.
+    pub features: Array2<f64>,
+    /// Draws that were out of bounds, diverged or had no features, and were drawn again.
+    pub redrawn: usize,
+}
+
+impl Draws {
+    /// The rows of several parts, one after another, `rows` of them at most; parts beyond these are not asked for. `odd` is the
+    /// error of a part whose rows have another width than those of the first.
+    pub(crate) fn stacked<'a, E>(
+        rows: usize,
+        parts: impl IntoIterator<Item = Result<Cow<'a, Self>, E>>,
+        odd: impl Fn(usize) -> E,
+    ) -> Result<Self, E> {
+        let mut all: Option<[Array2<f64>; 2]> = None;
+        let (mut filled, mut redrawn) = ([0; 2], 0);
+        for (index, part) in parts.into_iter().enumerate() {
+            let part = part?;
+            let sources = [&part.theta, &part.features];
+            let all = all.get_or_insert_with(|| sources.map(|m| Array2::zeros((rows, m.ncols()))));
+            for ((all, source), filled) in all.iter_mut().zip(sources).zip(&mut filled) {
+                if source.ncols() != all.ncols() {
+                    return Err(odd(index));
+                }
+                let to = rows.min(*filled + source.nrows());
+                let taken = source.slice(s![..to - *filled, ..]);
+                all.slice_mut(s![*filled..to, ..]).assign(&taken);
+                *filled = to;
+            }
+            redrawn += part.redrawn;
+            if filled[0] == rows {
+                break;
+            }
+        }
+        let [theta, features] = all.unwrap_or_default();
+        Ok(Self {
+            theta: theta.slice_move(s![..filled[0], ..]),
+            features: features.slice_move(s![..filled[1], ..]),
+            redrawn,
+        })
+    }
+}
+
+/// One simulation of a set.
+struct Row {
+    theta: Vec<f64>,
+    features: Vec<f64>,
+    /// Draws before that were out of bounds.
+    rejected: usize,
+    /// Draws before that diverged or had no features.
+    failed: usize,
+    /// Why the last of these failed.
+    reason: Option<String>,
+}
+
+impl FeatureSimulator {
+    /// Simulations `rows` on all cores of the current rayon pool; row i depends on `noise(i)` alone.
+    ///
+    /// `draw(i, attempt, noise)` says where to simulate, or rejects (`None`: out of bounds). A rejected or failed draw is
+    /// drawn again with the child noise of the next attempt, and counted; failures alone can stop the work.
+    pub fn draws<'a>(
+        &self,
+        rows: Range<u64>,
+        noise: impl Fn(u64) -> Noise + Sync,
+        draw: impl Fn(u64, usize, Noise) -> Result<Option<Draw<'a>>, BankError> + Sync,
+        stage: &Stage,
+    ) -> Result<Draws, BankError> {
+        let rows: Vec<Row> = rows
+            .into_par_iter()
+            .map(|i| {
+                let row = self.one(i, noise(i), &draw)?;
+                stage.tick()?;
+                Ok(row)
+            })
+            .collect::<Result<_, BankError>>()?;
+        let size = rows.len();
+        let failed: usize = rows.iter().map(|row| row.failed).sum();
+        if failed as f64 > HOPELESS * (size + failed) as f64 {
+            let reason = rows.iter().rev().find_map(|row| row.reason.clone());
+            return Err(BankError::Hopeless {
+                failed,
+                tried: size + failed,
+                reason: reason.unwrap_or_default(),
+            });
+        }
+        let stack = |of: fn(&Row) -> &Vec<f64>, width: usize| {
+            let mut all = Array2::zeros((size, width));
+            for (mut row, values) in all.rows_mut().into_iter().zip(rows.iter().map(of)) {
+                row.assign(&ndarray::ArrayView1::from(values));
+            }
+            all
+        };
+        Ok(Draws {
+            theta: stack(|row| &row.theta, self.twin().parameters().len()),
+            features: stack(|row| &row.features, self.dim()),
+            redrawn: failed + rows.iter().map(|row| row.rejected).sum::<usize>(),
+        })
+    }
+
+    /// One row.
+    fn one<'a>(
+        &self,
+        i: u64,
+        noise: Noise,
+        draw: &impl Fn(u64, usize, Noise) -> Result<Option<Draw<'a>>, BankError>,
+    ) -> Result<Row, BankError> {
+        let (mut rejected, mut failed, mut reason) = (0, 0, None);
+        while failed < ATTEMPTS && rejected < ATTEMPTS {
+            let attempt = rejected + failed;
+            let noise = match attempt {
+                0 => noise,
+                _ => noise.child(&format!("attempt {attempt}")),
+            };
+            let Some(Draw { theta, drive }) = draw(i, attempt, noise)? else {
+                rejected += 1;
+                continue;
+            };
+            match self.features(&theta, &drive, noise) {
+                Ok(features) => {
+                    return Ok(Row {
+                        theta,
+                        features,
+                        rejected,
+                        failed,
+                        reason,
+                    });
+                }
+                Err(DrawError::Rejected(text)) => {
+                    failed += 1;
+                    reason = Some(text);
+                }
+                Err(DrawError::Fatal(error)) => return Err(error),
+            }
+        }
+        Err(BankError::Hopeless {
+            failed: rejected + failed,
+            tried: rejected + failed,
+            reason: reason.unwrap_or_else(|| "out of bounds".into()),
+        })
+    }
+
+    /// `size` simulations at one θ under one drive.
+    pub fn repeat(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        size: usize,
+        noise: impl Fn(u64) -> Noise + Sync,
+        stage: &Stage,
+    ) -> Result<Array2<f64>, BankError> {
+        let draw = |_, _, _| {
+            Ok(Some(Draw {
+                theta: theta.to_vec(),
+                drive: Cow::Borrowed(drive),
+            }))
+        };
+        Ok(self.draws(0..size as u64, noise, draw, stage)?.features)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::feature::Ar;
+    use crate::progress::Progress;
+    use crate::record::{Signal, Signals};
+    use crate::twin::{DigitalTwin, Parameter, ParameterSpace, SimulationError};
+    use crate::twins::VanDerPol;
+    use std::sync::Arc;
+
+    fn simulator(twin: impl DigitalTwin + 'static) -> FeatureSimulator {
+        FeatureSimulator::new(Arc::new(twin), &Ar { order: 2 }).unwrap()
+    }
+
+    fn bank(simulator: &FeatureSimulator, size: usize) -> Result<Draws, BankError> {
+        let drive = Drive::autonomous(0.05, 60).unwrap();
+        let space = simulator.twin().parameters();
+        simulator.draws(
+            0..size as u64,
+            |i| Noise::new(1, "bank", i),
+            |_, _, noise| {
+                Ok(Some(Draw {
+                    theta: space.draw_prior(noise),
+                    drive: Cow::Borrowed(&drive),
+                }))
+            },
+            &Progress::silent().stage("bank", size),
+        )
+    }
+
+    #[test]
+    fn threads_and_size_change_no_sample() {
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
+            pool.install(|| bank(&simulator(VanDerPol), 40).unwrap())
+        };
+        assert_eq!(on(1), on(3));
+        let short = bank(&simulator(VanDerPol), 10).unwrap();
+        assert_eq!(short.features.row(9), on(2).features.row(9));
+    }
+
+    /// Diverges on a share of its prior.
+    struct Fragile(f64);
+    impl DigitalTwin for Fragile {
+        fn parameters(&self) -> ParameterSpace {
+            ParameterSpace::new([Parameter::new("a", "", 0.0, 1.0)])
+        }
+        fn signals(&self) -> Signals {
+            Signals {
+                inputs: vec![],
+                ..Signals::default()
+            }
+        }
+        fn simulate(
+            &self,
+            theta: &[f64],
+            drive: &Drive,
+            noise: Noise,
+        ) -> Result<Signal, SimulationError> {
+            if theta[0] < self.0 {
+                return Err(SimulationError::Diverged { at: 0.0 });
+            }
+            let mut source = noise.source("v");
+            Ok(Signal::from_shape_simple_fn((drive.samples(), 1), || {
+                source.normal()
+            }))
+        }
+    }
+
+    #[test]
+    fn diverged_draws_are_redrawn_and_counted() {
+        let simulator = simulator(Fragile(0.5));
+        let draws = bank(&simulator, 200).unwrap();
+        assert!(draws.theta.iter().all(|a| *a >= 0.5));
+        // Failures before 200 successes at ½: mean 200, sd 20.
+        assert!((100..300).contains(&draws.redrawn), "{}", draws.redrawn);
+        assert_eq!(simulator.calls(), 200 + draws.redrawn);
+    }
+
+    #[test]
+    fn a_twin_that_nearly_always_diverges_stops_the_work() {
+        let error = bank(&simulator(Fragile(0.97)), 50).unwrap_err();
+        assert!(matches!(error, BankError::Hopeless { .. }), "{error}");
+    }
+}

@@ -1,0 +1,181 @@
+//! A twin seen through its features.
+
+use super::{BankError, DrawError};
+use crate::feature::{Centred, FeatureError, FeatureMap, FeatureRecipe};
+use crate::record::{Drive, Record, Signal, Signals};
+use crate::twin::{DigitalTwin, Noise, ParameterSpace, SimulationError, StateSpace};
+use nalgebra::DVector;
+use rayon::prelude::*;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// A twin seen through its features; counts every simulation, also those that the features make.
+///
+/// ```
+/// use std::sync::Arc;
+/// use truetwin::estimator::bank::FeatureSimulator;
+/// use truetwin::feature::Ar;
+/// use truetwin::record::{Drive, Record};
+/// use truetwin::twin::{DigitalTwin, Noise};
+/// use truetwin::twins::VanDerPol;
+///
+/// let simulator = FeatureSimulator::new(Arc::new(VanDerPol), &Ar { order: 2 })?;
+/// let drive = Drive::autonomous(0.05, 200)?;
+///
+/// let outputs = simulator.twin().simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
+/// let features = simulator.observe(&Record::new(drive, outputs)?)?;
+/// assert_eq!((features.len(), simulator.calls()), (simulator.dim(), 1));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct FeatureSimulator {
+    twin: Arc<Counted>,
+    map: Arc<dyn FeatureMap>,
+}
+
+debug_by_name!(FeatureSimulator);
+
+/// A twin that counts its calls.
+struct Counted {
+    inner: Arc<dyn DigitalTwin>,
+    calls: AtomicUsize,
+}
+
+impl DigitalTwin for Counted {
+    fn parameters(&self) -> ParameterSpace {
+        self.inner.parameters()
+    }
+    fn signals(&self) -> Signals {
+        self.inner.signals()
+    }
+    fn state_space(&self) -> Option<&dyn StateSpace> {
+        self.inner.state_space()
+    }
+    fn simulate(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Signal, SimulationError> {
+        self.calls.fetch_add(1, Ordering::Relaxed);
+        self.inner.simulate(theta, drive, noise)
+    }
+}
+
+impl FeatureSimulator {
+    /// Couples a twin with features, which are bound to it here.
+    ///
+    /// # Errors
+    ///
+    /// Features that this twin cannot have.
+    pub fn new(
+        twin: Arc<dyn DigitalTwin>,
+        features: &dyn FeatureRecipe,
+    ) -> Result<Self, FeatureError> {
+        let twin = Arc::new(Counted {
+            inner: twin,
+            calls: AtomicUsize::new(0),
+        });
+        let counted: Arc<dyn DigitalTwin> = twin.clone();
+        Ok(Self {
+            map: features.bind(&counted)?,
+            twin,
+        })
+    }
+
+    /// The twin.
+    pub fn twin(&self) -> &dyn DigitalTwin {
+        self.twin.as_ref()
+    }
+
+    /// Number of features.
+    pub fn dim(&self) -> usize {
+        self.map.dim()
+    }
+
+    /// Simulator calls so far.
+    pub fn calls(&self) -> usize {
+        self.twin.calls.load(Ordering::Relaxed)
+    }
+
+    /// Features of a record.
+    pub fn observe(&self, record: &Record) -> Result<DVector<f64>, FeatureError> {
+        let features = self.map.extract(record.drive(), record.outputs())?;
+        Ok(DVector::from_vec(features))
+    }
+
+    /// The simulator with its features centred on a record, and where the record puts θ; `None` for features that do not
+    /// centre themselves. Calls are counted together.
+    ///
+    /// # Errors
+    ///
+    /// As [`FeatureMap::centred`].
+    pub fn centred(
+        &self,
+        record: &Record,
+        initial: &[f64],
+        noise: Noise,
+    ) -> Result<Option<(Self, Centred)>, FeatureError> {
+        let found = self.map.centred(record, initial, noise)?;
+        Ok(found.map(|centred| {
+            let simulator = Self {
+                twin: self.twin.clone(),
+                map: centred.map.clone(),
+            };
+            (simulator, centred)
+        }))
+    }
+
+    /// Features of one simulation.
+    pub fn features(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Vec<f64>, DrawError> {
+        let outputs = match self.twin.simulate(theta, drive, noise) {
+            Ok(outputs) => outputs,
+            Err(error) if error.costs_one_run() => {
+                return Err(DrawError::Rejected(error.to_string()));
+            }
+            Err(error) => return Err(BankError::Simulation(error).into()),
+        };
+        let rejected = |text: String| Err(DrawError::Rejected(text));
+        match self.map.extract(drive, &outputs) {
+            Ok(features) if features.iter().all(|v| v.is_finite()) => Ok(features),
+            Ok(_) => rejected("features are not finite".into()),
+            Err(
+                error @ (FeatureError::Constant { .. }
+                | FeatureError::Regression(_)
+                | FeatureError::Information),
+            ) => rejected(error.to_string()),
+            Err(FeatureError::Reference(error)) if error.costs_one_run() => {
+                rejected(error.to_string())
+            }
+            Err(FeatureError::Filter(error)) if error.is_recoverable() => {
+                rejected(error.to_string())
+            }
+            Err(error) => Err(BankError::Feature(error).into()),
+        }
+    }
+
+    /// Mean features over noise samples 0 … `seeds` − 1 of `noise`: the same draws at every θ (common random
+    /// numbers), so that differences between parameters are not drowned by noise.
+    pub fn mean_features(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        noise: impl Fn(u64) -> Noise + Sync,
+        seeds: usize,
+    ) -> Result<DVector<f64>, DrawError> {
+        let runs: Vec<Vec<f64>> = (0..seeds as u64)
+            .into_par_iter()
+            .map(|sample| self.features(theta, drive, noise(sample)))
+            .collect::<Result<_, _>>()?;
+        // Summed in order: the same bits for any number of threads.
+        let mut mean = DVector::zeros(self.dim());
+        for run in runs {
+            mean += DVector::from_vec(run);
+        }
+        Ok(mean / seeds as f64)
+    }
+}

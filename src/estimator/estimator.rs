@@ -1,0 +1,103 @@
+//! The pretrained estimator.
+
+use super::calibration::Calibration;
+use super::readout::Readout;
+use crate::estimator::bank::FeatureSimulator;
+use crate::feature::{FeatureError, FeatureRecipe};
+use crate::network::{Architecture, Network, NetworkError};
+use crate::record::Record;
+use crate::study::{PresetName, Settings, Study};
+use nalgebra::DVector;
+use ndarray::Array2;
+use std::sync::Arc;
+
+/// A network that maps features to parameters, with everything needed to refine it on a record.
+///
+/// It is never modified: tuning on a record makes new heads.
+#[derive(Clone)]
+pub struct Estimator {
+    pub(super) study: Study,
+    pub(super) preset: PresetName,
+    pub(super) settings: Settings,
+    pub(super) recipe: Arc<dyn FeatureRecipe>,
+    pub(super) architecture: Arc<dyn Architecture>,
+    pub(super) readout: Readout,
+    pub(super) calibration: Calibration,
+    pub(super) seed: u64,
+}
+
+impl std::fmt::Debug for Estimator {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Estimator")
+            .field("study", &self.study)
+            .field("preset", &self.preset)
+            .field("recipe", &self.recipe)
+            .field("architecture", &self.architecture.id())
+            .field("seed", &self.seed)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Estimator {
+    /// The study it was trained for.
+    pub fn study(&self) -> &Study {
+        &self.study
+    }
+
+    /// The preset it was trained with.
+    pub fn preset(&self) -> PresetName {
+        self.preset
+    }
+
+    /// Every number it was trained with, and will refine with unless told otherwise.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The seed of bank and training.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// The trained network.
+    pub fn network(&self) -> &Arc<dyn Network> {
+        self.readout.network()
+    }
+
+    /// The network with what stands around it.
+    pub fn readout(&self) -> &Readout {
+        &self.readout
+    }
+
+    /// Twin and features, with a call counter of its own.
+    pub fn simulator(&self) -> Result<FeatureSimulator, FeatureError> {
+        FeatureSimulator::new(self.study.twin().clone(), self.recipe.as_ref())
+    }
+
+    /// Features of a record.
+    pub fn observe(&self, record: &Record) -> Result<DVector<f64>, FeatureError> {
+        self.simulator()?.observe(record)
+    }
+
+    /// Predictions (rows: samples, columns: parameters) from features, clipped to the physical bounds.
+    pub fn predict(&self, features: &Array2<f64>) -> Result<Array2<f64>, NetworkError> {
+        let mut theta = self.readout.predict(features)?;
+        let bounds = self.study.twin().parameters().bounds();
+        for mut row in theta.rows_mut() {
+            for (value, bounds) in row.iter_mut().zip(&bounds) {
+                *value = bounds.clamp(*value);
+            }
+        }
+        Ok(theta)
+    }
+
+    /// θ_init from a record's features.
+    pub fn predict_one(&self, features: &DVector<f64>) -> Result<Vec<f64>, NetworkError> {
+        Ok(self.predict(&one_row(features))?.row(0).to_vec())
+    }
+}
+
+/// A vector as a matrix of one row.
+pub(super) fn one_row(features: &DVector<f64>) -> Array2<f64> {
+    Array2::from_shape_fn((1, features.len()), |(_, j)| features[j])
+}

@@ -1,0 +1,76 @@
+//! The Two-Stage estimator: pretrained on simulations, tested, refined, tuned.
+//!
+//! [`pretrain`] makes an [`Estimator`] ([`pretrain_on`] of a bank that is there, [`Pretraining`] so that it can be interrupted);
+//! [`Estimator::estimate`] takes a record through gate, Gauss–Newton, cloud and tuned heads; [`Estimator::save`] and
+//! [`Estimator::load`] keep it in one file.
+//!
+//! Source: Lakshminarayanan, Guerrero & Rojas, "Fine-Tuning a Simulation-Driven Estimator".
+//!
+//! ```
+//! use truetwin::progress::Progress;
+//! use truetwin::study::{RecordPlan, Study};
+//! use truetwin::record::{Drive, Record};
+//! use truetwin::twin::{DigitalTwin, Noise};
+//! use truetwin::twins::VanDerPol;
+//! use truetwin::estimator::*;
+//!
+//! let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 200))?;
+//! let small = PretrainOptions { bank_size: Some(200), epochs: Some(3), ..PretrainOptions::default() };
+//! let (estimator, _history) = pretrain(&study, &small, &Progress::silent())?;
+//!
+//! // One file, and back.
+//! let place = tempfile::tempdir()?;
+//! let file = place.path().join("oscillator.est");
+//! estimator.save(&file)?;
+//! let estimator: Estimator = Estimator::load(&file, &[study])?;
+//! let around_the_network: &Readout = estimator.readout();
+//! assert_eq!(around_the_network.targets.mean.len(), 1);
+//!
+//! // A record of ν = 3, outside of the prior [0, 2.5].
+//! let drive = Drive::autonomous(0.05, 200)?;
+//! let outputs = VanDerPol.simulate(&[3.0], &drive, Noise::new(7, "measured", 0))?;
+//! let record = Record::new(drive, outputs)?;
+//! let estimate: Estimate = estimator.estimate(&record, &EstimateOptions::default(), &Progress::silent())?;
+//! assert!(estimate.gate.out_of_distribution && estimate.refitted);
+//! assert!((estimate.theta[0] - 3.0).abs() < 5.0 * estimate.std_error[0]);
+//! let tracking: &Tracking = estimate.tracking.as_ref().ok_or("the free run is finite")?;
+//! assert_eq!(tracking.outputs.dim(), (200, 1));
+//! let seconds: &Seconds = &estimate.seconds;
+//! assert!(seconds.total >= seconds.predict);
+//! let unknown_starts_and_noise: Vec<Nuisance> = estimate.nuisance();
+//! assert!(unknown_starts_and_noise.is_empty());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod bank;
+pub mod gate;
+pub mod refine;
+pub(crate) mod sample;
+pub mod shards;
+
+mod calibration;
+mod cloud;
+mod estimate;
+mod estimator;
+mod file;
+mod pretrain;
+mod pretraining;
+mod quadratic;
+mod readout;
+mod scaler;
+mod standardiser;
+mod tracking;
+mod tune;
+
+pub use crate::estimator::sample::EllipsoidError;
+pub(crate) use estimate::INTERVAL_LEVEL;
+pub use estimate::{Estimate, EstimateError, EstimateOptions, Nuisance, Seconds};
+pub use estimator::Estimator;
+pub use file::EstimatorFileError;
+pub use pretrain::{PretrainError, PretrainOptions, pretrain, pretrain_on};
+pub use pretraining::{CHECKPOINT, GivenBank, Pretraining};
+pub use readout::Readout;
+pub use scaler::Scaler;
+pub use standardiser::Standardiser;
+pub use tracking::Tracking;
+pub(crate) use tracking::track;

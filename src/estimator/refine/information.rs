@@ -1,0 +1,172 @@
+//! What a record tells about θ: information, standard errors, and directions in words.
+
+use crate::twin::{PRIOR_DEVIATION, ParameterSpace, Role, combination, oriented};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+/// Fisher information of the features, regularised: G = JᵀJ/(1 + 1/K) + λ·diag(1/width²).
+///
+/// J (rank × d) is whitened; K seeds were averaged, which adds 1/K to the variance of the difference between mean and
+/// record.
+///
+/// Source: Lakshminarayanan, Guerrero & Rojas, section IV-B.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Information {
+    /// G, d × d, inverse squared parameter units.
+    pub matrix: DMatrix<f64>,
+    /// G⁻¹.
+    pub covariance: DMatrix<f64>,
+    /// √diag(G⁻¹), in parameter units.
+    pub std_error: Vec<f64>,
+    /// Eigen-directions over the twin's physical parameters, least known first.
+    pub directions: Vec<Direction>,
+}
+
+/// A combination of parameters and how well it is known.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Direction {
+    /// Unit vector in (θ over the prior's width), physical parameters only.
+    pub direction: Vec<f64>,
+    /// Standard deviation along it, in prior widths.
+    pub std_error: f64,
+    /// Whether the prior knows it better than the record does: worse than 1/√12 of its width.
+    pub weak: bool,
+    /// In words: `0.58·k1 − 0.58·k2 + 0.57·k4`.
+    pub combination: String,
+}
+
+/// Why there is no information matrix.
+///
+/// ```
+/// use nalgebra::dmatrix;
+/// use truetwin::estimator::refine::{Information, InformationError};
+/// use truetwin::twin::{Parameter, ParameterSpace};
+///
+/// // The only feature does not move with b.
+/// let space = ParameterSpace::new([Parameter::new("a", "-", 0.0, 1.0), Parameter::new("b", "-", 0.0, 1.0)]);
+/// let refused: Result<Information, InformationError> = Information::new(&dmatrix![1.0, 0.0], &space, 0.0, 64);
+/// assert!(refused.is_err());
+/// assert!(Information::new(&dmatrix![1.0, 0.0], &space, 1e-3, 64).is_ok()); // the prior's share
+/// ```
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(
+    "the features hold no information on {0} at the estimate; fix this parameter, or choose other features"
+)]
+pub struct InformationError(String);
+
+impl Information {
+    /// From the whitened Jacobian (rank × d, inverse parameter units), λ and K.
+    pub fn new(
+        jacobian: &DMatrix<f64>,
+        space: &ParameterSpace,
+        ridge: f64,
+        seeds: usize,
+    ) -> Result<Self, InformationError> {
+        let widths = DVector::from_vec(space.widths());
+        let d = space.len();
+        // In units of the prior's width, so that parameters of any scale are inverted alike.
+        let scaled = DMatrix::from_fn(jacobian.nrows(), d, |i, j| jacobian[(i, j)] * widths[j]);
+        let mut matrix = scaled.tr_mul(&scaled) / (1.0 + 1.0 / seeds as f64);
+        for j in 0..d {
+            matrix[(j, j)] += ridge;
+        }
+        let covariance = matrix.clone().cholesky().map(|factor| factor.inverse());
+        let Some(covariance) = covariance.filter(|c| c.iter().all(|v| v.is_finite())) else {
+            let flat = SymmetricEigen::new(matrix);
+            let weakest = flat.eigenvalues.imin();
+            let direction = flat.eigenvectors.column(weakest);
+            let words = combination(&space.names(), direction.as_slice());
+            return Err(InformationError(words));
+        };
+        let directions = directions(&covariance, space);
+        let unscale = |matrix: DMatrix<f64>, power: i32| {
+            DMatrix::from_fn(d, d, |i, j| {
+                matrix[(i, j)] * (widths[i] * widths[j]).powi(power)
+            })
+        };
+        let covariance = unscale(covariance, 1);
+        Ok(Self {
+            matrix: unscale(matrix, -1),
+            std_error: covariance.diagonal().iter().map(|v| v.sqrt()).collect(),
+            covariance,
+            directions,
+        })
+    }
+
+    /// Weakly identified directions, least known first.
+    pub fn weak(&self) -> impl Iterator<Item = &Direction> {
+        self.directions.iter().filter(|d| d.weak)
+    }
+}
+
+/// Eigen-directions of the covariance (prior widths) of the physical parameters; nuisances are marginalised out.
+fn directions(covariance: &DMatrix<f64>, space: &ParameterSpace) -> Vec<Direction> {
+    let physical: Vec<usize> = (0..space.len())
+        .filter(|&j| space[j].role == Role::Physical)
+        .collect();
+    let names: Vec<&str> = physical.iter().map(|&j| space[j].name.as_str()).collect();
+    let marginal = covariance.select_rows(&physical).select_columns(&physical);
+    let eigen = SymmetricEigen::new(marginal);
+    let mut directions: Vec<Direction> = (0..physical.len())
+        .map(|i| {
+            let direction = oriented(eigen.eigenvectors.column(i).clone_owned().as_slice());
+            let std_error = eigen.eigenvalues[i].max(0.0).sqrt();
+            Direction {
+                combination: combination(&names, &direction),
+                direction,
+                std_error,
+                weak: std_error > PRIOR_DEVIATION,
+            }
+        })
+        .collect();
+    directions.sort_by(|a, b| b.std_error.total_cmp(&a.std_error));
+    directions
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::twin::Parameter;
+
+    fn space(scale: f64) -> ParameterSpace {
+        ParameterSpace::new([
+            Parameter::new("a", "", 0.0, scale),
+            Parameter::new("b", "", 0.0, 2.0),
+            Parameter::new("start.x", "", 0.0, 1.0).with_role(Role::Start),
+        ])
+    }
+
+    /// Only a + b (in widths) is seen, and the start.
+    fn jacobian(scale: f64) -> DMatrix<f64> {
+        DMatrix::from_row_slice(2, 3, &[9.0 / scale, 4.5, 0.0, 0.0, 0.0, 5.0])
+    }
+
+    #[test]
+    fn the_unseen_direction_is_weak_and_named() {
+        let found = Information::new(&jacobian(1.0), &space(1.0), 0.01, 1).unwrap();
+        let weak: Vec<_> = found.weak().collect();
+        assert_eq!(weak.len(), 1);
+        assert_eq!(weak[0].combination, "0.71·a − 0.71·b");
+        assert!((weak[0].std_error - 10.0).abs() < 1e-9, "1/√λ");
+        // G = 25/2 + 0.01 for the start, K = 1.
+        assert!((found.std_error[2] - (12.51f64).powf(-0.5)).abs() < 1e-12);
+        assert!((&found.matrix * &found.covariance - DMatrix::identity(3, 3)).amax() < 1e-9);
+    }
+
+    /// The unit of a parameter changes its standard error by that unit, and no direction.
+    #[test]
+    fn units_do_not_matter() {
+        let (one, tiny) = (1.0, 1e-9);
+        let a = Information::new(&jacobian(one), &space(one), 0.01, 3).unwrap();
+        let b = Information::new(&jacobian(tiny), &space(tiny), 0.01, 3).unwrap();
+        assert!((a.std_error[0] * tiny / b.std_error[0] - 1.0).abs() < 1e-9);
+        assert!((a.directions[0].std_error - b.directions[0].std_error).abs() < 1e-9);
+    }
+
+    #[test]
+    fn no_information_is_an_error_that_names_the_direction() {
+        let error = Information::new(&jacobian(1.0), &space(1.0), 0.0, 1).unwrap_err();
+        assert!(error.to_string().contains("0.71·a − 0.71·b"), "{error}");
+    }
+}

@@ -1,0 +1,439 @@
+//! Gauss–Newton in whitened feature space: from the network's first estimate to one that explains the record.
+//!
+//! ```text
+//! v(θ) = ½‖S^{-1/2}(f̄(θ) − x_obs)‖² + γ/2·‖(θ − θ_init)/width‖²
+//! ```
+//!
+//! f̄ is the mean of the features over fixed seeds (common random numbers), S their covariance, simulated again as θ
+//! moves; `width` is that of the prior. Starts are θ_init and space-filling points in the bounds; among their ends the
+//! one with the largest synthetic likelihood −½‖r‖² − ½ log|S| is taken, since ‖r‖ under different S cannot be compared.
+//!
+//! Source: Lakshminarayanan, Guerrero & Rojas, section IV-B; Wood, "Statistical inference for noisy nonlinear
+//! ecological dynamic systems", Nature 466 (2010), for the synthetic likelihood.
+//!
+//! ```
+//! use std::sync::Arc;
+//! use truetwin::estimator::bank::FeatureSimulator;
+//! use truetwin::feature::Ar;
+//! use truetwin::estimator::gate::GateSettings;
+//! use truetwin::progress::Progress;
+//! use truetwin::estimator::refine::{Direction, Information, RefineSettings, Refined, Refinement};
+//! use truetwin::record::{Drive, Record};
+//! use truetwin::twin::{DigitalTwin, Noise};
+//! use truetwin::twins::VanDerPol;
+//!
+//! let simulator = FeatureSimulator::new(Arc::new(VanDerPol), &Ar { order: 5 })?;
+//! let drive = Drive::autonomous(0.05, 200)?;
+//! let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(7, "measured", 0))?;
+//! let observed = simulator.observe(&Record::new(drive.clone(), outputs)?)?;
+//! let few = RefineSettings { starts: 1, ..RefineSettings::default() };
+//! let refined: Refined = Refinement {
+//!     simulator: &simulator,
+//!     drive: &drive,
+//!     observed: &observed,
+//!     settings: &few,
+//!     gate: &GateSettings::default(),
+//!     noise: Noise::new(1, "refine", 0),
+//!     progress: &Progress::silent(),
+//! }
+//! .run(&[1.2])?;
+//! let information: &Information = &refined.information;
+//! assert!((refined.theta[0] - 1.5).abs() < 0.5);
+//! let least_known: &Direction = &information.directions[0];
+//! assert!(!least_known.weak);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod information;
+mod problem;
+mod settings;
+
+pub use crate::fit::OptimiseError;
+pub use information::{Direction, Information, InformationError};
+pub use settings::RefineSettings;
+
+use crate::estimator::bank::{BankError, FeatureSimulator};
+use crate::estimator::gate::{GateError, GateSettings};
+use crate::fit::{Bounds, EvaluationError, GaussNewton, ResidualProblem, space_filling};
+use crate::math::Whitening;
+use crate::progress::{Cancelled, Progress};
+use crate::record::Drive;
+use crate::twin::{Noise, ParameterSpace};
+use nalgebra::{DMatrix, DVector};
+use problem::FeatureResidual;
+
+/// The refined estimate, with what was simulated around it.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Refined {
+    /// θ_GN.
+    pub theta: DVector<f64>,
+    /// μ and S^{-1/2} at θ_GN; after a single round, where it began.
+    pub whitening: Whitening,
+    /// Whitened distances ‖S^{-1/2}(x_k − μ)‖ of the simulations there.
+    pub spread: Vec<f64>,
+    /// ∂f̄/∂θ at θ_GN, n × d, features over parameters.
+    pub jacobian: DMatrix<f64>,
+    /// S^{-1/2}(f̄ − x_obs) at θ_GN.
+    pub residual: DVector<f64>,
+    /// G and what follows from it.
+    pub information: Information,
+    /// Starts that led nowhere (diverged).
+    pub failed_starts: usize,
+}
+
+impl Refined {
+    /// S^{-1/2} ∂f̄/∂θ, rank × d.
+    pub fn whitened_jacobian(&self) -> DMatrix<f64> {
+        self.whitening.apply_columns(&self.jacobian)
+    }
+
+    /// The part of a whitened residual that θ could still remove, ‖P_J r‖²: χ²_d at the true θ.
+    pub fn explainable_misfit(&self, residual: &DVector<f64>) -> f64 {
+        let jacobian = self.whitened_jacobian();
+        jacobian
+            .clone()
+            .svd(true, false)
+            .u
+            .map_or(0.0, |u| u.tr_mul(residual).norm_squared())
+    }
+}
+
+/// Why the refinement failed.
+///
+/// ```
+/// use truetwin::progress::Cancelled;
+/// use truetwin::estimator::refine::RefineError;
+///
+/// assert_eq!(RefineError::from(Cancelled).to_string(), "cancelled");
+/// ```
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RefineError {
+    /// The simulations failed.
+    #[error(transparent)]
+    Bank(#[from] BankError),
+    /// The covariance of the features could not be simulated.
+    #[error(transparent)]
+    Gate(#[from] GateError),
+    /// Every start failed.
+    #[error(
+        "Gauss–Newton found no estimate from {starts} starts: {last}; widen the bounds or check the twin"
+    )]
+    NoStart {
+        /// Number of starts.
+        starts: usize,
+        /// What the last one said.
+        last: String,
+    },
+    /// The search itself failed.
+    #[error(transparent)]
+    Optimise(#[from] OptimiseError),
+    /// The information matrix is unusable.
+    #[error(transparent)]
+    Information(#[from] InformationError),
+    /// Stopped from outside.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl RefineError {
+    /// Whether no other start will help.
+    fn is_fatal(&self) -> bool {
+        let bank = |error: &BankError| !matches!(error, BankError::Hopeless { .. });
+        match self {
+            Self::Bank(error) | Self::Gate(GateError::Bank(error)) => bank(error),
+            Self::Optimise(OptimiseError::Fatal(_)) | Self::Cancelled(_) => true,
+            _ => false,
+        }
+    }
+}
+
+/// What the refinement works on.
+pub struct Refinement<'a> {
+    /// Twin and features.
+    pub simulator: &'a FeatureSimulator,
+    /// The record's input.
+    pub drive: &'a Drive,
+    /// The record's features.
+    pub observed: &'a DVector<f64>,
+    /// Settings.
+    pub settings: &'a RefineSettings,
+    /// How features are whitened.
+    pub gate: &'a GateSettings,
+    /// Randomness.
+    pub noise: Noise,
+    /// Who listens; asked at every simulation.
+    pub progress: &'a Progress,
+}
+
+debug_by_name!(Refinement<'_>);
+
+/// Where one start has come to.
+struct Candidate {
+    theta: DVector<f64>,
+    local: Local,
+    score: f64,
+}
+
+/// Features simulated at one θ.
+#[derive(Clone)]
+struct Local {
+    whitening: Whitening,
+    spread: Vec<f64>,
+}
+
+impl Refinement<'_> {
+    /// Runs it from `initial`.
+    pub fn run(&self, initial: &[f64]) -> Result<Refined, RefineError> {
+        let space = self.simulator.twin().parameters();
+        let settings = self.settings;
+        let stage = self
+            .progress
+            .stage("Gauss–Newton", settings.starts + settings.rounds);
+        let initial = DVector::from_vec(space.clamp(initial));
+        let (theta, local, failed) = match (settings.starts, settings.rounds) {
+            // Nothing to choose from, and little way to go.
+            (1, 1) => (initial.clone(), self.whiten(&initial)?, 0),
+            _ => self.survey(&space, &initial, &stage)?,
+        };
+        let (theta, local) = self.polish(&space, &initial, theta, local, &stage)?;
+        stage.finish();
+        self.describe(&space, &initial, theta, local, failed)
+    }
+
+    /// The best of several starts, and how many failed.
+    fn survey(
+        &self,
+        space: &ParameterSpace,
+        initial: &DVector<f64>,
+        stage: &crate::progress::Stage,
+    ) -> Result<(DVector<f64>, Local, usize), RefineError> {
+        let (mut best, mut failed, mut last): (Option<Candidate>, _, _) = (None, 0, String::new());
+        for start in starts(space, initial, self.settings.starts)? {
+            let survey = self.problem(space, initial, self.settings.survey_seeds);
+            match self.climb(survey, &start, space) {
+                Ok(candidate) => {
+                    // Ties and equals go to the earlier start: θ_init comes first.
+                    if best
+                        .as_ref()
+                        .is_none_or(|best| candidate.score > best.score)
+                    {
+                        best = Some(candidate);
+                    }
+                }
+                Err(error) if error.is_fatal() => return Err(error),
+                Err(error) => {
+                    failed += 1;
+                    last = error.to_string();
+                }
+            }
+            stage.tick()?;
+        }
+        let starts = self.settings.starts;
+        let Candidate { theta, local, .. } = best.ok_or(RefineError::NoStart { starts, last })?;
+        Ok((theta, local, failed))
+    }
+
+    /// S^{-1/2}(f̄(θ) − x_obs) with the covariance at θ_GN.
+    pub fn whitened_residual(
+        &self,
+        refined: &Refined,
+        theta: &[f64],
+    ) -> Result<DVector<f64>, RefineError> {
+        let space = self.simulator.twin().parameters();
+        let problem = self.problem(&space, &refined.theta, self.settings.seeds);
+        let mean = problem
+            .mean_features(&DVector::from_column_slice(theta))
+            .map_err(not_evaluated)?;
+        Ok(refined.whitening.apply(&(mean - self.observed)))
+    }
+
+    fn problem(
+        &self,
+        space: &ParameterSpace,
+        initial: &DVector<f64>,
+        seeds: usize,
+    ) -> FeatureResidual<'_> {
+        let bounds = space.bounds();
+        let side = |of: fn(crate::twin::Interval) -> f64| bounds.iter().map(|b| of(*b)).collect();
+        FeatureResidual {
+            simulator: self.simulator,
+            drive: self.drive,
+            observed: self.observed,
+            noise: self.noise.child("mean features"),
+            progress: self.progress,
+            seeds,
+            whitening: None,
+            pull: self.settings.pull.sqrt(),
+            initial: initial.clone(),
+            widths: DVector::from_vec(space.widths()),
+            steps: space
+                .widths()
+                .iter()
+                .map(|w| self.settings.step * w)
+                .collect(),
+            lower: side(crate::twin::Interval::low),
+            upper: side(crate::twin::Interval::high),
+        }
+    }
+
+    /// ∂f/∂θ at `theta`, n × d, of a few seeds, each by itself.
+    pub fn jacobians_at(&self, theta: &[f64]) -> Result<Vec<DMatrix<f64>>, RefineError> {
+        let space = self.simulator.twin().parameters();
+        let theta = DVector::from_vec(space.clamp(theta));
+        let problem = self.problem(&space, &theta, self.settings.centred_seeds);
+        Ok(problem.jacobians(&theta).map_err(not_evaluated)?)
+    }
+
+    /// What is known around `theta` without a search.
+    pub fn describe_at(&self, theta: &[f64]) -> Result<Refined, RefineError> {
+        let space = self.simulator.twin().parameters();
+        let theta = DVector::from_vec(space.clamp(theta));
+        let local = self.whiten(&theta)?;
+        self.describe(&space, &theta.clone(), theta, local, 0)
+    }
+
+    /// S at `theta`, from the same noise everywhere.
+    fn whiten(&self, theta: &DVector<f64>) -> Result<Local, RefineError> {
+        let size = self.gate.whitening_simulations(self.simulator.dim());
+        let noise = self.noise.child("whitening");
+        let features = self.simulator.repeat(
+            theta.as_slice(),
+            self.drive,
+            size,
+            |i| noise.sample(i),
+            &self.progress.unseen(),
+        )?;
+        let whitening = self.gate.whiten(&features).map_err(GateError::from)?;
+        let spread = (whitening.squared_distances(&features).iter())
+            .map(|s| s.sqrt())
+            .collect();
+        Ok(Local { whitening, spread })
+    }
+
+    fn minimiser(&self) -> GaussNewton {
+        GaussNewton {
+            max_iterations: self.settings.iterations,
+            relative_cutoff: self.settings.cutoff,
+            tolerance: 1e-6,
+            step_tolerance: 1e-5,
+            // A step over half the prior's width leaves what the Jacobian knows.
+            max_step: Some(0.5),
+            ..GaussNewton::default()
+        }
+    }
+
+    /// One start: whiten there, descend, whiten at the end, score.
+    fn climb(
+        &self,
+        mut problem: FeatureResidual<'_>,
+        start: &DVector<f64>,
+        space: &ParameterSpace,
+    ) -> Result<Candidate, RefineError> {
+        problem.whitening = Some(self.whiten(start)?.whitening);
+        let minimum =
+            self.minimiser()
+                .minimise(&problem, start, &bounds(space)?, &problem.widths)?;
+        let local = self.whiten(&minimum.theta)?;
+        problem.whitening = Some(local.whitening.clone());
+        let residual = problem.residual(&minimum.theta).map_err(not_evaluated)?;
+        Ok(Candidate {
+            score: -0.5 * (residual.norm_squared() + local.whitening.log_determinant()),
+            theta: minimum.theta,
+            local,
+        })
+    }
+
+    /// Descends on from the best start with all seeds, simulating S again until θ rests.
+    fn polish(
+        &self,
+        space: &ParameterSpace,
+        initial: &DVector<f64>,
+        mut theta: DVector<f64>,
+        mut local: Local,
+        stage: &crate::progress::Stage,
+    ) -> Result<(DVector<f64>, Local), RefineError> {
+        let mut problem = self.problem(space, initial, self.settings.seeds);
+        for _ in 0..self.settings.rounds {
+            problem.whitening = Some(local.whitening.clone());
+            let minimum =
+                self.minimiser()
+                    .minimise(&problem, &theta, &bounds(space)?, &problem.widths)?;
+            let moved = (&minimum.theta - &theta)
+                .component_div(&problem.widths)
+                .amax();
+            theta = minimum.theta;
+            // A single round stays so near that S does.
+            if self.settings.rounds > 1 {
+                local = self.whiten(&theta)?;
+            }
+            stage.tick()?;
+            if moved < 1e-3 {
+                break;
+            }
+        }
+        Ok((theta, local))
+    }
+
+    /// Everything around the estimate.
+    fn describe(
+        &self,
+        space: &ParameterSpace,
+        initial: &DVector<f64>,
+        theta: DVector<f64>,
+        Local { whitening, spread }: Local,
+        failed_starts: usize,
+    ) -> Result<Refined, RefineError> {
+        let problem = self.problem(space, initial, self.settings.seeds);
+        let jacobian = problem.feature_jacobian(&theta).map_err(not_evaluated)?;
+        let mean = problem.mean_features(&theta).map_err(not_evaluated)?;
+        let residual = whitening.apply(&(mean - self.observed));
+        let information = Information::new(
+            &whitening.apply_columns(&jacobian),
+            space,
+            self.settings.ridge,
+            self.settings.seeds,
+        )?;
+        Ok(Refined {
+            theta,
+            whitening,
+            spread,
+            jacobian,
+            residual,
+            information,
+            failed_starts,
+        })
+    }
+}
+
+/// An evaluation that failed outside of a search.
+fn not_evaluated(error: EvaluationError) -> OptimiseError {
+    match error {
+        EvaluationError::Fatal(error) => OptimiseError::Fatal(error),
+        rejected => OptimiseError::Start(rejected.into()),
+    }
+}
+
+/// The bounds of a space, as the minimiser wants them.
+fn bounds(space: &ParameterSpace) -> Result<Bounds, OptimiseError> {
+    let side = |of: fn(crate::twin::Interval) -> f64| {
+        DVector::from_iterator(space.len(), space.bounds().into_iter().map(of))
+    };
+    Bounds::new(
+        side(crate::twin::Interval::low),
+        side(crate::twin::Interval::high),
+    )
+    .map_err(|error| OptimiseError::Fatal(error.into()))
+}
+
+/// θ_init, then space-filling points in the bounds.
+fn starts(
+    space: &ParameterSpace,
+    initial: &DVector<f64>,
+    count: usize,
+) -> Result<Vec<DVector<f64>>, RefineError> {
+    let mut all = vec![initial.clone()];
+    all.extend(space_filling(&bounds(space)?, count - 1, 0)?);
+    Ok(all)
+}

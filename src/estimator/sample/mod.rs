@@ -1,0 +1,85 @@
+//! Where the cloud of fresh simulations around an estimate is drawn from: one sampler a file.
+//!
+//! Another one is a file, its `mod`, its variant of [`CloudSampler`] and its arm in [`CloudSampler::around`].
+
+mod eigenbox;
+mod ellipsoid;
+mod hybrid;
+mod sensitivity;
+
+pub use eigenbox::EigenBox;
+pub use ellipsoid::{Ellipsoid, EllipsoidError};
+pub use hybrid::Hybrid;
+pub use sensitivity::Sensitivity;
+
+use crate::estimator::refine::Refined;
+use crate::math::median;
+use crate::twin::{Noise, ParameterSpace};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use serde::{Deserialize, Serialize};
+
+/// Draws parameters around an estimate.
+///
+/// Bounds are not a sampler's business: whoever simulates the cloud rejects what is outside, draws again with
+/// other noise, and counts.
+pub trait Sampler: Send + Sync {
+    /// Draw number `index`, which depends on it and on `noise` alone.
+    fn draw(&self, index: u64, noise: Noise) -> DVector<f64>;
+}
+
+/// Which sampler draws the cloud.
+///
+/// ```
+/// use truetwin::study::{CloudSampler, CloudSettings};
+///
+/// assert_eq!(CloudSettings::default().sampler, CloudSampler::Ellipsoid);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum CloudSampler {
+    /// The confidence ellipsoid alone.
+    #[default]
+    Ellipsoid,
+    /// Along sensitivities alone.
+    Sensitivity,
+    /// The paper's alternation of both.
+    Hybrid,
+    /// Uniform in the box of the principal axes, ±1.8·`spread` standard deviations: flat over the region.
+    Box,
+}
+
+impl CloudSampler {
+    /// This sampler around an estimate, `spread` times as wide as its covariance says.
+    pub(crate) fn around(
+        self,
+        refined: &Refined,
+        space: &ParameterSpace,
+        spread: f64,
+    ) -> Result<Box<dyn Sampler>, EllipsoidError> {
+        let centre = refined.theta.clone();
+        let ellipsoid = || {
+            let information = &refined.information.matrix / spread.powi(2);
+            Ellipsoid::new(centre.clone(), information)
+        };
+        let sensitivity = || {
+            let jacobian = refined.whitened_jacobian();
+            let sensitivities: Vec<f64> = jacobian.column_iter().map(|c| c.norm()).collect();
+            let typical = median(&refined.spread).unwrap_or(1.0);
+            let reach: Vec<f64> = space.bounds().iter().map(|b| 0.5 * b.width()).collect();
+            let length = typical * refined.residual.norm();
+            Sensitivity::new(centre.clone(), &sensitivities, length, &reach)
+        };
+        Ok(match self {
+            Self::Ellipsoid => Box::new(ellipsoid()?),
+            Self::Sensitivity => Box::new(sensitivity()),
+            Self::Box => {
+                let eigen = SymmetricEigen::new(refined.information.covariance.clone());
+                let lengths = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
+                let axes = eigen.eigenvectors * DMatrix::from_diagonal(&lengths);
+                Box::new(EigenBox::of_spread(centre.as_slice(), &axes, spread))
+            }
+            Self::Hybrid => Box::new(Hybrid::new(ellipsoid()?, sensitivity())),
+        })
+    }
+}

@@ -1,0 +1,313 @@
+//! The folder of shards.
+
+use super::ShardsError;
+use super::plan::{MOST, VERB, rows_of_a_shard};
+use crate::estimator::bank::file::{self, BankFileError};
+use crate::estimator::bank::{Bank, Draws};
+use crate::storage::files::{sha256, sweep, write_new};
+use crate::storage::untrusted::{MESSAGE, MOST_NUMBERS, one_line, read_kept};
+use crate::storage::work::{Manifest, WorkError, WorkFolder};
+use serde_json::{Value, json};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::io;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// Where shards lie.
+pub(super) const SHARDS: &str = "shards";
+/// What to do about a shard that is not what it was.
+const AGAIN: &str = "run the same `truetwin bank` call again, and it is made again";
+
+/// What lies in a folder of shards.
+#[derive(Debug, Clone)]
+pub(super) struct Shards {
+    folder: WorkFolder,
+    manifest: Manifest,
+    /// Simulations of the whole bank.
+    pub size: usize,
+    rows: usize,
+    /// Names of the parameters.
+    pub names: Vec<String>,
+    /// Shards of the whole bank.
+    pub of: usize,
+    /// Checksum of each shard that is there.
+    pub there: BTreeMap<usize, String>,
+}
+
+/// The name of a shard.
+fn name(number: usize, checksum: &str) -> String {
+    format!("{number:06}-{checksum}.npz")
+}
+
+/// Number and checksum of a shard, of its name; `None` for any other file.
+fn parse(name: &str) -> Option<(usize, &str)> {
+    let (number, checksum) = name.strip_suffix(".npz")?.split_once('-')?;
+    let hexadecimal = checksum.bytes().all(|b| b.is_ascii_hexdigit());
+    (checksum.len() == 64 && hexadecimal).then_some((number.parse().ok()?, checksum))
+}
+
+impl Shards {
+    /// Of a folder with this manifest.
+    pub fn list(folder: WorkFolder, manifest: Manifest) -> Result<Self, ShardsError> {
+        let number = |key: &str| {
+            (manifest.get(key).and_then(Value::as_u64))
+                .filter(|n| *n > 0)
+                .and_then(|n| usize::try_from(n).ok())
+        };
+        let names = (manifest.get("parameters").and_then(Value::as_array)).and_then(|all| {
+            let name = |p: &Value| p["name"].as_str().map(str::to_owned);
+            all.iter().map(name).collect::<Option<Vec<String>>>()
+        });
+        let (Some(size), Some(rows), Some(names)) =
+            (number("size"), number("rows of a shard"), names)
+        else {
+            return Err(foreign(folder.path()).into());
+        };
+        // Everything below counts shards: no manifest may make it count without end.
+        if size > MOST || rows != rows_of_a_shard(size) {
+            return Err(foreign(folder.path()).into());
+        }
+        let of = size.div_ceil(rows);
+        let place = folder.part(SHARDS)?;
+        let mut there = BTreeMap::new();
+        let failed = |error| ShardsError::from(WorkError::io(&place, error));
+        for entry in std::fs::read_dir(&place).map_err(failed)? {
+            let found = entry.map_err(failed)?.file_name();
+            let Some((number, checksum)) = found.to_str().and_then(parse) else {
+                continue;
+            };
+            if number >= of {
+                continue;
+            }
+            if let Some(other) = there.insert(number, checksum.to_owned()) {
+                return Err(ShardsError::Conflict {
+                    one: place.join(name(number, checksum)),
+                    other: place.join(name(number, &other)),
+                });
+            }
+        }
+        Ok(Self {
+            folder,
+            manifest,
+            size,
+            rows,
+            names,
+            of,
+            there,
+        })
+    }
+
+    /// The same folder as it is now.
+    pub fn again(self) -> Result<Self, ShardsError> {
+        Self::list(self.folder, self.manifest)
+    }
+
+    /// Rows of a shard.
+    pub fn rows(&self, number: usize) -> Range<u64> {
+        let end = ((number + 1) * self.rows).min(self.size);
+        (number * self.rows) as u64..end as u64
+    }
+
+    /// Where a shard lies.
+    pub fn file(&self, number: usize) -> Option<PathBuf> {
+        let checksum = self.there.get(&number)?;
+        Some(self.folder.file(SHARDS).join(name(number, checksum)))
+    }
+
+    /// What a message about a shard names.
+    fn place(&self, number: usize) -> PathBuf {
+        (self.file(number)).unwrap_or_else(|| self.folder.path().into())
+    }
+
+    /// The bytes of a shard, if they are what they were.
+    pub fn bytes(&self, number: usize) -> Result<Vec<u8>, ShardsError> {
+        let incomplete = || ShardsError::Incomplete {
+            path: self.folder.path().into(),
+            there: self.there.len(),
+            of: self.of,
+        };
+        let path = self.file(number).ok_or_else(incomplete)?;
+        let bytes = read_kept(&path, 8 * MOST_NUMBERS as u64)
+            .map_err(|error| BankFileError::io(&path, error))?;
+        match self.there.get(&number) == Some(&sha256(&bytes)) {
+            true => Ok(bytes),
+            false => Err(damaged(path, "its SHA-256 is not that of its name").into()),
+        }
+    }
+
+    /// The rows of a shard, checked.
+    pub fn draws(&self, number: usize) -> Result<Draws, ShardsError> {
+        let bytes = self.bytes(number)?;
+        let draws = file::from_npz(io::Cursor::new(bytes));
+        let checked = draws.and_then(|draws| {
+            file::check(&draws, self.names.len())?;
+            match draws.theta.nrows() == self.rows(number).count() {
+                true => Ok(draws),
+                false => Err("another number of rows".into()),
+            }
+        });
+        checked.map_err(|reason| damaged(self.place(number), &reason).into())
+    }
+
+    /// Of a shard whose rows are wider or narrower than those of the first.
+    pub fn odd(&self, number: usize) -> BankFileError {
+        damaged(self.place(number), "another number of features")
+    }
+
+    /// Whether a shard is there and is what it was.
+    pub fn is_sound(&self, number: usize) -> Result<bool, ShardsError> {
+        match self.bytes(number) {
+            Ok(_) => Ok(true),
+            Err(
+                ShardsError::Incomplete { .. } | ShardsError::File(BankFileError::Content { .. }),
+            ) => Ok(false),
+            // A file that cannot be read now may be sound.
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Adds a shard; where another process has made it in the meantime, that one stays.
+    pub fn add(&self, number: usize, bytes: &[u8]) -> Result<(), ShardsError> {
+        let path = (self.folder.part(SHARDS)?).join(name(number, &sha256(bytes)));
+        match write_new(&path, bytes) {
+            Err(error) if !path.exists() => Err(BankFileError::io(&path, error).into()),
+            _ => Ok(()),
+        }
+    }
+
+    /// Removes a shard that is not what it was.
+    pub fn remove(&self, number: usize) -> Result<(), ShardsError> {
+        match self.file(number) {
+            Some(path) => {
+                std::fs::remove_file(&path).map_err(|error| BankFileError::io(&path, error).into())
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Puts the checksums into the manifest, if every shard is there; sweeps out what processes that died have left.
+    pub fn finish(&self) -> Result<(), ShardsError> {
+        if self.there.len() == self.of {
+            let checksums: Vec<&String> = self.there.values().collect();
+            self.folder.finish(&self.manifest, json!(checksums))?;
+            let place = self.folder.part(SHARDS)?;
+            sweep(&place).map_err(|error| WorkError::io(&place, error))?;
+        }
+        Ok(())
+    }
+
+    /// The folder's manifest.
+    pub fn manifest(&self) -> &Manifest {
+        &self.manifest
+    }
+}
+
+/// Of a folder whose manifest says too little.
+fn foreign(path: &Path) -> WorkError {
+    let path = path.into();
+    WorkError::Foreign { path, verb: VERB }
+}
+
+fn damaged(path: PathBuf, reason: &str) -> BankFileError {
+    BankFileError::Content {
+        path,
+        reason: one_line(reason, MESSAGE),
+        remedy: AGAIN,
+    }
+}
+
+/// A whole bank on disk: each shard is a part, read when it is asked for.
+#[derive(Debug, Clone)]
+pub struct ShardedBank {
+    shards: Shards,
+    seed: u64,
+}
+
+impl ShardedBank {
+    /// The bank in a folder.
+    ///
+    /// # Errors
+    ///
+    /// [`ShardsError`]: no folder of a bank, shards that are missing or are not those of the manifest.
+    pub fn open(path: &Path) -> Result<Self, ShardsError> {
+        let (folder, manifest) = WorkFolder::find(path, VERB)?;
+        let seed = manifest.get("seed").and_then(Value::as_u64);
+        let seed = seed.ok_or_else(|| foreign(path))?;
+        let finished = manifest.checksums().cloned();
+        let shards = Shards::list(folder, manifest)?;
+        let there = json!(shards.there.values().collect::<Vec<_>>());
+        if shards.there.len() < shards.of || finished.is_none() {
+            return Err(ShardsError::Incomplete {
+                path: path.into(),
+                there: shards.there.len(),
+                of: shards.of,
+            });
+        }
+        if finished != Some(there) {
+            let file = shards.folder.file(SHARDS);
+            return Err(damaged(file, "its shards are not those of manifest.json").into());
+        }
+        Ok(Self { shards, seed })
+    }
+
+    /// Whether there is any shard in a folder.
+    pub(crate) fn is_begun(path: &Path) -> bool {
+        let shards = std::fs::read_dir(path.join(SHARDS));
+        shards.is_ok_and(|mut shards| shards.next().is_some())
+    }
+
+    /// Simulations, M.
+    pub fn size(&self) -> usize {
+        self.shards.size
+    }
+
+    /// The seed of its rows.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// Names of the parameters.
+    pub fn names(&self) -> &[String] {
+        &self.shards.names
+    }
+
+    /// All rows, in memory.
+    ///
+    /// # Errors
+    ///
+    /// [`BankFileError`]: a shard that cannot be read, or is not what it was.
+    pub fn read(&self) -> Result<Draws, BankFileError> {
+        let parts = (0..self.shards.of).map(|index| self.part(index));
+        Draws::stacked(self.size(), parts, |index| self.shards.odd(index))
+    }
+
+    /// What tells this bank from any other.
+    pub fn checksum(&self) -> String {
+        self.shards.manifest.checksum()
+    }
+
+    /// Where it lies.
+    pub fn path(&self) -> &Path {
+        self.shards.folder.path()
+    }
+
+    pub(super) fn manifest(&self) -> &Manifest {
+        self.shards.manifest()
+    }
+}
+
+impl Bank for ShardedBank {
+    fn parts(&self) -> Vec<usize> {
+        let rows = |number| self.shards.rows(number).count();
+        (0..self.shards.of).map(rows).collect()
+    }
+
+    fn part(&self, index: usize) -> Result<Cow<'_, Draws>, BankFileError> {
+        match self.shards.draws(index) {
+            Ok(draws) => Ok(Cow::Owned(draws)),
+            Err(ShardsError::File(error)) => Err(error),
+            Err(error) => Err(damaged(self.shards.place(index), &error.to_string())),
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! Simulations from the prior of a study.
+
+use crate::estimator::bank::{BankError, Draw, Draws, FeatureSimulator};
+use crate::feature::{FeatureError, FeatureRecipe};
+use crate::progress::Stage;
+use crate::study::{DriveSource, PlanError, Study};
+use crate::twin::{Noise, ParameterSpace};
+use std::borrow::Cow;
+use std::ops::Range;
+
+/// Draws from a study's prior: θ uniform in the prior, each with noise and, where the study draws inputs, an input of its own.
+///
+/// Source: Lakshminarayanan, Guerrero & Rojas, section III.
+///
+/// ```
+/// use truetwin::feature::Ar;
+/// use truetwin::progress::Progress;
+/// use truetwin::estimator::shards::Prior;
+/// use truetwin::study::{RecordPlan, Study};
+/// use truetwin::twins::VanDerPol;
+///
+/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 100))?;
+/// let prior = Prior::new(&study, &Ar { order: 2 })?;
+/// let stage = Progress::silent().stage("bank", 10);
+/// let draws = prior.rows(0..10, 1, "bank", &stage)?;
+/// assert!(draws.theta.iter().all(|nu| (0.0..=2.5).contains(nu)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Prior {
+    simulator: FeatureSimulator,
+    space: ParameterSpace,
+    drives: DriveSource,
+}
+
+debug_by_name!(Prior);
+
+impl Prior {
+    /// Of a study, seen through features.
+    ///
+    /// # Errors
+    ///
+    /// Features that the twin cannot have.
+    pub fn new(study: &Study, features: &dyn FeatureRecipe) -> Result<Self, PriorError> {
+        Ok(Self {
+            simulator: FeatureSimulator::new(study.twin().clone(), features)?,
+            space: study.twin().parameters(),
+            drives: study.drives()?,
+        })
+    }
+
+    /// Number of features.
+    pub fn dim(&self) -> usize {
+        self.simulator.dim()
+    }
+
+    /// Rows `rows` of what `purpose` names: row i depends on (seed, purpose, i) alone.
+    ///
+    /// # Errors
+    ///
+    /// As [`FeatureSimulator::draws`].
+    pub fn rows(
+        &self,
+        rows: Range<u64>,
+        seed: u64,
+        purpose: &str,
+        stage: &Stage,
+    ) -> Result<Draws, BankError> {
+        self.simulator.draws(
+            rows,
+            |i| Noise::new(seed, purpose, i),
+            |_, _, noise| {
+                let drive = (self.drives.draw(noise))
+                    .map_err(|error| BankError::Input(error.to_string()))?;
+                Ok(Some(Draw {
+                    theta: self.space.draw_prior(noise),
+                    drive: Cow::Owned(drive),
+                }))
+            },
+            stage,
+        )
+    }
+}
+
+/// Why a study's prior cannot be simulated.
+///
+/// ```
+/// use truetwin::feature::Ar;
+/// use truetwin::estimator::shards::{Prior, PriorError};
+/// use truetwin::study::{RecordPlan, Study};
+/// use truetwin::twins::VanDerPol;
+///
+/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 100))?;
+/// assert!(matches!(Prior::new(&study, &Ar { order: 0 }), Err(PriorError::Feature(_))));
+/// # Ok::<(), truetwin::study::StudyError>(())
+/// ```
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PriorError {
+    /// Of the features.
+    #[error(transparent)]
+    Feature(#[from] FeatureError),
+    /// Of step, length, input.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+}

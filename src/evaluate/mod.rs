@@ -1,0 +1,11 @@
+//! Measures how good estimates and diagnoses are.
+//!
+//! | to … | look at |
+//! |---|---|
+//! | compare with the prediction-error method and the dual Kalman filter | [`baseline`] |
+//! | reproduce the paper's tables | [`paper`] |
+//! | diagnose sealed records whose missing effect is withheld | [`trials`] |
+
+pub mod baseline;
+pub mod paper;
+pub mod trials;

@@ -1,0 +1,76 @@
+//! The folder of a study of many records.
+
+use super::MonteCarlo;
+use crate::estimator::PretrainOptions;
+use crate::storage::work::{Manifest, WorkError, WorkFolder, checksum};
+use crate::study::Study;
+use serde_json::json;
+use std::path::Path;
+
+/// Layout of the folder; raised when it changes.
+const LAYOUT: u32 = 3;
+/// Where runs are kept.
+pub(super) const RUNS: &str = "runs";
+
+/// Where the estimator of a study comes from.
+///
+/// ```
+/// use truetwin::evaluate::paper::{Benchmark, MonteCarlo, Origin, Scenario, reference_studies};
+/// use truetwin::estimator::PretrainOptions;
+///
+/// let study = &reference_studies()?[0];
+/// let plan = MonteCarlo { benchmark: Benchmark::of(study), scenario: Scenario::First, runs: 100, seed: 1 };
+/// let place = tempfile::tempdir()?;
+/// let training = PretrainOptions::default();
+/// let folder = plan.folder(&place.path().join("runs"), study, Origin::Trained(&training))?;
+/// assert!(folder.file("manifest.json").exists()); // another call is refused there
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub enum Origin<'a> {
+    /// Trained for it, and kept in the folder.
+    Trained(&'a PretrainOptions),
+    /// From a file.
+    File(&'a Path),
+}
+
+impl MonteCarlo {
+    /// A folder for the runs of this plan over `study`, a new one or the one of the same call: `runs/0000.json`, … hold a
+    /// [`Run`](super::Run) each; `estimator.est` is for an estimator that is trained for the study.
+    ///
+    /// # Errors
+    ///
+    /// [`WorkError`]: a path that is taken, a folder of another call, an estimator or input file that cannot be read.
+    pub fn folder(
+        &self,
+        path: &Path,
+        study: &Study,
+        origin: Origin<'_>,
+    ) -> Result<WorkFolder, WorkError> {
+        let manifest = self.manifest(study, origin)?;
+        WorkFolder::open(path, &manifest, &[RUNS], |_| Ok(()))
+    }
+
+    /// Everything that the runs depend on; files by their checksums.
+    fn manifest(&self, study: &Study, origin: Origin<'_>) -> Result<Manifest, WorkError> {
+        let manifest = study
+            .manifest("reproduce", LAYOUT)?
+            .with("scenario", self.scenario.number())
+            .with("runs", self.runs)
+            .with("seed", self.seed);
+        Ok(match origin {
+            Origin::File(path) => manifest.with("estimator", checksum(path)?),
+            Origin::Trained(options) => {
+                let preset = study.preset(options.preset);
+                manifest
+                    .with("preset", options.preset.to_string())
+                    .with("bank size", options.bank_size)
+                    .with("epochs", options.epochs)
+                    .with("training seed", options.seed)
+                    .with("network", preset.architecture.id())
+                    .with("features", json!(preset.features))
+                    .with("preset settings", json!(preset.settings))
+            }
+        })
+    }
+}

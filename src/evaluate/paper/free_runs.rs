@@ -1,0 +1,107 @@
+//! What the twin shows at the methods' answers.
+
+use super::record::simulated;
+use super::{Method, MonteCarlo, MonteCarloError, Run};
+use crate::record::{Record, Signal};
+use crate::study::Study;
+use crate::twin::free_run;
+
+/// One run's record, and noise-free runs of the twin at the truth and at every answer.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct FreeRuns {
+    /// The record, simulated again.
+    pub record: Record,
+    /// N × channels.
+    pub truth: Option<Signal>,
+    /// In the order of [`Method::all`]; `None` without an answer, or where the twin diverges there.
+    pub answers: Vec<(Method, Option<Signal>)>,
+}
+
+impl FreeRuns {
+    /// Of a run of `plan`.
+    pub fn of(study: &Study, plan: &MonteCarlo, run: &Run) -> Result<Self, MonteCarloError> {
+        let draws = plan.draws(study)?;
+        let record = simulated(study, &draws, plan.seed, run.run)?.record;
+        // A free run may diverge where noisy runs do not.
+        let at = |theta: &[f64]| free_run(study.twin().as_ref(), theta, record.drive()).ok();
+        let answers = (run.answers.iter())
+            .map(|answer| (answer.method, answer.theta.as_deref().and_then(at)))
+            .collect();
+        Ok(Self {
+            truth: at(&run.truth),
+            answers,
+            record,
+        })
+    }
+}
+
+/// The mean over runs of the noise-free trajectories, as in the paper's figures.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct MeanRuns {
+    /// In seconds.
+    pub times: Vec<f64>,
+    /// At the truth, N × channels; `None` where the twin diverges there.
+    pub truth: Option<Signal>,
+    /// At the answers, in the order of [`Method::all`]; `None` without any run to draw.
+    pub answers: Vec<(Method, Option<Signal>)>,
+    /// Number of runs.
+    pub runs: usize,
+}
+
+impl MeanRuns {
+    /// Over runs of `plan`; `None` without runs, or where their true parameters differ so that a mean shows nothing.
+    pub fn of(
+        study: &Study,
+        plan: &MonteCarlo,
+        runs: &[Run],
+    ) -> Result<Option<Self>, MonteCarloError> {
+        if !plan.scenario.is_point() || runs.is_empty() {
+            return Ok(None);
+        }
+        let mut truth = Sum::default();
+        let mut answers: Vec<Sum> = Method::all().iter().map(|_| Sum::default()).collect();
+        let mut times = Vec::new();
+        for run in runs {
+            let one = FreeRuns::of(study, plan, run)?;
+            if times.is_empty() {
+                let drive = one.record.drive();
+                times = (0..drive.samples()).map(|k| drive.time(k)).collect();
+            }
+            truth.add(one.truth);
+            for (sum, (_, signal)) in answers.iter_mut().zip(one.answers) {
+                sum.add(signal);
+            }
+        }
+        Ok(Some(Self {
+            times,
+            truth: truth.mean(),
+            answers: (Method::all().into_iter())
+                .zip(answers.into_iter().map(Sum::mean))
+                .collect(),
+            runs: runs.len(),
+        }))
+    }
+}
+
+/// A mean in the making.
+#[derive(Default)]
+struct Sum(Option<(Signal, f64)>);
+
+impl Sum {
+    fn add(&mut self, signal: Option<Signal>) {
+        match (&mut self.0, signal) {
+            (_, None) => {}
+            (None, Some(signal)) => self.0 = Some((signal, 1.0)),
+            (Some((sum, count)), Some(signal)) => {
+                *sum += &signal;
+                *count += 1.0;
+            }
+        }
+    }
+
+    fn mean(self) -> Option<Signal> {
+        self.0.map(|(sum, count)| sum / count)
+    }
+}

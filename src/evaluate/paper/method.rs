@@ -1,0 +1,91 @@
+//! The rows of the table.
+
+use crate::evaluate::baseline::Initialisation;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// What is scored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+#[non_exhaustive]
+pub enum Method {
+    /// The pretrained network.
+    TsPre,
+    /// Gauss–Newton, whatever the gate says.
+    GaussNewton,
+    /// Tuned heads, whatever the gate says.
+    TsFine,
+    /// What the estimator answers: gate, misfit and all.
+    Final,
+    /// The prediction-error method, the paper's six steps.
+    PredictionError(Initialisation),
+    /// The dual Kalman filter; of twins with equations only.
+    DualFilter(Initialisation),
+}
+
+impl Method {
+    /// Every row, in the order of a table.
+    pub fn all() -> Vec<Self> {
+        let mut all = vec![Self::TsPre, Self::GaussNewton, Self::TsFine, Self::Final];
+        all.extend(Initialisation::ALL.map(Self::PredictionError));
+        all.extend(Initialisation::ALL.map(Self::DualFilter));
+        all
+    }
+
+    /// Where a baseline starts.
+    pub fn initialisation(self) -> Option<Initialisation> {
+        match self {
+            Self::PredictionError(start) | Self::DualFilter(start) => Some(start),
+            _ => None,
+        }
+    }
+
+    /// Method and start: `PEM (bad)`.
+    pub fn label(self) -> String {
+        match self.initialisation() {
+            Some(start) => format!("{self} ({start})"),
+            None => self.to_string(),
+        }
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::TsPre => "TS-pre",
+            Self::GaussNewton => "GN",
+            Self::TsFine => "TS-fine",
+            Self::Final => "final",
+            Self::PredictionError(_) => "PEM",
+            Self::DualFilter(_) => "dual-EKF",
+        })
+    }
+}
+
+impl From<Method> for String {
+    fn from(method: Method) -> Self {
+        method.label()
+    }
+}
+
+impl TryFrom<String> for Method {
+    type Error = String;
+
+    fn try_from(label: String) -> Result<Self, String> {
+        let found = Self::all().into_iter().find(|m| m.label() == label);
+        found.ok_or_else(|| format!("no method is called \"{label}\""))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_label_is_read_again() {
+        for method in Method::all() {
+            assert_eq!(Method::try_from(String::from(method)), Ok(method));
+        }
+        assert!(Method::try_from("PEM (worst)".to_owned()).is_err());
+    }
+}

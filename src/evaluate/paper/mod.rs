@@ -1,0 +1,62 @@
+//! Studies over many records, and the paper's settings of the reference twins.
+//!
+//! | to … | look at |
+//! |---|---|
+//! | run the estimator and the baselines on many simulated records | [`MonteCarlo::run`], [`Run`] |
+//! | turn the runs into errors and coverage | [`score`], [`Scores`] |
+//! | choose where true parameters come from | [`Scenario`] |
+//! | keep runs in a folder and go on later | [`MonteCarlo::folder`] |
+//! | draw what the answers predict | [`FreeRuns`], [`MeanRuns`] |
+//! | have a twin's test points, invariants, published figures | [`Benchmark`] |
+//!
+//! ```
+//! use truetwin::evaluate::paper::*;
+//! use truetwin::progress::Progress;
+//! use truetwin::study::{RecordPlan, Study};
+//! use truetwin::twins::VanDerPol;
+//! use truetwin::estimator::{PretrainOptions, pretrain};
+//!
+//! let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 150))?;
+//! let small = PretrainOptions { bank_size: Some(200), epochs: Some(3), ..PretrainOptions::default() };
+//! let (estimator, _) = pretrain(&study, &small, &Progress::silent())?;
+//!
+//! // A twin of one's own has no published points; true parameters come from all of its bounds.
+//! let plan = MonteCarlo { benchmark: Benchmark::default(), scenario: Scenario::Uniform, runs: 2, seed: 1 };
+//! let runs: Vec<Run> = plan.run(&estimator, None, &Progress::silent())?;
+//! let answers: &[Answer] = &runs[0].answers;
+//! assert_eq!(answers.len(), Method::all().len());
+//!
+//! let scores: Scores = score(&study, &plan, &runs);
+//! let network: &MethodScore = &scores.methods[0];
+//! assert_eq!((network.method, network.failed), (Method::TsPre, 0));
+//! let coverage: &Coverage = &scores.coverage[0];
+//! assert_eq!((coverage.name.as_str(), coverage.of), ("nu", 2));
+//!
+//! // What the answers predict; a mean only where all records have the same truth.
+//! let free: FreeRuns = FreeRuns::of(&study, &plan, &runs[0])?;
+//! assert_eq!(free.answers.len(), answers.len());
+//! assert!(MeanRuns::of(&study, &plan, &runs)?.is_none());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod folder;
+mod free_runs;
+mod invariant;
+mod method;
+mod monte_carlo;
+mod paper;
+mod record;
+mod run;
+mod scenario;
+mod score;
+
+pub use folder::Origin;
+pub use free_runs::{FreeRuns, MeanRuns};
+pub use invariant::{Invariant, Symmetry};
+pub use method::Method;
+pub use monte_carlo::{MonteCarlo, MonteCarloError};
+pub use paper::reference_studies;
+pub use run::{Answer, Run};
+pub use scenario::{Benchmark, Published, Scenario, ScenarioError, TestPoint};
+pub(crate) use score::COVERAGE_LEVEL;
+pub use score::{Coverage, MethodScore, Scores, score};

@@ -1,0 +1,345 @@
+//! Every method on many simulated records.
+
+use super::folder::RUNS;
+use super::record::simulated;
+use super::scenario::Draws;
+use super::{Benchmark, Run, Scenario, ScenarioError};
+use crate::estimator::Estimator;
+use crate::progress::{Cancelled, Progress};
+use crate::record::{Record, RecordError};
+use crate::storage::work::{Piece, Pieces, Share, WorkError, WorkFolder};
+use crate::study::Study;
+use crate::twin::SimulationError;
+
+/// What is run.
+#[derive(Debug, Clone)]
+pub struct MonteCarlo {
+    /// What is known about the twin: [`Benchmark::of`] for the paper's, the default for any other.
+    pub benchmark: Benchmark,
+    /// Where θ comes from.
+    pub scenario: Scenario,
+    /// Number of records.
+    pub runs: usize,
+    /// Seed of records and estimates.
+    pub seed: u64,
+}
+
+/// Why there are no scores.
+///
+/// ```
+/// use truetwin::evaluate::paper::{Benchmark, MonteCarlo, MonteCarloError, Scenario, ScenarioError};
+/// use truetwin::study::{RecordPlan, Study};
+/// use truetwin::twins::VanDerPol;
+///
+/// // No points of the paper's are known of this twin.
+/// let study = Study::new("mine", VanDerPol, RecordPlan::autonomous(0.05, 150))?;
+/// let plan = MonteCarlo { benchmark: Benchmark::default(), scenario: Scenario::First, runs: 2, seed: 1 };
+/// let error: MonteCarloError = plan.record(&study, 0).unwrap_err();
+/// assert!(matches!(error, MonteCarloError::Scenario(ScenarioError::NoPoint(_))));
+/// # Ok::<(), truetwin::study::StudyError>(())
+/// ```
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MonteCarloError {
+    /// The study does not have such a scenario.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// A record could not be simulated.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// A record could not be made.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// The estimator failed on every record.
+    #[error("the estimator failed on every record; on the first: {0}")]
+    Hopeless(String),
+    /// The folder of runs.
+    #[error(transparent)]
+    Work(#[from] WorkError),
+    /// No threads.
+    #[error("no threads could be started: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+    /// Stopped from outside.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl MonteCarlo {
+    /// Whether the study has this scenario; worth asking before an estimator is trained.
+    pub fn check(&self, study: &Study) -> Result<(), ScenarioError> {
+        self.draws(study).map(|_| ())
+    }
+
+    pub(super) fn draws<'a>(&self, study: &'a Study) -> Result<Draws<'a>, ScenarioError> {
+        Draws::new(study, &self.benchmark, self.scenario)
+    }
+
+    /// True parameters and record number `run`, from 0.
+    ///
+    /// # Errors
+    ///
+    /// A study without this scenario, a twin that diverges there.
+    pub fn record(&self, study: &Study, run: usize) -> Result<(Vec<f64>, Record), MonteCarloError> {
+        let simulated = simulated(study, &self.draws(study)?, self.seed, run)?;
+        Ok((simulated.truth, simulated.record))
+    }
+
+    /// Runs every stage of `estimator`, and the baselines, on simulated records, in order. Records are independent:
+    /// run i depends on (seed, i) alone, and on no number of threads.
+    ///
+    /// With a `folder`, each run is kept there as soon as it is done, and what is there already is not run again.
+    ///
+    /// Records run in parallel, each on its share of the current threads.
+    pub fn run(
+        &self,
+        estimator: &Estimator,
+        folder: Option<&WorkFolder>,
+        progress: &Progress,
+    ) -> Result<Vec<Run>, MonteCarloError> {
+        let runs = self.run_share(estimator, folder, Share::WHOLE, progress)?;
+        match runs.iter().all(|run| run.failure.is_some()) {
+            true => Err(MonteCarloError::Hopeless(
+                (runs.into_iter().find_map(|run| run.failure)).unwrap_or_default(),
+            )),
+            false => Ok(runs),
+        }
+    }
+
+    /// As [`run`](Self::run), but only the runs of a share; returns these and all that the folder had before.
+    pub fn run_share(
+        &self,
+        estimator: &Estimator,
+        folder: Option<&WorkFolder>,
+        share: Share,
+        progress: &Progress,
+    ) -> Result<Vec<Run>, MonteCarloError> {
+        let study = estimator.study();
+        let draws = self.draws(study)?;
+        let parameters = study.twin().parameters().len();
+        let pieces = Pieces {
+            folder,
+            part: RUNS,
+            count: self.runs,
+            share,
+        };
+        pieces.all(
+            &progress.stage("records", self.runs),
+            |run: &Run| match run.fits(parameters) {
+                true => Ok(()),
+                false => Err("its methods or parameters are those of another study"),
+            },
+            |run| {
+                let record = simulated(study, &draws, self.seed, run)?;
+                Run::new(estimator, run, &record, progress)
+            },
+        )
+    }
+}
+
+impl Piece for Run {
+    fn number(&self) -> usize {
+        self.run
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimator::{PretrainOptions, pretrain};
+    use crate::evaluate::paper::{Origin, reference_studies, score};
+    use crate::progress::Listener;
+    use crate::record::{Drive, Signal};
+    use crate::study::{PresetName, RecordPlan};
+    use crate::twin::{DigitalTwin, Noise, Parameter, ParameterSpace};
+    use std::fs;
+    use std::path::Path;
+    use std::sync::{Arc, OnceLock};
+
+    const TRAINING: PretrainOptions = PretrainOptions {
+        preset: PresetName::Paper,
+        bank_size: Some(200),
+        epochs: Some(2),
+        seed: 1,
+    };
+
+    fn oscillator() -> &'static Estimator {
+        static MADE: OnceLock<Estimator> = OnceLock::new();
+        MADE.get_or_init(|| {
+            let study = &reference_studies().unwrap()[0];
+            pretrain(study, &TRAINING, &Progress::silent()).unwrap().0
+        })
+    }
+
+    fn plan(scenario: Scenario, runs: usize) -> MonteCarlo {
+        MonteCarlo {
+            benchmark: Benchmark::of(oscillator().study()),
+            scenario,
+            runs,
+            seed: 3,
+        }
+    }
+
+    fn open(path: &Path, plan: &MonteCarlo) -> Result<WorkFolder, WorkError> {
+        plan.folder(path, oscillator().study(), Origin::Trained(&TRAINING))
+    }
+
+    /// All but the times.
+    fn answers(runs: Vec<Run>) -> Vec<Run> {
+        let timeless = |mut run: Run| {
+            run.answers.iter_mut().for_each(|answer| answer.ms = 0.0);
+            run
+        };
+        runs.into_iter().map(timeless).collect()
+    }
+
+    #[test]
+    fn threads_change_nothing() {
+        let plan = plan(Scenario::Uniform, 3);
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            let runs = || plan.run(oscillator(), None, &Progress::silent()).unwrap();
+            answers(pool.unwrap().install(runs))
+        };
+        let one = on(1);
+        assert_eq!(one, on(2));
+        assert_eq!(one, on(5));
+        assert!(one[0].truth != one[1].truth && one[2].run == 2);
+    }
+
+    #[test]
+    fn a_folder_is_gone_on_with_where_it_stopped() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("study");
+        let plan = plan(Scenario::First, 3);
+        let run = || {
+            let folder = open(&path, &plan).unwrap();
+            plan.run(oscillator(), Some(&folder), &Progress::silent())
+        };
+        let first = run().unwrap();
+        assert_eq!(
+            first,
+            plan_again(&plan, &first),
+            "kept runs are read as they were"
+        );
+        assert_eq!(first, run().unwrap(), "times included");
+        fs::remove_file(path.join("runs/0001.json")).unwrap();
+        let second = run().unwrap();
+        assert_eq!((&first[0], &first[2]), (&second[0], &second[2]));
+        assert_eq!(answers(first), answers(second));
+        fs::write(path.join("runs/0001.json"), "{ \"run\": 1, ").unwrap();
+        let error = run().unwrap_err().to_string();
+        assert!(
+            error.contains("0001.json") && error.contains("remove it"),
+            "{error}"
+        );
+        fs::copy(path.join("runs/0000.json"), path.join("runs/0001.json")).unwrap();
+        let error = run().unwrap_err().to_string();
+        assert!(error.contains("its number"), "{error}");
+    }
+
+    #[test]
+    fn shares_make_the_whole_and_each_keeps_to_its_own() {
+        let place = tempfile::tempdir().unwrap();
+        let plan = plan(Scenario::First, 3);
+        let folder = open(&place.path().join("study"), &plan).unwrap();
+        let share = |text: &str| {
+            let share = text.parse().unwrap();
+            let runs = plan.run_share(oscillator(), Some(&folder), share, &Progress::silent());
+            runs.unwrap().iter().map(|run| run.run).collect::<Vec<_>>()
+        };
+        assert_eq!(share("2/2"), [0, 2]);
+        assert_eq!(share("1/2"), [0, 1, 2]);
+        let runs = plan.run(oscillator(), Some(&folder), &Progress::silent());
+        let alone = plan.run(oscillator(), None, &Progress::silent());
+        assert_eq!(answers(runs.unwrap()), answers(alone.unwrap()));
+    }
+
+    /// The same study without a folder, with the times of `timed`.
+    fn plan_again(plan: &MonteCarlo, timed: &[Run]) -> Vec<Run> {
+        let mut runs = plan.run(oscillator(), None, &Progress::silent()).unwrap();
+        for (run, timed) in runs.iter_mut().zip(timed) {
+            for (answer, timed) in run.answers.iter_mut().zip(&timed.answers) {
+                answer.ms = timed.ms;
+            }
+        }
+        runs
+    }
+
+    #[test]
+    fn another_plan_is_refused() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("study");
+        open(&path, &plan(Scenario::First, 3)).unwrap();
+        let error = open(&path, &plan(Scenario::First, 4)).unwrap_err();
+        assert!(
+            error.to_string().contains("runs was 3, now it is 4"),
+            "{error}"
+        );
+    }
+
+    struct Stopped;
+    impl Listener for Stopped {
+        fn advanced(&self, _: &str, _: u64, _: u64) {}
+        fn cancelled(&self) -> bool {
+            true
+        }
+    }
+
+    #[test]
+    fn a_stop_is_heard_inside_a_run_and_leaves_no_run_behind() {
+        let place = tempfile::tempdir().unwrap();
+        let plan = plan(Scenario::First, 2);
+        let folder = open(&place.path().join("study"), &plan).unwrap();
+        let progress = Progress::new(Arc::new(Stopped));
+        let error = plan.run(oscillator(), Some(&folder), &progress);
+        assert!(matches!(error, Err(MonteCarloError::Cancelled(_))));
+        assert_eq!(fs::read_dir(folder.file("runs")).unwrap().count(), 0);
+    }
+
+    /// A twin without equations that diverges in the upper half of its bounds.
+    struct Amplifier;
+    impl DigitalTwin for Amplifier {
+        fn parameters(&self) -> ParameterSpace {
+            ParameterSpace::new([Parameter::new("gain", "-", 1.0, 2.0).within(0.0, 6.0)])
+        }
+        fn simulate(
+            &self,
+            theta: &[f64],
+            drive: &Drive,
+            noise: Noise,
+        ) -> Result<Signal, SimulationError> {
+            let mut v = noise.source("sensor");
+            match theta[0] > 3.0 {
+                true => Err(SimulationError::Diverged { at: 0.0 }),
+                false => Ok(drive.inputs().mapv(|u| theta[0] * u + 0.1 * v.normal())),
+            }
+        }
+    }
+
+    #[test]
+    fn a_black_box_is_scored_and_drawn_again_where_it_diverges() {
+        let levels = RecordPlan::levels(0.1, 80, -1.0, 1.0, 5);
+        let study = Study::new("amplifier", Amplifier, levels).unwrap();
+        let (estimator, _) = pretrain(&study, &TRAINING, &Progress::silent()).unwrap();
+        let plan = MonteCarlo {
+            benchmark: Benchmark::of(&study),
+            ..plan(Scenario::Uniform, 6)
+        };
+        let runs = plan.run(&estimator, None, &Progress::silent()).unwrap();
+        assert!(runs.iter().all(|run| run.truth[0] <= 3.0), "{runs:?}");
+        let scores = score(&study, &plan, &runs);
+        let failed: Vec<usize> = scores.methods.iter().map(|s| s.failed).collect();
+        assert_eq!(failed[7..], [6; 3], "a filter needs equations");
+        assert_eq!(failed[6], 6, "the bad start, the upper bound, diverges");
+        assert!(failed[..6].iter().all(|n| *n < 6), "{failed:?}");
+        assert!(scores.methods[8].mse.is_nan() && scores.methods[8].milliseconds.is_nan());
+        let point = MonteCarlo {
+            scenario: Scenario::Second,
+            ..plan
+        };
+        assert!(matches!(
+            point.check(&study),
+            Err(ScenarioError::NoPoint(_))
+        ));
+    }
+}

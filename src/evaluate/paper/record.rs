@@ -1,0 +1,47 @@
+//! The records of a Monte-Carlo study.
+
+use super::MonteCarloError;
+use super::scenario::Draws;
+use crate::record::Record;
+use crate::study::Study;
+use crate::twin::Noise;
+
+/// Draws of θ that are tried before a diverging twin is given up.
+const ATTEMPTS: u64 = 20;
+
+/// A simulated record and what it came from.
+pub(super) struct Simulated {
+    pub(super) truth: Vec<f64>,
+    pub(super) record: Record,
+    pub(super) noise: Noise,
+}
+
+/// Record number `run` under `seed`. Where θ is drawn, a draw that diverges is drawn again.
+pub(super) fn simulated(
+    study: &Study,
+    draws: &Draws<'_>,
+    seed: u64,
+    run: usize,
+) -> Result<Simulated, MonteCarloError> {
+    let first = Noise::new(seed, "record", run as u64);
+    let mut attempt = 0;
+    loop {
+        let noise = match attempt {
+            0 => first,
+            _ => first.child("again").sample(attempt),
+        };
+        attempt += 1;
+        let (truth, drive) = draws.draw(noise)?;
+        match study.twin().simulate(&truth, &drive, noise) {
+            Ok(outputs) => {
+                return Ok(Simulated {
+                    truth,
+                    record: Record::new(drive, outputs)?,
+                    noise,
+                });
+            }
+            Err(error) if error.costs_one_run() && draws.can_redraw() && attempt < ATTEMPTS => {}
+            Err(error) => return Err(error.into()),
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! Every method on one simulated record.
+
+use super::record::Simulated;
+use super::{Method, MonteCarloError};
+use crate::estimator::{Estimate, EstimateOptions, Estimator};
+use crate::evaluate::baseline::{DualFilter, Initialisation, PredictionErrorMethod};
+use crate::progress::Progress;
+use serde::{Deserialize, Serialize};
+use std::time::Instant;
+
+/// What all methods answered on one record; what scores and figures are made of.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct Run {
+    /// Which, from 0.
+    pub run: usize,
+    /// True θ.
+    pub truth: Vec<f64>,
+    /// The refitted estimate's 90 % interval, by parameter; `None` where it has
+    /// no finite ends, empty where the estimate failed.
+    pub interval: Vec<Option<[f64; 2]>>,
+    /// In the order of [`Method::all`].
+    pub answers: Vec<Answer>,
+    /// Why the estimator gave no estimate, where it did not.
+    pub failure: Option<String>,
+}
+
+/// What one method answered.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct Answer {
+    /// Method.
+    pub method: Method,
+    /// θ; `None` where the method cannot be used on this twin, or failed.
+    pub theta: Option<Vec<f64>>,
+    /// Wall-clock time in milliseconds.
+    pub ms: f64,
+}
+
+impl Run {
+    /// Runs every method. A method that fails leaves no answer: its row says that it cannot be relied on.
+    ///
+    /// # Errors
+    ///
+    /// [`MonteCarloError::Cancelled`] alone.
+    pub(super) fn new(
+        estimator: &Estimator,
+        run: usize,
+        simulated: &Simulated,
+        progress: &Progress,
+    ) -> Result<Self, MonteCarloError> {
+        let twin = estimator.study().twin().as_ref();
+        let Simulated {
+            truth,
+            record,
+            noise,
+        } = simulated;
+        let options = EstimateOptions {
+            seed: noise.seed().unwrap_or_default(),
+            always_refine: true,
+            ..EstimateOptions::default()
+        };
+        let estimate = estimator.estimate(record, &options, &progress.unshown());
+        // Whatever a stop looks like from inside, it is no failure of the estimator.
+        progress.checkpoint()?;
+        let (estimate, failure) = match estimate {
+            Ok(estimate) => (Some(estimate), None),
+            Err(error) => (None, Some(error.to_string())),
+        };
+        let start = |from: Initialisation| {
+            let initial = match (&estimate, from) {
+                (Some(estimate), _) => estimate.initial.as_slice(),
+                (None, Initialisation::Ts) => return None,
+                (None, _) => &[],
+            };
+            let noise = noise.child("start");
+            (from.theta(&twin.parameters(), truth, initial, noise)).ok()
+        };
+        let answer = |method: Method| {
+            let clock = Instant::now();
+            let (theta, seconds) = match method {
+                Method::PredictionError(from) => {
+                    let fit = start(from).and_then(|start| {
+                        PredictionErrorMethod::default()
+                            .fit(twin, record, &start)
+                            .ok()
+                    });
+                    (fit.map(|fit| fit.theta), None)
+                }
+                Method::DualFilter(from) => {
+                    let run = start(from)
+                        .zip(twin.state_space())
+                        .and_then(|(start, equations)| {
+                            DualFilter::default().run(equations, record, &start).ok()
+                        });
+                    (run.map(|run| run.theta), None)
+                }
+                stage => match &estimate {
+                    Some(estimate) => of_stage(stage, estimate),
+                    None => (None, None),
+                },
+            };
+            let seconds = seconds.unwrap_or_else(|| clock.elapsed().as_secs_f64());
+            Answer {
+                method,
+                theta: theta.filter(|theta| theta.iter().all(|v| v.is_finite())),
+                ms: 1000.0 * seconds,
+            }
+        };
+        let interval = |estimate: &Estimate| {
+            let ends = estimate.low.iter().zip(&estimate.high);
+            ends.map(|(&low, &high)| {
+                Some([low, high]).filter(|ends| ends.iter().all(|v| v.is_finite()))
+            })
+            .collect()
+        };
+        Ok(Self {
+            run,
+            truth: truth.clone(),
+            interval: estimate.as_ref().map(interval).unwrap_or_default(),
+            answers: Method::all().into_iter().map(answer).collect(),
+            failure,
+        })
+    }
+
+    /// Whether this may be a run of a study with `parameters` parameters.
+    pub(super) fn fits(&self, parameters: usize) -> bool {
+        let whole = |theta: &Vec<f64>| theta.len() == parameters;
+        let methods = self.answers.iter().map(|answer| answer.method);
+        whole(&self.truth)
+            && (self.interval.len() == parameters
+                || (self.interval.is_empty() && self.failure.is_some()))
+            && methods.eq(Method::all())
+            && (self.answers.iter()).all(|answer| answer.theta.as_ref().is_none_or(whole))
+    }
+}
+
+/// Estimate and seconds of one stage of the estimator.
+fn of_stage(method: Method, estimate: &Estimate) -> (Option<Vec<f64>>, Option<f64>) {
+    let seconds = &estimate.seconds;
+    let initial = (Some(estimate.initial.clone()), seconds.predict);
+    let gauss_newton = seconds.predict + seconds.gate + seconds.gauss_newton.unwrap_or(0.0);
+    let (theta, seconds) = match method {
+        Method::GaussNewton => (estimate.gauss_newton.clone(), gauss_newton),
+        Method::TsFine => {
+            let cloud = seconds.cloud.unwrap_or(0.0) + seconds.tune.unwrap_or(0.0);
+            (estimate.fine.clone(), gauss_newton + cloud)
+        }
+        // What would have been answered without being told to refine.
+        Method::Final if estimate.gate.out_of_distribution => {
+            (Some(estimate.theta.clone()), seconds.total)
+        }
+        Method::Final => (initial.0, seconds.predict + seconds.gate),
+        _ => initial,
+    };
+    (theta, Some(seconds))
+}

@@ -1,0 +1,306 @@
+//! Where true parameters and inputs of simulated records come from.
+
+use super::{Invariant, Method, Symmetry};
+use crate::record::{Drive, DriveError, Signal};
+use crate::study::{DriveSource, PlanError, RecordTable, Study};
+use crate::twin::{Interval, Noise};
+
+/// Where true parameters come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Scenario {
+    /// Uniform in the prior, where the network was trained.
+    InDistribution,
+    /// The paper's OOD 1.
+    First,
+    /// The paper's OOD 2.
+    Second,
+    /// Uniform in the physical bounds.
+    Uniform,
+}
+
+impl Scenario {
+    /// Its number in `truetwin.reproduce/1`.
+    pub fn number(self) -> u8 {
+        match self {
+            Self::InDistribution => 0,
+            Self::First => 1,
+            Self::Second => 2,
+            Self::Uniform => 3,
+        }
+    }
+
+    /// Whether every record has the same true parameters.
+    pub fn is_point(self) -> bool {
+        matches!(self, Self::First | Self::Second)
+    }
+}
+
+/// What is published about a twin: where it was tested, what its records can show, what others found.
+#[derive(Debug, Clone, Default)]
+pub struct Benchmark {
+    /// Parameters of the test points; empty where there are none.
+    pub points: &'static [TestPoint],
+    /// The first input of every record, as levels; empty for the study's own random inputs.
+    pub levels: &'static [f64],
+    /// Samples that a level is held.
+    pub hold: usize,
+    /// What a record determines.
+    pub invariants: &'static [Invariant],
+    /// What it does not.
+    pub symmetry: Option<Symmetry>,
+    /// Published figures, of [`Scenario::First`].
+    pub published: &'static [(Method, Published)],
+}
+
+/// One parameter at the test points.
+///
+/// ```
+/// use truetwin::evaluate::paper::{Benchmark, TestPoint, reference_studies};
+///
+/// let benchmark = Benchmark::of(&reference_studies()?[0]);
+/// let nu: &TestPoint = &benchmark.points[0];
+/// assert_eq!((nu.name, nu.values), ("nu", [3.0, 5.0]));
+/// # Ok::<(), truetwin::study::StudyError>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct TestPoint {
+    /// Parameter.
+    pub name: &'static str,
+    /// Its value at OOD 1 and OOD 2.
+    pub values: [f64; 2],
+}
+
+/// A published figure.
+///
+/// ```
+/// use truetwin::evaluate::paper::{Benchmark, Method, Published, reference_studies};
+///
+/// let benchmark = Benchmark::of(&reference_studies()?[0]);
+/// let (method, figures): &(Method, Published) = &benchmark.published[0];
+/// assert_eq!((*method, figures.mse), (Method::TsPre, 0.3204));
+/// # Ok::<(), truetwin::study::StudyError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Published {
+    /// Mean squared error.
+    pub mse: f64,
+    /// Milliseconds a record, on the authors' machine.
+    pub milliseconds: f64,
+}
+
+/// Why no true parameters or inputs can be had.
+///
+/// ```
+/// use truetwin::evaluate::paper::{Benchmark, MonteCarlo, Scenario, ScenarioError};
+/// use truetwin::study::{RecordPlan, Study};
+/// use truetwin::twins::VanDerPol;
+///
+/// let study = Study::new("mine", VanDerPol, RecordPlan::autonomous(0.05, 150))?;
+/// let plan = MonteCarlo { benchmark: Benchmark::default(), scenario: Scenario::Second, runs: 2, seed: 1 };
+/// assert!(matches!(plan.check(&study), Err(ScenarioError::NoPoint(_))));
+/// # Ok::<(), truetwin::study::StudyError>(())
+/// ```
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ScenarioError {
+    /// There are no test points.
+    #[error(
+        "the paper has no test points for twin \"{0}\"; take --scenario 0 (θ from the prior) or --scenario uniform (θ from the bounds)"
+    )]
+    NoPoint(String),
+    /// A test point is none of this study's.
+    #[error(
+        "the paper's test point {name} = {value} lies outside the study's bounds {bounds}; widen [bounds], or take --scenario 0 (θ from the prior) or --scenario uniform (θ from the bounds)"
+    )]
+    Outside {
+        /// Parameter.
+        name: &'static str,
+        /// Its value there.
+        value: f64,
+        /// Bounds of the study.
+        bounds: Interval,
+    },
+    /// The study's inputs.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// A bad time grid.
+    #[error(transparent)]
+    Drive(#[from] DriveError),
+}
+
+/// A scenario of one study, ready to be drawn from.
+pub(super) struct Draws<'a> {
+    study: &'a Study,
+    scenario: Scenario,
+    /// Values that are not drawn, in the order of θ.
+    held: Vec<Option<f64>>,
+    inputs: Inputs,
+}
+
+enum Inputs {
+    /// The same for all.
+    Fixed(Drive),
+    /// The study's.
+    Study(DriveSource),
+}
+
+impl<'a> Draws<'a> {
+    /// Checks that the study has such a scenario.
+    pub(super) fn new(
+        study: &'a Study,
+        benchmark: &Benchmark,
+        scenario: Scenario,
+    ) -> Result<Self, ScenarioError> {
+        if scenario.is_point() && benchmark.points.is_empty() {
+            return Err(ScenarioError::NoPoint(study.name().into()));
+        }
+        let held = (study.twin().parameters().iter())
+            .map(|p| {
+                let point = benchmark.points.iter().find(|point| point.name == p.name);
+                let (name, value) = match (point, scenario) {
+                    (Some(point), Scenario::First) => (point.name, point.values[0]),
+                    (Some(point), Scenario::Second) => (point.name, point.values[1]),
+                    _ => return Ok(None),
+                };
+                let bounds = p.bounds;
+                match bounds.contains(value) {
+                    true => Ok(Some(value)),
+                    false => Err(ScenarioError::Outside {
+                        name,
+                        value,
+                        bounds,
+                    }),
+                }
+            })
+            .collect::<Result<_, _>>()?;
+        // A study that says what its records look like means its own.
+        let own = benchmark.levels.is_empty() || study.file().record != RecordTable::default();
+        let inputs = match own {
+            true => Inputs::Study(study.drives()?),
+            false => Inputs::Fixed(staircase(study, benchmark)?),
+        };
+        Ok(Self {
+            study,
+            scenario,
+            held,
+            inputs,
+        })
+    }
+
+    /// True parameters and drive of the record with this noise.
+    pub(super) fn draw(&self, noise: Noise) -> Result<(Vec<f64>, Drive), ScenarioError> {
+        let space = self.study.twin().parameters();
+        let drawn = match self.scenario {
+            Scenario::Uniform => space.draw_bounds(noise),
+            // What a study has beyond the paper's parameters is drawn from its prior.
+            _ => space.draw_prior(noise),
+        };
+        let theta = (self.held.iter().zip(drawn))
+            .map(|(held, drawn)| held.unwrap_or(drawn))
+            .collect();
+        let drive = match &self.inputs {
+            Inputs::Fixed(drive) => drive.clone(),
+            Inputs::Study(source) => source.draw(noise)?,
+        };
+        Ok((theta, drive))
+    }
+
+    /// Whether another draw may help where this one diverged.
+    pub(super) fn can_redraw(&self) -> bool {
+        !self.scenario.is_point()
+    }
+}
+
+/// The benchmark's levels, over and over, as every input of the study's records.
+fn staircase(study: &Study, benchmark: &Benchmark) -> Result<Drive, DriveError> {
+    let (plan, channels) = (study.plan(), study.twin().signals().inputs.len());
+    let levels = Signal::from_shape_fn((plan.samples, channels), |(k, _)| {
+        benchmark.levels[(k / benchmark.hold.max(1)) % benchmark.levels.len()]
+    });
+    Drive::new(plan.step, levels)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluate::paper::reference_studies;
+    use crate::study::{RecordPlan, StudyFile};
+    use crate::twins::CascadedTanks;
+    use std::path::Path;
+
+    fn tanks(file: &str) -> Study {
+        let file = StudyFile::parse(file, Path::new("s.toml")).unwrap();
+        (reference_studies().unwrap()[1].configure(&file)).unwrap()
+    }
+
+    fn draws(study: &Study, scenario: Scenario) -> Result<Draws<'_>, ScenarioError> {
+        Draws::new(study, &Benchmark::of(study), scenario)
+    }
+
+    #[test]
+    fn the_papers_points_and_input_are_the_same_for_every_record() {
+        let study = tanks("twin = 'tanks'");
+        let noise = |run| Noise::new(1, "record", run);
+        let first = draws(&study, Scenario::First).unwrap();
+        let (theta, drive) = first.draw(noise(0)).unwrap();
+        assert_eq!(theta, [1.2, 1.2, 0.9, 1.0]);
+        assert_eq!(drive.input(29), [1.81107]);
+        assert_eq!(drive.input(30), [0.892673]);
+        let second = draws(&study, Scenario::Second).unwrap();
+        assert_eq!(
+            second.draw(noise(9)).unwrap(),
+            (vec![1.3, 1.3, 0.6, 0.7], drive)
+        );
+    }
+
+    /// Beyond the prior and within the bounds in every parameter; both halves of the bounds are met.
+    #[test]
+    fn uniform_fills_the_bounds() {
+        let study = tanks("twin = 'tanks'");
+        let space = study.twin().parameters();
+        let uniform = draws(&study, Scenario::Uniform).unwrap();
+        let prior = draws(&study, Scenario::InDistribution).unwrap();
+        let mut low = [0; 4];
+        for run in 0..200 {
+            let noise = Noise::new(1, "record", run);
+            let (theta, _) = uniform.draw(noise).unwrap();
+            space.check_point(&theta).unwrap();
+            for (j, p) in space.iter().enumerate() {
+                low[j] += u32::from(theta[j] < p.bounds.centre());
+            }
+            let (theta, _) = prior.draw(noise).unwrap();
+            assert!(space.iter().zip(theta).all(|(p, v)| p.prior.contains(v)));
+        }
+        assert!(low.iter().all(|n| (65..=135).contains(n)), "{low:?}");
+    }
+
+    #[test]
+    fn a_twin_of_ones_own_has_no_points_and_its_own_inputs() {
+        let plan = RecordPlan::levels(0.5, 100, 0.0, 3.0, 30);
+        let study = Study::new("mine", CascadedTanks, plan).unwrap();
+        let error = draws(&study, Scenario::First).err().unwrap().to_string();
+        assert!(
+            error.contains("\"mine\"") && error.contains("--scenario uniform"),
+            "{error}"
+        );
+        let uniform = draws(&study, Scenario::Uniform).unwrap();
+        let drive = |run| uniform.draw(Noise::new(1, "record", run)).unwrap().1;
+        assert_ne!(drive(0), drive(1));
+    }
+
+    #[test]
+    fn a_study_with_its_own_records_and_bounds_keeps_them() {
+        let study = tanks("twin = 'tanks'\n[record]\nsamples = 60\n");
+        let first = draws(&study, Scenario::First).unwrap();
+        let (_, drive) = first.draw(Noise::new(1, "record", 0)).unwrap();
+        assert!(drive.samples() == 60 && drive.input(0) != [1.81107]);
+        let study = tanks("twin = 'tanks'\n[bounds]\nk1 = [0.3, 1.0]\n");
+        let error = draws(&study, Scenario::First).err().unwrap().to_string();
+        assert!(
+            error.contains("k1 = 1.2") && error.contains("[0.3, 1]"),
+            "{error}"
+        );
+        assert!(draws(&study, Scenario::Uniform).is_ok());
+    }
+}

@@ -1,0 +1,242 @@
+//! Errors and coverage over many runs.
+
+use super::{Method, MonteCarlo, Published, Run, Scenario};
+use crate::math::{clopper_pearson, median};
+use crate::study::Study;
+
+/// Level of the intervals of a coverage.
+pub const COVERAGE_LEVEL: f64 = 0.95;
+
+/// What the runs of a study come to.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Scores {
+    /// In the order of [`Method::all`].
+    pub methods: Vec<MethodScore>,
+    /// How often the refitted estimate's interval held the truth, by parameter.
+    pub coverage: Vec<Coverage>,
+    /// Runs without an estimate.
+    pub failed: usize,
+}
+
+/// Error of one method.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct MethodScore {
+    /// Method.
+    pub method: Method,
+    /// Mean over runs and parameters of the squared error; NaN where the method cannot be used or failed on a run.
+    pub mse: f64,
+    /// Standard error of `mse`, from its scatter over runs; NaN for a single run.
+    pub mse_std_error: f64,
+    /// Median over runs of the squared error averaged over parameters; a run that failed counts as infinitely wrong.
+    pub median: f64,
+    /// Mean wall-clock time of an answer, milliseconds; NaN without any.
+    pub milliseconds: f64,
+    /// Runs without an answer.
+    pub failed: usize,
+    /// Mean squared error of what a record determines, by name; as `mse` otherwise.
+    pub invariants: Vec<(&'static str, f64)>,
+    /// As `mse`, without the part along what a record does not determine; `None` where there is no such part.
+    pub mse_without_scale: Option<f64>,
+    /// What was published for this twin, scenario and method.
+    pub published: Option<Published>,
+}
+
+/// How often an interval held the true value.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Coverage {
+    /// Parameter.
+    pub name: String,
+    /// Runs whose interval held it.
+    pub covered: u64,
+    /// Runs with an estimate.
+    pub of: u64,
+    /// Ends of the exact (Clopper–Pearson) interval of the probability, at 95 %.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// Scores the runs of `plan`.
+pub fn score(study: &Study, plan: &MonteCarlo, runs: &[Run]) -> Scores {
+    let space = study.twin().parameters();
+    let across = (plan.benchmark.symmetry).and_then(|symmetry| symmetry.bind(&space));
+    let invariants: Vec<_> = (plan.benchmark.invariants.iter())
+        .filter_map(|invariant| Some((invariant.name, invariant.bind(&space)?)))
+        .collect();
+    let methods = (Method::all().into_iter().enumerate())
+        .map(|(m, method)| {
+            let errors = |of: &dyn Fn(&[f64], &[f64]) -> f64| -> Vec<f64> {
+                (runs.iter())
+                    .map(|run| match &run.answers[m].theta {
+                        Some(theta) => of(theta, &run.truth),
+                        None => f64::NAN,
+                    })
+                    .collect()
+            };
+            let squares = errors(&|theta, truth| {
+                let squares = theta.iter().zip(truth).map(|(a, b)| (a - b).powi(2));
+                squares.sum::<f64>() / truth.len() as f64
+            });
+            let ranked: Vec<f64> = (squares.iter())
+                .map(|e| if e.is_nan() { f64::INFINITY } else { *e })
+                .collect();
+            let times: Vec<f64> = (runs.iter().map(|run| &run.answers[m]))
+                .filter(|answer| answer.theta.is_some())
+                .map(|answer| answer.ms)
+                .collect();
+            MethodScore {
+                method,
+                mse: mean(&squares),
+                mse_std_error: std_error(&squares),
+                median: median(&ranked).unwrap_or(f64::NAN),
+                milliseconds: mean(&times),
+                failed: squares.iter().filter(|e| e.is_nan()).count(),
+                invariants: (invariants.iter())
+                    .map(|(name, of)| {
+                        let squares = errors(&|theta, truth| (of(theta) - of(truth)).powi(2));
+                        (*name, mean(&squares))
+                    })
+                    .collect(),
+                mse_without_scale: (across.as_ref())
+                    .map(|across| mean(&errors(&|theta, truth| across(theta, truth)))),
+                published: (plan.benchmark.published.iter())
+                    .find(|(of, _)| *of == method && plan.scenario == Scenario::First)
+                    .map(|(_, published)| *published),
+            }
+        })
+        .collect();
+    let coverage = (space.names().into_iter().enumerate())
+        .map(|(j, name)| covered(name, j, runs))
+        .collect();
+    Scores {
+        methods,
+        coverage,
+        failed: runs.iter().filter(|run| run.failure.is_some()).count(),
+    }
+}
+
+/// Coverage of parameter number `j`.
+fn covered(name: &str, j: usize, runs: &[Run]) -> Coverage {
+    let (mut covered, mut of) = (0, 0);
+    for run in runs {
+        if let Some(interval) = run.interval.get(j) {
+            of += 1;
+            let holds = interval.is_some_and(|[low, high]| (low..=high).contains(&run.truth[j]));
+            covered += u64::from(holds);
+        }
+    }
+    // Nothing is known where the interval cannot be computed.
+    let (low, high) = clopper_pearson(covered, of, COVERAGE_LEVEL).unwrap_or((0.0, 1.0));
+    Coverage {
+        name: name.into(),
+        covered,
+        of,
+        low,
+        high,
+    }
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Standard deviation over √n; NaN for fewer than two values.
+fn std_error(values: &[f64]) -> f64 {
+    let (n, mean) = (values.len() as f64, mean(values));
+    let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+    match values.len() {
+        0 | 1 => f64::NAN,
+        _ => (squares / (n - 1.0) / n).sqrt(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluate::paper::{Answer, Benchmark, reference_studies};
+
+    const TRUTH: [f64; 4] = [1.2, 1.2, 0.9, 1.0];
+
+    /// A run in which every method answers θ, with this interval for each parameter.
+    fn run(number: usize, theta: Option<[f64; 4]>, interval: [f64; 2]) -> Run {
+        let answer = |method| Answer {
+            method,
+            theta: theta.map(Vec::from),
+            ms: 2.0 + number as f64,
+        };
+        Run {
+            run: number,
+            truth: TRUTH.into(),
+            interval: theta.map_or(vec![], |_| vec![Some(interval); 4]),
+            answers: Method::all().into_iter().map(answer).collect(),
+            failure: theta.is_none().then(|| "no start".to_owned()),
+        }
+    }
+
+    fn scored(scenario: Scenario, runs: &[Run]) -> Scores {
+        let study = &reference_studies().unwrap()[1];
+        let plan = MonteCarlo {
+            benchmark: Benchmark::of(study),
+            scenario,
+            runs: runs.len(),
+            seed: 1,
+        };
+        score(study, &plan, runs)
+    }
+
+    /// Errors of 0.2 and 0.4 in k3 alone: squares over four parameters 0.01 and 0.04.
+    #[test]
+    fn errors_times_and_coverage_are_those_of_the_runs() {
+        let at = |k3: f64| Some([1.2, 1.2, k3, 1.0]);
+        let scores = scored(
+            Scenario::First,
+            &[run(0, at(1.1), [0.8, 1.1]), run(1, at(0.5), [0.95, 2.0])],
+        );
+        let row = &scores.methods[0];
+        assert!((row.mse - 0.025).abs() < 1e-12 && (row.median - 0.025).abs() < 1e-12);
+        assert!((row.mse_std_error - 0.015).abs() < 1e-12);
+        assert_eq!((row.milliseconds, row.failed), (2.5, 0));
+        assert_eq!(row.published.unwrap().mse, 0.1189);
+        let (names, values): (Vec<_>, Vec<_>) = row.invariants.iter().copied().unzip();
+        assert_eq!(names, ["k1·k2", "k3", "k4·k2²"]);
+        assert!(values[0] == 0.0 && (values[1] - 0.1).abs() < 1e-12 && values[2] == 0.0);
+        assert!((row.mse_without_scale.unwrap() - 0.025).abs() < 1e-12);
+        let held: Vec<u64> = scores.coverage.iter().map(|c| c.covered).collect();
+        assert_eq!(
+            held,
+            [1, 1, 1, 2],
+            "1.2, 1.2, 0.9, 1.0 in [0.8, 1.1], [0.95, 2.0]"
+        );
+        assert_eq!((scores.coverage[3].of, scores.coverage[3].high), (2, 1.0));
+    }
+
+    /// e = (k1/2, −k2/2, 0, k4)/100 at the truth.
+    #[test]
+    fn an_error_along_the_scale_is_none_without_it() {
+        let along = Some([1.206, 1.194, 0.9, 1.01]);
+        let scores = scored(Scenario::Second, &[run(0, along, [0.0, 2.0])]);
+        let row = &scores.methods[2];
+        assert!(row.mse > 1e-5 && row.mse_without_scale.unwrap() < 1e-20);
+        assert!(row.mse_std_error.is_nan(), "one run has no scatter");
+        assert_eq!(row.published, None, "the table is of the first scenario");
+    }
+
+    #[test]
+    fn a_failure_spoils_the_mean_and_not_the_median() {
+        let good = || Some([1.2, 1.2, 1.1, 1.0]);
+        let ends = [0.0, 2.0];
+        let runs = [
+            run(0, good(), ends),
+            run(1, None, ends),
+            run(2, good(), ends),
+        ];
+        let scores = scored(Scenario::Uniform, &runs);
+        let row = &scores.methods[3];
+        assert!(row.mse.is_nan() && (row.median - 0.01).abs() < 1e-12);
+        assert_eq!((row.failed, scores.failed, row.milliseconds), (1, 1, 3.0));
+        assert_eq!((scores.coverage[0].covered, scores.coverage[0].of), (2, 2));
+    }
+}

@@ -1,0 +1,136 @@
+//! The folder of the trials: sealed keys, records, answers.
+
+use super::WithheldError;
+use super::truth::Truth;
+use crate::record::{Record, read_record, record_csv_text};
+use crate::storage::files::sha256;
+use crate::storage::untrusted::check_file;
+use crate::storage::work::{Manifest, NewWork, WorkError, WorkFolder};
+use serde::Serialize;
+use std::io;
+use std::path::Path;
+
+const KEYS: &str = "keys.json";
+const SEAL: &str = "seal.txt";
+const LEFT_OUT: &str = "left-out.json";
+const RECORDS: &str = "records";
+/// What the diagnoser said.
+pub(super) const ANSWERS: &str = "answers";
+/// What the opened keys added.
+pub(super) const OPENED: &str = "opened";
+/// Of a key file that is not the one that was sealed.
+const AGAIN: &str = "remove the folder and start again";
+
+/// A folder of trials: what every [`WorkFolder`] has, and
+///
+/// | file | holds |
+/// |---|---|
+/// | `keys.json` | the truth of every trial; not read again before every answer is there |
+/// | `seal.txt` | SHA-256 of `keys.json`, published before the first diagnosis |
+/// | `left-out.json` | the effects that each trial's library does without, where the call asks for that |
+/// | `records/0000.csv`, `records/0000-validation.csv` | what the diagnoser sees |
+/// | `answers/0000.json` | what it said |
+/// | `opened/0000.json` | what the true effect gains; made with the key |
+/// | `scorecard.json`, `scorecard.html` | made of all that |
+#[derive(Debug, Clone)]
+pub(super) struct Folder {
+    pub work: WorkFolder,
+    /// SHA-256 of the key file.
+    pub seal: String,
+}
+
+/// One trial's records, by number.
+fn record_name(trial: usize, validation: bool) -> String {
+    match validation {
+        true => format!("{RECORDS}/{trial:04}-validation.csv"),
+        false => format!("{RECORDS}/{trial:04}.csv"),
+    }
+}
+
+/// A new folder that is filled with sealed trials.
+pub(super) struct Filling<'a>(&'a NewWork<'a>);
+
+impl Filling<'_> {
+    /// Adds a record.
+    pub fn record(&self, trial: usize, validation: bool, record: &Record) -> Result<(), WorkError> {
+        let name = record_name(trial, validation);
+        self.0.write(&name, record_csv_text(record).as_bytes())
+    }
+
+    /// Says which effects each trial's library does without: the diagnoser may know that much.
+    pub fn left_out(&self, effects: &[&Vec<String>]) -> Result<(), WorkError> {
+        self.json(LEFT_OUT, effects).map(|_| ())
+    }
+
+    /// Writes keys and seal.
+    pub fn keys(&self, keys: &[Truth]) -> Result<(), WorkError> {
+        let keys = self.json(KEYS, keys)?;
+        let seal = sha256(keys.as_bytes());
+        self.0.write(SEAL, format!("{seal}\n").as_bytes())
+    }
+
+    fn json<T: Serialize + ?Sized>(&self, name: &str, value: &T) -> Result<String, WorkError> {
+        let text = serde_json::to_string_pretty(value)
+            .map_err(|error| WorkError::io(Path::new(name), io::Error::from(error)))?;
+        let text = format!("{text}\n");
+        self.0.write(name, text.as_bytes())?;
+        Ok(text)
+    }
+}
+
+impl Folder {
+    /// Goes on with a folder that was made by the same call; or makes one, which `fill` fills.
+    pub fn open(
+        path: &Path,
+        manifest: &Manifest,
+        fill: impl FnOnce(&Filling<'_>) -> Result<(), WithheldError>,
+    ) -> Result<Self, WithheldError> {
+        let parts = [RECORDS, ANSWERS, OPENED];
+        let work = WorkFolder::open(path, manifest, &parts, |new| fill(&Filling(new)))?;
+        let seal = work.read(SEAL)?.trim().into();
+        Ok(Self { work, seal })
+    }
+
+    /// Reads a trial's record.
+    pub fn record(&self, trial: usize, validation: bool) -> Result<Record, WithheldError> {
+        self.work.part(RECORDS)?;
+        let path = self.work.file(&record_name(trial, validation));
+        check_file(&path).map_err(|error| WorkError::io(&path, error))?;
+        Ok(read_record(&path)?)
+    }
+
+    /// Opens the keys of so many trials, if they are still those that were sealed.
+    pub fn keys(&self, trials: usize) -> Result<Vec<Truth>, WithheldError> {
+        let text = self.work.read(KEYS)?;
+        let damaged = |reason: String| WithheldError::Damaged {
+            path: self.work.file(KEYS),
+            reason,
+            remedy: AGAIN,
+        };
+        if sha256(text.as_bytes()) != self.seal {
+            return Err(damaged("its SHA-256 is not that of seal.txt".into()));
+        }
+        let keys: Vec<Truth> =
+            serde_json::from_str(&text).map_err(|error| damaged(error.to_string()))?;
+        match keys.iter().map(|key| key.trial).eq(0..trials) {
+            true => Ok(keys),
+            false => Err(damaged("trials are missing".into())),
+        }
+    }
+
+    /// The effects that the libraries of so many trials do without.
+    pub fn left_out(&self, trials: usize) -> Result<Vec<Vec<String>>, WithheldError> {
+        let text = self.work.read(LEFT_OUT)?;
+        let damaged = |reason: String| WithheldError::Damaged {
+            path: self.work.file(LEFT_OUT),
+            reason,
+            remedy: AGAIN,
+        };
+        let found: Vec<Vec<String>> =
+            serde_json::from_str(&text).map_err(|error| damaged(error.to_string()))?;
+        match found.len() == trials {
+            true => Ok(found),
+            false => Err(damaged("trials are missing".into())),
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Kinds of truth, and how many trials each has.
+
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// What may be wrong with the twin in a trial, and what is the right answer.
+///
+/// ```
+/// use truetwin::evaluate::trials::Kind;
+///
+/// assert!(Kind::ALL.iter().all(|kind| Kind::named(kind.id()) == Some(*kind)));
+/// assert!(!Kind::None.is_structural());
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Kind {
+    /// Nothing, θ inside the prior: no structural gap.
+    None,
+    /// Nothing, θ outside the prior: no structural gap.
+    Outside,
+    /// An effect of the library: to be named.
+    Listed,
+    /// An effect of the library, its physics written in other terms: to be named.
+    Parametrised,
+    /// Something that nobody listed: a structural gap, and none of the listed effects.
+    Unlisted,
+    /// Two effects of the library at different targets: both to be accepted.
+    Pair,
+    /// An effect of the library that another one imitates: to be in the class.
+    Confounded,
+    /// An effect that some θ stands in for: no structural gap.
+    Absorbed,
+}
+
+impl Kind {
+    /// All, in the order of tables.
+    pub const ALL: [Self; 8] = [
+        Self::None,
+        Self::Outside,
+        Self::Listed,
+        Self::Parametrised,
+        Self::Unlisted,
+        Self::Pair,
+        Self::Confounded,
+        Self::Absorbed,
+    ];
+
+    /// As in calls and files.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Outside => "outside",
+            Self::Listed => "listed",
+            Self::Parametrised => "parametrised",
+            Self::Unlisted => "unlisted",
+            Self::Pair => "pair",
+            Self::Confounded => "confounded",
+            Self::Absorbed => "absorbed",
+        }
+    }
+
+    /// The kind with this id.
+    pub fn named(id: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.id() == id)
+    }
+
+    /// Whether no θ explains the record.
+    pub fn is_structural(self) -> bool {
+        !matches!(self, Self::None | Self::Outside | Self::Absorbed)
+    }
+
+    /// Of every twenty trials, how many are of this kind.
+    fn weight(self) -> usize {
+        match self {
+            Self::None | Self::Outside | Self::Listed => 4,
+            Self::Parametrised | Self::Unlisted | Self::Absorbed => 2,
+            Self::Pair | Self::Confounded => 1,
+        }
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.id())
+    }
+}
+
+/// The kinds of so many trials, in the proportions of the weights and in no order that could be guessed: `pick` gives
+/// numbers below its argument.
+pub(super) fn deal(
+    kinds: &[Kind],
+    trials: usize,
+    mut pick: impl FnMut(usize) -> usize,
+) -> Vec<Kind> {
+    // Round after round, so that few trials have many kinds.
+    let most = kinds.iter().map(|kind| kind.weight()).max().unwrap_or(0);
+    let pack: Vec<Kind> = (0..most)
+        .flat_map(|round| kinds.iter().filter(move |kind| kind.weight() > round))
+        .copied()
+        .collect();
+    let mut dealt: Vec<Kind> = pack.into_iter().cycle().take(trials).collect();
+    for i in (1..dealt.len()).rev() {
+        dealt.swap(i, pick(i + 1));
+    }
+    dealt
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn twenty_trials_have_every_kind_by_its_weight() {
+        let dealt = deal(&Kind::ALL, 40, |n| n / 2);
+        for kind in Kind::ALL {
+            let count = dealt.iter().filter(|k| **k == kind).count();
+            assert_eq!(count, 2 * kind.weight(), "{kind}");
+            assert_eq!(Kind::named(kind.id()), Some(kind));
+        }
+        assert_eq!(deal(&[Kind::Pair], 3, |_| 0), [Kind::Pair; 3]);
+        assert!(deal(&[], 3, |_| 0).is_empty());
+    }
+}

@@ -1,0 +1,318 @@
+//! The trials from end to end: sealed, diagnosed, opened, scored.
+
+use super::folder::{ANSWERS, Filling, Folder, OPENED};
+use super::kind::deal;
+use super::opened::Opened;
+use super::truth::Urn;
+use super::unlisted::index;
+use super::{Answer, Kind, Row, Scorecard, WithheldError};
+use crate::diagnose::DiagnoseSettings;
+use crate::progress::Progress;
+use crate::record::Record;
+use crate::storage::work::{Manifest, Piece, Pieces, Share, WorkError};
+use crate::study::Study;
+use crate::twin::Noise;
+use serde_json::json;
+use std::path::Path;
+
+/// Layout of the folder; raised when it changes.
+const LAYOUT: u32 = 4;
+
+/// What is tried.
+///
+/// | setting | default | meaning |
+/// |---|---|---|
+/// | `trials` | 100 | records |
+/// | `seed` | 1 | of truths, records and diagnoses |
+/// | `kinds` | all | kinds of truth, dealt in the proportions of docs/withheld.md |
+/// | `without` | no | whether the true effects are taken out of the library: then every trial with one must abstain |
+/// | `validation` | no | whether each trial has a second record |
+/// | `detection_only` | no | whether a diagnosis ends with its verdict: for false alarms over many trials |
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Records.
+    pub trials: usize,
+    /// Of everything random.
+    pub seed: u64,
+    /// Kinds of truth.
+    pub kinds: Vec<Kind>,
+    /// Whether the true effects are taken out of the library.
+    pub without: bool,
+    /// Whether each trial has a validation record.
+    pub validation: bool,
+    /// Whether a diagnosis ends with its verdict.
+    pub detection_only: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            trials: 100,
+            seed: 1,
+            kinds: Kind::ALL.to_vec(),
+            without: false,
+            validation: false,
+            detection_only: false,
+        }
+    }
+}
+
+/// Sealed trials over one study.
+///
+/// ```
+/// use truetwin::evaluate::paper::reference_studies;
+/// use truetwin::progress::Progress;
+/// use truetwin::evaluate::trials::{Kind, Settings, Withheld};
+///
+/// let study = &reference_studies()?[0];
+/// let settings = Settings { trials: 1, kinds: vec![Kind::None], ..Settings::default() };
+/// let place = tempfile::tempdir()?;
+/// let sealed = Withheld::new(study, settings)?.seal(&place.path().join("trials"), &Progress::silent())?;
+/// println!("sha256 {}", sealed.seal());
+/// let card = sealed.score(&Progress::silent())?;
+/// assert_eq!(card.false_alarms.of, 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Withheld<'a> {
+    urn: Urn<'a>,
+    settings: Settings,
+}
+
+debug_by_name!(Withheld<'_>);
+
+impl<'a> Withheld<'a> {
+    /// Trials of a study of a reference twin.
+    ///
+    /// # Errors
+    ///
+    /// [`WithheldError`]: a twin without a world, a study that changes the twin, kinds that cannot be drawn, no trials.
+    pub fn new(study: &'a Study, settings: Settings) -> Result<Self, WithheldError> {
+        let urn = Urn::new(study)?;
+        if settings.trials == 0 {
+            return Err(WithheldError::Nothing("trials"));
+        }
+        if settings.kinds.is_empty() {
+            return Err(WithheldError::Nothing("kinds"));
+        }
+        for kind in &settings.kinds {
+            urn.check(*kind)?;
+        }
+        Ok(Self { urn, settings })
+    }
+
+    /// Draws every truth, writes records, keys and seal into a new folder; or goes on with the folder of the same call.
+    ///
+    /// # Errors
+    ///
+    /// [`WithheldError`]: a folder of another call, a place that cannot be written.
+    pub fn seal(self, path: &Path, progress: &Progress) -> Result<Sealed<'a>, WithheldError> {
+        let fill = |filling: &Filling<'_>| self.fill(filling, progress);
+        let folder = Folder::open(path, &self.manifest()?, fill)?;
+        Ok(Sealed {
+            trials: self,
+            folder,
+        })
+    }
+
+    fn fill(&self, filling: &Filling<'_>, progress: &Progress) -> Result<(), WithheldError> {
+        let Settings { trials, seed, .. } = self.settings;
+        let stage = progress.stage("seal", trials);
+        let mut dealer = Noise::new(seed, "withheld kinds", 0).source("deal");
+        let kinds = deal(&self.settings.kinds, trials, |n| index(&mut dealer, n));
+        let mut keys = Vec::with_capacity(trials);
+        for (trial, kind) in kinds.into_iter().enumerate() {
+            let noise = Noise::new(seed, "withheld", trial as u64);
+            let drawn = (self.urn).draw(trial, kind, self.settings.validation, noise)?;
+            filling.record(trial, false, &drawn.record)?;
+            if let Some(validation) = &drawn.validation {
+                filling.record(trial, true, validation)?;
+            }
+            keys.push(drawn.truth);
+            stage.tick()?;
+        }
+        if self.settings.without {
+            let effects: Vec<&Vec<String>> = keys.iter().map(|key| &key.effects).collect();
+            filling.left_out(&effects)?;
+        }
+        Ok(filling.keys(&keys)?)
+    }
+
+    /// What the trials depend on.
+    fn manifest(&self) -> Result<Manifest, WorkError> {
+        let study = self.urn.study();
+        let settings = &self.settings;
+        let kinds: Vec<&str> = settings.kinds.iter().map(|kind| kind.id()).collect();
+        Ok(study
+            .manifest("withheld", LAYOUT)?
+            .with("trials", settings.trials)
+            .with("seed", settings.seed)
+            .with("kinds", json!(kinds))
+            .with("without", settings.without)
+            .with("validation", settings.validation)
+            .with("detection_only", settings.detection_only))
+    }
+}
+
+/// Trials whose keys are sealed.
+pub struct Sealed<'a> {
+    trials: Withheld<'a>,
+    folder: Folder,
+}
+
+debug_by_name!(Sealed<'_>);
+
+impl Sealed<'_> {
+    /// SHA-256 of the key file: publish it before [`score`](Self::score).
+    pub fn seal(&self) -> &str {
+        &self.folder.seal
+    }
+
+    /// Diagnoses every record that has no answer yet, then opens the keys and scores.
+    ///
+    /// Trials run in parallel, each on its share of the current threads; answers do not depend on their number.
+    ///
+    /// # Errors
+    ///
+    /// [`WithheldError`]: files that cannot be read or written, keys that are not those that were sealed, a stop.
+    pub fn score(&self, progress: &Progress) -> Result<Scorecard, WithheldError> {
+        let answers = self.answer(Share::WHOLE, progress)?;
+        let opened = self.open(Share::WHOLE, progress)?;
+        let keys = self.folder.keys(self.trials.settings.trials)?;
+        let without = self.trials.settings.without;
+        let rows: Vec<Row> = (keys.iter().zip(&answers).zip(&opened))
+            .map(|((truth, answer), opened)| Row::new(truth, answer, opened, without))
+            .collect();
+        let twin = self.trials.urn.study().name();
+        let alpha = DiagnoseSettings::default().alpha;
+        let seed = self.trials.settings.seed;
+        Ok(Scorecard::new(twin, seed, alpha, self.seal(), rows))
+    }
+
+    /// Diagnoses the records of a share that have no answer yet; returns all answers that are there then.
+    ///
+    /// # Errors
+    ///
+    /// As [`score`](Self::score).
+    pub fn answer(&self, share: Share, progress: &Progress) -> Result<Vec<Answer>, WithheldError> {
+        let left_out = self.left_out()?;
+        self.pieces(ANSWERS, share).all(
+            &progress.stage("trials", self.trials.settings.trials),
+            |_: &Answer| Ok(()),
+            |trial| {
+                let (record, validation) = self.records(trial)?;
+                let settings = self.diagnosis(trial, left_out[trial].clone());
+                let study = self.trials.urn.study();
+                let answer = Answer::of(
+                    trial,
+                    study,
+                    record,
+                    validation.as_ref(),
+                    &settings,
+                    progress,
+                );
+                Ok::<_, WithheldError>(answer?)
+            },
+        )
+    }
+
+    /// Works out what the opened keys of a share add, where that has not been done; how many trials are finished then.
+    ///
+    /// # Errors
+    ///
+    /// As [`score`](Self::score); [`WithheldError::Unanswered`] before every answer is there, whatever the share.
+    pub fn open_keys(&self, share: Share, progress: &Progress) -> Result<usize, WithheldError> {
+        Ok(self.open(share, progress)?.len())
+    }
+
+    fn open(&self, share: Share, progress: &Progress) -> Result<Vec<Opened>, WithheldError> {
+        let Settings { trials, seed, .. } = self.trials.settings;
+        let answers: Vec<Answer> = self.pieces(ANSWERS, share).kept(|_| Ok(()))?;
+        if answers.len() < trials {
+            return Err(WithheldError::Unanswered {
+                there: answers.len(),
+                of: trials,
+            });
+        }
+        // Every answer is there: now, and not before, the keys.
+        let keys = self.folder.keys(trials)?;
+        let left_out = self.left_out()?;
+        self.pieces(OPENED, share).all(
+            &progress.stage("open", trials),
+            |_: &Opened| Ok(()),
+            |trial| {
+                Opened::of(
+                    &self.trials.urn,
+                    &keys[trial],
+                    answers[trial].outcome.as_ref(),
+                    self.records(trial)?,
+                    Noise::new(seed, "withheld", trial as u64),
+                    &self.diagnosis(trial, left_out[trial].clone()),
+                    progress,
+                )
+            },
+        )
+    }
+
+    /// Puts a result into the folder, in place of an earlier one.
+    pub fn write(&self, name: &str, text: &str) -> Result<(), WithheldError> {
+        Ok(self.folder.work.write(name, text)?)
+    }
+
+    fn pieces(&self, part: &'static str, share: Share) -> Pieces<'_> {
+        Pieces {
+            folder: Some(&self.folder.work),
+            part,
+            count: self.trials.settings.trials,
+            share,
+        }
+    }
+
+    /// The effects that each trial's library does without.
+    fn left_out(&self) -> Result<Vec<Vec<String>>, WithheldError> {
+        let Settings {
+            trials, without, ..
+        } = self.trials.settings;
+        match without {
+            true => self.folder.left_out(trials),
+            false => Ok(vec![vec![]; trials]),
+        }
+    }
+
+    fn records(&self, trial: usize) -> Result<(Record, Option<Record>), WithheldError> {
+        let validation = match self.trials.settings.validation {
+            true => Some(self.folder.record(trial, true)?),
+            false => None,
+        };
+        Ok((self.folder.record(trial, false)?, validation))
+    }
+
+    /// Settings of a trial's diagnosis.
+    fn diagnosis(&self, trial: usize, without: Vec<String>) -> DiagnoseSettings {
+        let noise = Noise::new(
+            self.trials.settings.seed,
+            "withheld diagnosis",
+            trial as u64,
+        );
+        DiagnoseSettings {
+            seed: noise.seed().unwrap_or_default(),
+            without,
+            detection_only: self.trials.settings.detection_only,
+            ..DiagnoseSettings::default()
+        }
+    }
+}
+
+impl Piece for Answer {
+    fn number(&self) -> usize {
+        self.trial
+    }
+}
+
+impl Piece for Opened {
+    fn number(&self) -> usize {
+        self.trial
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,238 @@
+//! What a world adds to the rate of a state.
+
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+/// Everything that a force may depend on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Moment<'a> {
+    /// In seconds.
+    pub t: f64,
+    /// Step between the states of `past`, in seconds.
+    pub dt: f64,
+    pub x: [f64; 2],
+    /// 0 where there is no input.
+    pub u: f64,
+    /// States at the samples so far.
+    pub past: &'a [[f64; 2]],
+}
+
+/// The course of a periodic force.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(in crate::evaluate::trials) enum Wave {
+    /// A sine.
+    Sine,
+    /// Straight up and down, between the same ends.
+    Triangle,
+    /// A sine whose amplitude varies slowly by a fifth.
+    Swelling,
+}
+
+/// A term of a rate, in units of the state per second. `of` is the number of the state that it depends on.
+///
+/// Where a law has a width (`onset`, `width`, `span`, `rounding`), 0 or nothing is its textbook form.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(in crate::evaluate::trials) enum ForceLaw {
+    /// Constant once `onset` seconds are over.
+    Constant { force: f64, onset: f64 },
+    /// −force·sign x; within `width` it grows smoothly.
+    Friction { force: f64, of: usize, width: f64 },
+    /// rate·x; beyond `span` it gives way.
+    Linear {
+        rate: f64,
+        of: usize,
+        span: Option<f64>,
+    },
+    /// −c·|x|^e·sign x.
+    Power {
+        coefficient: f64,
+        exponent: f64,
+        of: usize,
+        rounding: f64,
+    },
+    /// A wave of so many Hz.
+    Periodic {
+        amplitude: f64,
+        frequency: f64,
+        phase: f64,
+        wave: Wave,
+    },
+    /// c·x₁·x₂.
+    Product { coefficient: f64 },
+    /// c·sin(w·x).
+    Sine {
+        coefficient: f64,
+        wavenumber: f64,
+        of: usize,
+    },
+    /// −c times the state's mean over the past, which fades over `memory` seconds.
+    Memory {
+        coefficient: f64,
+        memory: f64,
+        of: usize,
+    },
+    /// c·u·x.
+    InputTimesState { coefficient: f64, of: usize },
+    /// A stop on one side: −c·(x − at)² beyond.
+    Stop {
+        coefficient: f64,
+        at: f64,
+        of: usize,
+    },
+    /// A wave whose frequency rises by `sweep` Hz a second.
+    Chirp {
+        amplitude: f64,
+        frequency: f64,
+        sweep: f64,
+    },
+    /// Pushes at odd times, about `each` seconds apart.
+    Bursts { amplitude: f64, each: f64 },
+}
+
+impl ForceLaw {
+    /// The term at a moment.
+    pub(super) fn at(&self, now: &Moment<'_>) -> f64 {
+        let x = |of: usize| now.x[of];
+        match *self {
+            Self::Constant { force, onset } if onset > 0.0 => force * (now.t / onset).min(1.0),
+            Self::Constant { force, .. } => force,
+            Self::Friction { force, of, width } => {
+                let x = x(of);
+                if width > 0.0 {
+                    -force * (x / width).tanh()
+                } else if x > 0.0 {
+                    -force
+                } else if x < 0.0 {
+                    force
+                } else {
+                    0.0
+                }
+            }
+            Self::Linear { rate, of, span } => match span {
+                None => rate * x(of),
+                Some(span) => rate * span * (x(of) / span).atan(),
+            },
+            Self::Power {
+                coefficient,
+                exponent,
+                of,
+                rounding,
+            } => {
+                let x = x(of);
+                let size = (x * x + rounding * rounding).sqrt();
+                // At rest there is no force, whatever the exponent.
+                if size == 0.0 {
+                    0.0
+                } else {
+                    -coefficient * size.powf(exponent - 1.0) * x
+                }
+            }
+            Self::Periodic {
+                amplitude,
+                frequency,
+                phase,
+                wave,
+            } => {
+                let angle = TAU * frequency * now.t + phase;
+                amplitude
+                    * match wave {
+                        Wave::Sine => angle.sin(),
+                        Wave::Triangle => angle.sin().asin() * 4.0 / TAU,
+                        Wave::Swelling => angle.sin() * (1.0 + 0.2 * (0.13 * angle).sin()),
+                    }
+            }
+            Self::Product { coefficient } => coefficient * now.x[0] * now.x[1],
+            Self::Sine {
+                coefficient,
+                wavenumber,
+                of,
+            } => coefficient * (wavenumber * x(of)).sin(),
+            Self::Memory {
+                coefficient,
+                memory,
+                of,
+            } => {
+                let keep = (-now.dt / memory).exp();
+                let (mut sum, mut weight) = (0.0, 1.0);
+                for state in now.past.iter().rev() {
+                    sum += weight * state[of];
+                    weight *= keep;
+                    if weight < 1e-4 {
+                        break;
+                    }
+                }
+                -coefficient * (1.0 - keep) * sum
+            }
+            Self::InputTimesState { coefficient, of } => coefficient * now.u * x(of),
+            Self::Stop {
+                coefficient,
+                at,
+                of,
+            } => -coefficient * (x(of) - at).max(0.0).powi(2),
+            Self::Chirp {
+                amplitude,
+                frequency,
+                sweep,
+            } => amplitude * (TAU * (frequency + 0.5 * sweep * now.t) * now.t).sin(),
+            Self::Bursts { amplitude, each } => {
+                // Two waves without a common period: their peaks coincide at odd times.
+                let t = TAU * now.t / each;
+                let pushes = (1.46 * t).sin() > 0.85 || (0.82 * t).cos() > 0.95;
+                if pushes { amplitude } else { 0.0 }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(law: &ForceLaw, t: f64, x: [f64; 2]) -> f64 {
+        let past = vec![[1.0, 2.0]; 400];
+        law.at(&Moment {
+            t,
+            dt: 0.1,
+            x,
+            u: 2.0,
+            past: &past,
+        })
+    }
+
+    #[test]
+    fn known_values() {
+        let drag = |rounding| ForceLaw::Power {
+            coefficient: 0.5,
+            exponent: 2.0,
+            of: 1,
+            rounding,
+        };
+        assert_eq!(at(&drag(0.0), 0.0, [9.0, -3.0]), 4.5);
+        assert!((at(&drag(0.1), 0.0, [9.0, -3.0]) - 4.5).abs() < 0.01);
+        let root = ForceLaw::Power {
+            coefficient: 1.0,
+            exponent: 0.5,
+            of: 0,
+            rounding: 0.0,
+        };
+        assert_eq!(at(&root, 0.0, [0.0, 0.0]), 0.0);
+        let memory = ForceLaw::Memory {
+            coefficient: 0.3,
+            memory: 2.0,
+            of: 1,
+        };
+        // A state that was always 2 is remembered as 2.
+        assert!((at(&memory, 0.0, [0.0, 2.0]) + 0.6).abs() < 1e-3);
+        let triangle = ForceLaw::Periodic {
+            amplitude: 2.0,
+            frequency: 0.25,
+            phase: 0.0,
+            wave: Wave::Triangle,
+        };
+        for (t, force) in [(0.0, 0.0), (0.5, 1.0), (1.0, 2.0), (3.0, -2.0)] {
+            assert!((at(&triangle, t, [0.0; 2]) - force).abs() < 1e-9);
+        }
+    }
+}

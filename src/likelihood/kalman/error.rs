@@ -1,0 +1,102 @@
+//! Why a record could not be filtered.
+
+use crate::fit::EvaluationError;
+use crate::math::DifferenceError;
+use crate::record::RecordError;
+use crate::setting::SettingError;
+use crate::twin::{ParameterError, SimulationError};
+
+/// Why a record could not be filtered. [`Diverged`](Self::Diverged), [`NoSpread`](Self::NoSpread) and a twin that
+/// refuses θ cost this θ alone; the rest ends the work.
+///
+/// ```
+/// use truetwin::likelihood::kalman::{FilterError, FilterSettings, log_likelihood};
+/// use truetwin::record::{Drive, Record};
+/// use truetwin::twin::{DigitalTwin, Noise};
+/// use truetwin::twins::VanDerPol;
+///
+/// let drive = Drive::autonomous(0.05, 100)?;
+/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
+/// let record = Record::new(drive, outputs)?;
+///
+/// let settings = FilterSettings { noise_floor: -1.0, ..FilterSettings::default() };
+/// let error = log_likelihood(&VanDerPol, &[1.5], &record, &settings).unwrap_err();
+/// assert!(matches!(error, FilterError::Setting(_)) && !error.is_recoverable());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FilterError {
+    /// The record does not fit the twin.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// θ does not fit the twin.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
+    /// The twin cannot be simulated at this θ.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// A mean or variance left the finite numbers.
+    #[error("the filter diverged at t = {at} s; these parameters are not for this record")]
+    Diverged {
+        /// Time in seconds.
+        at: f64,
+    },
+    /// The covariance of an innovation has no inverse.
+    #[error(
+        "the outputs at t = {at} s are predicted without any uncertainty; give one of them measurement noise, \
+         or raise noise_floor"
+    )]
+    NoSpread {
+        /// Time in seconds.
+        at: f64,
+    },
+    /// A setting that cannot be used.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// An initial covariance of another size, or none at all.
+    #[error(
+        "start_covariance is {rows} × {columns}; give a symmetric, non-negative {states} × {states} matrix"
+    )]
+    StartCovariance {
+        /// Rows that were given.
+        rows: usize,
+        /// Columns that were given.
+        columns: usize,
+        /// States of the twin.
+        states: usize,
+    },
+    /// No differences could be taken around θ.
+    #[error(transparent)]
+    Difference(#[from] DifferenceError),
+}
+
+impl FilterError {
+    /// Whether another θ may do: the search goes on elsewhere.
+    pub fn is_recoverable(&self) -> bool {
+        match self {
+            Self::Diverged { .. } | Self::NoSpread { .. } => true,
+            Self::Simulation(error) => error.costs_one_run(),
+            _ => false,
+        }
+    }
+}
+
+/// An error that only rules out one θ is no error of a search: `None`.
+pub(crate) fn recoverable<T>(result: Result<T, FilterError>) -> Result<Option<T>, FilterError> {
+    match result {
+        Ok(value) => Ok(Some(value)),
+        Err(error) if error.is_recoverable() => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+impl From<FilterError> for EvaluationError {
+    fn from(error: FilterError) -> Self {
+        if error.is_recoverable() {
+            Self::rejected(error)
+        } else {
+            Self::fatal(error)
+        }
+    }
+}

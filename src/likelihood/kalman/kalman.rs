@@ -1,0 +1,195 @@
+//! A filter bound to one twin and one record.
+
+use super::clip::clip;
+use super::gaussian::Gaussian;
+use super::pass::{Pass, Sink};
+use super::size::{Any, Fixed};
+use super::{FilterError, FilterSettings, Filtered, Method};
+use crate::record::Record;
+use crate::twin::{Interval, ParameterError, ParameterSpace, StateSpace};
+
+/// A filter for many θ on one record: what does not depend on θ is prepared once.
+///
+/// ```text
+/// row k:   predict ȳ_k from (m, P),  S_k,  e_k = y_k − ȳ_k          log p += −½(p·log 2π + log det S_k + e_kᵀS_k⁻¹e_k)
+///          put y_k into (m, P)
+///          carry (m, P) to row k + 1 under u_k, the states held in their limits
+/// ```
+///
+/// [`Method::Points`]: m and P are carried by points at ±√3 standard deviations along each direction that varies, state
+/// and process noise alike; what does not vary (a known start, unused memories) costs no point. Points start
+/// within the limits; what arrives is a normal state, and a limited one gets the mean and variance of the clipped
+/// normal, its covariances the share that is inside.
+///
+/// A twin without measurement noise gets a variance of `noise_floor` times that of the record's output.
+///
+/// Sources: Nørgaard, Poulsen & Ravn, "New developments in state estimation for nonlinear systems", *Automatica* 36
+/// (2000); Särkkä, *Bayesian Filtering and Smoothing* (2013), chapters 5, 6 and 9.
+///
+/// ```
+/// use truetwin::likelihood::kalman::{FilterSettings, Kalman};
+/// use truetwin::effect::*;
+/// use truetwin::record::*;
+/// use truetwin::twin::*;
+/// use truetwin::twins::VanDerPol;
+///
+/// let drive = Drive::autonomous(0.05, 300)?;
+/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
+/// let record = Record::new(drive, outputs)?;
+/// let settings = FilterSettings::default();
+/// let kalman = Kalman::new(&VanDerPol, &record, &settings)?;
+/// assert!(kalman.log_likelihood(&[1.5])? > kalman.log_likelihood(&[1.6])?);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Kalman<'a> {
+    pub(super) twin: &'a dyn StateSpace,
+    pub(super) record: &'a Record,
+    pub(super) settings: &'a FilterSettings,
+    pub(super) parameters: ParameterSpace,
+    pub(super) states: usize,
+    pub(super) outputs: Vec<f64>,
+    channels: usize,
+    /// Limits of the states.
+    limits: Vec<Interval>,
+    /// Limits of the points that are carried through the equations; those of a derivative have none.
+    pub(super) point_limits: Vec<Interval>,
+    pub(super) floor: Vec<f64>,
+    pub(super) start_covariance: Option<Vec<f64>>,
+}
+
+debug_by_name!(Kalman<'_>);
+
+impl<'a> Kalman<'a> {
+    /// Prepares a record.
+    ///
+    /// # Errors
+    ///
+    /// [`FilterError::Record`] where the channels differ, or settings that cannot be used.
+    pub fn new(
+        twin: &'a dyn StateSpace,
+        record: &'a Record,
+        settings: &'a FilterSettings,
+    ) -> Result<Self, FilterError> {
+        let outline = twin.outline();
+        let states = outline.states.len();
+        settings.check(states)?;
+        record.check_channels(&crate::record::Signals {
+            inputs: outline.inputs,
+            outputs: outline.outputs,
+        })?;
+        let limits = twin.limits();
+        let point_limits = match settings.method {
+            Method::Points => limits.clone(),
+            Method::Extended => vec![Interval::EVERYTHING; states],
+        };
+        let floor = (record.outputs().columns().into_iter())
+            .map(|y| settings.noise_floor * scale(y.iter().copied()))
+            .collect();
+        Ok(Self {
+            twin,
+            record,
+            settings,
+            parameters: outline.parameters,
+            states,
+            outputs: record.outputs().iter().copied().collect(),
+            channels: record.outputs().ncols(),
+            limits,
+            point_limits,
+            floor,
+            start_covariance: (settings.start_covariance.as_ref())
+                .map(|p| p.transpose().as_slice().to_vec()),
+        })
+    }
+
+    /// The parameters of the twin.
+    pub fn parameters(&self) -> &ParameterSpace {
+        &self.parameters
+    }
+
+    /// log p(y | θ), in nats.
+    ///
+    /// # Errors
+    ///
+    /// [`FilterError`]: θ of another length, a twin that refuses it, a filter that diverged or has no spread.
+    pub fn log_likelihood(&self, theta: &[f64]) -> Result<f64, FilterError> {
+        self.run(theta, &mut ())
+    }
+
+    /// Everything that [`Filtered`] holds.
+    ///
+    /// # Errors
+    ///
+    /// As [`log_likelihood`](Self::log_likelihood).
+    pub fn filter(&self, theta: &[f64]) -> Result<Filtered, FilterError> {
+        let states = self.settings.keep_states.then_some(self.states);
+        let mut filtered = Filtered::new(self.record.samples(), self.channels, states);
+        filtered.log_likelihood = self.run(theta, &mut filtered)?;
+        if let Some(states) = &mut filtered.states {
+            states.map(|state| self.told(state));
+        }
+        Ok(filtered)
+    }
+
+    /// One pass over the record; the log-likelihood.
+    pub(super) fn run<K: Sink>(&self, theta: &[f64], sink: &mut K) -> Result<f64, FilterError> {
+        match (self.states, self.channels) {
+            (1, 1) => Pass::new(Fixed::<1>, self, theta)?.run(sink),
+            (2, 1) => Pass::new(Fixed::<2>, self, theta)?.run(sink),
+            (3, 1) => Pass::new(Fixed::<3>, self, theta)?.run(sink),
+            (4, 1) => Pass::new(Fixed::<4>, self, theta)?.run(sink),
+            (states, outputs) => Pass::new(Any { states, outputs }, self, theta)?.run(sink),
+        }
+    }
+
+    /// Whether θ has the twin's length.
+    pub(super) fn check(&self, theta: &[f64]) -> Result<(), ParameterError> {
+        if theta.len() == self.parameters.len() {
+            return Ok(());
+        }
+        Err(ParameterError::Length {
+            given: theta.len(),
+            expected: self.parameters.len(),
+            names: self.parameters.names().join(", "),
+        })
+    }
+
+    /// Holds the states in their limits; whether covariances were scaled.
+    #[inline(always)]
+    pub(super) fn hold(&self, mean: &mut [f64], cov: &mut [f64], scale: &mut [f64]) -> bool {
+        match self.settings.method {
+            Method::Points => clip(mean, cov, &self.limits, scale),
+            Method::Extended => {
+                self.clamp_mean(mean);
+                false
+            }
+        }
+    }
+
+    /// After a row, only the linear filter holds its mean; the points of the other are held when they are carried on.
+    #[inline(always)]
+    pub(super) fn clamp_mean(&self, mean: &mut [f64]) {
+        if self.settings.method == Method::Extended {
+            for (mean, limit) in mean.iter_mut().zip(&self.limits) {
+                *mean = limit.clamp(*mean);
+            }
+        }
+    }
+
+    /// A state as it is told to people: within its limits.
+    pub(super) fn told(&self, mut state: Gaussian) -> Gaussian {
+        let mut scale = vec![1.0; self.states];
+        self.hold(&mut state.mean, &mut state.cov, &mut scale);
+        state
+    }
+}
+
+/// Variance of an output; of a constant one, its mean square; of zeros, one.
+fn scale(y: impl Iterator<Item = f64> + Clone) -> f64 {
+    let n = y.clone().count() as f64;
+    let mean = y.clone().sum::<f64>() / n;
+    let variance = y.map(|v| (v - mean).powi(2)).sum::<f64>() / n;
+    [variance, mean * mean, 1.0]
+        .into_iter()
+        .find(|v| *v > 0.0)
+        .unwrap_or(1.0)
+}

@@ -1,0 +1,319 @@
+//! Linear twins with normal noise, for which the filter is exact.
+
+use super::{FilterError, FilterSettings, Kalman, Method, Score, filter, log_likelihood, smooth};
+use crate::record::*;
+use crate::twin::*;
+use nalgebra::{DMatrix, DVector, dmatrix, dvector};
+
+/// Two coupled masses pushed by u; with one output, or the second state and the sum too.
+struct Chain {
+    outputs: usize,
+    ceiling: f64,
+}
+
+const DT: f64 = 0.1;
+const Q: [f64; 2] = [0.0, 0.3];
+const R: [f64; 2] = [0.2, 0.1];
+
+impl Chain {
+    fn new(outputs: usize) -> Self {
+        Self {
+            outputs,
+            ceiling: f64::INFINITY,
+        }
+    }
+
+    fn c(&self) -> DMatrix<f64> {
+        dmatrix![1.0, 0.0; 0.5, 2.0]
+            .rows(0, self.outputs)
+            .into_owned()
+    }
+}
+
+impl StateSpace for Chain {
+    fn outline(&self) -> Outline {
+        let outputs = (1..=self.outputs).map(|j| Quantity::new(&format!("y{j}"), "m"));
+        Outline {
+            parameters: ParameterSpace::new([
+                Parameter::new("k", "1/s²", 0.5, 2.0),
+                Parameter::new("offset", "m/s²", -1.0, 1.0),
+            ]),
+            states: vec![Quantity::new("x", "m"), Quantity::new("v", "m/s")],
+            inputs: vec![Quantity::new("u", "m/s²")],
+            outputs: outputs.collect(),
+        }
+    }
+    fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+        dx[0] = x[1];
+        dx[1] = now.u[0] + now.theta[1] - now.theta[0] * x[0] - 0.4 * x[1];
+    }
+    fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+        let c = self.c() * DVector::from_column_slice(x);
+        y.copy_from_slice(c.as_slice());
+    }
+    fn start(&self, _: &Now<'_>, x: &mut [f64]) {
+        x.copy_from_slice(&[1.0, -0.5]);
+    }
+    fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+        process.copy_from_slice(&Q);
+        measurement.copy_from_slice(&R[..self.outputs]);
+    }
+    fn readout(&self, _: &Now<'_>, y: &mut [f64]) {
+        y[0] = y[0].min(self.ceiling);
+    }
+}
+
+fn record(twin: &Chain, theta: &[f64]) -> Record {
+    let inputs = Signal::from_shape_fn((120, 1), |(k, _)| (0.2 * k as f64).sin());
+    let drive = Drive::new(DT, inputs).unwrap();
+    let outputs = (twin.simulate(theta, &drive, Noise::new(3, "linear", 0))).unwrap();
+    Record::new(drive, outputs).unwrap()
+}
+
+struct Exact {
+    log_likelihood: f64,
+    filtered: Vec<(DVector<f64>, DMatrix<f64>)>,
+    smoothed: Vec<(DVector<f64>, DMatrix<f64>)>,
+}
+
+/// The textbook's recursions, with matrices written out.
+fn exact(twin: &Chain, theta: &[f64], record: &Record, start: &DMatrix<f64>) -> Exact {
+    let a = dmatrix![1.0, DT; -DT * theta[0], 1.0 - 0.4 * DT];
+    let c = twin.c();
+    let q = DMatrix::from_diagonal(&dvector![Q[0], Q[1]].map(|v| v * v));
+    let r = DMatrix::from_diagonal(&DVector::from_column_slice(&R[..twin.outputs]).map(|v| v * v));
+    let (mut m, mut p) = (dvector![1.0, -0.5], start.clone());
+    let mut log_likelihood = 0.0;
+    let (mut filtered, mut predicted) = (vec![], vec![(m.clone(), p.clone())]);
+    for k in 0..record.samples() {
+        let y = record.outputs().row(k).to_vec();
+        let e = DVector::from_vec(y) - &c * &m;
+        let s = &c * &p * c.transpose() + &r;
+        let inverse = s.clone().try_inverse().unwrap();
+        log_likelihood -= 0.5
+            * ((s * 2.0 * std::f64::consts::PI).determinant().ln()
+                + (e.transpose() * &inverse * &e)[0]);
+        let gain = &p * c.transpose() * inverse;
+        m += &gain * e;
+        p = &p - &gain * &c * &p;
+        filtered.push((m.clone(), p.clone()));
+        let push = DT * (record.drive().input(k)[0] + theta[1]);
+        m = &a * m + dvector![0.0, push];
+        p = &a * p * a.transpose() + &q;
+        predicted.push((m.clone(), p.clone()));
+    }
+    let mut smoothed = filtered.clone();
+    for k in (0..record.samples() - 1).rev() {
+        let (m, p) = &filtered[k];
+        let (ahead, spread) = &predicted[k + 1];
+        let gain = p * a.transpose() * spread.clone().try_inverse().unwrap();
+        let (later, sure) = smoothed[k + 1].clone();
+        smoothed[k] = (
+            m + &gain * (later - ahead),
+            p + &gain * (sure - spread) * gain.transpose(),
+        );
+    }
+    Exact {
+        log_likelihood,
+        filtered,
+        smoothed,
+    }
+}
+
+const METHODS: [Method; 2] = [Method::Points, Method::Extended];
+
+/// One and two outputs, a start that is known and one that is not, both methods: the exact filter and smoother.
+#[test]
+fn linear_twins_are_filtered_and_smoothed_exactly() {
+    let theta = [1.2, 0.3];
+    for outputs in [1, 2] {
+        let twin = Chain::new(outputs);
+        let record = record(&twin, &theta);
+        // Invertible, so that the textbook's smoother has its inverse.
+        for start in [dmatrix![1e-6, 0.0; 0.0, 1e-6], dmatrix![0.5, 0.2; 0.2, 0.4]] {
+            let expected = exact(&twin, &theta, &record, &start);
+            for method in METHODS {
+                let settings = FilterSettings {
+                    method,
+                    start_covariance: Some(start.clone()),
+                    keep_states: true,
+                    ..FilterSettings::default()
+                };
+                let found = filter(&twin, &theta, &record, &settings).unwrap();
+                let error = found.log_likelihood - expected.log_likelihood;
+                assert!(error.abs() < 1e-9, "{method:?}: {error}");
+                let sum: f64 = found.log_densities.iter().sum();
+                assert!((sum - found.log_likelihood).abs() < 1e-9);
+                let fast = log_likelihood(&twin, &theta, &record, &settings).unwrap();
+                assert_eq!(fast, found.log_likelihood);
+                let smoothed = smooth(&twin, &theta, &record, &settings).unwrap();
+                for (states, expected) in [
+                    (found.states.unwrap(), &expected.filtered),
+                    (smoothed.states, &expected.smoothed),
+                ] {
+                    for (k, (m, p)) in expected.iter().enumerate() {
+                        for i in 0..2 {
+                            assert!((states.means[[k, i]] - m[i]).abs() < 1e-8);
+                            for j in 0..2 {
+                                let error = states.covariances[[k, i, j]] - p[(i, j)];
+                                assert!(error.abs() < 1e-8, "{method:?}, row {k}: {error}");
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// With a known start the first prediction is certain but for the sensor.
+#[test]
+fn a_known_start_leaves_the_measurement_noise() {
+    let twin = Chain::new(2);
+    let record = record(&twin, &[1.0, 0.0]);
+    let found = filter(&twin, &[1.0, 0.0], &record, &FilterSettings::default()).unwrap();
+    let variances = found.variances();
+    for j in 0..2 {
+        assert!((variances[[0, j]] - R[j] * R[j]).abs() < 1e-14);
+        let z = found.innovations[[0, j]] / R[j];
+        assert!((found.standardised[[0, j]] - z).abs() < 1e-12);
+    }
+    let predictions = found.predictions(record.outputs());
+    assert!((predictions[[0, 1]] - (0.5 - 1.0)).abs() < 1e-12);
+}
+
+/// The score is the derivative of the exact log-likelihood, in log k and in the offset; at a bound it is one-sided.
+#[test]
+fn the_score_is_the_derivative_of_the_log_likelihood() {
+    let twin = Chain::new(1);
+    let record = record(&twin, &[1.2, 0.3]);
+    let settings = FilterSettings::default();
+    let kalman = Kalman::new(&twin, &record, &settings).unwrap();
+    let known = DMatrix::zeros(2, 2);
+    let value = |k: f64, offset: f64| {
+        let a = exact_likelihood(&twin, &[k, offset], &record, &known);
+        assert!(a.is_finite());
+        a
+    };
+    for theta in [[1.2, 0.3], [2.0, -1.0]] {
+        let score = Score::at(&kalman, &theta).unwrap();
+        let h = 1e-5;
+        let [k, c] = theta;
+        let expected = [
+            (value(k * f64::exp(h), c) - value(k * f64::exp(-h), c)) / (2.0 * h),
+            (value(k, c + h) - value(k, c - h)) / (2.0 * h),
+        ];
+        for (j, expected) in expected.iter().enumerate() {
+            let error = (score.gradient[j] - expected).abs();
+            let scale = score.fisher[(j, j)].sqrt();
+            assert!(error < 1e-3 * scale, "{j}: {error} of {scale}");
+        }
+        let sum = score.samples.row_sum_tr() - &score.gradient;
+        assert!(sum.amax() < 1e-9);
+        let fast = kalman.log_likelihood(&theta).unwrap();
+        assert_eq!(score.log_likelihood, fast);
+    }
+    assert!(matches!(
+        Score::at(&kalman, &[3.0, 0.0]),
+        Err(FilterError::Parameter(_))
+    ));
+}
+
+fn exact_likelihood(twin: &Chain, theta: &[f64], record: &Record, start: &DMatrix<f64>) -> f64 {
+    // A start known to 1e-9: the textbook's form takes it.
+    let start = start + DMatrix::identity(2, 2) * 1e-18;
+    let a = dmatrix![1.0, DT; -DT * theta[0], 1.0 - 0.4 * DT];
+    let (c, r) = (twin.c(), R[0] * R[0]);
+    let q = DMatrix::from_diagonal(&dvector![Q[0], Q[1]].map(|v| v * v));
+    let (mut m, mut p, mut sum) = (dvector![1.0, -0.5], start, 0.0);
+    for k in 0..record.samples() {
+        let e = record.outputs()[[k, 0]] - (&c * &m)[0];
+        let s = (&c * &p * c.transpose())[0] + r;
+        sum -= 0.5 * ((2.0 * std::f64::consts::PI * s).ln() + e * e / s);
+        let gain = &p * c.transpose() / s;
+        m += &gain * e;
+        p = &p - &gain * &c * &p;
+        m = &a * m + dvector![0.0, DT * (record.drive().input(k)[0] + theta[1])];
+        p = &a * p * a.transpose() + &q;
+    }
+    sum
+}
+
+/// Over records, the score's covariance, the OPG's mean and the expected information agree; also with two outputs.
+#[test]
+fn information_is_the_covariance_of_the_score() {
+    let theta = [1.2, 0.3];
+    for outputs in [1, 2] {
+        let twin = Chain::new(outputs);
+        let settings = FilterSettings::default();
+        let n = 400u32;
+        let [mut outer, mut fisher, mut squares] = [(); 3].map(|()| DMatrix::<f64>::zeros(2, 2));
+        for run in 0..n {
+            let drive = record(&twin, &theta).drive().clone();
+            let noise = Noise::new(4, "information", run.into());
+            let outputs = twin.simulate(&theta, &drive, noise).unwrap();
+            let record = Record::new(drive, outputs).unwrap();
+            let kalman = Kalman::new(&twin, &record, &settings).unwrap();
+            let score = Score::at(&kalman, &theta).unwrap();
+            outer += &score.outer / f64::from(n);
+            fisher += &score.fisher / f64::from(n);
+            squares += &score.gradient * score.gradient.transpose() / f64::from(n);
+        }
+        for j in 0..2 {
+            // Relative sd of a mean of n squares: √(2/n) = 0.07.
+            let of = |m: &DMatrix<f64>| m[(j, j)] / fisher[(j, j)];
+            assert!((of(&squares) - 1.0).abs() < 0.3, "{squares} {fisher}");
+            assert!((of(&outer) - 1.0).abs() < 0.1, "{outer} {fisher}");
+        }
+    }
+}
+
+/// A sensor that never saturates changes no bit; one that does is believed less, and the filter stays calibrated
+/// enough to prefer the twin that knows of it.
+#[test]
+fn a_saturating_sensor_is_known_to_saturate() {
+    let theta = [1.2, 0.3];
+    let record = record(
+        &Chain {
+            outputs: 1,
+            ceiling: 0.4,
+        },
+        &theta,
+    );
+    let settings = FilterSettings::default();
+    let of = |ceiling| {
+        let twin = Chain {
+            outputs: 1,
+            ceiling,
+        };
+        log_likelihood(&twin, &theta, &record, &settings).unwrap()
+    };
+    assert_eq!(of(1e9), of(f64::INFINITY));
+    assert!(
+        of(0.4) > of(f64::INFINITY) + 10.0,
+        "{} {}",
+        of(0.4),
+        of(f64::INFINITY)
+    );
+}
+
+#[test]
+fn what_does_not_fit_is_named() {
+    let twin = Chain::new(1);
+    let theta = [1.2, 0.3];
+    let fitting = record(&twin, &theta);
+    let settings = FilterSettings::default();
+    let short = log_likelihood(&twin, &[1.0], &fitting, &settings).unwrap_err();
+    assert!(
+        short.to_string().contains("1 values for 2 parameters"),
+        "{short}"
+    );
+    let other = Chain::new(2);
+    let error = log_likelihood(&other, &theta, &fitting, &settings).unwrap_err();
+    assert!(
+        error.to_string().contains("1 outputs, the twin has 2"),
+        "{error}"
+    );
+    let error = log_likelihood(&twin, &[1e200, 0.0], &fitting, &settings).unwrap_err();
+    assert!(error.is_recoverable(), "{error}");
+}

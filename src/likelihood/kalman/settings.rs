@@ -1,0 +1,156 @@
+//! Which filter, and its few numbers.
+
+use super::FilterError;
+use crate::setting::SettingError;
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+/// How means and covariances are carried through the equations.
+///
+/// ```
+/// use truetwin::likelihood::kalman::{FilterSettings, Method, log_likelihood};
+/// use truetwin::record::{Drive, Record};
+/// use truetwin::twin::{DigitalTwin, Noise};
+/// use truetwin::twins::VanDerPol;
+///
+/// let drive = Drive::autonomous(0.05, 100)?;
+/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
+/// let record = Record::new(drive, outputs)?;
+///
+/// let points = FilterSettings::default();
+/// let extended = FilterSettings::default().with_method(Method::Extended);
+/// let difference = log_likelihood(&VanDerPol, &[1.5], &record, &points)?
+///     - log_likelihood(&VanDerPol, &[1.5], &record, &extended)?;
+/// assert!(difference.abs() < 1.0); // little noise: nearly linear
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Method {
+    /// Linearised at the mean, Jacobians by central differences; a mean beyond a limit is put onto it. Exact for
+    /// linear twins. Off by tens of nats where states touch their limits.
+    Extended,
+    /// Points at ±√3 standard deviations along each direction of state and process noise go through the real step
+    /// (divided differences of second order); limits act on the moments. Exact for linear twins without limits.
+    #[default]
+    Points,
+}
+
+/// Settings of a filter.
+///
+/// | setting | default | range | meaning |
+/// |---|---|---|---|
+/// | `method` | points | | how moments are carried through the equations |
+/// | `noise_floor` | 1e-13 | [0, 1) | least variance of the measurement noise, as a share of the output's variance over the record |
+/// | `start_covariance` | none | symmetric, ≥ 0 | covariance of the first state, in products of state units; none: the start is known |
+/// | `keep_states` | no | | keep filtered means and covariances in [`Filtered`](super::Filtered) |
+///
+/// ```
+/// use truetwin::likelihood::kalman::FilterSettings;
+///
+/// let unsure_of_the_start = FilterSettings {
+///     start_covariance: Some(nalgebra::dmatrix![0.01, 0.0; 0.0, 0.01]),
+///     ..FilterSettings::default()
+/// };
+/// assert!(!unsure_of_the_start.keep_states);
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct FilterSettings {
+    /// How moments are carried through the equations.
+    pub method: Method,
+    /// Least variance of the measurement noise, as a share of the output's variance.
+    pub noise_floor: f64,
+    /// Covariance of the first state.
+    pub start_covariance: Option<DMatrix<f64>>,
+    /// Whether filtered states are kept.
+    pub keep_states: bool,
+}
+
+impl Default for FilterSettings {
+    fn default() -> Self {
+        Self {
+            method: Method::default(),
+            noise_floor: 1e-13,
+            start_covariance: None,
+            keep_states: false,
+        }
+    }
+}
+
+impl FilterSettings {
+    /// With another method.
+    #[must_use]
+    pub fn with_method(mut self, method: Method) -> Self {
+        self.method = method;
+        self
+    }
+
+    /// Whether they can be used with a twin of `states` states.
+    pub(super) fn check(&self, states: usize) -> Result<(), FilterError> {
+        let floor = self.noise_floor;
+        SettingError::unless(
+            (0.0..1.0).contains(&floor),
+            "noise_floor",
+            floor,
+            "it must lie in [0, 1), such as 1e-13",
+        )?;
+        let Some(covariance) = &self.start_covariance else {
+            return Ok(());
+        };
+        let (rows, columns) = covariance.shape();
+        let square = (rows, columns) == (states, states);
+        let scale = covariance.amax();
+        let valid = square
+            && covariance.iter().all(|v| v.is_finite())
+            && (covariance - covariance.transpose()).amax() <= 1e-12 * scale
+            && covariance.symmetric_eigenvalues().min() >= -1e-12 * scale;
+        if !valid {
+            return Err(FilterError::StartCovariance {
+                rows,
+                columns,
+                states,
+            });
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::dmatrix;
+
+    #[test]
+    fn what_cannot_be_used_is_named() {
+        let negative = FilterSettings {
+            noise_floor: -1.0,
+            ..FilterSettings::default()
+        };
+        let error = negative.check(1).unwrap_err().to_string();
+        assert!(error.starts_with("noise_floor = -1;"), "{error}");
+        for bad in [
+            dmatrix![1.0, 0.5; 0.4, 1.0],
+            dmatrix![1.0, 2.0; 2.0, 1.0],
+            dmatrix![1.0],
+        ] {
+            let settings = FilterSettings {
+                start_covariance: Some(bad),
+                ..FilterSettings::default()
+            };
+            let error = settings.check(2).unwrap_err().to_string();
+            assert!(error.contains("2 × 2"), "{error}");
+        }
+    }
+
+    #[test]
+    fn files_say_only_what_differs() {
+        let settings: FilterSettings = toml::from_str("method = \"extended\"").unwrap();
+        assert_eq!(
+            settings,
+            FilterSettings::default().with_method(Method::Extended)
+        );
+        assert!(toml::from_str::<FilterSettings>("kind = 1").is_err());
+    }
+}

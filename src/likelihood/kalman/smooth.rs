@@ -1,0 +1,118 @@
+//! States given the whole record.
+
+use super::gaussian::{Belief, Gaussian, Root};
+use super::pass::Sink;
+use super::{FilterError, Kalman, States};
+
+/// States given the whole record, by the backward pass of Rauch, Tung & Striebel:
+///
+/// ```text
+/// G_k = cov(x_k, x_{k+1}) · P⁻_{k+1}⁻¹
+/// m_k ← m_k + G_k·(m_{k+1} − m⁻_{k+1}),   P_k ← P_k + G_k·(P_{k+1} − P⁻_{k+1})·G_kᵀ
+/// ```
+///
+/// The cross-covariances come from the filter's own points. Limited states are held in their limits at the end.
+///
+/// Source: Särkkä, *Bayesian Filtering and Smoothing* (2013), chapter 9.
+///
+/// ```
+/// use truetwin::likelihood::kalman::{FilterSettings, Kalman, Smoothed};
+/// use truetwin::record::{Drive, Record};
+/// use truetwin::twin::{DigitalTwin, Noise};
+/// use truetwin::twins::VanDerPol;
+///
+/// let drive = Drive::autonomous(0.05, 100)?;
+/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
+/// let record = Record::new(drive, outputs)?;
+///
+/// let settings = FilterSettings::default();
+/// let kalman = Kalman::new(&VanDerPol, &record, &settings)?;
+/// let smoothed: Smoothed = kalman.smooth(&[1.5])?;
+/// assert!((smoothed.log_likelihood - kalman.log_likelihood(&[1.5])?).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Smoothed {
+    /// log p(y | θ), in nats.
+    pub log_likelihood: f64,
+    /// States given the whole record.
+    pub states: States,
+}
+
+struct Tape {
+    filtered: Vec<Gaussian>,
+    carried: Vec<(Gaussian, Vec<f64>)>,
+}
+
+impl Sink for Tape {
+    const CARRIED: bool = true;
+    fn filtered(&mut self, _: usize, state: Belief<'_>) {
+        self.filtered.push(Gaussian::of(state));
+    }
+    fn carried(&mut self, _: usize, next: Belief<'_>, cross: &[f64]) {
+        self.carried.push((Gaussian::of(next), cross.to_vec()));
+    }
+}
+
+impl Kalman<'_> {
+    /// States at each sample given the whole record.
+    ///
+    /// # Errors
+    ///
+    /// As [`log_likelihood`](Self::log_likelihood).
+    pub fn smooth(&self, theta: &[f64]) -> Result<Smoothed, FilterError> {
+        let samples = self.record.samples();
+        let mut tape = Tape {
+            filtered: Vec::with_capacity(samples),
+            carried: Vec::with_capacity(samples),
+        };
+        let log_likelihood = self.run(theta, &mut tape)?;
+        let n = self.states;
+        let mut states = States::new(samples, n);
+        let mut root = <Root>::new(n);
+        let mut later = Gaussian::zero(n);
+        let mut change = vec![0.0; n * n];
+        let mut left = vec![0.0; n * n];
+        for k in (0..samples).rev() {
+            let mut state = tape.filtered[k].clone();
+            if let Some((next, gain)) = tape.carried.get_mut(k) {
+                root.factor(&next.mean, &next.cov);
+                for row in gain.chunks_exact_mut(n) {
+                    root.solve(row);
+                }
+                for (i, row) in gain.chunks_exact(n).enumerate() {
+                    for (j, g) in row.iter().enumerate() {
+                        state.mean[i] += g * (later.mean[j] - next.mean[j]);
+                    }
+                }
+                for ((to, a), b) in change.iter_mut().zip(&later.cov).zip(&next.cov) {
+                    *to = a - b;
+                }
+                product(gain, &change, n, &mut left);
+                for i in 0..n {
+                    for j in 0..=i {
+                        let sum: f64 = (0..n).map(|c| left[i * n + c] * gain[j * n + c]).sum();
+                        state.cov[i * n + j] += sum;
+                        state.cov[j * n + i] = state.cov[i * n + j];
+                    }
+                }
+            }
+            states.set(k, self.told(state.clone()).as_belief());
+            later = state;
+        }
+        Ok(Smoothed {
+            log_likelihood,
+            states,
+        })
+    }
+}
+
+/// a·b, n × n, row-major.
+fn product(a: &[f64], b: &[f64], n: usize, to: &mut [f64]) {
+    for i in 0..n {
+        for j in 0..n {
+            to[i * n + j] = (0..n).map(|c| a[i * n + c] * b[c * n + j]).sum();
+        }
+    }
+}

@@ -1,0 +1,3 @@
+//! Likelihoods of a record: innovations, log-likelihood and score at θ.
+
+pub mod kalman;

@@ -1,0 +1,54 @@
+//! Names and units of channels.
+
+/// A named physical quantity with its unit.
+///
+/// ```
+/// use truetwin::record::Quantity;
+///
+/// let level = Quantity::new("h", "m");
+/// assert_eq!((level.name.as_str(), level.unit.as_str()), ("h", "m"));
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Quantity {
+    /// Name.
+    pub name: String,
+    /// Unit, for people.
+    pub unit: String,
+}
+
+impl Quantity {
+    /// `name` in `unit`.
+    pub fn new(name: &str, unit: &str) -> Self {
+        Self {
+            name: name.into(),
+            unit: unit.into(),
+        }
+    }
+}
+
+/// The channels of a twin.
+///
+/// ```
+/// use truetwin::record::Signals;
+/// use truetwin::twin::DigitalTwin;
+/// use truetwin::twins::VanDerPol;
+///
+/// assert!(VanDerPol.signals().inputs.is_empty());
+/// assert_eq!(Signals::default().outputs[0].name, "y"); // of a black box that says nothing else
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Signals {
+    /// Inputs, in the order of a drive's columns.
+    pub inputs: Vec<Quantity>,
+    /// Outputs, in the order of a record's columns.
+    pub outputs: Vec<Quantity>,
+}
+
+impl Default for Signals {
+    fn default() -> Self {
+        Self {
+            inputs: vec![Quantity::new("u", "")],
+            outputs: vec![Quantity::new("y", "")],
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! Which pieces of numbered work are done here.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// Part `index` of `of`: piece k belongs to it where k ≡ index (mod of).
+///
+/// Written `i/n`. Whether an array of jobs counts from 0 to n − 1 or from 1 to n, its shares are the same n: 0/n is n/n.
+///
+/// ```
+/// use truetwin::storage::work::Share;
+/// let share: Share = "1/3".parse()?;
+/// assert_eq!((0..7).filter(|k| share.takes(*k)).collect::<Vec<_>>(), [1, 4]);
+/// assert_eq!("0/3".parse::<Share>()?, "3/3".parse()?);
+/// # Ok::<(), truetwin::storage::work::ShareError>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Share {
+    index: usize,
+    of: usize,
+}
+
+/// What is no share.
+///
+/// ```
+/// use truetwin::storage::work::{Share, ShareError};
+///
+/// let error: ShareError = Share::new(5, 4).unwrap_err();
+/// assert!(error.to_string().contains('4'), "{error}");
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("\"{0}\" is no share; write i/n: part i of n, such as 1/4")]
+pub struct ShareError(String);
+
+impl Share {
+    /// Everything.
+    pub const WHOLE: Self = Self { index: 0, of: 1 };
+
+    /// Part `index` (from 0, or from 1) of `of`.
+    ///
+    /// # Errors
+    ///
+    /// No parts, or an index beyond them.
+    pub fn new(index: usize, of: usize) -> Result<Self, ShareError> {
+        match index <= of && of > 0 {
+            true => Ok(Self {
+                index: index % of,
+                of,
+            }),
+            false => Err(ShareError(format!("{index}/{of}"))),
+        }
+    }
+
+    /// Whether piece `number` is done here.
+    pub fn takes(self, number: usize) -> bool {
+        number % self.of == self.index
+    }
+
+    /// Whether this is everything.
+    pub fn is_whole(self) -> bool {
+        self.of == 1
+    }
+}
+
+impl FromStr for Share {
+    type Err = ShareError;
+
+    fn from_str(text: &str) -> Result<Self, ShareError> {
+        let wrong = || ShareError(text.into());
+        let (index, of) = text.split_once('/').ok_or_else(wrong)?;
+        let number = |digits: &str| digits.parse().map_err(|_| wrong());
+        Self::new(number(index)?, number(of)?)
+    }
+}
+
+impl fmt::Display for Share {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.of)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Counted from 0 or from 1: every piece belongs to exactly one share.
+    #[test]
+    fn shares_are_a_partition_however_they_are_counted() {
+        for first in [0, 1] {
+            let shares: Vec<Share> = (first..first + 4)
+                .map(|i| format!("{i}/4").parse().unwrap())
+                .collect();
+            for k in 0..50 {
+                assert_eq!(shares.iter().filter(|s| s.takes(k)).count(), 1);
+            }
+        }
+        assert!(Share::WHOLE.is_whole() && Share::WHOLE.takes(7));
+    }
+
+    #[test]
+    fn what_is_no_share_is_said() {
+        for text in [
+            "", "3", "5/4", "1/0", "0/0", "-1/4", "a/b", "1/2/3", "1.0/2",
+        ] {
+            let error = text.parse::<Share>().unwrap_err().to_string();
+            assert!(error.contains("such as 1/4"), "{error}");
+        }
+    }
+}
