@@ -4,8 +4,8 @@ use std::process::ExitCode;
 use truetwin::study::StudyError;
 
 fn main() -> ExitCode {
-    match truetwin::evaluate::paper::reference_studies() {
-        Ok(studies) => truetwin::cli::run(studies.into_iter().map(Ok::<_, StudyError>)),
+    match truetwin::evaluate::paper::reference_projects() {
+        Ok(projects) => truetwin::cli::run(projects.into_iter().map(Ok::<_, StudyError>)),
         Err(error) => truetwin::cli::run([Err(error)]),
     }
 }

@@ -3,71 +3,12 @@
 use crate::estimator::gate::{GateForm, GateSettings};
 use crate::estimator::refine::RefineSettings;
 use crate::estimator::sample::CloudSampler;
-use crate::feature::FeatureRecipe;
-use crate::network::{Architecture, Training};
+use crate::network::Training;
 use crate::setting::SettingError;
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
 /// Largest bank.
 const MOST_SIMULATIONS: usize = 1_000_000_000_000;
-
-/// Which of a study's two recipes.
-///
-/// ```
-/// use truetwin::study::PresetName;
-///
-/// assert_eq!(PresetName::default().to_string(), "default");
-/// assert_eq!(PresetName::Paper.to_string(), "paper");
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum PresetName {
-    /// As in the paper, with what its text leaves open from the authors' code.
-    Paper,
-    /// What this project found to be better, on any twin.
-    #[default]
-    Default,
-}
-
-impl std::fmt::Display for PresetName {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Paper => "paper",
-            Self::Default => "default",
-        })
-    }
-}
-
-/// A recipe: features, network, and every number of the method.
-///
-/// ```
-/// use std::sync::Arc;
-/// use truetwin::feature::Ar;
-/// use truetwin::network::{Compact, architecture};
-/// use truetwin::study::{Preset, PresetName, RecordPlan, Settings, Study};
-/// use truetwin::twins::VanDerPol;
-///
-/// let preset = Preset {
-///     features: Arc::new(Ar { order: 5 }),
-///     architecture: architecture::<Compact>(),
-///     settings: Settings { bank_size: 2000, ..Settings::default() },
-/// };
-/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 300))?
-///     .with_preset(PresetName::Default, preset);
-/// assert_eq!(study.preset(PresetName::Default).settings.bank_size, 2000);
-/// # Ok::<(), truetwin::study::StudyError>(())
-/// ```
-#[derive(Debug, Clone)]
-pub struct Preset {
-    /// Stage 1.
-    pub features: Arc<dyn FeatureRecipe>,
-    /// Stage 2.
-    pub architecture: Arc<dyn Architecture>,
-    /// The numbers.
-    pub settings: Settings,
-}
 
 /// The cloud of fresh simulations around θ_GN.
 ///
@@ -81,7 +22,7 @@ pub struct Preset {
 /// | `rescale` | true | | standardise features and targets anew on the cloud; not in the paper |
 ///
 /// ```
-/// use truetwin::study::{CloudSampler, CloudSettings};
+/// use truetwin::estimator::{CloudSampler, CloudSettings};
 ///
 /// let wide = CloudSettings { spread: 4.0, sampler: CloudSampler::Box, ..CloudSettings::default() };
 /// assert_eq!(wide.draws(1), 400);
@@ -120,7 +61,7 @@ impl Default for CloudSettings {
 /// How features become network inputs.
 ///
 /// ```
-/// use truetwin::study::{Inputs, Settings};
+/// use truetwin::estimator::{Inputs, Settings};
 ///
 /// let settings = Settings { inputs: Inputs::Each, ..Settings::default() };
 /// assert!(settings.check().is_ok());
@@ -146,7 +87,7 @@ impl CloudSettings {
 /// Every number of the method.
 ///
 /// ```
-/// use truetwin::study::Settings;
+/// use truetwin::estimator::Settings;
 ///
 /// let mut settings = Settings::default();
 /// settings.gate.alpha = 0.05;
