@@ -105,7 +105,7 @@ macro_rules! debug_by_name {
     };
 }
 
-// Rooms, lowest first; a room uses only what stands above it here (tests/layering.rs holds it so).
+// Rooms, lowest first; a room uses only what stands above it here (tests/house/layering.rs holds it so).
 pub mod setting;
 
 pub mod math;
