@@ -90,7 +90,6 @@
     not(test),
     warn(clippy::print_stdout, clippy::print_stderr, clippy::unwrap_used)
 )]
-
 // A few functions of the rooms serve the command line alone.
 #![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
 
