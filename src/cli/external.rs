@@ -66,7 +66,19 @@ fn program(options: &External, line: &str) -> Result<Study, Failure> {
             ))
         })?;
     }
-    Ok(ProgramTwin::start(ProgramCommand::parse(line)?, settings)?.into_study()?)
+    Ok(ProgramTwin::start(command(line)?, settings)?.into_study()?)
+}
+
+/// Splits a line into program and arguments at spaces; quotes and backslashes keep words together, as in a shell.
+fn command(line: &str) -> Result<ProgramCommand, Failure> {
+    let wrong = |problem: &str| Failure::user(format!("--program \"{line}\": {problem}"));
+    let words = shell_words::split(line).map_err(|_| wrong("a quote is not closed; close it"))?;
+    match words.split_first() {
+        Some((program, arguments)) if !program.is_empty() => {
+            Ok(ProgramCommand::new(program, arguments.iter().cloned()))
+        }
+        _ => Err(wrong("no program is named; write 'python3 model.py'")),
+    }
 }
 
 #[cfg(feature = "fmi")]
