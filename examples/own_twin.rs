@@ -2,7 +2,6 @@
 //!
 //! `cargo run --release --example own_twin -- demo`, or check, simulate, pretrain, estimate, diagnose, …
 
-use truetwin::feature::Score;
 use truetwin::network::layers::*;
 use truetwin::prelude::*;
 
