@@ -14,6 +14,7 @@ use crate::effect::{EffectError, Effects, UnmodelledEffect, augment, given_magni
 use crate::feature::{Ar, Arx, FeatureError, FeatureMap, FeatureRecipe, Score};
 use crate::network::{Architecture, Deep, HeadArchitecture, architecture};
 use crate::record::{CsvError, Drive, Record, RecordError};
+use crate::setting::did_you_mean;
 use crate::twin::conformance::{Finding, Severity};
 use crate::twin::{Adaptation, AdaptationError, DigitalTwin, Noise, ParameterError, adapt, fix};
 use std::collections::BTreeMap;
@@ -72,7 +73,7 @@ pub enum StudyError {
     #[error(transparent)]
     File(#[from] StudyFileError),
     /// The file is about another twin.
-    #[error("no twin is called \"{given}\"; there are {known}")]
+    #[error("no twin is called \"{given}\"{}; there are {known}", did_you_mean(given, known.split(", ")))]
     Twin {
         /// In the file.
         given: String,
@@ -313,7 +314,19 @@ impl Study {
     fn check_library(&self, library: &Library) -> Result<(), StudyError> {
         let mut named = library.only.iter().chain(&library.without);
         let unknown = named.find(|name| !self.knows_effect(name));
-        unknown.map_or(Ok(()), |name| Err(StudyError::Library(name.clone())))
+        unknown.map_or(Ok(()), |name| {
+            Err(StudyError::Library(self.with_nearest_effect(name)))
+        })
+    }
+
+    /// Adds to the name of an unknown effect the known one that is nearest.
+    pub(crate) fn with_nearest_effect(&self, name: &str) -> String {
+        let effects = self.effects();
+        let known = effects.iter().map(|e| match name.contains('@') {
+            true => format!("{}@{}", e.typetag_name(), e.target()),
+            false => e.typetag_name().to_owned(),
+        });
+        format!("{name}{}", did_you_mean(name, known))
     }
 
     /// The library's effects and the study's own, each once for each target of this twin, all magnitudes free.
