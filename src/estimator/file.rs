@@ -9,6 +9,7 @@ use super::readout::Readout;
 use super::{Estimator, PresetName, Project, Scaler, Settings, Standardiser};
 use crate::feature::{FeatureError, FeatureRecipe};
 use crate::network::{NamedTensor, NetworkError, bytes_of, values_of};
+use crate::setting::did_you_mean;
 use crate::storage::files::{replace, with_remedy, write_new};
 use crate::storage::untrusted::{MESSAGE, one_line, read};
 use crate::study::{StudyError, StudyFile, StudyFileError};
@@ -90,7 +91,7 @@ pub enum EstimatorFileError {
         found: u32,
     },
     /// Its twin is not among the known ones.
-    #[error("{}: made for twin \"{twin}\", known are {known}; use the program that has this twin, or name it with --program or --fmu", path.display())]
+    #[error("{}: made for twin \"{twin}\"{}, known are {known}; use the program that has this twin, or name it with --program or --fmu", path.display(), did_you_mean(twin, known.split(", ")))]
     Twin {
         /// File.
         path: PathBuf,

@@ -9,6 +9,7 @@ pub use plan::{DriveSource, InputPlan, Levels, PlanError, RecordPlan};
 
 use crate::effect::{EffectError, Effects, UnmodelledEffect, augment, given_magnitudes};
 use crate::record::{CsvError, Record, RecordError};
+use crate::setting::did_you_mean;
 use crate::twin::{Adaptation, AdaptationError, DigitalTwin, ParameterError, adapt, fix};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -65,7 +66,7 @@ pub enum StudyError {
     #[error(transparent)]
     File(#[from] StudyFileError),
     /// The file is about another twin.
-    #[error("no twin is called \"{given}\"; there are {known}")]
+    #[error("no twin is called \"{given}\"{}; there are {known}", did_you_mean(given, known.split(", ")))]
     Twin {
         /// In the file.
         given: String,
@@ -241,7 +242,19 @@ impl Study {
     fn check_library(&self, library: &Library) -> Result<(), StudyError> {
         let mut named = library.only.iter().chain(&library.without);
         let unknown = named.find(|name| !self.knows_effect(name));
-        unknown.map_or(Ok(()), |name| Err(StudyError::Library(name.clone())))
+        unknown.map_or(Ok(()), |name| {
+            Err(StudyError::Library(self.with_nearest_effect(name)))
+        })
+    }
+
+    /// Adds to the name of an unknown effect the known one that is nearest.
+    pub(crate) fn with_nearest_effect(&self, name: &str) -> String {
+        let effects = self.effects();
+        let known = effects.iter().map(|e| match name.contains('@') {
+            true => format!("{}@{}", e.typetag_name(), e.target()),
+            false => e.typetag_name().to_owned(),
+        });
+        format!("{name}{}", did_you_mean(name, known))
     }
 
     /// The library's effects and the study's own, each once for each target of this twin, all magnitudes free.
