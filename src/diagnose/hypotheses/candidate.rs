@@ -110,7 +110,7 @@ pub(in crate::diagnose) fn candidates(
     without: &[String],
 ) -> Result<Vec<Candidate>, DiagnoseError> {
     if let Some(name) = without.iter().find(|name| !study.knows_effect(name)) {
-        return Err(DiagnoseError::Without(name.clone()));
+        return Err(DiagnoseError::Without(study.with_nearest_effect(name)));
     }
     let twin = study.twin();
     let named = |id: &str, target: &str| {
