@@ -47,15 +47,15 @@
 //! let unknown_starts_and_noise: &[FittedNuisance] = &found.nuisance;
 //! assert!(unknown_starts_and_noise.is_empty());
 //!
-//! // Which effect: one, a class of rivals, or none of the listed.
-//! let which: &Which = &found.which;
+//! // Cause effect: one, a class of rivals, or none of the listed.
+//! let which: &Cause = &found.which;
 //! assert_ne!(which.decision, Decision::NotNeeded);
 //! let first: &EffectFit = &which.effects[0];
 //! assert!((0.0..=1.0).contains(&first.probability));
 //! let tell_rivals_apart: Option<&NextInput> = which.next_input.as_ref();
 //! assert!(tell_rivals_apart.is_none_or(|next| !next.rivals.is_empty()));
 //!
-//! // Where: in the equations, in time, at which values, at which delays and frequencies.
+//! // Location: in the equations, in time, at which values, at which delays and frequencies.
 //! let place: &Where = &found.place;
 //! let targets: &[TargetShare] = &place.targets;
 //! let equations: &[Equation] = &place.equations;
@@ -108,9 +108,9 @@ mod thresholds;
 pub use error::{DiagnoseError, GivenRecord};
 pub(crate) use gain::{gain_of, held_out_score};
 pub use outcome::{
-    Band, Cell, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit, Equation,
-    FittedNuisance, FittedParameter, FreeRuns, Lag, Maps, NextInput, Onset, Region, Shrinkage,
-    TargetShare, Term, TermRange, Verdict, Visible, Where, Which, Window,
+    Band, Cause, Cell, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit, Equation,
+    FittedNuisance, FittedParameter, FreeRuns, Lag, Location, Maps, NextInput, Onset, Region,
+    Shrinkage, TargetShare, Term, TermRange, Verdict, Visible, Window,
 };
 pub(crate) use quantify::held_out::{SHORTEST_SPLIT, held_out_from};
 pub use run::diagnose;

@@ -1,4 +1,4 @@
-//! Where the candidates are looked for: magnitudes in the units of this record.
+//! Dictionary of candidates: magnitudes to try, in the units of the record.
 
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::fitting::problem::Problem;
@@ -14,7 +14,7 @@ use crate::twin::DigitalTwin;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// One place to look at.
+/// One point to try.
 #[derive(Debug, Clone)]
 pub(in crate::diagnose) struct Point {
     /// Index among the variants.
@@ -23,11 +23,11 @@ pub(in crate::diagnose) struct Point {
     pub m: Vec<f64>,
     /// Multiples of the secant that make sense.
     pub range: (f64, f64),
-    /// Whether a multiple of the secant is that multiple of the first magnitude.
+    /// True where a multiple of the secant is that multiple of the first magnitude.
     pub linear: bool,
 }
 
-/// All places, and the twins to look with.
+/// All points, and the twins to try them with.
 pub(in crate::diagnose) struct Dictionary {
     pub candidates: Vec<Candidate>,
     pub variants: Vec<Variant>,
@@ -35,7 +35,7 @@ pub(in crate::diagnose) struct Dictionary {
 }
 
 impl Dictionary {
-    /// Of candidates on the twin `study` with the effects `accepted`; `problem` and `reference` are that twin's.
+    /// Plans and tries the points of all candidates on the twin `study` with the effects `accepted`; `problem` and `reference` are that twin's.
     pub fn new(
         study: &Arc<dyn DigitalTwin>,
         accepted: &[Addition],
@@ -70,7 +70,7 @@ impl Dictionary {
             .into_par_iter()
             .map(|(v, lead, shape)| {
                 let plan = &plans[v];
-                let look = |first: f64| -> Result<Option<f64>, FilterError> {
+                let visibility = |first: f64| -> Result<Option<f64>, FilterError> {
                     let m: Vec<f64> = [first].into_iter().chain(shape.iter().copied()).collect();
                     let of = plan.variant.problem(problem);
                     let there = recoverable(of.filtered(
@@ -78,8 +78,8 @@ impl Dictionary {
                     ))?;
                     Ok(there.map(|there| reference.direction(&there).norm_squared()))
                 };
-                let found = try_lead(lead, look)?;
-                Ok(found.map(|(first, linear)| Point {
+                let lead_point = try_lead(lead, visibility)?;
+                Ok(lead_point.map(|(first, linear)| Point {
                     variant: v,
                     m: [first].into_iter().chain(shape.iter().copied()).collect(),
                     range: plan.range,
@@ -140,17 +140,19 @@ impl Dictionary {
     }
 }
 
-/// Finds the first magnitude to look at; `None` where nothing can be seen or filtered. Also whether it is linear.
+/// Finds the first magnitude to visibility at; `None` where nothing can be seen or filtered. Also whether it is linear.
 fn try_lead(
     lead: Lead,
-    look: impl Fn(f64) -> Result<Option<f64>, FilterError>,
+    visibility: impl Fn(f64) -> Result<Option<f64>, FilterError>,
 ) -> Result<Option<(f64, bool)>, FilterError> {
     let seen = |q: f64| q.is_finite() && q > 1e-6;
     match lead {
-        Lead::At(value) => Ok(look(value)?.filter(|q| seen(*q)).map(|_| (value, false))),
+        Lead::At(value) => Ok(visibility(value)?
+            .filter(|q| seen(*q))
+            .map(|_| (value, false))),
         Lead::Shrink(mut value) => {
             for _ in 0..12 {
-                match look(value)? {
+                match visibility(value)? {
                     Some(q) if q <= Thresholds::COARSE => {
                         return Ok(seen(q).then_some((value, false)));
                     }
@@ -162,7 +164,7 @@ fn try_lead(
         Lead::Visible { guess, linear } => {
             let mut value = guess;
             for _ in 0..20 {
-                let factor = match look(value)? {
+                let factor = match visibility(value)? {
                     Some(q)
                         if (0.3 * Thresholds::VISIBLE..=4.0 * Thresholds::VISIBLE).contains(&q) =>
                     {

@@ -16,21 +16,21 @@ use std::sync::Arc;
 /// d ← a·d + σ·√(1 − a²)·w        (a = 1: d ← d + σ·w)        ẋ_i + d,   y_j + d   or   θ_i·exp(d)
 /// ```
 ///
-/// θ is longer by σ > 0. A filter that may follow d gains on every gap at the right place, and on one elsewhere less.
+/// θ is longer by σ > 0. A filter that may follow d gains on every gap at the right entry, and on one elsewhere less.
 pub(in crate::diagnose) fn disturbed(
     base: Arc<dyn DigitalTwin>,
-    place: Entry,
+    entry: Entry,
     memory: f64,
 ) -> Arc<dyn DigitalTwin> {
     let Some(mut outline) = base.state_space().map(StateSpace::outline) else {
-        return disturbed_signals::disturbed(base, place, memory);
+        return disturbed_signals::disturbed(base, entry, memory);
     };
     outline.states.push(Quantity::new("disturbance/0", ""));
     let sigma = Parameter::new("disturbance", "", 0.01, 1.0).with_role(Role::Effect);
     outline.parameters = ParameterSpace::new(outline.parameters.iter().cloned().chain([sigma]));
     Arc::new(Disturbed {
         base,
-        place,
+        entry,
         memory,
         outline,
     })
@@ -38,7 +38,7 @@ pub(in crate::diagnose) fn disturbed(
 
 struct Disturbed {
     base: Arc<dyn DigitalTwin>,
-    place: Entry,
+    entry: Entry,
     memory: f64,
     outline: Outline,
 }
@@ -56,7 +56,7 @@ impl Disturbed {
 
     fn with<R>(&self, now: &Now<'_>, d: f64, f: impl FnOnce(&dyn StateSpace, &Now<'_>) -> R) -> R {
         let own = &now.theta[..now.theta.len() - 1];
-        let Entry::Parameter(i) = self.place else {
+        let Entry::Parameter(i) = self.entry else {
             return f(self.inner(), &Now { theta: own, ..*now });
         };
         let mut theta: SmallVec<[f64; 16]> = SmallVec::from_slice(own);
@@ -79,14 +79,14 @@ impl StateSpace for Disturbed {
         let (base, own) = dx.split_at_mut(n);
         own[0] = 0.0;
         self.with(now, d, |twin, now| twin.drift(now, &x[..n], base));
-        if let Entry::State(i) = self.place {
+        if let Entry::State(i) = self.entry {
             base[i] += d;
         }
     }
     fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
         let n = self.states();
         self.with(now, x[n], |twin, now| twin.observe(now, &x[..n], y));
-        if let Entry::Sensor(j) = self.place {
+        if let Entry::Sensor(j) = self.entry {
             y[j] += x[n];
         }
     }
