@@ -33,7 +33,7 @@ fn features(c: &mut Criterion) {
     ];
     let studies = reference_studies().expect("the reference studies are sound");
     for (study, recipes) in studies.iter().zip([autonomous, driven]) {
-        let twin = Arc::clone(study.twin());
+        let twin = study.twin().clone();
         let noise = Noise::new(1, "bench", 0);
         let drives = study.drives().expect("the plan fits the twin");
         let drive = drives.draw(noise).expect("levels are finite");

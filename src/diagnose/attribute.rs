@@ -13,7 +13,7 @@ use super::variant::Variant;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::progress::Stage;
 use crate::record::Record;
-use crate::twin::Noise;
+use crate::twin::{Noise, Twin};
 use rayon::prelude::*;
 
 /// Points of the dictionary that a fit starts from, per candidate; thresholds have more.
@@ -107,9 +107,9 @@ pub(super) fn explanations(
     order(&mut found);
     // Once more from where the best ended: a poor θ leads to poor fits.
     if only.is_none() {
-        let (round, draws) = match bench.problem.twin.state_space() {
-            Some(_) => (SECOND_ROUND, SECOND_DRAWS),
-            None => (SECOND_ROUND_SIMULATED, SECOND_DRAWS_SIMULATED),
+        let (round, draws) = match bench.problem.twin {
+            Twin::Equations(_) => (SECOND_ROUND, SECOND_DRAWS),
+            Twin::BlackBox(_) => (SECOND_ROUND_SIMULATED, SECOND_DRAWS_SIMULATED),
         };
         let space = bench.problem.twin.parameters();
         let d = space.len();

@@ -5,7 +5,7 @@ use super::black_box;
 use super::fit::{Fitted, fit};
 use super::problem::Problem;
 use crate::likelihood::kalman::{FilterError, recoverable};
-use crate::twin::Noise;
+use crate::twin::{Noise, Twin};
 use rayon::prelude::*;
 
 /// Random points whose likelihood is looked at, and how many become starts.
@@ -20,7 +20,7 @@ pub(super) fn base_fit(
     settings: &DiagnoseSettings,
     noise: Noise,
 ) -> Result<Option<Fitted>, FilterError> {
-    if problem.twin.state_space().is_none() {
+    if let Twin::BlackBox(_) = problem.twin {
         return black_box::base_fit(problem, settings, noise);
     }
     let space = problem.twin.parameters();

@@ -5,7 +5,7 @@ use super::catch_all::{Place, disturbed};
 use crate::effect::{Law, Magnitude, UnmodelledEffect, augment_short};
 use crate::record::Signals;
 use crate::study::Study;
-use crate::twin::{DigitalTwin, Outline, Role, fix};
+use crate::twin::{Outline, Role, Twin, fix};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -71,10 +71,7 @@ pub(super) struct Addition {
 }
 
 /// The twin with some effects, for filters: delays are cut short.
-pub(super) fn with(
-    base: &Arc<dyn DigitalTwin>,
-    additions: &[Addition],
-) -> Result<Arc<dyn DigitalTwin>, DiagnoseError> {
+pub(super) fn with(base: &Twin, additions: &[Addition]) -> Result<Twin, DiagnoseError> {
     let mut effects = vec![];
     let mut held = BTreeMap::new();
     for addition in additions {
@@ -87,11 +84,7 @@ pub(super) fn with(
 }
 
 /// The twin with a catch-all on top.
-pub(super) fn with_disturbance(
-    base: &Arc<dyn DigitalTwin>,
-    place: Place,
-    memory: f64,
-) -> Arc<dyn DigitalTwin> {
+pub(super) fn with_disturbance(base: &Twin, place: Place, memory: f64) -> Twin {
     disturbed(base.clone(), place, memory)
 }
 
@@ -127,8 +120,8 @@ pub(super) fn candidates(
         .filter(|c| !named(&c.id, &c.target))
         .filter(|c| !already.contains(&c.key()))
         .collect();
-    all.extend(match twin.state_space() {
-        Some(equations) => catch_alls(&equations.outline()),
+    all.extend(match twin.outline() {
+        Some(outline) => catch_alls(&outline),
         None => catch_alls_of_signals(&twin.signals()),
     });
     Ok(all)

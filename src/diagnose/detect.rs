@@ -12,7 +12,7 @@ use super::verdict::{left_the_prior, verdict};
 use super::{DiagnoseError, DiagnoseSettings, Setting};
 use crate::progress::Progress;
 use crate::record::Record;
-use crate::twin::{DigitalTwin, Noise, Now, Role};
+use crate::twin::{Noise, Now, Role, Twin};
 
 /// The twin, fitted and tested.
 pub(super) struct Detected<'a> {
@@ -100,8 +100,8 @@ pub(super) fn explained(
 }
 
 /// Whether no state of the twin is noisy, with any noise level that the study leaves open; nobody knows of a black box.
-pub(super) fn without_process_noise(twin: &dyn DigitalTwin, record: &Record) -> bool {
-    let Some(twin) = twin.state_space() else {
+pub(super) fn without_process_noise(twin: &Twin, record: &Record) -> bool {
+    let Twin::Equations(twin) = twin else {
         return false;
     };
     let outline = twin.outline();

@@ -9,9 +9,8 @@ use super::scales::Scales;
 use super::scan::{Gain, Reference};
 use super::variant::Variant;
 use crate::likelihood::kalman::{FilterError, recoverable};
-use crate::twin::DigitalTwin;
+use crate::twin::Twin;
 use rayon::prelude::*;
-use std::sync::Arc;
 
 /// d·d at which a magnitude is one that could just be seen.
 const VISIBLE: f64 = 10.0;
@@ -40,7 +39,7 @@ pub(super) struct Dictionary {
 impl Dictionary {
     /// Of candidates on the twin `study` with the effects `accepted`; `problem` and `reference` are that twin's.
     pub fn new(
-        study: &Arc<dyn DigitalTwin>,
+        study: &Twin,
         accepted: &[Addition],
         candidates: Vec<Candidate>,
         problem: &Problem<'_>,

@@ -10,7 +10,7 @@ use super::{DiagnoseError, Setting};
 use crate::likelihood::kalman::{FilterError, FilterSettings, Kalman, recoverable};
 use crate::progress::Stage;
 use crate::record::{Record, Signal};
-use crate::twin::StateSpace;
+use crate::twin::{StateSpace, Twin};
 
 /// Pieces of a record that the spread of a mean is taken from.
 const BLOCKS: usize = 20;
@@ -62,14 +62,14 @@ pub(super) fn missing_term(
 ) -> Result<Option<MissingTerm>, FilterError> {
     let problem = bench.explained(explanation);
     let twin = problem.twin.clone();
-    let Some(equations) = twin.state_space() else {
+    let Twin::Equations(equations) = &twin else {
         return Ok(None);
     };
     let own = bench.bins.states;
     let mut records = vec![];
     for (r, record) in problem.records.iter().enumerate() {
         let theta = problem.of_record(r, &explanation.fitted.theta);
-        let Some(smoothed) = smooth(equations, record, &theta, own)? else {
+        let Some(smoothed) = smooth(equations.as_ref(), record, &theta, own)? else {
             return Ok(None);
         };
         records.push(smoothed);

@@ -22,8 +22,7 @@
 //! See docs/diagnosing-a-gap.md for the mathematics and how to read the answer.
 //!
 //! ```
-//! use std::sync::Arc;
-//! use truetwin::diagnose::*;
+//! //! use truetwin::diagnose::*;
 //! use truetwin::effect::QuadraticDrag;
 //! use truetwin::progress::Progress;
 //! use truetwin::study::{RecordPlan, Study};
@@ -146,9 +145,8 @@ use crate::progress::Cancelled;
 use crate::record::{Record, RecordError};
 use crate::setting::SettingError;
 use crate::study::Study;
-use crate::twin::{DigitalTwin, ParameterError, SimulationError};
+use crate::twin::{ParameterError, SimulationError, Twin};
 use std::fmt;
-use std::sync::Arc;
 
 /// Settings of a diagnosis.
 ///
@@ -333,7 +331,7 @@ impl fmt::Display for GivenRecord {
 /// What all steps share.
 struct Setting<'a> {
     study: &'a Study,
-    twin: &'a Arc<dyn DigitalTwin>,
+    twin: &'a Twin,
     validation: Option<&'a [Record]>,
     /// The records and the validation record.
     together: Option<&'a [Record]>,
@@ -348,7 +346,7 @@ impl<'a> Setting<'a> {
     /// Of the twin as [`measured`](black_box::measured) shows it.
     fn new(
         study: &'a Study,
-        (twin, silent): &'a (Arc<dyn DigitalTwin>, bool),
+        (twin, silent): &'a (Twin, bool),
         records: &[Record],
         validation: Option<&'a [Record]>,
         together: Option<&'a [Record]>,
@@ -358,7 +356,7 @@ impl<'a> Setting<'a> {
             twin,
             validation,
             together,
-            follows: *silent || detect::without_process_noise(twin.as_ref(), &records[0]),
+            follows: *silent || detect::without_process_noise(twin, &records[0]),
             silent: *silent,
         }
     }

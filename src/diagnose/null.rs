@@ -12,7 +12,7 @@ use crate::likelihood::kalman::FilterError;
 use crate::math::{quantile, rank_p_value};
 use crate::progress::Stage;
 use crate::record::Record;
-use crate::twin::Noise;
+use crate::twin::{Noise, Twin};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -96,7 +96,7 @@ impl<'a> Bench<'a> {
 
     /// How the records themselves look.
     pub fn own_look(&self) -> Result<Option<Look>, FilterError> {
-        if self.problem.twin.state_space().is_none() {
+        if let Twin::BlackBox(_) = self.problem.twin {
             return Ok(self
                 .shared()?
                 .and_then(|s| s.look(self, self.problem.records)));
@@ -106,9 +106,9 @@ impl<'a> Bench<'a> {
 
     /// Of a black box: what all looks share.
     fn shared(&self) -> Result<Option<Shared>, FilterError> {
-        match self.problem.twin.state_space() {
-            Some(_) => Ok(None),
-            None => Shared::new(self),
+        match self.problem.twin {
+            Twin::Equations(_) => Ok(None),
+            Twin::BlackBox(_) => Shared::new(self),
         }
     }
 

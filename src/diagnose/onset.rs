@@ -16,7 +16,7 @@ use super::problem::Problem;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::math::rank_p_value;
 use crate::record::Record;
-use crate::twin::Noise;
+use crate::twin::{Noise, Twin};
 use rayon::prelude::*;
 
 /// Blocks of a record, and those before the first that is to be foreseen.
@@ -36,7 +36,7 @@ pub(super) fn onset(
     noise: Noise,
 ) -> Result<Option<Onset>, DiagnoseError> {
     // Each block would take ensembles of a black box.
-    if bench.problem.twin.state_space().is_none() {
+    if let Twin::BlackBox(_) = bench.problem.twin {
         return Ok(None);
     }
     let replicates = (1.0 / alpha + BEYOND) as u64;

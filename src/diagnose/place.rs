@@ -13,7 +13,7 @@ use super::result::{Decision, Discovery, TargetShare};
 use super::{DiagnoseError, Setting};
 use crate::likelihood::kalman::{Filtered, recoverable};
 use crate::progress::Progress;
-use crate::twin::Noise;
+use crate::twin::{Noise, Twin};
 
 /// `where` of the report but for what is drawn again, and, where nothing listed is accepted, what the missing term depends on.
 pub(super) fn locate(
@@ -31,7 +31,7 @@ pub(super) fn locate(
         maps: maps(bench, test, found.first())?,
         ..targets(bench, found, test, answer)
     };
-    let shows = setting.twin.state_space().is_some();
+    let shows = matches!(setting.twin, Twin::Equations(_));
     let apart = match setting.follows && shows {
         true => apart(
             setting,

@@ -10,7 +10,7 @@ use super::scales::{Scales, deviation, ends, largest};
 use super::variant::Variant;
 use crate::effect::{Law, Magnitude, Mark, UnmodelledEffect};
 use crate::math::quantile;
-use crate::twin::{DigitalTwin, Interval};
+use crate::twin::{Interval, Twin};
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
@@ -45,7 +45,7 @@ pub(super) enum Lead {
 
 /// What plans are made from: the study's twin, the effects that it has been given, and the fit of that.
 pub(super) struct Planner<'a> {
-    pub study: &'a Arc<dyn DigitalTwin>,
+    pub study: &'a Twin,
     pub accepted: &'a [Addition],
     pub problem: &'a Problem<'a>,
     pub scales: &'a Scales<'a>,
@@ -71,7 +71,7 @@ impl Planner<'_> {
                     _ => Mark::Unmarked,
                 };
                 let plan = |choice: &Choice| self.listed(index, effect, &values, &mark, choice);
-                let filtered = self.study.state_space().is_some();
+                let filtered = matches!(self.study, Twin::Equations(_));
                 (choices(effect.as_ref(), &mark, filtered).iter())
                     .filter_map(|choice| plan(choice).transpose())
                     .collect()
@@ -114,7 +114,7 @@ impl Planner<'_> {
 
     /// Values of the signal or state that an effect sits at.
     fn values(&self, effect: &dyn UnmodelledEffect) -> Vec<f64> {
-        let outline = self.study.state_space().map(|t| t.outline());
+        let outline = self.study.outline();
         let law = effect.law();
         let known = crate::effect::targets(law, outline.as_ref(), &self.study.signals());
         let target = known.iter().position(|k| k == effect.target()).unwrap_or(0);

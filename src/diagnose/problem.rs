@@ -6,7 +6,7 @@ use crate::likelihood::kalman::{
     Coordinates, FilterError, FilterSettings, Filtered, Kalman, Score,
 };
 use crate::record::{Record, Signal};
-use crate::twin::{DigitalTwin, Outline, Parameter, ParameterSpace, Role};
+use crate::twin::{Outline, Parameter, ParameterSpace, Role, Twin};
 use nalgebra::{DMatrix, DVector};
 use std::sync::{Arc, Mutex};
 
@@ -18,7 +18,7 @@ const LONGEST_NOISE: f64 = 2.0;
 /// The full θ is the twin's, then the starts of the second record, and so on.
 #[derive(Clone)]
 pub(super) struct Problem<'a> {
-    pub twin: Arc<dyn DigitalTwin>,
+    pub twin: Twin,
     pub records: &'a [Record],
     /// For each record, where the twin's parameters stand in the full θ.
     places: Vec<Vec<usize>>,
@@ -50,7 +50,7 @@ impl Slope {
 
 impl<'a> Problem<'a> {
     /// `axes` belong to the parameters of the twin; their likelihood is a filter's, or, without equations, that of an ensemble.
-    pub fn new(twin: Arc<dyn DigitalTwin>, axes: Vec<Axis>, records: &'a [Record]) -> Self {
+    pub fn new(twin: Twin, axes: Vec<Axis>, records: &'a [Record]) -> Self {
         let space = twin.parameters();
         let mut all = axes;
         let mut places = Vec::new();
@@ -89,9 +89,9 @@ impl<'a> Problem<'a> {
     }
 
     /// A twin with the weak priors of its own parameters.
-    pub fn of_twin(twin: &Arc<dyn DigitalTwin>, records: &'a [Record]) -> Self {
+    pub fn of_twin(twin: &Twin, records: &'a [Record]) -> Self {
         let mut axes: Vec<Axis> = twin.parameters().iter().map(Axis::of).collect();
-        if twin.state_space().is_none() {
+        if let Twin::BlackBox(_) = twin {
             // What an effect explains of a simulator's misfit may be all of it.
             let noise = |p: &Parameter| p.role == Role::Noise;
             for (axis, _) in
@@ -123,18 +123,16 @@ impl<'a> Problem<'a> {
 
     /// States, inputs and outputs; of a black box, its predicted outputs stand for states.
     pub fn outline(&self) -> Outline {
-        match self.twin.state_space() {
-            Some(equations) => equations.outline(),
-            None => black_box::outline(self.twin.as_ref()),
+        match &self.twin {
+            Twin::Equations(equations) => equations.outline(),
+            Twin::BlackBox(twin) => black_box::outline(twin.as_ref()),
         }
     }
 
     /// Of a black box: what predicts each record at θ.
     pub fn predictors(&self, theta: &[f64]) -> Result<Vec<Predictor>, FilterError> {
         (self.records.iter().enumerate())
-            .map(|(r, record)| {
-                black_box::predictor(self.twin.as_ref(), &self.of_record(r, theta), record)
-            })
+            .map(|(r, record)| black_box::predictor(&self.twin, &self.of_record(r, theta), record))
             .collect()
     }
 
@@ -209,7 +207,7 @@ impl<'a> Problem<'a> {
     }
 
     pub fn log_likelihood(&self, theta: &[f64]) -> Result<f64, FilterError> {
-        let Some(equations) = self.twin.state_space() else {
+        let Twin::Equations(equations) = &self.twin else {
             let all = self.filtered(theta)?;
             let sum = all.iter().map(|f| f.log_likelihood).sum();
             *self.seen.lock().unwrap_or_else(|e| e.into_inner()) = Some((theta.to_vec(), all));
@@ -217,7 +215,7 @@ impl<'a> Problem<'a> {
         };
         let mut sum = 0.0;
         for (r, record) in self.records.iter().enumerate() {
-            let kalman = Kalman::new(equations, record, &self.filter)?;
+            let kalman = Kalman::new(equations.as_ref(), record, &self.filter)?;
             sum += kalman.log_likelihood(&self.of_record(r, theta))?;
         }
         Ok(sum)
@@ -231,9 +229,9 @@ impl<'a> Problem<'a> {
 
     /// Gain at which a fit is done, in nats; what simulations say is not worth the last of them.
     pub fn done(&self) -> f64 {
-        match self.twin.state_space() {
-            Some(_) => 5e-3,
-            None => 5e-2,
+        match self.twin {
+            Twin::Equations(_) => 5e-3,
+            Twin::BlackBox(_) => 5e-2,
         }
     }
 
@@ -244,7 +242,7 @@ impl<'a> Problem<'a> {
 
     /// Innovations and filtered states of each record.
     pub fn states(&self, theta: &[f64]) -> Result<Vec<(Filtered, Signal)>, FilterError> {
-        if self.twin.state_space().is_none() {
+        if let Twin::BlackBox(_) = self.twin {
             let all = self.filtered(theta)?.into_iter().zip(self.records);
             return Ok(all
                 .map(|(f, record)| {
@@ -277,9 +275,11 @@ impl<'a> Problem<'a> {
         (self.records.iter().enumerate())
             .map(|(r, record)| {
                 let theta = self.of_record(r, theta);
-                match self.twin.state_space() {
-                    Some(equations) => Kalman::new(equations, record, settings)?.filter(&theta),
-                    None => black_box::filtered(self.twin.as_ref(), &theta, record),
+                match &self.twin {
+                    Twin::Equations(equations) => {
+                        Kalman::new(equations.as_ref(), record, settings)?.filter(&theta)
+                    }
+                    Twin::BlackBox(twin) => black_box::filtered(twin.as_ref(), &theta, record),
                 }
             })
             .collect()
@@ -287,7 +287,7 @@ impl<'a> Problem<'a> {
 
     /// Gradient and information at θ.
     pub fn slope(&self, theta: &[f64]) -> Result<Slope, FilterError> {
-        let Some(equations) = self.twin.state_space() else {
+        let Twin::Equations(equations) = &self.twin else {
             let mut slope = black_box::slope(self, theta)?;
             self.add_priors(theta, &mut slope);
             return Ok(slope);
@@ -300,7 +300,7 @@ impl<'a> Problem<'a> {
             information: DMatrix::zeros(d, d),
         };
         for (r, record) in self.records.iter().enumerate() {
-            let kalman = Kalman::new(equations, record, &self.filter)?;
+            let kalman = Kalman::new(equations.as_ref(), record, &self.filter)?;
             let place = &self.places[r];
             let score = Score::forward(&kalman, &self.of_record(r, theta), &self.of_record[r])?;
             slope.log_likelihood += score.log_likelihood;
@@ -326,9 +326,9 @@ impl<'a> Problem<'a> {
     /// Points around θ whose innovations tell their derivatives: (moved θ, distance in φ), one for each entry.
     pub fn neighbours(&self, theta: &[f64]) -> Vec<(Vec<f64>, f64)> {
         // Runs are smooth in θ up to a simulator's own tolerance only.
-        let share = match self.twin.state_space() {
-            Some(_) => 0.1,
-            None => 1.0,
+        let share = match self.twin {
+            Twin::Equations(_) => 0.1,
+            Twin::BlackBox(_) => 1.0,
         };
         let phi = self.coordinates.of(theta);
         (0..phi.len())

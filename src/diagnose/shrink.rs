@@ -6,9 +6,8 @@ use super::result::FreeRuns;
 use crate::estimator::track;
 use crate::math::{median, quantile};
 use crate::record::{Record, Signal};
-use crate::twin::{DigitalTwin, Noise, free_run};
+use crate::twin::{Noise, Twin};
 use rayon::prelude::*;
-use std::sync::Arc;
 
 /// Records simulated for the floor.
 const FLOOR: u64 = 32;
@@ -50,13 +49,13 @@ impl Shrinkage {
 
 /// A twin and θ to run free.
 pub(super) struct Runner {
-    pub twin: Arc<dyn DigitalTwin>,
+    pub twin: Twin,
     pub theta: Vec<f64>,
 }
 
 impl Runner {
     pub fn new(
-        base: &Arc<dyn DigitalTwin>,
+        base: &Twin,
         additions: &[Addition],
         theta: Vec<f64>,
     ) -> Result<Self, DiagnoseError> {
@@ -74,13 +73,13 @@ impl Runner {
 
     /// The free run beside the record.
     pub fn outputs(&self, record: &Record) -> Option<Signal> {
-        let run = track(self.twin.as_ref(), &self.theta, record).ok()?;
+        let run = track(&self.twin, &self.theta, record).ok()?;
         Some(run.outputs)
     }
 
     /// Median error of records simulated at θ against their own free run.
     pub fn floor(&self, record: &Record, from: usize, noise: Noise) -> Option<f64> {
-        let free = free_run(self.twin.as_ref(), &self.theta, record.drive()).ok()?;
+        let free = self.twin.free_run(&self.theta, record.drive()).ok()?;
         let errors: Vec<f64> = (0..FLOOR)
             .into_par_iter()
             .filter_map(|i| {

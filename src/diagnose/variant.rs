@@ -3,9 +3,8 @@
 use super::axis::Axis;
 use super::problem::Problem;
 use crate::effect::Magnitude;
-use crate::twin::{DigitalTwin, Interval};
+use crate::twin::{Interval, Twin};
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 /// How far a magnitude may go, and go in one step, in multiples of what is just visible: gaps of long records are thousands
 /// of standard deviations.
@@ -16,7 +15,7 @@ const LONGEST: f64 = 40.0;
 pub(super) struct Variant {
     /// Index among the candidates.
     pub candidate: usize,
-    pub twin: Arc<dyn DigitalTwin>,
+    pub twin: Twin,
     /// Free magnitudes in the order of θ; the others are held at their off values.
     pub free: Vec<Magnitude>,
     pub held: BTreeMap<String, f64>,

@@ -15,7 +15,9 @@ use crate::feature::{Ar, Arx, FeatureError, FeatureMap, FeatureRecipe, Score};
 use crate::network::{Architecture, Deep, HeadArchitecture, architecture};
 use crate::record::{CsvError, Drive, Record, RecordError};
 use crate::twin::conformance::{Finding, Severity};
-use crate::twin::{Adaptation, AdaptationError, DigitalTwin, Noise, ParameterError, adapt, fix};
+use crate::twin::{
+    Adaptation, AdaptationError, DigitalTwin, Noise, ParameterError, Twin, adapt, fix,
+};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -32,9 +34,9 @@ use std::sync::Arc;
 pub struct Study {
     name: String,
     /// As registered.
-    base: Arc<dyn DigitalTwin>,
+    base: Twin,
     /// In the setting of `file`.
-    twin: Arc<dyn DigitalTwin>,
+    twin: Twin,
     plan: RecordPlan,
     presets: BTreeMap<PresetName, Preset>,
     file: StudyFile,
@@ -126,7 +128,7 @@ impl Study {
         twin: impl DigitalTwin + 'static,
         plan: RecordPlan,
     ) -> Result<Self, StudyError> {
-        let base: Arc<dyn DigitalTwin> = Arc::new(twin);
+        let base = Twin::new(twin);
         base.parameters()
             .check()
             .map_err(|error| StudyError::Parameters {
@@ -140,9 +142,9 @@ impl Study {
                 inputs: 8,
             }),
         };
-        let best = match base.state_space() {
-            Some(_) => Arc::new(Score::default()),
-            None => regression.clone(),
+        let best = match base {
+            Twin::Equations(_) => Arc::new(Score::default()),
+            Twin::BlackBox(_) => regression.clone(),
         };
         let preset = |features, settings| Preset {
             features,
@@ -318,7 +320,7 @@ impl Study {
 
     /// The library's effects and the study's own, each once for each target of this twin, all magnitudes free.
     pub fn effects(&self) -> Effects {
-        let library = crate::effect::applicable(self.twin.as_ref());
+        let library = crate::effect::applicable(&self.twin);
         (library.into_iter())
             .chain(self.own_effects.iter().cloned())
             .collect()
@@ -348,7 +350,7 @@ impl Study {
     }
 
     /// The twin in this study's setting.
-    pub fn twin(&self) -> &Arc<dyn DigitalTwin> {
+    pub fn twin(&self) -> &Twin {
         &self.twin
     }
 

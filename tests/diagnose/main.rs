@@ -89,7 +89,7 @@ fn an_unlisted_push_is_named_by_nobody() {
     let study = study("van-der-pol");
     let noise = Noise::new(34, "unlisted", 0);
     let base = study.twin().clone();
-    let twin: Arc<dyn DigitalTwin> = Arc::new(Unlisted { base, kind: 2 });
+    let twin = Twin::new(Unlisted { base, kind: 2 });
     let record = record(&twin, "", &[1.5], drive(&study, noise), noise);
     let found = found(&study, record, None);
     println!("{}", line("unlisted", &found));

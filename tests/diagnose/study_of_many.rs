@@ -56,8 +56,8 @@ fn study_of_many_records() {
                 String::new(),
             ),
         };
-        let source: Arc<dyn DigitalTwin> = match kind.as_str() {
-            "unlisted" => Arc::new(Unlisted {
+        let source = match kind.as_str() {
+            "unlisted" => Twin::new(Unlisted {
                 base: twin.clone(),
                 kind: i as usize % UNLISTED,
             }),
