@@ -1,6 +1,6 @@
 #![no_main]
 
-#[path = "../../tests/fuzz/readers.rs"]
+#[path = "../../tests/hostile/fuzz/readers.rs"]
 mod readers;
 
 libfuzzer_sys::fuzz_target!(|data: &[u8]| {

@@ -2,7 +2,7 @@
 
 use super::args::Subject;
 use super::{Context, Failure, Verb, output};
-use crate::study::PresetName;
+use crate::estimator::PresetName;
 use crate::twin::conformance::{Severity, check};
 use crate::twin::{FREE_RUNS, Noise, SimulationError, Twin};
 use clap::Args;
@@ -27,7 +27,8 @@ impl Verb for Check {
     }
 
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        let study = context.study(&self.subject)?;
+        let project = context.project(&self.subject)?;
+        let study = project.study();
         let drive = study
             .drives()?
             .draw(Noise::new(context.seed, "check input", 0))?;
@@ -39,7 +40,7 @@ impl Verb for Check {
         stage.finish();
         context.progress.checkpoint().map_err(Failure::internal)?;
         if findings.iter().all(|f| f.severity < Severity::Failure) {
-            findings.push(study.check_features(PresetName::Default, &drive, context.seed)?);
+            findings.push(project.check_features(PresetName::Default, &drive, context.seed)?);
         }
         let word = |severity| match severity {
             Severity::Pass => "pass",

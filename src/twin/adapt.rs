@@ -1,6 +1,7 @@
 //! A twin in another setting: prior, bounds, limits, noise and start changed from outside.
 
 use crate::record::{Drive, Signal, Signals};
+use crate::setting::did_you_mean;
 use crate::twin::{
     DigitalTwin, Interval, Modified, Modify, Noise, Now, Outline, Parameter, ParameterError,
     ParameterSpace, Role, SimulationError, StateSpace, Twin,
@@ -107,7 +108,7 @@ pub struct Adaptation {
 #[non_exhaustive]
 pub enum AdaptationError {
     /// A name that the twin does not have.
-    #[error("[{table}] names {name}, the twin has {known}; use one of these")]
+    #[error("[{table}] names {name}{}, the twin has {known}; use one of these", did_you_mean(name, known.split(", ")))]
     Unknown {
         /// Table of the study file.
         table: &'static str,

@@ -1,0 +1,16 @@
+//! The command line and everything that is started from it: banks, external programs, FMUs, ranks, Parquet records.
+
+mod bank;
+mod cli;
+mod external;
+#[path = "../common/files.rs"]
+mod files;
+#[cfg(feature = "fmi")]
+mod fmu;
+#[cfg(feature = "mpi")]
+mod mpi;
+#[cfg(feature = "parquet")]
+mod parquet;
+#[cfg(feature = "mpi")]
+#[path = "../common/timeless.rs"]
+mod timeless;

@@ -1,0 +1,14 @@
+//! Hostile files and places: readers, limits, full disks, signals, security. Every allocation of this binary is counted.
+
+mod allocations;
+#[cfg(target_os = "linux")]
+mod faults;
+#[path = "../common/files.rs"]
+mod files;
+mod fuzz;
+mod memory;
+mod security;
+#[cfg(unix)]
+mod stop;
+#[path = "../common/timeless.rs"]
+mod timeless;

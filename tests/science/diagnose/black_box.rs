@@ -1,0 +1,347 @@
+//! Twins that show nothing but `simulate`: as rarely accused, and their signals' effects named.
+
+use super::trials::*;
+use std::sync::Arc;
+use truetwin::diagnose::{Decision, DiagnoseSettings, Diagnosis, Verdict, diagnose};
+use truetwin::math::binomial_bounds;
+use truetwin::progress::Progress;
+use truetwin::record::{Drive, Record, Signal};
+use truetwin::study::{RecordPlan, Study};
+use truetwin::twin::{DigitalTwin, Noise, Parameter, ParameterSpace, SimulationError};
+
+/// A record of the boxed twin of that name with an effect, and its study.
+fn affected(name: &str, effect: &str, theta: &[f64], noise: Noise) -> (Study, Record) {
+    let open = study(name);
+    let shown = boxed(&open);
+    let text = match effect {
+        "" => String::new(),
+        _ => format!("[[effect]]\n{effect}\n"),
+    };
+    let record = record(shown.twin(), &text, theta, drive(&open, noise), noise);
+    (shown, record)
+}
+
+/// What must hold of every answer.
+fn sound(found: &Diagnosis) {
+    let shares = |all: &mut dyn Iterator<Item = f64>| all.sum::<f64>() <= 1.0 + 1e-9;
+    assert!(shares(&mut found.place.targets.iter().map(|t| t.share)));
+    assert!(shares(
+        &mut found.place.maps.windows.iter().map(|w| w.share)
+    ));
+    assert!(shares(
+        &mut found.place.maps.regions.iter().map(|r| r.share)
+    ));
+    let structural = found.verdict == Verdict::StructuralGap;
+    assert_eq!(structural, found.place.target.is_some());
+    assert!(structural || found.which.accepted.is_empty());
+}
+
+fn alarms(name: &str, records: u64, theta: impl Fn(&Study, u64, Noise) -> Vec<f64>) -> u64 {
+    let open = study(name);
+    (0..records)
+        .filter(|&i| {
+            let noise = Noise::new(51, name, i);
+            let theta = theta(&open, i, noise);
+            let (shown, record) = affected(name, "", &theta, noise);
+            let found = found(&shown, record, None);
+            sound(&found);
+            found.verdict == Verdict::StructuralGap
+        })
+        .count() as u64
+}
+
+fn few(alarms: u64, records: u64) {
+    let bounds = binomial_bounds(records, 0.05, 0.99).unwrap();
+    assert!(alarms <= *bounds.end(), "{alarms} of {records}");
+}
+
+#[test]
+fn a_perfect_oscillator_in_a_box_is_rarely_accused() {
+    let alarms = alarms("van-der-pol", 40, |study, i, noise| {
+        theta(study, i % 2 == 1, noise)
+    });
+    few(alarms, 40);
+}
+
+#[test]
+fn perfect_tanks_in_a_box_are_rarely_accused() {
+    few(
+        alarms("tanks", 16, |study, _, noise| theta(study, false, noise)),
+        16,
+    );
+}
+
+/// Effects of signals, clear ones.
+#[test]
+fn effects_of_signals_are_named() {
+    let tanks = [0.6, 0.5, 0.55, 1.0];
+    let cases: [(&str, &str, &str, &[f64]); 4] = [
+        (
+            "van-der-pol",
+            "sensor-bias@sensor",
+            "id='sensor-bias'\ntarget='sensor'\nmagnitudes={offset=0.1}",
+            &[1.4],
+        ),
+        (
+            "van-der-pol",
+            "sensor-gain@sensor",
+            "id='sensor-gain'\ntarget='sensor'\nmagnitudes={error=0.05}",
+            &[1.4],
+        ),
+        (
+            "tanks",
+            "actuator-delay@actuator",
+            "id='actuator-delay'\ntarget='actuator'\nmagnitudes={delay=3.0}",
+            &tanks,
+        ),
+        (
+            "tanks",
+            "sensor-lag@sensor",
+            "id='sensor-lag'\ntarget='sensor'\nmagnitudes={tau=2.5}",
+            &tanks,
+        ),
+    ];
+    for (name, key, effect, theta) in cases {
+        let (shown, record) = affected(name, effect, theta, Noise::new(52, key, 0));
+        let found = found(&shown, record, None);
+        println!("{}", line(key, &found));
+        sound(&found);
+        assert_eq!(found.verdict, Verdict::StructuralGap, "{key}");
+        assert!(found.which.class.iter().any(|c| c == key), "{key}");
+        assert_eq!(found.place.target.as_deref(), key.split('@').nth(1));
+    }
+}
+
+/// What happens inside the box, and no effect of a signal imitates, is detected; no signal is blamed for it.
+#[test]
+fn an_effect_inside_the_box_is_named_by_nobody() {
+    for (name, key, sample) in [
+        ("van-der-pol", "cubic-stiffness@x2", 8),
+        ("tanks", "state-ceiling@h1", 19),
+    ] {
+        let open = study(name);
+        let effects = clear(name);
+        let (_, text) = effects.iter().find(|(k, _)| *k == key).unwrap();
+        let noise = Noise::new(777, &format!("{name} listed"), sample);
+        let theta = theta(&open, false, noise);
+        let text = format!("[[effect]]\n{text}\n");
+        let record = record(open.twin(), &text, &theta, drive(&open, noise), noise);
+        let found = found(&boxed(&open), record, None);
+        println!("{}", line(key, &found));
+        sound(&found);
+        assert_eq!(found.verdict, Verdict::StructuralGap, "{key}");
+        assert_eq!(found.which.decision, Decision::NoneOfThese, "{key}");
+    }
+}
+
+/// A heater without any noise of its own: τ·ẏ = gain·u − y.
+struct Heater;
+
+impl DigitalTwin for Heater {
+    fn parameters(&self) -> ParameterSpace {
+        ParameterSpace::new([
+            Parameter::new("gain", "K", 1.0, 3.0).within(0.1, 10.0),
+            Parameter::new("tau", "s", 10.0, 40.0).within(1.0, 200.0),
+        ])
+    }
+    fn simulate(&self, theta: &[f64], drive: &Drive, _: Noise) -> Result<Signal, SimulationError> {
+        let keep = (-drive.dt() / theta[1]).exp();
+        let mut y = 0.0;
+        Ok(drive.inputs().mapv(|u| {
+            let now = y;
+            y = keep * y + (1.0 - keep) * theta[0] * u;
+            now
+        }))
+    }
+}
+
+/// A heater's record with an effect and measurement noise of this deviation.
+fn heated(effect: &str, std: f64, noise: Noise) -> (Study, Record) {
+    let study = Study::new(
+        "heater",
+        Heater,
+        RecordPlan::levels(1.0, 300, -1.0, 1.0, 20),
+    )
+    .unwrap();
+    let clean = record(
+        study.twin(),
+        effect,
+        &[2.1, 18.0],
+        drive(&study, noise),
+        noise,
+    );
+    let mut source = noise.source("thermometer");
+    let outputs = clean.outputs().mapv(|y| y + std * source.normal());
+    let record = Record::new(clean.drive().clone(), outputs).unwrap();
+    (study, record)
+}
+
+/// A simulator without noise: its own record is no gap, noisy or not, and an effect is named, noisy or not.
+#[test]
+fn a_box_without_noise_is_no_trouble() {
+    let mut accused = 0;
+    for (i, std) in [0.0, 0.0, 0.0, 0.02, 0.02, 0.02].into_iter().enumerate() {
+        let (study, record) = heated("", std, Noise::new(54, "clean", i as u64));
+        let found = found(&study, record, None);
+        println!("{}", line("nothing", &found));
+        sound(&found);
+        accused += u64::from(found.verdict == Verdict::StructuralGap);
+        assert!((found.parameters[0].refitted - 2.1).abs() < 0.1);
+        assert_eq!(found.nuisance[0].role, "noise");
+        let noise = found.nuisance[0].value;
+        assert!(noise < 1.2 * std + 2e-3, "{noise}");
+    }
+    few(accused, 6);
+    let dead = "[[effect]]\nid='actuator-dead-zone'\ntarget='actuator'\nmagnitudes={width=0.4}\n";
+    for std in [0.0, 0.02] {
+        let (study, record) = heated(dead, std, Noise::new(54, "dead", 0));
+        let found = found(&study, record, None);
+        println!("{}", line("actuator-dead-zone@actuator", &found));
+        sound(&found);
+        assert_eq!(found.which.accepted, ["actuator-dead-zone@actuator"]);
+        let shrinkage = found.shrinkage.unwrap();
+        assert!(shrinkage.closed.is_some_and(|c| c > 0.9), "{shrinkage:?}");
+    }
+}
+
+/// Records with inputs of their own share θ: together they say more about it than one.
+#[test]
+fn two_records_share_their_parameters() {
+    let effect = "[[effect]]\nid='sensor-bias'\ntarget='sensor'\nmagnitudes={offset=0.3}\n";
+    let noise = Noise::new(55, "two", 0);
+    let ((study, first), (_, second)) = (
+        heated("", 0.02, noise),
+        heated("", 0.02, noise.child("second")),
+    );
+    assert_ne!(first.drive(), second.drive());
+    let run = |records: &[Record]| {
+        let settings = DiagnoseSettings::default();
+        diagnose(&study, records, None, &settings, &Progress::silent()).unwrap()
+    };
+    let (one, both) = (run(std::slice::from_ref(&first)), run(&[first, second]));
+    assert_eq!(both.verdict, Verdict::NoGap);
+    assert!(both.parameters[0].std_error < one.parameters[0].std_error);
+    let biased: Vec<Record> = ["first", "second"]
+        .map(|name| heated(effect, 0.02, noise.child(name)).1)
+        .into();
+    let found = run(&biased);
+    println!("{}", line("sensor-bias@sensor", &found));
+    assert_eq!(found.verdict, Verdict::StructuralGap);
+    assert!(found.which.class.contains(&"sensor-bias@sensor".into()));
+}
+
+/// Each record has unknown starts of its own.
+#[test]
+fn starts_are_of_each_record() {
+    struct Warm;
+    impl DigitalTwin for Warm {
+        fn parameters(&self) -> ParameterSpace {
+            let start = Parameter::new("start.y", "K", -1.0, 1.0).within(-5.0, 5.0);
+            let start = start.with_role(truetwin::twin::Role::Start);
+            ParameterSpace::new(Heater.parameters().iter().cloned().chain([start]))
+        }
+        fn simulate(
+            &self,
+            theta: &[f64],
+            drive: &Drive,
+            noise: Noise,
+        ) -> Result<Signal, SimulationError> {
+            let mut y = Heater.simulate(&theta[..2], drive, noise)?;
+            let mut source = noise.source("thermometer");
+            for (k, v) in y.iter_mut().enumerate() {
+                *v += theta[2] * (-drive.time(k) / theta[1]).exp() + 0.02 * source.normal();
+            }
+            Ok(y)
+        }
+    }
+    let study = Study::new("warm", Warm, RecordPlan::levels(1.0, 200, -1.0, 1.0, 20)).unwrap();
+    let records = [-0.8f64, 0.6].map(|start| {
+        let noise = Noise::new(56, "starts", start.to_bits());
+        record(
+            study.twin(),
+            "",
+            &[2.1, 18.0, start],
+            drive(&study, noise),
+            noise,
+        )
+    });
+    let settings = DiagnoseSettings::default();
+    let found = diagnose(&study, &records, None, &settings, &Progress::silent()).unwrap();
+    assert_eq!(found.verdict, Verdict::NoGap);
+    let starts: Vec<f64> = found.nuisance.iter().map(|n| n.value).collect();
+    assert_eq!(found.nuisance[1].name, "y (record 2)");
+    assert!(
+        (starts[0] + 0.8).abs() < 0.1 && (starts[1] - 0.6).abs() < 0.1,
+        "{starts:?}"
+    );
+}
+
+/// The same seed gives the same bits on one thread and on three; another seed does not.
+#[test]
+fn threads_change_no_bit_of_a_box() {
+    let effect = "id='sensor-bias'\ntarget='sensor'\nmagnitudes={offset=0.1}";
+    let (shown, record) = affected("van-der-pol", effect, &[1.2], Noise::new(57, "threads", 0));
+    let run = |threads: usize, seed: u64| {
+        let pool = rayon::ThreadPoolBuilder::new();
+        let pool = pool.num_threads(threads).build().unwrap();
+        let settings = DiagnoseSettings {
+            seed,
+            replicates: 25,
+            unexplained: 50,
+            ..DiagnoseSettings::default()
+        };
+        let records = std::slice::from_ref(&record);
+        let mut found = pool
+            .install(|| diagnose(&shown, records, None, &settings, &Progress::silent()).unwrap());
+        found.seconds = 0.0;
+        format!("{found:?}")
+    };
+    assert_eq!(run(1, 1), run(3, 1));
+    assert_ne!(run(1, 1), run(1, 2));
+}
+
+/// A simulator that fails for good stops the work; one that diverges half of the time does not.
+#[test]
+fn what_a_box_does_badly_is_survived_or_said() {
+    struct Bad(f64);
+    impl DigitalTwin for Bad {
+        fn parameters(&self) -> ParameterSpace {
+            Heater.parameters()
+        }
+        fn simulate(
+            &self,
+            theta: &[f64],
+            drive: &Drive,
+            noise: Noise,
+        ) -> Result<Signal, SimulationError> {
+            if theta[0] > self.0 {
+                return Err(SimulationError::fatal("no licence"));
+            }
+            let mut source = noise.source("thermometer");
+            let mut y = Heater.simulate(theta, drive, noise)?;
+            if noise.source("luck").uniform() < 0.2 {
+                y[[5, 0]] = f64::NAN;
+            }
+            y.iter_mut().for_each(|v| *v += 0.02 * source.normal());
+            Ok(y)
+        }
+    }
+    let study = |most: f64| {
+        let plan = RecordPlan::levels(1.0, 100, -1.0, 1.0, 20);
+        Study::new("bad", Bad(most), plan).unwrap()
+    };
+    let good = study(100.0);
+    let drive = drive(&good, Noise::new(58, "bad", 0));
+    let mut source = Noise::new(58, "bad", 1).source("y");
+    let outputs = Heater.simulate(&[2.0, 20.0], &drive, Noise::OFF).unwrap();
+    let outputs = outputs.mapv(|y| y + 0.02 * source.normal());
+    let record = Arc::new(Record::new(drive, outputs).unwrap());
+    let run = |study: &Study| {
+        let settings = DiagnoseSettings::default();
+        let records = std::slice::from_ref(record.as_ref());
+        diagnose(study, records, None, &settings, &Progress::silent())
+    };
+    assert_ne!(run(&good).unwrap().verdict, Verdict::StructuralGap);
+    let error = run(&study(1.0)).unwrap_err().to_string();
+    assert!(error.contains("no licence"), "{error}");
+}

@@ -1,0 +1,178 @@
+//! What a diagnosis says beside the name: since when, what is left, what else could have been seen, what to measure next.
+
+use super::trials::*;
+use truetwin::diagnose::{Cell, Decision, DiagnoseSettings, Diagnosis, Verdict, diagnose};
+use truetwin::math::binomial_bounds;
+use truetwin::progress::Progress;
+use truetwin::record::Record;
+use truetwin::study::Study;
+use truetwin::twin::Noise;
+
+fn with_settings(study: &Study, record: Record, settings: &DiagnoseSettings) -> Diagnosis {
+    diagnose(study, &[record], None, settings, &Progress::silent()).unwrap()
+}
+
+/// A parameter that jumps half-way: the record leaves its twin there, not before, and with the step added nothing is left.
+#[test]
+fn a_gap_begins_where_it_begins() {
+    let study = study("tanks");
+    let noise = Noise::new(41, "onset", 0);
+    let text = "[[effect]]\nid='parameter-step'\ntarget='k3'\nmagnitudes={size=0.6,time=100.0}\n";
+    let theta = [0.5, 0.45, 0.5, 0.8];
+    let record = record(study.twin(), text, &theta, drive(&study, noise), noise);
+    let found = found(&study, record, None);
+    println!("{}", line("parameter-step@k3", &found));
+    let maps = &found.place.maps;
+    let onset = found.place.onset.as_ref().expect("no onset");
+    // Of 200 s, in blocks of 17 s.
+    assert!((85.0..140.0).contains(&onset.time), "{onset:?}");
+    assert!(onset.p_value <= 0.05 && onset.channel == "y");
+    let sums = [
+        maps.windows.iter().map(Cell::share).sum::<f64>(),
+        maps.regions.iter().map(Cell::share).sum(),
+        maps.channels.iter().map(Cell::share).sum(),
+        maps.lags.iter().map(Cell::share).sum(),
+        maps.bands.iter().map(Cell::share).sum(),
+    ];
+    assert!(sums.iter().all(|sum| *sum <= 1.0 + 1e-9), "{sums:?}");
+    assert!(!maps.notable().windows.is_empty() || !maps.notable().bands.is_empty());
+    let equations: Vec<&str> = (found.place.equations.iter())
+        .map(|e| e.equation.as_str())
+        .collect();
+    assert_eq!(equations.len(), 3, "{equations:?}");
+    let after = found.place.after.as_ref().expect("nothing was drawn again");
+    assert!(after.notable().windows.is_empty(), "{:?}", after.notable());
+}
+
+/// Neighbours that one record cannot tell apart: a next record is proposed that would tell more than the present one again.
+#[test]
+fn rivals_get_a_record_that_tells_more() {
+    let study = study("tanks");
+    let text = "[[effect]]\nid='quadratic-drag'\ntarget='h1'\nmagnitudes={coefficient=0.04}\n";
+    let theta = [0.6, 0.6, 0.6, 1.0];
+    let mut proposed = 0;
+    for i in 0..3 {
+        let noise = Noise::new(42, "rivals", i);
+        let record = record(study.twin(), text, &theta, drive(&study, noise), noise);
+        let range = (record.drive().inputs().iter())
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), u| {
+                (low.min(*u), high.max(*u))
+            });
+        let found = found(&study, record, None);
+        println!("{}", line("quadratic-drag@h1", &found));
+        let Some(next) = &found.which.next_input else {
+            continue;
+        };
+        println!("{}: {:?}, again {:?}", next.kind, next.split, next.again);
+        proposed += 1;
+        assert_eq!(found.which.decision, Decision::Class);
+        assert!(next.split[0] > next.again[0] && next.split[1] == next.again[1]);
+        assert!(next.rivals.iter().all(|r| found.which.class.contains(r)));
+        let inputs = next.drive.inputs();
+        assert!(inputs.iter().all(|u| (range.0..=range.1).contains(u)));
+    }
+    assert!(proposed > 0, "no next input");
+}
+
+/// The cube of a spring that the library is not allowed to name is read off the smoothed missing term.
+#[test]
+fn the_missing_term_is_regressed() {
+    let study = study("van-der-pol");
+    let noise = Noise::new(43, "discover", 0);
+    let text =
+        "[[effect]]\nid='cubic-stiffness'\ntarget='x2'\nfrom='x1'\nmagnitudes={coefficient=0.4}\n";
+    let drive = drive(&study, noise);
+    let record = record(study.twin(), text, &[1.4], drive, noise);
+    let every = study.effects();
+    let settings = DiagnoseSettings {
+        without: every.iter().map(|e| e.typetag_name().into()).collect(),
+        ..DiagnoseSettings::default()
+    };
+    let found = with_settings(&study, record, &settings);
+    assert_eq!(found.which.decision, Decision::NoneOfThese);
+    let discovery = found.discovery.as_ref().expect("no regression");
+    println!("{:?}, explained {}", discovery.terms, discovery.explained);
+    assert_eq!(discovery.equation, "x2");
+    let cube = discovery
+        .terms
+        .iter()
+        .find(|t| t.name == "x1³")
+        .expect("no cube");
+    assert!(cube.inclusion > 0.5, "{cube:?}");
+    assert!((-0.6..-0.2).contains(&cube.coefficient), "{cube:?}");
+    assert_eq!(discovery.missing.len(), discovery.fitted.len());
+}
+
+/// Effects of the size that a record of the plain twin says it would have revealed in 80 of 100 cases are revealed about so
+/// often.
+#[test]
+fn power_is_what_it_says() {
+    let study = study("van-der-pol");
+    let theta = [1.4];
+    let plain = Noise::new(44, "plain", 0);
+    let settings = DiagnoseSettings {
+        unexplained: 50,
+        ..DiagnoseSettings::default()
+    };
+    let own = record(study.twin(), "", &theta, drive(&study, plain), plain);
+    let found = with_settings(&study, own, &settings);
+    assert_ne!(found.verdict, Verdict::StructuralGap);
+    let only = DiagnoseSettings {
+        detection_only: true,
+        ..settings
+    };
+    let (mut seen, mut records) = (0, 0);
+    for (id, target, more) in [
+        ("linear-loss", "x2", ""),
+        ("sensor-delay", "sensor", ""),
+        ("cubic-stiffness", "x2", "from='x1'\n"),
+    ] {
+        let visible = (found.power.iter())
+            .find(|v| v.id == id && v.target == target)
+            .and_then(|v| Some((v.magnitude.clone(), v.value?)));
+        let (name, value) = visible.expect("nothing is visible");
+        let text = format!(
+            "[[effect]]\nid='{id}'\ntarget='{target}'\n{more}magnitudes={{{name}={value}}}\n"
+        );
+        for i in 0..12 {
+            let noise = Noise::new(45, id, i);
+            let drive = drive(&study, noise);
+            let record = record(study.twin(), &text, &theta, drive, noise);
+            let found = with_settings(&study, record, &only);
+            assert!(found.place.targets.is_empty() && found.shrinkage.is_none());
+            seen += u64::from(found.verdict == Verdict::StructuralGap);
+            records += 1;
+        }
+        println!("{id} {name} = {value}: {seen} of {records} so far");
+    }
+    let bounds = binomial_bounds(records, 0.8, 0.999).unwrap();
+    // To first order, and for this θ̂: somewhat more or less than 80 %.
+    assert!(
+        (bounds.start().saturating_sub(3)..=*bounds.end()).contains(&seen),
+        "{seen} of {records}"
+    );
+}
+
+/// Two effects at once, one in the equations and one at the sensor: both are accepted, and nothing else.
+#[test]
+fn two_effects_are_both_accepted() {
+    let study = study("van-der-pol");
+    let noise = Noise::new(46, "pair", 0);
+    let text = "[[effect]]\nid='coulomb-friction'\ntarget='x2'\nmagnitudes={force=0.2}\n\
+                [[effect]]\nid='sensor-bias'\ntarget='sensor'\nmagnitudes={offset=0.15}\n";
+    let record = record(study.twin(), text, &[1.4], drive(&study, noise), noise);
+    let found = found(&study, record, None);
+    println!("{}", line("pair", &found));
+    let mut accepted = found.which.accepted.clone();
+    accepted.sort();
+    assert_eq!(accepted, ["coulomb-friction@x2", "sensor-bias@sensor"]);
+    assert_eq!(found.which.decision, Decision::Named);
+    let sum: f64 = found
+        .which
+        .effects
+        .iter()
+        .skip(2)
+        .map(|e| e.probability)
+        .sum();
+    assert!(sum <= 1.0, "{sum}");
+}

@@ -1,0 +1,169 @@
+//! Whether a diagnosis alarms as rarely as it says, and names what is there.
+
+mod black_box;
+mod complete;
+mod study_of_many;
+mod trials;
+
+use std::sync::Arc;
+use trials::*;
+use truetwin::diagnose::{Decision, DiagnoseSettings, Verdict, diagnose};
+use truetwin::math::binomial_bounds;
+use truetwin::progress::{Listener, Progress};
+use truetwin::record::{Drive, Record, Signal};
+use truetwin::twin::{Noise, Twin};
+
+/// Records of the twin itself, half of them with θ outside the prior: alarms stay within the binomial bound.
+#[test]
+fn a_perfect_twin_is_rarely_accused() {
+    const RECORDS: u64 = 16;
+    let mut alarms = 0;
+    for name in ["van-der-pol", "tanks"] {
+        let study = study(name);
+        for i in 0..RECORDS / 2 {
+            let noise = Noise::new(31, name, i);
+            let outside = i % 2 == 1;
+            let theta = theta(&study, outside, noise);
+            let drive = drive(&study, noise);
+            let found = found(&study, record(study.twin(), "", &theta, drive, noise), None);
+            alarms += usize::from(found.verdict == Verdict::StructuralGap);
+            if found.verdict != Verdict::StructuralGap {
+                assert!(found.which.accepted.is_empty() && found.place.targets.is_empty());
+            }
+        }
+    }
+    let bounds = binomial_bounds(RECORDS, 0.05, 0.99).unwrap();
+    assert!(alarms as u64 <= *bounds.end(), "{alarms} of {RECORDS}");
+}
+
+/// Effects that a record shows clearly are detected, located, and named or among the rivals.
+#[test]
+fn clear_effects_are_found_and_named() {
+    let study = study("van-der-pol");
+    let effects = clear("van-der-pol");
+    for key in [
+        "cubic-stiffness@x2",
+        "sensor-rectification@sensor",
+        "parameter-step@nu",
+    ] {
+        let (_, text) = effects.iter().find(|(k, _)| *k == key).unwrap();
+        let noise = Noise::new(32, key, 0);
+        let text = format!("[[effect]]\n{text}\n");
+        let drive = drive(&study, noise);
+        let record = record(study.twin(), &text, &[1.4], drive, noise);
+        let found = found(&study, record, None);
+        println!("{}", line(key, &found));
+        assert_eq!(found.verdict, Verdict::StructuralGap, "{key}");
+        assert!(
+            found.which.class.iter().any(|c| c == key),
+            "{key}: {:?}",
+            found.which.class
+        );
+        assert_eq!(found.place.target.as_deref(), key.split('@').nth(1));
+        let shares: f64 = found.place.targets.iter().map(|t| t.share).sum();
+        assert!(shares <= 1.0 + 1e-9);
+    }
+}
+
+/// A gain of the pump is nothing but another k4: no structural gap.
+#[test]
+fn what_parameters_absorb_is_no_structural_gap() {
+    let study = study("tanks");
+    let effect =
+        "[[effect]]\nid = 'actuator-gain'\ntarget = 'actuator'\nmagnitudes = { error = 0.2 }\n";
+    let noise = Noise::new(33, "absorbed", 0);
+    let theta = [0.6, 0.5, 0.55, 1.1];
+    let record = record(study.twin(), effect, &theta, drive(&study, noise), noise);
+    let found = found(&study, record, None);
+    assert_ne!(
+        found.verdict,
+        Verdict::StructuralGap,
+        "{}",
+        line("absorbed", &found)
+    );
+}
+
+/// A disturbance that nobody listed is detected, and no effect is named for it.
+#[test]
+fn an_unlisted_push_is_named_by_nobody() {
+    let study = study("van-der-pol");
+    let noise = Noise::new(34, "unlisted", 0);
+    let base = study.twin().clone();
+    let twin = Twin::new(Unlisted { base, kind: 2 });
+    let record = record(&twin, "", &[1.5], drive(&study, noise), noise);
+    let found = found(&study, record, None);
+    println!("{}", line("unlisted", &found));
+    assert_eq!(found.verdict, Verdict::StructuralGap);
+    assert_eq!(found.which.decision, Decision::NoneOfThese);
+    assert!(found.which.accepted.is_empty());
+}
+
+/// The same seed gives the same bits on one thread and on three; another seed does not.
+#[test]
+fn threads_change_no_bit() {
+    let study = study("van-der-pol");
+    let noise = Noise::new(35, "threads", 0);
+    let (_, text) = clear("van-der-pol")[11];
+    let text = format!("[[effect]]\n{text}\n");
+    let record = record(study.twin(), &text, &[1.2], drive(&study, noise), noise);
+    let run = |threads: usize, seed: u64| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        let settings = DiagnoseSettings {
+            seed,
+            replicates: 25,
+            unexplained: 50,
+            ..DiagnoseSettings::default()
+        };
+        let mut found = pool.install(|| {
+            diagnose(
+                &study,
+                std::slice::from_ref(&record),
+                None,
+                &settings,
+                &Progress::silent(),
+            )
+            .unwrap()
+        });
+        found.seconds = 0.0;
+        format!("{found:?}")
+    };
+    assert_eq!(run(1, 1), run(3, 1));
+    assert_ne!(run(1, 1), run(1, 2));
+}
+
+struct Stop;
+impl Listener for Stop {
+    fn advanced(&self, _: &str, _: u64, _: u64) {}
+    fn cancelled(&self) -> bool {
+        true
+    }
+}
+
+#[test]
+fn what_cannot_be_diagnosed_is_refused_in_one_line() {
+    let study = study("van-der-pol");
+    let noise = Noise::new(36, "refused", 0);
+    let good = record(study.twin(), "", &[1.2], drive(&study, noise), noise);
+    let run = |records: &[Record], settings: &DiagnoseSettings, progress: &Progress| {
+        diagnose(&study, records, None, settings, progress)
+            .unwrap_err()
+            .to_string()
+    };
+    let (usual, silent) = (DiagnoseSettings::default(), Progress::silent());
+    assert!(run(&[], &usual, &silent).contains("give at least one"));
+    let short = Record::new(Drive::autonomous(0.05, 20).unwrap(), Signal::zeros((20, 1))).unwrap();
+    assert!(run(&[short], &usual, &silent).contains("at least 50"));
+    let unknown = DiagnoseSettings {
+        without: vec!["sensor-lags@sensor".into()],
+        ..usual.clone()
+    };
+    let one = std::slice::from_ref(&good);
+    assert!(run(one, &unknown, &silent).contains("sensor-lags@sensor"));
+    assert_eq!(
+        run(one, &usual, &Progress::new(Arc::new(Stop))),
+        "cancelled"
+    );
+}

@@ -1,0 +1,175 @@
+//! The same system in other units: the same answers, up to the units.
+
+use super::chain::{Chain, Units};
+use truetwin::diagnose::{DiagnoseSettings, Diagnosis, diagnose};
+use truetwin::estimator::{Estimate, EstimateOptions, Estimator, PretrainOptions, pretrain};
+use truetwin::evaluate::baseline::{DualFilter, DualStart, PredictionErrorMethod};
+use truetwin::progress::Progress;
+use truetwin::record::{Record, Signal};
+
+const SAMPLES: usize = 240;
+
+/// Parameters around 1e-9 and 1e9, outputs around 1e-6 and 1e6; and everything at once, steps of nanoseconds and of months included.
+const UNITS: [Units; 4] = [
+    Units {
+        parameters: 1e-9,
+        outputs: 1e6,
+        ..Units::PLAIN
+    },
+    Units {
+        parameters: 1e9,
+        outputs: 1e-6,
+        ..Units::PLAIN
+    },
+    Units {
+        parameters: 1e9,
+        states: 1e-9,
+        inputs: 1e6,
+        outputs: 1e-6,
+        seconds: 1e-9,
+    },
+    Units {
+        parameters: 1e-9,
+        states: 1e9,
+        inputs: 1e-6,
+        outputs: 1e6,
+        seconds: 1e8,
+    },
+];
+
+fn estimator(units: Units) -> Estimator {
+    let options = PretrainOptions {
+        bank_size: Some(1500),
+        epochs: Some(15),
+        seed: 1,
+        ..PretrainOptions::default()
+    };
+    let study = Chain::pair(units).study(SAMPLES);
+    pretrain(&study, &options, &Progress::silent()).unwrap().0
+}
+
+/// `given` in other units is `plain`, within a share of itself.
+fn same(what: &str, units: Units, given: f64, plain: f64, tolerance: f64) {
+    let error = (given - plain).abs() / plain.abs().max(f64::MIN_POSITIVE);
+    assert!(
+        error < tolerance,
+        "{what}: {given} for {plain}, in {units:?}"
+    );
+}
+
+fn all(what: &str, units: Units, given: &[f64], plain: &[f64], unit: f64, tolerance: f64) {
+    assert_eq!(given.len(), plain.len());
+    for (given, plain) in given.iter().zip(plain) {
+        same(what, units, given / unit, *plain, tolerance);
+    }
+}
+
+/// Far from the prior, so that all steps of an estimate are taken; the network learns in 32 bits, and differs in the last of them.
+/// Of the default recipe: the paper's adds ε in squared units of the features to their covariance, and so depends on units.
+#[test]
+fn estimates_do_not_depend_on_units() {
+    let estimate = |units: Units| -> Estimate {
+        let record = Chain::pair(units).record(1.7, SAMPLES, 5);
+        let options = EstimateOptions::default();
+        (estimator(units).estimate(&record, &options, &Progress::silent())).unwrap()
+    };
+    let plain = estimate(Units::PLAIN);
+    assert!(plain.refitted, "nothing but the network was tried");
+    for units in UNITS {
+        let given = estimate(units);
+        assert!(given.refitted);
+        let unit = units.parameters;
+        let [g, p] = [&given, &plain].map(|e| e.gauss_newton.clone().unwrap());
+        for (what, given, plain, tolerance) in [
+            ("θ_init", &given.initial, &plain.initial, 1e-2),
+            ("θ_GN", &g, &p, 1e-6),
+            ("θ", &given.theta, &plain.theta, 1e-3),
+            ("standard error", &given.std_error, &plain.std_error, 1e-2),
+            ("low", &given.low, &plain.low, 1e-2),
+            ("high", &given.high, &plain.high, 1e-2),
+        ] {
+            all(what, units, given, plain, unit, tolerance);
+        }
+    }
+}
+
+/// The settings of the paper's baselines are in units of the twin's.
+#[test]
+fn baselines_do_not_depend_on_units() {
+    let fit = |units: Units| {
+        let chain = Chain::pair(units);
+        let record = chain.record(1.5, SAMPLES, 6);
+        let start: Vec<f64> = (0..2).map(|i| chain.rate(i)).collect();
+        let converged = PredictionErrorMethod::converged();
+        let few = PredictionErrorMethod::default();
+        let few = PredictionErrorMethod {
+            ridge: few.ridge * (units.outputs / units.parameters).powi(2),
+            ..few
+        };
+        let [converged, few] = [converged, few].map(|m| m.fit(&chain, &record, &start).unwrap());
+        let plain = DualFilter::default();
+        let filter = DualFilter {
+            state_variance: plain.state_variance * units.states.powi(2),
+            parameter_variance: plain.parameter_variance * units.parameters.powi(2),
+            state_walk: plain.state_walk * units.states.powi(2),
+            parameter_walk: plain.parameter_walk * units.parameters.powi(2),
+            measurement: plain.measurement * units.outputs,
+            start: DualStart::Twin,
+        };
+        let dual = filter.run(&chain, &record, &start).unwrap();
+        [converged.theta, few.theta, dual.theta]
+    };
+    let plain = fit(Units::PLAIN);
+    for units in UNITS {
+        let given = fit(units);
+        let unit = units.parameters;
+        for (k, what) in ["converged", "six steps", "dual filter"].iter().enumerate() {
+            all(what, units, &given[k], &plain[k], unit, 1e-4);
+        }
+    }
+}
+
+/// Without a gap, and with a sensor that sticks at a ceiling.
+#[test]
+fn diagnoses_do_not_depend_on_units() {
+    for ceiling in [None, Some(1.2)] {
+        let diagnosis = |units: Units| -> Diagnosis {
+            let chain = Chain::pair(units);
+            let record = chain.record(1.2, SAMPLES, 7);
+            let top = ceiling.map_or(f64::INFINITY, |level| level * units.outputs);
+            let outputs: Signal = record.outputs().mapv(|y| y.min(top));
+            let record = Record::new(record.drive().clone(), outputs).unwrap();
+            let study = chain.study(SAMPLES);
+            let settings = DiagnoseSettings::default();
+            diagnose(&study, &[record], None, &settings, &Progress::silent()).unwrap()
+        };
+        let plain = diagnosis(Units::PLAIN);
+        for units in UNITS {
+            let given = diagnosis(units);
+            assert_eq!(given.verdict, plain.verdict, "{units:?}");
+            same(
+                "statistic",
+                units,
+                given.detection.statistic,
+                plain.detection.statistic,
+                1e-2,
+            );
+            for (g, p) in given.parameters.iter().zip(&plain.parameters) {
+                same("θ", units, g.refitted / units.parameters, p.refitted, 1e-3);
+                same(
+                    "sd",
+                    units,
+                    g.std_error / units.parameters,
+                    p.std_error,
+                    1e-2,
+                );
+            }
+            assert_eq!(given.which.decision, plain.which.decision, "{units:?}");
+            let named = |d: &Diagnosis| -> Vec<String> {
+                let likely = d.which.effects.iter().filter(|fit| fit.probability > 0.05);
+                likely.map(|fit| fit.key()).collect()
+            };
+            assert_eq!(named(&given), named(&plain), "{units:?}");
+        }
+    }
+}

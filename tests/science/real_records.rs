@@ -1,0 +1,172 @@
+//! Measured records, where they are at hand: `../shared/data`, or the folder that `TRUETWIN_DATA` names.
+
+use std::path::{Path, PathBuf};
+use truetwin::diagnose::{Decision, DiagnoseSettings, Diagnosis, FreeRuns, Verdict, diagnose};
+use truetwin::estimator::{EstimateOptions, PretrainOptions, pretrain};
+use truetwin::evaluate::paper::reference_studies;
+use truetwin::progress::Progress;
+use truetwin::record::{Record, Signal, read_record};
+use truetwin::report::gap_pictures;
+use truetwin::study::{Study, StudyFile};
+
+fn data(name: &str) -> Option<PathBuf> {
+    let folder = std::env::var_os("TRUETWIN_DATA").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
+        PathBuf::from,
+    );
+    let path = folder.join(name);
+    if !path.exists() {
+        println!("skipped: no {}", path.display());
+        return None;
+    }
+    Some(path)
+}
+
+/// The study of the real tanks.
+fn tanks() -> Study {
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/cascaded-tanks.toml");
+    let file = StudyFile::read(&example).unwrap();
+    let twins = reference_studies().unwrap();
+    let tanks = twins
+        .into_iter()
+        .find(|study| study.name() == "tanks")
+        .unwrap();
+    tanks.configure(&file).unwrap()
+}
+
+/// The record to fit and the one to validate, where the data are at hand.
+fn tanks_records() -> Option<(Record, Record)> {
+    let read = |name| data(name).map(|path| read_record(&path).unwrap());
+    Some((
+        read("cascaded-tanks-estimation.csv")?,
+        read("cascaded-tanks-validation.csv")?,
+    ))
+}
+
+/// Four k and two start levels cannot explain these tanks, which overflow; but they can follow them to 0.69 V.
+#[test]
+fn the_cascaded_tanks_are_followed_on_a_record_never_seen() {
+    let Some((record, validation)) = tanks_records() else {
+        return;
+    };
+    let study = tanks();
+    let options = PretrainOptions {
+        bank_size: Some(2000),
+        epochs: Some(20),
+        seed: 1,
+        ..PretrainOptions::default()
+    };
+    let (estimator, _) = pretrain(&study, &options, &Progress::silent()).unwrap();
+    let options = EstimateOptions {
+        validation: Some(validation),
+        ..EstimateOptions::default()
+    };
+    let estimate = estimator
+        .estimate(&record, &options, &Progress::silent())
+        .unwrap();
+    let after = estimate.tracking.as_ref().unwrap().rmse;
+    let unseen = estimate.validation.as_ref().map(|v| v.rmse).unwrap();
+    println!("free-run RMSE {after:.3} V, on the validation record {unseen:.3} V");
+    assert!(estimate.gate.out_of_distribution);
+    assert!(unseen <= 0.69, "{unseen}");
+    assert!(
+        estimate.after.is_some_and(|after| after.p_value <= 0.05),
+        "no parameters make this twin right, and it must say so"
+    );
+    let nuisance: Vec<_> = estimate
+        .nuisance()
+        .into_iter()
+        .map(|n| (n.name, n.role))
+        .collect();
+    assert_eq!(nuisance, [("h1".into(), "start"), ("h2".into(), "start")]);
+}
+
+/// What these tanks lack is known: the upper one overflows. The share that closes is on a record that no fit has seen.
+///
+/// With `TRUETWIN_PICTURES=docs/pictures` the pictures of docs/diagnosing-a-gap.md are drawn anew.
+#[test]
+fn the_cascaded_tanks_lack_their_overflow() {
+    let Some((record, validation)) = tanks_records() else {
+        return;
+    };
+    let study = tanks();
+    let settings = DiagnoseSettings::default();
+    let silent = Progress::silent();
+    let mut found = diagnose(&study, &[record], Some(&validation), &settings, &silent).unwrap();
+    assert_eq!(found.verdict, Verdict::StructuralGap);
+    assert!(
+        found
+            .which
+            .accepted
+            .iter()
+            .any(|key| key == "state-ceiling@h1"),
+        "{:?}",
+        found.which.accepted
+    );
+    let shrinkage = found.shrinkage.as_ref().unwrap();
+    let (before, after) = (shrinkage.before, shrinkage.after.unwrap());
+    println!("free-run NRMSE on the validation record {before:.3} -> {after:.3}");
+    assert!(after < 0.6 * before, "{before} -> {after}");
+    if let Some(folder) = std::env::var_os("TRUETWIN_PICTURES") {
+        draw(&study, &mut found, Path::new(&folder));
+    }
+}
+
+/// With nothing in the library that these tanks lack, the diagnosis abstains, and regresses what an equation misses.
+#[test]
+fn what_the_cascaded_tanks_lack_is_explored() {
+    let Some((record, validation)) = tanks_records() else {
+        return;
+    };
+    let study = tanks();
+    let every = study.effects();
+    let settings = DiagnoseSettings {
+        without: (every.iter().map(|e| e.typetag_name().to_owned()))
+            .filter(|id| id != "sensor-rectification")
+            .collect(),
+        ..DiagnoseSettings::default()
+    };
+    let silent = Progress::silent();
+    let found = diagnose(&study, &[record], Some(&validation), &settings, &silent).unwrap();
+    assert_eq!(found.which.decision, Decision::NoneOfThese);
+    let discovery = found.discovery.as_ref().expect("no regression");
+    println!(
+        "{}: explained {:.2}",
+        discovery.equation, discovery.explained
+    );
+    for term in &discovery.terms {
+        println!("{term:?}");
+    }
+    assert_eq!(found.place.target.as_ref(), Some(&discovery.equation));
+    assert!(["h1", "h2"].contains(&discovery.equation.as_str()));
+    assert!(discovery.explained > 0.1 && discovery.terms[0].inclusion > 0.3);
+}
+
+/// The pictures of the page, of every fourth sample: the record itself is not to be handed on.
+fn draw(study: &Study, found: &mut Diagnosis, folder: &Path) {
+    thin(&mut found.free_runs);
+    found.validation_runs.as_mut().map(thin);
+    let shown = [
+        "record",
+        "validation",
+        "targets",
+        "regions",
+        "which",
+        "extent",
+    ];
+    let pictures = gap_pictures(study, found);
+    for name in shown {
+        let (_, svg) = pictures.iter().find(|(n, _)| *n == name).unwrap();
+        let path = folder.join(format!("tanks-{name}.svg"));
+        std::fs::write(path, svg).unwrap();
+    }
+}
+
+fn thin(runs: &mut FreeRuns) {
+    let every = 4;
+    let of = |signal: &Signal| signal.slice(ndarray::s![..;every, ..]).to_owned();
+    runs.times = runs.times.iter().copied().step_by(every as usize).collect();
+    runs.measured = of(&runs.measured);
+    runs.before = runs.before.as_ref().map(of);
+    runs.after = runs.after.as_ref().map(of);
+}
