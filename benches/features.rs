@@ -2,7 +2,6 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
-use std::sync::Arc;
 use std::time::Duration;
 use truetwin::evaluate::paper::reference_studies;
 use truetwin::feature::{Ar, Armax, Arx, Deviation, FeatureRecipe, Score};

@@ -103,6 +103,7 @@ mod run;
 mod settings;
 mod summary;
 mod test;
+mod thresholds;
 
 pub use error::{DiagnoseError, GivenRecord};
 pub(crate) use gain::{gain_of, held_out_score};

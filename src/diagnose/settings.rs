@@ -11,13 +11,6 @@
 /// | `without` | none | ids, or `id@target` | effects that are not to be named |
 /// | `initial` | none | | θ that an estimator gave, a start of the fit |
 /// | `detection_only` | no | | stop after the verdict: neither where, nor which, nor how far |
-///
-/// ```
-/// use truetwin::diagnose::DiagnoseSettings;
-///
-/// let quick = DiagnoseSettings { detection_only: true, seed: 7, ..DiagnoseSettings::default() };
-/// assert_eq!(quick.alpha, 0.05);
-/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiagnoseSettings {
     /// Level of every test.

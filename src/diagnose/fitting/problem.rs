@@ -5,9 +5,8 @@ use crate::likelihood::ensemble::{self, Predictor};
 use crate::likelihood::kalman::{Coordinates, FilterError, FilterSettings, Filtered, Kalman};
 use crate::record::{Record, Signal};
 use crate::twin::{Outline, Parameter, ParameterSpace, Role, Twin};
-use std::sync::{Arc, Mutex};
 
-/// And of the noise level of a black box.
+/// Longest step of a fit in the logarithm of a black box's noise level.
 const LONGEST_NOISE: f64 = 2.0;
 
 /// A twin and records, with one θ for all of them but for unknown starts, of which each record has its own.
@@ -23,12 +22,14 @@ pub(in crate::diagnose) struct Problem<'a> {
     pub coordinates: Coordinates,
     pub(super) coordinates_of: Vec<Coordinates>,
     pub(super) filter: FilterSettings,
-    /// What a black box showed last: a fit looks at a θ before it steps from there.
-    seen: Arc<Mutex<Option<Seen>>>,
 }
 
-/// θ and the innovations there.
-type Seen = (Vec<f64>, Vec<Filtered>);
+/// Log-likelihood at one θ.
+pub(super) struct Evaluation {
+    pub log_likelihood: f64,
+    /// Innovations of each record of a black box: the slope at the same θ needs them, and they cost an ensemble.
+    pub innovations: Option<Vec<Filtered>>,
+}
 
 impl<'a> Problem<'a> {
     /// `axes` belong to the parameters of the twin; their likelihood is a filter's, or, without equations, that of an ensemble.
@@ -66,7 +67,6 @@ impl<'a> Problem<'a> {
             twin,
             records,
             filter: FilterSettings::default(),
-            seen: Arc::default(),
         }
     }
 
@@ -196,25 +196,29 @@ impl<'a> Problem<'a> {
         })
     }
 
+    /// Log-likelihood of all records at θ.
     pub fn log_likelihood(&self, theta: &[f64]) -> Result<f64, FilterError> {
-        let Some(equations) = self.twin.equations() else {
-            let all = self.filtered(theta)?;
-            let sum = all.iter().map(|f| f.log_likelihood).sum();
-            *self.seen.lock().unwrap_or_else(|e| e.into_inner()) = Some((theta.to_vec(), all));
-            return Ok(sum);
-        };
-        let mut sum = 0.0;
-        for (r, record) in self.records.iter().enumerate() {
-            let kalman = Kalman::new(equations, record, &self.filter)?;
-            sum += kalman.log_likelihood(&self.of_record(r, theta))?;
-        }
-        Ok(sum)
+        Ok(self.evaluate(theta)?.log_likelihood)
     }
 
-    /// Innovations that were seen last, if it was at θ.
-    pub fn last_seen(&self, theta: &[f64]) -> Option<Vec<Filtered>> {
-        let seen = self.seen.lock().unwrap_or_else(|e| e.into_inner());
-        (seen.as_ref().filter(|(at, _)| at == theta)).map(|(_, all)| all.clone())
+    /// Log-likelihood of all records at θ, with the innovations of a black box.
+    pub(super) fn evaluate(&self, theta: &[f64]) -> Result<Evaluation, FilterError> {
+        let Some(equations) = self.twin.equations() else {
+            let innovations = self.filtered(theta)?;
+            return Ok(Evaluation {
+                log_likelihood: innovations.iter().map(|f| f.log_likelihood).sum(),
+                innovations: Some(innovations),
+            });
+        };
+        let mut log_likelihood = 0.0;
+        for (r, record) in self.records.iter().enumerate() {
+            let kalman = Kalman::new(equations, record, &self.filter)?;
+            log_likelihood += kalman.log_likelihood(&self.of_record(r, theta))?;
+        }
+        Ok(Evaluation {
+            log_likelihood,
+            innovations: None,
+        })
     }
 
     /// Gain at which a fit is done, in nats; what simulations say is not worth the last of them.

@@ -3,15 +3,13 @@
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::disturbed_equations::disturbed;
 use crate::diagnose::hypotheses::entry::Entry;
+use crate::diagnose::thresholds::Thresholds;
 use crate::effect::{Law, Magnitude, UnmodelledEffect, augment_short};
 use crate::record::Signals;
 use crate::study::Study;
 use crate::twin::{Outline, Role, Twin, fix};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// Memories a of the disturbances.
-const MEMORIES: [f64; 3] = [1.0, 0.95, 0.8];
 
 /// A listed effect, or a catch-all.
 #[derive(Debug, Clone)]
@@ -186,7 +184,7 @@ fn numbered(
 fn disturbances(places: impl Iterator<Item = (Entry, String)>) -> Vec<Candidate> {
     places
         .flat_map(|(place, target)| {
-            MEMORIES.map(|memory| Candidate {
+            Thresholds::MEMORIES.map(|memory| Candidate {
                 id: "disturbance".into(),
                 target: target.clone(),
                 kind: Kind::CatchAll(place, memory),

@@ -1,12 +1,9 @@
 //! What a plan is made of: which magnitudes of an effect are in use, how each moves, and what its unit is worth.
 
 use crate::diagnose::fitting::axis::Axis;
+use crate::diagnose::thresholds::Thresholds;
 use crate::effect::{Mark, UnmodelledEffect};
 use crate::twin::Interval;
-
-/// Delays in steps, each with a register that just holds it: the shorter the register, the faster the filter.
-pub(in crate::diagnose) const DELAYS: [&[f64]; 3] = [&[0.5, 1.5], &[3.0], &[5.5]];
-pub(in crate::diagnose) const REGISTERS: [usize; 3] = [3, 5, 8];
 
 /// Which of an effect's magnitudes are in use.
 pub(in crate::diagnose) struct Choice {
@@ -62,7 +59,8 @@ pub(in crate::diagnose) fn choices(
         return vec![choice(off, None)];
     }
     match thresholds.len() {
-        0 | 1 if filtered && effect.least_memory() < effect.memory() => (0..REGISTERS.len())
+        0 | 1 if filtered && effect.least_memory() < effect.memory() => (0..Thresholds::REGISTERS
+            .len())
             .map(|i| choice(vec![], Some(i)))
             .collect(),
         0 | 1 => vec![choice(vec![], None)],

@@ -4,12 +4,11 @@ use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::fitting::axis::Axis;
 use crate::diagnose::fitting::problem::Problem;
 use crate::diagnose::hypotheses::candidate::{Addition, Candidate, Kind, with, with_disturbance};
-use crate::diagnose::hypotheses::choice::{
-    Choice, DELAYS, REGISTERS, axis, choices, log_axis, unit, unset_log_axis,
-};
+use crate::diagnose::hypotheses::choice::{Choice, axis, choices, log_axis, unit, unset_log_axis};
 use crate::diagnose::hypotheses::entry::Entry;
 use crate::diagnose::hypotheses::scales::Scales;
 use crate::diagnose::hypotheses::variant::Variant;
+use crate::diagnose::thresholds::Thresholds;
 use crate::effect::{Law, Magnitude, Mark, UnmodelledEffect};
 use crate::math::quantile;
 use crate::math::{deviation, ends, largest};
@@ -18,13 +17,6 @@ use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
 
-/// Frequencies, times and levels that are looked at, and how many where it is enough to see that something is left.
-const FREQUENCIES: [usize; 2] = [8, 4];
-const TIMES: [usize; 2] = [8, 4];
-const LEVELS: [usize; 2] = [4, 2];
-/// Nats for a mark that outputs bear, and against an effect that would have left one: other sensors have noise behind them.
-const PRESENT: f64 = 12.0;
-const ABSENT: f64 = -5.0;
 /// A variant before its points are tried.
 pub(in crate::diagnose) struct Plan {
     pub variant: Variant,
@@ -172,7 +164,7 @@ impl Planner<'_> {
             shapes = shown.map(|(_, v)| vec![*v]).collect();
             axes.iter_mut().for_each(|axis| axis.held = true);
         }
-        let kept = choice.register.map(|i| REGISTERS[i]);
+        let kept = choice.register.map(|i| Thresholds::REGISTERS[i]);
         let addition = Addition {
             effect: effect.clone(),
             held: held.clone(),
@@ -188,8 +180,8 @@ impl Planner<'_> {
                 kept,
                 mark: match mark {
                     Mark::Unmarked => 0.0,
-                    Mark::Absent => ABSENT,
-                    Mark::Present(_) => PRESENT,
+                    Mark::Absent => Thresholds::MARK_ABSENT,
+                    Mark::Present(_) => Thresholds::MARK_PRESENT,
                 },
                 axes,
                 jumps,
@@ -216,8 +208,8 @@ impl Planner<'_> {
             let axis = log_axis(1e-3 * greatest, 1e2 * greatest, greatest);
             (leads, axis, (0.0, 1.5))
         } else if let (Some(register), "s") = (register, m.unit) {
-            let delays = DELAYS[register].iter();
-            let longest = (REGISTERS[register] - 1) as f64 * dt;
+            let delays = Thresholds::DELAYS[register].iter();
+            let longest = (Thresholds::REGISTERS[register] - 1) as f64 * dt;
             let bounds = Interval::unchecked(0.0, longest);
             let axis = axis(bounds, dt, 10.0 * dt, 0.1 * dt, 1.5 * dt);
             (
@@ -269,7 +261,7 @@ impl Planner<'_> {
             Some(off) if off > 0.0 => [0.9, 0.5, 0.97, 0.75],
             _ => [0.1, 0.5, 0.03, 0.25],
         };
-        let levels = (shares[..LEVELS[usize::from(self.coarse)]].iter())
+        let levels = (shares[..Thresholds::LEVELS[usize::from(self.coarse)]].iter())
             .filter_map(|p| quantile(values, *p).ok());
         let bounds = Interval::unchecked(low - 0.3 * span, high + 0.3 * span);
         let axis = axis(
@@ -297,7 +289,7 @@ impl Planner<'_> {
             }
             "Hz" => {
                 let (low, high): (f64, f64) = (1.5 / duration, 0.15 / dt);
-                let count = FREQUENCIES[usize::from(self.coarse)];
+                let count = Thresholds::FREQUENCIES[usize::from(self.coarse)];
                 let at = |i: usize| low * (high / low).powf(i as f64 / (count - 1) as f64);
                 let axis = Axis {
                     longest: 0.3,
@@ -307,7 +299,7 @@ impl Planner<'_> {
             }
             "rad" => (vec![0.0, FRAC_PI_2], linear(-TAU, TAU, 1.0, 1.0)),
             "s" => {
-                let count = TIMES[usize::from(self.coarse)];
+                let count = Thresholds::TIMES[usize::from(self.coarse)];
                 let times = (1..=count).map(|i| duration * i as f64 / (count + 1) as f64);
                 let axis = Axis {
                     held: true,

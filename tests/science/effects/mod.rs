@@ -9,7 +9,6 @@ mod off;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use truetwin::effect::*;
 use truetwin::effect::{applicable, library, parse_effects, read_effects};
 use truetwin::record::*;
