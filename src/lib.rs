@@ -75,8 +75,8 @@
 //! | show progress, stop long work | [`progress`] |
 //! | print, draw, hand on results | [`report`] |
 //!
-//! The library never prints, never exits and sets no global thread pool. Cargo features, none by default: `mpi` (ranks of
-//! a cluster share work), `fmi` (FMUs as twins), `parquet` (records in Parquet files).
+//! The library never prints, never exits and sets no global thread pool. Cargo features: `cli` (the command line; the one
+//! default), `mpi` (ranks of a cluster share work), `fmi` (FMUs as twins), `parquet` (records in Parquet files).
 //!
 //! Public items, the command line and the schemas of files follow semantic versioning; bits of results and hidden items do
 //! not. What raises which number: [docs/architecture.md](../../../docs/architecture.md#versions).
@@ -90,6 +90,8 @@
     not(test),
     warn(clippy::print_stdout, clippy::print_stderr, clippy::unwrap_used)
 )]
+// A few functions of the rooms serve the command line alone.
+#![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
 
 /// `Debug` by name, of types that hold what has no `Debug`: twins, maps, listeners.
 macro_rules! debug_by_name {
@@ -134,6 +136,7 @@ pub mod evaluate;
 
 pub mod report;
 
+#[cfg(feature = "cli")]
 pub mod cli;
 
 pub mod prelude;

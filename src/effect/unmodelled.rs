@@ -1,6 +1,7 @@
 //! What a twin may lack: the trait of an unmodelled effect.
 
 use crate::record::Signals;
+use crate::setting::did_you_mean;
 use crate::twin::{Interval, Outliers, Outline, Source};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -336,7 +337,7 @@ pub trait UnmodelledEffect: Debug + Send + Sync {
 #[non_exhaustive]
 pub enum EffectError {
     /// The target, or the other state, is not there.
-    #[error("effect {id}: the twin has no {what} \"{name}\"; choose one of {known}")]
+    #[error("effect {id}: the twin has no {what} \"{name}\"{}; choose one of {known}", did_you_mean(name, known.split(", ")))]
     Target {
         /// Effect.
         id: String,
@@ -356,7 +357,7 @@ pub enum EffectError {
         id: String,
     },
     /// A magnitude that the effect does not have.
-    #[error("effect {id} has no magnitude \"{name}\"; it has {known}")]
+    #[error("effect {id} has no magnitude \"{name}\"{}; it has {known}", did_you_mean(name, known.split(", ")))]
     Magnitude {
         /// Effect.
         id: String,

@@ -3,14 +3,6 @@
 use std::process::Command;
 
 /// A program and its arguments. No shell is run: `*`, `|`, `$` and the like mean themselves.
-///
-/// ```
-/// use truetwin::external::program::ProgramCommand;
-/// let command = ProgramCommand::parse("python3 'my models/pendulum.py' --length 2")?;
-/// assert_eq!(command.arguments(), ["my models/pendulum.py", "--length", "2"]);
-/// assert!(ProgramCommand::parse("python3 'pendulum.py").is_err());
-/// # Ok::<(), truetwin::external::program::ProgramError>(())
-/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ProgramCommand {
     program: String,
@@ -23,25 +15,6 @@ impl ProgramCommand {
         Self {
             program: program.into(),
             arguments: arguments.into_iter().map(Into::into).collect(),
-        }
-    }
-
-    /// From one line, split at spaces; quotes and backslashes keep what belongs together, as in a shell.
-    ///
-    /// # Errors
-    ///
-    /// No word at all, or a quote that is not closed.
-    pub fn parse(line: &str) -> Result<Self, super::ProgramError> {
-        let wrong = |problem: &str| super::ProgramError::Command {
-            line: line.into(),
-            problem: problem.into(),
-        };
-        let words = shell_words::split(line).map_err(|_| wrong("a quote is not closed"))?;
-        match words.split_first() {
-            Some((program, arguments)) if !program.is_empty() => {
-                Ok(Self::new(program, arguments.iter().cloned()))
-            }
-            _ => Err(wrong("no program is named; write 'python3 model.py'")),
         }
     }
 
@@ -65,10 +38,15 @@ impl ProgramCommand {
     }
 }
 
-/// As it would be typed.
+/// The words as they would be typed; those with spaces or quotes stand in quotes.
 impl std::fmt::Display for ProgramCommand {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let words = std::iter::once(&self.program).chain(&self.arguments);
-        f.write_str(&shell_words::join(words))
+        let plain = |c: char| c.is_alphanumeric() || "_-./=:,+@%".contains(c);
+        let word = |word: &str| match !word.is_empty() && word.chars().all(plain) {
+            true => word.to_owned(),
+            false => format!("'{}'", word.replace('\'', r"'\''")),
+        };
+        f.write_str(&word(&self.program))?;
+        (self.arguments.iter()).try_for_each(|argument| write!(f, " {}", word(argument)))
     }
 }

@@ -4,24 +4,9 @@ use crate::storage::files::with_remedy;
 use crate::study::StudyError;
 
 /// Why a program cannot be used as a twin.
-///
-/// ```
-/// use truetwin::external::program::{ProgramCommand, ProgramError};
-///
-/// let error = ProgramCommand::parse("").unwrap_err();
-/// assert!(matches!(error, ProgramError::Command { .. }));
-/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProgramError {
-    /// The line names no program.
-    #[error("the program \"{line}\": {problem}")]
-    Command {
-        /// What was given.
-        line: String,
-        /// What is wrong with it.
-        problem: String,
-    },
     /// A setting out of its range.
     #[error("the program's {0}")]
     Settings(String),

@@ -62,7 +62,7 @@ use worker::Trouble;
 ///
 /// ```no_run
 /// use truetwin::external::program::{ProgramCommand, ProgramSettings, ProgramTwin};
-/// let command = ProgramCommand::parse("python3 examples/pendulum.py")?;
+/// let command = ProgramCommand::new("python3", ["examples/pendulum.py"]);
 /// let study = ProgramTwin::start(command, ProgramSettings::default())?.into_study()?;
 /// assert_eq!(study.name(), "pendulum");
 /// # Ok::<(), truetwin::external::program::ProgramError>(())
