@@ -10,7 +10,7 @@ pub use plan::{DriveSource, InputPlan, Levels, PlanError, RecordPlan};
 use crate::effect::{EffectError, Effects, UnmodelledEffect, augment, given_magnitudes};
 use crate::record::{CsvError, Record, RecordError};
 use crate::setting::did_you_mean;
-use crate::twin::{Adaptation, AdaptationError, DigitalTwin, ParameterError, adapt, fix};
+use crate::twin::{Adaptation, AdaptationError, DigitalTwin, ParameterError, Twin, adapt, fix};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -27,9 +27,9 @@ use std::sync::Arc;
 pub struct Study {
     name: String,
     /// As registered.
-    base: Arc<dyn DigitalTwin>,
+    base: Twin,
     /// In the setting of `file`.
-    twin: Arc<dyn DigitalTwin>,
+    twin: Twin,
     plan: RecordPlan,
     file: StudyFile,
     demo: Option<Arc<Record>>,
@@ -116,7 +116,7 @@ impl Study {
         twin: impl DigitalTwin + 'static,
         plan: RecordPlan,
     ) -> Result<Self, StudyError> {
-        let base: Arc<dyn DigitalTwin> = Arc::new(twin);
+        let base = Twin::new(twin);
         base.parameters()
             .check()
             .map_err(|error| StudyError::Parameters {
@@ -259,7 +259,7 @@ impl Study {
 
     /// The library's effects and the study's own, each once for each target of this twin, all magnitudes free.
     pub fn effects(&self) -> Effects {
-        let library = crate::effect::applicable(self.twin.as_ref());
+        let library = crate::effect::applicable(&self.twin);
         (library.into_iter())
             .chain(self.own_effects.iter().cloned())
             .collect()
@@ -289,7 +289,7 @@ impl Study {
     }
 
     /// The twin in this study's setting.
-    pub fn twin(&self) -> &Arc<dyn DigitalTwin> {
+    pub fn twin(&self) -> &Twin {
         &self.twin
     }
 
