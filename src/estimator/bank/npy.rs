@@ -209,7 +209,7 @@ mod tests {
 
     #[test]
     fn numbers_of_four_forms_are_read() {
-        let value = 2.5;
+        let value = 2.5f64;
         let forms: [(&str, Vec<u8>); 4] = [
             ("<f8", value.to_le_bytes().into()),
             (">f8", value.to_be_bytes().into()),
