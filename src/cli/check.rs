@@ -1,4 +1,4 @@
-//! `check`: what is wrong with a twin.
+//! `check`: tests a twin before training.
 
 use super::args::Subject;
 use super::{Context, Failure, Verb, output};
@@ -11,7 +11,7 @@ use clap::Args;
 use serde_json::{Value, json};
 use std::process::ExitCode;
 
-/// Check a twin before any training: repeatable, paired noise, finite, identifiable.
+/// Check a twin before training: repeatable, paired noise, finite outputs, identifiable parameters.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
         truetwin check --twin tanks\n  \
@@ -71,15 +71,15 @@ impl Verb for Check {
     }
 }
 
-/// About how many runs the checks make: corners of the prior, differences for each parameter; a black box's free run is the
-/// mean of 32.
+/// Estimates the number of runs: corners of the prior, differences for each parameter; a black box's free run is the mean
+/// of 32.
 fn runs(twin: &dyn DigitalTwin) -> usize {
     let d = twin.parameters().len();
     let free = if twin.state_space().is_some() { 1 } else { 32 };
     (1 << d.min(6)) + 2 * d * free + 4
 }
 
-/// A twin whose runs are counted on a bar, and can be stopped.
+/// A twin whose runs advance a progress bar and can be stopped.
 struct Watched<'a> {
     twin: &'a dyn DigitalTwin,
     stage: Stage,

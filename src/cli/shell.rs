@@ -1,7 +1,8 @@
-//! `completions` and `man`: the command line at home in a shell, both made from the options themselves.
+//! `completions` and `man`: shell completion and manual pages, generated from the options.
 
 use super::args;
 use super::{Context, Failure, Verb, output};
+use crate::setting::did_you_mean;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Command};
 use clap_complete::Shell;
@@ -10,16 +11,16 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Print a script that completes verbs, options and names of twins in a shell.
+/// Print a shell script that completes verbs, options and twin names.
 #[derive(Debug, Args)]
-#[command(after_help = "Once, and again after an update:\n  \
+#[command(after_help = "Run once, and after each update:\n  \
         bash        truetwin completions bash > ~/.local/share/bash-completion/completions/truetwin\n  \
         zsh         truetwin completions zsh  > \"${fpath[1]}/_truetwin\"\n  \
         fish        truetwin completions fish > ~/.config/fish/completions/truetwin.fish\n  \
         PowerShell  truetwin completions powershell >> $PROFILE\n\
         Then open a new shell.")]
 pub(super) struct Completions {
-    /// The shell that reads the script.
+    /// Shell.
     #[arg(value_enum)]
     shell: Shell,
 }
@@ -40,16 +41,16 @@ impl Verb for Completions {
     }
 }
 
-/// Write the manual: one page of the whole, and one for each verb.
+/// Print or write manual pages: one for the program, one for each verb.
 #[derive(Debug, Args)]
 #[command(after_help = "Read one page, or install all of them:\n  \
         truetwin man estimate | man -l -\n  \
         truetwin man --out man1 && sudo mv man1/* /usr/local/share/man/man1/")]
 pub(super) struct Man {
-    /// The verb whose page is printed; the page of the whole unless given.
+    /// Verb of the page to print [default: the program's page].
     #[arg(value_name = "VERB", conflicts_with = "out")]
     verb: Option<String>,
-    /// A new folder for all pages, instead of printing one.
+    /// New folder for all pages.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -84,10 +85,12 @@ impl Verb for Man {
         };
         let Some((name, text)) = pages.iter().find(|(name, _)| *name == asked) else {
             let verbs = command(context);
+            let verb = self.verb.as_deref().unwrap_or_default();
             let known: Vec<&str> = verbs.get_subcommands().map(Command::get_name).collect();
             return Err(Failure::user(format!(
-                "man: there is no verb {}; there are {}",
-                self.verb.as_deref().unwrap_or_default(),
+                "man: no verb is called {}{}; there are {}",
+                verb,
+                did_you_mean(verb, &known),
                 known.join(", ")
             )));
         };
@@ -101,7 +104,7 @@ impl Verb for Man {
     }
 }
 
-/// The command line with the name of this program, and its twins as values of `--twin`.
+/// Returns the command line with this program's name, and its twins as values of `--twin`.
 fn command(context: &Context<'_>) -> Command {
     let names: Vec<String> = (context.studies.iter())
         .map(|study| study.name().to_owned())
@@ -117,10 +120,10 @@ fn command(context: &Context<'_>) -> Command {
     })
 }
 
-/// Names and texts of all pages in the language of `man`.
+/// Renders all pages: names and roff texts.
 fn pages(context: &Context<'_>) -> Result<Vec<(String, String)>, Failure> {
     let mut whole = command(context).bin_name(context.program.to_owned());
-    // Hands the options that all verbs share to each of them.
+    // Copies the global options to each verb.
     whole.build();
     let verbs = (whole
         .get_subcommands()
