@@ -60,9 +60,10 @@ impl Verb for Bank {
         };
         let share = context.share(self.shard)?;
         // Rows of all ranks are counted, by one rank.
-        let before = match context.team.leads() {
-            true => plan.finish(&self.out).map_or(0, |filled| filled.rows),
-            false => 0,
+        let before = if context.team.leads() {
+            plan.finish(&self.out).map_or(0, |filled| filled.rows)
+        } else {
+            0
         };
         context.team.wait();
         let clock = Instant::now();
@@ -89,12 +90,10 @@ impl Verb for Bank {
                 "seconds": seconds,
             }))?;
         } else {
-            let next = match filled.there == filled.of {
-                true => format!("next: truetwin pretrain … --bank {folder} --out EST"),
-                false => {
-                    "other jobs make the other shards; merge their folders with truetwin merge"
-                        .into()
-                }
+            let next = if filled.there == filled.of {
+                format!("next: truetwin pretrain … --bank {folder} --out EST")
+            } else {
+                "other jobs make the other shards; merge their folders with truetwin merge".into()
             };
             output::print(&format!(
                 "{folder}: {} of {} shards, {} of {} simulations; {made} new in {seconds:.1} s ({rate:.0} per second)\n{next}",

@@ -81,7 +81,8 @@ impl Failure {
         ];
         let near = similar.iter().find_map(|kind| match error.get(*kind)? {
             ContextValue::String(name) => Some(name.clone()),
-            ContextValue::Strings(names) => names.first().cloned(),
+            // Sorted by confidence: the nearest name is the last one.
+            ContextValue::Strings(names) => names.last().cloned(),
             _ => None,
         });
         let near = near.map_or(String::new(), |name| format!(" (did you mean {name}?)"));
@@ -114,9 +115,10 @@ impl Failure {
 
     /// Reports a failure that all ranks share; the root rank prints it.
     pub fn report_of(self, team: &Team) -> ExitCode {
-        match team.leads() {
-            true => self.report(),
-            false => ExitCode::from(self.code),
+        if team.leads() {
+            self.report()
+        } else {
+            ExitCode::from(self.code)
         }
     }
 

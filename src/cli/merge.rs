@@ -27,18 +27,20 @@ impl Verb for Merge {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         output::check_new(&self.out)?;
         let out = self.out.display();
-        let (what, count) = match file::is_named(&self.out) {
-            true => (
+        let (what, count) = if file::is_named(&self.out) {
+            (
                 "simulations",
                 merge_into_file(&self.from, &self.out, context.progress)?,
-            ),
-            false => ("shards", merge(&self.from, &self.out, context.progress)?),
+            )
+        } else {
+            ("shards", merge(&self.from, &self.out, context.progress)?)
         };
-        match context.json {
-            true => output::print_json(&json!({
+        if context.json {
+            output::print_json(&json!({
                 "schema": "truetwin.merge/1", "out": self.out, "what": what, "count": count,
-            }))?,
-            false => output::print(&format!("{out}: {count} {what}"))?,
+            }))?
+        } else {
+            output::print(&format!("{out}: {count} {what}"))?
         }
         Ok(ExitCode::SUCCESS)
     }

@@ -78,9 +78,10 @@ pub fn run_from<E: Into<StudyError>>(
         Ok(parsed) => parsed,
         Err(error) if !error.use_stderr() => {
             // Help and version are results.
-            let shown = match team.leads() {
-                true => output::print(&error.to_string()),
-                false => Ok(()),
+            let shown = if team.leads() {
+                output::print(&error.to_string())
+            } else {
+                Ok(())
             };
             return shown.map_or_else(Failure::report, |()| ExitCode::SUCCESS);
         }
@@ -143,9 +144,10 @@ fn dispatch(
     studies: &[Study],
     team: &Team,
 ) -> Result<ExitCode, Failure> {
-    let progress = match team.leads() {
-        true => progress::bars(),
-        false => progress::bars().unshown(),
+    let progress = if team.leads() {
+        progress::bars()
+    } else {
+        progress::bars().unshown()
     };
     let external = external::study(&arguments.external, studies)?;
     let studies: Vec<Study> = studies.iter().chain(&external).cloned().collect();

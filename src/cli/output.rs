@@ -43,10 +43,10 @@ fn hidden_escaped(json: &str) -> Cow<'_, str> {
     }
     let mut text = String::with_capacity(json.len() + 16);
     for c in json.chars() {
-        match odd(c) {
-            // All of them are below U+10000.
-            true => text.push_str(&format!("\\u{:04x}", u32::from(c))),
-            false => text.push(c),
+        if odd(c) {
+            text.push_str(&format!("\\u{:04x}", u32::from(c)))
+        } else {
+            text.push(c)
         }
     }
     Cow::Owned(text)
@@ -60,14 +60,15 @@ pub(super) fn print_share(
     there: usize,
     of: usize,
 ) -> Result<ExitCode, Failure> {
-    match context.json {
-        true => print_json(&json!({
+    if context.json {
+        print_json(&json!({
             "schema": "truetwin.share/1", "folder": folder, "pieces": what, "there": there, "of": of,
-        }))?,
-        false => print(&format!(
+        }))?
+    } else {
+        print(&format!(
             "{}: {there} of {of} {what} done; when all shards are done, rerun without --shard to merge",
             folder.display()
-        ))?,
+        ))?
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -86,13 +87,14 @@ pub(super) fn check_new(path: &Path) -> Result<(), Failure> {
 /// Refuses a missing parent folder, before the work starts.
 pub(super) fn check_folder(path: &Path) -> Result<(), Failure> {
     let folder = folder(path);
-    match folder.is_dir() {
-        true => Ok(()),
-        false => Err(Failure::user(format!(
+    if folder.is_dir() {
+        Ok(())
+    } else {
+        Err(Failure::user(format!(
             "{}: the folder {} does not exist; make it first",
             path.display(),
             folder.display()
-        ))),
+        )))
     }
 }
 

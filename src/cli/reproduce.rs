@@ -170,9 +170,10 @@ impl Verb for Reproduce {
             // Written last: it marks the folder as complete.
             folder.write("reproduce.json", &format!("{json:#}\n"))?;
         }
-        match context.json {
-            true => output::print_json(&json)?,
-            false => output::print(&text)?,
+        if context.json {
+            output::print_json(&json)?
+        } else {
+            output::print(&text)?
         }
         Ok(ExitCode::SUCCESS)
     }

@@ -31,11 +31,12 @@ impl Verb for Completions {
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut command, context.program, &mut script);
         let script = String::from_utf8(script).map_err(Failure::internal)?;
-        match context.json {
-            true => output::print_json(&json!({
+        if context.json {
+            output::print_json(&json!({
                 "schema": "truetwin.completions/1", "shell": self.shell.to_string(), "script": script,
-            }))?,
-            false => output::print(&script)?,
+            }))?
+        } else {
+            output::print(&script)?
         }
         Ok(ExitCode::SUCCESS)
     }
@@ -66,16 +67,17 @@ impl Verb for Man {
             }
             folder.finish()?;
             let names: Vec<&String> = pages.iter().map(|(name, _)| name).collect();
-            match context.json {
-                true => output::print_json(&json!({
+            if context.json {
+                output::print_json(&json!({
                     "schema": "truetwin.man/1", "folder": out, "pages": names,
-                }))?,
-                false => output::print(&format!(
+                }))?
+            } else {
+                output::print(&format!(
                     "{0}: {1} pages\nnext: man {0}/{2}.1",
                     out.display(),
                     names.len(),
                     context.program
-                ))?,
+                ))?
             }
             return Ok(ExitCode::SUCCESS);
         }
@@ -94,11 +96,12 @@ impl Verb for Man {
                 known.join(", ")
             )));
         };
-        match context.json {
-            true => output::print_json(&json!({
+        if context.json {
+            output::print_json(&json!({
                 "schema": "truetwin.man/1", "page": name, "text": text,
-            }))?,
-            false => output::print(text)?,
+            }))?
+        } else {
+            output::print(text)?
         }
         Ok(ExitCode::SUCCESS)
     }
@@ -111,11 +114,12 @@ fn command(context: &Context<'_>) -> Command {
         .collect();
     (args::command().name(context.program.to_owned())).mut_subcommands(|verb| {
         let takes_twin = verb.get_arguments().any(|option| option.get_id() == "twin");
-        match takes_twin {
-            true => verb.mut_arg("twin", |option| {
+        if takes_twin {
+            verb.mut_arg("twin", |option| {
                 option.value_parser(PossibleValuesParser::new(names.clone()))
-            }),
-            false => verb,
+            })
+        } else {
+            verb
         }
     })
 }

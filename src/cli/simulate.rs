@@ -57,7 +57,7 @@ impl Verb for Simulate {
             magnitudes = given_magnitudes(&effects);
             twin = augment(twin, effects).map_err(|error| Failure::from(error).within(path))?;
         }
-        let theta = complete(&twin.parameters(), given, &magnitudes)?;
+        let theta = complete(&twin.parameters(), &given, &magnitudes)?;
         let noise = Noise::new(context.seed, "simulate", 0);
         let drive = match &self.input {
             Some(path) => read_drive(path)?,
@@ -115,12 +115,20 @@ fn parse_theta(text: &str) -> Result<BTreeMap<String, f64>, Failure> {
 /// Returns θ from the call and the effect file; omitted starts and noise levels take their prior's centre.
 fn complete(
     space: &ParameterSpace,
-    mut given: BTreeMap<String, f64>,
+    given: &BTreeMap<String, f64>,
     magnitudes: &BTreeMap<String, f64>,
 ) -> Result<Vec<f64>, Failure> {
+    let names = space.names();
+    if let Some(name) = given.keys().find(|name| !names.contains(&name.as_str())) {
+        return Err(Failure::user(format!(
+            "--theta: no parameter is called {name}{}; there are {}",
+            did_you_mean(name, &names),
+            names.join(", ")
+        )));
+    }
     let mut theta = Vec::new();
     for p in space.iter() {
-        let value = given.remove(&p.name);
+        let value = given.get(&p.name).copied();
         let value = match (value, magnitudes.get(&p.name), p.role) {
             (Some(value), _, _) if !p.bounds.contains(value) => {
                 return Err(Failure::user(format!(
@@ -136,20 +144,13 @@ fn complete(
                 return Err(Failure::user(format!(
                     "--theta: no value for {}; give {}",
                     p.name,
-                    space.names().join(", ")
+                    names.join(", ")
                 )));
             }
         };
         theta.push(value);
     }
-    match given.keys().next() {
-        Some(name) => Err(Failure::user(format!(
-            "--theta: no parameter is called {name}{}; there are {}",
-            did_you_mean(name, space.names()),
-            space.names().join(", ")
-        ))),
-        None => Ok(theta),
-    }
+    Ok(theta)
 }
 
 fn check_inputs(twin: &dyn DigitalTwin, drive: &Drive, options: &Simulate) -> Result<(), Failure> {

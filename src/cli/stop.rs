@@ -28,12 +28,13 @@ pub(super) fn asked() -> bool {
 /// Creates the failure of a stopped call; `call` holds its words.
 pub(super) fn failure(verb: &dyn Verb, call: &[OsString]) -> Failure {
     let words: Vec<_> = call.iter().map(|word| word.to_string_lossy()).collect();
-    let text = match verb.is_resumed() {
-        true => format!(
+    let text = if verb.is_resumed() {
+        format!(
             "stopped; finished work is kept; resume with: {}",
             shell_words::join(&words)
-        ),
-        false => "stopped; nothing was written".into(),
+        )
+    } else {
+        "stopped; nothing was written".into()
     };
     Failure::stopped(text, CODE)
 }

@@ -89,9 +89,10 @@ impl Verb for Withheld {
         sealed.write("scorecard.html", &scorecard_html(&card))?;
         // Written last: it marks the folder as complete.
         sealed.write("scorecard.json", &format!("{json:#}\n"))?;
-        match context.json {
-            true => output::print_json(&json)?,
-            false => output::print(&scorecard_text(&card))?,
+        if context.json {
+            output::print_json(&json)?
+        } else {
+            output::print(&scorecard_text(&card))?
         }
         Ok(ExitCode::SUCCESS)
     }
