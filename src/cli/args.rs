@@ -1,7 +1,7 @@
 //! Options of all verbs, and options that several verbs share.
 
 use super::Command as Verbs;
-use crate::study::PresetName;
+use crate::estimator::PresetName;
 use clap::{Args, Command, CommandFactory, Parser, ValueEnum};
 use std::path::PathBuf;
 use std::time::Duration;

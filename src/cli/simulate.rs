@@ -63,7 +63,7 @@ impl Verb for Simulate {
             Some(path) => read_drive(path)?,
             None => study.drives()?.draw(noise)?,
         };
-        check_inputs(twin.as_ref(), &drive, self)?;
+        check_inputs(&twin, &drive, self)?;
         let noise = if self.noise_free { Noise::OFF } else { noise };
         let outputs = twin.simulate(&theta, &drive, noise)?;
         let record = Record::new(drive, outputs)?;

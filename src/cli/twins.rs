@@ -18,10 +18,18 @@ pub(super) struct Twins {}
 impl Verb for Twins {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         if context.json {
-            let twins: Vec<Value> = context.studies.iter().map(describe).collect();
+            let twins: Vec<Value> = context
+                .projects
+                .iter()
+                .map(|p| describe(p.study()))
+                .collect();
             output::print_json(&json!({ "schema": "truetwin.twins/1", "twins": twins }))?;
         } else {
-            let blocks: Vec<String> = context.studies.iter().map(in_words).collect();
+            let blocks: Vec<String> = context
+                .projects
+                .iter()
+                .map(|p| in_words(p.study()))
+                .collect();
             output::print(&blocks.join("\n"))?;
         }
         Ok(ExitCode::SUCCESS)
@@ -41,7 +49,7 @@ fn parameter(p: &Parameter) -> Value {
 fn describe(study: &Study) -> Value {
     let twin = study.twin();
     let signals = twin.signals();
-    let states = (twin.state_space()).map(|equations| quantities(&equations.outline().states));
+    let states = twin.outline().map(|outline| quantities(&outline.states));
     json!({
         "name": study.name(),
         "equations": states.is_some(),
@@ -63,8 +71,8 @@ fn in_words(study: &Study) -> String {
             .collect::<Vec<_>>()
             .join(", "),
     };
-    let states = match twin.state_space() {
-        Some(equations) => names(&equations.outline().states),
+    let states = match twin.outline() {
+        Some(outline) => names(&outline.states),
         None => "hidden (black box)".into(),
     };
     let mut text = format!(

@@ -17,7 +17,7 @@ pub(super) struct Units {
 impl Units {
     pub(super) fn of(study: &Study) -> Self {
         let signals = study.twin().signals();
-        let outline = study.twin().state_space().map(|twin| twin.outline());
+        let outline = study.twin().outline();
         Self {
             inputs: signals.inputs,
             outputs: signals.outputs,

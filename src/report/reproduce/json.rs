@@ -1,8 +1,9 @@
 //! Scores over many records as JSON, `truetwin.reproduce/1`.
 
 use crate::estimator::INTERVAL_LEVEL;
+use crate::estimator::PresetName;
 use crate::evaluate::paper::{COVERAGE_LEVEL, MethodScore, MonteCarlo, Scenario, Scores};
-use crate::study::{PresetName, Study};
+use crate::study::Study;
 use serde_json::{Map, Value, json};
 
 /// The scores as one JSON object, `truetwin.reproduce/1`.

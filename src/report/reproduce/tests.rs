@@ -1,14 +1,14 @@
 //! JSON, tables and figures of one small study.
 
 use super::{first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
-use crate::estimator::{PretrainOptions, pretrain};
+use crate::estimator::{PresetName, PretrainOptions, pretrain};
 use crate::evaluate::paper::{
-    Benchmark, FreeRuns, MeanRuns, Method, MonteCarlo, Run, Scenario, Scores, reference_studies,
+    Benchmark, FreeRuns, MeanRuns, Method, MonteCarlo, Run, Scenario, Scores, reference_projects,
     score,
 };
 use crate::progress::Progress;
 use crate::report::fixture::validator;
-use crate::study::{PresetName, Study};
+use crate::study::Study;
 use std::sync::OnceLock;
 
 struct Made {
@@ -22,14 +22,15 @@ struct Made {
 fn made() -> &'static Made {
     static MADE: OnceLock<Made> = OnceLock::new();
     MADE.get_or_init(|| {
-        let study = reference_studies().unwrap().remove(0);
+        let project = reference_projects().unwrap().remove(0);
+        let study = project.study().clone();
         let options = PretrainOptions {
             preset: PresetName::Paper,
             bank_size: Some(200),
             epochs: Some(2),
             seed: 1,
         };
-        let (estimator, _) = pretrain(&study, &options, &Progress::silent()).unwrap();
+        let (estimator, _) = pretrain(&project, &options, &Progress::silent()).unwrap();
         let plan = MonteCarlo {
             benchmark: Benchmark::of(&study),
             scenario: Scenario::First,

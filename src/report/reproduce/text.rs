@@ -1,10 +1,11 @@
 //! Scores over many records as tables for people.
 
 use crate::estimator::INTERVAL_LEVEL;
+use crate::estimator::PresetName;
 use crate::evaluate::paper::{COVERAGE_LEVEL, MonteCarlo, Scenario, Scores};
 use crate::report::digits::short;
 use crate::report::table::table;
-use crate::study::{PresetName, Study};
+use crate::study::Study;
 
 /// The paper's table with ours beside it; then, where there is such, the errors of what a record determines; then how
 /// often the intervals held the truth.

@@ -1,0 +1,125 @@
+//! Disturbances that stand for whatever is not in the library.
+
+use crate::diagnose::hypotheses::disturbed_signals;
+use crate::diagnose::hypotheses::entry::{Entry, share};
+use crate::record::Quantity;
+use crate::twin::{
+    Modified, Modify, Now, Outline, Parameter, ParameterSpace, Role, StateSpace, Twin,
+};
+use smallvec::SmallVec;
+use std::sync::Arc;
+
+/// The twin with an Ornstein–Uhlenbeck disturbance: what an effect that nobody listed would look like to a filter.
+///
+/// ```text
+/// d ← a·d + σ·√(1 − a²)·w        (a = 1: d ← d + σ·w)        ẋ_i + d,   y_j + d   or   θ_i·exp(d)
+/// ```
+///
+/// θ is longer by σ > 0. A filter that may follow d gains on every gap at the right place, and on one elsewhere less.
+pub(in crate::diagnose) fn disturbed(base: Twin, place: Entry, memory: f64) -> Twin {
+    let base = match base {
+        Twin::Equations(base) => base,
+        Twin::BlackBox(base) => return disturbed_signals::disturbed(base, place, memory),
+    };
+    let mut outline = base.outline();
+    outline.states.push(Quantity::new("disturbance/0", ""));
+    let sigma = Parameter::new("disturbance", "", 0.01, 1.0).with_role(Role::Effect);
+    outline.parameters = ParameterSpace::new(outline.parameters.iter().cloned().chain([sigma]));
+    Twin::Equations(Arc::new(Modified(Disturbed {
+        base,
+        place,
+        memory,
+        outline,
+    })))
+}
+
+struct Disturbed {
+    base: Arc<dyn StateSpace>,
+    place: Entry,
+    memory: f64,
+    outline: Outline,
+}
+
+impl Modify for Disturbed {
+    fn base(&self) -> &dyn StateSpace {
+        self.base.as_ref()
+    }
+    fn added(&self) -> usize {
+        1
+    }
+    fn theta<R>(&self, theta: &[f64], then: impl FnOnce(&[f64]) -> R) -> R {
+        then(&theta[..theta.len() - 1])
+    }
+    /// A disturbed parameter moves with the disturbance, the added state.
+    fn now<R>(&self, now: &Now<'_>, added: &[f64], then: impl FnOnce(&Now<'_>) -> R) -> R {
+        let own = &now.theta[..now.theta.len() - 1];
+        let Entry::Parameter(i) = self.place else {
+            return then(&Now { theta: own, ..*now });
+        };
+        let d = added.first().copied().unwrap_or(0.0);
+        let mut theta: SmallVec<[f64; 16]> = SmallVec::from_slice(own);
+        theta[i] *= d.clamp(-5.0, 5.0).exp();
+        then(&Now {
+            theta: &theta,
+            ..*now
+        })
+    }
+    fn outline(&self) -> Outline {
+        self.outline.clone()
+    }
+    fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+        let (x, d) = x.split_at(x.len() - 1);
+        let (dx, rate) = dx.split_at_mut(x.len());
+        rate[0] = 0.0;
+        self.now(now, d, |now| self.base.drift(now, x, dx));
+        if let Entry::State(i) = self.place {
+            dx[i] += d[0];
+        }
+    }
+    fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
+        let (x, d) = x.split_at(x.len() - 1);
+        self.now(now, d, |now| self.base.observe(now, x, y));
+        if let Entry::Sensor(j) = self.place {
+            y[j] += d[0];
+        }
+    }
+    fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+        let (process, own) = process.split_at_mut(process.len() - 1);
+        self.now(now, &[], |now| self.base.noise(now, process, measurement));
+        own[0] = share(self.memory) * now.theta[now.theta.len() - 1];
+    }
+    fn update(&self, now: &Now<'_>, x: &mut [f64]) {
+        let (x, d) = x.split_at_mut(x.len() - 1);
+        self.now(now, d, |now| self.base.update(now, x));
+        // Limits and motion of this step see the new value, as a held input does.
+        d[0] *= self.memory;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{Drive, Signal};
+    use crate::twin::Noise;
+    use crate::twins::CascadedTanks;
+
+    /// Without strength, nothing changes; with it, the disturbance has the standard deviation that σ says.
+    #[test]
+    fn a_disturbance_has_its_strength() {
+        let base = Twin::new(CascadedTanks);
+        let drive = Drive::new(0.5, Signal::from_elem((3000, 1), 1.5)).unwrap();
+        let theta = [0.6, 0.5, 0.55, 1.0];
+        let noise = Noise::new(2, "t", 0);
+        let plain = base.simulate(&theta, &drive, noise).unwrap();
+        let twin = disturbed(base, Entry::Sensor(0), 0.8);
+        let run = |sigma: f64| {
+            let theta: Vec<f64> = theta.iter().copied().chain([sigma]).collect();
+            twin.simulate(&theta, &drive, noise).unwrap()
+        };
+        assert_eq!(run(0.0), plain);
+        let difference = &run(0.3) - &plain;
+        let variance = difference.mapv(|d| d * d).mean().unwrap();
+        // Effective number of draws: 3000·(1 − a²)/(1 + a²) = 660; five standard deviations of the variance.
+        assert!((variance / 0.09 - 1.0).abs() < 5.0 * (2.0f64 / 660.0).sqrt());
+    }
+}
