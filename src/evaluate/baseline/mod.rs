@@ -19,7 +19,7 @@ use crate::likelihood::kalman::FilterError;
 use crate::math::DifferenceError;
 use crate::record::RecordError;
 use crate::setting::SettingError;
-use crate::twin::{ParameterError, SimulationError};
+use crate::twin::{SimulationError, TwinError};
 
 /// Why a baseline gave no estimate.
 ///
@@ -46,7 +46,7 @@ pub enum BaselineError {
     Record(#[from] RecordError),
     /// The start does not fit the twin, or lies outside the bounds.
     #[error(transparent)]
-    Parameter(#[from] ParameterError),
+    Parameter(#[from] TwinError),
     /// The twin failed.
     #[error(transparent)]
     Simulation(#[from] SimulationError),

@@ -1,7 +1,7 @@
 //! Where true parameters and inputs of simulated records come from.
 
 use super::{Invariant, Method, Symmetry};
-use crate::record::{Drive, DriveError, Signal};
+use crate::record::{Drive, RecordError, Signal};
 use crate::study::{DriveSource, PlanError, RecordTable, Study};
 use crate::twin::{Interval, Noise};
 
@@ -126,7 +126,7 @@ pub enum ScenarioError {
     Plan(#[from] PlanError),
     /// A bad time grid.
     #[error(transparent)]
-    Drive(#[from] DriveError),
+    Drive(#[from] RecordError),
 }
 
 /// A scenario of one study, ready to be drawn from.
@@ -213,7 +213,7 @@ impl<'a> Draws<'a> {
 }
 
 /// The benchmark's levels, over and over, as every input of the study's records.
-fn staircase(study: &Study, benchmark: &Benchmark) -> Result<Drive, DriveError> {
+fn staircase(study: &Study, benchmark: &Benchmark) -> Result<Drive, RecordError> {
     let (plan, channels) = (study.plan(), study.twin().signals().inputs.len());
     let levels = Signal::from_shape_fn((plan.samples, channels), |(k, _)| {
         benchmark.levels[(k / benchmark.hold.max(1)) % benchmark.levels.len()]

@@ -3,7 +3,7 @@
 use super::world::World;
 use crate::diagnose::DiagnoseError;
 use crate::progress::Cancelled;
-use crate::record::{CsvError, DriveError, RecordError};
+use crate::record::RecordError;
 use crate::storage::work::WorkError;
 use crate::study::PlanError;
 use std::path::PathBuf;
@@ -72,15 +72,9 @@ pub enum WithheldError {
     /// Of the input.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// Of the input.
-    #[error(transparent)]
-    Drive(#[from] DriveError),
-    /// Of a record.
+    /// Of the input, a record or its file.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// Of a record's file.
-    #[error(transparent)]
-    Csv(#[from] CsvError),
     /// Of a diagnosis that no trial can have.
     #[error(transparent)]
     Diagnose(#[from] DiagnoseError),
