@@ -1,4 +1,4 @@
-//! From any error to one line and an exit code.
+//! Turns errors into one line and an exit code.
 
 use super::output;
 use crate::diagnose::DiagnoseError;
@@ -22,9 +22,9 @@ use std::fmt::Display;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// The call or a file is wrong.
+/// Exit code of a wrong call or file.
 const USER: u8 = 2;
-/// Anything else.
+/// Exit code of everything else.
 const INTERNAL: u8 = 1;
 
 /// Why a verb ended early.
@@ -32,12 +32,12 @@ const INTERNAL: u8 = 1;
 pub(super) struct Failure {
     message: String,
     code: u8,
-    /// Whether the study may be what is wrong.
+    /// The study file may be the cause.
     about_study: bool,
 }
 
 impl Failure {
-    /// The user can mend it; the message says how.
+    /// Creates a failure that the user can fix; the message tells how.
     pub fn user(message: impl Display) -> Self {
         Self {
             message: message.to_string(),
@@ -46,7 +46,7 @@ impl Failure {
         }
     }
 
-    /// The user cannot mend it.
+    /// Creates a failure that the user cannot fix.
     pub fn internal(message: impl Display) -> Self {
         Self {
             message: message.to_string(),
@@ -55,7 +55,7 @@ impl Failure {
         }
     }
 
-    /// The user has stopped it.
+    /// Creates the failure of a call that the user has stopped.
     pub fn stopped(message: impl Display, code: u8) -> Self {
         Self {
             message: message.to_string(),
@@ -64,7 +64,7 @@ impl Failure {
         }
     }
 
-    /// A wrong call, in one line with the remedy.
+    /// Creates the failure of a wrong call, in one line with the remedy.
     pub fn usage(error: &clap::Error) -> Self {
         use clap::error::{ContextKind, ContextValue, ErrorKind};
         if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
@@ -81,7 +81,8 @@ impl Failure {
         ];
         let near = similar.iter().find_map(|kind| match error.get(*kind)? {
             ContextValue::String(name) => Some(name.clone()),
-            ContextValue::Strings(names) => names.first().cloned(),
+            // Sorted by confidence: the nearest name is the last one.
+            ContextValue::Strings(names) => names.last().cloned(),
             _ => None,
         });
         let near = near.map_or(String::new(), |name| format!(" (did you mean {name}?)"));
@@ -90,7 +91,7 @@ impl Failure {
         ))
     }
 
-    /// Names the study file, where the study may be what is wrong.
+    /// Adds the study file if it may be the cause.
     pub fn of_study(self, path: Option<&Path>) -> Self {
         match path {
             Some(path) if self.about_study => self.within(path),
@@ -98,7 +99,7 @@ impl Failure {
         }
     }
 
-    /// Names the file that the message is about, unless it does.
+    /// Adds the name of the file unless the message has it.
     pub fn within(mut self, path: &Path) -> Self {
         let name = path.display().to_string();
         if !self.message.contains(&name) {
@@ -112,11 +113,12 @@ impl Failure {
         self.code
     }
 
-    /// As [`report`](Self::report), of what every process of a team finds: one says it.
+    /// Reports a failure that all ranks share; the root rank prints it.
     pub fn report_of(self, team: &Team) -> ExitCode {
-        match team.leads() {
-            true => self.report(),
-            false => ExitCode::from(self.code),
+        if team.leads() {
+            self.report()
+        } else {
+            ExitCode::from(self.code)
         }
     }
 
@@ -127,7 +129,6 @@ impl Failure {
             .split_whitespace()
             .collect::<Vec<_>>()
             .join(" ");
-        // What a message quotes may come from anywhere.
         output::say(&format!("error: {line}"));
         ExitCode::from(self.code)
     }
