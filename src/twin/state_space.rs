@@ -280,12 +280,11 @@ mod tests {
     struct Walk;
     impl StateSpace for Walk {
         fn outline(&self) -> Outline {
-            Outline {
-                parameters: ParameterSpace::new([Parameter::new("rate", "1/s", -2.0, 30.0)]),
-                states: vec![Quantity::new("x", "m")],
-                inputs: vec![],
-                outputs: vec![Quantity::new("y1", "m"), Quantity::new("y2", "m")],
-            }
+            Outline::new()
+                .parameter(Parameter::new("rate", "1/s", -2.0, 30.0))
+                .state("x", "m")
+                .output("y1", "m")
+                .output("y2", "m")
         }
         fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
             dx[0] = now.theta[0] * x[0];
