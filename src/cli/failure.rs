@@ -13,10 +13,10 @@ use crate::estimator::{EstimateError, EstimatorFileError, PretrainError};
 use crate::evaluate::EvaluateError;
 use crate::feature::FeatureError;
 use crate::network::NetworkError;
-use crate::record::{CsvError, DriveError, RecordError};
+use crate::record::RecordError;
 use crate::storage::work::{Team, TeamError, WorkError};
 use crate::study::{PlanError, StudyError};
-use crate::twin::{AdaptationError, ParameterError, SimulationError};
+use crate::twin::{SimulationError, TwinError};
 use std::fmt::Display;
 use std::path::Path;
 use std::process::ExitCode;
@@ -144,17 +144,14 @@ macro_rules! users {
     };
 }
 users!(
-    AdaptationError,
     BankFileError,
-    CsvError,
-    DriveError,
     EffectError,
     EffectFileError,
     EstimatorFileError,
-    ParameterError,
     RecordError,
     SimulationError,
     TeamError,
+    TwinError,
     WorkError,
 );
 

@@ -5,11 +5,11 @@ use crate::fit::{BoundsError, OptimiseError};
 use crate::likelihood::kalman::FilterError;
 use crate::math::DifferenceError;
 use crate::progress::Cancelled;
-use crate::record::{CsvError, DriveError, RecordError};
+use crate::record::RecordError;
 use crate::setting::SettingError;
 use crate::storage::work::WorkError;
 use crate::study::PlanError;
-use crate::twin::{Interval, ParameterError, SimulationError};
+use crate::twin::{Interval, SimulationError, TwinError};
 use std::path::PathBuf;
 
 /// Error of an evaluation.
@@ -84,18 +84,12 @@ pub enum EvaluateError {
     /// The study's inputs cannot be drawn.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// The study's inputs have a bad time grid.
-    #[error(transparent)]
-    Drive(#[from] DriveError),
-    /// The record does not fit the twin.
+    /// The record cannot be read, or does not fit the twin.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// A record's file cannot be read.
-    #[error(transparent)]
-    Csv(#[from] CsvError),
     /// The start does not fit the twin, or lies outside the bounds.
     #[error(transparent)]
-    Parameter(#[from] ParameterError),
+    Parameter(#[from] TwinError),
     /// The twin failed.
     #[error(transparent)]
     Simulation(#[from] SimulationError),

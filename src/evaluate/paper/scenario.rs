@@ -2,7 +2,7 @@
 
 use super::{Invariant, Method, Symmetry};
 use crate::evaluate::EvaluateError;
-use crate::record::{Drive, DriveError, Signal};
+use crate::record::{Drive, RecordError, Signal};
 use crate::study::{DriveSource, RecordTable, Study};
 use crate::twin::Noise;
 
@@ -157,7 +157,7 @@ impl<'a> Draws<'a> {
 }
 
 /// The benchmark's levels, over and over, as every input of the study's records.
-fn staircase(study: &Study, benchmark: &Benchmark) -> Result<Drive, DriveError> {
+fn staircase(study: &Study, benchmark: &Benchmark) -> Result<Drive, RecordError> {
     let (plan, channels) = (study.plan(), study.twin().signals().inputs.len());
     let levels = Signal::from_shape_fn((plan.samples, channels), |(k, _)| {
         benchmark.levels[(k / benchmark.hold.max(1)) % benchmark.levels.len()]
