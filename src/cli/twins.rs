@@ -1,4 +1,4 @@
-//! `twins`: what there is.
+//! `twins`: lists the twins.
 
 use super::{Context, Failure, Verb, output};
 use crate::record::Quantity;
@@ -49,7 +49,7 @@ fn parameter(p: &Parameter) -> Value {
 fn describe(study: &Study) -> Value {
     let twin = study.twin();
     let signals = twin.signals();
-    let states = (twin.state_space()).map(|equations| quantities(&equations.outline().states));
+    let states = twin.outline().map(|outline| quantities(&outline.states));
     json!({
         "name": study.name(),
         "equations": states.is_some(),
@@ -71,9 +71,9 @@ fn in_words(study: &Study) -> String {
             .collect::<Vec<_>>()
             .join(", "),
     };
-    let states = match twin.state_space() {
-        Some(equations) => names(&equations.outline().states),
-        None => "not shown (black box)".into(),
+    let states = match twin.outline() {
+        Some(outline) => names(&outline.states),
+        None => "hidden (black box)".into(),
     };
     let mut text = format!(
         "{}\n  states  {states}\n  inputs  {}\n  outputs {}\n  record  {} samples, step {} s\n  {:<12} {:<8} {:<16} bounds\n",

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::effect::{Effects, Law, Magnitude, targets};
-use crate::twin::{DigitalTwin, Noise, Now, Outline, ParameterSpace, Role, StateSpace};
+use crate::twin::{Noise, Now, Outline, ParameterSpace, Role, StateSpace, Twin};
 
 /// What an effect is, for people and tables.
 ///
@@ -66,16 +66,20 @@ pub fn library() -> Vec<Description> {
 ///
 /// ```
 /// use truetwin::effect::applicable;
+/// use truetwin::twin::Twin;
 /// use truetwin::twins::VanDerPol;
 ///
-/// let possible = applicable(&VanDerPol);
+/// let possible = applicable(&Twin::new(VanDerPol));
 /// assert!(possible.iter().any(|effect| effect.target() == "x2"));
 /// assert!(possible.iter().all(|effect| effect.target() != "actuator")); // the oscillator has no input
 /// ```
-pub fn applicable(twin: &dyn DigitalTwin) -> Effects {
-    let (equations, signals) = (twin.state_space(), twin.signals());
-    let outline = equations.map(|twin| own(twin.outline()));
-    let rates = equations.map_or_else(Vec::new, rates);
+pub fn applicable(twin: &Twin) -> Effects {
+    let signals = twin.signals();
+    let outline = twin.outline().map(own);
+    let rates = match twin {
+        Twin::Equations(equations) => rates(equations.as_ref()),
+        Twin::BlackBox(_) => vec![],
+    };
     let mut effects = Effects::new();
     for Member { make, other, .. } in members() {
         let law = make("", "").law();

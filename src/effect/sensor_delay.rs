@@ -66,7 +66,7 @@ mod tests {
     use super::*;
     use crate::effect::{augment, augment_short};
     use crate::record::{Drive, Signal};
-    use crate::twin::{DigitalTwin, Noise};
+    use crate::twin::{Noise, Twin};
     use crate::twins::CascadedTanks;
     use std::sync::Arc;
 
@@ -76,18 +76,17 @@ mod tests {
             target: "sensor".into(),
             magnitudes: Given::default(),
         });
-        let base: Arc<dyn DigitalTwin> = Arc::new(CascadedTanks);
+        let base = Twin::new(CascadedTanks);
         let long = augment(base.clone(), vec![delay.clone()]).unwrap();
         let short = augment_short(base, vec![(delay, 5)]).unwrap();
-        let states =
-            |twin: &Arc<dyn DigitalTwin>| twin.state_space().unwrap().outline().states.len();
+        let states = |twin: &Twin| twin.outline().unwrap().states.len();
         assert_eq!((states(&long), states(&short)), (2 + 64, 2 + 5));
         let u = Signal::from_shape_fn((80, 1), |(k, _)| (k % 17) as f64 / 6.0);
         let drive = Drive::new(0.5, u).unwrap();
         for delay in [0.0, 0.7, 2.0] {
             let theta = [0.6, 0.5, 0.55, 1.0, delay];
             let noise = Noise::new(1, "t", 0);
-            let run = |twin: &Arc<dyn DigitalTwin>| twin.simulate(&theta, &drive, noise).unwrap();
+            let run = |twin: &Twin| twin.simulate(&theta, &drive, noise).unwrap();
             assert_eq!(run(&long), run(&short));
         }
     }

@@ -17,7 +17,7 @@ pub(super) struct Units {
 impl Units {
     pub(super) fn of(study: &Study) -> Self {
         let signals = study.twin().signals();
-        let outline = study.twin().state_space().map(|twin| twin.outline());
+        let outline = study.twin().outline();
         Self {
             inputs: signals.inputs,
             outputs: signals.outputs,
@@ -58,9 +58,10 @@ impl Units {
 
     /// `rate of h1`, or `output y`.
     pub(super) fn equation_name(&self, name: &str) -> String {
-        match self.is_state(name) {
-            true => format!("rate of {name}"),
-            false => format!("output {name}"),
+        if self.is_state(name) {
+            format!("rate of {name}")
+        } else {
+            format!("output {name}")
         }
     }
 

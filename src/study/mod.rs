@@ -8,9 +8,9 @@ pub use file::{Library, RecordTable, StudyFile, StudyFileError};
 pub use plan::{DriveSource, InputPlan, Levels, PlanError, RecordPlan};
 
 use crate::effect::{EffectError, Effects, UnmodelledEffect, augment, given_magnitudes};
-use crate::record::{CsvError, Record, RecordError};
+use crate::record::{Record, RecordError};
 use crate::setting::did_you_mean;
-use crate::twin::{Adaptation, AdaptationError, DigitalTwin, ParameterError, adapt, fix};
+use crate::twin::{Adaptation, DigitalTwin, Twin, TwinError, adapt, check_twin, fix};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -27,9 +27,9 @@ use std::sync::Arc;
 pub struct Study {
     name: String,
     /// As registered.
-    base: Arc<dyn DigitalTwin>,
+    base: Twin,
     /// In the setting of `file`.
-    twin: Arc<dyn DigitalTwin>,
+    twin: Twin,
     plan: RecordPlan,
     file: StudyFile,
     demo: Option<Arc<Record>>,
@@ -75,7 +75,7 @@ pub enum StudyError {
     },
     /// Of prior, bounds, limits, noise, start.
     #[error(transparent)]
-    Adaptation(#[from] AdaptationError),
+    Adaptation(#[from] TwinError),
     /// Of effects.
     #[error(transparent)]
     Effect(#[from] EffectError),
@@ -89,22 +89,19 @@ pub enum StudyError {
     Library(String),
     /// Of fixed parameters.
     #[error("[fixed]: {0}")]
-    Fixed(ParameterError),
+    Fixed(TwinError),
     /// Of the twin's own parameters.
     #[error("twin \"{name}\": {error}")]
     Parameters {
         /// Twin.
         name: String,
         /// What is wrong.
-        error: ParameterError,
+        error: TwinError,
     },
     /// Of step, length, input.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// The demo record cannot be read.
-    #[error(transparent)]
-    Demo(#[from] CsvError),
-    /// Of a record's channels.
+    /// Of a record's channels, or of the file of the demo record.
     #[error(transparent)]
     Record(#[from] RecordError),
 }
@@ -116,13 +113,11 @@ impl Study {
         twin: impl DigitalTwin + 'static,
         plan: RecordPlan,
     ) -> Result<Self, StudyError> {
-        let base: Arc<dyn DigitalTwin> = Arc::new(twin);
-        base.parameters()
-            .check()
-            .map_err(|error| StudyError::Parameters {
-                name: name.into(),
-                error,
-            })?;
+        let base = Twin::new(twin);
+        check_twin(&base).map_err(|error| StudyError::Parameters {
+            name: name.into(),
+            error,
+        })?;
         Ok(Self {
             name: name.into(),
             twin: base.clone(),
@@ -199,7 +194,7 @@ impl Study {
         for (name, &value) in &file.fixed {
             let parameter = &space[space.position(name).map_err(StudyError::Fixed)?];
             if !parameter.bounds.contains(value) {
-                return Err(StudyError::Fixed(ParameterError::OutOfBounds {
+                return Err(StudyError::Fixed(TwinError::OutOfBounds {
                     name: name.clone(),
                     value,
                     bounds: parameter.bounds,
@@ -259,7 +254,7 @@ impl Study {
 
     /// The library's effects and the study's own, each once for each target of this twin, all magnitudes free.
     pub fn effects(&self) -> Effects {
-        let library = crate::effect::applicable(self.twin.as_ref());
+        let library = crate::effect::applicable(&self.twin);
         (library.into_iter())
             .chain(self.own_effects.iter().cloned())
             .collect()
@@ -289,7 +284,7 @@ impl Study {
     }
 
     /// The twin in this study's setting.
-    pub fn twin(&self) -> &Arc<dyn DigitalTwin> {
+    pub fn twin(&self) -> &Twin {
         &self.twin
     }
 

@@ -1,10 +1,9 @@
 //! A twin in another setting: prior, bounds, limits, noise and start changed from outside.
 
 use crate::record::{Drive, Signal, Signals};
-use crate::setting::did_you_mean;
 use crate::twin::{
-    DigitalTwin, Integrator, Interval, Noise, Now, Outliers, Outline, Parameter, ParameterError,
-    ParameterSpace, Role, SimulationError, StateSpace,
+    DigitalTwin, Interval, Modified, Modify, Noise, Now, Outline, Parameter, ParameterSpace, Role,
+    SimulationError, StateSpace, Twin, TwinError,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -69,7 +68,7 @@ impl From<Level> for LevelText {
 ///
 /// ```
 /// use std::sync::Arc;
-/// use truetwin::twin::{Adaptation, AdaptationError, DigitalTwin, Level, adapt};
+/// use truetwin::twin::{Adaptation, Level, TwinError, adapt};
 /// use truetwin::twins::CascadedTanks;
 ///
 /// let mut adaptation = Adaptation::default();
@@ -79,7 +78,7 @@ impl From<Level> for LevelText {
 ///
 /// adaptation.start.insert("h3".into(), Level::Known(0.0));
 /// let refused = adapt(Arc::new(CascadedTanks), &adaptation, 4.0).err().ok_or("h3 is no state")?;
-/// assert!(matches!(refused, AdaptationError::Unknown { .. }));
+/// assert!(matches!(refused, TwinError::UnknownIn { .. }));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -96,58 +95,6 @@ pub struct Adaptation {
     pub start: BTreeMap<String, Level>,
 }
 
-/// Why a twin cannot be changed so.
-///
-/// ```
-/// use truetwin::twin::AdaptationError;
-///
-/// let error = AdaptationError::NoPrior { name: "start.h1".into() };
-/// assert!(error.to_string().ends_with("add [prior] \"start.h1\" = [low, high]"));
-/// ```
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum AdaptationError {
-    /// A name that the twin does not have.
-    #[error("[{table}] names {name}{}, the twin has {known}; use one of these", did_you_mean(name, known.split(", ")))]
-    Unknown {
-        /// Table of the study file.
-        table: &'static str,
-        /// The name.
-        name: String,
-        /// Known names.
-        known: String,
-    },
-    /// A black box has neither limits, noise levels nor starts.
-    #[error(
-        "[{table}] needs the twin's equations, which a black box does not show; remove the table or implement StateSpace"
-    )]
-    BlackBox {
-        /// Table of the study file.
-        table: &'static str,
-    },
-    /// A noise level or start that is no number of its kind.
-    #[error("[{table}] {name} = {value}; {remedy}")]
-    Value {
-        /// Table of the study file.
-        table: &'static str,
-        /// Name.
-        name: String,
-        /// Value.
-        value: f64,
-        /// What to write.
-        remedy: &'static str,
-    },
-    /// Nothing says where an unknown start or noise level lies.
-    #[error("nothing says where the unknown {name} lies; add [prior] \"{name}\" = [low, high]")]
-    NoPrior {
-        /// Parameter.
-        name: String,
-    },
-    /// Parameters that make no sense together.
-    #[error(transparent)]
-    Parameter(#[from] ParameterError),
-}
-
 /// The twin in another setting; θ is the twin's, then unknown noise levels, then unknown starts. `step` is the Δt, in
 /// seconds, at which the twin's own noise levels are taken.
 ///
@@ -162,32 +109,19 @@ pub enum AdaptationError {
 /// assert_eq!(twin.parameters().centre(), [1.5]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn adapt(
-    base: Arc<dyn DigitalTwin>,
-    adaptation: &Adaptation,
-    step: f64,
-) -> Result<Arc<dyn DigitalTwin>, AdaptationError> {
+pub fn adapt(base: impl Into<Twin>, adaptation: &Adaptation, step: f64) -> Result<Twin, TwinError> {
+    let base = base.into();
     if *adaptation == Adaptation::default() {
         return Ok(base);
     }
-    let Some(equations) = base.state_space() else {
-        for (table, used) in [
-            ("limits", !adaptation.limits.is_empty()),
-            ("noise", !adaptation.noise.is_empty()),
-            ("start", !adaptation.start.is_empty()),
-        ] {
-            if used {
-                return Err(AdaptationError::BlackBox { table });
-            }
-        }
-        let mut parameters = base.parameters();
-        rebox(&mut parameters, adaptation)?;
-        return Ok(Arc::new(AdaptedBlackBox { base, parameters }));
+    let equations = match base {
+        Twin::Equations(equations) => equations,
+        Twin::BlackBox(base) => return adapt_black_box(base, adaptation),
     };
     let mut outline = equations.outline();
     let n = outline.parameters.len();
     let position = |table, name: &str, known: &[String]| {
-        (known.iter().position(|k| k == name)).ok_or_else(|| AdaptationError::Unknown {
+        (known.iter().position(|k| k == name)).ok_or_else(|| TwinError::UnknownIn {
             table,
             name: name.into(),
             known: known.join(", "),
@@ -200,7 +134,7 @@ pub fn adapt(
     for (name, &limit) in &adaptation.limits {
         limits[position("limits", name, &states)?] = limit;
     }
-    let declared = declared_noise(equations, &outline, step);
+    let declared = declared_noise(equations.as_ref(), &outline, step);
     let mut added: Vec<Parameter> = Vec::new();
     let mut noise = Vec::new();
     for (name, &level) in &adaptation.noise {
@@ -208,7 +142,7 @@ pub fn adapt(
         let what = match level {
             Level::Known(value) if value >= 0.0 && value.is_finite() => Setting::Known(value),
             Level::Known(value) => {
-                return Err(AdaptationError::Value {
+                return Err(TwinError::Value {
                     table: "noise",
                     name: name.clone(),
                     value,
@@ -237,7 +171,7 @@ pub fn adapt(
                 Setting::Known(value)
             }
             Level::Known(value) => {
-                return Err(AdaptationError::Value {
+                return Err(TwinError::Value {
                     table: "start",
                     name: name.clone(),
                     value,
@@ -259,14 +193,32 @@ pub fn adapt(
     }
     outline.parameters = ParameterSpace::new(outline.parameters.iter().cloned().chain(added));
     rebox(&mut outline.parameters, adaptation)?;
-    Ok(Arc::new(AdaptedEquations {
+    Ok(Twin::Equations(Arc::new(Modified(Adapted {
         outline,
         limits,
         noise,
         start,
         own: n,
+        base: equations,
+    }))))
+}
+
+fn adapt_black_box(base: Arc<dyn DigitalTwin>, adaptation: &Adaptation) -> Result<Twin, TwinError> {
+    for (table, used) in [
+        ("limits", !adaptation.limits.is_empty()),
+        ("noise", !adaptation.noise.is_empty()),
+        ("start", !adaptation.start.is_empty()),
+    ] {
+        if used {
+            return Err(TwinError::BlackBox(table));
+        }
+    }
+    let mut parameters = base.parameters();
+    rebox(&mut parameters, adaptation)?;
+    Ok(Twin::BlackBox(Arc::new(AdaptedBlackBox {
         base,
-    }))
+        parameters,
+    })))
 }
 
 /// Noise levels of states, then outputs, at the prior's centre.
@@ -293,11 +245,11 @@ fn unknown(
     name: &str,
     guess: Option<Interval>,
     role: Role,
-) -> Result<Parameter, AdaptationError> {
+) -> Result<Parameter, TwinError> {
     let given = adaptation.prior.get(name).copied();
     let prior = given
         .or(guess)
-        .ok_or_else(|| AdaptationError::NoPrior { name: name.into() })?;
+        .ok_or_else(|| TwinError::NoPrior(name.into()))?;
     let mut parameter = Parameter::new(name, "", prior.low(), prior.high()).with_role(role);
     if let Some(guess) = guess {
         let (low, high) = (guess.low().min(prior.low()), guess.high().max(prior.high()));
@@ -307,14 +259,14 @@ fn unknown(
 }
 
 /// Sets prior boxes and bounds.
-fn rebox(parameters: &mut ParameterSpace, adaptation: &Adaptation) -> Result<(), AdaptationError> {
+fn rebox(parameters: &mut ParameterSpace, adaptation: &Adaptation) -> Result<(), TwinError> {
     for (table, boxes) in [("prior", &adaptation.prior), ("bounds", &adaptation.bounds)] {
         for (name, &interval) in boxes {
             let known = parameters.names().join(", ");
             let parameter = parameters
                 .iter_mut()
                 .find(|p| p.name == *name)
-                .ok_or_else(|| AdaptationError::Unknown {
+                .ok_or_else(|| TwinError::UnknownIn {
                     table,
                     name: name.clone(),
                     known,
@@ -325,7 +277,7 @@ fn rebox(parameters: &mut ParameterSpace, adaptation: &Adaptation) -> Result<(),
             }
         }
     }
-    Ok(parameters.check()?)
+    parameters.check()
 }
 
 /// Where a start or noise level comes from.
@@ -346,8 +298,8 @@ impl Setting {
 }
 
 /// Equations in another setting.
-struct AdaptedEquations {
-    base: Arc<dyn DigitalTwin>,
+struct Adapted {
+    base: Arc<dyn StateSpace>,
     outline: Outline,
     limits: Vec<Interval>,
     /// Index among states, then outputs.
@@ -357,63 +309,27 @@ struct AdaptedEquations {
     own: usize,
 }
 
-impl AdaptedEquations {
-    fn inner(&self) -> &dyn StateSpace {
-        self.base
-            .state_space()
-            .expect("adapt builds this type for twins with equations only")
+impl Modify for Adapted {
+    fn base(&self) -> &dyn StateSpace {
+        self.base.as_ref()
     }
-
-    fn own<'a>(&self, now: &Now<'a>) -> Now<'a> {
-        Now {
-            theta: &now.theta[..self.own],
-            ..*now
-        }
+    fn theta<R>(&self, theta: &[f64], then: impl FnOnce(&[f64]) -> R) -> R {
+        then(&theta[..self.own])
     }
-}
-
-impl StateSpace for AdaptedEquations {
     fn outline(&self) -> Outline {
         self.outline.clone()
-    }
-    fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
-        self.inner().drift(&self.own(now), x, dx);
-    }
-    fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
-        self.inner().observe(&self.own(now), x, y);
-    }
-    fn readout(&self, now: &Now<'_>, y: &mut [f64]) {
-        self.inner().readout(&self.own(now), y);
-    }
-    fn update(&self, now: &Now<'_>, x: &mut [f64]) {
-        self.inner().update(&self.own(now), x);
-    }
-    fn constrain(&self, now: &Now<'_>, x: &mut [f64]) {
-        self.inner().constrain(&self.own(now), x);
-    }
-    fn integrator(&self) -> Integrator {
-        self.inner().integrator()
-    }
-    fn admit(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {
-        self.inner().admit(&theta[..self.own], dt)
-    }
-    fn outliers(&self, theta: &[f64]) -> Vec<Outliers> {
-        self.inner().outliers(&theta[..self.own])
-    }
-    fn strike(&self, theta: &[f64], noise: Noise, outputs: &mut Signal) {
-        self.inner().strike(&theta[..self.own], noise, outputs);
     }
     fn limits(&self) -> Vec<Interval> {
         self.limits.clone()
     }
     fn start(&self, now: &Now<'_>, x: &mut [f64]) {
-        self.inner().start(&self.own(now), x);
+        self.now(now, &[], |now| self.base.start(now, x));
         for &(i, setting) in &self.start {
             x[i] = setting.value(now.theta);
         }
     }
     fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
-        self.inner().noise(&self.own(now), process, measurement);
+        self.now(now, &[], |now| self.base.noise(now, process, measurement));
         for &(i, setting) in &self.noise {
             let level = match i.checked_sub(process.len()) {
                 None => &mut process[i],

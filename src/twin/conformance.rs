@@ -8,11 +8,11 @@
 //! let drive = Drive::new(4.0, ndarray::Array2::ones((50, 1)))?;
 //! let worst = check(&CascadedTanks, &drive, 1).into_iter().max_by_key(|f: &Finding| f.severity);
 //! assert!(worst.is_some_and(|finding| finding.severity < Severity::Failure));
-//! # Ok::<(), truetwin::record::DriveError>(())
+//! # Ok::<(), truetwin::record::RecordError>(())
 //! ```
 
 use crate::record::{Drive, Signal};
-use crate::twin::{DigitalTwin, Noise, PRIOR_DEVIATION, SimulationError, combination, free_run};
+use crate::twin::{DigitalTwin, Noise, PRIOR_DEVIATION, SimulationError, combination};
 use nalgebra::DMatrix;
 
 /// How bad a finding is.
@@ -73,7 +73,7 @@ const PAIRED: f64 = 1e-2;
 /// let findings: Vec<Finding> = check(&VanDerPol, &Drive::autonomous(0.05, 100)?, 1);
 /// assert!(findings.iter().all(|finding| finding.severity < Severity::Failure));
 /// assert_eq!(findings[0].check, "parameters");
-/// # Ok::<(), truetwin::record::DriveError>(())
+/// # Ok::<(), truetwin::record::RecordError>(())
 /// ```
 pub fn check(twin: &dyn DigitalTwin, drive: &Drive, seed: u64) -> Vec<Finding> {
     let space = twin.parameters();
@@ -304,7 +304,7 @@ fn free_run_jacobian(
         let side = |sign: f64| {
             let mut theta = centre.clone();
             theta[j] += sign * 1e-4 * widths[j];
-            free_run(twin, &theta, drive)
+            twin.free_run(&theta, drive)
         };
         let difference = side(1.0)? - side(-1.0)?;
         Ok(difference.iter().map(|d| d / 2e-4).collect())

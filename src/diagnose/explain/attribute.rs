@@ -92,7 +92,7 @@ pub(in crate::diagnose) fn explanations(
     order(&mut explanations);
     // Once more from where the best ended: a poor θ leads to poor fits.
     if only.is_none() {
-        let (round, draws) = match model.problem.twin.state_space() {
+        let (round, draws) = match model.problem.twin.equations() {
             Some(_) => (Thresholds::SECOND_ROUND, Thresholds::SECOND_DRAWS),
             None => (
                 Thresholds::SECOND_ROUND_SIMULATED,

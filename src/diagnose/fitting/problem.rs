@@ -4,8 +4,7 @@ use crate::diagnose::fitting::axis::Axis;
 use crate::likelihood::ensemble::{self, Predictor};
 use crate::likelihood::kalman::{Coordinates, FilterError, FilterSettings, Filtered, Kalman};
 use crate::record::{Record, Signal};
-use crate::twin::{DigitalTwin, Outline, Parameter, ParameterSpace, Role};
-use std::sync::Arc;
+use crate::twin::{Outline, Parameter, ParameterSpace, Role, Twin};
 
 /// Longest step of a fit in the logarithm of a black box's noise level.
 const LONGEST_NOISE: f64 = 2.0;
@@ -15,7 +14,7 @@ const LONGEST_NOISE: f64 = 2.0;
 /// The full θ is the twin's, then the starts of the second record, and so on.
 #[derive(Clone)]
 pub(in crate::diagnose) struct Problem<'a> {
-    pub twin: Arc<dyn DigitalTwin>,
+    pub twin: Twin,
     pub records: &'a [Record],
     /// Indices of the twin's parameters in the full θ, for each record.
     pub(super) places: Vec<Vec<usize>>,
@@ -34,7 +33,7 @@ pub(super) struct Evaluation {
 
 impl<'a> Problem<'a> {
     /// `axes` belong to the parameters of the twin; their likelihood is a filter's, or, without equations, that of an ensemble.
-    pub fn new(twin: Arc<dyn DigitalTwin>, axes: Vec<Axis>, records: &'a [Record]) -> Self {
+    pub fn new(twin: Twin, axes: Vec<Axis>, records: &'a [Record]) -> Self {
         let space = twin.parameters();
         let mut all = axes;
         let mut places = Vec::new();
@@ -72,9 +71,9 @@ impl<'a> Problem<'a> {
     }
 
     /// A twin with the weak priors of its own parameters.
-    pub fn of_twin(twin: &Arc<dyn DigitalTwin>, records: &'a [Record]) -> Self {
+    pub fn of_twin(twin: &Twin, records: &'a [Record]) -> Self {
         let mut axes: Vec<Axis> = twin.parameters().iter().map(Axis::of).collect();
-        if twin.state_space().is_none() {
+        if twin.equations().is_none() {
             // What an effect explains of a simulator's misfit may be all of it.
             let noise = |p: &Parameter| p.role == Role::Noise;
             for (axis, _) in
@@ -106,7 +105,7 @@ impl<'a> Problem<'a> {
 
     /// States, inputs and outputs; of a black box, its predicted outputs stand for states.
     pub fn outline(&self) -> Outline {
-        match self.twin.state_space() {
+        match self.twin.equations() {
             Some(equations) => equations.outline(),
             None => {
                 let signals = self.twin.signals();
@@ -123,9 +122,7 @@ impl<'a> Problem<'a> {
     /// Returns the predictors of all records of a black box at θ.
     pub fn predictors(&self, theta: &[f64]) -> Result<Vec<Predictor>, FilterError> {
         (self.records.iter().enumerate())
-            .map(|(r, record)| {
-                ensemble::predictor(self.twin.as_ref(), &self.of_record(r, theta), record)
-            })
+            .map(|(r, record)| ensemble::predictor(&self.twin, &self.of_record(r, theta), record))
             .collect()
     }
 
@@ -206,7 +203,7 @@ impl<'a> Problem<'a> {
 
     /// Log-likelihood of all records at θ, with the innovations of a black box.
     pub(super) fn evaluate(&self, theta: &[f64]) -> Result<Evaluation, FilterError> {
-        let Some(equations) = self.twin.state_space() else {
+        let Some(equations) = self.twin.equations() else {
             let innovations = self.filtered(theta)?;
             return Ok(Evaluation {
                 log_likelihood: innovations.iter().map(|f| f.log_likelihood).sum(),
@@ -226,7 +223,7 @@ impl<'a> Problem<'a> {
 
     /// Gain at which a fit is done, in nats; what simulations say is not worth the last of them.
     pub fn done(&self) -> f64 {
-        match self.twin.state_space() {
+        match self.twin.equations() {
             Some(_) => 5e-3,
             None => 5e-2,
         }
@@ -239,7 +236,7 @@ impl<'a> Problem<'a> {
 
     /// Innovations and filtered states of each record.
     pub fn states(&self, theta: &[f64]) -> Result<Vec<(Filtered, Signal)>, FilterError> {
-        if self.twin.state_space().is_none() {
+        if self.twin.equations().is_none() {
             let all = self.filtered(theta)?.into_iter().zip(self.records);
             return Ok(all
                 .map(|(f, record)| {
@@ -272,9 +269,9 @@ impl<'a> Problem<'a> {
         (self.records.iter().enumerate())
             .map(|(r, record)| {
                 let theta = self.of_record(r, theta);
-                match self.twin.state_space() {
+                match self.twin.equations() {
                     Some(equations) => Kalman::new(equations, record, settings)?.filter(&theta),
-                    None => ensemble::filtered(self.twin.as_ref(), &theta, record),
+                    None => ensemble::filtered(&self.twin, &theta, record),
                 }
             })
             .collect()
@@ -283,7 +280,7 @@ impl<'a> Problem<'a> {
     /// Points around θ whose innovations tell their derivatives: (moved θ, distance in φ), one for each entry.
     pub fn neighbours(&self, theta: &[f64]) -> Vec<(Vec<f64>, f64)> {
         // Runs are smooth in θ up to a simulator's own tolerance only.
-        let share = match self.twin.state_space() {
+        let share = match self.twin.equations() {
             Some(_) => 0.1,
             None => 1.0,
         };

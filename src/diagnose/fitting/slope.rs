@@ -30,7 +30,7 @@ pub(super) fn slope(
     theta: &[f64],
     innovations: Option<Vec<Filtered>>,
 ) -> Result<Slope, FilterError> {
-    let Some(equations) = problem.twin.state_space() else {
+    let Some(equations) = problem.twin.equations() else {
         let innovations = innovations.map_or_else(|| problem.filtered(theta), Ok)?;
         let mut slope = by_differences(problem, theta, innovations)?;
         add_priors(problem, theta, &mut slope);

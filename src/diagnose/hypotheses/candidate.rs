@@ -7,7 +7,7 @@ use crate::diagnose::thresholds::Thresholds;
 use crate::effect::{Law, Magnitude, UnmodelledEffect, augment_short};
 use crate::record::Signals;
 use crate::study::Study;
-use crate::twin::{DigitalTwin, Outline, Role, fix};
+use crate::twin::{Outline, Role, Twin, fix};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -71,9 +71,9 @@ pub(in crate::diagnose) struct Addition {
 
 /// The twin with some effects, for filters: delays are cut short.
 pub(in crate::diagnose) fn with(
-    base: &Arc<dyn DigitalTwin>,
+    base: &Twin,
     additions: &[Addition],
-) -> Result<Arc<dyn DigitalTwin>, DiagnoseError> {
+) -> Result<Twin, DiagnoseError> {
     let mut effects = vec![];
     let mut held = BTreeMap::new();
     for addition in additions {
@@ -86,11 +86,7 @@ pub(in crate::diagnose) fn with(
 }
 
 /// The twin with a catch-all on top.
-pub(in crate::diagnose) fn with_disturbance(
-    base: &Arc<dyn DigitalTwin>,
-    entry: Entry,
-    memory: f64,
-) -> Arc<dyn DigitalTwin> {
+pub(in crate::diagnose) fn with_disturbance(base: &Twin, entry: Entry, memory: f64) -> Twin {
     disturbed(base.clone(), entry, memory)
 }
 
@@ -126,7 +122,7 @@ pub(in crate::diagnose) fn candidates(
         .filter(|c| !named(&c.id, &c.target))
         .filter(|c| !already.contains(&c.key()))
         .collect();
-    all.extend(match twin.state_space() {
+    all.extend(match twin.equations() {
         Some(equations) => catch_alls(&equations.outline()),
         None => catch_alls_of_signals(&twin.signals()),
     });

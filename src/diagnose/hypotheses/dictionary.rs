@@ -10,9 +10,8 @@ use crate::diagnose::hypotheses::scales::Scales;
 use crate::diagnose::hypotheses::variant::Variant;
 use crate::diagnose::thresholds::Thresholds;
 use crate::likelihood::kalman::{FilterError, recoverable};
-use crate::twin::DigitalTwin;
+use crate::twin::Twin;
 use rayon::prelude::*;
-use std::sync::Arc;
 
 /// One point to try.
 #[derive(Debug, Clone)]
@@ -37,7 +36,7 @@ pub(in crate::diagnose) struct Dictionary {
 impl Dictionary {
     /// Plans and tries the points of all candidates on the twin `study` with the effects `accepted`; `problem` and `reference` are that twin's.
     pub fn new(
-        study: &Arc<dyn DigitalTwin>,
+        study: &Twin,
         accepted: &[Addition],
         candidates: Vec<Candidate>,
         problem: &Problem<'_>,

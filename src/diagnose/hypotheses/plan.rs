@@ -12,7 +12,7 @@ use crate::diagnose::thresholds::Thresholds;
 use crate::effect::{Law, Magnitude, Mark, UnmodelledEffect};
 use crate::math::quantile;
 use crate::math::{deviation, ends, largest};
-use crate::twin::{DigitalTwin, Interval};
+use crate::twin::{Interval, Twin};
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
@@ -40,7 +40,7 @@ pub(in crate::diagnose) enum Lead {
 
 /// Inputs of the plans: the study's twin, its accepted effects, and the fit of both.
 pub(in crate::diagnose) struct Planner<'a> {
-    pub study: &'a Arc<dyn DigitalTwin>,
+    pub study: &'a Twin,
     pub accepted: &'a [Addition],
     pub problem: &'a Problem<'a>,
     pub scales: &'a Scales<'a>,
@@ -66,7 +66,7 @@ impl Planner<'_> {
                     _ => Mark::Unmarked,
                 };
                 let plan = |choice: &Choice| self.listed(index, effect, &values, &mark, choice);
-                let filtered = self.study.state_space().is_some();
+                let filtered = self.study.equations().is_some();
                 (choices(effect.as_ref(), &mark, filtered).iter())
                     .filter_map(|choice| plan(choice).transpose())
                     .collect()
@@ -109,7 +109,7 @@ impl Planner<'_> {
 
     /// Values of the signal or state that an effect sits at.
     fn values(&self, effect: &dyn UnmodelledEffect) -> Vec<f64> {
-        let outline = self.study.state_space().map(|t| t.outline());
+        let outline = self.study.equations().map(|t| t.outline());
         let law = effect.law();
         let known = crate::effect::targets(law, outline.as_ref(), &self.study.signals());
         let target = known.iter().position(|k| k == effect.target()).unwrap_or(0);

@@ -4,9 +4,8 @@ use crate::diagnose::fitting::axis::Axis;
 use crate::diagnose::fitting::problem::Problem;
 use crate::diagnose::thresholds::Thresholds;
 use crate::effect::Magnitude;
-use crate::twin::{DigitalTwin, Interval};
+use crate::twin::{Interval, Twin};
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 const LONGEST: f64 = 40.0;
 
@@ -14,7 +13,7 @@ const LONGEST: f64 = 40.0;
 pub(in crate::diagnose) struct Variant {
     /// Index among the candidates.
     pub candidate: usize,
-    pub twin: Arc<dyn DigitalTwin>,
+    pub twin: Twin,
     /// Free magnitudes in the order of θ; the others are held at their off values.
     pub free: Vec<Magnitude>,
     pub held: BTreeMap<String, f64>,

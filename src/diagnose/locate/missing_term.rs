@@ -62,7 +62,7 @@ pub(in crate::diagnose) fn missing_term(
 ) -> Result<Option<MissingTerm>, FilterError> {
     let problem = model.explained(explanation);
     let twin = problem.twin.clone();
-    let Some(equations) = twin.state_space() else {
+    let Some(equations) = twin.equations() else {
         return Ok(None);
     };
     let own = model.bins.states;

@@ -9,7 +9,7 @@ use crate::diagnose::hypotheses::dictionary::Dictionary;
 use crate::diagnose::hypotheses::scales::Scales;
 use crate::diagnose::residuals::cut::Bins;
 use crate::record::{Record, Signal};
-use crate::twin::DigitalTwin;
+use crate::twin::Twin;
 use std::sync::Arc;
 
 /// A fitted twin, its dictionary of effects and the cuts of its records.
@@ -23,7 +23,7 @@ pub(in crate::diagnose) struct FittedTwin<'a> {
 impl<'a> FittedTwin<'a> {
     /// Builds the dictionary of effects around a fit; `None` where the twin cannot be filtered there.
     pub fn new(
-        twin: &Arc<dyn DigitalTwin>,
+        twin: &Twin,
         problem: Problem<'a>,
         fitted: Fitted,
         additions: &[Addition],

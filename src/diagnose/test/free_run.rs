@@ -7,19 +7,18 @@ use crate::diagnose::thresholds::Thresholds;
 use crate::estimator::track;
 use crate::math::{median, quantile};
 use crate::record::{Record, Signal};
-use crate::twin::{DigitalTwin, Noise, free_run};
+use crate::twin::{Noise, Twin};
 use rayon::prelude::*;
-use std::sync::Arc;
 
 /// A twin and θ to run free.
 pub(in crate::diagnose) struct Runner {
-    pub twin: Arc<dyn DigitalTwin>,
+    pub twin: Twin,
     pub theta: Vec<f64>,
 }
 
 impl Runner {
     pub fn new(
-        base: &Arc<dyn DigitalTwin>,
+        base: &Twin,
         additions: &[Addition],
         theta: Vec<f64>,
     ) -> Result<Self, DiagnoseError> {
@@ -37,13 +36,13 @@ impl Runner {
 
     /// The free run beside the record.
     pub fn outputs(&self, record: &Record) -> Option<Signal> {
-        let run = track(self.twin.as_ref(), &self.theta, record).ok()?;
+        let run = track(&self.twin, &self.theta, record).ok()?;
         Some(run.outputs)
     }
 
     /// Median error of records simulated at θ against their own free run.
     pub fn floor(&self, record: &Record, from: usize, noise: Noise) -> Option<f64> {
-        let free = free_run(self.twin.as_ref(), &self.theta, record.drive()).ok()?;
+        let free = self.twin.free_run(&self.theta, record.drive()).ok()?;
         let errors: Vec<f64> = (0..Thresholds::FLOOR_RECORDS)
             .into_par_iter()
             .filter_map(|i| {

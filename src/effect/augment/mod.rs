@@ -5,7 +5,7 @@ mod equations;
 mod outliers;
 
 use crate::effect::{EffectError, Effects, Law, UnmodelledEffect, check_effects};
-use crate::twin::{DigitalTwin, Interval, Parameter, ParameterSpace, Role, SimulationError};
+use crate::twin::{Interval, Parameter, ParameterSpace, Role, SimulationError, Twin};
 use black_box::AugmentedBlackBox;
 use equations::AugmentedEquations;
 use std::collections::BTreeMap;
@@ -41,32 +41,29 @@ use std::sync::Arc;
 /// assert_eq!(biased, plain + 0.5);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn augment(
-    base: Arc<dyn DigitalTwin>,
-    effects: Effects,
-) -> Result<Arc<dyn DigitalTwin>, EffectError> {
+pub fn augment(base: impl Into<Twin>, effects: Effects) -> Result<Twin, EffectError> {
     let whole = effects.iter().map(|e| (e.clone(), e.memory())).collect();
-    augment_short(base, whole)
+    augment_short(base.into(), whole)
 }
 
 /// [`augment`], with so many memory values for each effect; no fewer than [`UnmodelledEffect::least_memory`], no more than it has.
 ///
 /// A filter's cost grows with the square of the states, and a delay's register is longer than most delays.
 pub(crate) fn augment_short(
-    base: Arc<dyn DigitalTwin>,
+    base: Twin,
     effects: Vec<(Arc<dyn UnmodelledEffect>, usize)>,
-) -> Result<Arc<dyn DigitalTwin>, EffectError> {
+) -> Result<Twin, EffectError> {
     if effects.is_empty() {
         return Ok(base);
     }
-    let outline = base.state_space().map(|twin| twin.outline());
+    let outline = base.outline();
     let (all, memories): (Effects, Vec<usize>) = effects.into_iter().unzip();
     check_effects(&all, outline.as_ref(), &base.signals())?;
     let slots = Slots::of(&base, all, &memories);
-    if outline.is_none() {
-        return Ok(Arc::new(AugmentedBlackBox::new(base, slots)));
-    }
-    Ok(Arc::new(AugmentedEquations::new(base, slots)))
+    Ok(match base {
+        Twin::Equations(base) => Twin::Equations(Arc::new(AugmentedEquations::new(base, slots))),
+        Twin::BlackBox(base) => Twin::BlackBox(Arc::new(AugmentedBlackBox::new(base, slots))),
+    })
 }
 
 /// Magnitudes that effects' files give, by the names that [`augment`] gives their parameters.
@@ -126,8 +123,8 @@ struct Slots {
 
 impl Slots {
     /// Targets must have been checked.
-    fn of(base: &Arc<dyn DigitalTwin>, effects: Effects, memories: &[usize]) -> Self {
-        let outline = base.state_space().map(|twin| twin.outline());
+    fn of(base: &Twin, effects: Effects, memories: &[usize]) -> Self {
+        let outline = base.outline();
         let signals = base.signals();
         let base = base.parameters().len();
         let mut parameters = Vec::new();

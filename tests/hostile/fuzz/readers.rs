@@ -233,14 +233,7 @@ pub fn bank(data: &[u8]) -> Result<(), String> {
 
 /// An archive with sound `theta` and these bytes as `features`.
 fn archive(features: &[u8]) -> Vec<u8> {
-    static THETA: OnceLock<Vec<u8>> = OnceLock::new();
-    let theta = THETA.get_or_init(|| {
-        use ndarray_npy::WriteNpyExt;
-        let mut bytes = Vec::new();
-        let theta = array![[1.0, 2.0], [3.0, 4.0]];
-        theta.write_npy(&mut bytes).expect("into memory");
-        bytes
-    });
+    let theta = npy([1.0, 2.0, 3.0, 4.0]);
     let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
     for (name, bytes) in [("theta.npy", theta.as_slice()), ("features.npy", features)] {
         let options = zip::write::SimpleFileOptions::default();
@@ -248,6 +241,16 @@ fn archive(features: &[u8]) -> Vec<u8> {
         archive.write_all(bytes).expect("into memory");
     }
     archive.finish().expect("into memory").into_inner()
+}
+
+/// The bytes of a 2 × 2 matrix as NumPy writes them.
+pub fn npy(numbers: [f64; 4]) -> Vec<u8> {
+    let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+    bytes.extend(b"{'descr': '<f8', 'fortran_order': False, 'shape': (2, 2), }");
+    bytes.resize(127, b' ');
+    bytes.push(b'\n');
+    bytes.extend(numbers.map(f64::to_le_bytes).concat());
+    bytes
 }
 
 /// Writes a small bank, for a seed.

@@ -5,12 +5,12 @@ use super::*;
 #[test]
 fn a_black_box_takes_signal_effects_only() {
     for (name, base, ..) in twins() {
-        let on_signals = applicable(base.as_ref())
+        let on_signals = applicable(&base)
             .iter()
             .all(|e| e.target() == "sensor" || e.target() == "actuator");
         assert_eq!(on_signals, name.starts_with("boxed"));
     }
-    let boxed: Arc<dyn DigitalTwin> = Arc::new(BlackBox(CascadedTanks));
+    let boxed: Twin = Twin::new(BlackBox(CascadedTanks));
     for effects in [
         one("linear-loss", "h1", ""),
         one("parameter-step", "k1", ""),
@@ -57,19 +57,19 @@ fn the_sensor_chain_keeps_its_order() {
 #[test]
 fn black_box_and_equations_agree_without_noise() {
     let (_, base, theta, drive) = twins().remove(0);
-    for effect in applicable(&BlackBox(CascadedTanks)) {
+    for effect in applicable(&Twin::new(BlackBox(CascadedTanks))) {
         let starts = effect
             .magnitudes()
             .into_iter()
             .map(|m| m.starts[m.starts.len() - 1]);
         let at: Vec<f64> = theta.iter().copied().chain(starts).collect();
-        let y = |base: Arc<dyn DigitalTwin>| {
+        let y = |base: Twin| {
             let twin = augment(base, vec![effect.clone()]).unwrap();
             bits(&twin.simulate(&at, &drive, Noise::OFF).unwrap())
         };
         assert_eq!(
             y(base.clone()),
-            y(Arc::new(BlackBox(CascadedTanks))),
+            y(Twin::new(BlackBox(CascadedTanks))),
             "{effect:?}"
         );
     }
@@ -106,15 +106,11 @@ fn effects_nest() {
             "the inner delay is checked too"
         );
         let inner = augment(base.clone(), [lag(), late()].concat()).unwrap();
-        let targets = |twin: &dyn DigitalTwin| {
+        let targets = |twin: &Twin| {
             let all = applicable(twin);
             all.iter().map(|e| format!("{e:?}")).collect::<Vec<_>>()
         };
-        assert_eq!(
-            targets(inner.as_ref()),
-            targets(base.as_ref()),
-            "memories are no targets"
-        );
+        assert_eq!(targets(&inner), targets(&base), "memories are no targets");
     }
 }
 
@@ -140,6 +136,6 @@ fn feedthrough_sees_the_present_input() {
     }
     let drive = Drive::new(0.1, Signal::from_shape_fn((5, 1), |(k, _)| k as f64)).unwrap();
     let bias = one("actuator-bias", "actuator", "magnitudes = { offset = 1.0 }");
-    let y = run(Arc::new(Wire), &[2.0], bias, &drive, Noise::OFF);
+    let y = run(Twin::new(Wire), &[2.0], bias, &drive, Noise::OFF);
     assert_eq!(y.column(0).to_vec(), [2.0, 4.0, 6.0, 8.0, 10.0]);
 }

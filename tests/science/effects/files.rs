@@ -74,7 +74,7 @@ fn effects_that_do_not_fit_a_twin_are_refused_in_one_line() {
             ["offset", "NaN"],
         ),
     ] {
-        let error = augment(Arc::new(CascadedTanks), effects)
+        let error = augment(Twin::new(CascadedTanks), effects)
             .err()
             .unwrap()
             .to_string();
@@ -85,7 +85,7 @@ fn effects_that_do_not_fit_a_twin_are_refused_in_one_line() {
     }
     let late = one("sensor-delay", "sensor", "magnitudes = { delay = 40.0 }");
     let (theta, drive) = (held(&TANKS, &late), twins()[0].3.clone());
-    let twin = augment(Arc::new(CascadedTanks), late).unwrap();
+    let twin = augment(Twin::new(CascadedTanks), late).unwrap();
     let error = twin
         .simulate(&theta, &drive, Noise::OFF)
         .unwrap_err()
@@ -106,7 +106,7 @@ fn files_hold_off_values_and_survive_a_round_trip() {
     assert_eq!(effects[0].given().get("low"), Some(f64::NEG_INFINITY));
     assert_eq!(effects[0].given().get("high"), Some(2.0));
     assert_eq!(effects[1].given().get("spill"), None);
-    assert!(augment(Arc::new(CascadedTanks), effects.clone()).is_ok());
+    assert!(augment(Twin::new(CascadedTanks), effects.clone()).is_ok());
     let file: BTreeMap<_, Vec<_>> =
         [("effect", effects.iter().map(AsRef::as_ref).collect())].into();
     let text = toml::to_string(&file).unwrap();

@@ -18,9 +18,9 @@ fn golden_records() {
         }
         let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
         let (id, twin) = name.split_once('.').unwrap();
-        let (base, theta): (Arc<dyn DigitalTwin>, &[f64]) = match twin {
-            "tanks" => (Arc::new(CascadedTanks), &TANKS),
-            _ => (Arc::new(VanDerPol), &NU),
+        let (base, theta): (Twin, &[f64]) = match twin {
+            "tanks" => (Twin::new(CascadedTanks), &TANKS),
+            _ => (Twin::new(VanDerPol), &NU),
         };
         let effects = match id {
             "none" => vec![],

@@ -29,7 +29,7 @@ fn the_library_makes_sense() {
         }
     }
     for (name, base, ..) in twins() {
-        for effect in applicable(base.as_ref()) {
+        for effect in applicable(&base) {
             let twin = augment(base.clone(), vec![effect]).unwrap();
             twin.parameters()
                 .check()
@@ -41,15 +41,12 @@ fn the_library_makes_sense() {
 /// Counts by hand from the table; the cubic spring only on the oscillator's rate.
 #[test]
 fn what_may_be_lacking() {
-    let counts: Vec<_> = twins()
-        .iter()
-        .map(|t| applicable(t.1.as_ref()).len())
-        .collect();
+    let counts: Vec<_> = twins().iter().map(|t| applicable(&t.1).len()).collect();
     // Tanks: 10 sensor, 8 actuator, 2 × (6 forces + 1 coupling + 1 ceiling + 1 noise), 4 × 2 parameters.
     // Oscillator: no actuator, one parameter, one cubic spring.
     assert_eq!(counts, [10 + 8 + 18 + 8, 10 + 18 + 2 + 1, 18, 10]);
     let springs: Vec<_> = (twins().iter())
-        .flat_map(|t| applicable(t.1.as_ref()))
+        .flat_map(|t| applicable(&t.1))
         .filter(|e| e.typetag_name() == "cubic-stiffness")
         .map(|e| (e.target().to_owned(), e.other().unwrap().to_owned()))
         .collect();

@@ -9,7 +9,6 @@ mod off;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use truetwin::effect::*;
 use truetwin::effect::{applicable, library, parse_effects, read_effects};
 use truetwin::record::*;
@@ -37,7 +36,7 @@ impl<T: DigitalTwin> DigitalTwin for BlackBox<T> {
 }
 
 /// A name, a twin, a θ inside, and a drive that moves it.
-type Case = (&'static str, Arc<dyn DigitalTwin>, Vec<f64>, Drive);
+type Case = (&'static str, Twin, Vec<f64>, Drive);
 
 /// The reference twins, with their equations and without.
 fn twins() -> Vec<Case> {
@@ -48,18 +47,28 @@ fn twins() -> Vec<Case> {
     vec![
         (
             "tanks",
-            Arc::new(CascadedTanks),
+            Twin::new(CascadedTanks),
             tanks.clone(),
             driven.clone(),
         ),
-        ("van-der-pol", Arc::new(VanDerPol), nu.clone(), free.clone()),
+        (
+            "van-der-pol",
+            Twin::new(VanDerPol),
+            nu.clone(),
+            free.clone(),
+        ),
         (
             "boxed tanks",
-            Arc::new(BlackBox(CascadedTanks)),
+            Twin::new(BlackBox(CascadedTanks)),
             tanks,
             driven,
         ),
-        ("boxed van-der-pol", Arc::new(BlackBox(VanDerPol)), nu, free),
+        (
+            "boxed van-der-pol",
+            Twin::new(BlackBox(VanDerPol)),
+            nu,
+            free,
+        ),
     ]
 }
 
@@ -85,13 +94,7 @@ fn one(id: &str, target: &str, rest: &str) -> Effects {
 }
 
 /// One run of a twin with these effects.
-fn run(
-    base: Arc<dyn DigitalTwin>,
-    theta: &[f64],
-    e: Effects,
-    drive: &Drive,
-    noise: Noise,
-) -> Signal {
+fn run(base: Twin, theta: &[f64], e: Effects, drive: &Drive, noise: Noise) -> Signal {
     let theta = held(theta, &e);
     (augment(base, e).unwrap().simulate(&theta, drive, noise)).unwrap()
 }

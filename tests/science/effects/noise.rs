@@ -28,7 +28,7 @@ fn effects_move_no_draws() {
 }
 
 /// Variance of one sample over many runs.
-fn variance(base: Arc<dyn DigitalTwin>, theta: &[f64], effects: &Effects, row: usize) -> f64 {
+fn variance(base: Twin, theta: &[f64], effects: &Effects, row: usize) -> f64 {
     let inputs = base.signals().inputs.len();
     let drive = Drive::new(0.5, Signal::ones((row + 1, inputs))).unwrap();
     let free = run(base.clone(), theta, effects.clone(), &drive, Noise::OFF)[[row, 0]];
@@ -61,10 +61,10 @@ fn noises_add_in_quadrature() {
     // Sample 1 of the oscillator carries the noise of x1, which has none of its own; sample 2 carries Δt times the first
     // increment of x2, whose own standard deviation is Δt·√0.02.
     let shaken = one("process-noise", "x1", "magnitudes = { std = 0.3 }");
-    let v = variance(Arc::new(VanDerPol), &NU, &shaken, 1);
+    let v = variance(Twin::new(VanDerPol), &NU, &shaken, 1);
     assert!(near(v, 0.09), "{v}");
     let shaken = one("process-noise", "x2", "magnitudes = { std = 0.07 }");
-    let v = variance(Arc::new(VanDerPol), &NU, &shaken, 2);
+    let v = variance(Twin::new(VanDerPol), &NU, &shaken, 2);
     assert!(near(v, 0.25 * (0.25 * 0.02 + 0.0049)), "{v}");
 }
 

@@ -7,7 +7,7 @@ fn off_changes_no_bit() {
     for (name, base, theta, drive) in twins() {
         let noise = Noise::new(1, "off", 0);
         let plain = bits(&base.simulate(&theta, &drive, noise).unwrap());
-        for effect in applicable(base.as_ref()) {
+        for effect in applicable(&base) {
             let what = format!("{name}: {effect:?}");
             let magnitudes = effect.magnitudes();
             let twin = augment(base.clone(), vec![effect]).unwrap();
@@ -33,7 +33,7 @@ fn all_off_together_change_no_bit() {
     for (name, base, mut theta, drive) in twins() {
         let noise = Noise::new(2, "off", 0);
         let plain = bits(&base.simulate(&theta, &drive, noise).unwrap());
-        let effects = applicable(base.as_ref());
+        let effects = applicable(&base);
         for m in effects.iter().flat_map(|e| e.magnitudes()) {
             theta.push(m.off.unwrap_or(m.starts[0]));
         }
@@ -51,7 +51,7 @@ fn on_changes_the_record() {
     for (name, base, theta, drive) in twins() {
         let noise = Noise::new(3, "on", 0);
         let plain = base.simulate(&theta, &drive, noise).unwrap();
-        for effect in applicable(base.as_ref()) {
+        for effect in applicable(&base) {
             let what = format!("{name}: {effect:?}");
             let magnitudes = effect.magnitudes();
             let twin = augment(base.clone(), vec![effect]).unwrap();
