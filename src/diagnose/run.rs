@@ -32,7 +32,7 @@ use std::time::Instant;
 /// Diagnoses the gap between a twin and records of one real system.
 ///
 /// All records share θ, but for unknown starts. A validation record is used for the test, the order of explanations, and
-/// the share closed. A twin without equations is looked at through ensembles of its simulations instead of a filter; only effects of its
+/// the share closed. The likelihood of a twin without equations is an ensemble's instead of a filter's; only effects of its
 /// signals can then be named. The same seed gives the same bits on any number of threads.
 ///
 /// ```
@@ -48,8 +48,8 @@ use std::time::Instant;
 /// let drive = Drive::autonomous(0.05, 300)?;
 /// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
 /// let record = Record::new(drive, outputs)?;
-/// let explanations = diagnose(&study, &[record], None, &DiagnoseSettings::default(), &Progress::silent())?;
-/// assert_eq!(explanations.verdict, Verdict::NoGap);
+/// let diagnosis = diagnose(&study, &[record], None, &DiagnoseSettings::default(), &Progress::silent())?;
+/// assert_eq!(diagnosis.verdict, Verdict::NoGap);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
