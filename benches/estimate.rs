@@ -5,10 +5,9 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use std::time::Duration;
 use truetwin::estimator::bank::FeatureSimulator;
 use truetwin::estimator::gate::GateTest;
-use truetwin::estimator::{EstimateOptions, PretrainOptions, pretrain};
+use truetwin::estimator::{EstimateOptions, PresetName, PretrainOptions, Project, pretrain};
 use truetwin::evaluate::paper::{Benchmark, MonteCarlo, Scenario, reference_studies};
 use truetwin::progress::Progress;
-use truetwin::study::PresetName;
 use truetwin::twin::Noise;
 
 fn estimates(c: &mut Criterion) {
@@ -28,7 +27,8 @@ fn estimates(c: &mut Criterion) {
         };
         let (theta, record) = plan.record(&study, 0).expect("the paper has this point");
         let twin = study.twin();
-        let preset = study.preset(PresetName::Default);
+        let project = Project::from(&study);
+        let preset = project.recipe(PresetName::Default);
         let simulator = FeatureSimulator::new(twin.clone(), preset.features.as_ref())
             .expect("the features fit the twin");
         let mut group = c.benchmark_group(study.name());

@@ -73,11 +73,12 @@ impl FeatureMap for Gains {
     }
 }
 
-fn study() -> Result<Study, StudyError> {
+fn project() -> Result<Project, StudyError> {
     let plan = RecordPlan::levels(0.1, 300, -3.0, 3.0, 1);
-    Ok(Study::new("amplifier", Amplifier, plan)?.with_features(Gains { ranges: 8 }))
+    let study = Study::new("amplifier", Amplifier, plan)?;
+    Ok(Project::from(study).with_features(Gains { ranges: 8 }))
 }
 
 fn main() -> ExitCode {
-    truetwin::cli::run([study()])
+    truetwin::cli::run([project()])
 }

@@ -2,7 +2,6 @@
 //!
 //! `cargo run --release --example own_twin -- demo`, or check, simulate, pretrain, estimate, diagnose, …
 
-use truetwin::feature::Score;
 use truetwin::network::layers::*;
 use truetwin::prelude::*;
 
@@ -46,13 +45,13 @@ impl HeadArchitecture for Small {
     type Head = (Linear<64, 32>, Tanh, Linear<32, 1>);
 }
 
-fn study() -> Result<Study, StudyError> {
+fn project() -> Result<Project, StudyError> {
     // Records: step in seconds, samples, levels of the input, samples that each is held.
     let records = RecordPlan::levels(0.1, 300, 0.0, 1.0, 20);
-    let study = Study::new("tank", Tank, records)?.with_features(Score::default());
-    Ok(study.with_architecture::<Small>())
+    let study = Study::new("tank", Tank, records)?;
+    Ok(Project::from(study).with_architecture::<Small>())
 }
 
 fn main() -> std::process::ExitCode {
-    truetwin::cli::run([study()])
+    truetwin::cli::run([project()])
 }

@@ -39,7 +39,7 @@
 //! ```
 
 pub use crate::diagnose::{DiagnoseSettings, diagnose};
-pub use crate::estimator::{EstimateOptions, Estimator, PretrainOptions, pretrain};
+pub use crate::estimator::{EstimateOptions, Estimator, PretrainOptions, Project, pretrain};
 pub use crate::progress::Progress;
 pub use crate::record::{Drive, Quantity, Record, Signal};
 pub use crate::study::{RecordPlan, Study, StudyError};

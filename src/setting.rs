@@ -77,3 +77,57 @@ impl SettingError {
         &self.remedy
     }
 }
+
+/// Returns ` (did you mean "…"?)` with the known name nearest to `given`; nothing where none is near.
+pub(crate) fn did_you_mean<'a>(
+    given: &str,
+    known: impl IntoIterator<Item = impl AsRef<str> + 'a>,
+) -> String {
+    let most = given.chars().count().div_ceil(3);
+    let near = (known.into_iter())
+        .map(|name| (edits(given, name.as_ref()), name))
+        .filter(|(edits, _)| *edits <= most)
+        .min_by_key(|(edits, _)| *edits);
+    near.map_or(String::new(), |(_, name)| {
+        format!(" (did you mean \"{}\"?)", name.as_ref())
+    })
+}
+
+/// Returns how many letters have to be inserted, removed, replaced or swapped with their neighbour to turn `a` into `b`.
+fn edits(a: &str, b: &str) -> usize {
+    let letters = |text: &str| text.to_lowercase().chars().take(64).collect::<Vec<char>>();
+    let (a, b) = (letters(a), letters(b));
+    let mut rows = vec![(0..=b.len()).collect::<Vec<usize>>()];
+    for i in 1..=a.len() {
+        let mut row = vec![i];
+        for j in 1..=b.len() {
+            let replaced = rows[i - 1][j - 1] + usize::from(a[i - 1] != b[j - 1]);
+            let mut least = replaced.min(row[j - 1] + 1).min(rows[i - 1][j] + 1);
+            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+                least = least.min(rows[i - 2][j - 2] + 1);
+            }
+            row.push(least);
+        }
+        rows.push(row);
+    }
+    rows[a.len()][b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slip_of_the_keyboard_is_recognised() {
+        let known = ["tanks", "van-der-pol", "state-ceiling@h1"];
+        for (given, expected) in [
+            ("tnaks", " (did you mean \"tanks\"?)"),
+            ("vanderpol", " (did you mean \"van-der-pol\"?)"),
+            ("state-cieling@h1", " (did you mean \"state-ceiling@h1\"?)"),
+            ("pump", ""),
+            ("", ""),
+        ] {
+            assert_eq!(did_you_mean(given, known), expected, "{given}");
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! The options of all verbs, and those that several share. What a verb has of its own stands in its file.
 
 use super::Command as Verbs;
-use crate::study::PresetName;
+use crate::estimator::PresetName;
 use clap::{Args, Command, CommandFactory, Parser, ValueEnum};
 use std::path::PathBuf;
 use std::time::Duration;

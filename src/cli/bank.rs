@@ -51,9 +51,9 @@ impl Verb for Bank {
     }
 
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        let study = context.study(&self.subject)?;
+        let project = context.project(&self.subject)?;
         let plan = BankPlan {
-            study: &study,
+            project: project.clone(),
             preset: self.preset.into(),
             size: self.size,
             seed: context.seed,
@@ -79,7 +79,7 @@ impl Verb for Bank {
         if context.json {
             output::print_json(&json!({
                 "schema": "truetwin.bank/1",
-                "twin": study.name(),
+                "twin": project.study().name(),
                 "folder": self.out,
                 "size": self.size,
                 "seed": context.seed,

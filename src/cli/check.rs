@@ -2,9 +2,9 @@
 
 use super::args::Subject;
 use super::{Context, Failure, Verb, output};
+use crate::estimator::PresetName;
 use crate::progress::Stage;
 use crate::record::{Drive, Signal, Signals};
-use crate::study::PresetName;
 use crate::twin::conformance::{Severity, check};
 use crate::twin::{DigitalTwin, Noise, ParameterSpace, SimulationError, StateSpace};
 use clap::Args;
@@ -28,7 +28,8 @@ impl Verb for Check {
     }
 
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        let study = context.study(&self.subject)?;
+        let project = context.project(&self.subject)?;
+        let study = project.study();
         let drive = study
             .drives()?
             .draw(Noise::new(context.seed, "check input", 0))?;
@@ -40,7 +41,7 @@ impl Verb for Check {
         twin.stage.finish();
         context.progress.checkpoint().map_err(Failure::internal)?;
         if findings.iter().all(|f| f.severity < Severity::Failure) {
-            findings.push(study.check_features(PresetName::Default, &drive, context.seed)?);
+            findings.push(project.check_features(PresetName::Default, &drive, context.seed)?);
         }
         let word = |severity| match severity {
             Severity::Pass => "pass",

@@ -2,9 +2,9 @@
 
 use super::estimate::{show, write_results};
 use super::{Context, Failure, Verb, output};
-use crate::estimator::{EstimateOptions, PretrainOptions, pretrain};
+use crate::estimator::{EstimateOptions, PresetName, PretrainOptions, pretrain};
 use crate::record::{Record, write_record};
-use crate::study::{PresetName, Study};
+use crate::study::Study;
 use crate::twin::Noise;
 use clap::Args;
 use std::path::PathBuf;
@@ -33,12 +33,13 @@ impl Verb for Demo {
         if let Some(out) = &self.out {
             output::check_new(out)?;
         }
-        let study = match &self.twin {
+        let project = match &self.twin {
             Some(name) => context.named(name)?,
-            None => (context.studies.iter().find(|s| s.demo().is_some()))
-                .or(context.studies.first())
+            None => (context.projects.iter().find(|p| p.study().demo().is_some()))
+                .or(context.projects.first())
                 .ok_or_else(|| Failure::user("there is no twin to show"))?,
         };
+        let study = project.study();
         let (record, origin) = match study.demo() {
             Some(record) => (record.clone(), "a record made beforehand by this program"),
             None => (
@@ -56,7 +57,7 @@ impl Verb for Demo {
             epochs: Some(EPOCHS),
             seed: context.seed,
         };
-        let (estimator, _) = pretrain(study, &settings, context.progress)?;
+        let (estimator, _) = pretrain(project, &settings, context.progress)?;
         let settings = EstimateOptions {
             seed: context.seed,
             ..EstimateOptions::default()

@@ -110,7 +110,7 @@ fn first_estimate(
     path: &Path,
     record: &Record,
 ) -> Result<Vec<f64>, Failure> {
-    let estimator = Estimator::load(path, context.studies)?;
+    let estimator = Estimator::load(path, context.projects)?;
     let names = |study: &Study| -> Vec<String> {
         let space = study.twin().parameters();
         space.names().into_iter().map(Into::into).collect()

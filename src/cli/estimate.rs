@@ -42,7 +42,7 @@ impl Verb for Estimate {
         if let Some(out) = &self.out {
             output::check_new(out)?;
         }
-        let estimator = Estimator::load(&self.estimator, context.studies)?;
+        let estimator = Estimator::load(&self.estimator, context.projects)?;
         let record = read_record(&self.record)?;
         let settings = EstimateOptions {
             seed: context.seed,

@@ -2,6 +2,7 @@
 
 use super::Failure;
 use super::args::External;
+use crate::estimator::Project;
 use crate::external::program::{ProgramCommand, ProgramError, ProgramSettings, ProgramTwin};
 use crate::study::Study;
 use std::path::Path;
@@ -10,7 +11,7 @@ use std::time::Duration;
 /// The study of the program or FMU that the call names, beside `registered` ones; `None` where it names none.
 ///
 /// Foreign code is started here and nowhere else: no study file and no estimator can name any.
-pub(super) fn study(options: &External, registered: &[Study]) -> Result<Option<Study>, Failure> {
+pub(super) fn study(options: &External, registered: &[Project]) -> Result<Option<Study>, Failure> {
     check_options(options)?;
     let (what, study) = match (&options.program, &options.fmu) {
         (None, None) => return Ok(None),
@@ -18,7 +19,7 @@ pub(super) fn study(options: &External, registered: &[Study]) -> Result<Option<S
         (None, Some(path)) => (path.display().to_string(), fmu(options, path)?),
     };
     let name = study.name();
-    if registered.iter().any(|other| other.name() == name) {
+    if registered.iter().any(|other| other.study().name() == name) {
         return Err(Failure::user(format!(
             "{what} calls its twin \"{name}\", which is registered already; let it have another name"
         )));

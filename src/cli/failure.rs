@@ -64,17 +64,29 @@ impl Failure {
         }
     }
 
-    /// A wrong call, in one line.
+    /// A wrong call, in one line with the remedy.
     pub fn usage(error: &clap::Error) -> Self {
-        if error.kind() == clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        use clap::error::{ContextKind, ContextValue, ErrorKind};
+        if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
             return Self::user("no verb given; see `truetwin --help`, or try `truetwin demo`");
         }
         let text = error.to_string();
         let first = text.split("\n\n").next().unwrap_or(&text);
         let line = first.split_whitespace().collect::<Vec<_>>().join(" ");
         let line = line.strip_prefix("error: ").unwrap_or(&line);
+        let similar = [
+            ContextKind::SuggestedSubcommand,
+            ContextKind::SuggestedArg,
+            ContextKind::SuggestedValue,
+        ];
+        let near = similar.iter().find_map(|kind| match error.get(*kind)? {
+            ContextValue::String(name) => Some(name.clone()),
+            ContextValue::Strings(names) => names.first().cloned(),
+            _ => None,
+        });
+        let near = near.map_or(String::new(), |name| format!(" (did you mean {name}?)"));
         Self::user(format!(
-            "{line}; see `truetwin --help` and `truetwin VERB --help`"
+            "{line}{near}; see `truetwin --help` and `truetwin VERB --help`"
         ))
     }
 

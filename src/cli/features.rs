@@ -37,9 +37,9 @@ impl Verb for Features {
         if let Some(out) = &self.out {
             output::check_new(out)?;
         }
-        let study = context.study(&self.subject)?;
-        let recipe = &study.preset(self.preset.into()).features;
-        let map = study.features(recipe.as_ref())?;
+        let project = context.project(&self.subject)?;
+        let study = project.study();
+        let map = (project.recipe(self.preset.into()).features).bind(study.twin())?;
         let mut all = Vec::new();
         let stage = context.progress.stage("records", self.records.len());
         for path in &self.records {

@@ -35,6 +35,7 @@ mod stop;
 mod twins;
 mod withheld;
 
+use crate::estimator::Project;
 use crate::progress::Progress;
 use crate::storage::work::{Share, Team};
 use crate::study::{Study, StudyError, StudyFile};
@@ -48,12 +49,14 @@ use std::process::ExitCode;
 /// More threads than any machine has cores are a slip of the keyboard.
 const MOST_THREADS: usize = 1024;
 
-/// Runs the command line of this process over `studies`.
-pub fn run<E: Into<StudyError>>(studies: impl IntoIterator<Item = Result<Study, E>>) -> ExitCode {
-    run_from(studies, std::env::args_os())
+/// Runs the command line of this process over studies or projects.
+pub fn run<P: Into<Project>, E: Into<StudyError>>(
+    projects: impl IntoIterator<Item = Result<P, E>>,
+) -> ExitCode {
+    run_from(projects, std::env::args_os())
 }
 
-/// Runs the command line `arguments`, the program's name first, over `studies`.
+/// Runs the command line `arguments`, the program's name first, over studies or projects.
 ///
 /// ```
 /// use std::process::ExitCode;
@@ -64,8 +67,8 @@ pub fn run<E: Into<StudyError>>(studies: impl IntoIterator<Item = Result<Study, 
 /// let code = truetwin::cli::run_from(studies, ["mine", "twins", "--json"]);
 /// assert_eq!(code, ExitCode::SUCCESS);
 /// ```
-pub fn run_from<E: Into<StudyError>>(
-    studies: impl IntoIterator<Item = Result<Study, E>>,
+pub fn run_from<P: Into<Project>, E: Into<StudyError>>(
+    projects: impl IntoIterator<Item = Result<P, E>>,
     arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>,
 ) -> ExitCode {
     let team = match Team::join() {
@@ -95,12 +98,14 @@ pub fn run_from<E: Into<StudyError>>(
         .and_then(|word| Some(Path::new(word).file_stem()?.to_str()?.to_owned()))
         .unwrap_or_else(|| "truetwin".into());
     stop::listen();
-    let studies: Result<Vec<Study>, E> = studies.into_iter().collect();
-    let result = studies
+    let projects: Result<Vec<Project>, E> = (projects.into_iter())
+        .map(|project| project.map(Into::into))
+        .collect();
+    let result = projects
         .map_err(|error| Failure::from(error.into()))
-        .and_then(|studies| {
+        .and_then(|projects| {
             in_pool(parsed.threads, || {
-                dispatch(&parsed, &program, &studies, &team)
+                dispatch(&parsed, &program, &projects, &team)
             })
         });
     match result {
@@ -140,17 +145,17 @@ fn in_pool<R: Send>(
 fn dispatch(
     arguments: &Arguments,
     program: &str,
-    studies: &[Study],
+    registered: &[Project],
     team: &Team,
 ) -> Result<ExitCode, Failure> {
     let progress = match team.leads() {
         true => progress::bars(),
         false => progress::bars().unshown(),
     };
-    let external = external::study(&arguments.external, studies)?;
-    let studies: Vec<Study> = studies.iter().chain(&external).cloned().collect();
+    let external = external::study(&arguments.external, registered)?.map(Project::from);
+    let projects: Vec<Project> = registered.iter().chain(&external).cloned().collect();
     let context = Context {
-        studies: &studies,
+        projects: &projects,
         external: external.as_ref(),
         program,
         json: arguments.json,
@@ -228,9 +233,9 @@ trait Verb {
 /// What every verb sees.
 struct Context<'a> {
     /// All there are, the external one among them.
-    studies: &'a [Study],
+    projects: &'a [Project],
     /// The one that this call brings along.
-    external: Option<&'a Study>,
+    external: Option<&'a Project>,
     /// What the command is called.
     program: &'a str,
     json: bool,
@@ -242,13 +247,18 @@ struct Context<'a> {
 impl Context<'_> {
     /// The study that `--twin` or `--study` names, else the one that the call brings along.
     fn study(&self, subject: &Subject) -> Result<Study, Failure> {
+        Ok(self.project(subject)?.study().clone())
+    }
+
+    /// As [`study`](Self::study), with the recipes.
+    fn project(&self, subject: &Subject) -> Result<Project, Failure> {
         match (&subject.twin, &subject.study) {
             (Some(name), _) => Ok(self.named(name)?.clone()),
             (None, Some(path)) => {
                 let file = StudyFile::read(path).map_err(StudyError::from)?;
                 let at = |failure: Failure| failure.within(path);
-                let study = self.named(&file.twin).map_err(at)?;
-                study.configure(&file).map_err(|error| at(error.into()))
+                let project = self.named(&file.twin).map_err(at)?;
+                project.configure(&file).map_err(|error| at(error.into()))
             }
             (None, None) => (self.external.cloned()).ok_or_else(|| {
                 Failure::user(
@@ -269,14 +279,14 @@ impl Context<'_> {
         }
     }
 
-    fn named(&self, name: &str) -> Result<&Study, Failure> {
-        let found = self.studies.iter().find(|study| study.name() == name);
-        Ok(found.ok_or_else(|| StudyError::Twin {
+    fn named(&self, name: &str) -> Result<&Project, Failure> {
+        let project = (self.projects.iter()).find(|project| project.study().name() == name);
+        Ok(project.ok_or_else(|| StudyError::Twin {
             given: name.into(),
             known: self
-                .studies
+                .projects
                 .iter()
-                .map(Study::name)
+                .map(|project| project.study().name())
                 .collect::<Vec<_>>()
                 .join(", "),
         })?)

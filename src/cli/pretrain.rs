@@ -4,9 +4,8 @@ use super::args::{PresetArgument, Subject, seconds};
 use super::{Context, Failure, Verb, output};
 use crate::estimator::bank::{Bank, file};
 use crate::estimator::shards::{BankPlan, ShardedBank};
-use crate::estimator::{GivenBank, PretrainOptions, Pretraining};
+use crate::estimator::{GivenBank, PretrainOptions, Pretraining, Project};
 use crate::storage::work::checksum;
-use crate::study::Study;
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -54,7 +53,8 @@ impl Verb for Pretrain {
 
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         output::check_folder(&self.out)?;
-        let study = context.study(&self.subject)?;
+        let project = context.project(&self.subject)?;
+        let study = project.study();
         let clock = Instant::now();
         let settings = PretrainOptions {
             preset: self.preset.into(),
@@ -62,11 +62,11 @@ impl Verb for Pretrain {
             epochs: self.epochs,
             seed: context.seed,
         };
-        let pretraining = Pretraining::new(&study, settings).with_checkpoints(self.checkpoint);
+        let pretraining = Pretraining::new(&project, settings).with_checkpoints(self.checkpoint);
         let (estimator, history) = match &self.bank {
             None => pretraining.write(&self.out, context.progress)?,
             Some(path) => {
-                let (bank, checksum) = given(&study, path, &settings)?;
+                let (bank, checksum) = given(&project, path, &settings)?;
                 let bank = bank.as_ref();
                 (pretraining.with_bank(GivenBank { bank, checksum }))
                     .write(&self.out, context.progress)?
@@ -105,17 +105,17 @@ impl Verb for Pretrain {
 
 /// A bank that is there, and its checksum.
 fn given(
-    study: &Study,
+    project: &Project,
     path: &Path,
     settings: &PretrainOptions,
 ) -> Result<(Box<dyn Bank>, String), Failure> {
     if file::is_named(path) {
-        let bank = file::read(path, &study.twin().parameters().names())?;
+        let bank = file::read(path, &project.study().twin().parameters().names())?;
         return Ok((Box::new(bank), checksum(path)?));
     }
     let bank = ShardedBank::open(path)?;
     let plan = BankPlan {
-        study,
+        project: project.clone(),
         preset: settings.preset,
         size: bank.size(),
         seed: bank.seed(),

@@ -2,7 +2,7 @@
 
 use super::args::{PresetArgument, Subject, at_least_one};
 use super::{Context, Failure, Verb, output};
-use crate::estimator::{Estimator, PretrainError, PretrainOptions, Pretraining, pretrain};
+use crate::estimator::{Estimator, PretrainError, PretrainOptions, Pretraining, Project, pretrain};
 use crate::evaluate::paper::{
     Benchmark, FreeRuns, MeanRuns, MonteCarlo, Origin, Run, Scenario, score,
 };
@@ -107,13 +107,14 @@ impl Verb for Reproduce {
     }
 
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        let study = context.study(&self.subject)?;
+        let project = context.project(&self.subject)?;
         let given = match &self.estimator {
-            Some(path) => Some((path, load(context, path, &study)?)),
+            Some(path) => Some((path, load(context, path, project.study())?)),
             None => None,
         };
         // An estimator carries the setting that it was made for.
-        let study = &(given.as_ref()).map_or(study, |(_, estimator)| estimator.study().clone());
+        let study = (given.as_ref()).map_or(project.study(), |(_, estimator)| estimator.study());
+        let study = &study.clone();
         let plan = MonteCarlo {
             benchmark: Benchmark::of(study),
             scenario: self.scenario.into(),
@@ -135,7 +136,7 @@ impl Verb for Reproduce {
             Some(out) => {
                 let origin = match &given {
                     Some((path, _)) => Origin::File(path),
-                    None => Origin::Trained(&training),
+                    None => Origin::Trained(project.recipe(training.preset), &training),
                 };
                 Some(plan.folder(out, study, origin)?)
             }
@@ -143,8 +144,8 @@ impl Verb for Reproduce {
         };
         let estimator = match (given, &folder) {
             (Some((_, estimator)), _) => estimator,
-            (None, None) => pretrain(study, &training, context.progress)?.0,
-            (None, Some(folder)) => kept(context, study, &training, folder)?,
+            (None, None) => pretrain(&project, &training, context.progress)?.0,
+            (None, Some(folder)) => kept(context, &project, &training, folder)?,
         };
         if let (Some(out), Some(folder)) = (&self.out, &folder) {
             let there = plan
@@ -180,7 +181,7 @@ impl Verb for Reproduce {
 
 /// The estimator of a file, if it is one of this twin.
 fn load(context: &Context<'_>, path: &Path, study: &Study) -> Result<Estimator, Failure> {
-    let estimator = Estimator::load(path, context.studies)?;
+    let estimator = Estimator::load(path, context.projects)?;
     let (made_for, asked) = (estimator.study().name(), study.name());
     if made_for != asked {
         return Err(Failure::user(format!(
@@ -194,13 +195,13 @@ fn load(context: &Context<'_>, path: &Path, study: &Study) -> Result<Estimator, 
 /// The folder's estimator: trained once, then read.
 fn kept(
     context: &Context<'_>,
-    study: &Study,
+    project: &Project,
     training: &PretrainOptions,
     folder: &WorkFolder,
 ) -> Result<Estimator, Failure> {
     let path = folder.file("estimator.est");
     while context.team.leads() && !path.exists() {
-        match Pretraining::new(study, *training).write(&path, context.progress) {
+        match Pretraining::new(project, *training).write(&path, context.progress) {
             // Another job trains the same.
             Err(PretrainError::Work(WorkError::Busy { .. })) => {
                 context.progress.checkpoint().map_err(Failure::internal)?;
@@ -212,7 +213,7 @@ fn kept(
         }
     }
     context.team.wait();
-    Ok(Estimator::load(&path, context.studies)?)
+    Ok(Estimator::load(&path, context.projects)?)
 }
 
 /// `trajectories.svg`, where all records have the same truth, and `first-record.svg`.

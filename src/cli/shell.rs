@@ -103,8 +103,8 @@ impl Verb for Man {
 
 /// The command line with the name of this program, and its twins as values of `--twin`.
 fn command(context: &Context<'_>) -> Command {
-    let names: Vec<String> = (context.studies.iter())
-        .map(|study| study.name().to_owned())
+    let names: Vec<String> = (context.projects.iter())
+        .map(|project| project.study().name().to_owned())
         .collect();
     (args::command().name(context.program.to_owned())).mut_subcommands(|verb| {
         let takes_twin = verb.get_arguments().any(|option| option.get_id() == "twin");

@@ -18,10 +18,18 @@ pub(super) struct Twins {}
 impl Verb for Twins {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         if context.json {
-            let twins: Vec<Value> = context.studies.iter().map(describe).collect();
+            let twins: Vec<Value> = context
+                .projects
+                .iter()
+                .map(|p| describe(p.study()))
+                .collect();
             output::print_json(&json!({ "schema": "truetwin.twins/1", "twins": twins }))?;
         } else {
-            let blocks: Vec<String> = context.studies.iter().map(in_words).collect();
+            let blocks: Vec<String> = context
+                .projects
+                .iter()
+                .map(|p| in_words(p.study()))
+                .collect();
             output::print(&blocks.join("\n"))?;
         }
         Ok(ExitCode::SUCCESS)

@@ -1,25 +1,28 @@
 //! Whether the twin can have made the records.
 
-use super::attribute::{Explanation, explanations};
-use super::base_fit::{ITERATIONS, base_fit};
-use super::candidate::{candidates, not_tested};
-use super::evalue::{combined, log_e};
-use super::fit::{Fitted, fit};
-use super::null::{Bench, Nulls, Test};
-use super::problem::Problem;
-use super::result::{Detection, Verdict};
-use super::verdict::{left_the_prior, verdict};
-use super::{DiagnoseError, DiagnoseSettings, Setting};
+use crate::diagnose::context::Context;
+use crate::diagnose::error::DiagnoseError;
+use crate::diagnose::explain::attribute::{Explanation, explanations};
+use crate::diagnose::explain::evalue::{combined, log_e};
+use crate::diagnose::explain::verdict::{left_the_prior, verdict};
+use crate::diagnose::fitting::base_fit::{ITERATIONS, base_fit};
+use crate::diagnose::fitting::climb::{Fitted, fit};
+use crate::diagnose::fitting::problem::Problem;
+use crate::diagnose::hypotheses::candidate::{candidates, not_tested};
+use crate::diagnose::outcome::{Detection, Verdict};
+use crate::diagnose::settings::DiagnoseSettings;
+use crate::diagnose::test::fitted_twin::FittedTwin;
+use crate::diagnose::test::null::{NullDistribution, Test};
 use crate::progress::Progress;
 use crate::record::Record;
-use crate::twin::{DigitalTwin, Noise, Now, Role};
+use crate::twin::{Noise, Role};
 
 /// The twin, fitted and tested.
-pub(super) struct Detected<'a> {
+pub(in crate::diagnose) struct Detected<'a> {
     /// The refitted twin with everything that records are looked at with.
-    pub bench: Bench<'a>,
+    pub bench: FittedTwin<'a>,
     /// What simulations of it look like.
-    pub nulls: Nulls,
+    pub nulls: NullDistribution,
     pub test: Test,
     pub detection: Detection,
     pub verdict: Verdict,
@@ -32,24 +35,24 @@ pub(super) struct Detected<'a> {
 }
 
 /// Fits the twin to the records, and tests it.
-pub(super) fn detect<'a>(
-    setting: &Setting<'a>,
+pub(in crate::diagnose) fn detect<'a>(
+    context: &Context<'a>,
     records: &'a [Record],
     settings: &DiagnoseSettings,
     noise: Noise,
     progress: &Progress,
 ) -> Result<Detected<'a>, DiagnoseError> {
-    let problem = Problem::of_twin(setting.twin, records);
+    let problem = Problem::of_twin(context.twin, records);
     let stage = progress.stage("fit", 1);
     let fitted = base_fit(&problem, settings, noise)?.ok_or(DiagnoseError::NoFit)?;
     stage.tick()?;
-    let mut all = candidates(setting.study, &settings.without)?;
-    if setting.follows {
+    let mut all = candidates(context.study, &settings.without)?;
+    if context.follows {
         all.retain(|c| c.is_listed() && !c.is_noise());
     }
-    let not_tested = not_tested(setting.study, &all);
-    let bench =
-        (setting.bench(problem.clone(), fitted.clone(), &[], all)?).ok_or(DiagnoseError::NoFit)?;
+    let not_tested = not_tested(context.study, &all);
+    let bench = (FittedTwin::new(context.twin, problem.clone(), fitted.clone(), &[], all)?)
+        .ok_or(DiagnoseError::NoFit)?;
     let stage = progress.stage("test", settings.replicates);
     // With a validation record, p is twice the rank's; and without one it is not to end at the edge of the level.
     let level = 0.5 * settings.alpha;
@@ -63,8 +66,8 @@ pub(super) fn detect<'a>(
     let test = nulls.test();
     let mut found = None;
     let mut e_value = None;
-    if let Some(records) = setting.validation {
-        let list = explained(setting, &bench, &nulls, progress)?;
+    if let Some(records) = context.validation {
+        let list = explained(context, &bench, &nulls, progress)?;
         e_value = against(&problem, &fitted, records, &list)?;
         found = Some(list);
     }
@@ -89,34 +92,14 @@ pub(super) fn detect<'a>(
 }
 
 /// Every candidate, fitted.
-pub(super) fn explained(
-    setting: &Setting<'_>,
-    bench: &Bench<'_>,
-    nulls: &Nulls,
+pub(in crate::diagnose) fn explained(
+    context: &Context<'_>,
+    bench: &FittedTwin<'_>,
+    nulls: &NullDistribution,
     progress: &Progress,
 ) -> Result<Vec<Explanation>, DiagnoseError> {
     let stage = progress.stage("explain", bench.dictionary.candidates.len());
-    explanations(bench, &nulls.own, setting.validation, None, &stage)
-}
-
-/// Whether no state of the twin is noisy, with any noise level that the study leaves open; nobody knows of a black box.
-pub(super) fn without_process_noise(twin: &dyn DigitalTwin, record: &Record) -> bool {
-    let Some(twin) = twin.state_space() else {
-        return false;
-    };
-    let outline = twin.outline();
-    let theta = outline.parameters.centre();
-    let drive = record.drive();
-    let now = Now {
-        t: 0.0,
-        dt: drive.dt(),
-        u: drive.input(0),
-        theta: &theta,
-    };
-    let mut process = vec![0.0; outline.states.len()];
-    let mut measurement = vec![0.0; outline.outputs.len()];
-    twin.noise(&now, &mut process, &mut measurement);
-    process.iter().all(|q| *q == 0.0)
+    explanations(bench, &nulls.own, context.validation, None, &stage)
 }
 
 /// log E of the validation record against the twin refitted on it.

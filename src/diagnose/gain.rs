@@ -1,13 +1,16 @@
 //! What a known effect would gain: the yardstick of trials whose truth is known.
 
-use super::attribute::{elsewhere, explanations};
-use super::base_fit::base_fit;
-use super::black_box::measured;
-use super::candidate::{Candidate, candidates};
-use super::decide::grown;
-use super::problem::Problem;
-use super::run::check;
-use super::{DiagnoseError, DiagnoseSettings, Setting};
+use crate::diagnose::context::Context;
+use crate::diagnose::error::DiagnoseError;
+use crate::diagnose::explain::attribute::{elsewhere, explanations};
+use crate::diagnose::explain::step::grown;
+use crate::diagnose::fitting::base_fit::base_fit;
+use crate::diagnose::fitting::problem::Problem;
+use crate::diagnose::hypotheses::candidate::{Candidate, candidates};
+use crate::diagnose::run::check;
+use crate::diagnose::settings::DiagnoseSettings;
+use crate::diagnose::test::fitted_twin::FittedTwin;
+use crate::likelihood::ensemble::measured;
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::study::Study;
@@ -42,13 +45,13 @@ pub fn gain_of(
         return Ok(None);
     }
     let validation: Option<Vec<Record>> = validation.map(|v| vec![v.clone()]);
-    let setting = Setting::new(study, &twin, records, validation.as_deref(), None);
-    let problem = Problem::of_twin(setting.twin, records);
+    let context = Context::new(study, &twin, records, validation.as_deref(), None);
+    let problem = Problem::of_twin(context.twin, records);
     let noise = Noise::new(settings.seed, "diagnose", 0);
     let Some(fitted) = base_fit(&problem, settings, noise)? else {
         return Ok(None);
     };
-    let Some(mut bench) = setting.bench(problem, fitted, &[], named)? else {
+    let Some(mut bench) = FittedTwin::new(context.twin, problem, fitted, &[], named)? else {
         return Ok(None);
     };
     let mut accepted = vec![];
@@ -58,13 +61,13 @@ pub fn gain_of(
         let Some(look) = bench.own_look()? else {
             return Ok(None);
         };
-        let found = explanations(&bench, &look, setting.validation, None, &stage)?;
+        let found = explanations(&bench, &look, context.validation, None, &stage)?;
         let Some(best) = found.first() else {
             return Ok(None);
         };
         gain += best.gain + best.validation.unwrap_or(0.0);
         if left > 0 {
-            let Some(step) = grown(&setting, &bench, &accepted, best, 1.0)? else {
+            let Some(step) = grown(&context, &bench, &accepted, best, 1.0)? else {
                 return Ok(None);
             };
             (bench, accepted) = (step.bench, step.accepted);
@@ -90,8 +93,8 @@ pub fn held_out_score(
     let (records, held_out) = ([record], [held_out]);
     check(study, &records, Some(&held_out[0]), settings)?;
     let twin = measured(study.twin(), &records)?;
-    let setting = Setting::new(study, &twin, &records, Some(&held_out), None);
-    let problem = Problem::of_twin(setting.twin, &records);
+    let context = Context::new(study, &twin, &records, Some(&held_out), None);
+    let problem = Problem::of_twin(context.twin, &records);
     let noise = Noise::new(settings.seed, "diagnose", 0);
     let Some(fitted) = base_fit(&problem, settings, noise)? else {
         return Ok(None);
@@ -101,14 +104,14 @@ pub fn held_out_score(
     }
     let mut all = candidates(study, &settings.without)?;
     all.retain(Candidate::is_listed);
-    let Some(bench) = setting.bench(problem, fitted, &[], all)? else {
+    let Some(bench) = FittedTwin::new(context.twin, problem, fitted, &[], all)? else {
         return Ok(None);
     };
     let Some(look) = bench.own_look()? else {
         return Ok(None);
     };
     let stage = progress.unseen();
-    let found = explanations(&bench, &look, setting.validation, None, &stage)?;
+    let found = explanations(&bench, &look, context.validation, None, &stage)?;
     Ok((found.iter())
         .filter_map(|e| e.validation_likelihood)
         .reduce(f64::max))

@@ -1,21 +1,25 @@
 //! The way of one diagnosis.
 
-use super::attribute::Explanation;
-use super::black_box::{dithered, measured};
-use super::candidate::Addition;
-use super::decide::{Accepted, Answer, Step, decide};
-use super::detect::{Detected, detect, explained};
-use super::held_out::shrinkage;
-use super::map::Maps;
-use super::next_input::next_input;
-use super::null::Bench;
-use super::place::{locate, maps};
-use super::power::power;
-use super::result::*;
-use super::shrink::{Runner, free_runs};
-use super::summary::{fitted_parameters, reported};
-use super::verdict::absorbing;
-use super::{DiagnoseError, DiagnoseSettings, GivenRecord, Setting};
+use crate::diagnose::context::Context;
+use crate::diagnose::detect::{Detected, detect, explained};
+use crate::diagnose::error::{DiagnoseError, GivenRecord};
+use crate::diagnose::explain::attribute::Explanation;
+use crate::diagnose::explain::decide::{Answer, decide};
+use crate::diagnose::explain::step::{Accepted, Step};
+use crate::diagnose::explain::verdict::absorbing;
+use crate::diagnose::hypotheses::candidate::Addition;
+use crate::diagnose::locate::location::{locate, maps};
+use crate::diagnose::outcome::Maps;
+use crate::diagnose::outcome::*;
+use crate::diagnose::quantify::held_out::shrinkage;
+use crate::diagnose::quantify::next_input::next_input;
+use crate::diagnose::quantify::power::power;
+use crate::diagnose::settings::DiagnoseSettings;
+use crate::diagnose::summary::{fitted_parameters, reported};
+use crate::diagnose::test::fitted_twin::FittedTwin;
+use crate::diagnose::test::free_run::{Runner, free_runs};
+use crate::likelihood::ensemble::dithered;
+use crate::likelihood::ensemble::measured;
 use crate::math::six_digits;
 use crate::progress::Progress;
 use crate::record::Record;
@@ -74,8 +78,8 @@ pub fn diagnose(
     let validation: Option<Vec<Record>> = validation.map(|v| vec![v.clone()]);
     let validation = validation.as_deref();
     let together = validation.map(|v| [records, v].concat());
-    let setting = Setting::new(study, &twin, records, validation, together.as_deref());
-    let mut detected = detect(&setting, records, settings, noise, progress)?;
+    let context = Context::new(study, &twin, records, validation, together.as_deref());
+    let mut detected = detect(&context, records, settings, noise, progress)?;
     let Attributed {
         answer,
         step,
@@ -84,7 +88,7 @@ pub fn diagnose(
         found,
     } = match settings.detection_only {
         true => Attributed::nothing(),
-        false => attribute(&setting, &mut detected, settings, noise, progress)?,
+        false => attribute(&context, &mut detected, settings, noise, progress)?,
     };
     let Detected { bench, nulls, .. } = &detected;
     let structural = detected.verdict == Verdict::StructuralGap;
@@ -94,7 +98,7 @@ pub fn diagnose(
         if let Some(found) = found.as_deref().filter(|_| structural) {
             let alpha = settings.alpha;
             (place, discovery) =
-                locate(&setting, &detected, found, &answer, alpha, noise, progress)?;
+                locate(&context, &detected, found, &answer, alpha, noise, progress)?;
             place.after = after;
             if answer.decision == Decision::Class {
                 let stage = progress.stage("next input", 1);
@@ -107,7 +111,7 @@ pub fn diagnose(
         stage.tick()?;
         let found = found.as_deref();
         shrunk = shrinkage(
-            &setting,
+            &context,
             bench,
             step.as_ref(),
             &answer,
@@ -118,10 +122,10 @@ pub fn diagnose(
         stage.tick()?;
     }
     let last = step.as_ref().map_or(bench, |step| &step.bench);
-    let space = setting.twin.parameters();
+    let space = context.twin.parameters();
     let (parameters, nuisance) =
         fitted_parameters(&space.iter().collect::<Vec<_>>(), last, settings);
-    let runs = |record: &Record| beside(&setting, bench, last, &answer, record);
+    let runs = |record: &Record| beside(&context, bench, last, &answer, record);
     Ok(Diagnosis {
         twin: study.name().into(),
         verdict: detected.verdict,
@@ -178,7 +182,7 @@ impl Attributed<'_> {
 }
 
 fn attribute<'a>(
-    setting: &Setting<'a>,
+    context: &Context<'a>,
     detected: &mut Detected<'a>,
     settings: &DiagnoseSettings,
     noise: Noise,
@@ -196,10 +200,10 @@ fn attribute<'a>(
         (Verdict::StructuralGap, _) => {
             let list = match all.found.take() {
                 Some(list) => list,
-                None => explained(setting, bench, nulls, progress)?,
+                None => explained(context, bench, nulls, progress)?,
             };
             let stage = progress.stage("accept", 2 * settings.unexplained);
-            let decided = decide(setting, bench, &list, settings, noise, &stage)?;
+            let decided = decide(context, bench, &list, settings, noise, &stage)?;
             stage.finish();
             let added = decided.step.as_ref().or(decided.best.as_ref());
             if let (Some(added), Some(left)) = (added, &decided.left) {
@@ -228,15 +232,15 @@ fn attribute<'a>(
 
 /// Free runs beside a record: of the twin, and with the accepted effects.
 fn beside(
-    setting: &Setting<'_>,
-    bench: &Bench<'_>,
-    last: &Bench<'_>,
+    context: &Context<'_>,
+    bench: &FittedTwin<'_>,
+    last: &FittedTwin<'_>,
     answer: &Answer,
     record: &Record,
 ) -> Result<FreeRuns, DiagnoseError> {
-    let runner = |bench: &Bench<'_>, additions: &[Addition]| {
+    let runner = |bench: &FittedTwin<'_>, additions: &[Addition]| {
         let theta = bench.problem.of_record(0, &bench.fitted.theta);
-        Runner::new(setting.twin, additions, theta)
+        Runner::new(context.twin, additions, theta)
     };
     let additions: Vec<Addition> = answer.accepted.iter().map(|a| a.addition.clone()).collect();
     let grown = match additions.is_empty() {
@@ -246,7 +250,7 @@ fn beside(
     Ok(free_runs(record, &runner(bench, &[])?, grown.as_ref()))
 }
 
-pub(super) fn check(
+pub(in crate::diagnose) fn check(
     study: &Study,
     records: &[Record],
     validation: Option<&Record>,

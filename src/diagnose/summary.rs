@@ -1,18 +1,20 @@
 //! What was found, in the words of a report.
 
-use super::DiagnoseSettings;
-use super::attribute::{Explanation, probabilities};
-use super::decide::{Answer, magnitudes};
-use super::null::{Bench, Test};
-use super::result::{EffectFit, FittedNuisance, FittedParameter};
+use crate::diagnose::explain::attribute::{Explanation, probabilities};
+use crate::diagnose::explain::decide::Answer;
+use crate::diagnose::explain::step::magnitudes;
+use crate::diagnose::outcome::{EffectFit, FittedNuisance, FittedParameter};
+use crate::diagnose::settings::DiagnoseSettings;
+use crate::diagnose::test::fitted_twin::FittedTwin;
+use crate::diagnose::test::null::Test;
 use crate::twin::{PRIOR_DEVIATION, Parameter, Role};
 
 /// Explanations that are reported.
 const REPORTED: usize = 12;
 
 /// Explanations as they are reported: the accepted ones first.
-pub(super) fn reported(
-    bench: &Bench<'_>,
+pub(in crate::diagnose) fn reported(
+    bench: &FittedTwin<'_>,
     found: &[Explanation],
     test: &Test,
     answer: &Answer,
@@ -53,9 +55,9 @@ pub(super) fn reported(
 }
 
 /// The twin's own parameters, and everything else that the study estimates.
-pub(super) fn fitted_parameters(
+pub(in crate::diagnose) fn fitted_parameters(
     space: &[&Parameter],
-    bench: &Bench<'_>,
+    bench: &FittedTwin<'_>,
     settings: &DiagnoseSettings,
 ) -> (Vec<FittedParameter>, Vec<FittedNuisance>) {
     let errors = bench.fitted.std_errors(&bench.problem);

@@ -90,9 +90,10 @@ impl Catalogue {
                     Some(OtherState::To) if known.len() == 1 => vec![Some(target)],
                     Some(OtherState::From | OtherState::To) => rest().map(Some).collect(),
                 };
-                effects.extend((others.into_iter()).map(|other| {
-                    Effect::new(kind.clone(), target, other.map(String::as_str))
-                }));
+                effects.extend(
+                    (others.into_iter())
+                        .map(|other| Effect::new(kind.clone(), target, other.map(String::as_str))),
+                );
             }
         }
         effects

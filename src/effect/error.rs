@@ -1,5 +1,6 @@
 //! The error of this room.
 
+use crate::setting::did_you_mean;
 use crate::twin::Interval;
 use std::path::PathBuf;
 
@@ -29,7 +30,7 @@ pub enum EffectError {
         problem: String,
     },
     /// An id that neither the library nor the study has.
-    #[error("unknown id \"{id}\"; choose one of {known}")]
+    #[error("unknown id \"{id}\"{}; choose one of {known}", did_you_mean(id, known.split(", ")))]
     Unknown {
         /// The id.
         id: String,
@@ -61,7 +62,7 @@ pub enum EffectError {
         state: String,
     },
     /// The target, or the other state, does not exist.
-    #[error("effect {id}: the twin has no {what} \"{name}\"; choose one of {known}")]
+    #[error("effect {id}: the twin has no {what} \"{name}\"{}; choose one of {known}", did_you_mean(name, known.split(", ")))]
     Target {
         /// Effect.
         id: String,
@@ -81,7 +82,7 @@ pub enum EffectError {
         id: String,
     },
     /// A magnitude that the effect does not have.
-    #[error("effect {id} has no magnitude \"{name}\"; it has {known}")]
+    #[error("effect {id} has no magnitude \"{name}\"{}; it has {known}", did_you_mean(name, known.split(", ")))]
     Magnitude {
         /// Effect.
         id: String,

@@ -1,13 +1,12 @@
 //! The cloud of fresh simulations around θ_GN.
 
-use super::EstimateError;
+use super::{EstimateError, Settings};
 use crate::estimator::bank::{Draw, Draws, FeatureSimulator};
 use crate::estimator::refine::Refined;
 use crate::estimator::sample::{EigenBox, Sampler};
 use crate::feature::Centred;
 use crate::progress::Progress;
 use crate::record::Drive;
-use crate::study::Settings;
 use crate::twin::{Interval, Noise};
 use std::borrow::Cow;
 

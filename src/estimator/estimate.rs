@@ -4,7 +4,7 @@ use super::calibration::Spread;
 use super::cloud::{Around, cloud};
 use super::tracking::track;
 use super::tune::tune;
-use super::{Estimator, Tracking};
+use super::{Estimator, PresetName, Settings, Tracking};
 use crate::estimator::bank::{BankError, Draws, FeatureSimulator};
 use crate::estimator::gate::{GateError, GateForm, GateOutcome, GateTest};
 use crate::estimator::refine::{Information, RefineError, RefineSettings, Refined, Refinement};
@@ -14,7 +14,7 @@ use crate::network::NetworkError;
 use crate::progress::{Cancelled, Progress};
 use crate::record::Record;
 use crate::setting::SettingError;
-use crate::study::{PresetName, Settings, StudyError};
+use crate::study::StudyError;
 use crate::twin::{Noise, Role};
 use nalgebra::DVector;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -207,12 +207,12 @@ impl Estimator {
         progress: &Progress,
     ) -> Result<Estimate, EstimateError> {
         let clock = Instant::now();
-        self.study.check_record(record)?;
+        self.study().check_record(record)?;
         if let Some(validation) = &options.validation {
-            self.study.check_record(validation)?;
+            self.study().check_record(validation)?;
         }
         let settings = match options.preset {
-            Some(name) if name != self.preset => &self.study.preset(name).settings,
+            Some(name) if name != self.preset => &self.project.recipe(name).settings,
             _ => &self.settings,
         };
         settings.check()?;
@@ -341,7 +341,7 @@ impl Run<'_> {
             GateForm::Paper => test.at(initial)?,
             GateForm::Calibrated => {
                 // The hypothesis is a θ in the prior; the network extrapolates, and errs, beyond.
-                let space = self.estimator.study.twin().parameters();
+                let space = self.estimator.study().twin().parameters();
                 let initial: Vec<f64> = (space.iter().zip(initial))
                     .map(|(p, v)| p.prior.clamp(*v))
                     .collect();
@@ -378,7 +378,7 @@ impl Run<'_> {
         simulator: &FeatureSimulator,
         initial: &[f64],
     ) -> Result<Outcome, EstimateError> {
-        let space = self.estimator.study.twin().parameters();
+        let space = self.estimator.study().twin().parameters();
         let spread = (self.estimator.calibration).spread(initial, &space.widths(), INTERVAL_LEVEL);
         let unknown = || Spread::normal(vec![f64::NAN; initial.len()], INTERVAL_LEVEL);
         // The estimate stands whether or not its directions can be told.

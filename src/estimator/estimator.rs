@@ -2,11 +2,12 @@
 
 use super::calibration::Calibration;
 use super::readout::Readout;
+use super::{PresetName, Project, Settings};
 use crate::estimator::bank::FeatureSimulator;
 use crate::feature::{FeatureError, FeatureRecipe};
 use crate::network::{Architecture, Network, NetworkError};
 use crate::record::Record;
-use crate::study::{PresetName, Settings, Study};
+use crate::study::Study;
 use nalgebra::DVector;
 use ndarray::Array2;
 use std::sync::Arc;
@@ -16,7 +17,7 @@ use std::sync::Arc;
 /// It is never modified: tuning on a record makes new heads.
 #[derive(Clone)]
 pub struct Estimator {
-    pub(super) study: Study,
+    pub(super) project: Project,
     pub(super) preset: PresetName,
     pub(super) settings: Settings,
     pub(super) recipe: Arc<dyn FeatureRecipe>,
@@ -29,7 +30,7 @@ pub struct Estimator {
 impl std::fmt::Debug for Estimator {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Estimator")
-            .field("study", &self.study)
+            .field("study", self.study())
             .field("preset", &self.preset)
             .field("recipe", &self.recipe)
             .field("architecture", &self.architecture.id())
@@ -41,7 +42,7 @@ impl std::fmt::Debug for Estimator {
 impl Estimator {
     /// The study it was trained for.
     pub fn study(&self) -> &Study {
-        &self.study
+        self.project.study()
     }
 
     /// The preset it was trained with.
@@ -71,7 +72,7 @@ impl Estimator {
 
     /// Twin and features, with a call counter of its own.
     pub fn simulator(&self) -> Result<FeatureSimulator, FeatureError> {
-        FeatureSimulator::new(self.study.twin().clone(), self.recipe.as_ref())
+        FeatureSimulator::new(self.study().twin().clone(), self.recipe.as_ref())
     }
 
     /// Features of a record.
@@ -82,7 +83,7 @@ impl Estimator {
     /// Predictions (rows: samples, columns: parameters) from features, clipped to the physical bounds.
     pub fn predict(&self, features: &Array2<f64>) -> Result<Array2<f64>, NetworkError> {
         let mut theta = self.readout.predict(features)?;
-        let bounds = self.study.twin().parameters().bounds();
+        let bounds = self.study().twin().parameters().bounds();
         for mut row in theta.rows_mut() {
             for (value, bounds) in row.iter_mut().zip(&bounds) {
                 *value = bounds.clamp(*value);

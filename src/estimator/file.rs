@@ -6,12 +6,13 @@
 
 use super::calibration::Calibration;
 use super::readout::Readout;
-use super::{Estimator, Scaler, Standardiser};
+use super::{Estimator, PresetName, Project, Scaler, Settings, Standardiser};
 use crate::feature::{FeatureError, FeatureRecipe};
 use crate::network::{NamedTensor, NetworkError, bytes_of, values_of};
+use crate::setting::did_you_mean;
 use crate::storage::files::{replace, with_remedy, write_new};
 use crate::storage::untrusted::{MESSAGE, one_line, read};
-use crate::study::{PresetName, Settings, Study, StudyError, StudyFile, StudyFileError};
+use crate::study::{StudyError, StudyFile, StudyFileError};
 use ndarray::Array2;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
@@ -90,7 +91,7 @@ pub enum EstimatorFileError {
         found: u32,
     },
     /// Its twin is not among the known ones.
-    #[error("{}: made for twin \"{twin}\", known are {known}; use the program that has this twin, or name it with --program or --fmu", path.display())]
+    #[error("{}: made for twin \"{twin}\"{}, known are {known}; use the program that has this twin, or name it with --program or --fmu", path.display(), did_you_mean(twin, known.split(", ")))]
     Twin {
         /// File.
         path: PathBuf,
@@ -116,6 +117,14 @@ pub enum EstimatorFileError {
         file: String,
         /// Parameters of the twin.
         twin: String,
+    },
+    /// Its features cannot be taken from the twin's records.
+    #[error("{}: {error}", path.display())]
+    Features {
+        /// File.
+        path: PathBuf,
+        /// Reason.
+        error: FeatureError,
     },
     /// Its study cannot be made.
     #[error("{}: {error}", path.display())]
@@ -165,8 +174,8 @@ impl Estimator {
     /// What the file at `path` holds.
     fn bytes(&self, path: &Path) -> Result<Vec<u8>, EstimatorFileError> {
         let at = At(path);
-        let study = toml::to_string(self.study.file()).map_err(|e| at.foreign(e))?;
-        let space = self.study.twin().parameters();
+        let study = toml::to_string(self.study().file()).map_err(|e| at.foreign(e))?;
+        let space = self.study().twin().parameters();
         let mut header = Header {
             schema: SCHEMA,
             study,
@@ -194,8 +203,16 @@ impl Estimator {
         safetensors::serialize(views, &metadata).map_err(|error| at.foreign(format!("{error:?}")))
     }
 
-    /// Reads a file made for one of `studies`.
-    pub fn load(path: &Path, studies: &[Study]) -> Result<Self, EstimatorFileError> {
+    /// Reads a file made for one of `known`, studies or projects.
+    pub fn load<P>(path: &Path, known: &[P]) -> Result<Self, EstimatorFileError>
+    where
+        for<'a> &'a P: Into<Project>,
+    {
+        let known: Vec<Project> = known.iter().map(Into::into).collect();
+        Self::load_known(path, &known)
+    }
+
+    fn load_known(path: &Path, known: &[Project]) -> Result<Self, EstimatorFileError> {
         let at = At(path);
         let bytes = read(path, MOST).map_err(|e| at.io(e))?;
         let (_, metadata) =
@@ -217,15 +234,16 @@ impl Estimator {
         }
         let file = StudyFile::parse(&header.study, path)
             .map_err(|error: StudyFileError| at.study(error))?;
-        let Some(registered) = studies.iter().find(|s| s.name() == file.twin) else {
-            let known: Vec<_> = studies.iter().map(Study::name).collect();
+        let Some(registered) = known.iter().find(|p| p.study().name() == file.twin) else {
+            let known: Vec<_> = known.iter().map(|p| p.study().name()).collect();
             return Err(EstimatorFileError::Twin {
                 path: path.into(),
                 twin: one_line(&file.twin, MESSAGE),
                 known: known.join(", "),
             });
         };
-        let study = registered.configure(&file).map_err(|e| at.study(e))?;
+        let project = registered.configure(&file).map_err(|e| at.study(e))?;
+        let study = project.study();
         let names = study.twin().parameters().names().join(", ");
         if names != header.names.join(", ") {
             return Err(EstimatorFileError::Parameters {
@@ -234,7 +252,7 @@ impl Estimator {
                 twin: names,
             });
         }
-        let Some(architecture) = study.architecture(&header.architecture) else {
+        let Some(architecture) = project.architecture(&header.architecture) else {
             return Err(EstimatorFileError::Architecture {
                 path: path.into(),
                 architecture: one_line(&header.architecture, MESSAGE),
@@ -248,8 +266,11 @@ impl Estimator {
         let weights = weights(&tensors);
         let network = (architecture.restore(header.inputs, header.outputs, &weights))
             .map_err(|error: NetworkError| at.foreign(error))?;
-        let map = (study.features(header.features.as_ref()))
-            .map_err(|error: FeatureError| at.study(error))?;
+        let map =
+            (header.features.bind(study.twin())).map_err(|error| EstimatorFileError::Features {
+                path: path.into(),
+                error,
+            })?;
         if map.dim() != header.inputs {
             let reason = format!(
                 "{} features, the network reads {}",
@@ -305,7 +326,7 @@ impl Estimator {
             recipe: header.features,
             seed: header.seed,
             architecture,
-            study,
+            project,
         })
     }
 

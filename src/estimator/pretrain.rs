@@ -2,7 +2,9 @@
 
 use super::calibration::Calibration;
 use super::readout::Readout;
-use super::{Estimator, EstimatorFileError, Scaler, Standardiser};
+use super::{
+    Estimator, EstimatorFileError, Inputs, PresetName, Project, Scaler, Settings, Standardiser,
+};
 use crate::estimator::bank::file::BankFileError;
 use crate::estimator::bank::{Bank, BankError, Draws};
 use crate::estimator::shards::{Prior, PriorError, ShardsError};
@@ -12,7 +14,7 @@ use crate::network::{Checkpoints, History, NetworkError, Part, Samples};
 use crate::progress::Progress;
 use crate::setting::SettingError;
 use crate::storage::work::WorkError;
-use crate::study::{Inputs, PlanError, PresetName, Settings, Study};
+use crate::study::PlanError;
 use ndarray::Array2;
 use std::borrow::Cow;
 use std::error::Error;
@@ -132,18 +134,21 @@ pub enum PretrainError {
 ///
 /// Source: Lakshminarayanan, Guerrero & Rojas, section III.
 pub fn pretrain(
-    study: &Study,
+    project: impl Into<Project>,
     options: &PretrainOptions,
     progress: &Progress,
 ) -> Result<(Estimator, History), PretrainError> {
-    let settings = settings(study, options)?;
+    let project = &project.into();
+    let settings = settings(project, options)?;
     let size = settings.bank_size;
     fits_into_memory(size)?;
-    let prior = prior(study, options)?;
+    let prior = prior(project, options)?;
     let stage = progress.stage("bank", size);
     let bank = prior.rows(0..size as u64, options.seed, "bank", &stage)?;
     let nowhere = Checkpoints::none();
-    train(study, options, settings, &prior, &bank, &nowhere, progress)
+    train(
+        project, options, settings, &prior, &bank, &nowhere, progress,
+    )
 }
 
 /// Trains the network on a bank that is there, of this study's prior and the preset's features.
@@ -158,12 +163,13 @@ pub fn pretrain(
 /// ```
 /// use truetwin::progress::Progress;
 /// use truetwin::estimator::shards::Prior;
-/// use truetwin::study::{PresetName, RecordPlan, Study};
+/// use truetwin::study::{RecordPlan, Study};
 /// use truetwin::twins::VanDerPol;
-/// use truetwin::estimator::{PretrainOptions, pretrain_on};
+/// use truetwin::estimator::{PresetName, PretrainOptions, Project, pretrain_on};
 ///
 /// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 100))?;
-/// let features = &study.preset(PresetName::Default).features;
+/// let project = Project::from(&study);
+/// let features = &project.recipe(PresetName::Default).features;
 /// let stage = Progress::silent().stage("bank", 150);
 /// let bank = Prior::new(&study, features.as_ref())?.rows(0..150, 1, "bank", &stage)?;
 ///
@@ -173,17 +179,18 @@ pub fn pretrain(
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn pretrain_on(
-    study: &Study,
+    project: impl Into<Project>,
     bank: &dyn Bank,
     options: &PretrainOptions,
     progress: &Progress,
 ) -> Result<(Estimator, History), PretrainError> {
-    pretrain_from(study, bank, options, &Checkpoints::none(), progress)
+    let project = project.into();
+    pretrain_from(&project, bank, options, &Checkpoints::none(), progress)
 }
 
 /// As [`pretrain_on`], and goes on with what was kept of the training.
 pub(super) fn pretrain_from(
-    study: &Study,
+    project: &Project,
     bank: &dyn Bank,
     options: &PretrainOptions,
     checkpoints: &Checkpoints,
@@ -193,10 +200,10 @@ pub(super) fn pretrain_from(
         bank_size: Some(bank.rows()),
         ..*options
     };
-    let settings = settings(study, &options)?;
-    let prior = prior(study, &options)?;
+    let settings = settings(project, &options)?;
+    let prior = prior(project, &options)?;
     train(
-        study,
+        project,
         &options,
         settings,
         &prior,
@@ -216,10 +223,10 @@ pub(super) fn fits_into_memory(size: usize) -> Result<(), PretrainError> {
 
 /// The preset's numbers with what the options say otherwise, checked.
 pub(super) fn settings(
-    study: &Study,
+    project: &Project,
     options: &PretrainOptions,
 ) -> Result<Settings, PretrainError> {
-    let mut settings = study.preset(options.preset).settings.clone();
+    let mut settings = project.recipe(options.preset).settings.clone();
     settings.bank_size = options.bank_size.unwrap_or(settings.bank_size);
     settings.training.epochs = options.epochs.unwrap_or(settings.training.epochs);
     settings.check()?;
@@ -227,9 +234,9 @@ pub(super) fn settings(
 }
 
 /// The prior through the preset's features, which the network must take.
-pub(super) fn prior(study: &Study, options: &PretrainOptions) -> Result<Prior, PretrainError> {
-    let preset = study.preset(options.preset);
-    let prior = Prior::new(study, preset.features.as_ref())?;
+pub(super) fn prior(project: &Project, options: &PretrainOptions) -> Result<Prior, PretrainError> {
+    let preset = project.recipe(options.preset);
+    let prior = Prior::new(project.study(), preset.features.as_ref())?;
     let most = preset.architecture.max_features();
     if prior.dim() > most {
         return Err(PretrainError::TooManyFeatures {
@@ -242,7 +249,7 @@ pub(super) fn prior(study: &Study, options: &PretrainOptions) -> Result<Prior, P
 }
 
 fn train(
-    study: &Study,
+    project: &Project,
     options: &PretrainOptions,
     settings: Settings,
     prior: &Prior,
@@ -250,14 +257,14 @@ fn train(
     checkpoints: &Checkpoints,
     progress: &Progress,
 ) -> Result<(Estimator, History), PretrainError> {
-    let preset = study.preset(options.preset);
+    let preset = project.recipe(options.preset);
     let seed = options.seed;
     let first = first_rows(bank)?;
     for (what, given, expected) in [
         (
             "parameters",
             first.theta.ncols(),
-            study.twin().parameters().len(),
+            project.study().twin().parameters().len(),
         ),
         ("features", first.features.ncols(), prior.dim()),
     ] {
@@ -289,7 +296,7 @@ fn train(
     let stage = progress.stage("calibration", CALIBRATION);
     let calibration = prior.rows(0..CALIBRATION as u64, seed, "calibration", &stage)?;
     let mut estimator = Estimator {
-        study: study.clone(),
+        project: project.clone(),
         preset: options.preset,
         settings,
         recipe: preset.features.clone(),

@@ -1,13 +1,12 @@
 //! A pretraining that can be interrupted.
 
 use super::pretrain::{fits_into_memory, pretrain_from, prior, settings};
-use super::{Estimator, PretrainError, PretrainOptions};
+use super::{Estimator, PretrainError, PretrainOptions, Project};
 use crate::estimator::bank::{Bank, Draws};
 use crate::estimator::shards::{BankPlan, ShardedBank};
 use crate::network::{Checkpoints, History, NetworkError};
 use crate::progress::Progress;
 use crate::storage::work::{Manifest, Share, WorkFolder};
-use crate::study::Study;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -43,7 +42,7 @@ pub const CHECKPOINT: Duration = Duration::from_secs(10);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Pretraining<'a> {
-    study: &'a Study,
+    project: Project,
     options: PretrainOptions,
     bank: Option<GivenBank<'a>>,
     every: Duration,
@@ -55,19 +54,18 @@ pub struct Pretraining<'a> {
 /// use truetwin::evaluate::paper::reference_studies;
 /// use truetwin::progress::Progress;
 /// use truetwin::estimator::shards::{BankPlan, ShardedBank};
-/// use truetwin::study::PresetName;
-/// use truetwin::estimator::{GivenBank, PretrainOptions, Pretraining};
+/// use truetwin::estimator::{GivenBank, PresetName, PretrainOptions, Pretraining, Project};
 /// use truetwin::storage::work::Share;
 ///
-/// let study = &reference_studies()?[0];
+/// let project = &Project::from(&reference_studies()?[0]);
 /// let (place, silent) = (tempfile::tempdir()?, Progress::silent());
 /// let folder = place.path().join("bank");
-/// let plan = BankPlan { study, preset: PresetName::Default, size: 100, seed: 1 };
+/// let plan = BankPlan { project: project.clone(), preset: PresetName::Default, size: 100, seed: 1 };
 /// plan.fill(&folder, Share::WHOLE, &silent)?;
 /// let bank = ShardedBank::open(&folder)?;
 /// let given = GivenBank { bank: &bank, checksum: bank.checksum() };
 /// let options = PretrainOptions { epochs: Some(1), ..PretrainOptions::default() };
-/// let pretraining = Pretraining::new(study, options).with_bank(given);
+/// let pretraining = Pretraining::new(project, options).with_bank(given);
 /// let (estimator, _) = pretraining.write(&place.path().join("first.est"), &silent)?;
 /// assert_eq!(estimator.settings().bank_size, 100);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -81,9 +79,9 @@ pub struct GivenBank<'a> {
 
 impl<'a> Pretraining<'a> {
     /// On simulations of its own.
-    pub fn new(study: &'a Study, options: PretrainOptions) -> Self {
+    pub fn new(project: impl Into<Project>, options: PretrainOptions) -> Self {
         Self {
-            study,
+            project: project.into(),
             options,
             bank: None,
             every: CHECKPOINT,
@@ -155,18 +153,18 @@ impl<'a> Pretraining<'a> {
                 &simulated
             }
         };
-        pretrain_from(self.study, bank, &self.options, &checkpoints, progress)
+        pretrain_from(&self.project, bank, &self.options, &checkpoints, progress)
     }
 
     /// The bank in the folder, made as far as it is missing, as one part: rows in the order in which they would be without a
     /// folder.
     fn simulated(&self, path: &Path, progress: &Progress) -> Result<Draws, PretrainError> {
-        let size = settings(self.study, &self.options)?.bank_size;
+        let size = settings(&self.project, &self.options)?.bank_size;
         fits_into_memory(size)?;
         // What the network cannot take is said before anything is simulated.
-        prior(self.study, &self.options)?;
+        prior(&self.project, &self.options)?;
         let plan = BankPlan {
-            study: self.study,
+            project: self.project.clone(),
             preset: self.options.preset,
             size,
             seed: self.options.seed,
@@ -177,8 +175,8 @@ impl<'a> Pretraining<'a> {
 
     /// Everything that the estimator depends on.
     fn manifest(&self) -> Result<Manifest, PretrainError> {
-        let preset = self.study.preset(self.options.preset);
-        let mut settings = settings(self.study, &self.options)?;
+        let preset = self.project.recipe(self.options.preset);
+        let mut settings = settings(&self.project, &self.options)?;
         let bank = match &self.bank {
             Some(given) => {
                 settings.bank_size = given.bank.rows();
@@ -187,7 +185,8 @@ impl<'a> Pretraining<'a> {
             None => "simulated".into(),
         };
         Ok(self
-            .study
+            .project
+            .study()
             .manifest(VERB, LAYOUT)?
             .with("features", json!(preset.features))
             .with("network", preset.architecture.id())

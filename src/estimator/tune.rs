@@ -4,12 +4,11 @@ use super::calibration::{Calibration, Spread};
 use super::estimate::INTERVAL_LEVEL;
 use super::estimator::one_row;
 use super::readout::{Layer, Readout};
-use super::{EstimateError, Estimator, Scaler, Standardiser};
+use super::{EstimateError, Estimator, Scaler, Settings, Standardiser};
 use crate::estimator::bank::Draws;
 use crate::estimator::refine::Refined;
 use crate::network::Training;
 use crate::progress::Progress;
-use crate::study::Settings;
 use nalgebra::DVector;
 use ndarray::{Array2, s};
 
@@ -87,7 +86,7 @@ pub fn tune(
         layer,
         network,
     };
-    let space = estimator.study.twin().parameters();
+    let space = estimator.study().twin().parameters();
     let theta = space.clamp(&readout.predict(&one_row(observed))?.row(0).to_vec());
     let calibration = Calibration {
         predicted: readout.predict(&unseen)?,

@@ -1,3 +1,4 @@
 //! Likelihoods of a record: innovations, log-likelihood and score at θ.
 
+pub(crate) mod ensemble;
 pub mod kalman;

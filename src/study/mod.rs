@@ -3,23 +3,18 @@
 mod file;
 mod manifest;
 mod plan;
-mod settings;
 
-pub use crate::estimator::sample::CloudSampler;
 pub use file::{Library, RecordTable, StudyFile, StudyFileError};
 pub use plan::{DriveSource, InputPlan, Levels, PlanError, RecordPlan};
-pub use settings::{CloudSettings, Inputs, Preset, PresetName, Settings};
 
 use crate::effect::{EffectError, Effects, UnmodelledEffect, augment, given_magnitudes};
-use crate::feature::{Ar, Arx, FeatureError, FeatureMap, FeatureRecipe, Score};
-use crate::network::{Architecture, Deep, HeadArchitecture, architecture};
-use crate::record::{CsvError, Drive, Record, RecordError};
-use crate::twin::conformance::{Finding, Severity};
-use crate::twin::{Adaptation, AdaptationError, DigitalTwin, Noise, ParameterError, adapt, fix};
+use crate::record::{CsvError, Record, RecordError};
+use crate::setting::did_you_mean;
+use crate::twin::{Adaptation, AdaptationError, DigitalTwin, ParameterError, adapt, fix};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A twin, the records it is compared with, and the recipes for its estimator.
+/// A twin, the records it is compared with, and the effects it may lack.
 ///
 /// ```
 /// use truetwin::study::{RecordPlan, Study};
@@ -36,7 +31,6 @@ pub struct Study {
     /// In the setting of `file`.
     twin: Arc<dyn DigitalTwin>,
     plan: RecordPlan,
-    presets: BTreeMap<PresetName, Preset>,
     file: StudyFile,
     demo: Option<Arc<Record>>,
     /// Beside those of the library.
@@ -72,7 +66,7 @@ pub enum StudyError {
     #[error(transparent)]
     File(#[from] StudyFileError),
     /// The file is about another twin.
-    #[error("no twin is called \"{given}\"; there are {known}")]
+    #[error("no twin is called \"{given}\"{}; there are {known}", did_you_mean(given, known.split(", ")))]
     Twin {
         /// In the file.
         given: String,
@@ -107,9 +101,6 @@ pub enum StudyError {
     /// Of step, length, input.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// Of features.
-    #[error(transparent)]
-    Feature(#[from] FeatureError),
     /// The demo record cannot be read.
     #[error(transparent)]
     Demo(#[from] CsvError),
@@ -119,8 +110,7 @@ pub enum StudyError {
 }
 
 impl Study {
-    /// A study of `twin` under `name`. Unless said otherwise, the network is [`Deep`] and the features are the [`Score`] of a
-    /// twin with equations; of a black box, and in the paper's preset, AR(5), or ARX(8, 8) for a twin with inputs.
+    /// Creates a study of `twin` under `name`.
     pub fn new(
         name: &str,
         twin: impl DigitalTwin + 'static,
@@ -133,31 +123,11 @@ impl Study {
                 name: name.into(),
                 error,
             })?;
-        let regression: Arc<dyn FeatureRecipe> = match base.signals().inputs.len() {
-            0 => Arc::new(Ar { order: 5 }),
-            _ => Arc::new(Arx {
-                outputs: 8,
-                inputs: 8,
-            }),
-        };
-        let best = match base.state_space() {
-            Some(_) => Arc::new(Score::default()),
-            None => regression.clone(),
-        };
-        let preset = |features, settings| Preset {
-            features,
-            architecture: architecture::<Deep>(),
-            settings,
-        };
         Ok(Self {
             name: name.into(),
             twin: base.clone(),
             base,
             plan,
-            presets: BTreeMap::from([
-                (PresetName::Default, preset(best, Settings::default())),
-                (PresetName::Paper, preset(regression, Settings::paper())),
-            ]),
             file: StudyFile {
                 twin: name.into(),
                 ..StudyFile::default()
@@ -165,41 +135,6 @@ impl Study {
             demo: None,
             own_effects: Effects::new(),
         })
-    }
-
-    /// With another recipe under a preset's name.
-    #[must_use]
-    pub fn with_preset(mut self, name: PresetName, preset: Preset) -> Self {
-        self.presets.insert(name, preset);
-        self
-    }
-
-    /// With other features, in both presets.
-    #[must_use]
-    pub fn with_features(mut self, features: impl FeatureRecipe + 'static) -> Self {
-        let features: Arc<dyn FeatureRecipe> = Arc::new(features);
-        for preset in self.presets.values_mut() {
-            preset.features = features.clone();
-        }
-        self
-    }
-
-    /// With another network, in both presets.
-    #[must_use]
-    pub fn with_architecture<A: HeadArchitecture>(mut self) -> Self {
-        for preset in self.presets.values_mut() {
-            preset.architecture = architecture::<A>();
-        }
-        self
-    }
-
-    /// With other numbers, in the default preset.
-    #[must_use]
-    pub fn with_settings(mut self, settings: Settings) -> Self {
-        if let Some(preset) = self.presets.get_mut(&PresetName::Default) {
-            preset.settings = settings;
-        }
-        self
     }
 
     /// With effects that the twin may lack and the library does not have, one for each target.
@@ -279,7 +214,7 @@ impl Study {
             samples,
             input,
         } = file.record.clone();
-        let mut study = Self {
+        Ok(Self {
             twin,
             plan: RecordPlan {
                 step: step.unwrap_or(self.plan.step),
@@ -288,13 +223,7 @@ impl Study {
             },
             file: file.clone(),
             ..self.clone()
-        };
-        if let Some(features) = &file.features {
-            for preset in study.presets.values_mut() {
-                preset.features = features.clone();
-            }
-        }
-        Ok(study)
+        })
     }
 
     /// Whether a name is that of an effect: an `id` of the library or of the study's own, or an `id@target` of this twin.
@@ -313,7 +242,19 @@ impl Study {
     fn check_library(&self, library: &Library) -> Result<(), StudyError> {
         let mut named = library.only.iter().chain(&library.without);
         let unknown = named.find(|name| !self.knows_effect(name));
-        unknown.map_or(Ok(()), |name| Err(StudyError::Library(name.clone())))
+        unknown.map_or(Ok(()), |name| {
+            Err(StudyError::Library(self.with_nearest_effect(name)))
+        })
+    }
+
+    /// Adds to the name of an unknown effect the known one that is nearest.
+    pub(crate) fn with_nearest_effect(&self, name: &str) -> String {
+        let effects = self.effects();
+        let known = effects.iter().map(|e| match name.contains('@') {
+            true => format!("{}@{}", e.typetag_name(), e.target()),
+            false => e.typetag_name().to_owned(),
+        });
+        format!("{name}{}", did_you_mean(name, known))
     }
 
     /// The library's effects and the study's own, each once for each target of this twin, all magnitudes free.
@@ -362,72 +303,9 @@ impl Study {
         &self.file
     }
 
-    /// A recipe.
-    pub fn preset(&self, name: PresetName) -> &Preset {
-        &self.presets[&name]
-    }
-
-    /// The features of a recipe, bound to the twin.
-    pub fn features(
-        &self,
-        recipe: &dyn FeatureRecipe,
-    ) -> Result<Arc<dyn FeatureMap>, FeatureError> {
-        recipe.bind(&self.twin)
-    }
-
-    /// An architecture of this study by its id.
-    pub fn architecture(&self, id: &str) -> Option<Arc<dyn Architecture>> {
-        (self.presets.values())
-            .map(|preset| &preset.architecture)
-            .find(|a| a.id() == id)
-            .cloned()
-    }
-
     /// What drives are drawn from.
     pub fn drives(&self) -> Result<DriveSource, PlanError> {
         self.plan.prepare(&self.twin.signals())
-    }
-
-    /// Whether a recipe's features can be taken from a simulated record, and its network reads as many.
-    ///
-    /// # Errors
-    ///
-    /// As [`features`](Self::features).
-    pub fn check_features(
-        &self,
-        preset: PresetName,
-        drive: &Drive,
-        seed: u64,
-    ) -> Result<Finding, FeatureError> {
-        let Preset {
-            features,
-            architecture,
-            ..
-        } = self.preset(preset);
-        let map = self.features(features.as_ref())?;
-        let noise = Noise::new(seed, "check features", 0);
-        let most = architecture.max_features();
-        let extracted = (self
-            .twin
-            .simulate(&self.twin.parameters().centre(), drive, noise))
-        .map_err(|error| error.to_string())
-        .and_then(|y| map.extract(drive, &y).map_err(|error| error.to_string()));
-        let (severity, message) = match extracted {
-            Err(error) => (Severity::Failure, error),
-            Ok(x) if x.len() > most => {
-                let (n, id) = (x.len(), architecture.id());
-                let problem = format!(
-                    "{n} features, network \"{id}\" takes at most {most}; lower their order"
-                );
-                (Severity::Failure, problem)
-            }
-            Ok(x) => (Severity::Pass, format!("{} features of a record", x.len())),
-        };
-        Ok(Finding {
-            check: "features",
-            severity,
-            message,
-        })
     }
 
     /// Whether a record has the step and the channels of this study.

@@ -1,6 +1,7 @@
 //! A twin in another setting: prior, bounds, limits, noise and start changed from outside.
 
 use crate::record::{Drive, Signal, Signals};
+use crate::setting::did_you_mean;
 use crate::twin::{
     DigitalTwin, Integrator, Interval, Noise, Now, Outliers, Outline, Parameter, ParameterError,
     ParameterSpace, Role, SimulationError, StateSpace,
@@ -107,7 +108,7 @@ pub struct Adaptation {
 #[non_exhaustive]
 pub enum AdaptationError {
     /// A name that the twin does not have.
-    #[error("[{table}] names {name}, the twin has {known}; use one of these")]
+    #[error("[{table}] names {name}{}, the twin has {known}; use one of these", did_you_mean(name, known.split(", ")))]
     Unknown {
         /// Table of the study file.
         table: &'static str,

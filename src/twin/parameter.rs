@@ -1,5 +1,6 @@
 //! What is estimated: names, units, prior box and physical bounds.
 
+use crate::setting::did_you_mean;
 use crate::twin::{Interval, Noise};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -154,7 +155,7 @@ pub enum ParameterError {
         bounds: Interval,
     },
     /// A name that no parameter has.
-    #[error("no parameter is called {name}; there are {names}")]
+    #[error("no parameter is called {name}{}; there are {names}", did_you_mean(name, names.split(", ")))]
     Unknown {
         /// The name.
         name: String,

@@ -8,22 +8,23 @@ use rayon::prelude::*;
 use truetwin::estimator::bank::FeatureSimulator;
 use truetwin::estimator::gate::{GateForm, GateSettings, GateTest};
 use truetwin::estimator::refine::{RefineSettings, Refinement};
-use truetwin::evaluate::paper::reference_studies;
+use truetwin::estimator::{PresetName, Project};
+use truetwin::evaluate::paper::reference_projects;
 use truetwin::feature::{Ar, Arx, FeatureRecipe};
 use truetwin::math::binomial_bounds;
 use truetwin::progress::Progress;
-use truetwin::study::{PresetName, Study};
 use truetwin::twin::Noise;
 
-fn study(name: &str) -> Study {
-    let mut studies = reference_studies().unwrap().into_iter();
-    studies.find(|s| s.name() == name).unwrap()
+fn project(name: &str) -> Project {
+    let mut projects = reference_projects().unwrap().into_iter();
+    projects.find(|p| p.study().name() == name).unwrap()
 }
 
 /// Records rejected at the true θ, with a fresh null for each.
 fn rejected(name: &str, settings: &GateSettings, records: u64) -> u64 {
-    let study = study(name);
-    let features = study.preset(PresetName::Paper).features.clone();
+    let project = project(name);
+    let study = project.study();
+    let features = project.recipe(PresetName::Paper).features.clone();
     let simulator = FeatureSimulator::new(study.twin().clone(), features.as_ref()).unwrap();
     let drives = study.drives().unwrap();
     let theta = study.twin().parameters().centre();
@@ -86,7 +87,8 @@ fn after_a_refit_the_test_is_still_calibrated() {
         }),
     );
     for (name, features, records) in [("van-der-pol", ar, 200), ("tanks", arx, 50)] {
-        let study = study(name);
+        let project = project(name);
+        let study = project.study();
         let simulator = FeatureSimulator::new(study.twin().clone(), features.as_ref()).unwrap();
         let drives = study.drives().unwrap();
         let space = study.twin().parameters();

@@ -6,9 +6,7 @@ use truetwin::estimator::{EstimateOptions, PretrainOptions, pretrain};
 use truetwin::evaluate::paper::reference_studies;
 use truetwin::progress::Progress;
 use truetwin::record::{Record, Signal, read_record};
-use truetwin::report::{
-    gap_regions_svg, gap_runs_svg, gap_shrinkage_svg, gap_targets_svg, gap_which_svg,
-};
+use truetwin::report::gap_pictures;
 use truetwin::study::{Study, StudyFile};
 
 fn data(name: &str) -> Option<PathBuf> {
@@ -148,16 +146,19 @@ fn what_the_cascaded_tanks_lack_is_explored() {
 fn draw(study: &Study, found: &mut Diagnosis, folder: &Path) {
     thin(&mut found.free_runs);
     found.validation_runs.as_mut().map(thin);
-    for (name, svg) in [
-        ("record", gap_runs_svg(study, found, false)),
-        ("validation", gap_runs_svg(study, found, true)),
-        ("targets", gap_targets_svg(found)),
-        ("regions", gap_regions_svg(study, found)),
-        ("which", gap_which_svg(found)),
-        ("extent", gap_shrinkage_svg(found)),
-    ] {
+    let shown = [
+        "record",
+        "validation",
+        "targets",
+        "regions",
+        "which",
+        "extent",
+    ];
+    let pictures = gap_pictures(study, found);
+    for name in shown {
+        let (_, svg) = pictures.iter().find(|(n, _)| *n == name).unwrap();
         let path = folder.join(format!("tanks-{name}.svg"));
-        std::fs::write(path, svg.unwrap()).unwrap();
+        std::fs::write(path, svg).unwrap();
     }
 }
 

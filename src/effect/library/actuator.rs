@@ -2,7 +2,9 @@
 
 use super::super::kind::EffectKind;
 use super::super::magnitude::Magnitude;
-use super::shared::{DELAY, DELAY_SAMPLES, HIGH, LOW, TAU, check_delay, clamp, delay, lag, limit_rate};
+use super::shared::{
+    DELAY, DELAY_SAMPLES, HIGH, LOW, TAU, check_delay, clamp, delay, lag, limit_rate,
+};
 
 pub(super) fn rows() -> Vec<EffectKind> {
     vec![
@@ -57,9 +59,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
             "v ← v + clamp(u − v, ±rate·Δt)",
             |m, now, memory, u| limit_rate(m[0] * now.dt, &mut memory[0], u),
         )
-        .magnitude(
-            Magnitude::positive("rate", "signal/s", &[0.1, 0.5, 2.0]).off(f64::INFINITY),
-        )
+        .magnitude(Magnitude::positive("rate", "signal/s", &[0.1, 0.5, 2.0]).off(f64::INFINITY))
         .memory(1)
         .order(60),
         // A first-order lag; v starts at the first u.

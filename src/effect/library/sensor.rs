@@ -17,20 +17,23 @@ pub(super) fn rows() -> Vec<EffectKind> {
             ))
             .order(10),
         // A relative error of the scale; −1 is a dead sensor.
-        EffectKind::sensor("sensor-gain", "s·(1 + error)", |m, _, _, s| s * (1.0 + m[0]))
-            .magnitude(
-                Magnitude::signed("error", "1", &[-0.2, -0.05, 0.05, 0.2])
-                    .within(-1.0, f64::INFINITY),
-            )
-            .order(20),
+        EffectKind::sensor("sensor-gain", "s·(1 + error)", |m, _, _, s| {
+            s * (1.0 + m[0])
+        })
+        .magnitude(
+            Magnitude::signed("error", "1", &[-0.2, -0.05, 0.05, 0.2]).within(-1.0, f64::INFINITY),
+        )
+        .order(20),
         // A zero that moves steadily from the first sample on.
-        EffectKind::sensor("sensor-drift", "s + rate·t", |m, now, _, s| s + m[0] * now.t)
-            .magnitude(Magnitude::signed(
-                "rate",
-                "signal/s",
-                &[-0.01, -0.001, 0.001, 0.01],
-            ))
-            .order(30),
+        EffectKind::sensor("sensor-drift", "s + rate·t", |m, now, _, s| {
+            s + m[0] * now.t
+        })
+        .magnitude(Magnitude::signed(
+            "rate",
+            "signal/s",
+            &[-0.01, -0.001, 0.001, 0.01],
+        ))
+        .order(30),
         // A first-order lag; the reading is z, which starts at the first s.
         EffectKind::sensor(
             "sensor-lag",

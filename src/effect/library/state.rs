@@ -54,13 +54,15 @@ fn forces() -> Vec<EffectKind> {
         EffectKind::force("linear-loss", "ẋ − rate·x", |m, at| -m[0] * at.x)
             .magnitude(Magnitude::positive("rate", "1/s", &[0.03, 0.1, 0.3])),
         // Another state acts on this one.
-        EffectKind::force("cross-coupling", "ẋ + rate·x_from", |m, at| m[0] * at.other)
-            .magnitude(Magnitude::signed(
-                "rate",
-                "state/(from·s)",
-                &[-0.3, -0.1, 0.1, 0.3],
-            ))
-            .other(OtherState::From),
+        EffectKind::force("cross-coupling", "ẋ + rate·x_from", |m, at| {
+            m[0] * at.other
+        })
+        .magnitude(Magnitude::signed(
+            "rate",
+            "state/(from·s)",
+            &[-0.3, -0.1, 0.1, 0.3],
+        ))
+        .other(OtherState::From),
         // Turbulent drag.
         EffectKind::force("quadratic-drag", "ẋ − c·abs(x)·x", |m, at| {
             -m[0] * at.x.abs() * at.x

@@ -30,7 +30,7 @@ pub trait Sampler: Send + Sync {
 /// Which sampler draws the cloud.
 ///
 /// ```
-/// use truetwin::study::{CloudSampler, CloudSettings};
+/// use truetwin::estimator::{CloudSampler, CloudSettings};
 ///
 /// assert_eq!(CloudSettings::default().sampler, CloudSampler::Ellipsoid);
 /// ```

@@ -11,12 +11,13 @@ use std::path::PathBuf;
 /// ```
 /// use truetwin::progress::Progress;
 /// use truetwin::estimator::shards::{BankPlan, ShardsError};
-/// use truetwin::study::{PresetName, RecordPlan, Study};
+/// use truetwin::estimator::{PresetName, Project};
+/// use truetwin::study::{RecordPlan, Study};
 /// use truetwin::twins::VanDerPol;
 /// use truetwin::storage::work::Share;
 ///
 /// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 100))?;
-/// let none = BankPlan { study: &study, preset: PresetName::Default, size: 0, seed: 1 };
+/// let none = BankPlan { project: study.into(), preset: PresetName::Default, size: 0, seed: 1 };
 /// let error = none.fill("nowhere".as_ref(), Share::WHOLE, &Progress::silent()).unwrap_err();
 /// assert!(matches!(error, ShardsError::Size(0)));
 /// # Ok::<(), truetwin::study::StudyError>(())

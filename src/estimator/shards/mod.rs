@@ -19,11 +19,12 @@
 //! use truetwin::estimator::bank::{Bank, file};
 //! use truetwin::progress::Progress;
 //! use truetwin::estimator::shards::{BankPlan, Filled, ShardedBank, merge, merge_into_file};
-//! use truetwin::study::{PresetName, RecordPlan, Study};
+//! use truetwin::estimator::{PresetName, Project};
+//! use truetwin::study::{RecordPlan, Study};
 //! use truetwin::twins::VanDerPol;
 //!
 //! let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 100))?;
-//! let plan = BankPlan { study: &study, preset: PresetName::Default, size: 40, seed: 1 };
+//! let plan = BankPlan { project: study.into(), preset: PresetName::Default, size: 40, seed: 1 };
 //! let place = tempfile::tempdir()?;
 //! let [one, two, all] = ["one", "two", "all"].map(|name| place.path().join(name));
 //! // Two jobs, each with a folder of its own; then one bank.

@@ -4,9 +4,9 @@ use super::folder::{SHARDS, ShardedBank, Shards};
 use super::{Prior, ShardsError};
 use crate::estimator::bank::BankError;
 use crate::estimator::bank::file::{BankFileError, npz};
+use crate::estimator::{PresetName, Project};
 use crate::progress::Progress;
 use crate::storage::work::{Manifest, Share, WorkFolder};
-use crate::study::{PresetName, Study};
 use serde_json::json;
 use std::io;
 use std::path::Path;
@@ -28,10 +28,10 @@ const MOST_ROWS: usize = 16_384;
 /// use truetwin::evaluate::paper::reference_studies;
 /// use truetwin::progress::Progress;
 /// use truetwin::estimator::shards::{BankPlan, ShardedBank};
-/// use truetwin::study::PresetName;
+/// use truetwin::estimator::{PresetName, Project};
 ///
-/// let study = &reference_studies()?[0];
-/// let plan = BankPlan { study, preset: PresetName::Paper, size: 40, seed: 1 };
+/// let project = Project::from(&reference_studies()?[0]);
+/// let plan = BankPlan { project, preset: PresetName::Paper, size: 40, seed: 1 };
 /// let place = tempfile::tempdir()?;
 /// let folder = place.path().join("bank");
 /// // Two jobs of an array, one after the other, in any order.
@@ -41,10 +41,10 @@ const MOST_ROWS: usize = 16_384;
 /// assert_eq!(ShardedBank::open(&folder)?.rows(), 40);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Debug, Clone, Copy)]
-pub struct BankPlan<'a> {
+#[derive(Debug, Clone)]
+pub struct BankPlan {
     /// Twin, prior, records.
-    pub study: &'a Study,
+    pub project: Project,
     /// Whose features.
     pub preset: PresetName,
     /// Simulations, M.
@@ -70,7 +70,7 @@ pub(super) fn rows_of_a_shard(size: usize) -> usize {
     size.div_ceil(SHARES).clamp(FEWEST_ROWS, MOST_ROWS)
 }
 
-impl BankPlan<'_> {
+impl BankPlan {
     /// Simulates the shards of a share that are not in the folder yet; makes the folder where there is none.
     ///
     /// Shards that are there are read once: one that is not what it was is made again. Several processes may fill one
@@ -88,7 +88,10 @@ impl BankPlan<'_> {
         if !(1..=MOST).contains(&self.size) {
             return Err(ShardsError::Size(self.size));
         }
-        let prior = Prior::new(self.study, self.study.preset(self.preset).features.as_ref())?;
+        let prior = Prior::new(
+            self.project.study(),
+            self.project.recipe(self.preset).features.as_ref(),
+        )?;
         let manifest = self.manifest()?;
         let folder = WorkFolder::open::<ShardsError>(path, &manifest, &[SHARDS], |_| Ok(()))?;
         let shards = Shards::list(folder, manifest.clone())?;
@@ -124,13 +127,13 @@ impl BankPlan<'_> {
 
     /// Everything that the rows depend on.
     pub(super) fn manifest(&self) -> Result<Manifest, ShardsError> {
-        let study = self.study;
-        Ok(study
+        let features = &self.project.recipe(self.preset).features;
+        Ok((self.project.study())
             .manifest(VERB, LAYOUT)?
             .with("size", self.size)
             .with("rows of a shard", rows_of_a_shard(self.size))
             .with("seed", self.seed)
-            .with("features", json!(study.preset(self.preset).features)))
+            .with("features", json!(features)))
     }
 
     /// Whether a bank was made as this plan says.

@@ -1,7 +1,7 @@
 //! The folder of a study of many records.
 
 use super::MonteCarlo;
-use crate::estimator::PretrainOptions;
+use crate::estimator::{PretrainOptions, Recipe};
 use crate::storage::work::{Manifest, WorkError, WorkFolder, checksum};
 use crate::study::Study;
 use serde_json::json;
@@ -15,21 +15,23 @@ pub(super) const RUNS: &str = "runs";
 /// Where the estimator of a study comes from.
 ///
 /// ```
-/// use truetwin::evaluate::paper::{Benchmark, MonteCarlo, Origin, Scenario, reference_studies};
+/// use truetwin::evaluate::paper::{Benchmark, MonteCarlo, Origin, Scenario, reference_projects};
 /// use truetwin::estimator::PretrainOptions;
 ///
-/// let study = &reference_studies()?[0];
+/// let project = &reference_projects()?[0];
+/// let study = project.study();
 /// let plan = MonteCarlo { benchmark: Benchmark::of(study), scenario: Scenario::First, runs: 100, seed: 1 };
 /// let place = tempfile::tempdir()?;
 /// let training = PretrainOptions::default();
-/// let folder = plan.folder(&place.path().join("runs"), study, Origin::Trained(&training))?;
+/// let origin = Origin::Trained(project.recipe(training.preset), &training);
+/// let folder = plan.folder(&place.path().join("runs"), study, origin)?;
 /// assert!(folder.file("manifest.json").exists()); // another call is refused there
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub enum Origin<'a> {
     /// Trained for it, and kept in the folder.
-    Trained(&'a PretrainOptions),
+    Trained(&'a Recipe, &'a PretrainOptions),
     /// From a file.
     File(&'a Path),
 }
@@ -60,17 +62,14 @@ impl MonteCarlo {
             .with("seed", self.seed);
         Ok(match origin {
             Origin::File(path) => manifest.with("estimator", checksum(path)?),
-            Origin::Trained(options) => {
-                let preset = study.preset(options.preset);
-                manifest
-                    .with("preset", options.preset.to_string())
-                    .with("bank size", options.bank_size)
-                    .with("epochs", options.epochs)
-                    .with("training seed", options.seed)
-                    .with("network", preset.architecture.id())
-                    .with("features", json!(preset.features))
-                    .with("preset settings", json!(preset.settings))
-            }
+            Origin::Trained(recipe, options) => manifest
+                .with("preset", options.preset.to_string())
+                .with("bank size", options.bank_size)
+                .with("epochs", options.epochs)
+                .with("training seed", options.seed)
+                .with("network", recipe.architecture.id())
+                .with("features", json!(recipe.features))
+                .with("preset settings", json!(recipe.settings)),
         })
     }
 }

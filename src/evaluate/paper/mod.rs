@@ -55,7 +55,7 @@ pub use free_runs::{FreeRuns, MeanRuns};
 pub use invariant::{Invariant, Symmetry};
 pub use method::Method;
 pub use monte_carlo::{MonteCarlo, MonteCarloError};
-pub use paper::reference_studies;
+pub use paper::{reference_projects, reference_studies};
 pub use run::{Answer, Run};
 pub use scenario::{Benchmark, Published, Scenario, ScenarioError, TestPoint};
 pub(crate) use score::COVERAGE_LEVEL;

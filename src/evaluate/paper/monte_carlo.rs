@@ -145,11 +145,11 @@ impl Piece for Run {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimator::{PretrainOptions, pretrain};
-    use crate::evaluate::paper::{Origin, reference_studies, score};
+    use crate::estimator::{PresetName, PretrainOptions, pretrain};
+    use crate::evaluate::paper::{Origin, reference_projects, score};
     use crate::progress::Listener;
     use crate::record::{Drive, Signal};
-    use crate::study::{PresetName, RecordPlan};
+    use crate::study::RecordPlan;
     use crate::twin::{DigitalTwin, Noise, Parameter, ParameterSpace};
     use std::fs;
     use std::path::Path;
@@ -165,8 +165,8 @@ mod tests {
     fn oscillator() -> &'static Estimator {
         static MADE: OnceLock<Estimator> = OnceLock::new();
         MADE.get_or_init(|| {
-            let study = &reference_studies().unwrap()[0];
-            pretrain(study, &TRAINING, &Progress::silent()).unwrap().0
+            let project = &reference_projects().unwrap()[0];
+            pretrain(project, &TRAINING, &Progress::silent()).unwrap().0
         })
     }
 
@@ -180,7 +180,9 @@ mod tests {
     }
 
     fn open(path: &Path, plan: &MonteCarlo) -> Result<WorkFolder, WorkError> {
-        plan.folder(path, oscillator().study(), Origin::Trained(&TRAINING))
+        let project = &reference_projects().unwrap()[0];
+        let origin = Origin::Trained(project.recipe(TRAINING.preset), &TRAINING);
+        plan.folder(path, oscillator().study(), origin)
     }
 
     /// All but the times.

@@ -7,13 +7,12 @@
 
 use super::{Benchmark, Invariant, Method, Published, Symmetry, TestPoint};
 use crate::estimator::refine::RefineSettings;
+use crate::estimator::{CloudSettings, PresetName, Project, Recipe, Settings};
 use crate::evaluate::baseline::Initialisation::{Bad, Good, Ts};
 use crate::feature::{Ar, Arx};
 use crate::network::{Compact, Deep, Training, architecture};
 use crate::record::parse_record;
-use crate::study::{
-    CloudSettings, Library, Preset, PresetName, RecordPlan, Settings, Study, StudyError, StudyFile,
-};
+use crate::study::{Library, RecordPlan, Study, StudyError, StudyFile};
 use crate::twins::{CascadedTanks, VanDerPol};
 use std::path::Path;
 use std::sync::Arc;
@@ -31,27 +30,32 @@ const DEMO: &str = include_str!("demo-van-der-pol.csv");
 /// # Ok::<(), truetwin::study::StudyError>(())
 /// ```
 pub fn reference_studies() -> Result<Vec<Study>, StudyError> {
+    let projects = reference_projects()?.into_iter();
+    Ok(projects.map(|project| project.study().clone()).collect())
+}
+
+/// The reference twins with the paper's recipes for them.
+pub fn reference_projects() -> Result<Vec<Project>, StudyError> {
     Ok(vec![van_der_pol()?, tanks()?])
 }
 
-fn van_der_pol() -> Result<Study, StudyError> {
+fn van_der_pol() -> Result<Project, StudyError> {
     let width = 2.5f64;
     let settings = paper(width, 1e-3, 200, 0.0, 400);
-    let preset = |settings| Preset {
+    let recipe = Recipe {
         features: Arc::new(Ar { order: 5 }),
         architecture: architecture::<Compact>(),
         settings,
     };
     let plan = RecordPlan::autonomous(0.05, 300);
     let demo = parse_record(DEMO, Path::new("demo-van-der-pol.csv"))?;
-    Ok(Study::new("van-der-pol", VanDerPol, plan)?
-        .with_preset(PresetName::Paper, preset(settings))
-        .with_demo(demo))
+    let study = Study::new("van-der-pol", VanDerPol, plan)?.with_demo(demo);
+    Ok(Project::from(study).with_recipe(PresetName::Paper, recipe))
 }
 
-fn tanks() -> Result<Study, StudyError> {
+fn tanks() -> Result<Project, StudyError> {
     let width = 0.4f64;
-    let paper = Preset {
+    let recipe = Recipe {
         features: Arc::new(Arx {
             outputs: 64,
             inputs: 64,
@@ -60,7 +64,8 @@ fn tanks() -> Result<Study, StudyError> {
         settings: paper(width, 1e-4, 250, 5e-4, 1000),
     };
     let plan = RecordPlan::levels(0.5, 400, 0.0, 3.0, 30);
-    Ok(Study::new("tanks", CascadedTanks, plan)?.with_preset(PresetName::Paper, paper))
+    let study = Study::new("tanks", CascadedTanks, plan)?;
+    Ok(Project::from(study).with_recipe(PresetName::Paper, recipe))
 }
 
 /// The paper's numbers for priors of one `width`; `pull` is γ in parameter units.
@@ -215,9 +220,10 @@ mod tests {
     /// scaled tanks show the same output and the same invariants; the symmetry's direction is the scaling's derivative.
     #[test]
     fn the_tanks_invariants_are_what_the_output_sees() {
-        let study = tanks().unwrap();
+        let project = tanks().unwrap();
+        let study = project.study();
         let space = study.twin().parameters();
-        let benchmark = Benchmark::of(&study);
+        let benchmark = Benchmark::of(study);
         let levels =
             Signal::from_shape_fn((400, 1), |(k, _)| 0.5 + EVALUATION_LEVELS[k / 30] / 3.0);
         let drive = Drive::new(0.5, levels).unwrap();
@@ -243,8 +249,8 @@ mod tests {
     fn the_papers_figures_stand_beside_the_papers_setting_alone() {
         let published = |text: &str| {
             let file = StudyFile::parse(text, Path::new("s.toml")).unwrap();
-            let study = tanks().unwrap().configure(&file).unwrap();
-            Benchmark::of(&study).published.len()
+            let project = tanks().unwrap().configure(&file).unwrap();
+            Benchmark::of(project.study()).published.len()
         };
         assert_eq!(published("twin = 'tanks'"), 8);
         assert_eq!(

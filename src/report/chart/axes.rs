@@ -1,11 +1,12 @@
 //! One panel: axes, ticks, legend, lines.
 
 use super::decimate::decimate;
-use super::layers::{self, Swatch};
+use super::frame::{EDGE, Frame, LINE, ROOM, TEXT, WIDTH, widest};
+use super::layers::Swatch;
+use super::panel::Panel;
 use super::strip;
 use super::text::{BOLD, clipped, text, width};
 use super::ticks::{Ticks, padded};
-use super::{EDGE, LINE, Panel, ROOM, TEXT, WIDTH, widest};
 use std::fmt::Write;
 
 /// Length of a line in the legend, with the gap after it.
@@ -13,23 +14,6 @@ pub(super) const SWATCH: f64 = 28.0;
 
 /// Between entries of the legend.
 const GAP: f64 = 16.0;
-
-/// What all panels share.
-pub(super) struct Frame {
-    pub(super) x: (f64, f64),
-    pub(super) ticks: Ticks,
-    pub(super) left: f64,
-    pub(super) right: f64,
-    /// That lines are thinned to.
-    pub(super) columns: usize,
-}
-
-impl Frame {
-    pub(super) fn x(&self, value: f64) -> f64 {
-        let share = (value - self.x.0) / (self.x.1 - self.x.0);
-        self.left + share * (self.right - self.left)
-    }
-}
 
 /// A panel with its range and ticks.
 pub(super) struct Axes<'a> {
@@ -133,7 +117,7 @@ impl<'a> Axes<'a> {
         let mut at = (EDGE, top + LINE);
         text(out, at, "start", TEXT, true, &quantity);
         at.0 += width(&quantity, TEXT * BOLD) + GAP;
-        let entries: Vec<(String, f64, Swatch)> = (layers::legend(self.panel))
+        let entries: Vec<(String, f64, Swatch)> = (legend(self.panel))
             .map(|(label, swatch)| {
                 let label = clipped(label, TEXT, ROOM - SWATCH);
                 (label.clone(), SWATCH + width(&label, TEXT), swatch)
@@ -153,4 +137,12 @@ impl<'a> Axes<'a> {
         }
         at.1
     }
+}
+
+/// Everything with a name, the lines first.
+fn legend(panel: &Panel) -> impl Iterator<Item = (&str, Swatch)> {
+    let lines = (panel.series.iter()).map(|s| (s.label.as_str(), Swatch::Line(s.style)));
+    let areas = (panel.areas.iter()).map(|a| (a.label.as_str(), Swatch::Area));
+    let dots = (panel.dots.iter()).map(|d| (d.label.as_str(), Swatch::Dot));
+    (lines.chain(areas).chain(dots)).filter(|(label, _)| !label.is_empty())
 }

@@ -1,8 +1,8 @@
 //! Horizontal bars with their names on the left and their numbers on the right.
 
+use super::frame::{EDGE, LINE, ROOM, TEXT, WIDTH};
 use super::picture::Picture;
 use super::text::{BOLD, clipped, text, width};
-use super::{EDGE, LINE, ROOM, TEXT, WIDTH};
 use std::fmt::Write;
 
 /// Height of a row and of the bar inside it.
@@ -48,6 +48,17 @@ pub struct Bar {
     pub clear: bool,
     /// Ends of an interval around the value.
     pub interval: Option<[f64; 2]>,
+}
+
+impl BarGroup {
+    /// Returns bars under `label`; `full` is the value that takes all the room.
+    pub fn new(label: &str, full: Option<f64>, bars: Vec<Bar>) -> Self {
+        Self {
+            label: label.into(),
+            full,
+            bars,
+        }
+    }
 }
 
 impl Bar {
@@ -165,26 +176,5 @@ impl Bar {
             end = end.max(high);
         }
         text(out, (end + GAP, baseline), "start", TEXT, false, &self.note);
-    }
-}
-
-#[cfg(test)]
-mod examples {
-    #[test]
-    fn the_example() {
-        use crate::report::chart::{Bar, BarChart, BarGroup};
-        let chart = BarChart {
-            title: "Error".into(),
-            description: "0.3 before, 0.1 after.".into(),
-            groups: vec![BarGroup {
-                label: "free run".into(),
-                full: None,
-                bars: vec![
-                    Bar::new("before", 0.3, "0.300"),
-                    Bar::new("after", 0.1, "0.100").clear(true),
-                ],
-            }],
-        };
-        assert!(chart.svg().contains(">0.300<"));
     }
 }

@@ -1,12 +1,12 @@
 //! Heat maps: rows of stretches along one x axis.
 
-use super::axes::Frame;
+use super::frame::Frame;
+use super::frame::{EDGE, LINE, ROOM, TEXT, WIDTH, widest};
 use super::layers::Mark;
 use super::picture::Picture;
 use super::strip::Span;
 use super::text::{BOLD, clipped, text, width};
 use super::ticks::{Ticks, padded};
-use super::{EDGE, LINE, ROOM, TEXT, WIDTH, widest};
 use std::fmt::Write;
 
 /// Height of a row and of the cells inside it.
@@ -129,34 +129,5 @@ impl HeatGroup {
             y += ROW;
         }
         y + 4.0
-    }
-}
-
-#[cfg(test)]
-mod examples {
-    #[test]
-    fn the_example() {
-        use crate::report::chart::{Edge, HeatGroup, HeatMap, HeatRow, Span};
-        let cell = |from: f64, share: f64, edge| Span {
-            from,
-            to: from + 5.0,
-            label: format!("{:.0} %", 100.0 * share),
-            weight: share,
-            edge,
-        };
-        let map = HeatMap {
-            title: "Where in time".into(),
-            description: "80 % from 5 s on.".into(),
-            x: "t in s".into(),
-            groups: vec![HeatGroup {
-                label: "twin, refitted".into(),
-                rows: vec![HeatRow {
-                    label: "y".into(),
-                    cells: vec![cell(0.0, 0.2, Edge::Bare), cell(5.0, 0.8, Edge::Unbroken)],
-                    mark: None,
-                }],
-            }],
-        };
-        assert!(map.svg().contains(">80 %<"));
     }
 }

@@ -1,8 +1,9 @@
 //! What lies below and over the lines of a panel: bands, points with intervals, marks.
 
-use super::axes::Frame;
+use super::frame::Frame;
+use super::frame::TEXT;
+use super::style::Style;
 use super::text::{text, width};
-use super::{Panel, Style, TEXT};
 use std::fmt::Write;
 
 /// Half the width of a whisker's end.
@@ -133,12 +134,4 @@ impl Swatch {
             }
         };
     }
-}
-
-/// Everything with a name, the lines first.
-pub(super) fn legend(panel: &Panel) -> impl Iterator<Item = (&str, Swatch)> {
-    let lines = (panel.series.iter()).map(|s| (s.label.as_str(), Swatch::Line(s.style)));
-    let areas = (panel.areas.iter()).map(|a| (a.label.as_str(), Swatch::Area));
-    let dots = (panel.dots.iter()).map(|d| (d.label.as_str(), Swatch::Dot));
-    (lines.chain(areas).chain(dots)).filter(|(label, _)| !label.is_empty())
 }

@@ -1,10 +1,10 @@
 //! Small multiples: what a quantity is, on average, in ranges of several variables.
 
-use super::axes::Frame;
+use super::frame::Frame;
+use super::frame::{EDGE, LINE, ROOM, TEXT, WIDTH, widest};
 use super::picture::Picture;
 use super::text::{BOLD, clipped, text, width};
 use super::ticks::{Ticks, padded};
-use super::{EDGE, LINE, ROOM, TEXT, WIDTH, widest};
 use crate::report::digits::short;
 use std::fmt::Write;
 
@@ -179,40 +179,5 @@ impl Facet {
             false,
             &clipped(&self.x, TEXT, room),
         );
-    }
-}
-
-#[cfg(test)]
-mod examples {
-    #[test]
-    fn the_example() {
-        use crate::report::chart::{Facet, FacetRow, Multiples, Step};
-        let steps = vec![
-            Step {
-                low: 0.0,
-                high: 1.0,
-                mean: 0.1,
-                error: 0.2,
-            },
-            Step {
-                low: 1.0,
-                high: 2.0,
-                mean: -0.9,
-                error: 0.2,
-            },
-        ];
-        let picture = Multiples {
-            title: "What is missing".into(),
-            description: "A loss above 1 V.".into(),
-            rows: vec![FacetRow {
-                label: "rate of h in V/s".into(),
-                clear: true,
-                facets: vec![Facet {
-                    x: "h in V".into(),
-                    steps,
-                }],
-            }],
-        };
-        assert!(picture.svg().contains("h in V"));
     }
 }

@@ -1,7 +1,7 @@
 //! The frame of every picture: size, title, words for those who cannot see it.
 
+use super::frame::{EDGE, LARGEST, ROOM, TITLE, WIDTH};
 use super::text::{BOLD, clipped, escaped, text};
-use super::{EDGE, LARGEST, ROOM, TITLE, WIDTH};
 
 /// A picture that is being drawn.
 pub(super) struct Picture<'a> {

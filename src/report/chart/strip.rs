@@ -1,7 +1,7 @@
 //! Stretches of the x axis, marked in a strip below it.
 
-use super::TEXT;
-use super::axes::Frame;
+use super::frame::Frame;
+use super::frame::TEXT;
 use super::text::{BOLD, text, width};
 use std::fmt::Write;
 

@@ -22,11 +22,12 @@ const MOST: u64 = 1 << 28;
 /// | anything else | what the work starts from, and results made of the pieces |
 ///
 /// ```
-/// use truetwin::evaluate::paper::{Benchmark, MonteCarlo, Origin, Scenario, reference_studies};
+/// use truetwin::evaluate::paper::{Benchmark, MonteCarlo, Origin, Scenario, reference_projects};
 /// use truetwin::estimator::PretrainOptions;
 /// use truetwin::storage::work::{WorkError, WorkFolder};
 ///
-/// let study = &reference_studies()?[0];
+/// let project = &reference_projects()?[0];
+/// let study = project.study();
 /// let place = tempfile::tempdir()?;
 /// let training = PretrainOptions::default();
 /// let open = |seed| -> Result<WorkFolder, _> {
@@ -49,12 +50,13 @@ pub struct WorkFolder {
 /// ```
 /// use truetwin::progress::Progress;
 /// use truetwin::estimator::shards::{BankPlan, ShardsError};
-/// use truetwin::study::{PresetName, RecordPlan, Study};
+/// use truetwin::estimator::PresetName;
+/// use truetwin::study::{RecordPlan, Study};
 /// use truetwin::twins::VanDerPol;
 /// use truetwin::storage::work::{Share, WorkError};
 ///
 /// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 100))?;
-/// let plan = BankPlan { study: &study, preset: PresetName::Paper, size: 10, seed: 1 };
+/// let plan = BankPlan { project: study.into(), preset: PresetName::Paper, size: 10, seed: 1 };
 /// let error = plan.fill("no/such/place".as_ref(), Share::WHOLE, &Progress::silent()).unwrap_err();
 /// let of_the_folder: Option<&WorkError> = match &error {
 ///     ShardsError::Work(error) => Some(error),

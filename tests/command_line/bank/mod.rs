@@ -6,27 +6,28 @@ mod training;
 use crate::files::files;
 use std::fs;
 use std::path::{Path, PathBuf};
+use truetwin::estimator::PresetName;
 use truetwin::estimator::bank::Bank;
 use truetwin::estimator::shards::{BankPlan, ShardedBank, ShardsError, merge, merge_into_file};
 use truetwin::progress::{Listener, Progress};
 use truetwin::storage::work::Share;
-use truetwin::study::{PresetName, RecordPlan, Study};
+use truetwin::study::{RecordPlan, Study};
 use truetwin::twins::VanDerPol;
 
 fn oscillator() -> Study {
     Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 60)).unwrap()
 }
 
-fn plan(study: &Study, size: usize) -> BankPlan<'_> {
+fn plan(study: &Study, size: usize) -> BankPlan {
     BankPlan {
-        study,
+        project: study.into(),
         preset: PresetName::Paper,
         size,
         seed: 3,
     }
 }
 
-fn fill(plan: &BankPlan<'_>, path: &Path, share: &str) -> Result<(usize, usize), ShardsError> {
+fn fill(plan: &BankPlan, path: &Path, share: &str) -> Result<(usize, usize), ShardsError> {
     let filled = plan.fill(path, share.parse().unwrap(), &Progress::silent())?;
     Ok((filled.there, filled.of))
 }

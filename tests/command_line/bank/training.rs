@@ -8,9 +8,8 @@ use truetwin::estimator::bank::Bank;
 use truetwin::estimator::bank::Draws;
 use truetwin::estimator::bank::file::BankFileError;
 use truetwin::estimator::shards::ShardedBank;
-use truetwin::estimator::{PretrainOptions, pretrain, pretrain_on};
+use truetwin::estimator::{PresetName, PretrainOptions, pretrain, pretrain_on};
 use truetwin::progress::Progress;
-use truetwin::study::PresetName;
 
 fn options(size: usize) -> PretrainOptions {
     PretrainOptions {

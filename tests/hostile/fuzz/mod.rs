@@ -110,9 +110,8 @@ fuzzed!(
 #[ignore = "writes into tests/hostile/fuzz/seeds"]
 fn seeds_that_are_not_text() {
     use truetwin::estimator::shards::BankPlan;
-    use truetwin::estimator::{PretrainOptions, pretrain};
+    use truetwin::estimator::{PresetName, PretrainOptions, pretrain};
     use truetwin::progress::Progress;
-    use truetwin::study::PresetName;
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/hostile/fuzz/seeds");
     let new = |name: &str| {
         let path = root.join(name);
@@ -123,17 +122,17 @@ fn seeds_that_are_not_text() {
     readers::write_bank(&new("bank/table.csv"));
     let matrix = ndarray::array![[0.5, 0.25], [1e-9, -3.0]];
     ndarray_npy::write_npy(new("bank/matrix.npy"), &matrix).unwrap();
-    let study = readers::tiny();
+    let project = readers::tiny();
     let options = PretrainOptions {
         preset: PresetName::Default,
         bank_size: Some(100),
         epochs: Some(1),
         seed: 1,
     };
-    let (estimator, _) = pretrain(&study, &options, &Progress::silent()).unwrap();
+    let (estimator, _) = pretrain(&project, &options, &Progress::silent()).unwrap();
     estimator.save(&new("estimator/tiny.est")).unwrap();
     let plan = BankPlan {
-        study: &study,
+        project,
         preset: PresetName::Default,
         size: 20,
         seed: 1,

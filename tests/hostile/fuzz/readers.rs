@@ -12,9 +12,10 @@ use std::sync::OnceLock;
 use truetwin::effect::augment;
 use truetwin::effect::read_effects;
 use truetwin::estimator::Estimator;
+use truetwin::estimator::Project;
 use truetwin::estimator::bank::{Bank, Draws, file as bank_file};
 use truetwin::estimator::shards::{ShardedBank, merge, merge_into_file};
-use truetwin::evaluate::paper::{Run, reference_studies};
+use truetwin::evaluate::paper::{Run, reference_projects};
 use truetwin::external::program::fuzzing as program;
 use truetwin::network::HeadArchitecture;
 use truetwin::network::layers::*;
@@ -72,20 +73,20 @@ pub fn record(data: &[u8]) -> Result<(), String> {
     drive.map(|_| ())
 }
 
-fn studies() -> &'static [Study] {
-    static STUDIES: OnceLock<Vec<Study>> = OnceLock::new();
-    STUDIES.get_or_init(|| {
-        let mut studies = reference_studies().expect("the reference twins");
-        studies.push(tiny());
-        studies
+fn projects() -> &'static [Project] {
+    static PROJECTS: OnceLock<Vec<Project>> = OnceLock::new();
+    PROJECTS.get_or_init(|| {
+        let mut projects = reference_projects().expect("the reference twins");
+        projects.push(tiny());
+        projects
     })
 }
 
 /// A study file, up to the study that it makes.
 pub fn study(data: &[u8]) -> Result<(), String> {
     let found = StudyFile::read(&file("study.toml", data)).map_err(text)?;
-    match studies().iter().find(|s| s.name() == found.twin) {
-        Some(study) => study.configure(&found).map(|_| ()).map_err(text),
+    match projects().iter().find(|p| p.study().name() == found.twin) {
+        Some(project) => project.configure(&found).map(|_| ()).map_err(text),
         None => Ok(()),
     }
 }
@@ -93,7 +94,11 @@ pub fn study(data: &[u8]) -> Result<(), String> {
 /// An effect file, up to the twin that has the effects.
 pub fn effect(data: &[u8]) -> Result<(), String> {
     let found = read_effects(&file("effect.toml", data)).map_err(text)?;
-    let Some(study) = studies().iter().find(|s| s.name() == "tanks") else {
+    let Some(study) = projects()
+        .iter()
+        .map(Project::study)
+        .find(|s| s.name() == "tanks")
+    else {
         return Ok(());
     };
     augment(study.twin().clone(), found)
@@ -111,19 +116,21 @@ impl HeadArchitecture for Tiny {
     type Head = Linear<4, 1>;
 }
 
-/// The study of the estimators among the seeds.
-pub fn tiny() -> Study {
+/// The project of the estimators among the seeds.
+pub fn tiny() -> Project {
     let plan = RecordPlan::autonomous(0.05, 60);
     let study = Study::new("tiny", VanDerPol, plan).expect("a study");
     let features = truetwin::feature::Ar { order: 3 };
-    study.with_features(features).with_architecture::<Tiny>()
+    Project::from(study)
+        .with_features(features)
+        .with_architecture::<Tiny>()
 }
 
 /// An estimator file as it is, and as it would be if whoever changed it had made the checksum fit.
 pub fn estimator(data: &[u8]) -> Result<(), String> {
     let load = |bytes: &[u8]| {
         let path = file("tiny.est", bytes);
-        Estimator::load(&path, studies()).map(|_| ()).map_err(text)
+        Estimator::load(&path, projects()).map(|_| ()).map_err(text)
     };
     let as_it_is = load(data);
     match signed(data) {

@@ -7,11 +7,12 @@ use super::{SEED, mean, records, runs, square, study};
 use ndarray::{Array2, Axis, concatenate};
 use std::borrow::Cow;
 use truetwin::estimator::bank::{Draw, Draws, FeatureSimulator};
+use truetwin::estimator::{PresetName, Project};
 use truetwin::estimator::{Scaler, Standardiser};
 use truetwin::evaluate::paper::Scenario;
 use truetwin::network::{Deep, Network, architecture};
 use truetwin::progress::Progress;
-use truetwin::study::{PresetName, Study};
+use truetwin::study::Study;
 use truetwin::twin::Noise;
 
 /// Step of the differences that give the sign of the gradient.
@@ -60,7 +61,8 @@ fn attacked(network: &dyn Network, z: &Array2<f64>, y: &Array2<f64>, epsilon: f6
 fn adversarial_training_is_compared_with_plain_training() {
     for twin in ["van-der-pol", "tanks"] {
         let study = study(twin, "");
-        let preset = study.preset(PresetName::Default);
+        let project = Project::from(&study);
+        let preset = project.recipe(PresetName::Default);
         let simulator =
             FeatureSimulator::new(study.twin().clone(), preset.features.as_ref()).unwrap();
         let training = bank(&study, &simulator, 10_000, "bank");

@@ -3,10 +3,9 @@
 use super::chain::{Chain, Units};
 use std::time::Instant;
 use truetwin::diagnose::{DiagnoseSettings, diagnose};
-use truetwin::estimator::{EstimateOptions, PretrainOptions, pretrain};
+use truetwin::estimator::{EstimateOptions, PretrainOptions, Project, pretrain};
 use truetwin::feature::Arx;
 use truetwin::progress::Progress;
-use truetwin::study::Study;
 
 const MANY: Chain = Chain {
     tanks: 20,
@@ -15,7 +14,7 @@ const MANY: Chain = Chain {
 };
 
 /// From bank to estimate.
-fn estimated(chain: Chain, study: Study, samples: usize, bank: usize) {
+fn estimated(chain: Chain, project: impl Into<Project>, samples: usize, bank: usize) {
     let options = PretrainOptions {
         bank_size: Some(bank),
         epochs: Some(20),
@@ -23,7 +22,7 @@ fn estimated(chain: Chain, study: Study, samples: usize, bank: usize) {
         ..PretrainOptions::default()
     };
     let silent = Progress::silent();
-    let (estimator, history) = pretrain(&study, &options, &silent).unwrap();
+    let (estimator, history) = pretrain(project, &options, &silent).unwrap();
     assert!(history.training.iter().all(|loss| loss.is_finite()));
     let record = chain.record(1.1, samples, 3);
     let estimate = (estimator.estimate(&record, &EstimateOptions::default(), &silent)).unwrap();
@@ -62,7 +61,12 @@ fn twenty_parameters_and_ten_outputs() {
         outputs: 3,
         inputs: 3,
     };
-    estimated(MANY, MANY.study(400).with_features(lags), 400, 2000);
+    estimated(
+        MANY,
+        Project::from(MANY.study(400)).with_features(lags),
+        400,
+        2000,
+    );
 }
 
 #[test]

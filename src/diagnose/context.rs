@@ -1,0 +1,60 @@
+//! Inputs that all steps of a diagnosis share.
+
+use crate::record::Record;
+use crate::study::Study;
+use crate::twin::{DigitalTwin, Now};
+use std::sync::Arc;
+
+/// What all steps share.
+pub(super) struct Context<'a> {
+    pub study: &'a Study,
+    pub twin: &'a Arc<dyn DigitalTwin>,
+    pub validation: Option<&'a [Record]>,
+    /// The records and the validation record.
+    pub together: Option<&'a [Record]>,
+    /// Whether the twin has no process noise: its free run is to follow the record, and neither noise nor a disturbance
+    /// is a rival: either would explain anything.
+    pub follows: bool,
+    /// Whether the twin is a simulator without noise of its own, and has been given measurement noise.
+    pub silent: bool,
+}
+
+impl<'a> Context<'a> {
+    /// Of the twin as [`measured`](crate::likelihood::ensemble::measured) shows it.
+    pub fn new(
+        study: &'a Study,
+        (twin, silent): &'a (Arc<dyn DigitalTwin>, bool),
+        records: &[Record],
+        validation: Option<&'a [Record]>,
+        together: Option<&'a [Record]>,
+    ) -> Self {
+        Self {
+            study,
+            twin,
+            validation,
+            together,
+            follows: *silent || without_process_noise(twin.as_ref(), &records[0]),
+            silent: *silent,
+        }
+    }
+}
+
+/// Whether no state of the twin is noisy, with any noise level that the study leaves open; nobody knows of a black box.
+fn without_process_noise(twin: &dyn DigitalTwin, record: &Record) -> bool {
+    let Some(twin) = twin.state_space() else {
+        return false;
+    };
+    let outline = twin.outline();
+    let theta = outline.parameters.centre();
+    let drive = record.drive();
+    let now = Now {
+        t: 0.0,
+        dt: drive.dt(),
+        u: drive.input(0),
+        theta: &theta,
+    };
+    let mut process = vec![0.0; outline.states.len()];
+    let mut measurement = vec![0.0; outline.outputs.len()];
+    twin.noise(&now, &mut process, &mut measurement);
+    process.iter().all(|q| *q == 0.0)
+}

@@ -1,0 +1,9 @@
+//! Fits of the explanations, their order, and the decision.
+
+pub(super) mod attribute;
+pub(super) mod decide;
+pub(super) mod evalue;
+pub(super) mod frequency;
+pub(super) mod several;
+pub(super) mod step;
+pub(super) mod verdict;

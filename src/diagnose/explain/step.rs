@@ -1,0 +1,138 @@
+//! A twin with accepted effects.
+
+use crate::diagnose::context::Context;
+use crate::diagnose::error::DiagnoseError;
+use crate::diagnose::explain::attribute::Explanation;
+use crate::diagnose::hypotheses::candidate::{Addition, Candidate};
+use crate::diagnose::test::fitted_twin::FittedTwin;
+use crate::diagnose::test::free_run::{Runner, closed};
+use crate::effect::Law;
+use crate::twin::Noise;
+
+/// Nats that another effect must add beyond what it costs.
+pub(in crate::diagnose) const WORTH_ANOTHER: f64 = 3.0;
+/// Least share of the free-run error that effects must take off where something is left unexplained.
+const GOOD_PART: f64 = 0.1;
+
+/// One accepted effect.
+#[derive(Clone)]
+pub(in crate::diagnose) struct Accepted {
+    pub addition: Addition,
+    pub id: String,
+    pub target: String,
+    pub magnitudes: Vec<(String, f64)>,
+    /// Nats that it adds.
+    pub gain: f64,
+    /// Among all that was tried in its place.
+    pub probability: f64,
+}
+
+impl Accepted {
+    pub fn key(&self) -> String {
+        format!("{}@{}", self.id, self.target)
+    }
+
+    /// Whether only the noise is changed, so that no free run moves.
+    pub fn is_noise(&self) -> bool {
+        matches!(
+            self.addition.effect.law(),
+            Law::MeasurementNoise | Law::ProcessNoise | Law::Outliers
+        )
+    }
+}
+
+/// A twin with accepted effects, fitted.
+pub(in crate::diagnose) struct Step<'a> {
+    pub bench: FittedTwin<'a>,
+    pub accepted: Vec<Accepted>,
+    /// Score over the twin alone.
+    pub score: f64,
+}
+
+/// The bench of a twin with effects, whose fit is `explanation` on `bench`, with its probability there.
+pub(in crate::diagnose) fn grown<'a>(
+    context: &Context<'a>,
+    bench: &FittedTwin<'a>,
+    accepted: &[Accepted],
+    explanation: &Explanation,
+    probability: f64,
+) -> Result<Option<Step<'a>>, DiagnoseError> {
+    let Some(addition) = bench.addition(explanation) else {
+        return Ok(None);
+    };
+    let variant = &bench.dictionary.variants[explanation.variant];
+    let candidate = &bench.dictionary.candidates[explanation.candidate];
+    let mut all = accepted.to_vec();
+    all.push(Accepted {
+        addition,
+        id: candidate.id.clone(),
+        target: candidate.target.clone(),
+        magnitudes: magnitudes(bench, explanation),
+        gain: explanation.gain + explanation.validation.unwrap_or(0.0),
+        probability,
+    });
+    let additions: Vec<Addition> = all.iter().map(|a| a.addition.clone()).collect();
+    let left: Vec<Candidate> = (bench.dictionary.candidates.iter())
+        .filter(|c| !c.is_listed() || !all.iter().any(|a| a.key() == c.key()))
+        .cloned()
+        .collect();
+    let problem = variant.problem(&bench.problem);
+    let Some(bench) = FittedTwin::new(
+        context.twin,
+        problem,
+        explanation.fitted.clone(),
+        &additions,
+        left,
+    )?
+    else {
+        return Ok(None);
+    };
+    Ok(Some(Step {
+        bench,
+        accepted: all,
+        score: explanation.score(),
+    }))
+}
+
+/// Names and values of an explanation's magnitudes, those held at their off values included.
+pub(in crate::diagnose) fn magnitudes(
+    bench: &FittedTwin<'_>,
+    explanation: &Explanation,
+) -> Vec<(String, f64)> {
+    let candidate = &bench.dictionary.candidates[explanation.candidate];
+    let variant = &bench.dictionary.variants[explanation.variant];
+    let problem = variant.problem(&bench.problem);
+    let theta = problem.of_record(0, &explanation.fitted.theta);
+    let mut free = theta[theta.len() - variant.free.len()..].iter();
+    (candidate.magnitudes().into_iter())
+        .map(|m| {
+            let value = (variant.held.get(m.name).copied())
+                .unwrap_or_else(|| free.next().copied().unwrap_or(f64::NAN));
+            (m.name.to_owned(), value)
+        })
+        .collect()
+}
+
+/// Of a twin whose free run is to follow the record: whether a step's effects let it follow the validation record better than
+/// those `before` by a good part, beyond chance. A real system is never explained to the last bit, and without process noise
+/// nothing else would be accepted.
+pub(in crate::diagnose) fn improves(
+    context: &Context<'_>,
+    (bench, before): (&FittedTwin<'_>, &[Accepted]),
+    step: &Step<'_>,
+    noise: Noise,
+) -> Result<bool, DiagnoseError> {
+    let Some(records) = context.validation.filter(|_| context.follows) else {
+        return Ok(false);
+    };
+    let errors = |bench: &FittedTwin<'_>, accepted: &[Accepted]| -> Result<_, DiagnoseError> {
+        let additions: Vec<Addition> = accepted.iter().map(|a| a.addition.clone()).collect();
+        let theta = bench.problem.of_record(0, &bench.fitted.theta);
+        Ok(Runner::new(context.twin, &additions, theta)?.errors(&records[0], 0))
+    };
+    let (before, after) = (errors(bench, before)?, errors(&step.bench, &step.accepted)?);
+    Ok(before.zip(after).is_some_and(|(before, after)| {
+        let (_, interval) = closed(&before, &after, 0.0, noise.child("improves"));
+        interval.is_some_and(|[low, _]| low > GOOD_PART)
+    }))
+}

@@ -1,0 +1,151 @@
+//! The most probable θ of a twin, given its records and a weak prior.
+
+use crate::diagnose::fitting::problem::Problem;
+use crate::diagnose::fitting::slope::{Slope, slope};
+use crate::likelihood::kalman::{FilterError, recoverable};
+use nalgebra::{DMatrix, DVector};
+
+/// Where a fit ended.
+#[derive(Debug, Clone)]
+pub(in crate::diagnose) struct Fitted {
+    /// Full θ.
+    pub theta: Vec<f64>,
+    pub log_likelihood: f64,
+    /// Log-density of the priors that count in comparisons.
+    pub log_prior: f64,
+    /// What the fit maximises: likelihood and all priors.
+    pub objective: f64,
+    /// Information in φ, that of the priors included.
+    pub information: DMatrix<f64>,
+}
+
+impl Fitted {
+    /// What fits of different twins are compared by.
+    pub fn value(&self) -> f64 {
+        self.log_likelihood + self.log_prior
+    }
+
+    /// Standard deviations of θ from information and prior, first order.
+    pub fn std_errors(&self, problem: &Problem<'_>) -> Vec<f64> {
+        let slopes = problem.coordinates.slopes(&self.theta);
+        match self.information.clone().try_inverse() {
+            Some(covariance) => (slopes.iter().enumerate())
+                .map(|(j, slope)| slope * covariance[(j, j)].max(0.0).sqrt())
+                .collect(),
+            None => vec![f64::NAN; slopes.len()],
+        }
+    }
+}
+
+/// Damped Fisher scoring from one start, within the bounds; `None` where the filter does not work at the start.
+///
+/// ```text
+/// (F + λ·diag F)·δ = s,   φ ← φ + δ,   λ smaller after a step that helps, larger after one that does not
+/// ```
+///
+/// F holds the information of the weak prior too. Entries at a bound that want to leave it are held for the step. A trial
+/// point where the filter fails only rejects the step.
+pub(in crate::diagnose) fn climb(
+    problem: &Problem<'_>,
+    start: &[f64],
+    iterations: usize,
+) -> Result<Option<Fitted>, FilterError> {
+    let c = &problem.coordinates;
+    let at = |phi: &DVector<f64>| recoverable(slope(problem, &c.theta(phi.as_slice())));
+    let mut phi = c.clamp(&DVector::from_vec(c.of(&problem.clamp(start))));
+    let Some(mut slope) = at(&phi)?.filter(|s| s.objective().is_finite()) else {
+        return Ok(None);
+    };
+    let mut damping: f64 = 0.1;
+    let mut tried = 0;
+    while tried < iterations && damping < 1e5 {
+        tried += 1;
+        let Some(step) = step(problem, &slope, &phi, damping) else {
+            break;
+        };
+        let next = c.clamp(&(&phi + &step));
+        let moved = (&next - &phi).amax();
+        // Not worth a look: the gain that the step promises is nothing.
+        if moved < 1e-9 || slope.gradient.dot(&step) < 0.2 * problem.done() {
+            break;
+        }
+        // The likelihood alone tells whether to go there; the derivatives follow if so.
+        let value = recoverable(problem.log_likelihood(&c.theta(next.as_slice())))?
+            .map(|v| v + problem.log_prior(&c.theta(next.as_slice()), true));
+        match value {
+            Some(value) if value > slope.objective() => {
+                let gain = value - slope.objective();
+                let Some(better) = at(&next)? else { break };
+                (phi, slope) = (next, better);
+                damping = (0.1 * damping).max(1e-6);
+                if gain < problem.done() {
+                    break;
+                }
+            }
+            _ => damping = (8.0 * damping).max(1e-3),
+        }
+    }
+    let theta = c.theta(phi.as_slice());
+    Ok(Some(Fitted {
+        log_prior: problem.log_prior(&theta, false),
+        log_likelihood: slope.log_likelihood,
+        objective: slope.objective(),
+        information: slope.information,
+        theta,
+    }))
+}
+
+/// The damped step, entries held at their bounds left out.
+fn step(
+    problem: &Problem<'_>,
+    slope: &Slope,
+    phi: &DVector<f64>,
+    damping: f64,
+) -> Option<DVector<f64>> {
+    let c = &problem.coordinates;
+    let free: Vec<usize> = (0..phi.len())
+        .filter(|&j| {
+            let out_below = phi[j] <= c.lower()[j] && slope.gradient[j] < 0.0;
+            let out_above = phi[j] >= c.upper()[j] && slope.gradient[j] > 0.0;
+            !(out_below || out_above || problem.axes[j].held)
+        })
+        .collect();
+    let n = free.len();
+    if n == 0 {
+        return None;
+    }
+    let matrix = DMatrix::from_fn(n, n, |a, b| {
+        let value = slope.information[(free[a], free[b])];
+        if a == b {
+            value * (1.0 + damping) + f64::MIN_POSITIVE
+        } else {
+            value
+        }
+    });
+    let gradient = DVector::from_fn(n, |a, _| slope.gradient[free[a]]);
+    let part = matrix.cholesky()?.solve(&gradient);
+    let mut step = DVector::zeros(phi.len());
+    let mut shrink: f64 = 1.0;
+    for (a, &j) in free.iter().enumerate() {
+        step[j] = part[a];
+        shrink = shrink.min(problem.axes[j].longest / part[a].abs().max(1e-300));
+    }
+    step.iter().all(|v| v.is_finite()).then(|| step * shrink)
+}
+
+/// The best of several starts.
+pub(in crate::diagnose) fn fit(
+    problem: &Problem<'_>,
+    starts: &[Vec<f64>],
+    iterations: usize,
+) -> Result<Option<Fitted>, FilterError> {
+    let mut best: Option<Fitted> = None;
+    for start in starts {
+        if let Some(found) = climb(problem, start, iterations)?
+            && best.as_ref().is_none_or(|b| found.objective > b.objective)
+        {
+            best = Some(found);
+        }
+    }
+    Ok(best)
+}

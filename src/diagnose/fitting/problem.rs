@@ -1,0 +1,293 @@
+//! A twin and the records that it is fitted to.
+
+use crate::diagnose::fitting::axis::Axis;
+use crate::likelihood::ensemble::{self, Predictor};
+use crate::likelihood::kalman::{Coordinates, FilterError, FilterSettings, Filtered, Kalman};
+use crate::record::{Record, Signal};
+use crate::twin::{DigitalTwin, Outline, Parameter, ParameterSpace, Role};
+use std::sync::{Arc, Mutex};
+
+/// And of the noise level of a black box.
+const LONGEST_NOISE: f64 = 2.0;
+
+/// A twin and records, with one θ for all of them but for unknown starts, of which each record has its own.
+///
+/// The full θ is the twin's, then the starts of the second record, and so on.
+#[derive(Clone)]
+pub(in crate::diagnose) struct Problem<'a> {
+    pub twin: Arc<dyn DigitalTwin>,
+    pub records: &'a [Record],
+    /// For each record, where the twin's parameters stand in the full θ.
+    pub(super) places: Vec<Vec<usize>>,
+    pub axes: Vec<Axis>,
+    pub coordinates: Coordinates,
+    pub(super) coordinates_of: Vec<Coordinates>,
+    pub(super) filter: FilterSettings,
+    /// What a black box showed last: a fit looks at a θ before it steps from there.
+    seen: Arc<Mutex<Option<Seen>>>,
+}
+
+/// θ and the innovations there.
+type Seen = (Vec<f64>, Vec<Filtered>);
+
+impl<'a> Problem<'a> {
+    /// `axes` belong to the parameters of the twin; their likelihood is a filter's, or, without equations, that of an ensemble.
+    pub fn new(twin: Arc<dyn DigitalTwin>, axes: Vec<Axis>, records: &'a [Record]) -> Self {
+        let space = twin.parameters();
+        let mut all = axes;
+        let mut places = Vec::new();
+        for r in 0..records.len() {
+            let mut of_record = Vec::new();
+            for (j, p) in space.iter().enumerate() {
+                if r > 0 && p.role == Role::Start {
+                    all.push(all[j].clone());
+                    of_record.push(all.len() - 1);
+                } else {
+                    of_record.push(j);
+                }
+            }
+            places.push(of_record);
+        }
+        let coordinates = |axes: &mut dyn Iterator<Item = &Axis>| {
+            Coordinates::new(&ParameterSpace::new(axes.map(|axis| {
+                let mut p = Parameter::new("", "", 0.0, axis.width);
+                p.bounds = axis.bounds;
+                p
+            })))
+        };
+        Self {
+            coordinates: coordinates(&mut all.iter()),
+            coordinates_of: places
+                .iter()
+                .map(|place| coordinates(&mut place.iter().map(|&j| &all[j])))
+                .collect(),
+            places,
+            axes: all,
+            twin,
+            records,
+            filter: FilterSettings::default(),
+            seen: Arc::default(),
+        }
+    }
+
+    /// A twin with the weak priors of its own parameters.
+    pub fn of_twin(twin: &Arc<dyn DigitalTwin>, records: &'a [Record]) -> Self {
+        let mut axes: Vec<Axis> = twin.parameters().iter().map(Axis::of).collect();
+        if twin.state_space().is_none() {
+            // What an effect explains of a simulator's misfit may be all of it.
+            let noise = |p: &Parameter| p.role == Role::Noise;
+            for (axis, _) in
+                (axes.iter_mut().zip(twin.parameters().iter())).filter(|(_, p)| noise(p))
+            {
+                axis.longest = LONGEST_NOISE;
+            }
+        }
+        Self::new(twin.clone(), axes, records)
+    }
+
+    /// The same twin on other records.
+    pub fn on<'b>(&self, records: &'b [Record]) -> Problem<'b> {
+        let d = self.twin.parameters().len();
+        Problem::new(self.twin.clone(), self.axes[..d].to_vec(), records)
+    }
+
+    /// The same problem with all but the unknown starts held.
+    pub fn starts_only(&self) -> Option<Self> {
+        let space = self.twin.parameters();
+        let d = space.len();
+        let free = |j: usize| j >= d || space[j].role == Role::Start;
+        let mut problem = self.clone();
+        for (j, axis) in problem.axes.iter_mut().enumerate() {
+            axis.held = !free(j);
+        }
+        (0..self.dimension()).any(free).then_some(problem)
+    }
+
+    /// States, inputs and outputs; of a black box, its predicted outputs stand for states.
+    pub fn outline(&self) -> Outline {
+        match self.twin.state_space() {
+            Some(equations) => equations.outline(),
+            None => {
+                let signals = self.twin.signals();
+                Outline {
+                    parameters: self.twin.parameters(),
+                    states: signals.outputs.clone(),
+                    inputs: signals.inputs,
+                    outputs: signals.outputs,
+                }
+            }
+        }
+    }
+
+    /// Of a black box: what predicts each record at θ.
+    pub fn predictors(&self, theta: &[f64]) -> Result<Vec<Predictor>, FilterError> {
+        (self.records.iter().enumerate())
+            .map(|(r, record)| {
+                ensemble::predictor(self.twin.as_ref(), &self.of_record(r, theta), record)
+            })
+            .collect()
+    }
+
+    /// Number of samples of all records.
+    pub fn samples(&self) -> usize {
+        self.records.iter().map(Record::samples).sum()
+    }
+
+    /// Dimension of the full θ.
+    pub fn dimension(&self) -> usize {
+        self.axes.len()
+    }
+
+    /// θ of one record.
+    pub fn of_record(&self, r: usize, theta: &[f64]) -> Vec<f64> {
+        self.places[r].iter().map(|&j| theta[j]).collect()
+    }
+
+    /// Full θ from that of one record: all records start alike.
+    pub fn full(&self, theta: &[f64]) -> Vec<f64> {
+        let mut full = vec![0.0; self.dimension()];
+        for r in 0..self.places.len() {
+            self.place(r, theta, &mut full);
+        }
+        full
+    }
+
+    /// Full θ from that of another problem, whose records are the first of these: others start as its first one does.
+    pub fn carried(&self, other: &Problem<'_>, theta: &[f64]) -> Vec<f64> {
+        let mut full = self.full(&other.of_record(0, theta));
+        for r in 0..other.records.len() {
+            self.place(r, &other.of_record(r, theta), &mut full);
+        }
+        full
+    }
+
+    /// Puts θ of one record into the full θ.
+    pub fn place(&self, r: usize, theta: &[f64], full: &mut [f64]) {
+        for (&j, value) in self.places[r].iter().zip(theta) {
+            full[j] = *value;
+        }
+    }
+
+    /// The nearest θ within the bounds.
+    pub fn clamp(&self, theta: &[f64]) -> Vec<f64> {
+        let axes = self.axes.iter().zip(theta);
+        axes.map(|(axis, v)| axis.bounds.clamp(*v)).collect()
+    }
+
+    /// The prior's centre.
+    pub fn centre(&self) -> Vec<f64> {
+        self.axes.iter().map(|a| a.bounds.clamp(a.centre)).collect()
+    }
+
+    /// Log-density of the priors, up to a constant: of all axes, or of those that count.
+    pub fn log_prior(&self, theta: &[f64], all: bool) -> f64 {
+        let phi = self.coordinates.of(theta);
+        self.prior_terms()
+            .enumerate()
+            .filter(|(j, _)| all || self.axes[*j].counts)
+            .map(|(j, (centre, precision))| -0.5 * precision * (phi[j] - centre).powi(2))
+            .sum()
+    }
+
+    /// Centre and precision of the priors in φ.
+    pub fn prior_terms(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        let logs = self.coordinates.is_log().iter();
+        self.axes.iter().zip(logs).map(|(axis, log)| {
+            let centre = if *log { axis.centre.ln() } else { axis.centre };
+            (centre, axis.deviation.powi(-2))
+        })
+    }
+
+    pub fn log_likelihood(&self, theta: &[f64]) -> Result<f64, FilterError> {
+        let Some(equations) = self.twin.state_space() else {
+            let all = self.filtered(theta)?;
+            let sum = all.iter().map(|f| f.log_likelihood).sum();
+            *self.seen.lock().unwrap_or_else(|e| e.into_inner()) = Some((theta.to_vec(), all));
+            return Ok(sum);
+        };
+        let mut sum = 0.0;
+        for (r, record) in self.records.iter().enumerate() {
+            let kalman = Kalman::new(equations, record, &self.filter)?;
+            sum += kalman.log_likelihood(&self.of_record(r, theta))?;
+        }
+        Ok(sum)
+    }
+
+    /// Innovations that were seen last, if it was at θ.
+    pub fn last_seen(&self, theta: &[f64]) -> Option<Vec<Filtered>> {
+        let seen = self.seen.lock().unwrap_or_else(|e| e.into_inner());
+        (seen.as_ref().filter(|(at, _)| at == theta)).map(|(_, all)| all.clone())
+    }
+
+    /// Gain at which a fit is done, in nats; what simulations say is not worth the last of them.
+    pub fn done(&self) -> f64 {
+        match self.twin.state_space() {
+            Some(_) => 5e-3,
+            None => 5e-2,
+        }
+    }
+
+    /// Innovations of each record.
+    pub fn filtered(&self, theta: &[f64]) -> Result<Vec<Filtered>, FilterError> {
+        self.filtered_by(theta, &self.filter)
+    }
+
+    /// Innovations and filtered states of each record.
+    pub fn states(&self, theta: &[f64]) -> Result<Vec<(Filtered, Signal)>, FilterError> {
+        if self.twin.state_space().is_none() {
+            let all = self.filtered(theta)?.into_iter().zip(self.records);
+            return Ok(all
+                .map(|(f, record)| {
+                    let predicted = f.predictions(record.outputs());
+                    (f, predicted)
+                })
+                .collect());
+        }
+        let keep = FilterSettings {
+            keep_states: true,
+            ..self.filter.clone()
+        };
+        let all = self.filtered_by(theta, &keep)?;
+        Ok((all.into_iter())
+            .map(|mut f| {
+                let states = f
+                    .states
+                    .take()
+                    .map_or_else(|| Signal::zeros((0, 0)), |s| s.means);
+                (f, states)
+            })
+            .collect())
+    }
+
+    fn filtered_by(
+        &self,
+        theta: &[f64],
+        settings: &FilterSettings,
+    ) -> Result<Vec<Filtered>, FilterError> {
+        (self.records.iter().enumerate())
+            .map(|(r, record)| {
+                let theta = self.of_record(r, theta);
+                match self.twin.state_space() {
+                    Some(equations) => Kalman::new(equations, record, settings)?.filter(&theta),
+                    None => ensemble::filtered(self.twin.as_ref(), &theta, record),
+                }
+            })
+            .collect()
+    }
+
+    /// Points around θ whose innovations tell their derivatives: (moved θ, distance in φ), one for each entry.
+    pub fn neighbours(&self, theta: &[f64]) -> Vec<(Vec<f64>, f64)> {
+        // Runs are smooth in θ up to a simulator's own tolerance only.
+        let share = match self.twin.state_space() {
+            Some(_) => 0.1,
+            None => 1.0,
+        };
+        let phi = self.coordinates.of(theta);
+        (0..phi.len())
+            .map(|j| {
+                let (moved, distance) = self.coordinates.beside(&phi, j, share);
+                (self.coordinates.theta(&moved), distance)
+            })
+            .collect()
+    }
+}

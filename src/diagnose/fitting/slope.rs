@@ -1,0 +1,103 @@
+//! Gradient and information of the likelihood that an ensemble gives, from differences.
+//!
+//! Innovations and covariances a step beside θ, of the same draws, say how both change; of Gaussian innovations the gradient is
+//! then D·r and the information DᵀD, as in `reference.rs`.
+
+use crate::diagnose::fitting::problem::Problem;
+use crate::diagnose::fitting::reference::Reference;
+use crate::likelihood::kalman::{FilterError, Filtered, Kalman, Score};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Gradient and information of all records and the weak prior, in φ.
+pub(super) struct Slope {
+    pub log_likelihood: f64,
+    /// Log-density of the weak priors, all of them, up to a constant.
+    pub log_prior: f64,
+    pub gradient: DVector<f64>,
+    pub information: DMatrix<f64>,
+}
+
+impl Slope {
+    pub fn objective(&self) -> f64 {
+        self.log_likelihood + self.log_prior
+    }
+}
+
+/// Returns gradient and information at θ.
+pub(super) fn slope(problem: &Problem<'_>, theta: &[f64]) -> Result<Slope, FilterError> {
+    let Some(equations) = problem.twin.state_space() else {
+        let mut slope = by_differences(problem, theta)?;
+        add_priors(problem, theta, &mut slope);
+        return Ok(slope);
+    };
+    let d = problem.dimension();
+    let mut slope = Slope {
+        log_likelihood: 0.0,
+        log_prior: problem.log_prior(theta, true),
+        gradient: DVector::zeros(d),
+        information: DMatrix::zeros(d, d),
+    };
+    for (r, record) in problem.records.iter().enumerate() {
+        let kalman = Kalman::new(equations, record, &problem.filter)?;
+        let place = &problem.places[r];
+        let score = Score::forward(
+            &kalman,
+            &problem.of_record(r, theta),
+            &problem.coordinates_of[r],
+        )?;
+        slope.log_likelihood += score.log_likelihood;
+        for (a, &i) in place.iter().enumerate() {
+            slope.gradient[i] += score.gradient[a];
+            for (b, &j) in place.iter().enumerate() {
+                slope.information[(i, j)] += score.fisher[(a, b)];
+            }
+        }
+    }
+    add_priors(problem, theta, &mut slope);
+    Ok(slope)
+}
+
+fn add_priors(problem: &Problem<'_>, theta: &[f64], slope: &mut Slope) {
+    let phi = problem.coordinates.of(theta);
+    for (j, (centre, precision)) in problem.prior_terms().enumerate() {
+        slope.gradient[j] -= precision * (phi[j] - centre);
+        slope.information[(j, j)] += precision;
+    }
+}
+
+/// Gradient and information of an ensemble's likelihood, from differences.
+fn by_differences(problem: &Problem<'_>, theta: &[f64]) -> Result<Slope, FilterError> {
+    let here = match problem.last_seen(theta) {
+        Some(here) => here,
+        None => problem.filtered(theta)?,
+    };
+    let here = Reference::bare(here);
+    let d = problem.dimension();
+    let directions: Vec<Option<DVector<f64>>> = (problem.neighbours(theta).into_par_iter())
+        .enumerate()
+        .map(|(j, (moved, distance))| {
+            if problem.axes[j].held {
+                return Ok(None);
+            }
+            let there: Vec<Filtered> = problem.filtered(&moved)?;
+            Ok(Some(here.direction(&there) / distance))
+        })
+        .collect::<Result<_, FilterError>>()?;
+    let mut slope = Slope {
+        log_likelihood: here.filtered.iter().map(|f| f.log_likelihood).sum(),
+        log_prior: problem.log_prior(theta, true),
+        gradient: DVector::zeros(d),
+        information: DMatrix::zeros(d, d),
+    };
+    for (i, a) in directions.iter().enumerate() {
+        let Some(a) = a else { continue };
+        slope.gradient[i] = here.residual().dot(a);
+        for (j, b) in directions.iter().enumerate().take(i + 1) {
+            let Some(b) = b else { continue };
+            slope.information[(i, j)] = a.dot(b);
+            slope.information[(j, i)] = slope.information[(i, j)];
+        }
+    }
+    Ok(slope)
+}

@@ -1,0 +1,200 @@
+//! What a twin may lack: listed effects, and disturbances for everything else.
+
+use crate::diagnose::error::DiagnoseError;
+use crate::diagnose::hypotheses::disturbed_equations::disturbed;
+use crate::diagnose::hypotheses::entry::Entry;
+use crate::effect::{Law, Magnitude, UnmodelledEffect, augment_short};
+use crate::record::Signals;
+use crate::study::Study;
+use crate::twin::{DigitalTwin, Outline, Role, fix};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Memories a of the disturbances.
+const MEMORIES: [f64; 3] = [1.0, 0.95, 0.8];
+
+/// A listed effect, or a catch-all.
+#[derive(Debug, Clone)]
+pub(in crate::diagnose) enum Kind {
+    Listed(Arc<dyn UnmodelledEffect>),
+    CatchAll(Entry, f64),
+}
+
+/// One explanation of a gap.
+#[derive(Debug, Clone)]
+pub(in crate::diagnose) struct Candidate {
+    /// Id of the effect; of a catch-all, `disturbance`.
+    pub id: String,
+    /// Sensor, actuator, state or parameter.
+    pub target: String,
+    pub kind: Kind,
+}
+
+impl Candidate {
+    /// `id@target`.
+    pub fn key(&self) -> String {
+        format!("{}@{}", self.id, self.target)
+    }
+
+    pub fn is_listed(&self) -> bool {
+        matches!(self.kind, Kind::Listed(_))
+    }
+
+    /// Whether only the noise is changed, so that no free run moves.
+    pub fn is_noise(&self) -> bool {
+        match &self.kind {
+            Kind::Listed(effect) => {
+                matches!(
+                    effect.law(),
+                    Law::MeasurementNoise | Law::ProcessNoise | Law::Outliers
+                )
+            }
+            Kind::CatchAll(..) => true,
+        }
+    }
+
+    /// The numbers of the law; of a catch-all, its strength.
+    pub fn magnitudes(&self) -> Vec<Magnitude> {
+        match &self.kind {
+            Kind::Listed(effect) => effect.magnitudes(),
+            Kind::CatchAll(..) => vec![Magnitude::positive("std", "", &[0.05])],
+        }
+    }
+}
+
+/// An effect with those of its magnitudes that are held at their off value.
+#[derive(Debug, Clone)]
+pub(in crate::diagnose) struct Addition {
+    pub effect: Arc<dyn UnmodelledEffect>,
+    pub held: BTreeMap<String, f64>,
+    /// Memory values that filters keep of a delay.
+    pub kept: Option<usize>,
+}
+
+/// The twin with some effects, for filters: delays are cut short.
+pub(in crate::diagnose) fn with(
+    base: &Arc<dyn DigitalTwin>,
+    additions: &[Addition],
+) -> Result<Arc<dyn DigitalTwin>, DiagnoseError> {
+    let mut effects = vec![];
+    let mut held = BTreeMap::new();
+    for addition in additions {
+        let effect = &addition.effect;
+        let (id, target) = (effect.typetag_name(), effect.target());
+        effects.push((effect.clone(), addition.kept.unwrap_or(effect.memory())));
+        held.extend((addition.held.iter()).map(|(name, v)| (format!("{id}@{target}.{name}"), *v)));
+    }
+    Ok(fix(augment_short(base.clone(), effects)?, &held)?)
+}
+
+/// The twin with a catch-all on top.
+pub(in crate::diagnose) fn with_disturbance(
+    base: &Arc<dyn DigitalTwin>,
+    place: Entry,
+    memory: f64,
+) -> Arc<dyn DigitalTwin> {
+    disturbed(base.clone(), place, memory)
+}
+
+/// Magnitudes that a fit may start from.
+fn first_starts(effect: &dyn UnmodelledEffect) -> Vec<f64> {
+    (effect.magnitudes().iter())
+        .map(|m| m.starts.first().copied().unwrap_or(0.0))
+        .collect()
+}
+
+/// Every listed effect that the study lets a diagnosis name and a filter knows; then a catch-all for each state, sensor and
+/// own parameter.
+pub(in crate::diagnose) fn candidates(
+    study: &Study,
+    without: &[String],
+) -> Result<Vec<Candidate>, DiagnoseError> {
+    if let Some(name) = without.iter().find(|name| !study.knows_effect(name)) {
+        return Err(DiagnoseError::Without(study.with_nearest_effect(name)));
+    }
+    let twin = study.twin();
+    let named = |id: &str, target: &str| {
+        let full = format!("{id}@{target}");
+        without.iter().any(|name| name == id || *name == full)
+    };
+    let already = already(study);
+    let mut all: Vec<Candidate> = (study.candidates().into_iter())
+        .filter(|e| e.law() != Law::Outliers || e.outliers(&first_starts(e.as_ref())).is_some())
+        .map(|effect| Candidate {
+            id: effect.typetag_name().into(),
+            target: effect.target().into(),
+            kind: Kind::Listed(effect),
+        })
+        .filter(|c| !named(&c.id, &c.target))
+        .filter(|c| !already.contains(&c.key()))
+        .collect();
+    all.extend(match twin.state_space() {
+        Some(equations) => catch_alls(&equations.outline()),
+        None => catch_alls_of_signals(&twin.signals()),
+    });
+    Ok(all)
+}
+
+/// What the twin may lack beside these and its own effects.
+pub(in crate::diagnose) fn not_tested(study: &Study, candidates: &[Candidate]) -> Vec<String> {
+    let known: Vec<String> = candidates
+        .iter()
+        .map(Candidate::key)
+        .chain(already(study))
+        .collect();
+    let mut keys: Vec<String> = (study.effects().iter())
+        .map(|e| format!("{}@{}", e.typetag_name(), e.target()))
+        .filter(|key| !known.contains(key))
+        .collect();
+    keys.dedup();
+    keys
+}
+
+/// Effects that the study has added to its twin.
+fn already(study: &Study) -> Vec<String> {
+    (study.file().effect.iter())
+        .map(|e| format!("{}@{}", e.typetag_name(), e.target()))
+        .collect()
+}
+
+fn catch_alls(outline: &Outline) -> Vec<Candidate> {
+    let states = (outline.states.iter().enumerate())
+        .filter(|(_, s)| !s.name.contains('/'))
+        .map(|(i, s)| (Entry::State(i), s.name.clone()));
+    let sensors = numbered("sensor", outline.outputs.len(), Entry::Sensor);
+    let parameters = (outline.parameters.iter().enumerate())
+        .filter(|(_, p)| p.role == Role::Physical)
+        .map(|(i, p)| (Entry::Parameter(i), p.name.clone()));
+    disturbances(states.chain(sensors).chain(parameters))
+}
+
+/// Of a twin that shows nothing but its signals.
+fn catch_alls_of_signals(signals: &Signals) -> Vec<Candidate> {
+    let sensors = numbered("sensor", signals.outputs.len(), Entry::Sensor);
+    let actuators = numbered("actuator", signals.inputs.len(), Entry::Actuator);
+    disturbances(sensors.chain(actuators))
+}
+
+/// Places and targets of all sensors or actuators.
+fn numbered(
+    word: &str,
+    count: usize,
+    place: fn(usize) -> Entry,
+) -> impl Iterator<Item = (Entry, String)> {
+    (0..count).map(move |j| match count {
+        1 => (place(j), word.to_owned()),
+        _ => (place(j), format!("{word}{}", j + 1)),
+    })
+}
+
+fn disturbances(places: impl Iterator<Item = (Entry, String)>) -> Vec<Candidate> {
+    places
+        .flat_map(|(place, target)| {
+            MEMORIES.map(|memory| Candidate {
+                id: "disturbance".into(),
+                target: target.clone(),
+                kind: Kind::CatchAll(place, memory),
+            })
+        })
+        .collect()
+}

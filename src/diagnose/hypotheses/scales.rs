@@ -1,0 +1,45 @@
+//! What a record's units are: sizes of its signals and states.
+
+use crate::effect::Law;
+use crate::record::{Record, Signal};
+
+/// What the dictionary's units are taken from.
+pub(in crate::diagnose) struct Scales<'a> {
+    pub records: &'a [Record],
+    /// Filtered states of each record at θ̂.
+    pub states: &'a [Signal],
+}
+
+impl Scales<'_> {
+    /// Values of a sensor, actuator or state, of all records.
+    pub fn columns(&self, law: Law, target: usize) -> Vec<f64> {
+        let column = |signal: &Signal| -> Vec<f64> {
+            if target < signal.ncols() {
+                signal.column(target).to_vec()
+            } else {
+                vec![]
+            }
+        };
+        let all: Vec<Vec<f64>> = match law {
+            Law::Sensor | Law::MeasurementNoise | Law::Outliers => {
+                self.records.iter().map(|r| column(r.outputs())).collect()
+            }
+            Law::Actuator => (self.records.iter())
+                .map(|r| column(r.drive().inputs()))
+                .collect(),
+            _ => self.states.iter().map(column).collect(),
+        };
+        all.concat()
+    }
+
+    /// Step in seconds.
+    pub fn dt(&self) -> f64 {
+        self.records[0].drive().dt()
+    }
+
+    /// Length of the longest record in seconds.
+    pub fn duration(&self) -> f64 {
+        let longest = self.records.iter().map(Record::samples).max().unwrap_or(1);
+        longest as f64 * self.dt()
+    }
+}

@@ -1,0 +1,206 @@
+//! Where a gap lies: in the equations, in time, in the states, by lag and by frequency.
+
+/// Cells are notable up to this p-value.
+const NOTABLE: f64 = 0.1;
+
+/// Where the gap is.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Where {
+    /// The most probable place of a structural gap.
+    pub target: Option<String>,
+    /// All places, most probable first.
+    pub targets: Vec<TargetShare>,
+    /// Equations and what each would have to gain or lose to follow the record, most probable first.
+    pub equations: Vec<Equation>,
+    /// Since when the twin does not follow.
+    pub onset: Option<Onset>,
+    /// How the record differs from simulations of the refitted twin.
+    pub maps: Maps,
+    /// The same with the accepted effects, or else the best explanation, added.
+    pub after: Option<Maps>,
+}
+
+/// A target, and how much speaks for it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TargetShare {
+    /// State, `sensor`, `actuator` or parameter.
+    pub target: String,
+    /// Family-wise over all candidates.
+    pub p_value: f64,
+    /// Probability of the explanations there.
+    pub share: f64,
+}
+
+/// How innovations differ from those of simulations, cut in several ways. All p-values are corrected for all cells of all cuts
+/// together; shares add up to at most one in each list.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Maps {
+    /// Windows of time, clearest first.
+    pub windows: Vec<Window>,
+    /// Ranges of states, inputs and predicted outputs, clearest first.
+    pub regions: Vec<Region>,
+    /// Outputs, clearest first.
+    pub channels: Vec<Channel>,
+    /// Past signals that innovations still depend on, clearest first.
+    pub lags: Vec<Lag>,
+    /// Frequency bands, clearest first.
+    pub bands: Vec<Band>,
+}
+
+/// The start of the first block of time that the twin, fitted to all before it, does not foresee.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Onset {
+    /// Which record, from 0.
+    pub record: usize,
+    /// In seconds.
+    pub time: f64,
+    /// Output.
+    pub channel: String,
+    /// Of the block that begins there, corrected for all blocks.
+    pub p_value: f64,
+}
+
+/// A stretch of time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Window {
+    /// Which record, from 0.
+    pub record: usize,
+    /// First instant, in seconds.
+    pub start: f64,
+    /// Last instant, in seconds.
+    pub end: f64,
+    /// Output.
+    pub channel: String,
+    /// Family-wise.
+    pub p_value: f64,
+    /// Share in what the best explanation gains.
+    pub share: f64,
+}
+
+/// A range of a variable.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Region {
+    /// State, input, or output as predicted.
+    pub variable: String,
+    /// From.
+    pub low: f64,
+    /// To.
+    pub high: f64,
+    /// Family-wise.
+    pub p_value: f64,
+    /// Share in what the best explanation gains, over all regions of all variables.
+    pub share: f64,
+}
+
+/// One output over the whole of all records.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channel {
+    /// Output.
+    pub channel: String,
+    /// Family-wise.
+    pub p_value: f64,
+    /// Share of its innovations in what stands out.
+    pub share: f64,
+}
+
+/// What an innovation still depends on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lag {
+    /// Output.
+    pub channel: String,
+    /// The past signal: an input, or the output itself (its own innovations).
+    pub signal: String,
+    /// Shortest lag, in seconds.
+    pub from: f64,
+    /// Longest lag, in seconds.
+    pub to: f64,
+    /// Family-wise.
+    pub p_value: f64,
+    /// Share in all squared correlations beyond what chance makes.
+    pub share: f64,
+}
+
+/// A band of frequencies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Band {
+    /// Output.
+    pub channel: String,
+    /// In Hz.
+    pub low: f64,
+    /// In Hz.
+    pub high: f64,
+    /// Family-wise.
+    pub p_value: f64,
+    /// Share in all power beyond what chance makes.
+    pub share: f64,
+}
+
+/// What an equation lacks, as a disturbance there that a smoother follows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Equation {
+    /// The state whose rate, or the output whose value, the equation gives.
+    pub equation: String,
+    /// Family-wise, of the disturbance's scan.
+    pub p_value: f64,
+    /// Probability of a disturbance there among disturbances in all equations.
+    pub share: f64,
+    /// Mean of the missing term by ranges of states and inputs.
+    pub term: Vec<TermRange>,
+}
+
+/// The missing term where a variable is in a range.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TermRange {
+    /// State or input.
+    pub variable: String,
+    /// From.
+    pub low: f64,
+    /// To.
+    pub high: f64,
+    /// Mean of the missing term, in the unit of the equation.
+    pub mean: f64,
+    /// Standard deviation of that mean, the term's correlation in time counted.
+    pub std_error: f64,
+}
+
+/// One cell of a map.
+pub trait Cell {
+    /// Family-wise p-value.
+    fn p_value(&self) -> f64;
+    /// Share of what the list divides.
+    fn share(&self) -> f64;
+    /// Whether the cell stands out of simulations: p ≤ 0.1.
+    fn is_notable(&self) -> bool {
+        self.p_value() <= NOTABLE
+    }
+}
+
+macro_rules! cells {
+    ($($name:ty),*) => {
+        $(impl Cell for $name {
+            fn p_value(&self) -> f64 {
+                self.p_value
+            }
+            fn share(&self) -> f64 {
+                self.share
+            }
+        })*
+    };
+}
+cells!(Window, Region, Channel, Lag, Band);
+
+impl Maps {
+    /// The maps without the cells that do not stand out.
+    pub fn notable(&self) -> Self {
+        fn kept<C: Cell + Clone>(cells: &[C]) -> Vec<C> {
+            cells.iter().filter(|c| c.is_notable()).cloned().collect()
+        }
+        Self {
+            windows: kept(&self.windows),
+            regions: kept(&self.regions),
+            channels: kept(&self.channels),
+            lags: kept(&self.lags),
+            bands: kept(&self.bands),
+        }
+    }
+}

@@ -1,0 +1,291 @@
+//! Results of a diagnosis.
+
+mod location;
+
+pub use location::{
+    Band, Cell, Channel, Equation, Lag, Maps, Onset, Region, TargetShare, TermRange, Where, Window,
+};
+
+use crate::record::{Drive, Signal};
+use crate::twin::Interval;
+use serde::{Deserialize, Serialize};
+
+/// Which kind of gap there is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// The twin explains the record with parameters within the prior.
+    NoGap,
+    /// It does with parameters outside of the prior.
+    ParameterGap,
+    /// No parameters explain the record.
+    StructuralGap,
+}
+
+impl Verdict {
+    /// As in reports.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::NoGap => "no-gap",
+            Self::ParameterGap => "parameter-gap",
+            Self::StructuralGap => "structural-gap",
+        }
+    }
+}
+
+/// What is said about causes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Decision {
+    /// One effect, or an accepted pair.
+    Named,
+    /// Rivals that the data cannot tell apart.
+    Class,
+    /// No listed effect, nor a pair of them, explains the record.
+    NoneOfThese,
+    /// Parameters outside of the prior explain the record, and so does a listed effect with parameters inside.
+    Absorbed,
+    /// Nothing needs a cause.
+    NotNeeded,
+}
+
+impl Decision {
+    /// As in reports.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::Named => "named",
+            Self::Class => "class",
+            Self::NoneOfThese => "none-of-these",
+            Self::Absorbed => "absorbed",
+            Self::NotNeeded => "not-needed",
+        }
+    }
+}
+
+/// Whether the twin, refitted, can have made the record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Detection {
+    /// p-value of the structural test; with a validation record, of rank and e-value together.
+    pub p_value: f64,
+    /// Level of the test.
+    pub alpha: f64,
+    /// How far the record stands out of simulations, in their standard deviations.
+    pub statistic: f64,
+    /// p-value by the record alone.
+    pub rank_p_value: f64,
+    /// log E of the validation record.
+    pub log_e: Option<f64>,
+}
+
+/// One parameter of the twin.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedParameter {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// The estimator's first estimate.
+    pub initial: Option<f64>,
+    /// Refitted, beside accepted effects.
+    pub refitted: f64,
+    /// Standard deviation by information and weak prior.
+    pub std_error: f64,
+    /// Whether the record knows it better than the prior.
+    pub identified: bool,
+    /// The prior box.
+    pub prior: Interval,
+}
+
+/// An unknown start, noise level or magnitude that the study itself estimates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedNuisance {
+    /// State, output or magnitude.
+    pub name: String,
+    /// `start`, `noise` or `effect`.
+    pub role: &'static str,
+    /// Value.
+    pub value: f64,
+    /// Standard deviation.
+    pub std_error: f64,
+}
+
+/// One listed effect, fitted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EffectFit {
+    /// Id of the effect.
+    pub id: String,
+    /// Its target.
+    pub target: String,
+    /// Among listed effects and catch-alls.
+    pub probability: f64,
+    /// Names and values, those held at an infinite off value included.
+    pub magnitudes: Vec<(String, f64)>,
+    /// Nats over the twin, on the record and, if there is one, the validation record.
+    pub log_score_gain: f64,
+    /// Of its scan, family-wise.
+    pub p_value: Option<f64>,
+}
+
+impl EffectFit {
+    /// `id@target`.
+    pub fn key(&self) -> String {
+        format!("{}@{}", self.id, self.target)
+    }
+}
+
+/// Which effect the twin lacks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Which {
+    /// What is decided.
+    pub decision: Decision,
+    /// Best first.
+    pub effects: Vec<EffectFit>,
+    /// What was added to the twin.
+    pub accepted: Vec<String>,
+    /// Rivals that the data cannot tell apart, the accepted among them.
+    pub class: Vec<String>,
+    /// p-value of the structural test with the accepted, or else the best, effect added.
+    pub unexplained_p_value: Option<f64>,
+    /// The catch-all that beats every listed effect.
+    pub catch_all: Option<String>,
+    /// A record that would split the class; none where there is no class, or no input splits it.
+    pub next_input: Option<NextInput>,
+}
+
+/// A record to measure next, so that rivals are told apart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NextInput {
+    /// Inputs and length of it.
+    pub drive: Drive,
+    /// What kind of input it is.
+    pub kind: String,
+    /// The rivals, as `id@target`.
+    pub rivals: Vec<String>,
+    /// Of how many simulated pairs of the present record and such a next one the rival that made them stood out.
+    pub split: [u64; 2],
+    /// The same with the present inputs measured once more.
+    pub again: [u64; 2],
+}
+
+/// What a regression of the missing term found: exploratory, not a test.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Discovery {
+    /// The equation that lacks the term: a state or an output.
+    pub equation: String,
+    /// Terms by how often resampled records include them.
+    pub terms: Vec<Term>,
+    /// Share of the variance of the smoothed missing term that the terms explain.
+    pub explained: f64,
+    /// Instants of the first record, in seconds.
+    pub times: Vec<f64>,
+    /// The smoothed missing term there.
+    pub missing: Vec<f64>,
+    /// Its standard deviation.
+    pub std_error: Vec<f64>,
+    /// What the regression says there.
+    pub fitted: Vec<f64>,
+}
+
+/// One term of a regression.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Term {
+    /// Such as `h1²` or `u`.
+    pub name: String,
+    /// Its factor, in the unit of the equation.
+    pub coefficient: f64,
+    /// 90 % of the coefficients of resampled records that include it.
+    pub interval: [f64; 2],
+    /// Share of resampled records that include it.
+    pub inclusion: f64,
+}
+
+/// The smallest magnitude of a listed effect that records like these reveal in 80 of 100 cases.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Visible {
+    /// Id of the effect.
+    pub id: String,
+    /// Its target.
+    pub target: String,
+    /// Name of the magnitude that is meant.
+    pub magnitude: String,
+    /// Its value; none where no magnitude in reach would be seen.
+    pub value: Option<f64>,
+}
+
+/// Free runs beside a record, for pictures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreeRuns {
+    /// Instants, in seconds.
+    pub times: Vec<f64>,
+    /// Measured outputs.
+    pub measured: Signal,
+    /// Of the twin, refitted.
+    pub before: Option<Signal>,
+    /// With the accepted effects.
+    pub after: Option<Signal>,
+}
+
+/// Everything that a diagnosis found.
+#[derive(Debug, Clone)]
+pub struct Diagnosis {
+    /// Name of the twin.
+    pub twin: String,
+    /// Which kind of gap.
+    pub verdict: Verdict,
+    /// The test.
+    pub detection: Detection,
+    /// The twin's own parameters.
+    pub parameters: Vec<FittedParameter>,
+    /// Everything else that was estimated.
+    pub nuisance: Vec<FittedNuisance>,
+    /// Where.
+    pub place: Where,
+    /// Which.
+    pub which: Which,
+    /// How far; none without held-out data.
+    pub shrinkage: Option<Shrinkage>,
+    /// What the missing term depends on, where no listed effect is accepted.
+    pub discovery: Option<Discovery>,
+    /// What each listed effect would have had to be to be seen.
+    pub power: Vec<Visible>,
+    /// Free runs beside the first record.
+    pub free_runs: FreeRuns,
+    /// Free runs beside the validation record.
+    pub validation_runs: Option<FreeRuns>,
+    /// Effects that this twin may lack and that were not looked at, as `id@target`.
+    pub not_tested: Vec<String>,
+    /// Explanations that were looked at: listed effects and catch-alls.
+    pub candidates: usize,
+    /// Wall-clock seconds.
+    pub seconds: f64,
+}
+
+/// Free-run errors before and after, on held-out data.
+#[derive(Debug, Clone)]
+pub struct Shrinkage {
+    /// What is measured: [`Shrinkage::FREE_RUN`] or [`Shrinkage::LOG_SCORE`].
+    pub metric: &'static str,
+    /// Of the twin alone, θ refitted.
+    pub before: f64,
+    /// With the accepted effects.
+    pub after: Option<f64>,
+    /// What noise alone leaves: the median over records simulated from the accepted twin.
+    pub floor: Option<f64>,
+    /// (before − after)/(before − floor); none where the gap's own interval touches zero.
+    pub closed: Option<f64>,
+    /// 90 % of what draws of θ given all data close: the uncertainty of the share that the true effects close.
+    pub interval: Option<[f64; 2]>,
+    /// Which data: `validation record` or `last third of the record`.
+    pub held_out: &'static str,
+    /// The same error at the prior's centre or the estimator's first estimate, without any refit.
+    pub unfitted: Option<f64>,
+    /// The same error with an effect that was not chosen, fitted alike: what any extra number gains.
+    pub placebo: Option<f64>,
+}
+
+impl Shrinkage {
+    /// Root mean square of a free run's error over the standard deviation of the output.
+    pub const FREE_RUN: &str = "free-run NRMSE";
+    /// Mean log density of a sample, for effects that move no free run.
+    pub const LOG_SCORE: &str = "held-out log score";
+}

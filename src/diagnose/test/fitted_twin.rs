@@ -1,0 +1,80 @@
+//! A fitted twin with its dictionary of effects.
+
+use crate::diagnose::error::DiagnoseError;
+use crate::diagnose::fitting::climb::Fitted;
+use crate::diagnose::fitting::problem::Problem;
+use crate::diagnose::fitting::reference::Reference;
+use crate::diagnose::hypotheses::candidate::{Addition, Candidate};
+use crate::diagnose::hypotheses::dictionary::Dictionary;
+use crate::diagnose::hypotheses::scales::Scales;
+use crate::diagnose::residuals::cut::Bins;
+use crate::record::{Record, Signal};
+use crate::twin::DigitalTwin;
+use std::sync::Arc;
+
+/// A fitted twin and everything that its records are looked at with.
+pub(in crate::diagnose) struct FittedTwin<'a> {
+    pub problem: Problem<'a>,
+    pub fitted: Fitted,
+    pub dictionary: Arc<Dictionary>,
+    pub bins: Bins,
+}
+
+impl<'a> FittedTwin<'a> {
+    /// Everything that is needed to look at a fitted twin; `None` where it cannot be filtered around the fit.
+    pub fn new(
+        twin: &Arc<dyn DigitalTwin>,
+        problem: Problem<'a>,
+        fitted: Fitted,
+        additions: &[Addition],
+        candidates: Vec<Candidate>,
+    ) -> Result<Option<Self>, DiagnoseError> {
+        let states = problem.states(&fitted.theta)?;
+        let bins = Bins::new(&problem.outline(), &states, problem.records);
+        let Some(reference) = Reference::new(&problem, &fitted.theta)? else {
+            return Ok(None);
+        };
+        let means: Vec<Signal> = states.into_iter().map(|(_, s)| s).collect();
+        let scales = Scales {
+            records: problem.records,
+            states: &means,
+        };
+        let dictionary = Dictionary::new(
+            twin,
+            additions,
+            candidates,
+            &problem,
+            &fitted.theta,
+            &reference,
+            &scales,
+        )?;
+        Ok(Some(Self {
+            problem,
+            fitted,
+            dictionary: Arc::new(dictionary),
+            bins,
+        }))
+    }
+
+    /// The same candidates beside another fit of the same twin.
+    pub fn with_problem<R>(
+        &self,
+        problem: Problem<'a>,
+        fitted: Fitted,
+        f: impl FnOnce(&FittedTwin<'a>) -> R,
+    ) -> R {
+        f(&Self {
+            problem,
+            fitted,
+            dictionary: self.dictionary.clone(),
+            bins: self.bins.clone(),
+        })
+    }
+
+    /// The bench's twin on other records, the first of which are its own, and θ to start a fit from.
+    pub fn on<'b>(&self, records: &'b [Record]) -> (Problem<'b>, Vec<f64>) {
+        let problem = self.problem.on(records);
+        let start = problem.carried(&self.problem, &self.fitted.theta);
+        (problem, start)
+    }
+}

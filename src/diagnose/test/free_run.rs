@@ -1,0 +1,185 @@
+//! How far the accepted effects close the gap, on data that no fit has seen.
+
+use crate::diagnose::error::DiagnoseError;
+use crate::diagnose::hypotheses::candidate::{Addition, with};
+use crate::diagnose::outcome::FreeRuns;
+use crate::estimator::track;
+use crate::math::{median, quantile};
+use crate::record::{Record, Signal};
+use crate::twin::{DigitalTwin, Noise, free_run};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Records simulated for the floor.
+const FLOOR: u64 = 32;
+/// Resamples of the bootstrap, and blocks of a record.
+const RESAMPLES: u64 = 400;
+const BLOCKS: usize = 20;
+/// Level of the intervals.
+const LEVEL: f64 = 0.9;
+
+/// A twin and θ to run free.
+pub(in crate::diagnose) struct Runner {
+    pub twin: Arc<dyn DigitalTwin>,
+    pub theta: Vec<f64>,
+}
+
+impl Runner {
+    pub fn new(
+        base: &Arc<dyn DigitalTwin>,
+        additions: &[Addition],
+        theta: Vec<f64>,
+    ) -> Result<Self, DiagnoseError> {
+        Ok(Self {
+            twin: with(base, additions)?,
+            theta,
+        })
+    }
+
+    /// Squared errors of the free run over the variance of y, mean over channels, by sample from `from` on.
+    pub fn errors(&self, record: &Record, from: usize) -> Option<Vec<f64>> {
+        let outputs = self.outputs(record)?;
+        Some(squares(record.outputs(), &outputs, from))
+    }
+
+    /// The free run beside the record.
+    pub fn outputs(&self, record: &Record) -> Option<Signal> {
+        let run = track(self.twin.as_ref(), &self.theta, record).ok()?;
+        Some(run.outputs)
+    }
+
+    /// Median error of records simulated at θ against their own free run.
+    pub fn floor(&self, record: &Record, from: usize, noise: Noise) -> Option<f64> {
+        let free = free_run(self.twin.as_ref(), &self.theta, record.drive()).ok()?;
+        let errors: Vec<f64> = (0..FLOOR)
+            .into_par_iter()
+            .filter_map(|i| {
+                let drive = record.drive();
+                let outputs = self
+                    .twin
+                    .simulate(&self.theta, drive, noise.sample(i))
+                    .ok()?;
+                // In units of the measured record, as the other errors are.
+                let scale = variances(record.outputs());
+                Some(root(&scaled(&(outputs - &free), &scale, from)))
+            })
+            .collect();
+        median(&errors).ok()
+    }
+}
+
+/// Free runs beside a record.
+pub(in crate::diagnose) fn free_runs(
+    record: &Record,
+    base: &Runner,
+    grown: Option<&Runner>,
+) -> FreeRuns {
+    let drive = record.drive();
+    FreeRuns {
+        times: (0..drive.samples()).map(|k| drive.time(k)).collect(),
+        measured: record.outputs().clone(),
+        before: base.outputs(record),
+        after: grown.and_then(|grown| grown.outputs(record)),
+    }
+}
+
+fn variances(y: &Signal) -> Vec<f64> {
+    (y.columns().into_iter())
+        .map(|y| y.var(0.0).max(1e-300))
+        .collect()
+}
+
+fn scaled(difference: &Signal, variances: &[f64], from: usize) -> Vec<f64> {
+    (difference.rows().into_iter().skip(from))
+        .map(|row| {
+            let squares = row.iter().zip(variances).map(|(d, v)| d * d / v);
+            squares.sum::<f64>() / variances.len() as f64
+        })
+        .collect()
+}
+
+fn squares(y: &Signal, free: &Signal, from: usize) -> Vec<f64> {
+    scaled(&(y - free), &variances(y), from)
+}
+
+/// √(mean).
+pub(in crate::diagnose) fn root(squares: &[f64]) -> f64 {
+    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+}
+
+/// `closed` and its interval from squared errors before and after, and the floor.
+pub(in crate::diagnose) fn closed(
+    before: &[f64],
+    after: &[f64],
+    floor: f64,
+    noise: Noise,
+) -> (Option<f64>, Option<[f64; 2]>) {
+    let share = |b: f64, a: f64| (b - a) / (b - floor);
+    let n = before.len();
+    let length = n.div_ceil(BLOCKS).max(1);
+    let mut source = noise.source("blocks");
+    let mut gaps = Vec::new();
+    let mut shares = Vec::new();
+    for _ in 0..RESAMPLES {
+        let (mut b, mut a, mut count) = (0.0, 0.0, 0usize);
+        while count < n {
+            let start = ((source.uniform() * n as f64) as usize).min(n - 1);
+            for k in (start..start + length).map(|k| k % n) {
+                b += before[k];
+                a += after[k];
+            }
+            count += length;
+        }
+        let (b, a) = ((b / count as f64).sqrt(), (a / count as f64).sqrt());
+        gaps.push(b - floor);
+        shares.push(share(b, a));
+    }
+    let tail = 0.5 * (1.0 - LEVEL);
+    let low_gap = quantile(&gaps, tail).unwrap_or(f64::NEG_INFINITY);
+    if low_gap.is_nan() || low_gap <= 0.0 {
+        return (None, None);
+    }
+    let ends = [tail, 1.0 - tail].map(|p| quantile(&shares, p).unwrap_or(f64::NAN));
+    (Some(share(root(before), root(after))), Some(ends))
+}
+
+/// 90 % of the shares that draws of θ, given all data, close; the share that was reached lies within.
+///
+/// The true system is one such draw, where the accepted effects are the true ones.
+pub(in crate::diagnose) fn interval(
+    before: f64,
+    closed: f64,
+    floor: f64,
+    afters: &[f64],
+) -> Option<[f64; 2]> {
+    let shares: Vec<f64> = (afters.iter())
+        .map(|after| (before - after) / (before - floor))
+        .collect();
+    let tail = 0.5 * (1.0 - LEVEL);
+    let end = |p: f64| quantile(&shares, p).ok();
+    Some([end(tail)?.min(closed), end(1.0 - tail)?.max(closed)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_of_a_gap_is_half() {
+        let before = vec![1.0; 400];
+        let after = vec![0.36; 400];
+        let (share, interval) = closed(&before, &after, 0.2, Noise::new(1, "t", 0));
+        assert!((share.unwrap() - 0.5).abs() < 1e-12);
+        assert!(interval.unwrap().iter().all(|v| (v - 0.5).abs() < 1e-9));
+    }
+
+    #[test]
+    fn no_share_of_a_gap_that_noise_explains() {
+        let mut source = Noise::new(2, "t", 0).source("x");
+        let noisy: Vec<f64> = (0..300).map(|_| source.normal().powi(2)).collect();
+        assert_eq!(
+            closed(&noisy, &noisy, 1.0, Noise::new(1, "t", 0)),
+            (None, None)
+        );
+    }
+}

@@ -1,0 +1,163 @@
+//! Projects: a study with the recipes of its estimators.
+
+use crate::estimator::recipe::{PresetName, Recipe};
+use crate::estimator::settings::Settings;
+use crate::feature::{FeatureError, FeatureRecipe};
+use crate::network::{Architecture, HeadArchitecture, architecture};
+use crate::record::Drive;
+use crate::study::{Study, StudyError, StudyFile};
+use crate::twin::Noise;
+use crate::twin::conformance::{Finding, Severity};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A [`Study`] with a [`Recipe`] for each preset. A study alone becomes a project with the standard recipes.
+///
+/// ```
+/// use truetwin::estimator::{PresetName, Project};
+/// use truetwin::feature::Ar;
+/// use truetwin::network::Compact;
+/// use truetwin::study::{RecordPlan, Study};
+/// use truetwin::twins::VanDerPol;
+///
+/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 300))?;
+/// let project = Project::from(study).with_features(Ar { order: 4 }).with_architecture::<Compact>();
+/// assert_eq!(project.recipe(PresetName::Default).architecture.id(), "compact");
+/// # Ok::<(), truetwin::study::StudyError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Project {
+    study: Study,
+    recipes: BTreeMap<PresetName, Recipe>,
+}
+
+impl From<Study> for Project {
+    fn from(study: Study) -> Self {
+        let recipes = BTreeMap::from([
+            (PresetName::Default, Recipe::standard(&study)),
+            (PresetName::Paper, Recipe::paper(&study)),
+        ]);
+        Self { study, recipes }.with_features_of_file()
+    }
+}
+
+impl From<&Study> for Project {
+    fn from(study: &Study) -> Self {
+        study.clone().into()
+    }
+}
+
+impl From<&Project> for Project {
+    fn from(project: &Project) -> Self {
+        project.clone()
+    }
+}
+
+impl Project {
+    /// Replaces the recipe of a preset.
+    #[must_use]
+    pub fn with_recipe(mut self, name: PresetName, recipe: Recipe) -> Self {
+        self.recipes.insert(name, recipe);
+        self
+    }
+
+    /// Replaces the features of both presets.
+    #[must_use]
+    pub fn with_features(self, features: impl FeatureRecipe + 'static) -> Self {
+        self.with_shared_features(Arc::new(features))
+    }
+
+    fn with_shared_features(mut self, features: Arc<dyn FeatureRecipe>) -> Self {
+        for recipe in self.recipes.values_mut() {
+            recipe.features = features.clone();
+        }
+        self
+    }
+
+    fn with_features_of_file(self) -> Self {
+        match self.study.file().features.clone() {
+            Some(features) => self.with_shared_features(features),
+            None => self,
+        }
+    }
+
+    /// Replaces the network of both presets.
+    #[must_use]
+    pub fn with_architecture<A: HeadArchitecture>(mut self) -> Self {
+        for recipe in self.recipes.values_mut() {
+            recipe.architecture = architecture::<A>();
+        }
+        self
+    }
+
+    /// Replaces the settings of the default preset.
+    #[must_use]
+    pub fn with_settings(mut self, settings: Settings) -> Self {
+        if let Some(recipe) = self.recipes.get_mut(&PresetName::Default) {
+            recipe.settings = settings;
+        }
+        self
+    }
+
+    /// Applies a study file to the study, and its `[features]` to the recipes.
+    pub fn configure(&self, file: &StudyFile) -> Result<Self, StudyError> {
+        let study = self.study.configure(file)?;
+        let recipes = self.recipes.clone();
+        Ok(Self { study, recipes }.with_features_of_file())
+    }
+
+    /// The study.
+    pub fn study(&self) -> &Study {
+        &self.study
+    }
+
+    /// The recipe of a preset.
+    pub fn recipe(&self, name: PresetName) -> &Recipe {
+        &self.recipes[&name]
+    }
+
+    /// Returns the network with this id among the recipes' networks.
+    pub(super) fn architecture(&self, id: &str) -> Option<Arc<dyn Architecture>> {
+        (self.recipes.values())
+            .map(|recipe| &recipe.architecture)
+            .find(|architecture| architecture.id() == id)
+            .cloned()
+    }
+
+    /// Checks that the recipe's features exist for a simulated record, and that the network takes as many.
+    ///
+    /// # Errors
+    ///
+    /// Features that cannot be bound to this twin.
+    pub(crate) fn check_features(
+        &self,
+        preset: PresetName,
+        drive: &Drive,
+        seed: u64,
+    ) -> Result<Finding, FeatureError> {
+        let recipe = self.recipe(preset);
+        let twin = self.study.twin();
+        let map = recipe.features.bind(twin)?;
+        let noise = Noise::new(seed, "check features", 0);
+        let most = recipe.architecture.max_features();
+        let features = (twin.simulate(&twin.parameters().centre(), drive, noise))
+            .map_err(|error| error.to_string())
+            .and_then(|y| map.extract(drive, &y).map_err(|error| error.to_string()));
+        let (severity, message) = match features {
+            Err(error) => (Severity::Failure, error),
+            Ok(x) if x.len() > most => {
+                let (n, id) = (x.len(), recipe.architecture.id());
+                let problem = format!(
+                    "{n} features, network \"{id}\" takes at most {most}; lower their order"
+                );
+                (Severity::Failure, problem)
+            }
+            Ok(x) => (Severity::Pass, format!("{} features of a record", x.len())),
+        };
+        Ok(Finding {
+            check: "features",
+            severity,
+            message,
+        })
+    }
+}

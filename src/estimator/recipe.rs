@@ -1,0 +1,94 @@
+//! Recipes: features, network and settings of an estimator.
+
+use crate::estimator::settings::Settings;
+use crate::feature::{Ar, Arx, FeatureRecipe, Score};
+use crate::network::{Architecture, Deep, architecture};
+use crate::study::Study;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Name of one of the two recipes of a [`Project`](super::Project).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum PresetName {
+    /// The paper's method; what its text leaves open is taken from the authors' code.
+    Paper,
+    /// This project's improved method, for any twin.
+    #[default]
+    Default,
+}
+
+impl std::fmt::Display for PresetName {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Paper => "paper",
+            Self::Default => "default",
+        })
+    }
+}
+
+/// Features, network and settings of an estimator.
+///
+/// ```
+/// use std::sync::Arc;
+/// use truetwin::estimator::{PresetName, Project, Recipe, Settings};
+/// use truetwin::feature::Ar;
+/// use truetwin::network::{Compact, architecture};
+/// use truetwin::study::{RecordPlan, Study};
+/// use truetwin::twins::VanDerPol;
+///
+/// let recipe = Recipe {
+///     features: Arc::new(Ar { order: 5 }),
+///     architecture: architecture::<Compact>(),
+///     settings: Settings { bank_size: 2000, ..Settings::default() },
+/// };
+/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 300))?;
+/// let project = Project::from(study).with_recipe(PresetName::Default, recipe);
+/// assert_eq!(project.recipe(PresetName::Default).settings.bank_size, 2000);
+/// # Ok::<(), truetwin::study::StudyError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Recipe {
+    /// Stage 1: record to features.
+    pub features: Arc<dyn FeatureRecipe>,
+    /// Stage 2: features to parameters.
+    pub architecture: Arc<dyn Architecture>,
+    /// All numbers of the method.
+    pub settings: Settings,
+}
+
+impl Recipe {
+    /// Returns the default recipe: the [`Score`] of a twin with equations (AR(5) or ARX(8, 8) of a black box), and [`Deep`].
+    pub(super) fn standard(study: &Study) -> Self {
+        let features: Arc<dyn FeatureRecipe> = match study.twin().state_space() {
+            Some(_) => Arc::new(Score::default()),
+            None => regression(study),
+        };
+        Self {
+            features,
+            architecture: architecture::<Deep>(),
+            settings: Settings::default(),
+        }
+    }
+
+    /// Returns the paper's recipe: AR(5), or ARX(8, 8) of a twin with inputs, and [`Deep`].
+    pub(super) fn paper(study: &Study) -> Self {
+        Self {
+            features: regression(study),
+            architecture: architecture::<Deep>(),
+            settings: Settings::paper(),
+        }
+    }
+}
+
+fn regression(study: &Study) -> Arc<dyn FeatureRecipe> {
+    if study.twin().signals().inputs.is_empty() {
+        Arc::new(Ar { order: 5 })
+    } else {
+        Arc::new(Arx {
+            outputs: 8,
+            inputs: 8,
+        })
+    }
+}

@@ -1,0 +1,44 @@
+//! Likelihood of a twin without equations, from an ensemble of its simulations.
+//!
+//! | step | file |
+//! |---|---|
+//! | runs at one θ under the record's own input, the same draws at every θ | `runs.rs` |
+//! | prediction of each row from the rows before it: innovations, covariances | `predictor.rs` |
+//! | density of innovations with outliers among them | `tail.rs` |
+//! | measurement noise for a simulator without noise of its own | `silent.rs` |
+//!
+//! Source: Wood, "Statistical inference for noisy nonlinear ecological dynamic systems", *Nature* 466 (2010): a synthetic
+//! likelihood is Gaussian, with mean and covariance of what is simulated.
+
+mod predictor;
+mod row;
+mod runs;
+mod silent;
+mod tail;
+
+pub(crate) use predictor::{Predictor, standardised};
+pub(crate) use silent::{dithered, measured};
+
+use crate::likelihood::kalman::{FilterError, Filtered};
+use crate::record::Record;
+use crate::twin::DigitalTwin;
+use runs::Ensemble;
+
+/// Innovations of a record under the ensemble at θ.
+pub(crate) fn filtered(
+    twin: &dyn DigitalTwin,
+    theta: &[f64],
+    record: &Record,
+) -> Result<Filtered, FilterError> {
+    Ok(predictor(twin, theta, record)?.filter(record.outputs()))
+}
+
+/// Predictor of records under the drive of `record`, at θ.
+pub(crate) fn predictor(
+    twin: &dyn DigitalTwin,
+    theta: &[f64],
+    record: &Record,
+) -> Result<Predictor, FilterError> {
+    let ensemble = Ensemble::new(twin, theta, record.drive())?;
+    Ok(Predictor::new(&ensemble, record.outputs()))
+}

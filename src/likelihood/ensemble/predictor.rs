@@ -1,0 +1,176 @@
+//! Each row of a record predicted from the rows before it, as runs of the twin say.
+//!
+//! ```text
+//! e = y − μ                         μ: mean of the runs
+//! z_k = (e_{k−1}, …, e_{k−L})       ê_k = Bᵀ_k z_k            least squares over the runs, for each row anew
+//! v_k = e_k − ê_k ~ N(0, S_k)       S_k = Σ_k·(1 + 1/M + zᵀA⁻¹z),   A = Z Zᵀ
+//! ```
+//!
+//! Σ is the covariance that the runs' own residuals have, over their degrees of freedom. The bracket is what M runs leave
+//! unknown about the mean and B: a record far from all runs is predicted with less confidence, not with more.
+//!
+//! About linear dynamics around the mean run this is what a Kalman filter does, its gain read off the runs, row by row; what is
+//! not linear within the scatter of the runs widens Σ. Rare large errors make the density a Student's (`tail.rs`).
+
+use super::row::{Row, row};
+use super::runs::Ensemble;
+use super::tail::Tail;
+use crate::likelihood::kalman::Filtered;
+use crate::math::quantile;
+use crate::record::Signal;
+use nalgebra::{DMatrix, DVector};
+use ndarray::Array3;
+
+/// Rows before a row that it is predicted from.
+const LAGS: usize = 4;
+/// Runs for each number that a row is predicted from.
+const RUNS_EACH: usize = 6;
+/// Independent noise that everything measured has, as a share of the output's size.
+const FLOOR: f64 = 1e-5;
+/// And as a share of what most rows have: a known start or a clipped output is not believed to the last bit.
+const LEAST: f64 = 0.3;
+const MOST_ROWS: f64 = 0.9;
+/// Rows with less than this share of the largest variance are clipped, or the start.
+const ALIVE: f64 = 1e-3;
+
+/// What predicts all rows at one θ.
+#[derive(Debug, Clone)]
+pub(crate) struct Predictor {
+    mean: Signal,
+    lags: usize,
+    runs: f64,
+    rows: Vec<Row>,
+    tail: Tail,
+}
+
+impl Predictor {
+    /// From runs; `outputs` say how large the outputs are.
+    pub(crate) fn new(ensemble: &Ensemble, outputs: &Signal) -> Self {
+        let p = ensemble.outputs();
+        let m = ensemble.runs;
+        let lags = LAGS.min(m / RUNS_EACH / p).max(1);
+        let floors: Vec<f64> = (outputs.columns().into_iter())
+            .map(|y| {
+                let size = y
+                    .std(0.0)
+                    .max(1e-3 * y.iter().fold(0.0, |a, v| v.abs().max(a)));
+                (FLOOR * size).max(1e-150).powi(2)
+            })
+            .collect();
+        let mut rows: Vec<Row> = (0..ensemble.mean.nrows())
+            .map(|k| row(ensemble, k, lags.min(k), &floors))
+            .collect();
+        let least: Vec<f64> = (0..p).map(|j| least(&rows, j)).collect();
+        let tail = Tail::of(ensemble, &rows, lags, &least);
+        for row in &mut rows {
+            for (j, least) in least.iter().enumerate() {
+                row.covariance[(j, j)] = row.covariance[(j, j)].max(*least);
+            }
+        }
+        Self {
+            mean: ensemble.mean.clone(),
+            lags,
+            runs: m as f64,
+            rows,
+            tail,
+        }
+    }
+
+    /// Innovations of a record.
+    pub fn filter(&self, outputs: &Signal) -> Filtered {
+        let (samples, p) = outputs.dim();
+        let errors = outputs - &self.mean;
+        let mut filtered = Filtered {
+            log_likelihood: 0.0,
+            log_densities: vec![0.0; samples],
+            innovations: Signal::zeros((samples, p)),
+            covariances: Array3::zeros((samples, p, p)),
+            standardised: Signal::zeros((samples, p)),
+            states: None,
+        };
+        for (k, row) in self.rows.iter().enumerate() {
+            let lags = self.lags.min(k);
+            let z = DVector::from_fn(lags * p, |i, _| errors[[k - 1 - i / p, i % p]]);
+            let e = DVector::from_fn(p, |j, _| errors[[k, j]]) - &row.weights * &z;
+            let wide = 1.0 + 1.0 / self.runs + (&row.whitening * &z).norm_squared();
+            let covariance = &row.covariance * wide;
+            let (v, log_determinant) = standardised(&covariance, &e);
+            for i in 0..p {
+                filtered.innovations[[k, i]] = e[i];
+                filtered.standardised[[k, i]] = v[i];
+                for j in 0..p {
+                    filtered.covariances[[k, i, j]] = covariance[(i, j)];
+                }
+            }
+            let density = self.tail.log_density(&v) - 0.5 * log_determinant;
+            filtered.log_densities[k] = density;
+            filtered.log_likelihood += density;
+        }
+        filtered
+    }
+}
+
+/// Least variance of output j in a row.
+fn least(rows: &[Row], j: usize) -> f64 {
+    let all = || rows.iter().map(|row| row.covariance[(j, j)]);
+    let largest = all().fold(0.0, f64::max);
+    let alive: Vec<f64> = all().filter(|s| *s >= ALIVE * largest).collect();
+    LEAST * LEAST * quantile(&alive, MOST_ROWS).unwrap_or(0.0)
+}
+
+/// C⁻¹e and log det S of S = C·Cᵀ.
+pub(crate) fn standardised(s: &DMatrix<f64>, e: &DVector<f64>) -> (DVector<f64>, f64) {
+    let p = e.len();
+    if p == 1 {
+        return (e / s[(0, 0)].sqrt(), s[(0, 0)].ln());
+    }
+    match s.clone().cholesky() {
+        Some(c) => {
+            let l = c.l_dirty();
+            let mut v = e.clone();
+            l.solve_lower_triangular_mut(&mut v);
+            let log: f64 = (0..p).map(|i| 2.0 * l[(i, i)].ln()).sum();
+            (v, log)
+        }
+        // Rounding took the smallest root away: outputs on their own.
+        None => (
+            DVector::from_fn(p, |i, _| e[i] / s[(i, i)].sqrt()),
+            (0..p).map(|i| s[(i, i)].ln()).sum(),
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::likelihood::kalman::{FilterSettings, filter};
+    use crate::record::{Drive, Record};
+    use crate::twin::{DigitalTwin, Noise};
+    use crate::twins::CascadedTanks;
+
+    /// Where a filter can tell what the best prediction is, the ensemble's is nearly as good.
+    #[test]
+    fn an_ensemble_predicts_about_as_well_as_a_filter() {
+        let theta = [0.6, 0.5, 0.55, 1.0];
+        let inputs =
+            Signal::from_shape_fn((400, 1), |(k, _)| [2.6, 0.4, 2.0, 1.2, 1.7][k / 30 % 5]);
+        let drive = Drive::new(0.5, inputs).unwrap();
+        let (mut lost, mut square) = (0.0, 0.0);
+        for seed in 0..5 {
+            let outputs = CascadedTanks
+                .simulate(&theta, &drive, Noise::new(3, "t", seed))
+                .unwrap();
+            let record = Record::new(drive.clone(), outputs).unwrap();
+            let best = filter(&CascadedTanks, &theta, &record, &FilterSettings::default()).unwrap();
+            let ours = {
+                let ensemble = Ensemble::new(&CascadedTanks, &theta, record.drive()).unwrap();
+                Predictor::new(&ensemble, record.outputs()).filter(record.outputs())
+            };
+            lost += (best.log_likelihood - ours.log_likelihood) / 5.0;
+            square += ours.standardised.mapv(|v| v * v).mean().unwrap() / 5.0;
+        }
+        println!("{lost} nats, mean square {square}");
+        assert!(lost < 25.0, "{lost} nats");
+        assert!((square - 1.0).abs() < 0.12, "{square}");
+    }
+}

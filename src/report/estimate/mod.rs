@@ -1,0 +1,11 @@
+//! An estimate as JSON, text, picture and table.
+
+mod json;
+mod overlay;
+mod text;
+mod trajectories;
+
+pub use json::estimate_json;
+pub use overlay::overlay_svg;
+pub use text::estimate_text;
+pub use trajectories::trajectories_csv;

@@ -1,0 +1,96 @@
+//! A diagnosis as one page that needs nothing else.
+
+mod discovery;
+mod explanations;
+mod extent;
+mod limits;
+mod numbers;
+mod place;
+mod steps;
+
+use crate::diagnose::{Diagnosis, Verdict};
+use crate::report::digits::{probability, short};
+use crate::report::gap::pictures;
+use crate::report::gap::text::verdict_sentence;
+use crate::report::page::{Section, escaped, figure, page, paragraph};
+use crate::report::units::Units;
+use crate::study::Study;
+
+/// The diagnosis as a self-contained page, readable on a phone and in print: the verdict, measured and twin before and after,
+/// where, which, how far, what to do next, how sure and what was not tested, parameters.
+///
+/// Pictures are SVG inside the page, with words for those who cannot see them; nothing is told by colour alone. There are no
+/// scripts, and nothing is loaded from elsewhere.
+pub fn gap_html(study: &Study, diagnosis: &Diagnosis) -> String {
+    let units = Units::of(study);
+    let verdict = escaped(&verdict_sentence(diagnosis));
+    let lead = format!(
+        "<p class=\"verdict\">{verdict}</p>\n{}",
+        paragraph(&test(diagnosis))
+    );
+    let mut sections = vec![runs(study, diagnosis), place::section_of(study, diagnosis)];
+    sections.push(explanations::section_of(&units, diagnosis));
+    sections.extend(discovery::section_of(study, diagnosis));
+    sections.extend([
+        extent::section_of(diagnosis),
+        steps::section_of(study, &units, diagnosis),
+        limits::section_of(&units, diagnosis),
+    ]);
+    // Where nothing else is to be said, the parameters are the answer.
+    let parameters = match diagnosis.verdict {
+        Verdict::StructuralGap => sections.len(),
+        _ => 1,
+    };
+    sections.insert(parameters, numbers::section_of(&units, diagnosis));
+    page(
+        &format!("{}: what the twin lacks", diagnosis.twin),
+        &lead,
+        &sections,
+    )
+}
+
+/// The test behind the verdict.
+fn test(diagnosis: &Diagnosis) -> String {
+    let d = &diagnosis.detection;
+    let validation = match d.log_e {
+        Some(log_e) => format!(
+            ", from simulations and from the validation record together (log E {})",
+            short(log_e)
+        ),
+        None => ", from simulations".into(),
+    };
+    format!(
+        "Structural test of the twin with its parameters refitted: {} at level {}{validation}.",
+        probability(d.p_value),
+        d.alpha
+    )
+}
+
+/// Measured and twin.
+fn runs(study: &Study, diagnosis: &Diagnosis) -> Section {
+    let marked = match diagnosis.place.maps.notable().windows.is_empty() {
+        true => String::new(),
+        false => format!(
+            " The strip below the axis marks windows in which the twin does not follow, with their shares of the gap: unbroken \
+             frame and bold text p < {}, dashed frame p ≤ 0.1.",
+            diagnosis.detection.alpha
+        ),
+    };
+    let caption = format!(
+        "The twin sees the inputs of the record alone and runs without noise. Its parameters are fitted to this record.{marked}"
+    );
+    let mut body = String::new();
+    if let Some(svg) = pictures::runs(study, diagnosis, false) {
+        body.push_str(&figure(&svg, &caption));
+    }
+    if let Some(svg) = pictures::runs(study, diagnosis, true) {
+        body.push_str(&figure(
+            &svg,
+            "The same on the validation record; no parameter is fitted to it.",
+        ));
+    }
+    Section::new("runs", "Measured against twin", body)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,170 @@
+//! What to do next.
+
+use crate::diagnose::{Decision, Diagnosis, EffectFit, NextInput, Verdict};
+use crate::effect::Law;
+use crate::math::six_digits;
+use crate::report::digits::short;
+use crate::report::gap::json::NEXT_INPUT;
+use crate::report::gap::pictures;
+use crate::report::page::{Section, figure, list, paragraph, preformatted, subheading};
+use crate::report::units::Units;
+use crate::study::Study;
+
+pub(super) fn section_of(study: &Study, units: &Units, diagnosis: &Diagnosis) -> Section {
+    let mut body = list(&steps(diagnosis));
+    let accepted = &diagnosis.which.accepted;
+    if !accepted.is_empty() {
+        let tables: Vec<String> = (diagnosis.which.effects.iter())
+            .filter(|e| accepted.contains(&e.key()))
+            .filter_map(|e| study_table(units, e))
+            .collect();
+        body.push_str(&paragraph(
+            "For the study file; without magnitudes, they are estimated:",
+        ));
+        body.push_str(&preformatted(&tables.join("\n")));
+    }
+    if let Some(next) = &diagnosis.which.next_input {
+        body.push_str(&measure(study, diagnosis, next));
+    }
+    Section::new("next", "What to do next", body)
+}
+
+/// The record that tells rivals apart.
+fn measure(study: &Study, diagnosis: &Diagnosis, next: &NextInput) -> String {
+    let drive = &next.drive;
+    let mut body = subheading("Measure this next");
+    body.push_str(&paragraph(&format!(
+        "{NEXT_INPUT}, beside this page, holds {}: {} samples every {} s, {} s in all. It is to tell apart {}.",
+        next.kind,
+        drive.samples(),
+        short(drive.dt()),
+        short(drive.time(drive.samples())),
+        next.rivals.join(" and ")
+    )));
+    let ([split, of], [again, of_again]) = (next.split, next.again);
+    body.push_str(&paragraph(&format!(
+        "{split} of {of} simulated pairs of the present record and such a one were told apart; with the same inputs measured again, \
+         {again} of {of_again}."
+    )));
+    match pictures::next_input(study, diagnosis) {
+        Some(svg) => {
+            body.push_str(&figure(&svg, "The input, held over each step."));
+        }
+        None => body.push_str(&paragraph(
+            "The twin has no input: the file holds the instants alone.",
+        )),
+    }
+    let call = format!(
+        "truetwin diagnose RECORD.csv NEXT.csv --twin {}",
+        diagnosis.twin
+    );
+    body.push_str(&paragraph("Then diagnose both records together:"));
+    body.push_str(&preformatted(&call));
+    body
+}
+
+fn steps(diagnosis: &Diagnosis) -> Vec<String> {
+    let which = &diagnosis.which;
+    let mut steps = Vec::new();
+    match (diagnosis.verdict, which.decision) {
+        (Verdict::NoGap, _) => steps.push("Use the twin with the refitted parameters.".into()),
+        (Verdict::ParameterGap, Decision::Absorbed) => steps.push(format!(
+            "Take the refitted parameters, or give a record with another input: it may tell them from {}.",
+            which.class.join(", ")
+        )),
+        (Verdict::ParameterGap, _) => steps.push(
+            "Take the refitted parameters, if they make sense; widen the prior in the study then, and pretrain again.".into(),
+        ),
+        (_, Decision::Named) => {
+            steps.push(format!("Add {} to the twin.", which.accepted.join(" and ")));
+        }
+        (_, Decision::Class) if which.next_input.is_some() => steps.push(format!(
+            "Tell the rivals apart ({}): measure the record below.",
+            which.class.join(", ")
+        )),
+        (_, Decision::Class) => steps.push(format!(
+            "Tell the rivals apart ({}): give a validation record, or a record whose input reaches further or changes faster; \
+             docs/choosing-effects.md says what separates neighbours.",
+            which.class.join(", ")
+        )),
+        _ => steps.extend(none_of_these(diagnosis)),
+    }
+    let left = which
+        .unexplained_p_value
+        .is_some_and(|p| p < diagnosis.detection.alpha);
+    if left && which.decision == Decision::Named {
+        steps.push("Something is left beside what was accepted: diagnose again with it added to the study.".into());
+    }
+    let vague: Vec<&str> = (diagnosis.parameters.iter())
+        .filter(|p| !p.identified)
+        .map(|p| p.name.as_str())
+        .collect();
+    if !vague.is_empty() {
+        steps.push(format!(
+            "This record knows no more of {} than the prior: fix what is known otherwise, or measure with a livelier input.",
+            vague.join(", ")
+        ));
+    }
+    if diagnosis.validation_runs.is_none() && diagnosis.verdict == Verdict::StructuralGap {
+        steps
+            .push("Measure a second record with another input and give it as --validation.".into());
+    }
+    steps
+}
+
+/// Where to look for a law that is not listed.
+fn none_of_these(diagnosis: &Diagnosis) -> Vec<String> {
+    let (place, maps) = (&diagnosis.place, diagnosis.place.maps.notable());
+    let mut look = match &place.target {
+        Some(target) => format!("Look at {target}"),
+        None => "Look at the twin".into(),
+    };
+    if let Some(r) = maps.regions.first() {
+        look.push_str(&format!(
+            ", above all where {} is {} … {}",
+            r.variable,
+            short(r.low),
+            short(r.high)
+        ));
+    }
+    if let Some(w) = maps.windows.first() {
+        look.push_str(&format!(
+            ", and at {} to {} s",
+            short(w.start),
+            short(w.end)
+        ));
+    }
+    let terms: Vec<&str> = (diagnosis.discovery.iter().flat_map(|d| &d.terms))
+        .filter(|term| term.inclusion > 0.5)
+        .map(|term| term.name.as_str())
+        .collect();
+    if !terms.is_empty() {
+        look.push_str(&format!("; the exploration points to {}", terms.join(", ")));
+    }
+    vec![
+        look + ".",
+        "Write the law that you suspect as an effect of your own (examples/own_effect.rs) and diagnose again.".into(),
+    ]
+}
+
+/// `[[effect]]` with its keys.
+fn study_table(units: &Units, fit: &EffectFit) -> Option<String> {
+    let effect = units.effect(&fit.id, &fit.target)?;
+    let other = effect.other().map_or(String::new(), |name| {
+        let key = match effect.law() {
+            Law::Limit => "to",
+            _ => "from",
+        };
+        format!("{key} = \"{name}\"\n")
+    });
+    let finite = fit.magnitudes.iter().filter(|(_, value)| value.is_finite());
+    let values: Vec<String> = finite
+        .map(|(name, value)| format!("{name} = {:?}", six_digits(*value)))
+        .collect();
+    Some(format!(
+        "[[effect]]\nid = \"{}\"\ntarget = \"{}\"\n{other}magnitudes = {{ {} }}\n",
+        fit.id,
+        fit.target,
+        values.join(", ")
+    ))
+}

@@ -1,0 +1,12 @@
+//! A diagnosis as JSON, text, pictures and page.
+
+mod html;
+mod json;
+mod pictures;
+mod text;
+
+pub use html::gap_html;
+pub(crate) use json::NEXT_INPUT;
+pub use json::gap_json;
+pub use pictures::gap_pictures;
+pub use text::gap_text;

@@ -1,0 +1,96 @@
+//! Where in time: windows of all outputs, before and after the accepted effects.
+
+use super::windows::{largest, onset, spans};
+use crate::diagnose::{Diagnosis, Maps, Onset};
+use crate::report::chart::{HeatGroup, HeatMap, HeatRow};
+use crate::report::digits::{percent, short};
+
+/// Windows of time by output, of the refitted twin and, below, with the accepted effects added; `None` where nothing was looked for.
+///
+/// Each cell has its share; frames say which cells stand out.
+pub fn time(diagnosis: &Diagnosis) -> Option<String> {
+    let maps = &diagnosis.place.maps;
+    let clearest = maps.windows.first()?;
+    let after = (diagnosis.place.after.as_ref()).filter(|m| !m.windows.is_empty());
+    let full = largest(maps).max(after.map_or(0.0, largest));
+    let alpha = diagnosis.detection.alpha;
+    let mut groups = of_records(
+        "twin, refitted",
+        maps,
+        diagnosis.place.onset.as_ref(),
+        alpha,
+        full,
+    );
+    if let Some(after) = after {
+        groups.extend(of_records(
+            &with_effects(diagnosis),
+            after,
+            None,
+            alpha,
+            full,
+        ));
+    }
+    let windows = |maps: &Maps| maps.notable().windows.len();
+    let after = after.map_or(String::new(), |after| {
+        format!("; with the effect added {} stand out", windows(after))
+    });
+    let map = HeatMap {
+        title: "Windows of time".into(),
+        description: format!(
+            "{} of {} windows stand out, the clearest of {} from {} to {} s with {} of the gap{after}.",
+            windows(maps),
+            maps.windows.len(),
+            clearest.channel,
+            short(clearest.start),
+            short(clearest.end),
+            percent(clearest.share),
+        ),
+        x: "t in s".into(),
+        groups,
+    };
+    Some(map.svg())
+}
+
+/// What the second map is of.
+fn with_effects(diagnosis: &Diagnosis) -> String {
+    match diagnosis.which.accepted.as_slice() {
+        [] => "with the best explanation added".into(),
+        accepted => format!("with {} added", accepted.join(" and ")),
+    }
+}
+
+/// A group a record, a row an output.
+fn of_records(
+    label: &str,
+    maps: &Maps,
+    begin: Option<&Onset>,
+    alpha: f64,
+    full: f64,
+) -> Vec<HeatGroup> {
+    let last = (maps.windows.iter().map(|w| w.record)).max().unwrap_or(0);
+    (0..=last)
+        .map(|record| {
+            let mut channels: Vec<&str> = vec![];
+            for window in maps.windows.iter().filter(|w| w.record == record) {
+                if !channels.contains(&window.channel.as_str()) {
+                    channels.push(&window.channel);
+                }
+            }
+            channels.sort_unstable();
+            HeatGroup {
+                label: match last {
+                    0 => label.into(),
+                    _ => format!("record {}: {label}", record + 1),
+                },
+                rows: (channels.into_iter())
+                    .map(|channel| HeatRow {
+                        label: channel.into(),
+                        cells: spans(maps, alpha, full, (record, channel)),
+                        mark: onset(begin, record, channel),
+                    })
+                    .collect(),
+            }
+        })
+        .filter(|group| !group.rows.is_empty())
+        .collect()
+}

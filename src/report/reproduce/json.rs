@@ -1,0 +1,72 @@
+//! Scores over many records as JSON, `truetwin.reproduce/1`.
+
+use crate::estimator::INTERVAL_LEVEL;
+use crate::estimator::PresetName;
+use crate::evaluate::paper::{COVERAGE_LEVEL, MethodScore, MonteCarlo, Scenario, Scores};
+use crate::study::Study;
+use serde_json::{Map, Value, json};
+
+/// The scores as one JSON object, `truetwin.reproduce/1`.
+///
+/// | key | holds |
+/// |---|---|
+/// | `methods` | a row a method and start: `mse`, `median` of the squared error over runs, `ms` |
+/// | `scenario` | 0, 1, 2 as on the command line; 3 for θ from the bounds |
+///
+/// Beyond the contract: `theta_from` (`prior`, `point`, `bounds`), `seed`, `failed` (runs without an answer),
+/// `mse_std_error`, `invariants` and `mse_without_scale` (what a record determines, of twins that it does not determine
+/// whole), `paper` (the published figures of this twin, scenario and method), `coverage` of the intervals.
+///
+/// All keys are always there; numbers that are not finite are null.
+pub fn reproduce_json(
+    study: &Study,
+    plan: &MonteCarlo,
+    preset: PresetName,
+    scores: &Scores,
+) -> Value {
+    let coverage: Vec<Value> = (scores.coverage.iter())
+        .map(|c| {
+            let share = c.covered as f64 / c.of as f64;
+            json!({
+                "name": c.name, "count": c.covered, "of": c.of, "share": share,
+                "interval": [c.low, c.high],
+            })
+        })
+        .collect();
+    json!({
+        "schema": "truetwin.reproduce/1",
+        "twin": study.name(),
+        "scenario": plan.scenario.number(),
+        "theta_from": match plan.scenario {
+            Scenario::InDistribution => "prior",
+            Scenario::First | Scenario::Second => "point",
+            Scenario::Uniform => "bounds",
+        },
+        "runs": plan.runs,
+        "seed": plan.seed,
+        "preset": preset,
+        "failed": scores.failed,
+        "methods": scores.methods.iter().map(row).collect::<Vec<_>>(),
+        "coverage": {
+            "level": INTERVAL_LEVEL, "interval_level": COVERAGE_LEVEL, "parameters": coverage,
+        },
+    })
+}
+
+fn row(score: &MethodScore) -> Value {
+    let invariants: Map<String, Value> = (score.invariants.iter())
+        .map(|(name, mse)| ((*name).to_owned(), json!(mse)))
+        .collect();
+    json!({
+        "method": score.method.to_string(),
+        "initialisation": score.method.initialisation().map(|start| start.to_string()),
+        "mse": score.mse,
+        "mse_std_error": score.mse_std_error,
+        "median": score.median,
+        "ms": score.milliseconds,
+        "failed": score.failed,
+        "invariants": invariants,
+        "mse_without_scale": score.mse_without_scale,
+        "paper": score.published.map(|p| json!({ "mse": p.mse, "ms": p.milliseconds })),
+    })
+}

@@ -1,0 +1,10 @@
+//! Scores of withheld trials as JSON, text and page.
+
+mod figures;
+mod html;
+mod json;
+mod text;
+
+pub use html::scorecard_html;
+pub use json::scorecard_json;
+pub use text::scorecard_text;
