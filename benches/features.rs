@@ -2,7 +2,6 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
-use std::sync::Arc;
 use std::time::Duration;
 use truetwin::evaluate::paper::reference_studies;
 use truetwin::feature::{Ar, Armax, Arx, Deviation, FeatureRecipe, Score};
@@ -33,7 +32,7 @@ fn features(c: &mut Criterion) {
     ];
     let studies = reference_studies().expect("the reference studies are sound");
     for (study, recipes) in studies.iter().zip([autonomous, driven]) {
-        let twin = Arc::clone(study.twin());
+        let twin = study.twin().clone();
         let noise = Noise::new(1, "bench", 0);
         let drives = study.drives().expect("the plan fits the twin");
         let drive = drives.draw(noise).expect("levels are finite");

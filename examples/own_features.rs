@@ -45,7 +45,7 @@ struct Gains {
 
 #[typetag::serde(name = "gains")]
 impl FeatureRecipe for Gains {
-    fn bind(&self, _: &Arc<dyn DigitalTwin>) -> Result<Arc<dyn FeatureMap>, FeatureError> {
+    fn bind(&self, _: &Twin) -> Result<Arc<dyn FeatureMap>, FeatureError> {
         match self.ranges {
             0 => Err(FeatureError::Setting {
                 kind: "gains",

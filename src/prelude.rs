@@ -44,5 +44,5 @@ pub use crate::progress::Progress;
 pub use crate::record::{Drive, Quantity, Record, Signal};
 pub use crate::study::{RecordPlan, Study, StudyError};
 pub use crate::twin::{
-    DigitalTwin, Noise, Now, Outline, Parameter, ParameterSpace, SimulationError, StateSpace,
+    DigitalTwin, Noise, Now, Outline, Parameter, ParameterSpace, SimulationError, StateSpace, Twin,
 };

@@ -3,13 +3,12 @@
 use super::args::Subject;
 use super::{Context, Failure, Verb, output};
 use crate::estimator::PresetName;
-use crate::progress::Stage;
-use crate::record::{Drive, Signal, Signals};
 use crate::twin::conformance::{Severity, check};
-use crate::twin::{DigitalTwin, Noise, ParameterSpace, SimulationError, StateSpace};
+use crate::twin::{FREE_RUNS, Noise, SimulationError, Twin};
 use clap::Args;
 use serde_json::{Value, json};
 use std::process::ExitCode;
+use std::sync::Arc;
 
 /// Check a twin before any training: repeatable, paired noise, finite, identifiable.
 #[derive(Debug, Args)]
@@ -33,12 +32,12 @@ impl Verb for Check {
         let drive = study
             .drives()?
             .draw(Noise::new(context.seed, "check input", 0))?;
-        let twin = Watched {
-            twin: study.twin().as_ref(),
-            stage: context.progress.stage("runs", runs(study.twin().as_ref())),
-        };
+        let stage = Arc::new(context.progress.stage("runs", runs(study.twin())));
+        let counter = stage.clone();
+        let twin = (study.twin())
+            .watched(move || (counter.tick()).map_err(|stop| SimulationError::Fatal(stop.into())));
         let mut findings = check(&twin, &drive, context.seed);
-        twin.stage.finish();
+        stage.finish();
         context.progress.checkpoint().map_err(Failure::internal)?;
         if findings.iter().all(|f| f.severity < Severity::Failure) {
             findings.push(project.check_features(PresetName::Default, &drive, context.seed)?);
@@ -74,35 +73,11 @@ impl Verb for Check {
 
 /// About how many runs the checks make: corners of the prior, differences for each parameter; a black box's free run is the
 /// mean of 32.
-fn runs(twin: &dyn DigitalTwin) -> usize {
+fn runs(twin: &Twin) -> usize {
     let d = twin.parameters().len();
-    let free = if twin.state_space().is_some() { 1 } else { 32 };
+    let free = match twin {
+        Twin::Equations(_) => 1,
+        Twin::BlackBox(_) => FREE_RUNS as usize,
+    };
     (1 << d.min(6)) + 2 * d * free + 4
-}
-
-/// A twin whose runs are counted on a bar, and can be stopped.
-struct Watched<'a> {
-    twin: &'a dyn DigitalTwin,
-    stage: Stage,
-}
-
-impl DigitalTwin for Watched<'_> {
-    fn parameters(&self) -> ParameterSpace {
-        self.twin.parameters()
-    }
-    fn signals(&self) -> Signals {
-        self.twin.signals()
-    }
-    fn state_space(&self) -> Option<&dyn StateSpace> {
-        self.twin.state_space()
-    }
-    fn simulate(
-        &self,
-        theta: &[f64],
-        drive: &Drive,
-        noise: Noise,
-    ) -> Result<Signal, SimulationError> {
-        (self.stage.tick()).map_err(|stop| SimulationError::Fatal(stop.into()))?;
-        self.twin.simulate(theta, drive, noise)
-    }
 }

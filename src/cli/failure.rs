@@ -3,7 +3,6 @@
 use super::output;
 use crate::diagnose::DiagnoseError;
 use crate::effect::EffectError;
-use crate::effect::EffectFileError;
 use crate::estimator::bank::BankError;
 use crate::estimator::bank::file::BankFileError;
 use crate::estimator::gate::GateError;
@@ -149,7 +148,6 @@ users!(
     CsvError,
     DriveError,
     EffectError,
-    EffectFileError,
     EstimatorFileError,
     ParameterError,
     RecordError,

@@ -2,7 +2,6 @@
 
 use super::args::Subject;
 use super::{Context, Failure, Verb, output};
-use crate::effect::read_effects;
 use crate::effect::{augment, given_magnitudes};
 use crate::record::{Drive, Record, read_drive, record_csv_text, write_record};
 use crate::twin::{DigitalTwin, Noise, ParameterSpace, Role};
@@ -52,7 +51,7 @@ impl Verb for Simulate {
         let mut twin = study.twin().clone();
         let mut magnitudes = BTreeMap::new();
         if let Some(path) = &self.effect {
-            let effects = read_effects(path)?;
+            let effects = study.catalogue().read(path)?;
             magnitudes = given_magnitudes(&effects);
             twin = augment(twin, effects).map_err(|error| Failure::from(error).within(path))?;
         }
@@ -62,7 +61,7 @@ impl Verb for Simulate {
             Some(path) => read_drive(path)?,
             None => study.drives()?.draw(noise)?,
         };
-        check_inputs(twin.as_ref(), &drive, self)?;
+        check_inputs(&twin, &drive, self)?;
         let noise = if self.noise_free { Noise::OFF } else { noise };
         let outputs = twin.simulate(&theta, &drive, noise)?;
         let record = Record::new(drive, outputs)?;

@@ -49,7 +49,7 @@ fn parameter(p: &Parameter) -> Value {
 fn describe(study: &Study) -> Value {
     let twin = study.twin();
     let signals = twin.signals();
-    let states = (twin.state_space()).map(|equations| quantities(&equations.outline().states));
+    let states = twin.outline().map(|outline| quantities(&outline.states));
     json!({
         "name": study.name(),
         "equations": states.is_some(),
@@ -71,8 +71,8 @@ fn in_words(study: &Study) -> String {
             .collect::<Vec<_>>()
             .join(", "),
     };
-    let states = match twin.state_space() {
-        Some(equations) => names(&equations.outline().states),
+    let states = match twin.outline() {
+        Some(outline) => names(&outline.states),
         None => "not shown (black box)".into(),
     };
     let mut text = format!(

@@ -2,13 +2,12 @@
 
 use crate::record::Record;
 use crate::study::Study;
-use crate::twin::{DigitalTwin, Now};
-use std::sync::Arc;
+use crate::twin::{Now, Twin};
 
 /// What all steps share.
 pub(super) struct Context<'a> {
     pub study: &'a Study,
-    pub twin: &'a Arc<dyn DigitalTwin>,
+    pub twin: &'a Twin,
     pub validation: Option<&'a [Record]>,
     /// The records and the validation record.
     pub together: Option<&'a [Record]>,
@@ -23,7 +22,7 @@ impl<'a> Context<'a> {
     /// Of the twin as [`measured`](crate::likelihood::ensemble::measured) shows it.
     pub fn new(
         study: &'a Study,
-        (twin, silent): &'a (Arc<dyn DigitalTwin>, bool),
+        (twin, silent): &'a (Twin, bool),
         records: &[Record],
         validation: Option<&'a [Record]>,
         together: Option<&'a [Record]>,
@@ -33,15 +32,15 @@ impl<'a> Context<'a> {
             twin,
             validation,
             together,
-            follows: *silent || without_process_noise(twin.as_ref(), &records[0]),
+            follows: *silent || without_process_noise(twin, &records[0]),
             silent: *silent,
         }
     }
 }
 
 /// Whether no state of the twin is noisy, with any noise level that the study leaves open; nobody knows of a black box.
-fn without_process_noise(twin: &dyn DigitalTwin, record: &Record) -> bool {
-    let Some(twin) = twin.state_space() else {
+fn without_process_noise(twin: &Twin, record: &Record) -> bool {
+    let Some(twin) = twin.equations() else {
         return false;
     };
     let outline = twin.outline();

@@ -63,6 +63,9 @@ pub(in crate::diagnose) fn detect<'a>(
         &stage,
     )?;
     let nulls = nulls.ok_or(DiagnoseError::NoFit)?;
+    if nulls.others.iter().all(Option::is_none) {
+        return Err(DiagnoseError::NoSimulation);
+    }
     let test = nulls.test();
     let mut found = None;
     let mut e_value = None;

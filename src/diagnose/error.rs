@@ -8,124 +8,97 @@ use crate::setting::SettingError;
 use crate::twin::{ParameterError, SimulationError};
 use std::fmt;
 
-/// Why there is no diagnosis.
-///
-/// ```
-/// use truetwin::diagnose::{DiagnoseError, DiagnoseSettings, diagnose};
-/// use truetwin::progress::Progress;
-/// use truetwin::study::{RecordPlan, Study};
-/// use truetwin::twins::VanDerPol;
-///
-/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 200))?;
-/// let nothing = diagnose(&study, &[], None, &DiagnoseSettings::default(), &Progress::silent());
-/// assert!(matches!(nothing, Err(DiagnoseError::NoRecord)));
-/// # Ok::<(), truetwin::study::StudyError>(())
-/// ```
+/// Reasons for a diagnosis to fail.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DiagnoseError {
     /// No record.
-    #[error("no record was given; give at least one")]
+    #[error("no record given; pass at least one")]
     NoRecord,
     /// Records of different steps.
     #[error("{record} has a step of {given} s, the first record {expected} s; resample it")]
     Steps {
-        /// Which.
+        /// The record.
         record: GivenRecord,
-        /// Its step.
+        /// Step of the record, in seconds.
         given: f64,
-        /// That of the first.
+        /// Step of the first record.
         expected: f64,
     },
-    /// Too short to say anything.
+    /// A record that is too short.
     #[error("{record} has {samples} samples; at least {least} are needed, measure longer")]
     TooShort {
-        /// Which.
+        /// The record.
         record: GivenRecord,
-        /// Its samples.
+        /// Number of samples.
         samples: usize,
-        /// What is needed.
+        /// Least number of samples.
         least: usize,
     },
-    /// A setting that cannot be used.
+    /// An invalid setting.
     #[error(transparent)]
     Context(#[from] SettingError),
-    /// An effect to leave out that there is not.
-    #[error(
-        "--without names {0}, which is no effect of this twin; `truetwin effects --twin T` lists them"
-    )]
+    /// An unknown effect in `without`.
+    #[error("unknown effect {0} in --without; `truetwin effects --twin T` lists those of a twin")]
     Without(String),
-    /// The filter works nowhere.
+    /// No starting point can be fitted.
     #[error(
-        "the twin can be fitted to the record from no start; check units and step of the record, and the prior"
+        "no starting point could be fitted to the record; check units and step of the record, and the prior"
     )]
     NoFit,
-    /// Channels that are not the twin's.
-    #[error("{record} is not of this twin: {error}")]
+    /// Every simulation of the fitted twin fails.
+    #[error(
+        "no simulation of the fitted twin could be evaluated; check units and step of the record, and the prior"
+    )]
+    NoSimulation,
+    /// A record with channels other than the twin's.
+    #[error("{record} does not fit the twin: {error}")]
     Channels {
-        /// Which.
+        /// The record.
         record: GivenRecord,
         /// What is wrong.
         error: RecordError,
     },
-    /// Of a part of a record.
+    /// An error in a part of a record.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// Of a filter.
+    /// An error of the filter.
     #[error(transparent)]
     Filter(#[from] FilterError),
-    /// Of an effect.
+    /// An error of an effect.
     #[error(transparent)]
     Effect(#[from] EffectError),
-    /// Of parameters.
+    /// An error of parameters.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
-    /// Of a simulation.
+    /// An error of a simulation.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
-    /// Stopped.
+    /// Cancelled by the caller.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }
 
 impl DiagnoseError {
-    /// The record that is to blame, where one is.
+    /// Returns the record that caused the error, if one did.
     pub fn record(&self) -> Option<GivenRecord> {
         match self {
             Self::Steps { record, .. }
             | Self::TooShort { record, .. }
             | Self::Channels { record, .. } => Some(*record),
-            Self::NoFit => Some(GivenRecord::Measured(0)),
+            Self::NoFit | Self::NoSimulation => Some(GivenRecord::Measured(0)),
             _ => None,
         }
     }
 }
 
-/// One of the records that a diagnosis was given.
-///
-/// ```
-/// use truetwin::diagnose::{DiagnoseError, DiagnoseSettings, GivenRecord, diagnose};
-/// use truetwin::progress::Progress;
-/// use truetwin::study::{RecordPlan, Study};
-/// use truetwin::effect::*;
-/// use truetwin::record::*;
-/// use truetwin::twin::*;
-/// use truetwin::twins::VanDerPol;
-///
-/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 200))?;
-/// let drive = Drive::autonomous(0.05, 20)?;
-/// let short = Record::new(drive.clone(), VanDerPol.simulate(&[1.5], &drive, Noise::OFF)?)?;
-/// let error: DiagnoseError =
-///     diagnose(&study, &[short], None, &DiagnoseSettings::default(), &Progress::silent()).unwrap_err();
-/// assert_eq!(error.record(), Some(GivenRecord::Measured(0)));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
+/// A record given to a diagnosis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum GivenRecord {
-    /// Its place among the records, from 0.
+    /// Index among the measured records, from 0.
     Measured(usize),
-    /// The one that is held out.
+    /// The validation record.
     Validation,
 }
 

@@ -21,7 +21,6 @@
 //! ```
 //! use std::sync::Arc;
 //! use truetwin::diagnose::*;
-//! use truetwin::effect::QuadraticDrag;
 //! use truetwin::progress::Progress;
 //! use truetwin::study::{RecordPlan, Study};
 //! use truetwin::effect::*;
@@ -31,8 +30,8 @@
 //!
 //! // The real oscillator has a drag that the twin does not know.
 //! let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 200))?;
-//! let drag = QuadraticDrag { target: "x2".into(), magnitudes: Given::default() };
-//! let real = augment(Arc::new(VanDerPol), vec![Arc::new(drag)])?;
+//! let drag = study.catalogue().effect("quadratic-drag", "x2")?;
+//! let real = augment(Arc::new(VanDerPol), vec![drag])?;
 //! let drive = Drive::autonomous(0.05, 200)?;
 //! let outputs = real.simulate(&[1.5, 0.6], &drive, Noise::new(7, "measured", 0))?;
 //! let record = Record::new(drive, outputs)?;
@@ -103,6 +102,7 @@ mod run;
 mod settings;
 mod summary;
 mod test;
+mod thresholds;
 
 pub use error::{DiagnoseError, GivenRecord};
 pub(crate) use gain::{gain_of, held_out_score};

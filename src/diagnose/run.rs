@@ -18,6 +18,7 @@ use crate::diagnose::settings::DiagnoseSettings;
 use crate::diagnose::summary::{fitted_parameters, reported};
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::free_run::{Runner, free_runs};
+use crate::diagnose::thresholds::Thresholds;
 use crate::likelihood::ensemble::dithered;
 use crate::likelihood::ensemble::measured;
 use crate::math::six_digits;
@@ -27,9 +28,6 @@ use crate::setting::SettingError;
 use crate::study::Study;
 use crate::twin::Noise;
 use std::time::Instant;
-
-/// Shortest record.
-const LEAST: usize = 50;
 
 /// Diagnoses the gap between a twin and records of one real system.
 ///
@@ -276,11 +274,11 @@ pub(in crate::diagnose) fn check(
                 expected: six_digits(expected),
             });
         }
-        if record.samples() < LEAST {
+        if record.samples() < Thresholds::LEAST_SAMPLES {
             return Err(DiagnoseError::TooShort {
                 record: which,
                 samples: record.samples(),
-                least: LEAST,
+                least: Thresholds::LEAST_SAMPLES,
             });
         }
     }
@@ -304,4 +302,34 @@ pub(in crate::diagnose) fn check(
         "take at least 50",
     )?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{Drive, Signal};
+    use crate::study::RecordPlan;
+    use crate::twins::VanDerPol;
+
+    /// An oscillator with a cubic spring, its step given in milliseconds where seconds are expected: an answer or an error,
+    /// never a panic.
+    #[test]
+    fn a_record_in_milliseconds_does_not_panic() {
+        let (mut x, mut v) = (1.0f64, 0.0f64);
+        let outputs = Signal::from_shape_fn((200, 1), |_| {
+            for _ in 0..50 {
+                v += 1e-3 * (1.5 * (1.0 - x * x) * v - x - 0.028 * x.powi(3));
+                x += 1e-3 * v;
+            }
+            x
+        });
+        let record = Record::new(Drive::autonomous(50.0, 200).unwrap(), outputs).unwrap();
+        let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 200)).unwrap();
+        let settings = DiagnoseSettings::default();
+        let answer = diagnose(&study, &[record], None, &settings, &Progress::silent());
+        assert!(
+            matches!(answer, Err(DiagnoseError::NoSimulation)),
+            "{answer:?}"
+        );
+    }
 }

@@ -1,5 +1,7 @@
 //! Settings of a diagnosis.
 
+use crate::effect::EffectPattern;
+
 /// Settings of a diagnosis.
 ///
 /// | setting | default | range | meaning |
@@ -11,13 +13,6 @@
 /// | `without` | none | ids, or `id@target` | effects that are not to be named |
 /// | `initial` | none | | θ that an estimator gave, a start of the fit |
 /// | `detection_only` | no | | stop after the verdict: neither where, nor which, nor how far |
-///
-/// ```
-/// use truetwin::diagnose::DiagnoseSettings;
-///
-/// let quick = DiagnoseSettings { detection_only: true, seed: 7, ..DiagnoseSettings::default() };
-/// assert_eq!(quick.alpha, 0.05);
-/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiagnoseSettings {
     /// Level of every test.
@@ -29,7 +24,7 @@ pub struct DiagnoseSettings {
     /// Seed of everything random.
     pub seed: u64,
     /// Effects that are not to be named: `id` or `id@target`.
-    pub without: Vec<String>,
+    pub without: Vec<EffectPattern>,
     /// θ from an estimator.
     pub initial: Option<Vec<f64>>,
     /// Stop after the verdict.

@@ -7,10 +7,8 @@ use crate::diagnose::outcome::{EffectFit, FittedNuisance, FittedParameter};
 use crate::diagnose::settings::DiagnoseSettings;
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::null::Test;
+use crate::diagnose::thresholds::Thresholds;
 use crate::twin::{PRIOR_DEVIATION, Parameter, Role};
-
-/// Explanations that are reported.
-const REPORTED: usize = 12;
 
 /// Explanations as they are reported: the accepted ones first.
 pub(in crate::diagnose) fn reported(
@@ -50,7 +48,7 @@ pub(in crate::diagnose) fn reported(
             all.insert(0, effect);
         }
     }
-    all.truncate(REPORTED);
+    all.truncate(Thresholds::REPORTED);
     all
 }
 

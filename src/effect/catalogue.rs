@@ -6,7 +6,7 @@ use super::key::EffectPattern;
 use super::kind::{EffectKind, OtherState};
 use super::library;
 use super::placed::{Effect, EffectEntry};
-use crate::twin::{DigitalTwin, Noise, Now, Outline, ParameterSpace, Role, StateSpace};
+use crate::twin::{Noise, Now, Outline, ParameterSpace, Role, StateSpace, Twin};
 use std::sync::{Arc, LazyLock};
 
 static LIBRARY: LazyLock<Vec<Arc<EffectKind>>> =
@@ -16,9 +16,10 @@ static LIBRARY: LazyLock<Vec<Arc<EffectKind>>> =
 ///
 /// ```
 /// use truetwin::effect::Catalogue;
+/// use truetwin::twin::Twin;
 /// use truetwin::twins::VanDerPol;
 ///
-/// let possible = Catalogue::default().applicable(&VanDerPol);
+/// let possible = Catalogue::default().applicable(&Twin::new(VanDerPol));
 /// assert!(possible.iter().any(|effect| effect.target() == "x2"));
 /// assert!(possible.iter().all(|effect| effect.target() != "actuator")); // the oscillator has no input
 /// ```
@@ -71,9 +72,9 @@ impl Catalogue {
     ///
     /// Targets are the twin's own states and parameters, not the memories and magnitudes of effects already added.
     /// An effect of [`OtherState::RateOf`] is offered where a state is the rate of another; the drift is probed for that.
-    pub fn applicable(&self, twin: &dyn DigitalTwin) -> Vec<Effect> {
-        let (equations, signals) = (twin.state_space(), twin.signals());
-        let outline = equations.map(|twin| own(twin.outline()));
+    pub fn applicable(&self, twin: &Twin) -> Vec<Effect> {
+        let (equations, signals) = (twin.equations(), twin.signals());
+        let outline = twin.outline().map(own);
         let rates = equations.map_or_else(Vec::new, rates);
         let mut effects = Vec::new();
         for kind in &self.0 {
@@ -100,7 +101,7 @@ impl Catalogue {
     }
 
     /// Returns whether a pattern names a kind, or a kind at one of the targets of this twin.
-    pub(crate) fn knows(&self, pattern: &EffectPattern, twin: &dyn DigitalTwin) -> bool {
+    pub(crate) fn knows(&self, pattern: &EffectPattern, twin: &Twin) -> bool {
         if pattern.target.is_none() {
             return self.kind(&pattern.id).is_ok();
         }

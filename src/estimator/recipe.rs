@@ -61,7 +61,7 @@ pub struct Recipe {
 impl Recipe {
     /// Returns the default recipe: the [`Score`] of a twin with equations (AR(5) or ARX(8, 8) of a black box), and [`Deep`].
     pub(super) fn standard(study: &Study) -> Self {
-        let features: Arc<dyn FeatureRecipe> = match study.twin().state_space() {
+        let features: Arc<dyn FeatureRecipe> = match study.twin().equations() {
             Some(_) => Arc::new(Score::default()),
             None => regression(study),
         };

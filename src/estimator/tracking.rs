@@ -3,7 +3,7 @@
 use crate::fit::{Bounds, EvaluationError, GaussNewton, OptimiseError, ResidualProblem};
 use crate::math::Stencil;
 use crate::record::{Record, Signal};
-use crate::twin::{DigitalTwin, Interval, ParameterSpace, Role, free_run};
+use crate::twin::{DigitalTwin, Interval, ParameterSpace, Role};
 use nalgebra::{DMatrix, DVector};
 
 /// A free run beside a record.
@@ -50,7 +50,8 @@ pub fn track(
             fitted[j] = *value;
         }
     }
-    let outputs = free_run(twin, &fitted, record.drive())
+    let outputs = twin
+        .free_run(&fitted, record.drive())
         .map_err(|error| OptimiseError::Start(error.into()))?;
     let squares = (record.outputs() - &outputs).mapv(|d| d * d);
     Ok(Tracking {
@@ -80,7 +81,7 @@ impl ResidualProblem for StartFit<'_> {
             theta[j] = *value;
         }
         let run =
-            free_run(self.twin, &theta, self.record.drive()).map_err(EvaluationError::rejected)?;
+            (self.twin.free_run(&theta, self.record.drive())).map_err(EvaluationError::rejected)?;
         let rows = self.record.outputs().iter().zip(&run).map(|(y, f)| f - y);
         Ok(DVector::from_iterator(run.len(), rows))
     }

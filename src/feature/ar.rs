@@ -3,7 +3,7 @@
 use super::regression::coefficients;
 use super::{FeatureError, FeatureMap, FeatureRecipe};
 use crate::record::{Drive, Signal};
-use crate::twin::DigitalTwin;
+use crate::twin::Twin;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ use std::sync::Arc;
 /// use truetwin::twin::DigitalTwin;
 /// use truetwin::twins::VanDerPol;
 ///
-/// let twin: Arc<dyn DigitalTwin> = Arc::new(VanDerPol);
+/// let twin = Twin::new(VanDerPol);
 /// let map = Ar { order: 2 }.bind(&twin)?;
 /// // A cosine obeys y(t) = 2·cos(ω)·y(t − 1) − y(t − 2).
 /// let cosine = Signal::from_shape_fn((50, 1), |(t, _)| (0.3 * t as f64).cos());
@@ -41,7 +41,7 @@ pub struct Ar {
 
 #[typetag::serde(name = "ar")]
 impl FeatureRecipe for Ar {
-    fn bind(&self, twin: &Arc<dyn DigitalTwin>) -> Result<Arc<dyn FeatureMap>, FeatureError> {
+    fn bind(&self, twin: &Twin) -> Result<Arc<dyn FeatureMap>, FeatureError> {
         if self.order == 0 {
             return Err(FeatureError::Setting {
                 kind: "ar",
@@ -77,7 +77,7 @@ mod tests {
     use crate::feature::testing::Tank;
 
     fn features(order: usize, y: &[f64]) -> Result<Vec<f64>, FeatureError> {
-        let twin: Arc<dyn DigitalTwin> = Arc::new(Tank(0));
+        let twin = Twin::new(Tank(0));
         let outputs = Signal::from_shape_vec((y.len(), 1), y.to_vec()).unwrap();
         let drive = Drive::autonomous(1.0, y.len()).unwrap();
         Ar { order }.bind(&twin)?.extract(&drive, &outputs)

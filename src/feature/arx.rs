@@ -3,7 +3,7 @@
 use super::regression::coefficients;
 use super::{FeatureError, FeatureMap, FeatureRecipe};
 use crate::record::{Drive, Signal};
-use crate::twin::DigitalTwin;
+use crate::twin::Twin;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -21,10 +21,10 @@ use std::sync::Arc;
 /// use std::sync::Arc;
 /// use truetwin::feature::{Arx, FeatureRecipe};
 /// use truetwin::record::Drive;
-/// use truetwin::twin::{DigitalTwin, Noise};
+/// use truetwin::twin::{DigitalTwin, Noise, Twin};
 /// use truetwin::twins::CascadedTanks;
 ///
-/// let twin: Arc<dyn DigitalTwin> = Arc::new(CascadedTanks);
+/// let twin = Twin::new(CascadedTanks);
 /// let drive = Drive::new(0.5, ndarray::Array2::from_shape_fn((200, 1), |(t, _)| (t / 20 % 3) as f64))?;
 /// let outputs = twin.simulate(&[0.6, 0.5, 0.55, 1.0], &drive, Noise::new(1, "doc", 0))?;
 /// let map = Arx { outputs: 3, inputs: 2 }.bind(&twin)?;
@@ -42,7 +42,7 @@ pub struct Arx {
 
 #[typetag::serde(name = "arx")]
 impl FeatureRecipe for Arx {
-    fn bind(&self, twin: &Arc<dyn DigitalTwin>) -> Result<Arc<dyn FeatureMap>, FeatureError> {
+    fn bind(&self, twin: &Twin) -> Result<Arc<dyn FeatureMap>, FeatureError> {
         let setting = |problem: String| FeatureError::Setting {
             kind: "arx",
             problem,
@@ -114,7 +114,7 @@ mod tests {
 
     #[test]
     fn several_channels_come_output_after_output() {
-        let twin: Arc<dyn DigitalTwin> = Arc::new(Linear);
+        let twin = Twin::new(Linear);
         let mut source = Noise::new(1, "test", 0).source("u");
         let inputs = Signal::from_shape_simple_fn((50, 2), || source.normal());
         let drive = Drive::new(1.0, inputs).unwrap();

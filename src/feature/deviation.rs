@@ -2,7 +2,7 @@
 
 use super::{FeatureError, FeatureMap, FeatureRecipe};
 use crate::record::{Drive, Signal};
-use crate::twin::{DigitalTwin, free_run};
+use crate::twin::Twin;
 use serde::{Deserialize, Serialize};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -21,10 +21,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// use std::sync::Arc;
 /// use truetwin::feature::{Deviation, FeatureRecipe};
 /// use truetwin::record::Drive;
-/// use truetwin::twin::{DigitalTwin, Noise};
+/// use truetwin::twin::{DigitalTwin, Noise, Twin};
 /// use truetwin::twins::VanDerPol;
 ///
-/// let twin: Arc<dyn DigitalTwin> = Arc::new(VanDerPol);
+/// let twin = Twin::new(VanDerPol);
 /// let drive = Drive::autonomous(0.05, 300)?;
 /// let outputs = twin.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
 ///
@@ -44,7 +44,7 @@ pub struct Deviation {
 
 #[typetag::serde(name = "deviation")]
 impl FeatureRecipe for Deviation {
-    fn bind(&self, twin: &Arc<dyn DigitalTwin>) -> Result<Arc<dyn FeatureMap>, FeatureError> {
+    fn bind(&self, twin: &Twin) -> Result<Arc<dyn FeatureMap>, FeatureError> {
         if self.blocks == 0 {
             return Err(FeatureError::Setting {
                 kind: "deviation",
@@ -65,7 +65,7 @@ struct Bound {
     blocks: usize,
     outputs: usize,
     centre: Vec<f64>,
-    twin: Arc<dyn DigitalTwin>,
+    twin: Twin,
     /// The reference run of the last drive: around one record the drive never changes.
     last: Mutex<Option<(Drive, Arc<Signal>)>>,
 }
@@ -81,7 +81,7 @@ impl Bound {
             return Ok(run.clone());
         }
         drop(last);
-        let run = Arc::new(free_run(self.twin.as_ref(), &self.centre, drive)?);
+        let run = Arc::new(self.twin.free_run(&self.centre, drive)?);
         last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
         *last = Some((drive.clone(), run.clone()));
         Ok(run)
@@ -123,7 +123,7 @@ mod tests {
 
     #[test]
     fn a_constant_offset_is_every_feature() {
-        let twin: Arc<dyn DigitalTwin> = Arc::new(Tank(1));
+        let twin = Twin::new(Tank(1));
         let drive = Drive::new(0.5, Signal::from_elem((50, 1), 1.0)).unwrap();
         let map = Deviation { blocks: 7 }.bind(&twin).unwrap();
         let centre = twin.parameters().centre();

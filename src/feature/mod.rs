@@ -26,7 +26,7 @@ pub use score::Score;
 use crate::likelihood::kalman::FilterError;
 use crate::math::LeastSquaresError;
 use crate::record::{Drive, Record, Signal};
-use crate::twin::{DigitalTwin, Noise, SimulationError};
+use crate::twin::{Noise, SimulationError, Twin};
 use nalgebra::DMatrix;
 use std::fmt::Debug;
 use std::sync::Arc;
@@ -39,10 +39,10 @@ use std::sync::Arc;
 /// use std::sync::Arc;
 /// use truetwin::feature::{Centred, FeatureMap, FeatureRecipe, Score};
 /// use truetwin::record::{Drive, Record};
-/// use truetwin::twin::{DigitalTwin, Noise};
+/// use truetwin::twin::{DigitalTwin, Noise, Twin};
 /// use truetwin::twins::VanDerPol;
 ///
-/// let twin: Arc<dyn DigitalTwin> = Arc::new(VanDerPol);
+/// let twin = Twin::new(VanDerPol);
 /// let drive = Drive::autonomous(0.05, 200)?;
 /// let outputs = twin.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
 /// let map: Arc<dyn FeatureMap> = Score::default().bind(&twin)?;
@@ -83,10 +83,10 @@ pub trait FeatureMap: Send + Sync {
 /// use std::sync::Arc;
 /// use truetwin::feature::{Ar, Centred, FeatureRecipe};
 /// use truetwin::record::{Drive, Record};
-/// use truetwin::twin::{DigitalTwin, Noise};
+/// use truetwin::twin::{DigitalTwin, Noise, Twin};
 /// use truetwin::twins::VanDerPol;
 ///
-/// let twin: Arc<dyn DigitalTwin> = Arc::new(VanDerPol);
+/// let twin = Twin::new(VanDerPol);
 /// let drive = Drive::autonomous(0.05, 50)?;
 /// let outputs = twin.simulate(&[1.5], &drive, Noise::OFF)?;
 /// let found: Option<Centred> =
@@ -125,7 +125,7 @@ debug_by_name!(Centred);
 ///
 /// #[typetag::serde(name = "power")]
 /// impl FeatureRecipe for Power {
-///     fn bind(&self, _: &Arc<dyn DigitalTwin>) -> Result<Arc<dyn FeatureMap>, FeatureError> {
+///     fn bind(&self, _: &Twin) -> Result<Arc<dyn FeatureMap>, FeatureError> {
 ///         Ok(Arc::new(Self))
 ///     }
 /// }
@@ -140,7 +140,7 @@ debug_by_name!(Centred);
 ///     }
 /// }
 ///
-/// let twin: Arc<dyn DigitalTwin> = Arc::new(VanDerPol);
+/// let twin = Twin::new(VanDerPol);
 /// let map = Power.bind(&twin)?;
 /// assert_eq!(map.extract(&Drive::autonomous(0.1, 4)?, &Signal::from_elem((4, 1), 3.0))?, [9.0]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -148,7 +148,7 @@ debug_by_name!(Centred);
 #[typetag::serde(tag = "kind")]
 pub trait FeatureRecipe: Debug + Send + Sync {
     /// The map for a twin.
-    fn bind(&self, twin: &Arc<dyn DigitalTwin>) -> Result<Arc<dyn FeatureMap>, FeatureError>;
+    fn bind(&self, twin: &Twin) -> Result<Arc<dyn FeatureMap>, FeatureError>;
 }
 
 /// Why there are no features.
@@ -160,7 +160,7 @@ pub trait FeatureRecipe: Debug + Send + Sync {
 /// use truetwin::twin::DigitalTwin;
 /// use truetwin::twins::VanDerPol;
 ///
-/// let twin: Arc<dyn DigitalTwin> = Arc::new(VanDerPol);
+/// let twin = Twin::new(VanDerPol);
 /// let map = Ar { order: 5 }.bind(&twin)?;
 /// let error = map.extract(&Drive::autonomous(0.05, 20)?, &Signal::ones((20, 1))).unwrap_err();
 /// assert!(matches!(error, FeatureError::Constant { channel: 1, .. }));

@@ -3,8 +3,8 @@
 use crate::record::{Drive, Signal, Signals};
 use crate::setting::did_you_mean;
 use crate::twin::{
-    DigitalTwin, Integrator, Interval, Noise, Now, Outliers, Outline, Parameter, ParameterError,
-    ParameterSpace, Role, SimulationError, StateSpace,
+    DigitalTwin, Interval, Modified, Modify, Noise, Now, Outline, Parameter, ParameterError,
+    ParameterSpace, Role, SimulationError, StateSpace, Twin,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -163,26 +163,17 @@ pub enum AdaptationError {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn adapt(
-    base: Arc<dyn DigitalTwin>,
+    base: impl Into<Twin>,
     adaptation: &Adaptation,
     step: f64,
-) -> Result<Arc<dyn DigitalTwin>, AdaptationError> {
+) -> Result<Twin, AdaptationError> {
+    let base = base.into();
     if *adaptation == Adaptation::default() {
         return Ok(base);
     }
-    let Some(equations) = base.state_space() else {
-        for (table, used) in [
-            ("limits", !adaptation.limits.is_empty()),
-            ("noise", !adaptation.noise.is_empty()),
-            ("start", !adaptation.start.is_empty()),
-        ] {
-            if used {
-                return Err(AdaptationError::BlackBox { table });
-            }
-        }
-        let mut parameters = base.parameters();
-        rebox(&mut parameters, adaptation)?;
-        return Ok(Arc::new(AdaptedBlackBox { base, parameters }));
+    let equations = match base {
+        Twin::Equations(equations) => equations,
+        Twin::BlackBox(base) => return adapt_black_box(base, adaptation),
     };
     let mut outline = equations.outline();
     let n = outline.parameters.len();
@@ -200,7 +191,7 @@ pub fn adapt(
     for (name, &limit) in &adaptation.limits {
         limits[position("limits", name, &states)?] = limit;
     }
-    let declared = declared_noise(equations, &outline, step);
+    let declared = declared_noise(equations.as_ref(), &outline, step);
     let mut added: Vec<Parameter> = Vec::new();
     let mut noise = Vec::new();
     for (name, &level) in &adaptation.noise {
@@ -259,14 +250,35 @@ pub fn adapt(
     }
     outline.parameters = ParameterSpace::new(outline.parameters.iter().cloned().chain(added));
     rebox(&mut outline.parameters, adaptation)?;
-    Ok(Arc::new(AdaptedEquations {
+    Ok(Twin::Equations(Arc::new(Modified(Adapted {
         outline,
         limits,
         noise,
         start,
         own: n,
+        base: equations,
+    }))))
+}
+
+fn adapt_black_box(
+    base: Arc<dyn DigitalTwin>,
+    adaptation: &Adaptation,
+) -> Result<Twin, AdaptationError> {
+    for (table, used) in [
+        ("limits", !adaptation.limits.is_empty()),
+        ("noise", !adaptation.noise.is_empty()),
+        ("start", !adaptation.start.is_empty()),
+    ] {
+        if used {
+            return Err(AdaptationError::BlackBox { table });
+        }
+    }
+    let mut parameters = base.parameters();
+    rebox(&mut parameters, adaptation)?;
+    Ok(Twin::BlackBox(Arc::new(AdaptedBlackBox {
         base,
-    }))
+        parameters,
+    })))
 }
 
 /// Noise levels of states, then outputs, at the prior's centre.
@@ -346,8 +358,8 @@ impl Setting {
 }
 
 /// Equations in another setting.
-struct AdaptedEquations {
-    base: Arc<dyn DigitalTwin>,
+struct Adapted {
+    base: Arc<dyn StateSpace>,
     outline: Outline,
     limits: Vec<Interval>,
     /// Index among states, then outputs.
@@ -357,63 +369,27 @@ struct AdaptedEquations {
     own: usize,
 }
 
-impl AdaptedEquations {
-    fn inner(&self) -> &dyn StateSpace {
-        self.base
-            .state_space()
-            .expect("adapt builds this type for twins with equations only")
+impl Modify for Adapted {
+    fn base(&self) -> &dyn StateSpace {
+        self.base.as_ref()
     }
-
-    fn own<'a>(&self, now: &Now<'a>) -> Now<'a> {
-        Now {
-            theta: &now.theta[..self.own],
-            ..*now
-        }
+    fn theta<R>(&self, theta: &[f64], then: impl FnOnce(&[f64]) -> R) -> R {
+        then(&theta[..self.own])
     }
-}
-
-impl StateSpace for AdaptedEquations {
     fn outline(&self) -> Outline {
         self.outline.clone()
-    }
-    fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
-        self.inner().drift(&self.own(now), x, dx);
-    }
-    fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
-        self.inner().observe(&self.own(now), x, y);
-    }
-    fn readout(&self, now: &Now<'_>, y: &mut [f64]) {
-        self.inner().readout(&self.own(now), y);
-    }
-    fn update(&self, now: &Now<'_>, x: &mut [f64]) {
-        self.inner().update(&self.own(now), x);
-    }
-    fn constrain(&self, now: &Now<'_>, x: &mut [f64]) {
-        self.inner().constrain(&self.own(now), x);
-    }
-    fn integrator(&self) -> Integrator {
-        self.inner().integrator()
-    }
-    fn admit(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {
-        self.inner().admit(&theta[..self.own], dt)
-    }
-    fn outliers(&self, theta: &[f64]) -> Vec<Outliers> {
-        self.inner().outliers(&theta[..self.own])
-    }
-    fn strike(&self, theta: &[f64], noise: Noise, outputs: &mut Signal) {
-        self.inner().strike(&theta[..self.own], noise, outputs);
     }
     fn limits(&self) -> Vec<Interval> {
         self.limits.clone()
     }
     fn start(&self, now: &Now<'_>, x: &mut [f64]) {
-        self.inner().start(&self.own(now), x);
+        self.now(now, &[], |now| self.base.start(now, x));
         for &(i, setting) in &self.start {
             x[i] = setting.value(now.theta);
         }
     }
     fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
-        self.inner().noise(&self.own(now), process, measurement);
+        self.now(now, &[], |now| self.base.noise(now, process, measurement));
         for &(i, setting) in &self.noise {
             let level = match i.checked_sub(process.len()) {
                 None => &mut process[i],

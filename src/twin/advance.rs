@@ -1,6 +1,8 @@
 //! One step of any equations: of one state, or of all points of a filter at once.
 
-use crate::twin::{Interval, Now, StateSpace, Workspace};
+use super::state_space::simulate_equations;
+use crate::record::{Drive, Signal};
+use crate::twin::{Interval, Noise, Now, SimulationError, StateSpace, Workspace};
 
 /// What every twin with equations can do, and none in its own way: the step.
 ///
@@ -10,6 +12,15 @@ use crate::twin::{Interval, Now, StateSpace, Workspace};
 pub trait Advance {
     /// One step without noise and limits: memories, then motion.
     fn advance(&self, now: &Now<'_>, x: &mut [f64], work: &mut Workspace);
+
+    /// Simulates the equations.
+    #[doc(hidden)]
+    fn run_equations(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Signal, SimulationError>;
 
     /// Carries points over a step; see [`Points`]. Returns whether a constraint acted on any that matters to the noise.
     #[doc(hidden)]
@@ -45,6 +56,15 @@ impl<T: StateSpace> Advance for T {
         self.update(now, x);
         self.integrator()
             .step(now, x, work, |now, x, dx| self.drift(now, x, dx));
+    }
+
+    fn run_equations(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Signal, SimulationError> {
+        simulate_equations(self, theta, drive, noise)
     }
 
     fn advance_each(&self, now: &Now<'_>, points: Points<'_>, work: &mut Workspace) -> bool {

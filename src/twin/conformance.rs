@@ -12,7 +12,7 @@
 //! ```
 
 use crate::record::{Drive, Signal};
-use crate::twin::{DigitalTwin, Noise, PRIOR_DEVIATION, SimulationError, combination, free_run};
+use crate::twin::{DigitalTwin, Noise, PRIOR_DEVIATION, SimulationError, combination};
 use nalgebra::DMatrix;
 
 /// How bad a finding is.
@@ -304,7 +304,7 @@ fn free_run_jacobian(
         let side = |sign: f64| {
             let mut theta = centre.clone();
             theta[j] += sign * 1e-4 * widths[j];
-            free_run(twin, &theta, drive)
+            twin.free_run(&theta, drive)
         };
         let difference = side(1.0)? - side(-1.0)?;
         Ok(difference.iter().map(|d| d / 2e-4).collect())

@@ -3,6 +3,7 @@
 use crate::record::{Drive, Signal, Signals};
 use crate::twin::{Noise, ParameterSpace, StateSpace};
 use std::error::Error;
+use std::sync::Arc;
 
 /// A simulator of a physical system: parameters and inputs in, outputs out.
 ///
@@ -55,22 +56,41 @@ pub trait DigitalTwin: Send + Sync {
         noise: Noise,
     ) -> Result<Signal, SimulationError>;
 
-    /// Input and output channels. One input `u` and one output `y` unless said otherwise.
+    /// Input and output channels; one input `u` and one output `y` by default.
     fn signals(&self) -> Signals {
-        self.state_space().map_or_else(Signals::default, |twin| {
-            let outline = twin.outline();
-            Signals {
-                inputs: outline.inputs,
-                outputs: outline.outputs,
-            }
-        })
+        Signals::default()
     }
 
-    /// The equations, of a twin that can show them.
-    fn state_space(&self) -> Option<&dyn StateSpace> {
+    /// Outputs without noise (N × channels). The noise of a black box cannot be switched off from outside: by default, the
+    /// mean of 32 runs.
+    ///
+    /// # Errors
+    ///
+    /// As [`simulate`](Self::simulate).
+    fn free_run(&self, theta: &[f64], drive: &Drive) -> Result<Signal, SimulationError> {
+        let mut mean = Signal::zeros((drive.samples(), self.signals().outputs.len()));
+        for sample in 0..FREE_RUNS {
+            let run = self.simulate(theta, drive, Noise::new(0, "free run", sample))?;
+            if run.dim() != mean.dim() {
+                return Err(SimulationError::fatal(format!(
+                    "the twin gave {:?} rows and columns, {:?} were expected",
+                    run.dim(),
+                    mean.dim()
+                )));
+            }
+            mean += &run;
+        }
+        Ok(mean / FREE_RUNS as f64)
+    }
+
+    /// The equations, of a twin that shows them; none by default.
+    fn equations(self: Arc<Self>) -> Option<Arc<dyn StateSpace>> {
         None
     }
 }
+
+/// Runs that a black box's free run is the mean of.
+pub(crate) const FREE_RUNS: u64 = 32;
 
 /// Why a simulation gave no outputs.
 ///

@@ -1,10 +1,10 @@
 //! A twin with some parameters held at known values.
 
-use super::state_space::check_parameters;
+use super::state_space::check_length;
 use crate::record::{Drive, Signal, Signals};
 use crate::twin::{
-    DigitalTwin, Integrator, Interval, Noise, Now, Outliers, Outline, ParameterError,
-    ParameterSpace, SimulationError, StateSpace,
+    DigitalTwin, Modified, Modify, Noise, Outline, ParameterError, ParameterSpace, SimulationError,
+    StateSpace, Twin,
 };
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
@@ -28,10 +28,8 @@ use std::sync::Arc;
 /// assert_eq!(twin.parameters().names(), ["k1", "k2", "k3"]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn fix(
-    base: Arc<dyn DigitalTwin>,
-    values: &BTreeMap<String, f64>,
-) -> Result<Arc<dyn DigitalTwin>, ParameterError> {
+pub fn fix(base: impl Into<Twin>, values: &BTreeMap<String, f64>) -> Result<Twin, ParameterError> {
+    let base = base.into();
     if values.is_empty() {
         return Ok(base);
     }
@@ -46,123 +44,59 @@ pub fn fix(
             .map(|(p, _)| p.clone()),
     );
     free.check()?;
-    let map = Held { held };
-    Ok(match base.state_space().map(StateSpace::outline) {
-        Some(outline) => Arc::new(FixedTwin {
-            equations: FixedEquations {
-                outline: Outline {
-                    parameters: free,
-                    ..outline
-                },
+    let held = Held(held);
+    Ok(match base {
+        Twin::Equations(base) => {
+            let mut outline = base.outline();
+            outline.parameters = free;
+            Twin::Equations(Arc::new(Modified(Fixed {
                 base,
-                map,
-            },
-        }),
-        None => Arc::new(FixedBlackBox { base, free, map }),
+                outline,
+                held,
+            })))
+        }
+        Twin::BlackBox(base) => Twin::BlackBox(Arc::new(FixedBlackBox { base, free, held })),
     })
 }
 
-/// Where the free parameters stand among all.
-struct Held {
-    held: Vec<Option<f64>>,
-}
+/// Values of all parameters; none for those that are free.
+struct Held(Vec<Option<f64>>);
 
 impl Held {
     fn complete(&self, free: &[f64]) -> SmallVec<[f64; 16]> {
         let mut free = free.iter();
-        (self.held.iter())
+        (self.0.iter())
             .map(|held| held.unwrap_or_else(|| free.next().copied().unwrap_or(f64::NAN)))
             .collect()
     }
 }
 
-/// A state-space twin with held parameters. Its runs are the base twin's own, which may do more than equations.
-struct FixedTwin {
-    equations: FixedEquations,
+/// Equations with held parameters.
+struct Fixed {
+    base: Arc<dyn StateSpace>,
+    outline: Outline,
+    held: Held,
 }
 
-impl DigitalTwin for FixedTwin {
-    fn parameters(&self) -> ParameterSpace {
-        self.equations.outline.parameters.clone()
+impl Modify for Fixed {
+    fn base(&self) -> &dyn StateSpace {
+        self.base.as_ref()
     }
-    fn state_space(&self) -> Option<&dyn StateSpace> {
-        Some(&self.equations)
+    fn theta<R>(&self, theta: &[f64], then: impl FnOnce(&[f64]) -> R) -> R {
+        then(&self.held.complete(theta))
     }
-    fn simulate(
-        &self,
+    fn outline(&self) -> Outline {
+        self.outline.clone()
+    }
+    fn run(
+        whole: &Modified<Self>,
         theta: &[f64],
         drive: &Drive,
         noise: Noise,
     ) -> Result<Signal, SimulationError> {
-        let FixedEquations { base, map, outline } = &self.equations;
-        check_parameters(outline.parameters.len(), theta)?;
-        base.simulate(&map.complete(theta), drive, noise)
-    }
-}
-
-struct FixedEquations {
-    base: Arc<dyn DigitalTwin>,
-    map: Held,
-    outline: Outline,
-}
-
-impl FixedEquations {
-    fn inner<R>(&self, now: &Now<'_>, with: impl FnOnce(&dyn StateSpace, &Now<'_>) -> R) -> R {
-        let theta = self.map.complete(now.theta);
-        let now = Now {
-            theta: &theta,
-            ..*now
-        };
-        with(self.equations(), &now)
-    }
-
-    fn equations(&self) -> &dyn StateSpace {
-        self.base
-            .state_space()
-            .expect("fix builds this type for twins with equations only")
-    }
-}
-
-impl StateSpace for FixedEquations {
-    fn outline(&self) -> Outline {
-        self.outline.clone()
-    }
-    fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
-        self.inner(now, |twin, now| twin.drift(now, x, dx));
-    }
-    fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
-        self.inner(now, |twin, now| twin.observe(now, x, y));
-    }
-    fn start(&self, now: &Now<'_>, x: &mut [f64]) {
-        self.inner(now, |twin, now| twin.start(now, x));
-    }
-    fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
-        self.inner(now, |twin, now| twin.noise(now, process, measurement));
-    }
-    fn limits(&self) -> Vec<Interval> {
-        self.equations().limits()
-    }
-    fn constrain(&self, now: &Now<'_>, x: &mut [f64]) {
-        self.inner(now, |twin, now| twin.constrain(now, x));
-    }
-    fn update(&self, now: &Now<'_>, x: &mut [f64]) {
-        self.inner(now, |twin, now| twin.update(now, x));
-    }
-    fn readout(&self, now: &Now<'_>, y: &mut [f64]) {
-        self.inner(now, |twin, now| twin.readout(now, y));
-    }
-    fn integrator(&self) -> Integrator {
-        self.equations().integrator()
-    }
-    fn admit(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {
-        self.equations().admit(&self.map.complete(theta), dt)
-    }
-    fn outliers(&self, theta: &[f64]) -> Vec<Outliers> {
-        self.equations().outliers(&self.map.complete(theta))
-    }
-    fn strike(&self, theta: &[f64], noise: Noise, outputs: &mut Signal) {
-        self.equations()
-            .strike(&self.map.complete(theta), noise, outputs);
+        let fixed = &whole.0;
+        check_length(fixed.outline.parameters.len(), theta)?;
+        (fixed.base).run(&fixed.held.complete(theta), drive, noise)
     }
 }
 
@@ -170,7 +104,7 @@ impl StateSpace for FixedEquations {
 struct FixedBlackBox {
     base: Arc<dyn DigitalTwin>,
     free: ParameterSpace,
-    map: Held,
+    held: Held,
 }
 
 impl DigitalTwin for FixedBlackBox {
@@ -186,8 +120,8 @@ impl DigitalTwin for FixedBlackBox {
         drive: &Drive,
         noise: Noise,
     ) -> Result<Signal, SimulationError> {
-        check_parameters(self.free.len(), theta)?;
-        self.base.simulate(&self.map.complete(theta), drive, noise)
+        check_length(self.free.len(), theta)?;
+        self.base.simulate(&self.held.complete(theta), drive, noise)
     }
 }
 

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | plug in a simulator whose equations are at hand | [`StateSpace`] |
 //! | plug in a black box | [`DigitalTwin`] |
+//! | hold a twin of either kind | [`Twin`] |
 //! | say what is estimated, from where to where | [`ParameterSpace`], [`Parameter`], [`Interval`] |
 //! | draw noise that pairs across runs | [`Noise`] |
 //! | change limits, noise, start or prior of a twin | [`Adaptation`], [`adapt`], [`fix`] |
@@ -15,21 +16,24 @@ pub mod conformance;
 mod digital_twin;
 mod direction;
 mod fix;
-mod free_run;
+mod handle;
 mod integrator;
 mod interval;
+mod modified;
 mod noise;
 mod parameter;
 mod state_space;
 
 pub use adapt::{Adaptation, AdaptationError, Level, adapt};
 pub(crate) use advance::{Advance, Points};
+pub(crate) use digital_twin::FREE_RUNS;
 pub use digital_twin::{DigitalTwin, SimulationError};
 pub(crate) use direction::{combination, oriented};
 pub use fix::fix;
-pub use free_run::free_run;
+pub use handle::Twin;
 pub use integrator::{Integrator, Workspace};
 pub use interval::{Interval, IntervalError};
+pub(crate) use modified::{Modified, Modify};
 pub use noise::{Noise, Source};
 pub(crate) use parameter::PRIOR_DEVIATION;
 pub use parameter::{Parameter, ParameterError, ParameterSpace, Role};

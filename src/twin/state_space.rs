@@ -1,9 +1,10 @@
 //! Twins that can show their equations, and the loop that simulates them.
 
-use crate::record::{Drive, Quantity, Signal};
+use crate::record::{Drive, Quantity, Signal, Signals};
 use crate::twin::{
     Advance, DigitalTwin, Integrator, Interval, Noise, ParameterSpace, SimulationError, Workspace,
 };
+use std::sync::Arc;
 
 /// A twin given by its equations
 ///
@@ -81,35 +82,33 @@ pub trait StateSpace: Advance + Send + Sync {
     /// What happens to an output after its noise (saturation, quantisation); nothing unless said otherwise.
     fn readout(&self, _now: &Now<'_>, _y: &mut [f64]) {}
 
-    /// Whether these parameters can be simulated at this step; asked once before a run. Always, unless said otherwise.
-    fn admit(&self, _theta: &[f64], _dt: f64) -> Result<(), SimulationError> {
+    /// Checks once before a run that θ can be simulated at this step; every θ can by default.
+    fn check_parameters(&self, _theta: &[f64], _dt: f64) -> Result<(), SimulationError> {
         Ok(())
     }
 
-    /// What befalls the finished outputs of a run (outliers); nothing unless said otherwise.
-    fn strike(&self, _theta: &[f64], _noise: Noise, _outputs: &mut Signal) {}
+    /// Corrupts the finished outputs of a run (outliers); leaves them alone by default.
+    fn corrupt_outputs(&self, _theta: &[f64], _noise: Noise, _outputs: &mut Signal) {}
 
-    /// How often [`strike`](Self::strike) hits each output and how hard, for filters; empty for never.
+    /// Probability and size of the outliers of [`corrupt_outputs`](Self::corrupt_outputs) for filters, by output; empty
+    /// without any.
     fn outliers(&self, _theta: &[f64]) -> Vec<Outliers> {
         vec![]
     }
 
-    /// How the drift is carried over a step.
+    /// Integrator that carries the drift over a step.
     fn integrator(&self) -> Integrator {
         Integrator::Euler
+    }
+
+    /// One run. Wrappers that leave the motion alone run the twin that they hold.
+    #[doc(hidden)]
+    fn run(&self, theta: &[f64], drive: &Drive, noise: Noise) -> Result<Signal, SimulationError> {
+        self.run_equations(theta, drive, noise)
     }
 }
 
 /// Rare large errors: with this probability, N(0, scale²) is added to a sample.
-///
-/// ```
-/// use truetwin::effect::SensorOutliers;
-/// use truetwin::effect::{Given, UnmodelledEffect};
-/// use truetwin::twin::Outliers;
-///
-/// let effect = SensorOutliers { target: "sensor".into(), magnitudes: Given::default() };
-/// assert_eq!(effect.outliers(&[0.05, 2.0]), Some(Outliers { probability: 0.05, scale: 2.0 }));
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Outliers {
     /// Probability of each sample.
@@ -163,13 +162,23 @@ pub struct Outline {
     pub outputs: Vec<Quantity>,
 }
 
-impl<T: StateSpace> DigitalTwin for T {
+impl Outline {
+    /// Input and output channels.
+    pub(crate) fn signals(self) -> Signals {
+        Signals {
+            inputs: self.inputs,
+            outputs: self.outputs,
+        }
+    }
+}
+
+impl<T: StateSpace + 'static> DigitalTwin for T {
     fn parameters(&self) -> ParameterSpace {
         self.outline().parameters
     }
 
-    fn state_space(&self) -> Option<&dyn StateSpace> {
-        Some(self)
+    fn signals(&self) -> Signals {
+        self.outline().signals()
     }
 
     fn simulate(
@@ -178,12 +187,20 @@ impl<T: StateSpace> DigitalTwin for T {
         drive: &Drive,
         noise: Noise,
     ) -> Result<Signal, SimulationError> {
-        simulate_equations(self, theta, drive, noise)
+        self.run(theta, drive, noise)
+    }
+
+    fn free_run(&self, theta: &[f64], drive: &Drive) -> Result<Signal, SimulationError> {
+        self.run(theta, drive, Noise::OFF)
+    }
+
+    fn equations(self: Arc<Self>) -> Option<Arc<dyn StateSpace>> {
+        Some(self)
     }
 }
 
-/// Whether θ has the twin's length.
-pub(super) fn check_parameters(parameters: usize, theta: &[f64]) -> Result<(), SimulationError> {
+/// Checks that θ has the twin's length.
+pub(super) fn check_length(parameters: usize, theta: &[f64]) -> Result<(), SimulationError> {
     if theta.len() == parameters {
         return Ok(());
     }
@@ -195,7 +212,7 @@ pub(super) fn check_parameters(parameters: usize, theta: &[f64]) -> Result<(), S
 
 /// Checks lengths once, before the loop relies on them.
 fn check_lengths(outline: &Outline, theta: &[f64], drive: &Drive) -> Result<(), SimulationError> {
-    check_parameters(outline.parameters.len(), theta)?;
+    check_length(outline.parameters.len(), theta)?;
     let (given, inputs) = (drive.inputs().ncols(), outline.inputs.len());
     if given != inputs {
         return Err(SimulationError::fatal(format!(
@@ -206,7 +223,7 @@ fn check_lengths(outline: &Outline, theta: &[f64], drive: &Drive) -> Result<(), 
 }
 
 /// The simulation loop. Allocates its buffers once; nothing inside the loop.
-fn simulate_equations(
+pub(super) fn simulate_equations(
     twin: &(impl StateSpace + ?Sized),
     theta: &[f64],
     drive: &Drive,
@@ -214,7 +231,7 @@ fn simulate_equations(
 ) -> Result<Signal, SimulationError> {
     let outline = twin.outline();
     check_lengths(&outline, theta, drive)?;
-    twin.admit(theta, drive.dt())?;
+    twin.check_parameters(theta, drive.dt())?;
     let (n, p) = (outline.states.len(), outline.outputs.len());
     let limits: Vec<(usize, Interval)> = twin
         .limits()
@@ -275,7 +292,7 @@ fn simulate_equations(
     }
     let mut outputs = Signal::from_shape_vec((drive.samples(), p), outputs)
         .map_err(|error| SimulationError::Fatal(error.into()))?;
-    twin.strike(theta, noise, &mut outputs);
+    twin.corrupt_outputs(theta, noise, &mut outputs);
     Ok(outputs)
 }
 

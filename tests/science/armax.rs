@@ -2,11 +2,10 @@
 //! features. The table of docs/method.md: `cargo test --release --test science armax -- --nocapture`.
 
 use nalgebra::{DMatrix, DVector};
-use std::sync::Arc;
 use truetwin::feature::{Ar, Armax, Arx, FeatureRecipe};
 use truetwin::record::{Drive, Quantity, Signal, Signals};
 use truetwin::study::RecordPlan;
-use truetwin::twin::{DigitalTwin, Noise, Parameter, ParameterSpace, SimulationError};
+use truetwin::twin::{DigitalTwin, Noise, Parameter, ParameterSpace, SimulationError, Twin};
 
 const SIMULATIONS: u64 = 1000;
 
@@ -64,7 +63,7 @@ type Case<'a> = (&'a dyn FeatureRecipe, usize);
 /// from simulations and J from central differences under common random numbers. Two halves of the simulations give two J,
 /// whose errors do not multiply.
 fn bounds(twin: Resonance, theta: &[f64], drive: &Drive, cases: &[Case]) -> Vec<Vec<f64>> {
-    let twin: Arc<dyn DigitalTwin> = Arc::new(twin);
+    let twin = Twin::new(twin);
     (cases.iter())
         .map(|(recipe, left_out)| {
             let map = recipe.bind(&twin).unwrap();

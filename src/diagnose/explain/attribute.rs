@@ -10,33 +10,15 @@ use crate::diagnose::hypotheses::dictionary::{Dictionary, Point};
 use crate::diagnose::hypotheses::variant::Variant;
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::statistics::Statistics;
+use crate::diagnose::thresholds::Thresholds;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::progress::Stage;
 use crate::record::Record;
 use crate::twin::Noise;
 use rayon::prelude::*;
 
-/// Points of the dictionary that a fit starts from, per candidate; thresholds have more.
-const STARTS: usize = 2;
-const THRESHOLD_STARTS: usize = 4;
-/// Explanations that are fitted once more, from the θ of so many of the best.
-const SECOND_ROUND: usize = 10;
-const SECOND_STARTS: usize = 2;
-/// And from so many draws of θ from the prior: where much is missing, the twin's own best θ may be anywhere.
-const SECOND_DRAWS: u64 = 3;
-/// Of a black box, whose every look costs an ensemble: explanations and draws of that round.
-const SECOND_ROUND_SIMULATED: usize = 5;
-const SECOND_DRAWS_SIMULATED: u64 = 1;
 /// Iterations of a fit.
 pub(super) const ITERATIONS: usize = 15;
-/// Numbers that a catch-all counts for: strength and memory.
-const CATCH_ALL: f64 = 2.0;
-/// Scores within this are rivals, in nats: of 78 clear effects in sealed trials, 76 were in the class then, of 1.6 members.
-pub(in crate::diagnose) const RIVALS: f64 = 3.0;
-/// Nats that a factor e in probability takes, and the probability that a law that nobody listed imitates all of them: fitted to
-/// answers of sealed trials (docs/withheld.md).
-const TEMPERATURE: f64 = 1.5;
-const IMITATED: f64 = 0.05;
 
 /// A fitted explanation.
 #[derive(Debug, Clone)]
@@ -110,14 +92,17 @@ pub(in crate::diagnose) fn explanations(
     order(&mut found);
     // Once more from where the best ended: a poor θ leads to poor fits.
     if only.is_none() {
-        let (round, draws) = match bench.problem.twin.state_space() {
-            Some(_) => (SECOND_ROUND, SECOND_DRAWS),
-            None => (SECOND_ROUND_SIMULATED, SECOND_DRAWS_SIMULATED),
+        let (round, draws) = match bench.problem.twin.equations() {
+            Some(_) => (Thresholds::SECOND_ROUND, Thresholds::SECOND_DRAWS),
+            None => (
+                Thresholds::SECOND_ROUND_SIMULATED,
+                Thresholds::SECOND_DRAWS_SIMULATED,
+            ),
         };
         let space = bench.problem.twin.parameters();
         let d = space.len();
         let anywhere = Noise::new(0, "second round", 0);
-        let thetas: Vec<Vec<f64>> = (found.iter().take(SECOND_STARTS))
+        let thetas: Vec<Vec<f64>> = (found.iter().take(Thresholds::SECOND_STARTS))
             .map(|e| bench.explained(e).of_record(0, &e.fitted.theta)[..d].to_vec())
             .chain((0..draws).map(|i| space.draw_prior(anywhere.sample(i))))
             .collect();
@@ -174,7 +159,11 @@ fn best_points(
             .off
             .is_some_and(f64::is_infinite)
     });
-    let most = if threshold { THRESHOLD_STARTS } else { STARTS };
+    let most = if threshold {
+        Thresholds::THRESHOLD_STARTS
+    } else {
+        Thresholds::STARTS
+    };
     (points.into_iter().take(most))
         .map(|(point, gain)| {
             let axis = &dictionary.variants[point.variant].axes[0];
@@ -261,7 +250,7 @@ pub(super) fn scored(
     let numbers = if dictionary.candidates[candidate].is_listed() {
         variant.free.len() as f64
     } else {
-        CATCH_ALL
+        Thresholds::DISTURBANCE_NUMBERS
     };
     let gain = fitted.value() - bench.fitted.value();
     let samples = bench.problem.samples() as f64;
@@ -319,10 +308,13 @@ pub(in crate::diagnose) fn probabilities(found: &[Explanation]) -> Vec<f64> {
         .map(Explanation::score)
         .fold(f64::NEG_INFINITY, f64::max);
     let weights: Vec<f64> = (found.iter())
-        .map(|e| ((e.score() - top) / TEMPERATURE).exp())
+        .map(|e| ((e.score() - top) / Thresholds::TEMPERATURE).exp())
         .collect();
     let sum: f64 = weights.iter().sum();
-    weights.iter().map(|w| (1.0 - IMITATED) * w / sum).collect()
+    weights
+        .iter()
+        .map(|w| (1.0 - Thresholds::IMITATED) * w / sum)
+        .collect()
 }
 
 impl FittedTwin<'_> {

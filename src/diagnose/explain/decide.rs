@@ -2,9 +2,9 @@
 
 use crate::diagnose::context::Context;
 use crate::diagnose::error::DiagnoseError;
-use crate::diagnose::explain::attribute::{Explanation, RIVALS, probabilities};
+use crate::diagnose::explain::attribute::{Explanation, probabilities};
 use crate::diagnose::explain::several::{promises, several};
-use crate::diagnose::explain::step::{Accepted, Step, WORTH_ANOTHER, grown, improves};
+use crate::diagnose::explain::step::{Accepted, Step, grown, improves};
 use crate::diagnose::fitting::base_fit::ITERATIONS;
 use crate::diagnose::fitting::climb::fit;
 use crate::diagnose::outcome::Decision;
@@ -12,15 +12,9 @@ use crate::diagnose::settings::DiagnoseSettings;
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::null::Test;
 use crate::diagnose::test::statistics::Statistics;
+use crate::diagnose::thresholds::Thresholds;
 use crate::progress::Stage;
 use crate::twin::Noise;
-
-/// The structural test with the effect added: what is left below this is unexplained.
-const UNEXPLAINED: f64 = 0.02;
-/// Nats that another effect must add beside an effect that leaves nothing unexplained.
-const WORTH_BESIDE_A_GOOD_ONE: f64 = 8.0;
-/// Nats that several effects must be ahead of a catch-all: so many are tried that some imitate anything a little better.
-const SEVERAL_OVER_ANYTHING: f64 = 10.0;
 
 /// What was decided, and with which fits.
 pub(in crate::diagnose) struct Answer {
@@ -61,7 +55,7 @@ impl<'a> Decided<'a> {
         let answer = &mut decided.answer;
         if let [only] = &answer.class[..] {
             let rivals = (listed.iter())
-                .filter(|(key, s)| key != only && *s >= score - RIVALS)
+                .filter(|(key, s)| key != only && *s >= score - Thresholds::RIVALS)
                 .map(|(key, _)| key.clone());
             answer.class = [only.clone()].into_iter().chain(rivals).collect();
             if answer.class.len() > 1 {
@@ -136,14 +130,14 @@ pub(in crate::diagnose) fn decide<'a>(
     let Some(left) = left_over(context, &single.bench, settings, tests, stage)? else {
         return Ok(nothing(None, None));
     };
-    let passes = left.p_value > UNEXPLAINED
+    let passes = left.p_value > Thresholds::UNEXPLAINED
         && !beaten(first.score(), candidates[first.candidate].is_noise());
     // More than one, where one is not enough, or where a second one promises much.
     if !passes || promises(&single, &left.look) {
         let margin = if passes {
-            WORTH_BESIDE_A_GOOD_ONE
+            Thresholds::WORTH_BESIDE_SUFFICIENT
         } else {
-            WORTH_ANOTHER
+            Thresholds::WORTH_ANOTHER
         };
         let several = several(
             context,
@@ -156,13 +150,13 @@ pub(in crate::diagnose) fn decide<'a>(
         )?;
         if let Some(step) = several
             && !beaten(
-                step.score - SEVERAL_OVER_ANYTHING,
+                step.score - Thresholds::SEVERAL_OVER_DISTURBANCE,
                 step.accepted.iter().any(Accepted::is_noise),
             )
         {
             let tests = tests.child("several");
             if let Some(rest) = left_over(context, &step.bench, settings, tests, stage)?
-                && (rest.p_value > UNEXPLAINED
+                && (rest.p_value > Thresholds::UNEXPLAINED
                     || (!passes && improves(context, (bench, &[]), &step, noise)?))
             {
                 return Ok(Decided::among(&keys, step, Some(rest)));
@@ -189,7 +183,13 @@ fn left_over<'a>(
     stage: &Stage,
 ) -> Result<Option<Left>, DiagnoseError> {
     let count = settings.unexplained;
-    let Some(nulls) = bench.nulls(count, UNEXPLAINED, noise.child("records"), stage)? else {
+    let Some(nulls) = bench.nulls(
+        count,
+        Thresholds::UNEXPLAINED,
+        noise.child("records"),
+        stage,
+    )?
+    else {
         return Ok(None);
     };
     let test = nulls.test();
@@ -200,7 +200,10 @@ fn left_over<'a>(
             look: nulls.own,
         })
     };
-    let Some(records) = context.together.filter(|_| test.p_value > UNEXPLAINED) else {
+    let Some(records) = context
+        .together
+        .filter(|_| test.p_value > Thresholds::UNEXPLAINED)
+    else {
         return Ok(left(1.0));
     };
     let (there, start) = bench.on(records);
@@ -208,7 +211,12 @@ fn left_over<'a>(
         return Ok(left(1.0));
     };
     let seen = bench.with_problem(there, fitted, |bench| {
-        bench.nulls(count, UNEXPLAINED, noise.child("together"), stage)
+        bench.nulls(
+            count,
+            Thresholds::UNEXPLAINED,
+            noise.child("together"),
+            stage,
+        )
     })?;
     Ok(left(seen.map_or(1.0, |nulls| nulls.test().p_value)))
 }

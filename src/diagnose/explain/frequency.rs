@@ -2,16 +2,8 @@
 
 use crate::diagnose::fitting::reference::Reference;
 use crate::diagnose::test::fitted_twin::FittedTwin;
+use crate::diagnose::thresholds::Thresholds;
 use crate::likelihood::kalman::{FilterError, recoverable};
-
-/// Frequencies a cycle of the record.
-const FINENESS: f64 = 2.0;
-/// Most frequencies that are looked at.
-const MOST: usize = 100;
-/// How many of the best become starts.
-const PEAKS: usize = 3;
-/// Highest frequency, in cycles a step.
-const HIGHEST: f64 = 0.2;
 
 /// Magnitudes (amplitude, frequency, phase) at the best frequencies of a candidate that has a frequency and a phase.
 ///
@@ -34,10 +26,12 @@ pub(in crate::diagnose) fn peaks(
     let record = &bench.problem.records[0];
     let (dt, samples) = (record.drive().dt(), record.samples() as f64);
     let unit = variant.axes[0].width;
-    let count = ((FINENESS * HIGHEST * samples) as usize).clamp(2, MOST);
+    let count = ((Thresholds::FREQUENCIES_PER_CYCLE * Thresholds::HIGHEST_FREQUENCY * samples)
+        as usize)
+        .clamp(2, Thresholds::MOST_FREQUENCIES);
     let mut all: Vec<(f64, Vec<f64>)> = Vec::with_capacity(count);
     for i in 1..=count {
-        let frequency = i as f64 / (FINENESS * samples * dt);
+        let frequency = i as f64 / (Thresholds::FREQUENCIES_PER_CYCLE * samples * dt);
         let mut gain = 0.0;
         let mut parts = [0.0; 2];
         for (part, phase) in parts.iter_mut().zip([0.0, std::f64::consts::FRAC_PI_2]) {
@@ -61,7 +55,7 @@ pub(in crate::diagnose) fn peaks(
         .map(|i| all[i].clone())
         .collect();
     tops.sort_by(|a, b| b.0.total_cmp(&a.0));
-    Ok((tops.into_iter().take(PEAKS))
+    Ok((tops.into_iter().take(Thresholds::PEAKS))
         .map(|(_, m)| (index, m))
         .collect())
 }

@@ -8,25 +8,14 @@ use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::explain::attribute::{
     Explanation, ITERATIONS, base_validation, explanations, probabilities, scored,
 };
-use crate::diagnose::explain::step::{Accepted, Step, WORTH_ANOTHER, grown, improves};
+use crate::diagnose::explain::step::{Accepted, Step, grown, improves};
 use crate::diagnose::fitting::climb::fit;
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::statistics::Statistics;
+use crate::diagnose::thresholds::Thresholds;
 use crate::progress::Stage;
 use crate::record::Record;
 use crate::twin::Noise;
-
-/// Most effects together.
-const MOST: usize = 3;
-/// First effects, and second effects for each, that pairs are made of.
-const FIRSTS: usize = 2;
-const SECONDS: usize = 12;
-/// How often a partner of the best pair is kept and the other one looked for anew.
-const EXCHANGES: usize = 3;
-/// Nats that a third effect must add beyond what it costs: three numbers more imitate nearly anything a little.
-const WORTH_A_THIRD: f64 = 20.0;
-/// Nats beyond its price that the scan must promise for an effect beside others that leave nothing unexplained.
-const PROMISE: f64 = 5.0;
 
 /// Whether the scan beside a step's effects promises another one.
 pub(in crate::diagnose) fn promises(step: &Step<'_>, look: &Statistics) -> bool {
@@ -34,7 +23,7 @@ pub(in crate::diagnose) fn promises(step: &Step<'_>, look: &Statistics) -> bool 
     let candidates = &step.bench.dictionary.candidates;
     (candidates.iter().zip(&look.gains))
         .filter(|(candidate, _)| candidate.is_listed())
-        .any(|(_, root)| 0.5 * root * root > price + PROMISE)
+        .any(|(_, root)| 0.5 * root * root > price + Thresholds::PROMISE)
 }
 
 /// The best two of the `listed` explanations, or three: `None` where no second effect adds more than `margin` to the
@@ -58,12 +47,14 @@ pub(in crate::diagnose) fn several<'a>(
             && alone.score > step.score - margin
         {
             return Ok((alone.accepted[0].key() != first.accepted[0].key()
-                || alone.score > first.score + WORTH_ANOTHER)
+                || alone.score > first.score + Thresholds::WORTH_ANOTHER)
                 .then_some(alone));
         }
     }
     // Beside a noise, two effects follow nearly anything.
-    while step.accepted.len() < MOST && !step.accepted.iter().any(Accepted::is_noise) {
+    while step.accepted.len() < Thresholds::MOST_EFFECTS
+        && !step.accepted.iter().any(Accepted::is_noise)
+    {
         let Some(look) = step.bench.own_look()? else {
             break;
         };
@@ -72,7 +63,8 @@ pub(in crate::diagnose) fn several<'a>(
         }
         let next = beside(context, &step, &look, stage)?.best;
         let worth = |next: &Step<'_>| {
-            next.score > step.score + WORTH_A_THIRD && !next.accepted.iter().any(Accepted::is_noise)
+            next.score > step.score + Thresholds::WORTH_A_THIRD
+                && !next.accepted.iter().any(Accepted::is_noise)
         };
         let Some(next) = next.filter(worth) else {
             break;
@@ -121,11 +113,11 @@ fn best_pair<'a>(
             None => Ok(None),
         }
     };
-    for index in 1..listed.len().min(FIRSTS) {
+    for index in 1..listed.len().min(Thresholds::FIRSTS) {
         let pair = take(index)?.and_then(|found| found.best);
         better(&mut best, pair);
     }
-    for _ in 0..EXCHANGES {
+    for _ in 0..Thresholds::EXCHANGES {
         let Some(pair) = &mut best else { break };
         let partner = pair.accepted[1].key();
         let Some(index) = listed.iter().position(|e| key(e) == partner) else {
@@ -165,7 +157,7 @@ fn beside<'a>(
     order.sort_by(|&a, &b| look.gains[b].total_cmp(&look.gains[a]));
     let mut tried: Vec<usize> = (order.iter().copied())
         .filter(|&c| candidates[c].is_listed())
-        .take(SECONDS)
+        .take(Thresholds::SECONDS)
         .collect();
     // And the catch-all that promises most.
     tried.extend(order.iter().copied().find(|&c| !candidates[c].is_listed()));

@@ -6,13 +6,8 @@ use crate::diagnose::explain::attribute::Explanation;
 use crate::diagnose::hypotheses::candidate::{Addition, Candidate};
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::free_run::{Runner, closed};
-use crate::effect::Law;
+use crate::diagnose::thresholds::Thresholds;
 use crate::twin::Noise;
-
-/// Nats that another effect must add beyond what it costs.
-pub(in crate::diagnose) const WORTH_ANOTHER: f64 = 3.0;
-/// Least share of the free-run error that effects must take off where something is left unexplained.
-const GOOD_PART: f64 = 0.1;
 
 /// One accepted effect.
 #[derive(Clone)]
@@ -34,10 +29,7 @@ impl Accepted {
 
     /// Whether only the noise is changed, so that no free run moves.
     pub fn is_noise(&self) -> bool {
-        matches!(
-            self.addition.effect.law(),
-            Law::MeasurementNoise | Law::ProcessNoise | Law::Outliers
-        )
+        self.addition.effect.law().is_noise()
     }
 }
 
@@ -133,6 +125,6 @@ pub(in crate::diagnose) fn improves(
     let (before, after) = (errors(bench, before)?, errors(&step.bench, &step.accepted)?);
     Ok(before.zip(after).is_some_and(|(before, after)| {
         let (_, interval) = closed(&before, &after, 0.0, noise.child("improves"));
-        interval.is_some_and(|[low, _]| low > GOOD_PART)
+        interval.is_some_and(|[low, _]| low > Thresholds::GOOD_PART)
     }))
 }

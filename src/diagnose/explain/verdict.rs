@@ -8,12 +8,10 @@ use crate::diagnose::fitting::problem::Problem;
 use crate::diagnose::outcome::Verdict;
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::statistics::Statistics;
+use crate::diagnose::thresholds::Thresholds;
 use crate::progress::Stage;
 use crate::twin::Role;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-
-/// A listed effect with θ inside the prior absorbs a parameter gap within so many nats.
-const ABSORBS: f64 = 2.0;
 
 /// The rule: structural where the test says so, otherwise by whether θ left its prior significantly.
 pub(in crate::diagnose) fn verdict(p_value: f64, outside: bool, alpha: f64) -> Verdict {
@@ -80,7 +78,7 @@ pub(in crate::diagnose) fn absorbing(
         explanations(bench, look, None, Some(&listed), stage)
     })?;
     Ok((found.into_iter())
-        .filter(|e| e.fitted.log_likelihood >= free - ABSORBS)
+        .filter(|e| e.fitted.log_likelihood >= free - Thresholds::ABSORBS)
         .collect())
 }
 

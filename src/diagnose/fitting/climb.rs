@@ -1,7 +1,7 @@
 //! The most probable θ of a twin, given its records and a weak prior.
 
 use crate::diagnose::fitting::problem::Problem;
-use crate::diagnose::fitting::slope::{Slope, slope};
+use crate::diagnose::fitting::slope::{Slope, slope as slope_at};
 use crate::likelihood::kalman::{FilterError, recoverable};
 use nalgebra::{DMatrix, DVector};
 
@@ -51,9 +51,9 @@ pub(in crate::diagnose) fn climb(
     iterations: usize,
 ) -> Result<Option<Fitted>, FilterError> {
     let c = &problem.coordinates;
-    let at = |phi: &DVector<f64>| recoverable(slope(problem, &c.theta(phi.as_slice())));
     let mut phi = c.clamp(&DVector::from_vec(c.of(&problem.clamp(start))));
-    let Some(mut slope) = at(&phi)?.filter(|s| s.objective().is_finite()) else {
+    let first = recoverable(slope_at(problem, &c.theta(phi.as_slice()), None))?;
+    let Some(mut slope) = first.filter(|s| s.objective().is_finite()) else {
         return Ok(None);
     };
     let mut damping: f64 = 0.1;
@@ -70,12 +70,17 @@ pub(in crate::diagnose) fn climb(
             break;
         }
         // The likelihood alone tells whether to go there; the derivatives follow if so.
-        let value = recoverable(problem.log_likelihood(&c.theta(next.as_slice())))?
-            .map(|v| v + problem.log_prior(&c.theta(next.as_slice()), true));
-        match value {
-            Some(value) if value > slope.objective() => {
-                let gain = value - slope.objective();
-                let Some(better) = at(&next)? else { break };
+        let theta = c.theta(next.as_slice());
+        let trial = recoverable(problem.evaluate(&theta))?.map(|trial| {
+            let objective = trial.log_likelihood + problem.log_prior(&theta, true);
+            (objective, trial.innovations)
+        });
+        match trial {
+            Some((objective, innovations)) if objective > slope.objective() => {
+                let gain = objective - slope.objective();
+                let Some(better) = recoverable(slope_at(problem, &theta, innovations))? else {
+                    break;
+                };
                 (phi, slope) = (next, better);
                 damping = (0.1 * damping).max(1e-6);
                 if gain < problem.done() {

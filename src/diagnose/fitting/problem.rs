@@ -4,10 +4,9 @@ use crate::diagnose::fitting::axis::Axis;
 use crate::likelihood::ensemble::{self, Predictor};
 use crate::likelihood::kalman::{Coordinates, FilterError, FilterSettings, Filtered, Kalman};
 use crate::record::{Record, Signal};
-use crate::twin::{DigitalTwin, Outline, Parameter, ParameterSpace, Role};
-use std::sync::{Arc, Mutex};
+use crate::twin::{Outline, Parameter, ParameterSpace, Role, Twin};
 
-/// And of the noise level of a black box.
+/// Longest step of a fit in the logarithm of a black box's noise level.
 const LONGEST_NOISE: f64 = 2.0;
 
 /// A twin and records, with one θ for all of them but for unknown starts, of which each record has its own.
@@ -15,7 +14,7 @@ const LONGEST_NOISE: f64 = 2.0;
 /// The full θ is the twin's, then the starts of the second record, and so on.
 #[derive(Clone)]
 pub(in crate::diagnose) struct Problem<'a> {
-    pub twin: Arc<dyn DigitalTwin>,
+    pub twin: Twin,
     pub records: &'a [Record],
     /// For each record, where the twin's parameters stand in the full θ.
     pub(super) places: Vec<Vec<usize>>,
@@ -23,16 +22,18 @@ pub(in crate::diagnose) struct Problem<'a> {
     pub coordinates: Coordinates,
     pub(super) coordinates_of: Vec<Coordinates>,
     pub(super) filter: FilterSettings,
-    /// What a black box showed last: a fit looks at a θ before it steps from there.
-    seen: Arc<Mutex<Option<Seen>>>,
 }
 
-/// θ and the innovations there.
-type Seen = (Vec<f64>, Vec<Filtered>);
+/// Log-likelihood at one θ.
+pub(super) struct Evaluation {
+    pub log_likelihood: f64,
+    /// Innovations of each record of a black box: the slope at the same θ needs them, and they cost an ensemble.
+    pub innovations: Option<Vec<Filtered>>,
+}
 
 impl<'a> Problem<'a> {
     /// `axes` belong to the parameters of the twin; their likelihood is a filter's, or, without equations, that of an ensemble.
-    pub fn new(twin: Arc<dyn DigitalTwin>, axes: Vec<Axis>, records: &'a [Record]) -> Self {
+    pub fn new(twin: Twin, axes: Vec<Axis>, records: &'a [Record]) -> Self {
         let space = twin.parameters();
         let mut all = axes;
         let mut places = Vec::new();
@@ -66,14 +67,13 @@ impl<'a> Problem<'a> {
             twin,
             records,
             filter: FilterSettings::default(),
-            seen: Arc::default(),
         }
     }
 
     /// A twin with the weak priors of its own parameters.
-    pub fn of_twin(twin: &Arc<dyn DigitalTwin>, records: &'a [Record]) -> Self {
+    pub fn of_twin(twin: &Twin, records: &'a [Record]) -> Self {
         let mut axes: Vec<Axis> = twin.parameters().iter().map(Axis::of).collect();
-        if twin.state_space().is_none() {
+        if twin.equations().is_none() {
             // What an effect explains of a simulator's misfit may be all of it.
             let noise = |p: &Parameter| p.role == Role::Noise;
             for (axis, _) in
@@ -105,7 +105,7 @@ impl<'a> Problem<'a> {
 
     /// States, inputs and outputs; of a black box, its predicted outputs stand for states.
     pub fn outline(&self) -> Outline {
-        match self.twin.state_space() {
+        match self.twin.equations() {
             Some(equations) => equations.outline(),
             None => {
                 let signals = self.twin.signals();
@@ -122,9 +122,7 @@ impl<'a> Problem<'a> {
     /// Of a black box: what predicts each record at θ.
     pub fn predictors(&self, theta: &[f64]) -> Result<Vec<Predictor>, FilterError> {
         (self.records.iter().enumerate())
-            .map(|(r, record)| {
-                ensemble::predictor(self.twin.as_ref(), &self.of_record(r, theta), record)
-            })
+            .map(|(r, record)| ensemble::predictor(&self.twin, &self.of_record(r, theta), record))
             .collect()
     }
 
@@ -198,30 +196,34 @@ impl<'a> Problem<'a> {
         })
     }
 
+    /// Log-likelihood of all records at θ.
     pub fn log_likelihood(&self, theta: &[f64]) -> Result<f64, FilterError> {
-        let Some(equations) = self.twin.state_space() else {
-            let all = self.filtered(theta)?;
-            let sum = all.iter().map(|f| f.log_likelihood).sum();
-            *self.seen.lock().unwrap_or_else(|e| e.into_inner()) = Some((theta.to_vec(), all));
-            return Ok(sum);
-        };
-        let mut sum = 0.0;
-        for (r, record) in self.records.iter().enumerate() {
-            let kalman = Kalman::new(equations, record, &self.filter)?;
-            sum += kalman.log_likelihood(&self.of_record(r, theta))?;
-        }
-        Ok(sum)
+        Ok(self.evaluate(theta)?.log_likelihood)
     }
 
-    /// Innovations that were seen last, if it was at θ.
-    pub fn last_seen(&self, theta: &[f64]) -> Option<Vec<Filtered>> {
-        let seen = self.seen.lock().unwrap_or_else(|e| e.into_inner());
-        (seen.as_ref().filter(|(at, _)| at == theta)).map(|(_, all)| all.clone())
+    /// Log-likelihood of all records at θ, with the innovations of a black box.
+    pub(super) fn evaluate(&self, theta: &[f64]) -> Result<Evaluation, FilterError> {
+        let Some(equations) = self.twin.equations() else {
+            let innovations = self.filtered(theta)?;
+            return Ok(Evaluation {
+                log_likelihood: innovations.iter().map(|f| f.log_likelihood).sum(),
+                innovations: Some(innovations),
+            });
+        };
+        let mut log_likelihood = 0.0;
+        for (r, record) in self.records.iter().enumerate() {
+            let kalman = Kalman::new(equations, record, &self.filter)?;
+            log_likelihood += kalman.log_likelihood(&self.of_record(r, theta))?;
+        }
+        Ok(Evaluation {
+            log_likelihood,
+            innovations: None,
+        })
     }
 
     /// Gain at which a fit is done, in nats; what simulations say is not worth the last of them.
     pub fn done(&self) -> f64 {
-        match self.twin.state_space() {
+        match self.twin.equations() {
             Some(_) => 5e-3,
             None => 5e-2,
         }
@@ -234,7 +236,7 @@ impl<'a> Problem<'a> {
 
     /// Innovations and filtered states of each record.
     pub fn states(&self, theta: &[f64]) -> Result<Vec<(Filtered, Signal)>, FilterError> {
-        if self.twin.state_space().is_none() {
+        if self.twin.equations().is_none() {
             let all = self.filtered(theta)?.into_iter().zip(self.records);
             return Ok(all
                 .map(|(f, record)| {
@@ -267,9 +269,9 @@ impl<'a> Problem<'a> {
         (self.records.iter().enumerate())
             .map(|(r, record)| {
                 let theta = self.of_record(r, theta);
-                match self.twin.state_space() {
+                match self.twin.equations() {
                     Some(equations) => Kalman::new(equations, record, settings)?.filter(&theta),
-                    None => ensemble::filtered(self.twin.as_ref(), &theta, record),
+                    None => ensemble::filtered(&self.twin, &theta, record),
                 }
             })
             .collect()
@@ -278,7 +280,7 @@ impl<'a> Problem<'a> {
     /// Points around θ whose innovations tell their derivatives: (moved θ, distance in φ), one for each entry.
     pub fn neighbours(&self, theta: &[f64]) -> Vec<(Vec<f64>, f64)> {
         // Runs are smooth in θ up to a simulator's own tolerance only.
-        let share = match self.twin.state_space() {
+        let share = match self.twin.equations() {
             Some(_) => 0.1,
             None => 1.0,
         };

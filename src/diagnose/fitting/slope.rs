@@ -1,7 +1,7 @@
-//! Gradient and information of the likelihood that an ensemble gives, from differences.
+//! Gradient and information of the likelihood.
 //!
-//! Innovations and covariances a step beside θ, of the same draws, say how both change; of Gaussian innovations the gradient is
-//! then D·r and the information DᵀD, as in `reference.rs`.
+//! With equations, the filter's score gives both. Without, differences do: innovations and covariances a step beside θ, of the same
+//! draws, give the directions D; for Gaussian innovations the gradient is D·r and the information DᵀD, as in `reference.rs`.
 
 use crate::diagnose::fitting::problem::Problem;
 use crate::diagnose::fitting::reference::Reference;
@@ -24,10 +24,15 @@ impl Slope {
     }
 }
 
-/// Returns gradient and information at θ.
-pub(super) fn slope(problem: &Problem<'_>, theta: &[f64]) -> Result<Slope, FilterError> {
-    let Some(equations) = problem.twin.state_space() else {
-        let mut slope = by_differences(problem, theta)?;
+/// Returns gradient and information at θ; `innovations` are those of a black box at θ, where they are known.
+pub(super) fn slope(
+    problem: &Problem<'_>,
+    theta: &[f64],
+    innovations: Option<Vec<Filtered>>,
+) -> Result<Slope, FilterError> {
+    let Some(equations) = problem.twin.equations() else {
+        let innovations = innovations.map_or_else(|| problem.filtered(theta), Ok)?;
+        let mut slope = by_differences(problem, theta, innovations)?;
         add_priors(problem, theta, &mut slope);
         return Ok(slope);
     };
@@ -66,13 +71,13 @@ fn add_priors(problem: &Problem<'_>, theta: &[f64], slope: &mut Slope) {
     }
 }
 
-/// Gradient and information of an ensemble's likelihood, from differences.
-fn by_differences(problem: &Problem<'_>, theta: &[f64]) -> Result<Slope, FilterError> {
-    let here = match problem.last_seen(theta) {
-        Some(here) => here,
-        None => problem.filtered(theta)?,
-    };
-    let here = Reference::bare(here);
+/// Gradient and information of an ensemble's likelihood at θ with these innovations, from differences.
+fn by_differences(
+    problem: &Problem<'_>,
+    theta: &[f64],
+    innovations: Vec<Filtered>,
+) -> Result<Slope, FilterError> {
+    let here = Reference::bare(innovations);
     let d = problem.dimension();
     let directions: Vec<Option<DVector<f64>>> = (problem.neighbours(theta).into_par_iter())
         .enumerate()

@@ -1,12 +1,9 @@
 //! What a plan is made of: which magnitudes of an effect are in use, how each moves, and what its unit is worth.
 
 use crate::diagnose::fitting::axis::Axis;
-use crate::effect::{Mark, UnmodelledEffect};
+use crate::diagnose::thresholds::Thresholds;
+use crate::effect::{Effect, Mark};
 use crate::twin::Interval;
-
-/// Delays in steps, each with a register that just holds it: the shorter the register, the faster the filter.
-pub(in crate::diagnose) const DELAYS: [&[f64]; 3] = [&[0.5, 1.5], &[3.0], &[5.5]];
-pub(in crate::diagnose) const REGISTERS: [usize; 3] = [3, 5, 8];
 
 /// Which of an effect's magnitudes are in use.
 pub(in crate::diagnose) struct Choice {
@@ -47,12 +44,9 @@ pub(in crate::diagnose) fn unset_log_axis(centre: f64) -> Axis {
 /// The ways to use an effect: as its mark says; one threshold, or all of them; delays by length.
 ///
 /// Only filters pay for a long register.
-pub(in crate::diagnose) fn choices(
-    effect: &dyn UnmodelledEffect,
-    mark: &Mark,
-    filtered: bool,
-) -> Vec<Choice> {
+pub(in crate::diagnose) fn choices(effect: &Effect, mark: &Mark, filtered: bool) -> Vec<Choice> {
     let magnitudes = effect.magnitudes();
+    let (least, most) = effect.kind().memories();
     let thresholds: Vec<usize> = (0..magnitudes.len())
         .filter(|&i| magnitudes[i].is_threshold())
         .collect();
@@ -62,7 +56,7 @@ pub(in crate::diagnose) fn choices(
         return vec![choice(off, None)];
     }
     match thresholds.len() {
-        0 | 1 if filtered && effect.least_memory() < effect.memory() => (0..REGISTERS.len())
+        0 | 1 if filtered && least < most => (0..Thresholds::REGISTERS.len())
             .map(|i| choice(vec![], Some(i)))
             .collect(),
         0 | 1 => vec![choice(vec![], None)],

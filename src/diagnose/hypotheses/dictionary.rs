@@ -8,15 +8,11 @@ use crate::diagnose::hypotheses::choice::product;
 use crate::diagnose::hypotheses::plan::{Lead, Plan, Planner};
 use crate::diagnose::hypotheses::scales::Scales;
 use crate::diagnose::hypotheses::variant::Variant;
+use crate::diagnose::thresholds::Thresholds;
 use crate::likelihood::kalman::{FilterError, recoverable};
-use crate::twin::DigitalTwin;
+use crate::twin::Twin;
 use rayon::prelude::*;
-use std::sync::Arc;
 
-/// d·d at which a magnitude is one that could just be seen.
-const VISIBLE: f64 = 10.0;
-/// d·d beyond which a secant is shortened.
-const COARSE: f64 = 400.0;
 /// One place to look at.
 #[derive(Debug, Clone)]
 pub(in crate::diagnose) struct Point {
@@ -40,7 +36,7 @@ pub(in crate::diagnose) struct Dictionary {
 impl Dictionary {
     /// Of candidates on the twin `study` with the effects `accepted`; `problem` and `reference` are that twin's.
     pub fn new(
-        study: &Arc<dyn DigitalTwin>,
+        study: &Twin,
         accepted: &[Addition],
         candidates: Vec<Candidate>,
         problem: &Problem<'_>,
@@ -154,7 +150,9 @@ fn try_lead(
         Lead::Shrink(mut value) => {
             for _ in 0..12 {
                 match look(value)? {
-                    Some(q) if q <= COARSE => return Ok(seen(q).then_some((value, false))),
+                    Some(q) if q <= Thresholds::COARSE => {
+                        return Ok(seen(q).then_some((value, false)));
+                    }
                     _ => value *= 0.5,
                 }
             }
@@ -164,13 +162,15 @@ fn try_lead(
             let mut value = guess;
             for _ in 0..20 {
                 let factor = match look(value)? {
-                    Some(q) if (0.3 * VISIBLE..=4.0 * VISIBLE).contains(&q) => {
+                    Some(q)
+                        if (0.3 * Thresholds::VISIBLE..=4.0 * Thresholds::VISIBLE).contains(&q) =>
+                    {
                         return Ok(Some((value, linear)));
                     }
                     // Between the powers of a shift (2) and of a variance (4).
-                    Some(q) if q.is_finite() => {
-                        (VISIBLE / q.max(1e-12)).powf(0.3).clamp(0.05, 20.0)
-                    }
+                    Some(q) if q.is_finite() => (Thresholds::VISIBLE / q.max(1e-12))
+                        .powf(0.3)
+                        .clamp(0.05, 20.0),
                     _ => 0.1,
                 };
                 value *= factor;

@@ -2,10 +2,9 @@
 
 use crate::diagnose::hypotheses::disturbed_signals;
 use crate::diagnose::hypotheses::entry::{Entry, share};
-use crate::record::{Quantity, Signal};
+use crate::record::Quantity;
 use crate::twin::{
-    DigitalTwin, Integrator, Interval, Now, Outliers, Outline, Parameter, ParameterSpace, Role,
-    SimulationError, StateSpace,
+    Modified, Modify, Now, Outline, Parameter, ParameterSpace, Role, StateSpace, Twin,
 };
 use smallvec::SmallVec;
 use std::sync::Arc;
@@ -17,138 +16,97 @@ use std::sync::Arc;
 /// ```
 ///
 /// θ is longer by σ > 0. A filter that may follow d gains on every gap at the right place, and on one elsewhere less.
-pub(in crate::diagnose) fn disturbed(
-    base: Arc<dyn DigitalTwin>,
-    place: Entry,
-    memory: f64,
-) -> Arc<dyn DigitalTwin> {
-    let Some(mut outline) = base.state_space().map(StateSpace::outline) else {
-        return disturbed_signals::disturbed(base, place, memory);
+pub(in crate::diagnose) fn disturbed(base: Twin, place: Entry, memory: f64) -> Twin {
+    let base = match base {
+        Twin::Equations(base) => base,
+        Twin::BlackBox(base) => return disturbed_signals::disturbed(base, place, memory),
     };
+    let mut outline = base.outline();
     outline.states.push(Quantity::new("disturbance/0", ""));
     let sigma = Parameter::new("disturbance", "", 0.01, 1.0).with_role(Role::Effect);
     outline.parameters = ParameterSpace::new(outline.parameters.iter().cloned().chain([sigma]));
-    Arc::new(Disturbed {
+    Twin::Equations(Arc::new(Modified(Disturbed {
         base,
         place,
         memory,
         outline,
-    })
+    })))
 }
 
 struct Disturbed {
-    base: Arc<dyn DigitalTwin>,
+    base: Arc<dyn StateSpace>,
     place: Entry,
     memory: f64,
     outline: Outline,
 }
 
-impl Disturbed {
-    fn inner(&self) -> &dyn StateSpace {
-        self.base
-            .state_space()
-            .expect("only twins with equations are disturbed")
+impl Modify for Disturbed {
+    fn base(&self) -> &dyn StateSpace {
+        self.base.as_ref()
     }
-
-    fn states(&self) -> usize {
-        self.outline.states.len() - 1
+    fn added(&self) -> usize {
+        1
     }
-
-    fn with<R>(&self, now: &Now<'_>, d: f64, f: impl FnOnce(&dyn StateSpace, &Now<'_>) -> R) -> R {
+    fn theta<R>(&self, theta: &[f64], then: impl FnOnce(&[f64]) -> R) -> R {
+        then(&theta[..theta.len() - 1])
+    }
+    /// A disturbed parameter moves with the disturbance, the added state.
+    fn now<R>(&self, now: &Now<'_>, added: &[f64], then: impl FnOnce(&Now<'_>) -> R) -> R {
         let own = &now.theta[..now.theta.len() - 1];
         let Entry::Parameter(i) = self.place else {
-            return f(self.inner(), &Now { theta: own, ..*now });
+            return then(&Now { theta: own, ..*now });
         };
+        let d = added.first().copied().unwrap_or(0.0);
         let mut theta: SmallVec<[f64; 16]> = SmallVec::from_slice(own);
         theta[i] *= d.clamp(-5.0, 5.0).exp();
-        let now = Now {
+        then(&Now {
             theta: &theta,
             ..*now
-        };
-        f(self.inner(), &now)
+        })
     }
-}
-
-impl StateSpace for Disturbed {
     fn outline(&self) -> Outline {
         self.outline.clone()
     }
     fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
-        let n = self.states();
-        let d = x[n];
-        let (base, own) = dx.split_at_mut(n);
-        own[0] = 0.0;
-        self.with(now, d, |twin, now| twin.drift(now, &x[..n], base));
+        let (x, d) = x.split_at(x.len() - 1);
+        let (dx, rate) = dx.split_at_mut(x.len());
+        rate[0] = 0.0;
+        self.now(now, d, |now| self.base.drift(now, x, dx));
         if let Entry::State(i) = self.place {
-            base[i] += d;
+            dx[i] += d[0];
         }
     }
     fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
-        let n = self.states();
-        self.with(now, x[n], |twin, now| twin.observe(now, &x[..n], y));
+        let (x, d) = x.split_at(x.len() - 1);
+        self.now(now, d, |now| self.base.observe(now, x, y));
         if let Entry::Sensor(j) = self.place {
-            y[j] += x[n];
+            y[j] += d[0];
         }
     }
-    fn start(&self, now: &Now<'_>, x: &mut [f64]) {
-        let n = self.states();
-        x[n] = 0.0;
-        self.with(now, 0.0, |twin, now| twin.start(now, &mut x[..n]));
-    }
     fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
-        let n = self.states();
-        self.with(now, 0.0, |twin, now| {
-            twin.noise(now, &mut process[..n], measurement);
-        });
-        let share = share(self.memory);
-        process[n] = share * now.theta[now.theta.len() - 1];
-    }
-    fn limits(&self) -> Vec<Interval> {
-        let mut limits = self.inner().limits();
-        limits.push(Interval::EVERYTHING);
-        limits
-    }
-    fn constrain(&self, now: &Now<'_>, x: &mut [f64]) {
-        let n = self.states();
-        let d = x[n];
-        self.with(now, d, |twin, now| twin.constrain(now, &mut x[..n]));
+        let (process, own) = process.split_at_mut(process.len() - 1);
+        self.now(now, &[], |now| self.base.noise(now, process, measurement));
+        own[0] = share(self.memory) * now.theta[now.theta.len() - 1];
     }
     fn update(&self, now: &Now<'_>, x: &mut [f64]) {
-        let n = self.states();
-        let d = x[n];
-        self.with(now, d, |twin, now| twin.update(now, &mut x[..n]));
+        let (x, d) = x.split_at_mut(x.len() - 1);
+        self.now(now, d, |now| self.base.update(now, x));
         // Limits and motion of this step see the new value, as a held input does.
-        x[n] = self.memory * d;
-    }
-    fn readout(&self, now: &Now<'_>, y: &mut [f64]) {
-        self.with(now, 0.0, |twin, now| twin.readout(now, y));
-    }
-    fn admit(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {
-        self.inner().admit(&theta[..theta.len() - 1], dt)
-    }
-    fn outliers(&self, theta: &[f64]) -> Vec<Outliers> {
-        self.inner().outliers(&theta[..theta.len() - 1])
-    }
-    fn strike(&self, theta: &[f64], noise: crate::twin::Noise, outputs: &mut Signal) {
-        self.inner()
-            .strike(&theta[..theta.len() - 1], noise, outputs);
-    }
-    fn integrator(&self) -> Integrator {
-        self.inner().integrator()
+        d[0] *= self.memory;
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::Drive;
+    use crate::record::{Drive, Signal};
     use crate::twin::Noise;
     use crate::twins::CascadedTanks;
 
     /// Without strength, nothing changes; with it, the disturbance has the standard deviation that σ says.
     #[test]
     fn a_disturbance_has_its_strength() {
-        let base: Arc<dyn DigitalTwin> = Arc::new(CascadedTanks);
+        let base = Twin::new(CascadedTanks);
         let drive = Drive::new(0.5, Signal::from_elem((3000, 1), 1.5)).unwrap();
         let theta = [0.6, 0.5, 0.55, 1.0];
         let noise = Noise::new(2, "t", 0);

@@ -2,7 +2,7 @@
 
 use crate::diagnose::hypotheses::entry::{Entry, share};
 use crate::record::{Drive, Signal, Signals};
-use crate::twin::{DigitalTwin, Noise, Parameter, ParameterSpace, Role, SimulationError};
+use crate::twin::{DigitalTwin, Noise, Parameter, ParameterSpace, Role, SimulationError, Twin};
 use std::sync::Arc;
 
 /// The twin with an Ornstein–Uhlenbeck disturbance on an output or an input, θ longer by its strength σ.
@@ -14,12 +14,12 @@ pub(in crate::diagnose) fn disturbed(
     base: Arc<dyn DigitalTwin>,
     place: Entry,
     memory: f64,
-) -> Arc<dyn DigitalTwin> {
-    Arc::new(Disturbed {
+) -> Twin {
+    Twin::BlackBox(Arc::new(Disturbed {
         base,
         place,
         memory,
-    })
+    }))
 }
 
 struct Disturbed {

@@ -4,27 +4,18 @@ use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::fitting::axis::Axis;
 use crate::diagnose::fitting::problem::Problem;
 use crate::diagnose::hypotheses::candidate::{Addition, Candidate, Kind, with, with_disturbance};
-use crate::diagnose::hypotheses::choice::{
-    Choice, DELAYS, REGISTERS, axis, choices, log_axis, unit, unset_log_axis,
-};
+use crate::diagnose::hypotheses::choice::{Choice, axis, choices, log_axis, unit, unset_log_axis};
 use crate::diagnose::hypotheses::entry::Entry;
 use crate::diagnose::hypotheses::scales::Scales;
 use crate::diagnose::hypotheses::variant::Variant;
-use crate::effect::{Law, Magnitude, Mark, UnmodelledEffect};
+use crate::diagnose::thresholds::Thresholds;
+use crate::effect::{Effect, Law, Magnitude, Mark, TargetKind};
 use crate::math::quantile;
 use crate::math::{deviation, ends, largest};
-use crate::twin::{DigitalTwin, Interval};
+use crate::twin::{Interval, Twin};
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, TAU};
-use std::sync::Arc;
 
-/// Frequencies, times and levels that are looked at, and how many where it is enough to see that something is left.
-const FREQUENCIES: [usize; 2] = [8, 4];
-const TIMES: [usize; 2] = [8, 4];
-const LEVELS: [usize; 2] = [4, 2];
-/// Nats for a mark that outputs bear, and against an effect that would have left one: other sensors have noise behind them.
-const PRESENT: f64 = 12.0;
-const ABSENT: f64 = -5.0;
 /// A variant before its points are tried.
 pub(in crate::diagnose) struct Plan {
     pub variant: Variant,
@@ -48,7 +39,7 @@ pub(in crate::diagnose) enum Lead {
 
 /// What plans are made from: the study's twin, the effects that it has been given, and the fit of that.
 pub(in crate::diagnose) struct Planner<'a> {
-    pub study: &'a Arc<dyn DigitalTwin>,
+    pub study: &'a Twin,
     pub accepted: &'a [Addition],
     pub problem: &'a Problem<'a>,
     pub scales: &'a Scales<'a>,
@@ -68,14 +59,14 @@ impl Planner<'_> {
                 Ok(vec![self.disturbance(index, free, *place, *memory)])
             }
             Kind::Listed(effect) => {
-                let values = self.values(effect.as_ref());
+                let values = self.values(effect);
                 let mark = match effect.law() {
-                    Law::Sensor => effect.mark(&values),
+                    Law::Sensor(_) => effect.kind().marks(&values),
                     _ => Mark::Unmarked,
                 };
                 let plan = |choice: &Choice| self.listed(index, effect, &values, &mark, choice);
-                let filtered = self.study.state_space().is_some();
-                (choices(effect.as_ref(), &mark, filtered).iter())
+                let filtered = self.study.equations().is_some();
+                (choices(effect, &mark, filtered).iter())
                     .filter_map(|choice| plan(choice).transpose())
                     .collect()
             }
@@ -85,9 +76,11 @@ impl Planner<'_> {
     fn disturbance(&self, index: usize, free: Vec<Magnitude>, place: Entry, memory: f64) -> Plan {
         let scales = self.scales;
         let guess = match place {
-            Entry::State(i) => 0.05 * deviation(&scales.columns(Law::Force, i)) / scales.dt(),
-            Entry::Sensor(j) => 0.05 * deviation(&scales.columns(Law::Sensor, j)),
-            Entry::Actuator(j) => 0.05 * deviation(&scales.columns(Law::Actuator, j)),
+            Entry::State(i) => {
+                0.05 * deviation(&scales.columns(TargetKind::State, i)) / scales.dt()
+            }
+            Entry::Sensor(j) => 0.05 * deviation(&scales.columns(TargetKind::Sensor, j)),
+            Entry::Actuator(j) => 0.05 * deviation(&scales.columns(TargetKind::Actuator, j)),
             Entry::Parameter(_) => 0.05,
         };
         let visible = Lead::Visible {
@@ -116,18 +109,18 @@ impl Planner<'_> {
     }
 
     /// Values of the signal or state that an effect sits at.
-    fn values(&self, effect: &dyn UnmodelledEffect) -> Vec<f64> {
-        let outline = self.study.state_space().map(|t| t.outline());
-        let law = effect.law();
-        let known = crate::effect::targets(law, outline.as_ref(), &self.study.signals());
+    fn values(&self, effect: &Effect) -> Vec<f64> {
+        let outline = self.study.equations().map(|t| t.outline());
+        let kind = effect.law().target();
+        let known = crate::effect::targets(kind, outline.as_ref(), &self.study.signals());
         let target = known.iter().position(|k| k == effect.target()).unwrap_or(0);
-        self.scales.columns(law, target)
+        self.scales.columns(kind, target)
     }
 
     fn listed(
         &self,
         index: usize,
-        effect: &Arc<dyn UnmodelledEffect>,
+        effect: &Effect,
         values: &[f64],
         mark: &Mark,
         choice: &Choice,
@@ -137,17 +130,19 @@ impl Planner<'_> {
             .filter(|(i, _)| choice.off.contains(i))
             .map(|(_, m)| (m.name.to_owned(), m.off.unwrap_or(0.0)))
             .collect();
-        let free: Vec<Magnitude> = (magnitudes.into_iter())
+        let free: Vec<Magnitude> = (magnitudes.iter())
             .filter(|m| !held.contains_key(m.name))
+            .cloned()
             .collect();
         let Some(first) = free.first() else {
             return Ok(None);
         };
         let (mut leads, axis, range) = self.first(first, effect.law(), values, choice.register);
         let mut axes = vec![axis];
-        if choice.register.is_none() && effect.least_memory() < effect.memory() {
+        let (least, most) = effect.kind().memories();
+        if choice.register.is_none() && least < most {
             // No later than the whole register reaches.
-            let reach = (effect.memory() - 1) as f64 * self.scales.dt();
+            let reach = (most - 1) as f64 * self.scales.dt();
             let bounds = axes[0].bounds;
             axes[0].bounds = Interval::unchecked(bounds.low(), bounds.high().min(reach));
         }
@@ -172,7 +167,7 @@ impl Planner<'_> {
             shapes = shown.map(|(_, v)| vec![*v]).collect();
             axes.iter_mut().for_each(|axis| axis.held = true);
         }
-        let kept = choice.register.map(|i| REGISTERS[i]);
+        let kept = choice.register.map(|i| Thresholds::REGISTERS[i]);
         let addition = Addition {
             effect: effect.clone(),
             held: held.clone(),
@@ -188,8 +183,8 @@ impl Planner<'_> {
                 kept,
                 mark: match mark {
                     Mark::Unmarked => 0.0,
-                    Mark::Absent => ABSENT,
-                    Mark::Present(_) => PRESENT,
+                    Mark::Absent => Thresholds::MARK_ABSENT,
+                    Mark::Present(_) => Thresholds::MARK_PRESENT,
                 },
                 axes,
                 jumps,
@@ -201,7 +196,7 @@ impl Planner<'_> {
     }
 
     /// Where the first magnitude of an effect is looked for, at a signal or state with such values.
-    fn first(&self, m: &Magnitude, law: Law, values: &[f64], register: Option<usize>) -> First {
+    fn first(&self, m: &Magnitude, law: &Law, values: &[f64], register: Option<usize>) -> First {
         let (dt, duration) = (self.scales.dt(), self.scales.duration());
         let size = deviation(values).max(1e-9 * largest(values)).max(1e-12);
         let positive = m.limits.low() >= 0.0;
@@ -216,8 +211,8 @@ impl Planner<'_> {
             let axis = log_axis(1e-3 * greatest, 1e2 * greatest, greatest);
             (leads, axis, (0.0, 1.5))
         } else if let (Some(register), "s") = (register, m.unit) {
-            let delays = DELAYS[register].iter();
-            let longest = (REGISTERS[register] - 1) as f64 * dt;
+            let delays = Thresholds::DELAYS[register].iter();
+            let longest = (Thresholds::REGISTERS[register] - 1) as f64 * dt;
             let bounds = Interval::unchecked(0.0, longest);
             let axis = axis(bounds, dt, 10.0 * dt, 0.1 * dt, 1.5 * dt);
             (
@@ -229,10 +224,10 @@ impl Planner<'_> {
             let leads = starts.map(|v| Lead::Shrink(in_unit(v))).collect();
             let axis = log_axis(0.05 * dt, 0.5 * duration, 2.0 * dt);
             (leads, axis, (0.0, 3.0))
-        } else if law == Law::Outliers {
+        } else if matches!(law, Law::Outliers(_)) {
             let leads = starts.map(Lead::At).collect();
             (leads, log_axis(1e-4, 0.5, 0.02), (0.0, 2.0))
-        } else if matches!(law, Law::MeasurementNoise | Law::ProcessNoise) {
+        } else if law.is_noise() {
             let visible = Lead::Visible {
                 guess: greatest,
                 linear: true,
@@ -269,7 +264,7 @@ impl Planner<'_> {
             Some(off) if off > 0.0 => [0.9, 0.5, 0.97, 0.75],
             _ => [0.1, 0.5, 0.03, 0.25],
         };
-        let levels = (shares[..LEVELS[usize::from(self.coarse)]].iter())
+        let levels = (shares[..Thresholds::LEVELS[usize::from(self.coarse)]].iter())
             .filter_map(|p| quantile(values, *p).ok());
         let bounds = Interval::unchecked(low - 0.3 * span, high + 0.3 * span);
         let axis = axis(
@@ -297,7 +292,7 @@ impl Planner<'_> {
             }
             "Hz" => {
                 let (low, high): (f64, f64) = (1.5 / duration, 0.15 / dt);
-                let count = FREQUENCIES[usize::from(self.coarse)];
+                let count = Thresholds::FREQUENCIES[usize::from(self.coarse)];
                 let at = |i: usize| low * (high / low).powf(i as f64 / (count - 1) as f64);
                 let axis = Axis {
                     longest: 0.3,
@@ -307,7 +302,7 @@ impl Planner<'_> {
             }
             "rad" => (vec![0.0, FRAC_PI_2], linear(-TAU, TAU, 1.0, 1.0)),
             "s" => {
-                let count = TIMES[usize::from(self.coarse)];
+                let count = Thresholds::TIMES[usize::from(self.coarse)];
                 let times = (1..=count).map(|i| duration * i as f64 / (count + 1) as f64);
                 let axis = Axis {
                     held: true,

@@ -2,21 +2,18 @@
 
 use crate::diagnose::fitting::axis::Axis;
 use crate::diagnose::fitting::problem::Problem;
+use crate::diagnose::thresholds::Thresholds;
 use crate::effect::Magnitude;
-use crate::twin::{DigitalTwin, Interval};
+use crate::twin::{Interval, Twin};
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
-/// How far a magnitude may go, and go in one step, in multiples of what is just visible: gaps of long records are thousands
-/// of standard deviations.
-const REACH: f64 = 1e4;
 const LONGEST: f64 = 40.0;
 
 /// A candidate with those of its thresholds that are in use, as a twin.
 pub(in crate::diagnose) struct Variant {
     /// Index among the candidates.
     pub candidate: usize,
-    pub twin: Arc<dyn DigitalTwin>,
+    pub twin: Twin,
     /// Free magnitudes in the order of θ; the others are held at their off values.
     pub free: Vec<Magnitude>,
     pub held: BTreeMap<String, f64>,
@@ -63,7 +60,7 @@ impl Variant {
             let limits = self.free[0].limits;
             // A twin without measurement noise sees what is a millionth of any start.
             let start = first.longest;
-            let reach = (REACH * unit).max(3.0 * start);
+            let reach = (Thresholds::REACH * unit).max(3.0 * start);
             let low = limits.low().max(-reach);
             first.bounds = Interval::unchecked(low, limits.high().min(reach));
             first.centre = first.bounds.clamp(0.0);

@@ -13,23 +13,11 @@
 
 use crate::diagnose::locate::missing_term::{MissingTerm, Smoothed};
 use crate::diagnose::outcome::{Discovery, Term};
+use crate::diagnose::thresholds::Thresholds;
 use crate::math::quantile;
 use crate::record::{Record, Signal};
 use crate::twin::Noise;
 use nalgebra::{DMatrix, DVector};
-
-/// Resampled records.
-const RESAMPLES: u64 = 200;
-/// Most terms together.
-const MOST: usize = 4;
-/// Blocks of all records, at most, that are resampled.
-const BLOCKS: usize = 40;
-/// Terms that are in fewer resampled records are not worth a line.
-const RARE: f64 = 0.1;
-/// Level of the intervals.
-const LEVEL: f64 = 0.9;
-/// Correlations below this end the sum of a correlation time.
-const UNCORRELATED: f64 = 0.05;
 
 /// One function of state, input and time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -118,7 +106,7 @@ impl Sums {
         let Some((_, mut rest)) = self.solve(&chosen) else {
             return chosen;
         };
-        while chosen.len() <= MOST {
+        while chosen.len() <= Thresholds::MOST_TERMS {
             let best = (1..last)
                 .filter(|c| !chosen.contains(c))
                 .filter_map(|c| {
@@ -177,7 +165,7 @@ pub(in crate::diagnose) fn discover(
             .collect()
     };
     let typical = typical_variance(term);
-    let block = samples.div_ceil(BLOCKS).max(1);
+    let block = samples.div_ceil(Thresholds::DISCOVERY_BLOCKS).max(1);
     let mut blocks: Vec<Sums> = vec![];
     for (smoothed, record) in term.records.iter().zip(records) {
         for from in (0..smoothed.mean.len()).step_by(block) {
@@ -224,7 +212,7 @@ pub(in crate::diagnose) fn discover(
     let mut counts = vec![0.0; functions.len()];
     let mut drawn: Vec<Vec<f64>> = vec![vec![]; functions.len()];
     let mut source = noise.source("blocks");
-    for _ in 0..RESAMPLES {
+    for _ in 0..Thresholds::DISCOVERY_RESAMPLES {
         let mut sums = Sums::zero(functions.len() + 2);
         for _ in 0..blocks.len() {
             let b = ((source.uniform() * blocks.len() as f64) as usize).min(blocks.len() - 1);
@@ -239,12 +227,12 @@ pub(in crate::diagnose) fn discover(
             drawn[c - 1].push(factor / scales[c - 1]);
         }
     }
-    let tail = 0.5 * (1.0 - LEVEL);
+    let tail = 0.5 * (1.0 - Thresholds::INTERVAL_LEVEL);
     let mut terms: Vec<Term> = (functions.iter().enumerate())
         .filter_map(|(j, function)| {
-            let inclusion = counts[j] / RESAMPLES as f64;
+            let inclusion = counts[j] / Thresholds::DISCOVERY_RESAMPLES as f64;
             let own = chosen.iter().position(|c| *c == j + 1);
-            if inclusion < RARE && own.is_none() {
+            if inclusion < Thresholds::RARE && own.is_none() {
                 return None;
             }
             let middle = quantile(&drawn[j], 0.5).unwrap_or(f64::NAN);
@@ -294,7 +282,7 @@ fn correlation_time(series: &[Vec<f64>]) -> f64 {
             .map(|(a, b)| a * b)
             .sum();
         let rho = product / square.max(1e-300);
-        if rho < UNCORRELATED {
+        if rho < Thresholds::UNCORRELATED {
             break;
         }
         time += 2.0 * rho;

@@ -35,7 +35,7 @@ pub(in crate::diagnose) fn locate(
         maps: maps(bench, test, found.first())?,
         ..targets(bench, found, test, answer)
     };
-    let shows = context.twin.state_space().is_some();
+    let shows = context.twin.equations().is_some();
     let apart = match context.follows && shows {
         true => apart(
             context,

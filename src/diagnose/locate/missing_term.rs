@@ -9,13 +9,11 @@ use crate::diagnose::outcome::{Equation, TermRange};
 use crate::diagnose::residuals::cut::edges;
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::null::Test;
+use crate::diagnose::thresholds::Thresholds;
 use crate::likelihood::kalman::{FilterError, FilterSettings, Kalman, recoverable};
 use crate::progress::Stage;
 use crate::record::{Record, Signal};
 use crate::twin::StateSpace;
-
-/// Pieces of a record that the spread of a mean is taken from.
-const BLOCKS: usize = 20;
 
 /// A disturbance in one equation, given the whole of each record.
 pub(in crate::diagnose) struct MissingTerm {
@@ -64,7 +62,7 @@ pub(in crate::diagnose) fn missing_term(
 ) -> Result<Option<MissingTerm>, FilterError> {
     let problem = bench.explained(explanation);
     let twin = problem.twin.clone();
-    let Some(equations) = twin.state_space() else {
+    let Some(equations) = twin.equations() else {
         return Ok(None);
     };
     let own = bench.bins.states;
@@ -208,7 +206,7 @@ impl MissingTerm {
         let (mut n, mut sum, mut variance) = (0.0, 0.0, 0.0);
         let mut blocks: Vec<(f64, f64)> = vec![];
         for record in &self.records {
-            let length = record.mean.len().div_ceil(BLOCKS).max(1);
+            let length = record.mean.len().div_ceil(Thresholds::TERM_BLOCKS).max(1);
             for (b, block) in record.mean.chunks(length).enumerate() {
                 let (mut count, mut total) = (0.0, 0.0);
                 for (i, d) in block.iter().enumerate() {

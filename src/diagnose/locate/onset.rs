@@ -14,19 +14,13 @@ use crate::diagnose::outcome::Onset;
 use crate::diagnose::residuals::local::level;
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::null::{largest, standardised};
+use crate::diagnose::thresholds::Thresholds;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::math::rank_p_value;
 use crate::record::Record;
 use crate::twin::Noise;
 use rayon::prelude::*;
 
-/// Blocks of a record, and those before the first that is to be foreseen.
-const BLOCKS: usize = 12;
-const LEARNT: usize = 2;
-/// Least samples of a block.
-const SHORTEST: usize = 10;
-/// Simulations beyond those that a p-value at the level takes.
-const BEYOND: f64 = 5.0;
 /// Iterations of a fit that starts where that of a block before ended.
 const WARM: usize = 2;
 
@@ -37,10 +31,10 @@ pub(in crate::diagnose) fn onset(
     noise: Noise,
 ) -> Result<Option<Onset>, DiagnoseError> {
     // Each block would take ensembles of a black box.
-    if bench.problem.twin.state_space().is_none() {
+    if bench.problem.twin.equations().is_none() {
         return Ok(None);
     }
-    let replicates = (1.0 / alpha + BEYOND) as u64;
+    let replicates = (1.0 / alpha + Thresholds::ONSET_BEYOND) as u64;
     let signals = bench.problem.twin.signals();
     for (r, record) in bench.problem.records.iter().enumerate() {
         let theta = bench.problem.of_record(r, &bench.fitted.theta);
@@ -74,10 +68,12 @@ pub(in crate::diagnose) fn onset(
             .map(|(i, z)| (i, rank_p_value(&null, *z)))
             .find(|(_, p)| *p <= alpha);
         if let Some((i, p_value)) = first {
-            let block = LEARNT + i / channels;
+            let block = Thresholds::ONSET_LEARNT + i / channels;
             return Ok(Some(Onset {
                 record: r,
-                time: record.drive().time(block * record.samples() / BLOCKS),
+                time: record
+                    .drive()
+                    .time(block * record.samples() / Thresholds::ONSET_BLOCKS),
                 channel: signals.outputs[i % channels].name.clone(),
                 p_value,
             }));
@@ -94,13 +90,13 @@ fn foresight(
     record: &Record,
 ) -> Result<Option<Vec<f64>>, DiagnoseError> {
     let samples = record.samples();
-    if samples < SHORTEST * BLOCKS {
+    if samples < Thresholds::ONSET_SAMPLES * Thresholds::ONSET_BLOCKS {
         return Ok(None);
     }
-    let end = |block: usize| block * samples / BLOCKS;
+    let end = |block: usize| block * samples / Thresholds::ONSET_BLOCKS;
     let mut theta = theta.to_vec();
     let mut all = vec![];
-    for block in LEARNT..BLOCKS {
+    for block in Thresholds::ONSET_LEARNT..Thresholds::ONSET_BLOCKS {
         let before = [first_part(record, end(block))?];
         let learnt = problem.on(&before);
         let Some(fitted) = climb(&learnt, &learnt.full(&theta), WARM)? else {

@@ -1,7 +1,6 @@
 //! Where a gap lies: in the equations, in time, in the states, by lag and by frequency.
 
-/// Cells are notable up to this p-value.
-const NOTABLE: f64 = 0.1;
+use crate::diagnose::thresholds::Thresholds;
 
 /// Where the gap is.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -171,7 +170,7 @@ pub trait Cell {
     fn share(&self) -> f64;
     /// Whether the cell stands out of simulations: p ≤ 0.1.
     fn is_notable(&self) -> bool {
-        self.p_value() <= NOTABLE
+        self.p_value() <= Thresholds::NOTABLE
     }
 }
 

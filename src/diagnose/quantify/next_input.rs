@@ -8,30 +8,21 @@
 //! Source of the criterion: Hunter & Reiner, "Designs for discriminating between two rival models" (1965).
 
 use crate::diagnose::error::DiagnoseError;
-use crate::diagnose::explain::attribute::{Explanation, RIVALS};
+use crate::diagnose::explain::attribute::Explanation;
 use crate::diagnose::fitting::climb::climb;
 use crate::diagnose::fitting::problem::Problem;
 use crate::diagnose::fitting::reference::Reference;
 use crate::diagnose::outcome::NextInput;
 use crate::diagnose::test::fitted_twin::FittedTwin;
+use crate::diagnose::thresholds::Thresholds;
 use crate::likelihood::kalman::recoverable;
 use crate::record::{Drive, Record, RecordError, Signal};
 use crate::twin::Noise;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-/// Rivals that are looked at.
-const MOST: usize = 3;
-/// Simulations of each proposal.
-const PROOF: u64 = 20;
 /// Iterations of a refit.
 const WARM: usize = 4;
-/// Lengths of proposals, as multiples of the present record's.
-const LENGTHS: [usize; 2] = [1, 3];
-/// Parts of a record that levels are held for.
-const HOLDS: [usize; 4] = [80, 27, 10, 4];
-/// Levels of a staircase.
-const STAIRS: usize = 8;
 
 /// One input that could be applied.
 struct Proposal {
@@ -59,7 +50,7 @@ pub(in crate::diagnose) fn next_input(
     let candidates = &bench.dictionary.candidates;
     let rivals: Vec<Rival<'_>> = (found.iter())
         .filter(|e| class.contains(&candidates[e.candidate].key()))
-        .take(MOST)
+        .take(Thresholds::MOST_RIVALS)
         .map(|e| Rival {
             key: candidates[e.candidate].key(),
             problem: bench.explained(e),
@@ -73,17 +64,23 @@ pub(in crate::diagnose) fn next_input(
     }
     let records = bench.problem.records;
     let proof = noise.child("proof");
-    let again = told_apart(&rivals, records, records[0].drive(), PROOF, proof)?;
+    let again = told_apart(
+        &rivals,
+        records,
+        records[0].drive(),
+        Thresholds::PROOFS,
+        proof,
+    )?;
     let mut best: Option<([u64; 2], Proposal)> = None;
-    for times in LENGTHS {
+    for times in Thresholds::LENGTHS {
         let Some(proposal) = best_of(&rivals, records, times, noise)? else {
             continue;
         };
-        let split = told_apart(&rivals, records, &proposal.drive, PROOF, proof)?;
+        let split = told_apart(&rivals, records, &proposal.drive, Thresholds::PROOFS, proof)?;
         if split[0] > best.as_ref().map_or(again[0], |(most, _)| most[0]) {
             best = Some((split, proposal));
         }
-        if 2 * split[0] > PROOF {
+        if 2 * split[0] > Thresholds::PROOFS {
             break;
         }
     }
@@ -141,7 +138,7 @@ fn proposals(record: &Record, times: usize, noise: Noise) -> Result<Vec<Proposal
     let ranges: Vec<(f64, f64)> = (0..inputs).map(range).collect();
     // Shares of the range, by input and sample.
     let mut shapes: Vec<(String, Signal)> = vec![];
-    for hold in HOLDS.map(|parts| (drive.samples() / parts).max(1)) {
+    for hold in Thresholds::HOLDS.map(|parts| (drive.samples() / parts).max(1)) {
         let seconds = crate::math::six_digits(hold as f64 * dt);
         let mut source = noise.source(&format!("levels/{hold}"));
         let levels = Signal::from_shape_fn((samples.div_ceil(hold), inputs), |_| source.uniform());
@@ -168,7 +165,7 @@ fn proposals(record: &Record, times: usize, noise: Noise) -> Result<Vec<Proposal
     shapes.push((
         "a staircase up and down".into(),
         Signal::from_shape_fn((samples, inputs), |(k, _)| {
-            (ramp(k) * STAIRS as f64).floor() / (STAIRS - 1) as f64
+            (ramp(k) * Thresholds::STAIRS as f64).floor() / (Thresholds::STAIRS - 1) as f64
         }),
     ));
     (shapes.into_iter())
@@ -264,7 +261,7 @@ fn told_apart(
                 .collect::<Result<_, DiagnoseError>>()?;
             let others = scores.iter().enumerate().filter(|(j, _)| *j != truth);
             let next = others.map(|(_, s)| *s).fold(f64::NEG_INFINITY, f64::max);
-            Ok(scores[truth] > next + RIVALS)
+            Ok(scores[truth] > next + Thresholds::RIVALS)
         })
         .collect::<Result<Vec<bool>, DiagnoseError>>()?;
     Ok([told.iter().filter(|t| **t).count() as u64, trials])
@@ -280,7 +277,7 @@ mod tests {
         let record =
             Record::new(Drive::new(0.5, inputs).unwrap(), Signal::zeros((200, 1))).unwrap();
         let all = proposals(&record, 2, Noise::new(1, "t", 0)).unwrap();
-        assert_eq!(all.len(), 2 * HOLDS.len() + 2);
+        assert_eq!(all.len(), 2 * Thresholds::HOLDS.len() + 2);
         for proposal in all {
             let inputs = proposal.drive.inputs();
             for (j, (low, high)) in [(0.0, 6.0), (10.0, 16.0)].into_iter().enumerate() {

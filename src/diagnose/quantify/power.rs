@@ -17,17 +17,14 @@ use crate::diagnose::hypotheses::variant::Variant;
 use crate::diagnose::outcome::Visible;
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::null::NullDistribution;
+use crate::diagnose::thresholds::Thresholds;
 use crate::effect::Magnitude;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use rayon::prelude::*;
 
-/// The normal quantile of 80 %.
-const EIGHTY: f64 = 0.8416;
 /// Steps of a search, and how near is enough.
 const STEPS: usize = 10;
 const NEAR: f64 = 0.03;
-/// How much farther from nothing than a point of the dictionary is looked.
-const FURTHER: f64 = 64.0;
 
 /// For each listed candidate of the bench, in its order.
 pub(in crate::diagnose) fn power(
@@ -44,7 +41,7 @@ pub(in crate::diagnose) fn power(
         .into_par_iter()
         .filter(|&c| dictionary.candidates[c].is_listed())
         .map(|c| {
-            let need = needed[c] + EIGHTY;
+            let need = needed[c] + Thresholds::POWER_QUANTILE;
             let points = dictionary.points.iter();
             let mut best: Option<Least> = None;
             for point in points.filter(|p| dictionary.variants[p.variant].candidate == c) {
@@ -127,7 +124,7 @@ fn least(
     let within = |share: f64| {
         let value = nothing + share * whole;
         let reach = magnitude.limits.contains(value) && axis.bounds.contains(value);
-        reach && share <= FURTHER
+        reach && share <= Thresholds::VISIBLE_REACH
     };
     for _ in 0..STEPS {
         let Some(root) = root(nothing + share * whole)? else {

@@ -1,19 +1,10 @@
 //! How records are cut into windows, regions, lags and bands.
 
+use crate::diagnose::thresholds::Thresholds;
 use crate::likelihood::kalman::Filtered;
 use crate::math::quantile;
 use crate::record::{Record, Signal};
 use crate::twin::Outline;
-
-/// Windows of a record.
-const WINDOWS: usize = 8;
-
-/// Bins of a variable, of equal numbers of samples.
-const BINS: usize = 5;
-/// Ends of the lags, in samples.
-const LAGS: [(usize, usize); 5] = [(1, 1), (2, 3), (4, 7), (8, 15), (16, 31)];
-/// Ends of the bands, in cycles a sample.
-const BANDS: [f64; 7] = [0.0, 1.0 / 64.0, 1.0 / 32.0, 1.0 / 16.0, 0.125, 0.25, 0.5];
 
 /// One piece of what was measured.
 #[derive(Debug, Clone, PartialEq)]
@@ -114,18 +105,19 @@ impl Bins {
                 .map(Past::Output)
                 .chain((0..inputs.len()).map(Past::Input));
             bins.cuts.extend(past.flat_map(|past| {
-                LAGS.map(|(from, to)| Cut::Lag {
+                Thresholds::LAG_BINS.map(|(from, to)| Cut::Lag {
                     channel,
                     past,
                     from,
                     to,
                 })
             }));
-            bins.cuts.extend(BANDS.windows(2).map(|e| Cut::Band {
-                channel,
-                low: e[0],
-                high: e[1],
-            }));
+            bins.cuts
+                .extend(Thresholds::BANDS.windows(2).map(|e| Cut::Band {
+                    channel,
+                    low: e[0],
+                    high: e[1],
+                }));
         }
         bins
     }
@@ -187,18 +179,18 @@ impl Bins {
 
 /// Ends of ranges with equal numbers of values.
 pub(in crate::diagnose) fn edges(values: &[f64]) -> Vec<f64> {
-    let mut edges: Vec<f64> = (0..=BINS)
-        .filter_map(|i| quantile(values, i as f64 / BINS as f64).ok())
+    let mut edges: Vec<f64> = (0..=Thresholds::BINS)
+        .filter_map(|i| quantile(values, i as f64 / Thresholds::BINS as f64).ok())
         .collect();
     edges.dedup();
     edges
 }
 
 fn windows(record: usize, channel: usize, samples: usize) -> impl Iterator<Item = Cut> {
-    (0..WINDOWS).map(move |w| Cut::Window {
+    (0..Thresholds::WINDOWS).map(move |w| Cut::Window {
         record,
         channel,
-        from: w * samples / WINDOWS,
-        to: (w + 1) * samples / WINDOWS,
+        from: w * samples / Thresholds::WINDOWS,
+        to: (w + 1) * samples / Thresholds::WINDOWS,
     })
 }

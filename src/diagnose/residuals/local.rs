@@ -2,15 +2,11 @@
 
 use crate::diagnose::residuals::correlation::{centred, correlation};
 use crate::diagnose::residuals::cut::{Bins, Cut, Past};
+use crate::diagnose::thresholds::Thresholds;
 use crate::likelihood::kalman::Filtered;
 use crate::record::{Record, Signal};
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
-
-/// Lags that a whole output is looked at with.
-const LAGS: usize = 20;
-/// Samples below which a cut says nothing.
-const LEAST: f64 = 5.0;
 
 /// What is left of a cut beyond chance.
 #[derive(Debug, Clone, Copy, Default)]
@@ -57,7 +53,7 @@ pub(in crate::diagnose) fn excess(
         .map(|(cut, sums)| match *cut {
             Cut::Channel { channel } => {
                 let of_values = level(series.sums(channel));
-                let lags = series.lags(channel, Past::Output(channel), 1, LAGS);
+                let lags = series.lags(channel, Past::Output(channel), 1, Thresholds::LAGS);
                 Excess {
                     square: of_values.square + lags.square,
                     expected: of_values.expected + lags.expected,
@@ -77,7 +73,7 @@ pub(in crate::diagnose) fn excess(
 
 /// Of (count, sum, sum of squares).
 pub(in crate::diagnose) fn level((n, sum, square): (f64, f64, f64)) -> Excess {
-    if n < LEAST {
+    if n < Thresholds::LEAST_IN_CUT {
         return Excess::default();
     }
     Excess {

@@ -1,17 +1,9 @@
 //! Whether innovations look like white noise: what sees gaps that no candidate imitates.
 
 use crate::diagnose::residuals::correlation::{centred, correlation};
+use crate::diagnose::thresholds::Thresholds;
 use crate::likelihood::kalman::Filtered;
 use crate::record::{Record, Signal};
-
-/// Lags of innovations, of their squares, and of inputs.
-const LAGS: usize = 20;
-/// Lengths over which squared correlations are added up.
-const SUMS: [usize; 3] = [1, 5, LAGS];
-/// Windows in time.
-const WINDOWS: usize = 10;
-/// Frequencies of the periodogram, over the record's length.
-const FREQUENCIES: usize = 60;
 
 /// The statistics, each larger the less white the innovations are; no one has a known distribution, and none is needed:
 /// each is compared with simulations of the twin.
@@ -64,10 +56,10 @@ fn of_channel(v: &[f64], predicted: &[f64], inputs: &[Vec<f64>]) -> Vec<f64> {
         n * mean * mean,
     ];
     for signal in [&v0, &s0] {
-        let squared: Vec<f64> = (1..=LAGS)
+        let squared: Vec<f64> = (1..=Thresholds::LAGS)
             .map(|lag| n * correlation(signal, signal, lag).powi(2))
             .collect();
-        all.extend(SUMS.map(|k| squared[..k].iter().sum::<f64>()));
+        all.extend(Thresholds::LAG_SUMS.map(|k| squared[..k].iter().sum::<f64>()));
     }
     let bends: Vec<f64> = centred(&p0.iter().map(|p| p * p).collect::<Vec<_>>());
     for (a, b) in [(&v0, &p0), (&v0, &bends), (&s0, &p0)] {
@@ -79,7 +71,7 @@ fn of_channel(v: &[f64], predicted: &[f64], inputs: &[Vec<f64>]) -> Vec<f64> {
             .chain(u.windows(2).map(|w| w[1] - w[0]))
             .collect();
         for signal in [&u, &changes] {
-            let sum: f64 = (1..=LAGS)
+            let sum: f64 = (1..=Thresholds::LAGS)
                 .map(|lag| n * correlation(&v0, signal, lag).powi(2))
                 .sum();
             all.push(sum);
@@ -87,8 +79,11 @@ fn of_channel(v: &[f64], predicted: &[f64], inputs: &[Vec<f64>]) -> Vec<f64> {
         all.push(n * correlation(&s0, &u, 1).powi(2));
     }
     let (mut means, mut squares_max) = (0.0f64, 0.0f64);
-    for w in 0..WINDOWS {
-        let (from, to) = (w * v.len() / WINDOWS, (w + 1) * v.len() / WINDOWS);
+    for w in 0..Thresholds::OMNIBUS_WINDOWS {
+        let (from, to) = (
+            w * v.len() / Thresholds::OMNIBUS_WINDOWS,
+            (w + 1) * v.len() / Thresholds::OMNIBUS_WINDOWS,
+        );
         let m = (to - from).max(1) as f64;
         means = means.max((v[from..to].iter().sum::<f64>()).powi(2) / m);
         let excess = squares[from..to].iter().sum::<f64>() / m - 1.0;
@@ -120,7 +115,7 @@ fn products(v: &[f64], states: &Signal, inputs: &Signal, own: usize) -> Vec<f64>
 /// The largest line of the periodogram over its mean.
 fn line(v: &[f64]) -> f64 {
     let n = v.len();
-    let powers: Vec<f64> = (1..=FREQUENCIES.min(n / 2))
+    let powers: Vec<f64> = (1..=Thresholds::OMNIBUS_FREQUENCIES.min(n / 2))
         .map(|f| {
             let step = std::f64::consts::TAU * f as f64 / n as f64;
             let (mut c, mut s) = (0.0, 0.0);

@@ -9,7 +9,7 @@ use crate::diagnose::hypotheses::dictionary::Dictionary;
 use crate::diagnose::hypotheses::scales::Scales;
 use crate::diagnose::residuals::cut::Bins;
 use crate::record::{Record, Signal};
-use crate::twin::DigitalTwin;
+use crate::twin::Twin;
 use std::sync::Arc;
 
 /// A fitted twin and everything that its records are looked at with.
@@ -23,7 +23,7 @@ pub(in crate::diagnose) struct FittedTwin<'a> {
 impl<'a> FittedTwin<'a> {
     /// Everything that is needed to look at a fitted twin; `None` where it cannot be filtered around the fit.
     pub fn new(
-        twin: &Arc<dyn DigitalTwin>,
+        twin: &Twin,
         problem: Problem<'a>,
         fitted: Fitted,
         additions: &[Addition],

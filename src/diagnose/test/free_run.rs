@@ -3,30 +3,22 @@
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::candidate::{Addition, with};
 use crate::diagnose::outcome::FreeRuns;
+use crate::diagnose::thresholds::Thresholds;
 use crate::estimator::track;
 use crate::math::{median, quantile};
 use crate::record::{Record, Signal};
-use crate::twin::{DigitalTwin, Noise, free_run};
+use crate::twin::{Noise, Twin};
 use rayon::prelude::*;
-use std::sync::Arc;
-
-/// Records simulated for the floor.
-const FLOOR: u64 = 32;
-/// Resamples of the bootstrap, and blocks of a record.
-const RESAMPLES: u64 = 400;
-const BLOCKS: usize = 20;
-/// Level of the intervals.
-const LEVEL: f64 = 0.9;
 
 /// A twin and θ to run free.
 pub(in crate::diagnose) struct Runner {
-    pub twin: Arc<dyn DigitalTwin>,
+    pub twin: Twin,
     pub theta: Vec<f64>,
 }
 
 impl Runner {
     pub fn new(
-        base: &Arc<dyn DigitalTwin>,
+        base: &Twin,
         additions: &[Addition],
         theta: Vec<f64>,
     ) -> Result<Self, DiagnoseError> {
@@ -44,14 +36,14 @@ impl Runner {
 
     /// The free run beside the record.
     pub fn outputs(&self, record: &Record) -> Option<Signal> {
-        let run = track(self.twin.as_ref(), &self.theta, record).ok()?;
+        let run = track(&self.twin, &self.theta, record).ok()?;
         Some(run.outputs)
     }
 
     /// Median error of records simulated at θ against their own free run.
     pub fn floor(&self, record: &Record, from: usize, noise: Noise) -> Option<f64> {
-        let free = free_run(self.twin.as_ref(), &self.theta, record.drive()).ok()?;
-        let errors: Vec<f64> = (0..FLOOR)
+        let free = self.twin.free_run(&self.theta, record.drive()).ok()?;
+        let errors: Vec<f64> = (0..Thresholds::FLOOR_RECORDS)
             .into_par_iter()
             .filter_map(|i| {
                 let drive = record.drive();
@@ -116,11 +108,11 @@ pub(in crate::diagnose) fn closed(
 ) -> (Option<f64>, Option<[f64; 2]>) {
     let share = |b: f64, a: f64| (b - a) / (b - floor);
     let n = before.len();
-    let length = n.div_ceil(BLOCKS).max(1);
+    let length = n.div_ceil(Thresholds::SHARE_BLOCKS).max(1);
     let mut source = noise.source("blocks");
     let mut gaps = Vec::new();
     let mut shares = Vec::new();
-    for _ in 0..RESAMPLES {
+    for _ in 0..Thresholds::SHARE_RESAMPLES {
         let (mut b, mut a, mut count) = (0.0, 0.0, 0usize);
         while count < n {
             let start = ((source.uniform() * n as f64) as usize).min(n - 1);
@@ -134,7 +126,7 @@ pub(in crate::diagnose) fn closed(
         gaps.push(b - floor);
         shares.push(share(b, a));
     }
-    let tail = 0.5 * (1.0 - LEVEL);
+    let tail = 0.5 * (1.0 - Thresholds::INTERVAL_LEVEL);
     let low_gap = quantile(&gaps, tail).unwrap_or(f64::NEG_INFINITY);
     if low_gap.is_nan() || low_gap <= 0.0 {
         return (None, None);
@@ -155,7 +147,7 @@ pub(in crate::diagnose) fn interval(
     let shares: Vec<f64> = (afters.iter())
         .map(|after| (before - after) / (before - floor))
         .collect();
-    let tail = 0.5 * (1.0 - LEVEL);
+    let tail = 0.5 * (1.0 - Thresholds::INTERVAL_LEVEL);
     let end = |p: f64| quantile(&shares, p).ok();
     Some([end(tail)?.min(closed), end(1.0 - tail)?.max(closed)])
 }

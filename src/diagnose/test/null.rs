@@ -9,6 +9,7 @@ use crate::diagnose::residuals::omnibus::omnibus;
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::shared::Shared;
 use crate::diagnose::test::statistics::Statistics;
+use crate::diagnose::thresholds::Thresholds;
 use crate::likelihood::kalman::FilterError;
 use crate::math::{quantile, rank_p_value};
 use crate::progress::Stage;
@@ -20,16 +21,6 @@ use rayon::prelude::*;
 const WARM: usize = 6;
 /// What two statistics may differ by and still be the same: rounding.
 const HAIR: f64 = 1e-6;
-/// Least standard deviation of a statistic over the simulations: one that never moves cannot alarm by a hair.
-const LEAST: f64 = 0.1;
-
-/// Simulations at a time, and how many as extreme as the record are enough to say that it is not: p is then no smaller than
-/// 8 in the number asked for, and no further simulation makes it significant. Source: Besag & Clifford, "Sequential Monte
-/// Carlo p-values", *Biometrika* 78 (1991).
-const BATCH: usize = 20;
-const ENOUGH: usize = 8;
-/// Standard deviations above all simulations from which on no more of them are made than the level asks for.
-const OVERWHELMING: f64 = 12.0;
 
 /// The record's statistics and those of simulations; `None`: a simulation that could not be filtered.
 pub(in crate::diagnose) struct NullDistribution {
@@ -54,7 +45,7 @@ pub(in crate::diagnose) struct Test {
 impl<'a> FittedTwin<'a> {
     /// How the records themselves look.
     pub fn own_look(&self) -> Result<Option<Statistics>, FilterError> {
-        if self.problem.twin.state_space().is_none() {
+        if self.problem.twin.equations().is_none() {
             return Ok(self
                 .shared()?
                 .and_then(|s| s.look(self, self.problem.records)));
@@ -64,7 +55,7 @@ impl<'a> FittedTwin<'a> {
 
     /// Of a black box: what all looks share.
     fn shared(&self) -> Result<Option<Shared>, FilterError> {
-        match self.problem.twin.state_space() {
+        match self.problem.twin.equations() {
             Some(_) => Ok(None),
             None => Shared::new(self),
         }
@@ -146,7 +137,7 @@ impl<'a> FittedTwin<'a> {
         };
         while nulls.others.len() < replicates {
             let from = nulls.others.len();
-            let to = (from + BATCH).min(replicates);
+            let to = (from + Thresholds::BATCH).min(replicates);
             let batch = (from as u64..to as u64)
                 .into_par_iter()
                 .map(|i| {
@@ -158,8 +149,8 @@ impl<'a> FittedTwin<'a> {
                 .collect::<Result<Vec<_>, DiagnoseError>>()?;
             nulls.others.extend(batch);
             let test = nulls.test();
-            let overwhelming = test.statistic > OVERWHELMING && test.p_value <= level;
-            if overwhelming || test.as_extreme >= ENOUGH {
+            let overwhelming = test.statistic > Thresholds::OVERWHELMING && test.p_value <= level;
+            if overwhelming || test.as_extreme >= Thresholds::ENOUGH_EXTREME {
                 break;
             }
         }
@@ -184,7 +175,7 @@ impl NullDistribution {
         let alarm = quantile(&both, 1.0 - level).unwrap_or(f64::INFINITY);
         let (centre, spread) = moments(top_gain.iter().copied());
         let top = centre + alarm * spread;
-        (0..gains.first().map_or(0, |g| g.len()))
+        (0..self.own.gains.len())
             .map(|c| {
                 let (centre, spread) = moments(gains.iter().map(|g| g[c]));
                 centre + top * spread
@@ -241,7 +232,12 @@ fn moments(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let n = values.len().max(1) as f64;
     let mean = values.iter().sum::<f64>() / n;
     let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
-    (mean, variance.max(LEAST * LEAST).sqrt())
+    (
+        mean,
+        variance
+            .max(Thresholds::LEAST_SPREAD * Thresholds::LEAST_SPREAD)
+            .sqrt(),
+    )
 }
 
 /// Each entry less the mean of its column over all *other* rows, in their standard deviations.
@@ -257,7 +253,10 @@ pub(in crate::diagnose) fn standardised(rows: &[&Vec<f64>]) -> Vec<Vec<f64>> {
             let own = row[j] - centre;
             let mean = -own / (n - 1.0);
             let variance = (square - own * own) / (n - 1.0) - mean * mean;
-            z[j] = (own - mean) / variance.max(LEAST * LEAST).sqrt();
+            z[j] = (own - mean)
+                / variance
+                    .max(Thresholds::LEAST_SPREAD * Thresholds::LEAST_SPREAD)
+                    .sqrt();
         }
     }
     z

@@ -7,7 +7,7 @@ use crate::effect::law::{
 };
 use crate::record::{Quantity, Signal};
 use crate::twin::{
-    DigitalTwin, Integrator, Interval, Noise, Now, Outliers, Outline, SimulationError, StateSpace,
+    Integrator, Interval, Noise, Now, Outliers, Outline, SimulationError, StateSpace,
 };
 use smallvec::SmallVec;
 use std::ops::Range;
@@ -19,7 +19,7 @@ type Short = SmallVec<[f64; 16]>;
 /// Equations with effects. The state is the base twin's, then one held value for each input (where an
 /// actuator effect stands), then the memories of the signal effects; the added ones carry no noise.
 pub(super) struct AugmentedEquations {
-    base: Arc<dyn DigitalTwin>,
+    base: Arc<dyn StateSpace>,
     slots: Slots,
     /// Number of the base twin's states.
     states: usize,
@@ -45,8 +45,8 @@ struct OnSignal {
 
 impl AugmentedEquations {
     /// `base` must show its equations.
-    pub(super) fn new(base: Arc<dyn DigitalTwin>, slots: Slots) -> Self {
-        let mut outline = equations(&base).outline();
+    pub(super) fn new(base: Arc<dyn StateSpace>, slots: Slots) -> Self {
+        let mut outline = base.outline();
         let (states, inputs) = (outline.states.len(), outline.inputs.len());
         outline.parameters = slots.space(&outline.parameters);
         let any_actuator = (slots.all.iter()).any(|s| matches!(s.effect.law(), Law::Actuator(_)));
@@ -124,7 +124,7 @@ impl AugmentedEquations {
         with: impl FnOnce(&dyn StateSpace, &Now<'_>) -> R,
     ) -> R {
         let own = &now.theta[..self.slots.base];
-        let base = equations(&self.base);
+        let base = self.base.as_ref();
         if self.parameters.is_empty() {
             return with(
                 base,
@@ -187,12 +187,6 @@ impl OnSignal {
         memory.fill(channels[self.at.target]);
         self.pass(now, &mut Short::from_slice(memory), channels);
     }
-}
-
-/// The base twin's equations.
-fn equations(base: &Arc<dyn DigitalTwin>) -> &dyn StateSpace {
-    base.state_space()
-        .expect("augment builds this type for twins with equations only")
 }
 
 impl StateSpace for AugmentedEquations {
@@ -300,7 +294,7 @@ impl StateSpace for AugmentedEquations {
     }
 
     fn limits(&self) -> Vec<Interval> {
-        let mut limits = equations(&self.base).limits();
+        let mut limits = self.base.as_ref().limits();
         limits.resize(self.outline.states.len(), Interval::EVERYTHING);
         limits
     }
@@ -318,16 +312,18 @@ impl StateSpace for AugmentedEquations {
     }
 
     fn integrator(&self) -> Integrator {
-        equations(&self.base).integrator()
+        self.base.as_ref().integrator()
     }
 
-    fn admit(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {
-        equations(&self.base).admit(&theta[..self.slots.base], dt)?;
+    fn check_parameters(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {
+        self.base
+            .as_ref()
+            .check_parameters(&theta[..self.slots.base], dt)?;
         self.slots.check(theta, dt)
     }
 
     fn outliers(&self, theta: &[f64]) -> Vec<Outliers> {
-        let mut all = equations(&self.base).outliers(&theta[..self.slots.base]);
+        let mut all = self.base.as_ref().outliers(&theta[..self.slots.base]);
         for slot in &self.slots.all {
             let Law::Outliers(law) = slot.effect.law() else {
                 continue;
@@ -342,8 +338,10 @@ impl StateSpace for AugmentedEquations {
         all
     }
 
-    fn strike(&self, theta: &[f64], noise: Noise, outputs: &mut Signal) {
-        equations(&self.base).strike(&theta[..self.slots.base], noise, outputs);
+    fn corrupt_outputs(&self, theta: &[f64], noise: Noise, outputs: &mut Signal) {
+        self.base
+            .as_ref()
+            .corrupt_outputs(&theta[..self.slots.base], noise, outputs);
         for slot in &self.slots.all {
             strike(slot, theta, noise, outputs);
         }

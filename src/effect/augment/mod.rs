@@ -8,7 +8,7 @@ use super::check::{check_effects, targets};
 use super::error::EffectError;
 use super::law::Law;
 use super::placed::Effect;
-use crate::twin::{DigitalTwin, Interval, Parameter, ParameterSpace, Role, SimulationError};
+use crate::twin::{Interval, Parameter, ParameterSpace, Role, SimulationError, Twin};
 use black_box::AugmentedBlackBox;
 use equations::AugmentedEquations;
 use std::collections::BTreeMap;
@@ -44,32 +44,29 @@ use std::sync::Arc;
 /// assert_eq!(biased, plain + 0.5);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn augment(
-    base: Arc<dyn DigitalTwin>,
-    effects: Vec<Effect>,
-) -> Result<Arc<dyn DigitalTwin>, EffectError> {
+pub fn augment(base: impl Into<Twin>, effects: Vec<Effect>) -> Result<Twin, EffectError> {
     let memories = effects.iter().map(|e| e.kind().memories().1).collect();
-    augment_short(base, effects, memories)
+    augment_short(base.into(), effects, memories)
 }
 
 /// Adds effects as [`augment`] does, with so many memory values for each of them, within what its law allows.
 ///
 /// A filter's cost grows with the square of the states, and a delay's register is longer than most delays.
 pub(crate) fn augment_short(
-    base: Arc<dyn DigitalTwin>,
+    base: Twin,
     effects: Vec<Effect>,
     memories: Vec<usize>,
-) -> Result<Arc<dyn DigitalTwin>, EffectError> {
+) -> Result<Twin, EffectError> {
     if effects.is_empty() {
         return Ok(base);
     }
-    let outline = base.state_space().map(|twin| twin.outline());
+    let outline = base.outline();
     check_effects(&effects, outline.as_ref(), &base.signals())?;
     let slots = Slots::of(&base, &effects, &memories);
-    if outline.is_none() {
-        return Ok(Arc::new(AugmentedBlackBox::new(base, slots)));
-    }
-    Ok(Arc::new(AugmentedEquations::new(base, slots)))
+    Ok(match base {
+        Twin::Equations(base) => Twin::Equations(Arc::new(AugmentedEquations::new(base, slots))),
+        Twin::BlackBox(base) => Twin::BlackBox(Arc::new(AugmentedBlackBox::new(base, slots))),
+    })
 }
 
 /// Returns the given magnitudes of effects, by the names of the parameters that [`augment`] adds.
@@ -126,8 +123,8 @@ struct Slots {
 
 impl Slots {
     /// Targets must have been checked.
-    fn of(base: &Arc<dyn DigitalTwin>, effects: &[Effect], memories: &[usize]) -> Self {
-        let outline = base.state_space().map(|twin| twin.outline());
+    fn of(base: &Twin, effects: &[Effect], memories: &[usize]) -> Self {
+        let outline = base.outline();
         let signals = base.signals();
         let base = base.parameters().len();
         let mut parameters = Vec::new();
@@ -227,18 +224,17 @@ mod tests {
         let delay = Catalogue::default()
             .effect("sensor-delay", "sensor")
             .unwrap();
-        let base: Arc<dyn DigitalTwin> = Arc::new(CascadedTanks);
+        let base = Twin::new(CascadedTanks);
         let long = augment(base.clone(), vec![delay.clone()]).unwrap();
         let short = augment_short(base, vec![delay], vec![5]).unwrap();
-        let states =
-            |twin: &Arc<dyn DigitalTwin>| twin.state_space().unwrap().outline().states.len();
+        let states = |twin: &Twin| twin.outline().unwrap().states.len();
         assert_eq!((states(&long), states(&short)), (2 + 64, 2 + 5));
         let u = Signal::from_shape_fn((80, 1), |(k, _)| (k % 17) as f64 / 6.0);
         let drive = Drive::new(0.5, u).unwrap();
         for delay in [0.0, 0.7, 2.0] {
             let theta = [0.6, 0.5, 0.55, 1.0, delay];
             let noise = Noise::new(1, "t", 0);
-            let run = |twin: &Arc<dyn DigitalTwin>| twin.simulate(&theta, &drive, noise).unwrap();
+            let run = |twin: &Twin| twin.simulate(&theta, &drive, noise).unwrap();
             assert_eq!(run(&long), run(&short));
         }
     }

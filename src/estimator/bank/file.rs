@@ -21,16 +21,14 @@
 //! ```
 
 use super::Draws;
-use super::npz::Npz;
+use super::npy;
+use super::npz::{Npz, archive};
 use crate::storage::files::{with_remedy, write_new};
 use crate::storage::untrusted::{MESSAGE, MOST_NUMBERS, Rows, excerpt, one_line};
 use ndarray::Array2;
-use ndarray_npy::{NpzWriter, WriteNpyExt, WriteNpzError};
 use std::fs::File;
-use std::io::{self, Cursor, Read, Seek};
+use std::io::{self, Read, Seek};
 use std::path::{Path, PathBuf};
-use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, DateTime};
 
 /// Why a file of rows cannot be used.
 ///
@@ -100,10 +98,9 @@ pub(crate) fn write_features(path: &Path, features: &Array2<f64>) -> Result<(), 
     let bytes = match path.extension().and_then(|e| e.to_str()) {
         Some("npy") => {
             let mut bytes = Vec::new();
-            let written = features.write_npy(&mut bytes);
-            written.map(|()| bytes).map_err(io::Error::other)
+            npy::write(features, &mut bytes).map(|()| bytes)
         }
-        Some("npz") => archive(&[("features", features)]).map_err(io::Error::other),
+        Some("npz") => archive(&[("features", features)]),
         Some("csv") => csv_text(&features_alone(features), &[]),
         _ => return Err(BankFileError::Form(path.into())),
     };
@@ -142,7 +139,7 @@ pub(crate) fn is_named(path: &Path) -> bool {
 /// A place that is taken or cannot be written, a name of no form.
 pub fn write(path: &Path, draws: &Draws, names: &[&str]) -> Result<(), BankFileError> {
     let bytes = match form(path)? {
-        Form::Npz => npz(draws).map_err(io::Error::other),
+        Form::Npz => npz(draws),
         Form::Csv => csv_text(draws, names),
     };
     bytes
@@ -196,19 +193,8 @@ pub(crate) fn check(draws: &Draws, parameters: usize) -> Result<(), String> {
 }
 
 /// The bytes of an `.npz` archive.
-pub(crate) fn npz(draws: &Draws) -> Result<Vec<u8>, WriteNpzError> {
+pub(crate) fn npz(draws: &Draws) -> io::Result<Vec<u8>> {
     archive(&[("theta", &draws.theta), ("features", &draws.features)])
-}
-
-fn archive(arrays: &[(&str, &Array2<f64>)]) -> Result<Vec<u8>, WriteNpzError> {
-    let options = SimpleFileOptions::default()
-        .compression_method(CompressionMethod::Stored)
-        .last_modified_time(DateTime::default());
-    let mut archive = NpzWriter::new_with_options(Cursor::new(Vec::new()), options);
-    for (name, array) in arrays {
-        archive.add_array(*name, *array)?;
-    }
-    Ok(archive.finish()?.into_inner())
 }
 
 /// Rows of an `.npz` archive, of 64 or 32 bits.
@@ -304,22 +290,31 @@ mod tests {
         assert!(error.contains(".npz or .csv"), "{error}");
     }
 
-    /// As NumPy writes them: compressed, of 32 bits, column after column.
+    /// As NumPy writes them: compressed, of 32 bits, without an ending.
     #[test]
     fn archives_of_others_are_read() {
-        use ndarray::ShapeBuilder;
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("bank.npz");
-        let theta = array![[0.5f32, 1.0], [2.0, 3.0]];
-        let mut features = Array2::<f64>::zeros((2, 3).f());
-        features[[1, 2]] = 7.0;
-        let mut archive = NpzWriter::new_compressed(std::fs::File::create(&path).unwrap());
-        archive.add_array("theta", &theta).unwrap();
-        archive.add_array("features", &features).unwrap();
+        let numbers: Vec<u8> = [0.5f32, 1.0, 2.0, 3.0].map(f32::to_le_bytes).concat();
+        let header = "{'descr': '<f4', 'fortran_order': True, 'shape': (2, 2), }\n";
+        let npy = [
+            b"\x93NUMPY\x01\x00",
+            &(header.len() as u16).to_le_bytes()[..],
+            header.as_bytes(),
+            &numbers,
+        ]
+        .concat();
+        let mut archive = zip::ZipWriter::new(File::create(&path).unwrap());
+        let deflated = zip::CompressionMethod::Deflated;
+        for name in ["theta.npy", "features"] {
+            let options = zip::write::SimpleFileOptions::default().compression_method(deflated);
+            archive.start_file(name, options).unwrap();
+            io::Write::write_all(&mut archive, &npy).unwrap();
+        }
         archive.finish().unwrap();
         let draws = read(&path, &NAMES).unwrap();
-        assert_eq!(draws.theta, theta.mapv(f64::from));
-        assert_eq!(draws.features, features);
+        assert_eq!(draws.theta, array![[0.5, 2.0], [1.0, 3.0]]);
+        assert_eq!(draws.features, draws.theta);
     }
 
     #[test]
@@ -331,13 +326,11 @@ mod tests {
             write_features(&path, &x).unwrap();
             path
         };
-        let npy: Array2<f64> = ndarray_npy::read_npy(at("x.npy")).unwrap();
-        let file = std::fs::File::open(at("x.npz")).unwrap();
-        let npz: Array2<f64> = ndarray_npy::NpzReader::new(file)
-            .unwrap()
-            .by_name("features")
-            .unwrap();
-        assert_eq!((npy, npz), (x.clone(), x.clone()));
+        let npy = std::fs::read(at("x.npy")).unwrap();
+        let npy = super::npy::read(&mut &npy[..], npy.len() as u64).unwrap();
+        let npz =
+            Npz::new(File::open(at("x.npz")).unwrap()).and_then(|mut npz| npz.matrix("features"));
+        assert_eq!((npy, npz), (x.clone(), Ok(x.clone())));
         let csv = std::fs::read_to_string(at("x.csv")).unwrap();
         assert_eq!(csv, "x1,x2\n0.1,2\n-0.000000001,3.5\n");
         assert!(write_features(&place.path().join("x.txt"), &x).is_err());

@@ -10,6 +10,7 @@
 mod draws;
 mod error;
 pub mod file;
+mod npy;
 mod npz;
 mod parts;
 mod simulator;

@@ -2,8 +2,8 @@
 
 use super::{BankError, DrawError};
 use crate::feature::{Centred, FeatureError, FeatureMap, FeatureRecipe};
-use crate::record::{Drive, Record, Signal, Signals};
-use crate::twin::{DigitalTwin, Noise, ParameterSpace, SimulationError, StateSpace};
+use crate::record::{Drive, Record};
+use crate::twin::{Noise, Twin};
 use nalgebra::DVector;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -28,38 +28,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct FeatureSimulator {
-    twin: Arc<Counted>,
+    twin: Twin,
+    calls: Arc<AtomicUsize>,
     map: Arc<dyn FeatureMap>,
 }
 
 debug_by_name!(FeatureSimulator);
-
-/// A twin that counts its calls.
-struct Counted {
-    inner: Arc<dyn DigitalTwin>,
-    calls: AtomicUsize,
-}
-
-impl DigitalTwin for Counted {
-    fn parameters(&self) -> ParameterSpace {
-        self.inner.parameters()
-    }
-    fn signals(&self) -> Signals {
-        self.inner.signals()
-    }
-    fn state_space(&self) -> Option<&dyn StateSpace> {
-        self.inner.state_space()
-    }
-    fn simulate(
-        &self,
-        theta: &[f64],
-        drive: &Drive,
-        noise: Noise,
-    ) -> Result<Signal, SimulationError> {
-        self.calls.fetch_add(1, Ordering::Relaxed);
-        self.inner.simulate(theta, drive, noise)
-    }
-}
 
 impl FeatureSimulator {
     /// Couples a twin with features, which are bound to it here.
@@ -67,24 +41,23 @@ impl FeatureSimulator {
     /// # Errors
     ///
     /// Features that this twin cannot have.
-    pub fn new(
-        twin: Arc<dyn DigitalTwin>,
-        features: &dyn FeatureRecipe,
-    ) -> Result<Self, FeatureError> {
-        let twin = Arc::new(Counted {
-            inner: twin,
-            calls: AtomicUsize::new(0),
+    pub fn new(twin: impl Into<Twin>, features: &dyn FeatureRecipe) -> Result<Self, FeatureError> {
+        let calls = Arc::new(AtomicUsize::new(0));
+        let counter = calls.clone();
+        let twin = twin.into().watched(move || {
+            counter.fetch_add(1, Ordering::Relaxed);
+            Ok(())
         });
-        let counted: Arc<dyn DigitalTwin> = twin.clone();
         Ok(Self {
-            map: features.bind(&counted)?,
+            map: features.bind(&twin)?,
             twin,
+            calls,
         })
     }
 
     /// The twin.
-    pub fn twin(&self) -> &dyn DigitalTwin {
-        self.twin.as_ref()
+    pub fn twin(&self) -> &Twin {
+        &self.twin
     }
 
     /// Number of features.
@@ -94,7 +67,7 @@ impl FeatureSimulator {
 
     /// Simulator calls so far.
     pub fn calls(&self) -> usize {
-        self.twin.calls.load(Ordering::Relaxed)
+        self.calls.load(Ordering::Relaxed)
     }
 
     /// Features of a record.
@@ -119,6 +92,7 @@ impl FeatureSimulator {
         Ok(found.map(|centred| {
             let simulator = Self {
                 twin: self.twin.clone(),
+                calls: self.calls.clone(),
                 map: centred.map.clone(),
             };
             (simulator, centred)

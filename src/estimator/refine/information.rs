@@ -105,6 +105,9 @@ fn directions(covariance: &DMatrix<f64>, space: &ParameterSpace) -> Vec<Directio
     let physical: Vec<usize> = (0..space.len())
         .filter(|&j| space[j].role == Role::Physical)
         .collect();
+    if physical.is_empty() {
+        return Vec::new();
+    }
     let names: Vec<&str> = physical.iter().map(|&j| space[j].name.as_str()).collect();
     let marginal = covariance.select_rows(&physical).select_columns(&physical);
     let eigen = SymmetricEigen::new(marginal);
@@ -162,6 +165,17 @@ mod tests {
         let b = Information::new(&jacobian(tiny), &space(tiny), 0.01, 3).unwrap();
         assert!((a.std_error[0] * tiny / b.std_error[0] - 1.0).abs() < 1e-9);
         assert!((a.directions[0].std_error - b.directions[0].std_error).abs() < 1e-9);
+    }
+
+    /// A study may fix all physical parameters and estimate starts alone.
+    #[test]
+    fn starts_alone_have_no_directions() {
+        let start = Parameter::new("start.x", "", 0.0, 1.0).with_role(Role::Start);
+        let space = ParameterSpace::new([start]);
+        let information = Information::new(&DMatrix::from_element(1, 1, 5.0), &space, 0.01, 1);
+        let information = information.unwrap();
+        assert_eq!(information.directions, []);
+        assert!((information.std_error[0] - (12.51f64).powf(-0.5)).abs() < 1e-12);
     }
 
     #[test]

@@ -8,7 +8,6 @@ use crate::estimator::{PresetName, Project};
 use crate::progress::Progress;
 use crate::storage::work::{Manifest, Share, WorkFolder};
 use serde_json::json;
-use std::io;
 use std::path::Path;
 
 /// Layout of the folder; raised when it changes.
@@ -109,8 +108,7 @@ impl BankPlan {
         let stage = progress.stage("bank", rows);
         for number in missing {
             let draws = prior.rows(shards.rows(number), self.seed, "bank", &stage)?;
-            let bytes =
-                npz(&draws).map_err(|error| BankFileError::io(path, io::Error::other(error)))?;
+            let bytes = npz(&draws).map_err(|error| BankFileError::io(path, error))?;
             shards.add(number, &bytes)?;
         }
         finish(path, manifest)

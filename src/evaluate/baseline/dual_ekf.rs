@@ -165,7 +165,7 @@ impl DualFilter {
         let mut theta = space.clamp(start);
         space.check_point(&theta)?;
         let drive = record.drive();
-        twin.admit(&theta, drive.dt())?;
+        twin.check_parameters(&theta, drive.dt())?;
         let (n, p, d) = (outline.states.len(), outline.outputs.len(), theta.len());
         let mut step = Step::new(twin, space, n, p);
 

@@ -5,7 +5,7 @@ use crate::fit::{Bounds, EvaluationError, GaussNewton, ResidualProblem};
 use crate::math::Stencil;
 use crate::record::Record;
 use crate::setting::SettingError;
-use crate::twin::{DigitalTwin, ParameterSpace, SimulationError, free_run};
+use crate::twin::{DigitalTwin, ParameterSpace, SimulationError};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -216,7 +216,7 @@ struct OutputError<'a> {
 
 impl OutputError<'_> {
     fn at(&self, theta: &[f64]) -> Result<DVector<f64>, BaselineError> {
-        let run = free_run(self.twin, theta, self.record.drive())?;
+        let run = self.twin.free_run(theta, self.record.drive())?;
         let outputs = self.record.outputs();
         let pairs = run.iter().zip(outputs).map(|(a, b)| a - b);
         let residual = DVector::from_iterator(outputs.len(), pairs);

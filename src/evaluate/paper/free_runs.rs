@@ -4,7 +4,6 @@ use super::record::simulated;
 use super::{Method, MonteCarlo, MonteCarloError, Run};
 use crate::record::{Record, Signal};
 use crate::study::Study;
-use crate::twin::free_run;
 
 /// One run's record, and noise-free runs of the twin at the truth and at every answer.
 #[derive(Debug, Clone)]
@@ -24,7 +23,7 @@ impl FreeRuns {
         let draws = plan.draws(study)?;
         let record = simulated(study, &draws, plan.seed, run.run)?.record;
         // A free run may diverge where noisy runs do not.
-        let at = |theta: &[f64]| free_run(study.twin().as_ref(), theta, record.drive()).ok();
+        let at = |theta: &[f64]| study.twin().free_run(theta, record.drive()).ok();
         let answers = (run.answers.iter())
             .map(|answer| (answer.method, answer.theta.as_deref().and_then(at)))
             .collect();

@@ -214,7 +214,6 @@ const TANKS_TABLE: [(Method, Published); 8] = [
 mod tests {
     use super::*;
     use crate::record::{Drive, Signal};
-    use crate::twin::free_run;
 
     /// Without noise, away from the limits, and once the start at empty tanks is forgotten (where √h is cut off), the
     /// scaled tanks show the same output and the same invariants; the symmetry's direction is the scaling's derivative.
@@ -228,7 +227,7 @@ mod tests {
             Signal::from_shape_fn((400, 1), |(k, _)| 0.5 + EVALUATION_LEVELS[k / 30] / 3.0);
         let drive = Drive::new(0.5, levels).unwrap();
         let scaled = |c: f64| vec![0.9 * c.sqrt(), 0.8 / c.sqrt(), 0.7, 0.9 * c];
-        let run = |c| free_run(study.twin().as_ref(), &scaled(c), &drive).unwrap();
+        let run = |c| study.twin().free_run(&scaled(c), &drive).unwrap();
         let (one, other) = (run(1.0), run(1.3));
         let late = (&one - &other).into_iter().skip(100);
         let apart = late.fold(0.0f64, |a, d| a.max(d.abs()));

@@ -5,6 +5,7 @@ use super::{Method, MonteCarloError};
 use crate::estimator::{Estimate, EstimateOptions, Estimator};
 use crate::evaluate::baseline::{DualFilter, Initialisation, PredictionErrorMethod};
 use crate::progress::Progress;
+use crate::twin::Twin;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -51,7 +52,7 @@ impl Run {
         simulated: &Simulated,
         progress: &Progress,
     ) -> Result<Self, MonteCarloError> {
-        let twin = estimator.study().twin().as_ref();
+        let twin = estimator.study().twin();
         let Simulated {
             truth,
             record,
@@ -90,11 +91,13 @@ impl Run {
                     (fit.map(|fit| fit.theta), None)
                 }
                 Method::DualFilter(from) => {
-                    let run = start(from)
-                        .zip(twin.state_space())
-                        .and_then(|(start, equations)| {
-                            DualFilter::default().run(equations, record, &start).ok()
-                        });
+                    let run = match twin {
+                        Twin::Equations(equations) => start(from).and_then(|start| {
+                            let filter = DualFilter::default();
+                            filter.run(equations.as_ref(), record, &start).ok()
+                        }),
+                        Twin::BlackBox(_) => None,
+                    };
                     (run.map(|run| run.theta), None)
                 }
                 stage => match &estimate {

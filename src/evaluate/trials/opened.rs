@@ -75,7 +75,7 @@ impl Opened {
             }
         }
         let abstains = truth.kind.is_structural()
-            && (truth.right.iter()).all(|key| settings.without.contains(key));
+            && (truth.right.iter()).all(|key| settings.without.contains(&key.as_str().into()));
         let shortfall = match abstains && !settings.detection_only {
             true => shortfall(urn, truth, validation.is_some(), noise, settings, progress)?,
             false => None,

@@ -87,7 +87,7 @@ impl<'a> Urn<'a> {
             return Err(WithheldError::NoWorld(format!("this {}", study.name())));
         }
         let library = (study.candidates().iter())
-            .map(|e| format!("{}@{}", e.typetag_name(), e.target()))
+            .map(|e| e.key().to_string())
             .collect();
         Ok(Self {
             world,

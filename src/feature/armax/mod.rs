@@ -4,7 +4,7 @@ mod hannan_rissanen;
 
 use super::{FeatureError, FeatureMap, FeatureRecipe, check_varies};
 use crate::record::{Drive, Signal};
-use crate::twin::DigitalTwin;
+use crate::twin::Twin;
 use hannan_rissanen::{Model, Orders, estimate};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -31,10 +31,10 @@ use std::sync::Arc;
 /// ```
 /// use truetwin::feature::{Armax, FeatureRecipe};
 /// use truetwin::record::{Drive, Signal};
-/// use truetwin::twin::{DigitalTwin, Noise};
+/// use truetwin::twin::{DigitalTwin, Noise, Twin};
 /// use truetwin::twins::CascadedTanks;
 ///
-/// let twin: std::sync::Arc<dyn DigitalTwin> = std::sync::Arc::new(CascadedTanks);
+/// let twin = Twin::new(CascadedTanks);
 /// let drive = Drive::new(0.5, Signal::ones((400, 1)))?;
 /// let y = twin.simulate(&[0.6, 0.5, 0.55, 1.0], &drive, Noise::new(1, "example", 0))?;
 /// let map = Armax { outputs: 2, inputs: 1, noise: 2 }.bind(&twin)?;
@@ -59,7 +59,7 @@ pub struct Armax {
 
 #[typetag::serde(name = "armax")]
 impl FeatureRecipe for Armax {
-    fn bind(&self, twin: &Arc<dyn DigitalTwin>) -> Result<Arc<dyn FeatureMap>, FeatureError> {
+    fn bind(&self, twin: &Twin) -> Result<Arc<dyn FeatureMap>, FeatureError> {
         let refuse = |problem: String| {
             let kind = "armax";
             Err(FeatureError::Setting { kind, problem })
@@ -134,8 +134,8 @@ mod tests {
     };
 
     /// A tank with `inputs` inputs: one state, process and measurement noise, so ARMAX(1, 1, 1) exactly.
-    fn record(inputs: usize, samples: usize) -> (Arc<dyn DigitalTwin>, Drive, Signal) {
-        let twin: Arc<dyn DigitalTwin> = Arc::new(Tank(inputs));
+    fn record(inputs: usize, samples: usize) -> (Twin, Drive, Signal) {
+        let twin = Twin::new(Tank(inputs));
         let levels = Signal::from_shape_fn((samples, inputs), |(k, _)| f64::from(k / 20 % 2 == 0));
         let drive = Drive::new(0.1, levels).unwrap();
         let y = twin

@@ -7,7 +7,7 @@ use crate::likelihood::kalman::{
     Coordinates, FilterError, FilterSettings, Kalman, Score as Gradient,
 };
 use crate::record::{Drive, Record, Signal};
-use crate::twin::{DigitalTwin, Noise, ParameterSpace};
+use crate::twin::{Noise, ParameterSpace, StateSpace, Twin};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -30,10 +30,10 @@ use std::sync::Arc;
 /// use std::sync::Arc;
 /// use truetwin::feature::{Score, FeatureRecipe};
 /// use truetwin::record::Drive;
-/// use truetwin::twin::{DigitalTwin, Noise};
+/// use truetwin::twin::{DigitalTwin, Noise, Twin};
 /// use truetwin::twins::VanDerPol;
 ///
-/// let twin: Arc<dyn DigitalTwin> = Arc::new(VanDerPol);
+/// let twin = Twin::new(VanDerPol);
 /// let drive = Drive::autonomous(0.05, 300)?;
 /// let outputs = twin.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
 ///
@@ -52,21 +52,21 @@ pub struct Score {
 
 #[typetag::serde(name = "score")]
 impl FeatureRecipe for Score {
-    fn bind(&self, twin: &Arc<dyn DigitalTwin>) -> Result<Arc<dyn FeatureMap>, FeatureError> {
-        if twin.state_space().is_none() {
+    fn bind(&self, twin: &Twin) -> Result<Arc<dyn FeatureMap>, FeatureError> {
+        let Twin::Equations(equations) = twin else {
             return Err(FeatureError::Setting {
                 kind: "score",
                 problem:
                     "a black-box twin shows no equations to filter with; take ar, arx or armax"
                         .into(),
             });
-        }
+        };
         let space = twin.parameters();
         Ok(Arc::new(Bound {
             reference: space.centre(),
             coordinates: Coordinates::new(&space),
             filter: self.filter.clone(),
-            twin: twin.clone(),
+            equations: equations.clone(),
             space,
         }))
     }
@@ -75,7 +75,7 @@ impl FeatureRecipe for Score {
 /// Score features at one reference.
 #[derive(Clone)]
 struct Bound {
-    twin: Arc<dyn DigitalTwin>,
+    equations: Arc<dyn StateSpace>,
     space: ParameterSpace,
     coordinates: Coordinates,
     filter: FilterSettings,
@@ -89,11 +89,7 @@ impl Bound {
         record: &Record,
         with: impl FnOnce(&Kalman<'_>) -> Result<R, FilterError>,
     ) -> Result<R, FilterError> {
-        let equations = self
-            .twin
-            .state_space()
-            .expect("bound to twins with equations only");
-        with(&Kalman::new(equations, record, &self.filter)?)
+        with(&Kalman::new(self.equations.as_ref(), record, &self.filter)?)
     }
 }
 
@@ -148,13 +144,13 @@ mod tests {
     use super::*;
     use crate::feature::testing::Tank;
 
-    fn bound() -> (Arc<dyn DigitalTwin>, Arc<dyn FeatureMap>) {
-        let twin: Arc<dyn DigitalTwin> = Arc::new(Tank(1));
+    fn bound() -> (Twin, Arc<dyn FeatureMap>) {
+        let twin = Twin::new(Tank(1));
         let map = Score::default().bind(&twin).unwrap();
         (twin, map)
     }
 
-    fn simulated(twin: &dyn DigitalTwin, k: f64, seed: u64) -> Record {
+    fn simulated(twin: &Twin, k: f64, seed: u64) -> Record {
         let drive = Drive::new(0.1, Signal::from_elem((200, 1), 1.0)).unwrap();
         let outputs = twin
             .simulate(&[k], &drive, Noise::new(seed, "t", 0))
@@ -167,7 +163,7 @@ mod tests {
     fn the_first_feature_is_a_step_towards_the_truth() {
         let (twin, map) = bound();
         for (k, sign) in [(0.45, -1.0), (0.65, 1.0)] {
-            let record = simulated(twin.as_ref(), k, 1);
+            let record = simulated(&twin, k, 1);
             let x = map.extract(record.drive(), record.outputs()).unwrap();
             assert_eq!(x.len(), 3);
             assert!(x[0] * sign > 0.0, "{k}: {x:?}");
@@ -181,7 +177,7 @@ mod tests {
         let records = 40u64;
         let squares: f64 = (0..records)
             .map(|seed| {
-                let record = simulated(twin.as_ref(), 0.8, seed);
+                let record = simulated(&twin, 0.8, seed);
                 let noise = Noise::new(seed, "posterior", 0);
                 let found = map.centred(&record, &[0.3], noise).unwrap().unwrap();
                 ((found.theta[0] - 0.8) / found.axes[(0, 0)]).powi(2)

@@ -6,7 +6,9 @@
 use super::runs::run;
 use crate::math::{deviation, largest};
 use crate::record::{Drive, Record, RecordError, Signal, Signals};
-use crate::twin::{DigitalTwin, Interval, Noise, Parameter, ParameterSpace, Role, SimulationError};
+use crate::twin::{
+    DigitalTwin, Interval, Noise, Parameter, ParameterSpace, Role, SimulationError, Twin,
+};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
@@ -17,17 +19,14 @@ const KEPT: usize = 2_000_000;
 
 /// The twin as records show it: itself, or, where two runs are alike to the bit, with measurement noise. Also whether that
 /// was so.
-pub(crate) fn measured(
-    twin: &Arc<dyn DigitalTwin>,
-    records: &[Record],
-) -> Result<(Arc<dyn DigitalTwin>, bool), SimulationError> {
-    let Some(record) = records.first().filter(|_| twin.state_space().is_none()) else {
+pub(crate) fn measured(twin: &Twin, records: &[Record]) -> Result<(Twin, bool), SimulationError> {
+    let (Twin::BlackBox(base), Some(record)) = (twin, records.first()) else {
         return Ok((twin.clone(), false));
     };
     let theta = twin.parameters().centre();
     let one = |sample: u64| {
         let noise = Noise::new(0, "silent", sample);
-        run(twin.as_ref(), &theta, record.drive(), noise)
+        run(twin, &theta, record.drive(), noise)
     };
     let (Some(first), Some(second)) = (one(0)?, one(1)?) else {
         return Ok((twin.clone(), false));
@@ -36,11 +35,11 @@ pub(crate) fn measured(
         return Ok((twin.clone(), false));
     }
     let silent = Silent {
-        base: twin.clone(),
-        levels: levels(twin.as_ref(), record),
+        base: base.clone(),
+        levels: levels(twin, record),
         runs: Mutex::default(),
     };
-    Ok((Arc::new(silent), true))
+    Ok((Twin::BlackBox(Arc::new(silent)), true))
 }
 
 /// The records with noise too small to matter, so that one without any is as noisy as simulations are. Values that stand there

@@ -106,7 +106,7 @@ impl<'k, S: Size> Pass<'k, S> {
     pub fn new(size: S, kalman: &'k Kalman<'k>, theta: &'k [f64]) -> Result<Self, FilterError> {
         kalman.check(theta)?;
         let drive = kalman.record.drive();
-        kalman.twin.admit(theta, drive.dt())?;
+        kalman.twin.check_parameters(theta, drive.dt())?;
         let (n, p) = (size.states(), size.outputs());
         let now = Now {
             t: 0.0,

@@ -45,7 +45,7 @@ fn the_example_is_a_sound_twin() {
         .unwrap()
         .draw(Noise::new(1, "input", 0))
         .unwrap();
-    for finding in check(study.twin().as_ref(), &drive, 1) {
+    for finding in check(study.twin(), &drive, 1) {
         assert_eq!(finding.severity, Severity::Pass, "{finding:?}");
     }
 }

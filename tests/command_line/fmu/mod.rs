@@ -229,7 +229,7 @@ fn a_check_finds_nothing_but_that_there_is_no_noise() {
             .unwrap()
             .draw(Noise::new(1, "input", 0))
             .unwrap();
-        let findings = check(study.twin().as_ref(), &drive, 1);
+        let findings = check(study.twin(), &drive, 1);
         assert!(
             findings.iter().all(|f| f.severity < Severity::Failure),
             "{findings:?}"

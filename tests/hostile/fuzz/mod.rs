@@ -120,8 +120,11 @@ fn seeds_that_are_not_text() {
     };
     readers::write_bank(&new("bank/stored.npz"));
     readers::write_bank(&new("bank/table.csv"));
-    let matrix = ndarray::array![[0.5, 0.25], [1e-9, -3.0]];
-    ndarray_npy::write_npy(new("bank/matrix.npy"), &matrix).unwrap();
+    std::fs::write(
+        new("bank/matrix.npy"),
+        readers::npy([0.5, 0.25, 1e-9, -3.0]),
+    )
+    .unwrap();
     let project = readers::tiny();
     let options = PretrainOptions {
         preset: PresetName::Default,

@@ -9,8 +9,7 @@ use std::fs;
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
-use truetwin::effect::augment;
-use truetwin::effect::read_effects;
+use truetwin::effect::{Catalogue, augment};
 use truetwin::estimator::Estimator;
 use truetwin::estimator::Project;
 use truetwin::estimator::bank::{Bank, Draws, file as bank_file};
@@ -93,7 +92,9 @@ pub fn study(data: &[u8]) -> Result<(), String> {
 
 /// An effect file, up to the twin that has the effects.
 pub fn effect(data: &[u8]) -> Result<(), String> {
-    let found = read_effects(&file("effect.toml", data)).map_err(text)?;
+    let found = Catalogue::default()
+        .read(&file("effect.toml", data))
+        .map_err(text)?;
     let Some(study) = projects()
         .iter()
         .map(Project::study)
@@ -233,14 +234,7 @@ pub fn bank(data: &[u8]) -> Result<(), String> {
 
 /// An archive with sound `theta` and these bytes as `features`.
 fn archive(features: &[u8]) -> Vec<u8> {
-    static THETA: OnceLock<Vec<u8>> = OnceLock::new();
-    let theta = THETA.get_or_init(|| {
-        use ndarray_npy::WriteNpyExt;
-        let mut bytes = Vec::new();
-        let theta = array![[1.0, 2.0], [3.0, 4.0]];
-        theta.write_npy(&mut bytes).expect("into memory");
-        bytes
-    });
+    let theta = npy([1.0, 2.0, 3.0, 4.0]);
     let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
     for (name, bytes) in [("theta.npy", theta.as_slice()), ("features.npy", features)] {
         let options = zip::write::SimpleFileOptions::default();
@@ -248,6 +242,16 @@ fn archive(features: &[u8]) -> Vec<u8> {
         archive.write_all(bytes).expect("into memory");
     }
     archive.finish().expect("into memory").into_inner()
+}
+
+/// The bytes of a 2 × 2 matrix as NumPy writes them.
+pub fn npy(numbers: [f64; 4]) -> Vec<u8> {
+    let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+    bytes.extend(b"{'descr': '<f8', 'fortran_order': False, 'shape': (2, 2), }");
+    bytes.resize(127, b' ');
+    bytes.push(b'\n');
+    bytes.extend(numbers.map(f64::to_le_bytes).concat());
+    bytes
 }
 
 /// Writes a small bank, for a seed.

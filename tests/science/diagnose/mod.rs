@@ -11,7 +11,7 @@ use truetwin::diagnose::{Decision, DiagnoseSettings, Verdict, diagnose};
 use truetwin::math::binomial_bounds;
 use truetwin::progress::{Listener, Progress};
 use truetwin::record::{Drive, Record, Signal};
-use truetwin::twin::{DigitalTwin, Noise};
+use truetwin::twin::{Noise, Twin};
 
 /// Records of the twin itself, half of them with θ outside the prior: alarms stay within the binomial bound.
 #[test]
@@ -89,7 +89,7 @@ fn an_unlisted_push_is_named_by_nobody() {
     let study = study("van-der-pol");
     let noise = Noise::new(34, "unlisted", 0);
     let base = study.twin().clone();
-    let twin: Arc<dyn DigitalTwin> = Arc::new(Unlisted { base, kind: 2 });
+    let twin = Twin::new(Unlisted { base, kind: 2 });
     let record = record(&twin, "", &[1.5], drive(&study, noise), noise);
     let found = found(&study, record, None);
     println!("{}", line("unlisted", &found));

@@ -1,10 +1,9 @@
 //! A study of many records, for figures.
 
 use super::trials::*;
-use std::sync::Arc;
 use truetwin::diagnose::{Decision, Verdict};
 use truetwin::record::Record;
-use truetwin::twin::{DigitalTwin, Noise};
+use truetwin::twin::{Noise, Twin};
 
 fn number(name: &str, or: u64) -> u64 {
     std::env::var(name)
@@ -56,8 +55,8 @@ fn study_of_many_records() {
                 String::new(),
             ),
         };
-        let source: Arc<dyn DigitalTwin> = match kind.as_str() {
-            "unlisted" => Arc::new(Unlisted {
+        let source = match kind.as_str() {
+            "unlisted" => Twin::new(Unlisted {
                 base: twin.clone(),
                 kind: i as usize % UNLISTED,
             }),

@@ -1,15 +1,13 @@
 //! Records with known gaps, and what a diagnosis makes of many of them.
 
-use std::sync::Arc;
 use truetwin::diagnose::{DiagnoseSettings, Diagnosis, diagnose};
-use truetwin::effect::parse_effects;
-use truetwin::effect::{augment, given_magnitudes};
+use truetwin::effect::{Catalogue, augment, given_magnitudes};
 use truetwin::evaluate::paper::reference_studies;
 use truetwin::progress::Progress;
 use truetwin::record::{Drive, Record, Signal, Signals};
 use truetwin::study::Study;
 use truetwin::twin::{
-    DigitalTwin, Noise, Now, Outline, ParameterSpace, SimulationError, StateSpace,
+    DigitalTwin, Noise, Now, Outline, ParameterSpace, SimulationError, StateSpace, Twin,
 };
 
 pub fn study(name: &str) -> Study {
@@ -18,7 +16,7 @@ pub fn study(name: &str) -> Study {
 }
 
 /// A twin without its equations: noise and all come out of one box.
-pub struct Boxed(pub Arc<dyn DigitalTwin>);
+pub struct Boxed(pub Twin);
 
 impl DigitalTwin for Boxed {
     fn parameters(&self) -> ParameterSpace {
@@ -64,14 +62,8 @@ pub fn drive(study: &Study, noise: Noise) -> Drive {
 }
 
 /// A record of `twin` with the effects of a text.
-pub fn record(
-    twin: &Arc<dyn DigitalTwin>,
-    effects: &str,
-    theta: &[f64],
-    drive: Drive,
-    noise: Noise,
-) -> Record {
-    let effects = parse_effects(effects).unwrap();
+pub fn record(twin: &Twin, effects: &str, theta: &[f64], drive: Drive, noise: Noise) -> Record {
+    let effects = Catalogue::default().parse(effects).unwrap();
     let given = given_magnitudes(&effects);
     let twin = augment(twin.clone(), effects).unwrap();
     let space = twin.parameters();
@@ -250,7 +242,7 @@ pub fn clear(name: &str) -> Vec<(&'static str, &'static str)> {
 
 /// The tanks or the oscillator with something that no effect of the library says.
 pub struct Unlisted {
-    pub base: Arc<dyn DigitalTwin>,
+    pub base: Twin,
     pub kind: usize,
 }
 
@@ -259,7 +251,7 @@ pub const UNLISTED: usize = 4;
 
 impl Unlisted {
     fn inner(&self) -> &dyn StateSpace {
-        self.base.state_space().unwrap()
+        self.base.equations().unwrap()
     }
 }
 

@@ -5,12 +5,13 @@ use super::*;
 #[test]
 fn a_black_box_takes_signal_effects_only() {
     for (name, base, ..) in twins() {
-        let on_signals = applicable(base.as_ref())
+        let on_signals = Catalogue::default()
+            .applicable(&base)
             .iter()
             .all(|e| e.target() == "sensor" || e.target() == "actuator");
         assert_eq!(on_signals, name.starts_with("boxed"));
     }
-    let boxed: Arc<dyn DigitalTwin> = Arc::new(BlackBox(CascadedTanks));
+    let boxed: Twin = Twin::new(BlackBox(CascadedTanks));
     for effects in [
         one("linear-loss", "h1", ""),
         one("parameter-step", "k1", ""),
@@ -37,7 +38,7 @@ fn the_sensor_chain_keeps_its_order() {
         .iter()
         .chain(&chain[2..])
         .cloned()
-        .collect::<Effects>();
+        .collect::<Vec<Effect>>();
     for (name, base, theta, drive) in twins() {
         let noise = Noise::new(7, "chain", 0);
         let clipped = run(base.clone(), &theta, rest.clone(), &drive, noise);
@@ -57,19 +58,19 @@ fn the_sensor_chain_keeps_its_order() {
 #[test]
 fn black_box_and_equations_agree_without_noise() {
     let (_, base, theta, drive) = twins().remove(0);
-    for effect in applicable(&BlackBox(CascadedTanks)) {
+    for effect in Catalogue::default().applicable(&Twin::new(BlackBox(CascadedTanks))) {
         let starts = effect
             .magnitudes()
             .into_iter()
             .map(|m| m.starts[m.starts.len() - 1]);
         let at: Vec<f64> = theta.iter().copied().chain(starts).collect();
-        let y = |base: Arc<dyn DigitalTwin>| {
+        let y = |base: Twin| {
             let twin = augment(base, vec![effect.clone()]).unwrap();
             bits(&twin.simulate(&at, &drive, Noise::OFF).unwrap())
         };
         assert_eq!(
             y(base.clone()),
-            y(Arc::new(BlackBox(CascadedTanks))),
+            y(Twin::new(BlackBox(CascadedTanks))),
             "{effect:?}"
         );
     }
@@ -90,13 +91,13 @@ fn effects_nest() {
     let late = || one("sensor-delay", "sensor", "magnitudes = { delay = 40.0 }");
     for (_, base, theta, drive) in twins().into_iter().filter(|t| t.2.len() == 4) {
         let noise = Noise::new(8, "nest", 0);
-        let both = |first: Effects, then: Effects| {
+        let both = |first: Vec<Effect>, then: Vec<Effect>| {
             let theta = held(&held(&theta, &first), &then);
             let twin = augment(augment(base.clone(), first).unwrap(), then).unwrap();
             twin.simulate(&theta, &drive, noise)
         };
         let flat =
-            |effects: Vec<Effects>| run(base.clone(), &theta, effects.concat(), &drive, noise);
+            |effects: Vec<Vec<Effect>>| run(base.clone(), &theta, effects.concat(), &drive, noise);
         // The outer effect acts on the input first.
         assert_eq!(both(lag(), gain()).unwrap(), flat(vec![gain(), lag()]));
         let bias = one("sensor-bias", "sensor", "magnitudes = { offset = 0.0 }");
@@ -106,15 +107,11 @@ fn effects_nest() {
             "the inner delay is checked too"
         );
         let inner = augment(base.clone(), [lag(), late()].concat()).unwrap();
-        let targets = |twin: &dyn DigitalTwin| {
-            let all = applicable(twin);
+        let targets = |twin: &Twin| {
+            let all = Catalogue::default().applicable(twin);
             all.iter().map(|e| format!("{e:?}")).collect::<Vec<_>>()
         };
-        assert_eq!(
-            targets(inner.as_ref()),
-            targets(base.as_ref()),
-            "memories are no targets"
-        );
+        assert_eq!(targets(&inner), targets(&base), "memories are no targets");
     }
 }
 
@@ -140,6 +137,6 @@ fn feedthrough_sees_the_present_input() {
     }
     let drive = Drive::new(0.1, Signal::from_shape_fn((5, 1), |(k, _)| k as f64)).unwrap();
     let bias = one("actuator-bias", "actuator", "magnitudes = { offset = 1.0 }");
-    let y = run(Arc::new(Wire), &[2.0], bias, &drive, Noise::OFF);
+    let y = run(Twin::new(Wire), &[2.0], bias, &drive, Noise::OFF);
     assert_eq!(y.column(0).to_vec(), [2.0, 4.0, 6.0, 8.0, 10.0]);
 }

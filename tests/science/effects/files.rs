@@ -30,7 +30,7 @@ fn bad_files_are_refused_in_one_line() {
         (format!("{bias}magnitudes = \n"), vec!["line 4"]),
     ] {
         std::fs::write(&path, &text).unwrap();
-        let error = read_effects(&path).unwrap_err().to_string();
+        let error = Catalogue::default().read(&path).unwrap_err().to_string();
         assert!(
             error.contains("bad.toml") && !error.contains('\n') && !error.contains(", ,"),
             "{error}"
@@ -39,7 +39,9 @@ fn bad_files_are_refused_in_one_line() {
             assert!(error.contains(word), "{word}: {error}");
         }
     }
-    let missing = read_effects(&folder.path().join("none.toml")).unwrap_err();
+    let missing = Catalogue::default()
+        .read(&folder.path().join("none.toml"))
+        .unwrap_err();
     assert!(missing.to_string().contains("none.toml"), "{missing}");
 }
 
@@ -70,11 +72,19 @@ fn effects_that_do_not_fit_a_twin_are_refused_in_one_line() {
             ["spill = 1.5", "[0, 1]"],
         ),
         (
+            one("state-ceiling", "h1", "to = \"h1\""),
+            ["h1 to itself", "name another state"],
+        ),
+        (
+            one("cross-coupling", "h1", "from = \"h1\""),
+            ["h1 to itself", "name another state"],
+        ),
+        (
             one("sensor-bias", "sensor", "magnitudes = { offset = nan }"),
             ["offset", "NaN"],
         ),
     ] {
-        let error = augment(Arc::new(CascadedTanks), effects)
+        let error = augment(Twin::new(CascadedTanks), effects)
             .err()
             .unwrap()
             .to_string();
@@ -85,7 +95,7 @@ fn effects_that_do_not_fit_a_twin_are_refused_in_one_line() {
     }
     let late = one("sensor-delay", "sensor", "magnitudes = { delay = 40.0 }");
     let (theta, drive) = (held(&TANKS, &late), twins()[0].3.clone());
-    let twin = augment(Arc::new(CascadedTanks), late).unwrap();
+    let twin = augment(Twin::new(CascadedTanks), late).unwrap();
     let error = twin
         .simulate(&theta, &drive, Noise::OFF)
         .unwrap_err()
@@ -106,9 +116,9 @@ fn files_hold_off_values_and_survive_a_round_trip() {
     assert_eq!(effects[0].given().get("low"), Some(f64::NEG_INFINITY));
     assert_eq!(effects[0].given().get("high"), Some(2.0));
     assert_eq!(effects[1].given().get("spill"), None);
-    assert!(augment(Arc::new(CascadedTanks), effects.clone()).is_ok());
+    assert!(augment(Twin::new(CascadedTanks), effects.clone()).is_ok());
     let file: BTreeMap<_, Vec<_>> =
-        [("effect", effects.iter().map(AsRef::as_ref).collect())].into();
+        [("effect", effects.iter().map(Effect::entry).collect())].into();
     let text = toml::to_string(&file).unwrap();
     assert_eq!(format!("{:?}", from(&text)), format!("{effects:?}"));
 }

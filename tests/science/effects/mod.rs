@@ -9,9 +9,7 @@ mod off;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use truetwin::effect::*;
-use truetwin::effect::{applicable, library, parse_effects, read_effects};
 use truetwin::record::*;
 use truetwin::twin::*;
 use truetwin::twins::{CascadedTanks, VanDerPol};
@@ -37,7 +35,7 @@ impl<T: DigitalTwin> DigitalTwin for BlackBox<T> {
 }
 
 /// A name, a twin, a θ inside, and a drive that moves it.
-type Case = (&'static str, Arc<dyn DigitalTwin>, Vec<f64>, Drive);
+type Case = (&'static str, Twin, Vec<f64>, Drive);
 
 /// The reference twins, with their equations and without.
 fn twins() -> Vec<Case> {
@@ -48,50 +46,54 @@ fn twins() -> Vec<Case> {
     vec![
         (
             "tanks",
-            Arc::new(CascadedTanks),
+            Twin::new(CascadedTanks),
             tanks.clone(),
             driven.clone(),
         ),
-        ("van-der-pol", Arc::new(VanDerPol), nu.clone(), free.clone()),
+        (
+            "van-der-pol",
+            Twin::new(VanDerPol),
+            nu.clone(),
+            free.clone(),
+        ),
         (
             "boxed tanks",
-            Arc::new(BlackBox(CascadedTanks)),
+            Twin::new(BlackBox(CascadedTanks)),
             tanks,
             driven,
         ),
-        ("boxed van-der-pol", Arc::new(BlackBox(VanDerPol)), nu, free),
+        (
+            "boxed van-der-pol",
+            Twin::new(BlackBox(VanDerPol)),
+            nu,
+            free,
+        ),
     ]
 }
 
 /// θ of a twin with these effects at what their files hold; nothing may be left free.
-fn held(theta: &[f64], effects: &Effects) -> Vec<f64> {
+fn held(theta: &[f64], effects: &[Effect]) -> Vec<f64> {
     let magnitudes = effects.iter().flat_map(|effect| {
         let given = effect.given().clone();
-        (effect.magnitudes().into_iter()).map(move |m| given.get(m.name).unwrap())
+        (effect.magnitudes().iter()).map(move |m| given.get(m.name).unwrap())
     });
     theta.iter().copied().chain(magnitudes).collect()
 }
 
 /// Effects from the text of a file.
-fn from(text: &str) -> Effects {
-    parse_effects(text).unwrap()
+fn from(text: &str) -> Vec<Effect> {
+    Catalogue::default().parse(text).unwrap()
 }
 
 /// One effect in a file; `rest` holds further keys.
-fn one(id: &str, target: &str, rest: &str) -> Effects {
+fn one(id: &str, target: &str, rest: &str) -> Vec<Effect> {
     from(&format!(
         "[[effect]]\nid = \"{id}\"\ntarget = \"{target}\"\n{rest}"
     ))
 }
 
 /// One run of a twin with these effects.
-fn run(
-    base: Arc<dyn DigitalTwin>,
-    theta: &[f64],
-    e: Effects,
-    drive: &Drive,
-    noise: Noise,
-) -> Signal {
+fn run(base: Twin, theta: &[f64], e: Vec<Effect>, drive: &Drive, noise: Noise) -> Signal {
     let theta = held(theta, &e);
     (augment(base, e).unwrap().simulate(&theta, drive, noise)).unwrap()
 }

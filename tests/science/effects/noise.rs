@@ -7,8 +7,8 @@ use super::*;
 fn effects_move_no_draws() {
     let (_, base, theta, drive) = twins().remove(0);
     let noise = Noise::new(4, "draws", 0);
-    let part = |effects: &Effects| {
-        let at = |n| run(base.clone(), &theta, effects.clone(), &drive, n);
+    let part = |effects: &[Effect]| {
+        let at = |n| run(base.clone(), &theta, effects.to_vec(), &drive, n);
         at(noise) - at(Noise::OFF)
     };
     let plain = part(&vec![]);
@@ -28,13 +28,13 @@ fn effects_move_no_draws() {
 }
 
 /// Variance of one sample over many runs.
-fn variance(base: Arc<dyn DigitalTwin>, theta: &[f64], effects: &Effects, row: usize) -> f64 {
+fn variance(base: Twin, theta: &[f64], effects: &[Effect], row: usize) -> f64 {
     let inputs = base.signals().inputs.len();
     let drive = Drive::new(0.5, Signal::ones((row + 1, inputs))).unwrap();
-    let free = run(base.clone(), theta, effects.clone(), &drive, Noise::OFF)[[row, 0]];
+    let free = run(base.clone(), theta, effects.to_vec(), &drive, Noise::OFF)[[row, 0]];
     let n = 8000;
     let theta = held(theta, effects);
-    let twin = augment(base, effects.clone()).unwrap();
+    let twin = augment(base, effects.to_vec()).unwrap();
     let square = |i| {
         let y = twin
             .simulate(&theta, &drive, Noise::new(5, "variance", i))
@@ -61,10 +61,10 @@ fn noises_add_in_quadrature() {
     // Sample 1 of the oscillator carries the noise of x1, which has none of its own; sample 2 carries Δt times the first
     // increment of x2, whose own standard deviation is Δt·√0.02.
     let shaken = one("process-noise", "x1", "magnitudes = { std = 0.3 }");
-    let v = variance(Arc::new(VanDerPol), &NU, &shaken, 1);
+    let v = variance(Twin::new(VanDerPol), &NU, &shaken, 1);
     assert!(near(v, 0.09), "{v}");
     let shaken = one("process-noise", "x2", "magnitudes = { std = 0.07 }");
-    let v = variance(Arc::new(VanDerPol), &NU, &shaken, 2);
+    let v = variance(Twin::new(VanDerPol), &NU, &shaken, 2);
     assert!(near(v, 0.25 * (0.25 * 0.02 + 0.0049)), "{v}");
 }
 

@@ -5,7 +5,6 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use truetwin::effect::*;
-use truetwin::effect::{ActuatorLag, SensorLag, SensorOutliers, StateCeiling};
 use truetwin::likelihood::kalman::{
     FilterSettings, Kalman, Method, Score, filter, log_likelihood, smooth,
 };
@@ -101,12 +100,12 @@ fn an_unknown_start_is_found() {
         ..Adaptation::default()
     };
     let twin = adapt(Arc::new(CascadedTanks), &adaptation, 0.5).unwrap();
-    let equations = twin.state_space().unwrap();
+    let equations = twin.equations().unwrap();
     let truth = [0.6, 0.5, 0.55, 1.0, 3.0, 6.0];
     let errors: Vec<[f64; 2]> = (0..12)
         .into_par_iter()
         .map(|run| {
-            let record = record(twin.as_ref(), &truth, levels(run), run);
+            let record = record(&twin, &truth, levels(run), run);
             let begin = [0.55, 0.55, 0.55, 1.0, 4.0, 5.0];
             let (theta, sd) = maximum_likelihood(equations, &record, &begin);
             [4, 5].map(|j| (theta[j] - truth[j]) / sd[j])
@@ -129,7 +128,7 @@ fn noise_levels_are_parameters() {
         ..Adaptation::default()
     };
     let twin = adapt(Arc::new(CascadedTanks), &adaptation, 0.5).unwrap();
-    let equations = twin.state_space().unwrap();
+    let equations = twin.equations().unwrap();
     let mut truth = CENTRE.to_vec();
     for name in &twin.parameters().names()[4..] {
         truth.push(if *name == "noise.y" { 0.15 } else { 0.1 });
@@ -157,20 +156,16 @@ fn effects_that_are_off_leave_the_likelihood() {
     let record = simulated(&CENTRE, 3);
     let settings = FilterSettings::default();
     let base = log_likelihood(&CascadedTanks, &CENTRE, &record, &settings).unwrap();
-    let effects: Effects = vec![
-        Arc::new(SensorLag {
-            target: "sensor".into(),
-            magnitudes: Given::default(),
-        }),
-        Arc::new(ActuatorLag {
-            target: "actuator".into(),
-            magnitudes: Given::default(),
-        }),
+    let library = Catalogue::default();
+    let listed = |id, target| library.effect(id, target).unwrap();
+    let effects = vec![
+        listed("sensor-lag", "sensor"),
+        listed("actuator-lag", "actuator"),
     ];
     let twin = augment(Arc::new(CascadedTanks), effects).unwrap();
     let mut theta = CENTRE.to_vec();
     theta.extend([0.0, 0.0]);
-    let equations = twin.state_space().unwrap();
+    let equations = twin.equations().unwrap();
     let off = log_likelihood(equations, &theta, &record, &settings).unwrap();
     assert!((off - base).abs() < 1e-6, "{off} {base}");
     theta[4] = 2.0;
@@ -178,19 +173,15 @@ fn effects_that_are_off_leave_the_likelihood() {
     assert!(on < base - 5.0, "{on} {base}");
 
     // A ceiling is a constraint: points go through it.
-    let ceiling: Effects = vec![Arc::new(StateCeiling {
-        target: "h1".into(),
-        to: "h2".into(),
-        magnitudes: Given::default(),
-    })];
+    let ceiling = vec![listed("state-ceiling", "h1").with_other("h2")];
     let twin = augment(Arc::new(CascadedTanks), ceiling).unwrap();
-    let equations = twin.state_space().unwrap();
+    let equations = twin.equations().unwrap();
     let mut theta = CENTRE.to_vec();
     theta.extend([f64::INFINITY, 0.5]);
     let off = log_likelihood(equations, &theta, &record, &settings).unwrap();
     assert!((off - base).abs() < 1e-9, "{off} {base}");
     theta[4] = 3.0;
-    let spilled = super::record(twin.as_ref(), &theta, levels(3), 3);
+    let spilled = super::record(&twin, &theta, levels(3), 3);
     let known = log_likelihood(equations, &theta, &spilled, &settings).unwrap();
     let unknown = log_likelihood(&CascadedTanks, &CENTRE, &spilled, &settings).unwrap();
     assert!(known > unknown + 10.0, "{known} {unknown}");
@@ -199,19 +190,17 @@ fn effects_that_are_off_leave_the_likelihood() {
 /// Outliers make rows a mixture: the score at the truth has mean zero, and off they change no bit.
 #[test]
 fn outliers_are_a_mixture() {
-    let effects: Effects = vec![Arc::new(SensorOutliers {
-        target: "sensor".into(),
-        magnitudes: Given::default(),
-    })];
+    let outliers = Catalogue::default().effect("sensor-outliers", "sensor");
+    let effects = vec![outliers.unwrap()];
     let twin = augment(Arc::new(CascadedTanks), effects).unwrap();
-    let equations = twin.state_space().unwrap();
+    let equations = twin.equations().unwrap();
     let settings = FilterSettings::default();
     let with = |m: [f64; 2]| [&CENTRE[..], &m].concat();
     let truth = with([0.05, 1.5]);
     let scores: Vec<[f64; 2]> = (0..40)
         .into_par_iter()
         .map(|run| {
-            let record = record(twin.as_ref(), &truth, levels(run), run);
+            let record = record(&twin, &truth, levels(run), run);
             let kalman = Kalman::new(equations, &record, &settings).unwrap();
             let plain = kalman.log_likelihood(&with([0.0, 1.5])).unwrap();
             let base = log_likelihood(&CascadedTanks, &CENTRE, &record, &settings).unwrap();

@@ -11,7 +11,7 @@ use truetwin::study::Study;
 fn maximum_likelihood(study: &Study, record: &Record, truth: &[f64]) -> Vec<f64> {
     let settings = FilterSettings::default();
     let twin = study.twin();
-    let kalman = Kalman::new(twin.state_space().unwrap(), record, &settings).unwrap();
+    let kalman = Kalman::new(twin.equations().unwrap(), record, &settings).unwrap();
     let coordinates = Coordinates::new(&twin.parameters());
     let mut theta = truth.to_vec();
     let mut score = Score::at(&kalman, &theta).unwrap();
@@ -52,7 +52,7 @@ fn maximum_likelihood(study: &Study, record: &Record, truth: &[f64]) -> Vec<f64>
 pub(super) fn cramer_rao(study: &Study, record: &Record, truth: &[f64]) -> f64 {
     let settings = FilterSettings::default();
     let twin = study.twin();
-    let kalman = Kalman::new(twin.state_space().unwrap(), record, &settings).unwrap();
+    let kalman = Kalman::new(twin.equations().unwrap(), record, &settings).unwrap();
     let score = Score::at(&kalman, truth).unwrap();
     let covariance = score.fisher.try_inverse().unwrap();
     let slopes = Coordinates::new(&twin.parameters()).slopes(truth);

@@ -1,0 +1,179 @@
+//! The handle by which every stage holds a twin.
+
+use crate::record::{Drive, Signal, Signals};
+use crate::twin::modified::{Modified, Modify};
+use crate::twin::{DigitalTwin, Noise, Outline, ParameterSpace, SimulationError, StateSpace};
+use std::sync::Arc;
+
+/// A twin of either kind, cheap to clone. A stage that needs equations matches once, at its entrance.
+///
+/// ```
+/// use truetwin::twin::Twin;
+/// use truetwin::twins::VanDerPol;
+///
+/// let twin = Twin::new(VanDerPol);
+/// assert!(matches!(twin, Twin::Equations(_)));
+/// assert_eq!(twin.parameters().names(), ["nu"]);
+/// ```
+#[derive(Clone)]
+pub enum Twin {
+    /// A twin that shows its equations.
+    Equations(Arc<dyn StateSpace>),
+    /// A twin that can only be simulated.
+    BlackBox(Arc<dyn DigitalTwin>),
+}
+
+debug_by_name!(Twin);
+
+impl Twin {
+    /// The handle of `twin`.
+    pub fn new(twin: impl DigitalTwin + 'static) -> Self {
+        Arc::new(twin).into()
+    }
+
+    /// Names, units, prior box and physical bounds, in the order of θ.
+    pub fn parameters(&self) -> ParameterSpace {
+        match self {
+            Self::Equations(twin) => twin.outline().parameters,
+            Self::BlackBox(twin) => twin.parameters(),
+        }
+    }
+
+    /// Input and output channels.
+    pub fn signals(&self) -> Signals {
+        match self {
+            Self::Equations(twin) => twin.outline().signals(),
+            Self::BlackBox(twin) => twin.signals(),
+        }
+    }
+
+    /// Outputs as [`DigitalTwin::simulate`] gives them.
+    pub fn simulate(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Signal, SimulationError> {
+        match self {
+            Self::Equations(twin) => twin.run(theta, drive, noise),
+            Self::BlackBox(twin) => twin.simulate(theta, drive, noise),
+        }
+    }
+
+    /// Outputs without noise as [`DigitalTwin::free_run`] gives them.
+    pub fn free_run(&self, theta: &[f64], drive: &Drive) -> Result<Signal, SimulationError> {
+        match self {
+            Self::Equations(twin) => twin.run(theta, drive, Noise::OFF),
+            Self::BlackBox(twin) => twin.free_run(theta, drive),
+        }
+    }
+
+    /// The equations; `None` for a black box.
+    pub fn equations(&self) -> Option<&dyn StateSpace> {
+        match self {
+            Self::Equations(twin) => Some(twin.as_ref()),
+            Self::BlackBox(_) => None,
+        }
+    }
+
+    /// Names and units of the equations; `None` for a black box.
+    pub fn outline(&self) -> Option<Outline> {
+        self.equations().map(StateSpace::outline)
+    }
+
+    /// The twin with `hook` called before each of its runs; an error of the hook stops the run.
+    pub(crate) fn watched(&self, hook: impl Hook) -> Self {
+        match self.clone() {
+            Self::Equations(base) => Self::Equations(Arc::new(Modified(Watched { base, hook }))),
+            Self::BlackBox(base) => Self::BlackBox(Arc::new(Watched { base, hook })),
+        }
+    }
+}
+
+impl<T: DigitalTwin + 'static> From<Arc<T>> for Twin {
+    fn from(twin: Arc<T>) -> Self {
+        (twin as Arc<dyn DigitalTwin>).into()
+    }
+}
+
+impl From<Arc<dyn DigitalTwin>> for Twin {
+    fn from(twin: Arc<dyn DigitalTwin>) -> Self {
+        match twin.clone().equations() {
+            Some(equations) => Self::Equations(equations),
+            None => Self::BlackBox(twin),
+        }
+    }
+}
+
+impl DigitalTwin for Twin {
+    fn parameters(&self) -> ParameterSpace {
+        self.parameters()
+    }
+    fn simulate(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Signal, SimulationError> {
+        self.simulate(theta, drive, noise)
+    }
+    fn signals(&self) -> Signals {
+        self.signals()
+    }
+    fn free_run(&self, theta: &[f64], drive: &Drive) -> Result<Signal, SimulationError> {
+        self.free_run(theta, drive)
+    }
+    fn equations(self: Arc<Self>) -> Option<Arc<dyn StateSpace>> {
+        match self.as_ref() {
+            Self::Equations(twin) => Some(twin.clone()),
+            Self::BlackBox(_) => None,
+        }
+    }
+}
+
+/// Called before each run of a watched twin.
+pub(crate) trait Hook: Fn() -> Result<(), SimulationError> + Send + Sync + 'static {}
+
+impl<F: Fn() -> Result<(), SimulationError> + Send + Sync + 'static> Hook for F {}
+
+/// A twin with a hook before each run.
+struct Watched<B: ?Sized, H> {
+    base: Arc<B>,
+    hook: H,
+}
+
+impl<H: Hook> Modify for Watched<dyn StateSpace, H> {
+    fn base(&self) -> &dyn StateSpace {
+        self.base.as_ref()
+    }
+
+    fn run(
+        whole: &Modified<Self>,
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Signal, SimulationError> {
+        (whole.0.hook)()?;
+        whole.0.base.run(theta, drive, noise)
+    }
+}
+
+impl<H: Hook> DigitalTwin for Watched<dyn DigitalTwin, H> {
+    fn parameters(&self) -> ParameterSpace {
+        self.base.parameters()
+    }
+
+    fn signals(&self) -> Signals {
+        self.base.signals()
+    }
+
+    fn simulate(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Signal, SimulationError> {
+        (self.hook)()?;
+        self.base.simulate(theta, drive, noise)
+    }
+}
