@@ -24,10 +24,9 @@ pub fn read_record(path: &Path) -> Result<Record, RecordError> {
     read(path)?.record(path)
 }
 
-/// Reads time and inputs to simulate with; outputs, if the file is a record, are ignored.
+/// Reads time and inputs to simulate with; a file with outputs is refused.
 pub fn read_drive(path: &Path) -> Result<Drive, RecordError> {
-    let table = read(path)?;
-    Drive::new(table.dt, table.inputs).map_err(|error| RecordError::file(path, error))
+    read(path)?.drive(path)
 }
 
 /// Parses the text of a record that stands in the program itself; `path` is for messages.
