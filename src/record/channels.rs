@@ -1,13 +1,6 @@
 //! Names and units of channels.
 
 /// A named physical quantity with its unit.
-///
-/// ```
-/// use truetwin::record::Quantity;
-///
-/// let level = Quantity::new("h", "m");
-/// assert_eq!((level.name.as_str(), level.unit.as_str()), ("h", "m"));
-/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Quantity {
     /// Name.
@@ -27,15 +20,6 @@ impl Quantity {
 }
 
 /// The channels of a twin.
-///
-/// ```
-/// use truetwin::record::Signals;
-/// use truetwin::twin::DigitalTwin;
-/// use truetwin::twins::VanDerPol;
-///
-/// assert!(VanDerPol.signals().inputs.is_empty());
-/// assert_eq!(Signals::default().outputs[0].name, "y"); // of a black box that says nothing else
-/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Signals {
     /// Inputs, in the order of a drive's columns.
@@ -50,5 +34,14 @@ impl Default for Signals {
             inputs: vec![Quantity::new("u", "")],
             outputs: vec![Quantity::new("y", "")],
         }
+    }
+}
+
+/// Column names of a record file: `u` for one channel, `u1,u2,…` for several, nothing for none.
+pub(super) fn column_names(letter: &str, channels: usize) -> Vec<String> {
+    match channels {
+        0 => vec![],
+        1 => vec![letter.into()],
+        _ => (1..=channels).map(|j| format!("{letter}{j}")).collect(),
     }
 }

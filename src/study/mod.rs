@@ -10,9 +10,9 @@ pub use plan::{DriveSource, InputPlan, Levels, PlanError, RecordPlan};
 use crate::effect::{
     Catalogue, Effect, EffectError, EffectKey, EffectKind, EffectPattern, augment, given_magnitudes,
 };
-use crate::record::{CsvError, Record, RecordError};
+use crate::record::{Record, RecordError};
 use crate::setting::did_you_mean;
-use crate::twin::{Adaptation, AdaptationError, DigitalTwin, ParameterError, Twin, adapt, fix};
+use crate::twin::{Adaptation, DigitalTwin, Twin, TwinError, adapt, check_twin, fix};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -77,7 +77,7 @@ pub enum StudyError {
     },
     /// Of prior, bounds, limits, noise, start.
     #[error(transparent)]
-    Adaptation(#[from] AdaptationError),
+    Adaptation(#[from] TwinError),
     /// Of effects.
     #[error(transparent)]
     Effect(#[from] EffectError),
@@ -91,22 +91,19 @@ pub enum StudyError {
     Library(String),
     /// Of fixed parameters.
     #[error("[fixed]: {0}")]
-    Fixed(ParameterError),
+    Fixed(TwinError),
     /// Of the twin's own parameters.
     #[error("twin \"{name}\": {error}")]
     Parameters {
         /// Twin.
         name: String,
         /// What is wrong.
-        error: ParameterError,
+        error: TwinError,
     },
     /// Of step, length, input.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// The demo record cannot be read.
-    #[error(transparent)]
-    Demo(#[from] CsvError),
-    /// Of a record's channels.
+    /// Of a record's channels, or of the file of the demo record.
     #[error(transparent)]
     Record(#[from] RecordError),
 }
@@ -119,12 +116,10 @@ impl Study {
         plan: RecordPlan,
     ) -> Result<Self, StudyError> {
         let base = Twin::new(twin);
-        base.parameters()
-            .check()
-            .map_err(|error| StudyError::Parameters {
-                name: name.into(),
-                error,
-            })?;
+        check_twin(&base).map_err(|error| StudyError::Parameters {
+            name: name.into(),
+            error,
+        })?;
         Ok(Self {
             name: name.into(),
             twin: base.clone(),
@@ -201,13 +196,7 @@ impl Study {
         let space = twin.parameters();
         for (name, &value) in &file.fixed {
             let parameter = &space[space.position(name).map_err(StudyError::Fixed)?];
-            if !parameter.bounds.contains(value) {
-                return Err(StudyError::Fixed(ParameterError::OutOfBounds {
-                    name: name.clone(),
-                    value,
-                    bounds: parameter.bounds,
-                }));
-            }
+            parameter.check_value(value).map_err(StudyError::Fixed)?;
         }
         let mut held = file.fixed.clone();
         held.extend(given_magnitudes(&effects));

@@ -1,16 +1,9 @@
 //! A closed interval of real numbers.
 
+use crate::twin::TwinError;
 use serde::{Deserialize, Serialize};
 
 /// `[low, high]`, in the unit of what it bounds; an end may be infinite. Files write it as `[low, high]`.
-///
-/// ```
-/// use truetwin::twin::Interval;
-/// let prior = Interval::new(0.4, 0.8)?;
-/// assert_eq!(prior.centre(), 0.6000000000000001);
-/// assert!(Interval::new(0.8, 0.4).is_err());
-/// # Ok::<(), truetwin::twin::IntervalError>(())
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "[f64; 2]", into = "[f64; 2]")]
 pub struct Interval {
@@ -18,44 +11,29 @@ pub struct Interval {
     high: f64,
 }
 
-/// An interval that is turned inside out.
-///
-/// ```
-/// use truetwin::twin::{Interval, IntervalError};
-///
-/// let error: IntervalError = Interval::new(2.0, 1.0).unwrap_err();
-/// assert!(error.to_string().contains('2'), "{error}");
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("[{low}, {high}] is turned inside out; write [low, high] with low < high")]
-pub struct IntervalError {
-    low: f64,
-    high: f64,
-}
-
 impl Interval {
-    /// Without bounds.
+    /// The interval without bounds.
     pub const EVERYTHING: Self = Self {
         low: f64::NEG_INFINITY,
         high: f64::INFINITY,
     };
 
     /// `[low, high]` with `low < high`, neither NaN.
-    pub fn new(low: f64, high: f64) -> Result<Self, IntervalError> {
+    pub fn new(low: f64, high: f64) -> Result<Self, TwinError> {
         if low < high {
             Ok(Self { low, high })
         } else {
-            Err(IntervalError { low, high })
+            Err(TwinError::Interval { low, high })
         }
     }
 
-    /// As written by an author in code; checked with the rest of the twin, not here.
+    /// An interval written in code; it is checked with the rest of the twin.
     pub(crate) const fn unchecked(low: f64, high: f64) -> Self {
         Self { low, high }
     }
 
-    /// Whether the ends are in order and not NaN.
-    pub(crate) fn check(self) -> Result<Self, IntervalError> {
+    /// Checks that the ends are in order and not NaN.
+    pub(crate) fn check(self) -> Result<Self, TwinError> {
         Self::new(self.low, self.high)
     }
 
@@ -79,12 +57,12 @@ impl Interval {
         self.low + 0.5 * self.width()
     }
 
-    /// Whether both ends are finite.
+    /// Tells whether both ends are finite.
     pub fn is_finite(self) -> bool {
         self.low.is_finite() && self.high.is_finite()
     }
 
-    /// Whether `value` lies inside, ends included.
+    /// Tells whether `value` lies inside, ends included.
     pub fn contains(self, value: f64) -> bool {
         self.low <= value && value <= self.high
     }
@@ -99,8 +77,8 @@ impl Interval {
 }
 
 impl TryFrom<[f64; 2]> for Interval {
-    type Error = IntervalError;
-    fn try_from([low, high]: [f64; 2]) -> Result<Self, IntervalError> {
+    type Error = TwinError;
+    fn try_from([low, high]: [f64; 2]) -> Result<Self, TwinError> {
         Self::new(low, high)
     }
 }

@@ -1,0 +1,148 @@
+//! Errors of a twin's parameters, names and settings, and of its simulations.
+
+use crate::setting::did_you_mean;
+
+/// A fault in a twin, its parameters, a point or a new setting.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TwinError {
+    /// An interval whose ends are exchanged, equal or NaN.
+    #[error("invalid interval [{low}, {high}]: low must be below high")]
+    Interval {
+        /// Lower end.
+        low: f64,
+        /// Upper end.
+        high: f64,
+    },
+    /// No parameter at all.
+    #[error("the twin has no parameter to estimate; declare or free at least one")]
+    NoParameter,
+    /// Two parameters, states, inputs or outputs of one name.
+    #[error("duplicate {kind} name {name}; rename one")]
+    Duplicate {
+        /// "parameter", "state", "input" or "output".
+        kind: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// A name that files and the command line cannot tell apart from others.
+    #[error("{kind} name \"{name}\" {problem}")]
+    Name {
+        /// "parameter", "state", "input" or "output".
+        kind: &'static str,
+        /// The name.
+        name: String,
+        /// Problem and remedy.
+        problem: &'static str,
+    },
+    /// A prior or bounds with ends exchanged, or not finite.
+    #[error("{kind} of {name} is {interval}; write finite [low, high] with low < high")]
+    Box {
+        /// Parameter.
+        name: String,
+        /// "prior" or "bounds".
+        kind: &'static str,
+        /// The ends given.
+        interval: String,
+    },
+    /// A prior that leaves the physical bounds.
+    #[error(
+        "prior {prior} of {name} leaves its bounds {bounds}; shrink the prior or widen the bounds"
+    )]
+    PriorOutside {
+        /// Parameter.
+        name: String,
+        /// The prior box.
+        prior: String,
+        /// The physical bounds.
+        bounds: String,
+    },
+    /// A point with too many or too few numbers.
+    #[error("{given} values for {expected} parameters ({names}); give one value for each")]
+    Length {
+        /// Values given.
+        given: usize,
+        /// Values needed.
+        expected: usize,
+        /// Names of the parameters.
+        names: String,
+    },
+    /// A value outside the physical bounds, or not a number.
+    #[error("{name} = {value} is outside its bounds {bounds}; choose a value inside")]
+    OutOfBounds {
+        /// Parameter.
+        name: String,
+        /// The value.
+        value: f64,
+        /// Its bounds.
+        bounds: String,
+    },
+    /// A name that no parameter has.
+    #[error("no parameter is called {name}{}; there are {names}", did_you_mean(name, names.split(", ")))]
+    Unknown {
+        /// The name.
+        name: String,
+        /// The known names.
+        names: String,
+    },
+    /// A name in a study file's table that the twin does not have.
+    #[error("[{table}] names {name}{}, the twin has {known}; use one of these", did_you_mean(name, known.split(", ")))]
+    UnknownIn {
+        /// Table of the study file.
+        table: &'static str,
+        /// The name.
+        name: String,
+        /// Known names.
+        known: String,
+    },
+    /// Limits, noise levels or starts of a black box.
+    #[error(
+        "[{0}] needs the twin's equations, which a black box does not show; remove the table or implement StateSpace"
+    )]
+    BlackBox(&'static str),
+    /// A noise level or start that the twin cannot have.
+    #[error("[{table}] {name} = {value}; {remedy}")]
+    Value {
+        /// Table of the study file.
+        table: &'static str,
+        /// Name.
+        name: String,
+        /// Value.
+        value: f64,
+        /// Remedy.
+        remedy: &'static str,
+    },
+    /// An unknown start or noise level without a prior.
+    #[error("no prior for the unknown {0}; add [prior] \"{0}\" = [low, high]")]
+    NoPrior(String),
+}
+
+/// A simulation without outputs.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimulationError {
+    /// A trajectory that left the finite numbers: these parameters are not for this input.
+    #[error("the simulation diverged at t = {at} s")]
+    Diverged {
+        /// Time of the first non-finite value, in seconds.
+        at: f64,
+    },
+    /// A run that failed for another reason, such as a solver that gave up; others may work.
+    #[error("this simulation failed: {0}")]
+    Failed(Box<dyn std::error::Error + Send + Sync>),
+    /// A simulator that does not work at all; no other parameters will help.
+    #[error("the simulator failed: {0}")]
+    Fatal(Box<dyn std::error::Error + Send + Sync>),
+}
+
+impl SimulationError {
+    /// A fatal error from a message.
+    pub fn fatal(message: impl Into<String>) -> Self {
+        Self::Fatal(message.into().into())
+    }
+
+    /// Tells whether only this run is lost: a search goes on elsewhere, a draw is drawn again.
+    pub fn costs_one_run(&self) -> bool {
+        matches!(self, Self::Diverged { .. } | Self::Failed(_))
+    }
+}
