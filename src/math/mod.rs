@@ -17,6 +17,7 @@ mod sample;
 mod solve;
 mod svd;
 mod whitening;
+mod widest;
 
 pub use clopper_pearson::{BinomialError, binomial_bounds, clopper_pearson};
 pub use difference::DifferenceError;
@@ -30,3 +31,4 @@ pub(crate) use sample::{deviation, ends, largest};
 pub(crate) use solve::solve_above;
 pub(crate) use solve::{SolveError, solve_truncated};
 pub use whitening::{Whitening, WhiteningError};
+pub(crate) use widest::{Kernel, widest};
