@@ -1,5 +1,7 @@
 //! Names and units of channels.
 
+use serde::Serialize;
+
 /// A named physical quantity with its unit.
 ///
 /// ```
@@ -8,7 +10,7 @@
 /// let level = Quantity::new("h", "m");
 /// assert_eq!((level.name.as_str(), level.unit.as_str()), ("h", "m"));
 /// ```
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Quantity {
     /// Name.
     pub name: String,

@@ -14,9 +14,11 @@
 use crate::record::{Drive, Signal};
 use crate::twin::{DigitalTwin, Noise, PRIOR_DEVIATION, SimulationError, combination};
 use nalgebra::DMatrix;
+use serde::Serialize;
 
 /// How bad a finding is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Severity {
     /// As it should be.
     Pass,
@@ -27,7 +29,7 @@ pub enum Severity {
 }
 
 /// The outcome of one check.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Finding {
     /// Short name of the check.

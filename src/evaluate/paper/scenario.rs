@@ -4,6 +4,7 @@ use super::{Invariant, Method, Symmetry};
 use crate::record::{Drive, DriveError, Signal};
 use crate::study::{DriveSource, PlanError, RecordTable, Study};
 use crate::twin::{Interval, Noise};
+use serde::Serialize;
 
 /// Where true parameters come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,11 +82,12 @@ pub struct TestPoint {
 /// assert_eq!((*method, figures.mse), (Method::TsPre, 0.3204));
 /// # Ok::<(), truetwin::study::StudyError>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Published {
     /// Mean squared error.
     pub mse: f64,
     /// Milliseconds a record, on the authors' machine.
+    #[serde(rename = "ms")]
     pub milliseconds: f64,
 }
 

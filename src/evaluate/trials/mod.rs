@@ -70,5 +70,4 @@ pub use error::WithheldError;
 pub use kind::Kind;
 pub use row::Row;
 pub use run::{Sealed, Settings, Withheld};
-pub(crate) use score::LEVEL;
 pub use score::{Count, KindScore, Range, Scorecard, StatedBin};
