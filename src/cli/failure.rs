@@ -10,14 +10,13 @@ use crate::estimator::gate::GateError;
 use crate::estimator::refine::RefineError;
 use crate::estimator::shards::{PriorError, ShardsError};
 use crate::estimator::{EstimateError, EstimatorFileError, PretrainError};
-use crate::evaluate::paper::{MonteCarloError, ScenarioError};
-use crate::evaluate::trials::WithheldError;
+use crate::evaluate::EvaluateError;
 use crate::feature::FeatureError;
 use crate::network::NetworkError;
-use crate::record::{CsvError, DriveError, RecordError};
+use crate::record::RecordError;
 use crate::storage::work::{Team, TeamError, WorkError};
 use crate::study::{PlanError, StudyError};
-use crate::twin::{AdaptationError, ParameterError, SimulationError};
+use crate::twin::{SimulationError, TwinError};
 use std::fmt::Display;
 use std::path::Path;
 use std::process::ExitCode;
@@ -145,17 +144,14 @@ macro_rules! users {
     };
 }
 users!(
-    AdaptationError,
     BankFileError,
-    CsvError,
-    DriveError,
     EffectError,
     EffectFileError,
     EstimatorFileError,
-    ParameterError,
     RecordError,
     SimulationError,
     TeamError,
+    TwinError,
     WorkError,
 );
 
@@ -171,15 +167,15 @@ macro_rules! studies {
 }
 studies!(FeatureError, PlanError, StudyError);
 
-impl From<WithheldError> for Failure {
-    fn from(error: WithheldError) -> Self {
+impl From<EvaluateError> for Failure {
+    fn from(error: EvaluateError) -> Self {
         match error {
-            WithheldError::Diagnose(error) => error.into(),
-            WithheldError::Threads(_) | WithheldError::Cancelled(_) => Self::internal(error),
-            WithheldError::Changed(_)
-            | WithheldError::NoEffect(_)
-            | WithheldError::Runaway(_)
-            | WithheldError::Plan(_) => Self {
+            EvaluateError::Diagnose(error) => error.into(),
+            EvaluateError::Threads(_) | EvaluateError::Cancelled(_) => Self::internal(error),
+            EvaluateError::Changed(_)
+            | EvaluateError::NoEffect(_)
+            | EvaluateError::Runaway(_)
+            | EvaluateError::Plan(_) => Self {
                 about_study: true,
                 ..Self::user(error)
             },
@@ -280,26 +276,6 @@ impl From<DiagnoseError> for Failure {
     fn from(error: DiagnoseError) -> Self {
         match error {
             DiagnoseError::Cancelled(_) => Self::internal(error),
-            _ => Self::user(error),
-        }
-    }
-}
-
-impl From<ScenarioError> for Failure {
-    fn from(error: ScenarioError) -> Self {
-        match error {
-            ScenarioError::Plan(error) => error.into(),
-            ScenarioError::Drive(error) => error.into(),
-            ScenarioError::NoPoint(_) | ScenarioError::Outside { .. } => Self::user(error),
-        }
-    }
-}
-
-impl From<MonteCarloError> for Failure {
-    fn from(error: MonteCarloError) -> Self {
-        match error {
-            MonteCarloError::Cancelled(_) | MonteCarloError::Threads(_) => Self::internal(error),
-            MonteCarloError::Scenario(error) => error.into(),
             _ => Self::user(error),
         }
     }

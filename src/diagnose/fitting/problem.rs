@@ -16,7 +16,7 @@ const LONGEST_NOISE: f64 = 2.0;
 pub(in crate::diagnose) struct Problem<'a> {
     pub twin: Twin,
     pub records: &'a [Record],
-    /// For each record, where the twin's parameters stand in the full θ.
+    /// Indices of the twin's parameters in the full θ, for each record.
     pub(super) places: Vec<Vec<usize>>,
     pub axes: Vec<Axis>,
     pub coordinates: Coordinates,
@@ -119,7 +119,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Of a black box: what predicts each record at θ.
+    /// Returns the predictors of all records of a black box at θ.
     pub fn predictors(&self, theta: &[f64]) -> Result<Vec<Predictor>, FilterError> {
         (self.records.iter().enumerate())
             .map(|(r, record)| ensemble::predictor(&self.twin, &self.of_record(r, theta), record))

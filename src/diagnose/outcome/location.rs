@@ -1,15 +1,15 @@
-//! Where a gap lies: in the equations, in time, in the states, by lag and by frequency.
+//! Location of a gap: in the equations, in time, in the states, by lag and by frequency.
 
 use crate::diagnose::thresholds::Thresholds;
 use serde::{Serialize, Serializer};
 
-/// Where the gap is.
+/// Location of a gap.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Where {
-    /// How the record differs from simulations of the refitted twin.
+pub struct Location {
+    /// Difference between the record and simulations of the refitted twin.
     #[serde(flatten)]
     pub maps: Maps,
-    /// Since when the twin does not follow.
+    /// Onset of the gap.
     pub onset: Option<Onset>,
     /// The most probable place of a structural gap.
     pub target: Option<String>,
@@ -32,7 +32,7 @@ pub struct TargetShare {
     pub share: f64,
 }
 
-/// How innovations differ from those of simulations, cut in several ways. All p-values are corrected for all cells of all cuts
+/// Difference between innovations and those of simulations, cut in several ways. All p-values are corrected for all cells of all cuts
 /// together; shares add up to at most one in each list. Serialised are the cells that stand out.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Maps {
@@ -56,13 +56,13 @@ pub struct Maps {
 /// The start of the first block of time that the twin, fitted to all before it, does not foresee.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Onset {
-    /// Which record, from 0.
+    /// Index of the record, from 0.
     pub record: usize,
-    /// In seconds.
+    /// Time in seconds.
     pub time: f64,
     /// Output.
     pub channel: String,
-    /// Of the block that begins there, corrected for all blocks.
+    /// p-value of the block that begins there, corrected for all blocks.
     pub p_value: f64,
 }
 
@@ -79,7 +79,7 @@ pub struct Window {
     pub p_value: f64,
     /// Share in what the best explanation gains.
     pub share: f64,
-    /// Which record, from 0.
+    /// Index of the record, from 0.
     pub record: usize,
 }
 
@@ -109,7 +109,7 @@ pub struct Channel {
     pub share: f64,
 }
 
-/// What an innovation still depends on.
+/// Dependence of an innovation on the past.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Lag {
     /// Output.
@@ -141,7 +141,7 @@ pub struct Band {
     pub share: f64,
 }
 
-/// What an equation lacks, as a disturbance there that a smoother follows.
+/// Missing term of an equation, as the smoothed disturbance there.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Equation {
     /// The state whose rate, or the output whose value, the equation gives.
@@ -175,7 +175,7 @@ pub trait Cell {
     fn p_value(&self) -> f64;
     /// Share of what the list divides.
     fn share(&self) -> f64;
-    /// Whether the cell stands out of simulations: p ≤ 0.1.
+    /// Returns true where the cell stands out of simulations: p ≤ 0.1.
     fn is_notable(&self) -> bool {
         self.p_value() <= Thresholds::NOTABLE
     }

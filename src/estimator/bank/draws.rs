@@ -24,7 +24,7 @@ const HOPELESS: f64 = 0.9;
 /// let drive = Drive::autonomous(0.05, 200)?;
 /// let draw = Draw { theta: vec![1.5], drive: Cow::Borrowed(&drive) }; // see `Draws` for its use
 /// assert_eq!(draw.drive.samples(), 200);
-/// # Ok::<(), truetwin::record::DriveError>(())
+/// # Ok::<(), truetwin::record::RecordError>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct Draw<'a> {

@@ -9,13 +9,13 @@ use serde::{Serialize, Serializer};
 /// Level of the intervals of a coverage.
 pub const COVERAGE_LEVEL: f64 = 0.95;
 
-/// What the runs of a study come to.
+/// Errors and coverage of the runs of a study.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Scores {
     /// In the order of [`Method::all`].
     pub methods: Vec<MethodScore>,
-    /// How often the refitted estimate's interval held the truth, by parameter.
+    /// Coverage of the truth by the refitted estimate's interval, by parameter.
     pub coverage: Vec<Coverage>,
     /// Runs without an estimate.
     pub failed: usize,
@@ -44,12 +44,12 @@ pub struct MethodScore {
     pub invariants: Vec<(&'static str, f64)>,
     /// As `mse`, without the part along what a record does not determine; `None` where there is no such part.
     pub mse_without_scale: Option<f64>,
-    /// What was published for this twin, scenario and method.
+    /// Published figures for this twin, scenario and method.
     #[serde(rename = "paper")]
     pub published: Option<Published>,
 }
 
-/// How often an interval held the true value.
+/// Coverage of the true value by an interval.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Coverage {
@@ -177,7 +177,8 @@ fn std_error(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::paper::{Answer, Benchmark, reference_studies};
+    use crate::evaluate::paper::run::Answer;
+    use crate::evaluate::paper::{Benchmark, reference_studies};
 
     const TRUTH: [f64; 4] = [1.2, 1.2, 0.9, 1.0];
 
@@ -231,7 +232,10 @@ mod tests {
             [1, 1, 1, 2],
             "1.2, 1.2, 0.9, 1.0 in [0.8, 1.1], [0.95, 2.0]"
         );
-        assert_eq!((scores.coverage[3].of, scores.coverage[3].interval[1]), (2, 1.0));
+        assert_eq!(
+            (scores.coverage[3].of, scores.coverage[3].interval[1]),
+            (2, 1.0)
+        );
     }
 
     /// e = (k1/2, −k2/2, 0, k4)/100 at the truth.

@@ -84,7 +84,7 @@ pub struct Range {
 /// The trials of one kind.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct KindScore {
-    /// Which.
+    /// Kind.
     pub kind: Kind,
     /// Called structural.
     pub structural: Count,
@@ -97,7 +97,7 @@ pub struct KindScore {
 pub struct StatedBin {
     /// Mean of what was stated.
     pub stated: f64,
-    /// How often the effect on top was a true one.
+    /// Answers whose effect on top was a true one.
     pub right: Count,
 }
 
@@ -112,7 +112,7 @@ pub struct Confusion {
     pub count: u64,
 }
 
-/// All scores. What each is of, and when an answer counts as right, stands in docs/withheld.md.
+/// All scores; docs/withheld.md defines each.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "schema", rename = "truetwin.scorecard/1")]
 pub struct Scorecard {
@@ -183,7 +183,7 @@ pub struct Scorecard {
     pub by_strength: Vec<Range>,
     /// Detection by what the true effects gain, in nats.
     pub by_gain: Vec<Range>,
-    /// How often each truth was given each answer.
+    /// Counts of each truth and answer.
     pub confusion: Vec<Confusion>,
     /// Every trial.
     #[serde(rename = "list")]

@@ -164,7 +164,8 @@ fn after(estimate: &Estimate) -> Option<String> {
         return None;
     }
     Some(match estimate.after {
-        None => "The calibrated twin cannot be tested: there are no more features than parameters.".into(),
+        None => "The calibrated twin cannot be tested: there are no more features than parameters."
+            .into(),
         Some(test) if test.out_of_distribution => format!(
             "The calibrated twin does not explain the record ({}, false-alarm rate {} %): no parameters compensate for what it lacks. Standard errors hold only for a complete twin. Next: truetwin diagnose.",
             probability(test.p_value),

@@ -51,7 +51,7 @@ mod tests {
     #[test]
     fn what_is_infinite_is_null() {
         let mut diagnosis = diagnoses()[1].clone();
-        diagnosis.which.effects[0].magnitudes = vec![("level".into(), f64::INFINITY)];
+        diagnosis.cause.effects[0].magnitudes = vec![("level".into(), f64::INFINITY)];
         let value = gap_json(&diagnosis);
         assert!(value["which"]["effects"][0]["magnitudes"]["level"].is_null());
     }

@@ -393,7 +393,7 @@ fn wrong_studies_are_refused_with_file_and_line() {
     };
     check(
         "twin = 'tanks'\n[prior]\nk1 = [0.8, 0.4]\n",
-        &["line 2", "k1: [0.8, 0.4] is turned inside out"],
+        &["line 2", "k1: invalid interval [0.8, 0.4]"],
     );
     check(
         "twin = 'tanks'\n[prior]\nk7 = [0.4, 0.8]\n",

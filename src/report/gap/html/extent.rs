@@ -23,7 +23,9 @@ fn body(diagnosis: &Diagnosis) -> String {
     }
     if let Some(svg) = pictures::extent(diagnosis) {
         let wrong = match s.placebo {
-            Some(_) => " The wrong effect, fitted in the same way, shows the gain of any extra parameter.",
+            Some(_) => {
+                " The wrong effect, fitted in the same way, shows the gain of any extra parameter."
+            }
             None => "",
         };
         let caption = "Errors of free runs over the standard deviation of the output. Floor: the error that noise alone causes.";

@@ -33,7 +33,7 @@ fn sure(diagnosis: &Diagnosis) -> Vec<String> {
         ),
         None => "No validation record was given: an explanation that fits this record by chance is not detected.".into(),
     });
-    if !diagnosis.which.effects.is_empty() {
+    if !diagnosis.cause.effects.is_empty() {
         items.push(
             "Probabilities compare the effects that were tested; 5 % are reserved for unlisted laws that a listed effect imitates. \
              Sealed trials measure how often they are right (docs/diagnosing-a-gap.md). p-values of effects are corrected for all \
@@ -83,11 +83,7 @@ fn power(units: &Units, diagnosis: &Diagnosis) -> String {
         &head,
         &rows,
     );
-    [
-        paragraph(&lead),
-        folded("Detectable magnitudes", &numbers),
-    ]
-    .concat()
+    [paragraph(&lead), folded("Detectable magnitudes", &numbers)].concat()
 }
 
 fn row(units: &Units, visible: &Visible) -> Vec<String> {

@@ -9,7 +9,7 @@ const SHOWN: usize = 8;
 
 /// Listed effects by probability, then everything else together; `None` where none was fitted.
 pub fn explanations(diagnosis: &Diagnosis) -> Option<String> {
-    let which = &diagnosis.which;
+    let which = &diagnosis.cause;
     let first = which.effects.first()?;
     let bar = |effect: &EffectFit| {
         let (key, gain) = (effect.key(), short(effect.log_score_gain));
@@ -25,7 +25,11 @@ pub fn explanations(diagnosis: &Diagnosis) -> Option<String> {
     if which.decision != Decision::Absorbed {
         let listed: f64 = shown().map(|e| e.probability).sum();
         let rest = (1.0 - listed).max(0.0);
-        others.push(Bar::new("all others, including unlisted", rest, &chance(rest)));
+        others.push(Bar::new(
+            "all others, including unlisted",
+            rest,
+            &chance(rest),
+        ));
     }
     let groups = if rivals.is_empty() {
         vec![BarGroup::new("", Some(1.0), others)]
