@@ -217,7 +217,7 @@ fn the_help_teaches_and_wrong_scenarios_are_refused() {
     for expected in [
         "uniform",
         "reproduce.json",
-        "goes on where it stopped",
+        "resumes it",
         "TS-fine",
     ] {
         assert!(help.contains(expected), "{expected} is not in:\n{help}");
