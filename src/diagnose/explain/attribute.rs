@@ -92,12 +92,13 @@ pub(in crate::diagnose) fn explanations(
     order(&mut explanations);
     // Once more from where the best ended: a poor θ leads to poor fits.
     if only.is_none() {
-        let (round, draws) = match model.problem.twin.equations() {
-            Some(_) => (Thresholds::SECOND_ROUND, Thresholds::SECOND_DRAWS),
-            None => (
+        let (round, draws) = if model.problem.is_simulated() {
+            (
                 Thresholds::SECOND_ROUND_SIMULATED,
                 Thresholds::SECOND_DRAWS_SIMULATED,
-            ),
+            )
+        } else {
+            (Thresholds::SECOND_ROUND, Thresholds::SECOND_DRAWS)
         };
         let space = model.problem.twin.parameters();
         let d = space.len();

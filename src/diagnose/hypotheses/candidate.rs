@@ -122,8 +122,8 @@ pub(in crate::diagnose) fn candidates(
         .filter(|c| !named(&c.id, &c.target))
         .filter(|c| !already.contains(&c.key()))
         .collect();
-    all.extend(match twin.equations() {
-        Some(equations) => catch_alls(&equations.outline()),
+    all.extend(match twin.outline() {
+        Some(outline) => catch_alls(&outline),
         None => catch_alls_of_signals(&twin.signals()),
     });
     Ok(all)

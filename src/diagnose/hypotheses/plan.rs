@@ -66,7 +66,7 @@ impl Planner<'_> {
                     _ => Mark::Unmarked,
                 };
                 let plan = |choice: &Choice| self.listed(index, effect, &values, &mark, choice);
-                let filtered = self.study.equations().is_some();
+                let filtered = !self.problem.is_simulated();
                 (choices(effect.as_ref(), &mark, filtered).iter())
                     .filter_map(|choice| plan(choice).transpose())
                     .collect()
@@ -109,7 +109,7 @@ impl Planner<'_> {
 
     /// Values of the signal or state that an effect sits at.
     fn values(&self, effect: &dyn UnmodelledEffect) -> Vec<f64> {
-        let outline = self.study.equations().map(|t| t.outline());
+        let outline = self.study.outline();
         let law = effect.law();
         let known = crate::effect::targets(law, outline.as_ref(), &self.study.signals());
         let target = known.iter().position(|k| k == effect.target()).unwrap_or(0);

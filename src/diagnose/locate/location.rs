@@ -35,14 +35,14 @@ pub(in crate::diagnose) fn locate(
         maps: maps(model, test, explanations.first())?,
         ..targets(model, explanations, test, conclusion)
     };
-    let shows = context.twin.equations().is_some();
-    let apart = match context.follows && shows {
-        true => apart(
+    let apart = if context.follows && !model.problem.is_simulated() {
+        apart(
             context,
             model,
             &progress.stage("where", equations_of(model)),
-        )?,
-        false => None,
+        )?
+    } else {
+        None
     };
     let (model, explanations, test) = match &apart {
         Some((model, explanations)) => (model, explanations.as_slice(), None),

@@ -31,7 +31,7 @@ pub(in crate::diagnose) fn onset(
     noise: Noise,
 ) -> Result<Option<Onset>, DiagnoseError> {
     // Each block would take ensembles of a black box.
-    if model.problem.twin.equations().is_none() {
+    if model.problem.is_simulated() {
         return Ok(None);
     }
     let replicates = (1.0 / alpha + Thresholds::ONSET_BEYOND) as u64;

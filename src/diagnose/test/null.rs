@@ -45,7 +45,7 @@ pub(in crate::diagnose) struct Test {
 impl<'a> FittedTwin<'a> {
     /// Returns the statistics of the records themselves.
     pub fn own_statistics(&self) -> Result<Option<Statistics>, FilterError> {
-        if self.problem.twin.equations().is_none() {
+        if self.problem.is_simulated() {
             return Ok(self
                 .shared()?
                 .and_then(|s| s.statistics(self, self.problem.records)));
@@ -55,9 +55,10 @@ impl<'a> FittedTwin<'a> {
 
     /// Returns the ensembles that all statistics of a black box share.
     fn shared(&self) -> Result<Option<Shared>, FilterError> {
-        match self.problem.twin.equations() {
-            Some(_) => Ok(None),
-            None => Shared::new(self),
+        if self.problem.is_simulated() {
+            Shared::new(self)
+        } else {
+            Ok(None)
         }
     }
 
