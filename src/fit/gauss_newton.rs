@@ -247,6 +247,7 @@ mod examples {
     #[test]
     fn the_example() -> Result<(), Box<dyn std::error::Error>> {
         use crate::fit::{Bounds, GaussNewton, ResidualProblem};
+        use crate::math::MathError;
         use nalgebra::{DMatrix, DVector, dmatrix, dvector};
 
         struct Rosenbrock;
