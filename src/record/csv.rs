@@ -24,21 +24,9 @@ pub fn read_record(path: &Path) -> Result<Record, RecordError> {
     read(path)?.record(path)
 }
 
-/// Reads time and inputs to simulate with; outputs, if the file is a record, are ignored.
-///
-/// ```
-/// use truetwin::record::{Drive, Record, Signal, read_drive, write_record};
-///
-/// let record = Record::new(Drive::new(0.5, Signal::ones((3, 1)))?, Signal::zeros((3, 1)))?;
-/// let folder = tempfile::tempdir()?;
-/// let path = folder.path().join("R.csv");
-/// write_record(&path, &record)?;
-/// assert_eq!(read_drive(&path)?, *record.drive());
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
+/// Reads time and inputs to simulate with; a file with outputs is refused.
 pub fn read_drive(path: &Path) -> Result<Drive, RecordError> {
-    let table = read(path)?;
-    Drive::new(table.dt, table.inputs).map_err(|error| RecordError::file(path, error))
+    read(path)?.drive(path)
 }
 
 /// Parses the text of a record that stands in the program itself; `path` is for messages.
