@@ -16,6 +16,7 @@ const PATIENCE: Duration = Duration::from_secs(3);
 const BATCH: Duration = Duration::from_millis(5);
 
 /// Runs what the command line asks for, and prints medians.
+#[derive(Debug)]
 pub struct Clock {
     words: Vec<String>,
 }
