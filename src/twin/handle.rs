@@ -1,8 +1,10 @@
 //! The handle by which every stage holds a twin.
 
+use super::digital_twin::FREE_RUNS;
 use crate::record::{Drive, Signal, Signals};
-use crate::twin::modified::{Modified, Modify};
-use crate::twin::{DigitalTwin, Noise, Outline, ParameterSpace, SimulationError, StateSpace};
+use crate::twin::{
+    DigitalTwin, Modified, Modify, Noise, Outline, ParameterSpace, SimulationError, StateSpace,
+};
 use std::sync::Arc;
 
 /// A twin of either kind, cheap to clone. A stage that needs equations matches once, at its entrance.
@@ -79,6 +81,14 @@ impl Twin {
     /// Names and units of the equations; `None` for a black box.
     pub fn outline(&self) -> Option<Outline> {
         self.equations().map(StateSpace::outline)
+    }
+
+    /// Number of simulations that a free run takes.
+    pub(crate) fn runs_of_a_free_run(&self) -> usize {
+        match self {
+            Self::Equations(_) => 1,
+            Self::BlackBox(_) => FREE_RUNS as usize,
+        }
     }
 
     /// The twin with `hook` called before each of its runs; an error of the hook stops the run.
