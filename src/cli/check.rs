@@ -6,7 +6,7 @@ use crate::estimator::PresetName;
 use crate::twin::conformance::{Severity, check};
 use crate::twin::{Noise, SimulationError, Twin};
 use clap::Args;
-use serde_json::{Value, json};
+use serde_json::json;
 use std::process::ExitCode;
 use std::sync::Arc;
 
@@ -49,11 +49,6 @@ impl Verb for Check {
         };
         let failed = findings.iter().any(|f| f.severity == Severity::Failure);
         if context.json {
-            let findings: Vec<Value> = (findings.iter())
-                .map(
-                    |f| json!({ "check": f.check, "severity": word(f.severity), "message": f.message }),
-                )
-                .collect();
             output::print_json(&json!({
                 "schema": "truetwin.check/1", "twin": study.name(), "passed": !failed, "findings": findings,
             }))?;

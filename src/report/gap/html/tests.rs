@@ -116,7 +116,7 @@ fn every_section_is_there_under_every_verdict() {
     }
 }
 
-/// What the JSON says in numbers, the page says too.
+/// The page has the numbers of the JSON.
 #[test]
 fn the_numbers_of_the_json_are_on_the_page() {
     use crate::report::digits::{bare, chance, error, percent, probability, short};
@@ -180,9 +180,9 @@ fn each_answer_says_what_to_do_with_it() {
         "Use the twin with the refitted parameters",
         "Add cubic-stiffness@x2 to the twin",
         "Take the refitted parameters",
-        "Tell the rivals apart (cubic-stiffness@x2, power-law@x2)",
+        "Separate the rivals (cubic-stiffness@x2, power-law@x2)",
         "examples/own_effect.rs",
-        "Too short to hold anything back: no share",
+        "No share of the gap closed: the record is too short",
     ]) {
         let page = gap_html(&oscillator(), diagnosis);
         assert!(page.contains(expected), "{expected}");
@@ -197,28 +197,28 @@ fn each_answer_says_what_to_do_with_it() {
 fn every_part_of_the_answer_has_its_place() {
     let class = gap_html(&tanks(), &made::tanks_class());
     for text in [
-        "Fitted to all before it, the twin foresees each stretch until 612 s; there y departs (p = 0.012).",
-        "With state-ceiling@h1 added: no window stands out.",
+        "Fitted to all earlier samples, the twin predicts each stretch until 612 s; from there on y deviates (p = 0.012).",
+        "With state-ceiling@h1 added: no window is significant.",
         "<title>Windows of time</title>",
         ">onset 612 s<",
-        "A disturbance in the rate of h1 follows the record best (93 %",
+        "A disturbance in the rate of h1 explains the record best (93 %",
         ">93 %, p = 0.002: rate of h1 in V/s<",
         ">h2 in V<",
         ">y on the past of u<",
         ">40.0 … 77.5 s<",
         ">0.00625 … 0.0125 Hz<",
-        "One class: not told apart by these data",
+        "One class: not separated by this record",
         "rival, same class",
         "next-input.csv, beside this page, holds steps over the whole range",
-        "18 of 20 simulated pairs",
-        "again, 6 of 20",
+        "in 18 of 20 cases",
+        "again do so in 6 of 20",
         "<title>The input to measure with next</title>",
         "measure the record below",
         "log E 31.2; above 3.69 it would be enough alone",
         "Not tested, left out by the call, by the study, or because no filter models them: outliers@sensor",
         "<td class=\"n\">5.20 V</td>",
-        "<td class=\"n\">none in reach</td>",
-        "1 of 4 listed effects could not have been seen",
+        "<td class=\"n\">not detectable</td>",
+        "1 of 4 listed effects are not detectable",
     ] {
         assert!(class.contains(text), "{text}");
     }
