@@ -214,8 +214,8 @@ fn every_part_of_the_answer_has_its_place() {
         "again do so in 6 of 20",
         "<title>The input to measure with next</title>",
         "measure the record below",
-        "log E 31.2; above 3.69 it would be enough alone",
-        "Not tested, left out by the call, by the study, or because no filter models them: outliers@sensor",
+        "log E 31.2; above 3.69 it suffices without the rank",
+        "Not tested (excluded by the call or the study, or without a filter model): outliers@sensor",
         "<td class=\"n\">5.20 V</td>",
         "<td class=\"n\">not detectable</td>",
         "1 of 4 listed effects are not detectable",
@@ -226,7 +226,7 @@ fn every_part_of_the_answer_has_its_place() {
     let none = gap_html(&oscillator(), &made::oscillator_none());
     for text in [
         "Exploratory, not a test",
-        "what the rate of x2 lacks",
+        "missing term of the rate of x2",
         "explain 83 % of its variance",
         ">98 %, −0.620 (−0.744 to −0.496)<",
         "± 1 standard deviation",
@@ -235,7 +235,7 @@ fn every_part_of_the_answer_has_its_place() {
         assert!(none.contains(text), "{text}");
     }
     let no_gap = gap_html(&oscillator(), &made::oscillator_no_gap());
-    assert!(no_gap.contains("What this record could have revealed"));
+    assert!(no_gap.contains("Detectable magnitudes"));
     let (parameters, place) = (
         no_gap.find("<section id=\"parameters"),
         no_gap.find("<section id=\"where"),
@@ -251,7 +251,7 @@ fn a_twin_without_inputs_is_told_to_measure_instants() {
     let mut diagnosis = made::oscillator_none();
     diagnosis.cause.next_input = made::tanks_class().cause.next_input;
     let page = gap_html(&oscillator(), &diagnosis);
-    assert!(page.contains("the file holds the instants alone"));
+    assert!(page.contains("the file holds only the time column"));
     assert!(!page.contains("The input to measure with next"));
 }
 
