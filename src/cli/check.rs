@@ -4,7 +4,7 @@ use super::args::Subject;
 use super::{Context, Failure, Verb, output};
 use crate::estimator::PresetName;
 use crate::twin::conformance::{Severity, check};
-use crate::twin::{FREE_RUNS, Noise, SimulationError, Twin};
+use crate::twin::{Noise, SimulationError, Twin};
 use clap::Args;
 use serde_json::json;
 use std::process::ExitCode;
@@ -70,9 +70,6 @@ impl Verb for Check {
 /// of 32.
 fn runs(twin: &Twin) -> usize {
     let d = twin.parameters().len();
-    let free = match twin {
-        Twin::Equations(_) => 1,
-        Twin::BlackBox(_) => FREE_RUNS as usize,
-    };
+    let free = twin.runs_of_a_free_run();
     (1 << d.min(6)) + 2 * d * free + 4
 }
