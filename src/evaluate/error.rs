@@ -72,9 +72,9 @@ pub enum EvaluateError {
     Damaged {
         /// File.
         path: PathBuf,
-        /// What does not fit.
+        /// Mismatch.
         reason: String,
-        /// What can be done.
+        /// Remedy.
         remedy: &'static str,
     },
     /// The work folder cannot be used.
