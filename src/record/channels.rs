@@ -1,7 +1,9 @@
 //! Names and units of channels.
 
+use serde::Serialize;
+
 /// A named physical quantity with its unit.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Quantity {
     /// Name.
     pub name: String,

@@ -89,4 +89,4 @@ pub trait DigitalTwin: Send + Sync {
 }
 
 /// Runs that a black box's free run is the mean of.
-pub(crate) const FREE_RUNS: u64 = 32;
+pub(super) const FREE_RUNS: u64 = 32;

@@ -103,7 +103,7 @@ mod tests {
     fn nan_and_reversed_ends_are_refused() {
         assert!(Interval::new(f64::NAN, 1.0).is_err());
         let error = Interval::new(2.0, 1.0).unwrap_err().to_string();
-        assert!(error.contains("[2, 1]") && error.contains("low < high"));
+        assert!(error.contains("[2, 1]") && error.contains("low must be below high"));
     }
 
     #[test]

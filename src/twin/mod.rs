@@ -30,7 +30,6 @@ mod state_space;
 pub use adapt::Level;
 pub(crate) use adapt::{Adaptation, adapt};
 pub use digital_twin::DigitalTwin;
-pub(crate) use digital_twin::FREE_RUNS;
 pub(crate) use direction::{combination, oriented};
 pub use error::{SimulationError, TwinError};
 pub(crate) use fix::fix;
