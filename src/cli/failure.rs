@@ -3,7 +3,6 @@
 use super::output;
 use crate::diagnose::DiagnoseError;
 use crate::effect::EffectError;
-use crate::effect::EffectFileError;
 use crate::estimator::bank::BankError;
 use crate::estimator::bank::file::BankFileError;
 use crate::estimator::gate::GateError;
@@ -26,7 +25,7 @@ const USER: u8 = 2;
 /// Exit code of everything else.
 const INTERNAL: u8 = 1;
 
-/// Why a verb ended early.
+/// The reason why a verb ended early.
 #[derive(Debug)]
 pub(super) struct Failure {
     message: String,
@@ -146,7 +145,6 @@ macro_rules! users {
 users!(
     BankFileError,
     EffectError,
-    EffectFileError,
     EstimatorFileError,
     RecordError,
     SimulationError,

@@ -2,7 +2,7 @@
 
 use super::digits::{short, unit_suffix};
 use crate::diagnose::EffectFit;
-use crate::effect::{Effects, Law, UnmodelledEffect};
+use crate::effect::{Effect, TargetKind};
 use crate::record::Quantity;
 use crate::study::Study;
 
@@ -11,7 +11,7 @@ pub(super) struct Units {
     pub(super) inputs: Vec<Quantity>,
     pub(super) outputs: Vec<Quantity>,
     states: Vec<Quantity>,
-    effects: Effects,
+    effects: Vec<Effect>,
 }
 
 impl Units {
@@ -27,25 +27,23 @@ impl Units {
     }
 
     /// The effect of this id and target.
-    pub(super) fn effect(&self, id: &str, target: &str) -> Option<&dyn UnmodelledEffect> {
-        (self.effects.iter())
-            .find(|e| e.typetag_name() == id && e.target() == target)
-            .map(|e| e.as_ref())
+    pub(super) fn effect(&self, id: &str, target: &str) -> Option<&Effect> {
+        (self.effects.iter()).find(|e| e.id() == id && e.target() == target)
     }
 
-    /// Of a state, an input or an output.
+    /// Returns the unit of a state, an input or an output.
     pub(super) fn variable(&self, name: &str) -> &str {
         let signals = self.inputs.iter().chain(&self.outputs);
         let known = (self.states.iter().chain(signals)).find(|q| q.name == name);
         known.map_or("", |q| &q.unit)
     }
 
-    /// Whether this is a state: its equation gives a rate.
+    /// Tells whether the name is a state's: its equation gives a rate.
     fn is_state(&self, name: &str) -> bool {
         self.states.iter().any(|q| q.name == name)
     }
 
-    /// Of what the equation of a state or an output gives.
+    /// Returns the unit of the equation of a state or an output.
     pub(super) fn equation_unit(&self, name: &str) -> String {
         let unit = self.variable(name);
         match (self.is_state(name), unit) {
@@ -77,7 +75,7 @@ impl Units {
     /// The unit of one magnitude of a listed effect; none where the effect is not known.
     pub(super) fn of_magnitude(&self, id: &str, target: &str, name: &str) -> Option<String> {
         let effect = self.effect(id, target)?;
-        let known = effect.magnitudes().into_iter().find(|m| m.name == name)?;
+        let known = effect.magnitudes().iter().find(|m| m.name == name)?;
         Some(self.magnitude(effect, known.unit))
     }
 
@@ -97,14 +95,12 @@ impl Units {
 
     /// A unit of the library in those of the twin: its words `signal`, `state` and `from` stand for the unit of what is
     /// bent, and of the other state.
-    fn magnitude(&self, effect: &dyn UnmodelledEffect, unit: &str) -> String {
-        let bent = match effect.law() {
-            Law::Sensor | Law::MeasurementNoise | Law::Outliers => {
-                channel(&self.outputs, effect.target())
-            }
-            Law::Actuator => channel(&self.inputs, effect.target()),
-            Law::Force | Law::Limit | Law::ProcessNoise => self.variable(effect.target()),
-            Law::Parameter => "",
+    fn magnitude(&self, effect: &Effect, unit: &str) -> String {
+        let bent = match effect.law().target() {
+            TargetKind::Sensor => channel(&self.outputs, effect.target()),
+            TargetKind::Actuator => channel(&self.inputs, effect.target()),
+            TargetKind::State => self.variable(effect.target()),
+            TargetKind::Parameter => "",
         };
         let other = effect.other().map_or("", |name| self.variable(name));
         let inside = |word: &str, own: &str| match own {

@@ -1,0 +1,57 @@
+//! One record of each reference twin, outside the prior, in the default preset: gate, Gauss–Newton, and the whole estimate with
+//! tuned heads. The estimator is trained on a small bank, outside the timing.
+
+use crate::Clock;
+use std::time::Duration;
+use truetwin::estimator::bank::FeatureSimulator;
+use truetwin::estimator::gate::GateTest;
+use truetwin::estimator::{EstimateOptions, PresetName, PretrainOptions, Project, pretrain};
+use truetwin::evaluate::paper::{Benchmark, MonteCarlo, Scenario, reference_studies};
+use truetwin::progress::Progress;
+use truetwin::twin::Noise;
+
+pub fn run(clock: &Clock) {
+    if !clock.wants("estimate") {
+        return;
+    }
+    let silent = Progress::silent();
+    for study in reference_studies().expect("the reference studies are sound") {
+        let small = PretrainOptions {
+            bank_size: Some(2000),
+            epochs: Some(10),
+            ..PretrainOptions::default()
+        };
+        let (estimator, _) = pretrain(&study, &small, &silent).expect("it trains");
+        let plan = MonteCarlo {
+            benchmark: Benchmark::of(&study),
+            scenario: Scenario::First,
+            runs: 1,
+            seed: 1,
+        };
+        let (theta, record) = plan.record(&study, 0).expect("the paper has this point");
+        let twin = study.twin();
+        let project = Project::from(&study);
+        let preset = project.recipe(PresetName::Default);
+        let simulator = FeatureSimulator::new(twin.clone(), preset.features.as_ref())
+            .expect("the features fit the twin");
+        let name = |part: &str| format!("estimate: {}, {part}", study.name());
+        let gate = GateTest {
+            simulator: &simulator,
+            drive: record.drive(),
+            settings: &preset.settings.gate,
+            noise: Noise::new(1, "bench", 0),
+            progress: &silent,
+        };
+        clock.time(&name("gate"), 1, || gate.at(&theta));
+        let options = EstimateOptions {
+            always_refine: true,
+            ..EstimateOptions::default()
+        };
+        let refined = || (estimator.estimate(&record, &options, &silent)).expect("it is estimated");
+        clock.print(&name("Gauss–Newton"), 1, |calls| {
+            let seconds = (0..calls).filter_map(|_| refined().seconds.gauss_newton);
+            Duration::from_secs_f64(seconds.sum())
+        });
+        clock.time(&name("refined and tuned"), 1, refined);
+    }
+}
