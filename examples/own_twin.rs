@@ -38,17 +38,13 @@ impl HeadArchitecture for Small {
     const ID: &'static str = "small";
     type Features = Const<16>; // at most 16 features
     type Hidden = Const<64>;
-    type Trunk = (NormDense<16, 64, Leaky>, Dense<64, 64, Leaky>);
-    type Head = (Linear<64, 32>, Tanh, Linear<32, 1>);
-}
-
-fn project() -> Result<Project, StudyError> {
-    // Records: step in seconds, samples, levels of the input, samples that each is held.
-    let records = RecordPlan::levels(0.1, 300, 0.0, 1.0, 20);
-    let study = Study::new("tank", Tank, records)?;
-    Ok(Project::from(study).with_architecture::<Small>())
+    type Trunk = (Dense<16, 64>, Dense<64, 64>);
+    type Head = (Dense<64, 32>, Linear<32, 1>);
 }
 
 fn main() -> std::process::ExitCode {
-    truetwin::cli::run([project()])
+    // Records: step in seconds, samples, levels of the input, samples that each is held.
+    let records = RecordPlan::levels(0.1, 300, 0.0, 1.0, 20);
+    let study = Study::new("tank", Tank, records);
+    truetwin::cli::run([study.map(|study| Project::from(study).with_architecture::<Small>())])
 }
