@@ -10,16 +10,13 @@ struct Tank;
 
 impl StateSpace for Tank {
     fn outline(&self) -> Outline {
-        Outline {
-            // Name, unit, prior (where the network is trained); then the bounds of what is possible at all.
-            parameters: ParameterSpace::new([
-                Parameter::new("k", "m²/s", 0.2, 1.0).within(0.01, 3.0),
-                Parameter::new("area", "m²", 0.5, 1.5).within(0.2, 5.0),
-            ]),
-            states: vec![Quantity::new("h", "m")],
-            inputs: vec![Quantity::new("u", "m³/s")],
-            outputs: vec![Quantity::new("y", "m")],
-        }
+        // Parameters: name, unit, prior (where the network is trained); then the bounds of what is possible at all.
+        Outline::new()
+            .parameter(Parameter::new("k", "m²/s", 0.2, 1.0).within(0.01, 3.0))
+            .parameter(Parameter::new("area", "m²", 0.5, 1.5).within(0.2, 5.0))
+            .state("h", "m")
+            .input("u", "m³/s")
+            .output("y", "m")
     }
     fn drift(&self, now: &Now, x: &[f64], dx: &mut [f64]) {
         let (k, area) = (now.theta[0], now.theta[1]);

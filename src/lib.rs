@@ -20,12 +20,11 @@
 //!
 //! impl StateSpace for Tank {
 //!     fn outline(&self) -> Outline {
-//!         Outline {
-//!             parameters: ParameterSpace::new([Parameter::new("k", "1/s", 0.2, 1.0).within(0.05, 3.0)]),
-//!             states: vec![Quantity::new("h", "m")],
-//!             inputs: vec![Quantity::new("u", "m/s")],
-//!             outputs: vec![Quantity::new("y", "m")],
-//!         }
+//!         Outline::new()
+//!             .parameter(Parameter::new("k", "1/s", 0.2, 1.0).within(0.05, 3.0))
+//!             .state("h", "m")
+//!             .input("u", "m/s")
+//!             .output("y", "m")
 //!     }
 //!     fn drift(&self, now: &Now, x: &[f64], dx: &mut [f64]) {
 //!         dx[0] = now.u[0] - now.theta[0] * x[0];

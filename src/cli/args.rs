@@ -1,4 +1,4 @@
-//! The options of all verbs, and those that several share. What a verb has of its own stands in its file.
+//! Options of all verbs, and options that several verbs share.
 
 use super::Command as Verbs;
 use crate::estimator::PresetName;
@@ -6,7 +6,7 @@ use clap::{Args, Command, CommandFactory, Parser, ValueEnum};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Calibrate a digital twin from a measured record, and be told when it cannot be trusted.
+/// Calibrate simulators against measured data and diagnose what they are missing.
 #[derive(Debug, Parser)]
 #[command(
     name = "truetwin",
@@ -20,22 +20,22 @@ use std::time::Duration;
 pub(super) struct Arguments {
     #[command(subcommand)]
     pub command: Verbs,
-    /// Standard output is one JSON object.
+    /// Print one JSON object.
     #[arg(long, global = true)]
     pub json: bool,
-    /// Seed of everything random; the same seed gives the same bits on any number of threads.
+    /// Random seed; the same seed gives the same bits on any number of threads.
     #[arg(long, global = true, default_value_t = 1)]
     pub seed: u64,
-    /// Threads to use; all cores unless said.
+    /// Number of threads [default: all cores].
     #[arg(long, global = true)]
     pub threads: Option<usize>,
     #[command(flatten)]
     pub external: External,
 }
 
-/// How a call ends; every `--help` says so.
-const EXIT: &str = "Exit: 0 done, 2 the call or a file is wrong (one line says what, where and what to do), 130 stopped by Ctrl-C, \
-     1 anything else.";
+/// Exit codes, at the end of every `--help`.
+const EXIT: &str = "Exit codes: 0 done; 2 wrong call or file (one line names the problem, the place and the remedy); 130 stopped by Ctrl-C; \
+     1 internal error.";
 
 /// The whole command line.
 pub(super) fn command() -> Command {
@@ -49,44 +49,44 @@ pub(super) fn command() -> Command {
     with_exit(Arguments::command()).mut_subcommands(with_exit)
 }
 
-/// A twin from outside, for this call alone.
+/// An external twin, for this call alone.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "A simulator that is not in Rust")]
+#[command(next_help_heading = "External simulator")]
 pub(super) struct External {
-    /// A program that is a twin: it reads and writes lines of JSON. No shell is run.
+    /// Simulator program that reads and writes lines of JSON; started without a shell.
     #[arg(long, global = true, value_name = "COMMAND")]
     pub program: Option<String>,
-    /// An FMU that is a twin: FMI 2.0 or 3.0, co-simulation. Needs a build with the feature fmi.
+    /// FMU (FMI 2.0 or 3.0, co-simulation); needs a build with the feature fmi.
     #[arg(long, global = true, value_name = "M.fmu", conflicts_with = "program")]
     pub fmu: Option<PathBuf>,
-    /// Parameters, inputs and outputs of the FMU that the twin has; of a kind that none is named of, all.
+    /// Parameters, inputs and outputs to use from the FMU; if no variable of a kind is named, all of that kind are used.
     #[arg(long, global = true, value_name = "NAME,..", value_delimiter = ',')]
     pub variables: Vec<String>,
-    /// Copies of the program or FMU that run at once; one a thread unless said.
+    /// Number of copies of the program or FMU that run at once [default: one per thread].
     #[arg(long, global = true, value_name = "N")]
     pub workers: Option<usize>,
-    /// Seconds that one answer of the program may take; 60 unless said.
+    /// Time limit for one answer of the program [default: 60].
     #[arg(long, global = true, value_name = "SECONDS")]
     pub timeout: Option<f64>,
 }
 
-/// Which twin, in which setting; of a call with `--program`, that program's unless said.
+/// The twin and its setting; with `--program`, that program's twin by default.
 #[derive(Debug, Clone, Args)]
 #[group(multiple = false)]
 pub(super) struct Subject {
-    /// A twin by name (see `truetwin twins`).
+    /// Name of a twin; `truetwin twins` lists them.
     #[arg(long)]
     pub twin: Option<String>,
-    /// A twin in your own setting: a TOML file with step, prior, noise, limits, start, features.
+    /// Study file (TOML): twin, step, prior, noise, limits, start, features.
     #[arg(long, value_name = "S.toml")]
     pub study: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum PresetArgument {
-    /// As in the paper.
+    /// The paper's recipe.
     Paper,
-    /// What was found to be better, on any twin.
+    /// The recipe that works best on any twin.
     Default,
 }
 
@@ -99,16 +99,16 @@ impl From<PresetArgument> for PresetName {
     }
 }
 
-/// A number of runs.
+/// Parses a number of runs.
 pub(super) fn at_least_one(text: &str) -> Result<usize, String> {
     match text.parse() {
-        Ok(0) => Err("at least 1 is needed".into()),
+        Ok(0) => Err("choose at least 1".into()),
         Ok(number) => Ok(number),
         Err(error) => Err(format!("{error}")),
     }
 }
 
-/// A length of time.
+/// Parses a duration in seconds.
 pub(super) fn seconds(text: &str) -> Result<Duration, String> {
     let number: f64 = text.parse().map_err(|error| format!("{error}"))?;
     Duration::try_from_secs_f64(number).map_err(|error| error.to_string())

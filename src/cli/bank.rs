@@ -1,4 +1,4 @@
-//! `bank`: simulations onto the disk.
+//! `bank`: simulates a bank to disk.
 
 use super::args::{PresetArgument, Subject, at_least_one};
 use super::{Context, Failure, Verb, output};
@@ -10,29 +10,29 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// Simulate a bank from the prior onto the disk; run again, it goes on where it stopped.
+/// Simulate a bank from the prior to disk; rerunning the same command resumes it.
 ///
-/// DIR holds manifest.json and shards/*.npz, each shard with `theta` and `features`, for `pretrain --bank DIR` or numpy.load.
-/// Row i depends on the seed and i alone: any number of threads, jobs (--shard) and ranks (mpirun) makes the same bytes.
+/// DIR holds manifest.json and shards/*.npz; each shard has `theta` and `features`, for `pretrain --bank DIR` or numpy.load.
+/// Row i depends only on the seed and i: threads, jobs (--shard) and ranks (mpirun) give the same bytes.
 #[derive(Debug, Args)]
-#[command(after_help = "A job array of four, then one bank:\n  \
+#[command(after_help = "A job array of four, merged into one bank:\n  \
         truetwin bank --twin tanks --size 1000000 --shard $I/4 --out bank-$I\n  \
         truetwin merge bank-1 bank-2 bank-3 bank-4 --out bank\n  \
         truetwin pretrain --twin tanks --bank bank --out tanks.est\n\
-        On a shared file system all jobs may name one DIR, and nothing is to be merged. See docs/scaling.md.")]
+        On a shared file system, give all jobs one DIR; no merge is needed. See docs/scaling.md.")]
 pub(super) struct Bank {
     #[command(flatten)]
     subject: Subject,
-    /// Simulations.
+    /// Number of simulations.
     #[arg(long, value_name = "M", value_parser = at_least_one)]
     size: usize,
-    /// A folder for the shards: a new one, or one of this very call to go on with.
+    /// Output folder; rerunning the same command resumes it.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Only part i of n of the shards, for job arrays that count from 0 or from 1.
+    /// Share i of n of the shards, for job arrays that count from 0 or from 1.
     #[arg(long, value_name = "I/N")]
     shard: Option<Share>,
-    /// Whose features.
+    /// Recipe of the features.
     #[arg(long, value_enum, default_value = "default")]
     preset: PresetArgument,
 }
@@ -59,10 +59,11 @@ impl Verb for Bank {
             seed: context.seed,
         };
         let share = context.share(self.shard)?;
-        // What other ranks do counts too; one rank looks.
-        let before = match context.team.leads() {
-            true => plan.finish(&self.out).map_or(0, |filled| filled.rows),
-            false => 0,
+        // Rows of all ranks are counted, by one rank.
+        let before = if context.team.leads() {
+            plan.finish(&self.out).map_or(0, |filled| filled.rows)
+        } else {
+            0
         };
         context.team.wait();
         let clock = Instant::now();
@@ -89,12 +90,13 @@ impl Verb for Bank {
                 "seconds": seconds,
             }))?;
         } else {
-            let next = match filled.there == filled.of {
-                true => format!("next: truetwin pretrain … --bank {folder} --out EST"),
-                false => "the other shards are those of other jobs; put their folders together with truetwin merge".into(),
+            let next = if filled.there == filled.of {
+                format!("next: truetwin pretrain … --bank {folder} --out EST")
+            } else {
+                "other jobs make the other shards; merge their folders with truetwin merge".into()
             };
             output::print(&format!(
-                "{folder}: {} of {} shards, {} of {} simulations; {made} of them now, in {seconds:.1} s ({rate:.0} a second)\n{next}",
+                "{folder}: {} of {} shards, {} of {} simulations; {made} new in {seconds:.1} s ({rate:.0} per second)\n{next}",
                 filled.there, filled.of, filled.rows, self.size,
             ))?;
         }

@@ -1,4 +1,4 @@
-//! `check`: what is wrong with a twin.
+//! `check`: tests a twin before training.
 
 use super::args::Subject;
 use super::{Context, Failure, Verb, output};
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use std::process::ExitCode;
 use std::sync::Arc;
 
-/// Check a twin before any training: repeatable, paired noise, finite, identifiable.
+/// Check a twin before training: repeatable, paired noise, finite outputs, identifiable parameters.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
         truetwin check --twin tanks\n  \
@@ -71,8 +71,8 @@ impl Verb for Check {
     }
 }
 
-/// About how many runs the checks make: corners of the prior, differences for each parameter; a black box's free run is the
-/// mean of 32.
+/// Estimates the number of runs: corners of the prior, differences for each parameter; a black box's free run is the mean
+/// of 32.
 fn runs(twin: &Twin) -> usize {
     let d = twin.parameters().len();
     let free = match twin {

@@ -1,4 +1,4 @@
-//! `demo`: the main job on a record that comes with the program.
+//! `demo`: estimates the parameters behind an embedded record.
 
 use super::estimate::{show, write_results};
 use super::{Context, Failure, Verb, output};
@@ -10,20 +10,20 @@ use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// A small bank and few epochs: seconds, not minutes. The refinement makes up for what the network lacks.
+/// A small bank and few epochs keep the demo short; the refinement corrects the rough network.
 const BANK: usize = 2000;
 const EPOCHS: usize = 40;
 
-/// Calibrate a twin to an embedded record, in seconds, to see what it looks like.
+/// Calibrate a twin to an embedded record: a first look in seconds.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
         truetwin demo --out demo\n\
         Next: look at demo/overlay.svg, then truetwin twins")]
 pub(super) struct Demo {
-    /// A twin by name; the first one that has a demo unless given.
+    /// Name of the twin [default: the first one that has a demo record].
     #[arg(long)]
     twin: Option<String>,
-    /// A new folder for the result, the picture and the record.
+    /// New folder for result, picture and record.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -37,14 +37,16 @@ impl Verb for Demo {
             Some(name) => context.named(name)?,
             None => (context.projects.iter().find(|p| p.study().demo().is_some()))
                 .or(context.projects.first())
-                .ok_or_else(|| Failure::user("there is no twin to show"))?,
+                .ok_or_else(|| {
+                    Failure::user("no twin is registered; give --program 'COMMAND' or --fmu M.fmu")
+                })?,
         };
         let study = project.study();
         let (record, origin) = match study.demo() {
-            Some(record) => (record.clone(), "a record made beforehand by this program"),
+            Some(record) => (record.clone(), "embedded record"),
             None => (
                 simulated(context, study)?,
-                "a record simulated somewhere in the bounds",
+                "record simulated at parameters drawn from the bounds",
             ),
         };
         output::say(&format!(
@@ -69,7 +71,7 @@ impl Verb for Demo {
             write_results(&folder, study, &record, &estimate)?;
             folder.finish()?;
             output::say(&format!(
-                "demo: {0}/overlay.svg shows measured against twin, {0}/record.csv the record",
+                "demo: {0}/overlay.svg shows measured and twin, {0}/record.csv is the record",
                 out.display()
             ));
         }
@@ -78,7 +80,7 @@ impl Verb for Demo {
     }
 }
 
-/// A record of the twin somewhere in its bounds, so most likely outside of the prior.
+/// Simulates a record at parameters drawn from the bounds, most likely outside the prior.
 fn simulated(context: &Context<'_>, study: &Study) -> Result<Record, Failure> {
     let noise = Noise::new(context.seed, "demo", 0);
     let drive = study.drives()?.draw(noise)?;

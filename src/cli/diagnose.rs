@@ -1,4 +1,4 @@
-//! `diagnose`: what the twin lacks.
+//! `diagnose`: tests whether the twin explains the record, and finds what it lacks.
 
 use super::args::Subject;
 use super::{Context, Failure, Verb, output};
@@ -11,31 +11,31 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Learn what the twin lacks: whether parameters can explain the record, where not, which effect, how far it closes the gap.
+/// Diagnose what the twin lacks: can parameters explain the record; if not, where, which effect, how much of the gap closes.
 ///
-/// Needs no training. DIR holds report.json, report.html and, where another record would tell rivals apart,
-/// next-input.csv. Of a twin that shows no equations, only effects of sensors and actuators can be named.
+/// Needs no training. DIR holds report.json, report.html and, if another record can separate rivals, next-input.csv.
+/// For a black-box twin, only sensor and actuator effects can be named.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
         truetwin diagnose R.csv --twin tanks --validation V.csv --out gap\n  \
         truetwin diagnose R1.csv R2.csv --study S.toml --without sensor-bias,state-ceiling@h1 --out gap\n\
         Next: open gap/report.html; docs/diagnosing-a-gap.md says how to read it")]
 pub(super) struct Diagnose {
-    /// Measured records of one system; they share θ, but for unknown starts.
+    /// Measured records of one system; they share all parameters except unknown starts.
     #[arg(value_name = "R.csv", required = true)]
     records: Vec<PathBuf>,
     #[command(flatten)]
     subject: Subject,
-    /// An estimator of the same twin, whose first estimate is a start of the fit.
+    /// Estimator of the same twin; its estimate is one starting point of the fit.
     #[arg(long, value_name = "EST")]
     estimator: Option<PathBuf>,
-    /// A record that no fit sees: sharper test and ranking, and the share of the gap that closes.
+    /// Record that no fit uses: sharper test and ranking, share of the gap closed.
     #[arg(long, value_name = "V.csv")]
     validation: Option<PathBuf>,
-    /// Effects that are not to be named.
+    /// Effects to exclude.
     #[arg(long, value_name = "ID[@TARGET],..", value_delimiter = ',')]
     without: Vec<String>,
-    /// A new folder for report.json, report.html and next-input.csv.
+    /// New folder for report.json, report.html and next-input.csv.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -103,7 +103,7 @@ impl Verb for Diagnose {
     }
 }
 
-/// What a pretrained network reads off the first record.
+/// Returns the network's estimate for the first record.
 fn first_estimate(
     context: &Context<'_>,
     study: &Study,
@@ -118,7 +118,7 @@ fn first_estimate(
     let (theirs, ours) = (names(estimator.study()), names(study));
     if theirs != ours {
         return Err(Failure::user(format!(
-            "{}: the estimator is of {}, the call of {}; pretrain one for this twin and study",
+            "{}: the estimator has parameters {}, the study has {}; pretrain one for this twin and study",
             path.display(),
             theirs.join(", "),
             ours.join(", ")

@@ -1,4 +1,4 @@
-//! `effects`: what a twin may lack.
+//! `effects`: lists the effects that a twin may lack.
 
 use super::args::Subject;
 use super::{Context, Failure, Verb, output};
@@ -7,11 +7,11 @@ use clap::Args;
 use serde_json::{Value, json};
 use std::process::ExitCode;
 
-/// List the effects that a twin may lack, with their targets and magnitudes.
+/// List the effects that a twin may lack, with targets and magnitudes.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
         truetwin effects --twin tanks\n\
-        Next: give some to simulate --effect E.toml (docs/choosing-effects.md), or let truetwin diagnose find them")]
+        Next: simulate with --effect E.toml (docs/choosing-effects.md), or find effects with truetwin diagnose")]
 pub(super) struct Effects {
     #[command(flatten)]
     subject: Subject,

@@ -1,4 +1,4 @@
-//! `estimate`: the parameters behind a record.
+//! `estimate`: estimates the parameters behind a record.
 
 use super::args::PresetArgument;
 use super::{Context, Failure, Verb, output};
@@ -15,24 +15,24 @@ use std::process::ExitCode;
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
         truetwin estimate R.csv --estimator tanks.est --validation V.csv --out result\n\
-        Next, where the calibrated twin does not explain the record: truetwin diagnose R.csv")]
+        If the calibrated twin does not explain the record, next: truetwin diagnose R.csv")]
 pub(super) struct Estimate {
-    /// The measured record.
+    /// Measured record.
     #[arg(value_name = "R.csv")]
     record: PathBuf,
-    /// The estimator, from `truetwin pretrain`.
+    /// Estimator from `truetwin pretrain`.
     #[arg(long, value_name = "EST")]
     estimator: PathBuf,
-    /// A second record of the same system to score the calibrated twin on.
+    /// Second record of the same system, to score the calibrated twin.
     #[arg(long, value_name = "V.csv")]
     validation: Option<PathBuf>,
-    /// Numbers of the refinement; the estimator's own unless given.
+    /// Settings of the refinement [default: the estimator's own].
     #[arg(long, value_enum)]
     preset: Option<PresetArgument>,
-    /// Refine and tune even where the gate would keep the network's estimate.
+    /// Refine even if the record is consistent with the network's estimate.
     #[arg(long)]
     always_refine: bool,
-    /// A new folder for estimate.json, overlay.svg, trajectories.csv and, after a refit, the cloud of simulations (cloud.npz).
+    /// New folder for estimate.json, overlay.svg, trajectories.csv and, after a refit, the cloud of simulations (cloud.npz).
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -80,7 +80,7 @@ pub(super) fn show(
     }
 }
 
-/// `estimate.json`, `overlay.svg`, `trajectories.csv`, `cloud.npz`.
+/// Writes `estimate.json`, `overlay.svg`, `trajectories.csv`, `cloud.npz`.
 pub(super) fn write_results(
     folder: &output::NewFolder,
     study: &Study,
@@ -94,7 +94,7 @@ pub(super) fn write_results(
         file::write(&folder.file("cloud.npz"), cloud, &names)?;
     }
     let before = estimate.tracking_initial.as_ref().map(|t| &t.outputs);
-    // A free run that diverged leaves nothing to draw; the text says so.
+    // A free run that diverged cannot be drawn; the text reports it.
     let Some(after) = estimate.tracking.as_ref().map(|t| &t.outputs) else {
         return Ok(());
     };

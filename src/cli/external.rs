@@ -1,4 +1,4 @@
-//! A twin that only this call knows: `--program` or `--fmu`.
+//! The external twin of a call: `--program` or `--fmu`.
 
 use super::Failure;
 use super::args::External;
@@ -8,9 +8,9 @@ use crate::study::Study;
 use std::path::Path;
 use std::time::Duration;
 
-/// The study of the program or FMU that the call names, beside `registered` ones; `None` where it names none.
+/// Returns the study of the program or FMU that the call names; `None` if it names none.
 ///
-/// Foreign code is started here and nowhere else: no study file and no estimator can name any.
+/// Only the command line can start foreign code; study files and estimators cannot.
 pub(super) fn study(options: &External, registered: &[Project]) -> Result<Option<Study>, Failure> {
     check_options(options)?;
     let (what, study) = match (&options.program, &options.fmu) {
@@ -21,13 +21,13 @@ pub(super) fn study(options: &External, registered: &[Project]) -> Result<Option
     let name = study.name();
     if registered.iter().any(|other| other.study().name() == name) {
         return Err(Failure::user(format!(
-            "{what} calls its twin \"{name}\", which is registered already; let it have another name"
+            "{what} names its twin \"{name}\", which is registered already; choose another name"
         )));
     }
     Ok(Some(study))
 }
 
-/// Whether each option has something that it is about.
+/// Refuses options without the program or FMU that they configure.
 fn check_options(options: &External) -> Result<(), Failure> {
     let (program, fmu) = (options.program.is_some(), options.fmu.is_some());
     let rules = [
@@ -35,17 +35,17 @@ fn check_options(options: &External) -> Result<(), Failure> {
         (
             options.workers.is_some() && !program && !fmu,
             "--workers",
-            "it is about a program or an FMU: give --program 'COMMAND' or --fmu M.fmu, or leave it out",
+            "needs a program or an FMU; add --program 'COMMAND' or --fmu M.fmu, or remove it",
         ),
         (
             options.timeout.is_some() && !program,
             "--timeout",
-            "it is about a program: give --program 'COMMAND', or leave it out",
+            "needs a program; add --program 'COMMAND', or remove it",
         ),
         (
             !options.variables.is_empty() && !fmu,
             "--variables",
-            "it is about an FMU: give --fmu M.fmu, or leave it out",
+            "needs an FMU; add --fmu M.fmu, or remove it",
         ),
     ];
     match rules.iter().find(|(wrong, ..)| *wrong) {

@@ -1,25 +1,24 @@
-//! From any error to one line and an exit code.
+//! Turns errors into one line and an exit code.
 
 use super::output;
 use crate::diagnose::DiagnoseError;
 use crate::effect::EffectError;
 use crate::effect::EffectFileError;
 use crate::estimator::EstimatorError;
-use crate::evaluate::paper::{MonteCarloError, ScenarioError};
-use crate::evaluate::trials::WithheldError;
+use crate::evaluate::EvaluateError;
 use crate::feature::FeatureError;
 use crate::network::NetworkError;
-use crate::record::{CsvError, DriveError, RecordError};
+use crate::record::RecordError;
 use crate::storage::work::{Team, TeamError, WorkError};
 use crate::study::{PlanError, StudyError};
-use crate::twin::{AdaptationError, ParameterError, SimulationError};
+use crate::twin::{SimulationError, TwinError};
 use std::fmt::Display;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// The call or a file is wrong.
+/// Exit code of a wrong call or file.
 const USER: u8 = 2;
-/// Anything else.
+/// Exit code of everything else.
 const INTERNAL: u8 = 1;
 
 /// Why a verb ended early.
@@ -27,12 +26,12 @@ const INTERNAL: u8 = 1;
 pub(super) struct Failure {
     message: String,
     code: u8,
-    /// Whether the study may be what is wrong.
+    /// The study file may be the cause.
     about_study: bool,
 }
 
 impl Failure {
-    /// The user can mend it; the message says how.
+    /// Creates a failure that the user can fix; the message tells how.
     pub fn user(message: impl Display) -> Self {
         Self {
             message: message.to_string(),
@@ -41,7 +40,7 @@ impl Failure {
         }
     }
 
-    /// The user cannot mend it.
+    /// Creates a failure that the user cannot fix.
     pub fn internal(message: impl Display) -> Self {
         Self {
             message: message.to_string(),
@@ -50,7 +49,7 @@ impl Failure {
         }
     }
 
-    /// The user has stopped it.
+    /// Creates the failure of a call that the user has stopped.
     pub fn stopped(message: impl Display, code: u8) -> Self {
         Self {
             message: message.to_string(),
@@ -59,7 +58,7 @@ impl Failure {
         }
     }
 
-    /// A wrong call, in one line with the remedy.
+    /// Creates the failure of a wrong call, in one line with the remedy.
     pub fn usage(error: &clap::Error) -> Self {
         use clap::error::{ContextKind, ContextValue, ErrorKind};
         if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
@@ -76,7 +75,8 @@ impl Failure {
         ];
         let near = similar.iter().find_map(|kind| match error.get(*kind)? {
             ContextValue::String(name) => Some(name.clone()),
-            ContextValue::Strings(names) => names.first().cloned(),
+            // Sorted by confidence: the nearest name is the last one.
+            ContextValue::Strings(names) => names.last().cloned(),
             _ => None,
         });
         let near = near.map_or(String::new(), |name| format!(" (did you mean {name}?)"));
@@ -85,7 +85,7 @@ impl Failure {
         ))
     }
 
-    /// Names the study file, where the study may be what is wrong.
+    /// Adds the study file if it may be the cause.
     pub fn of_study(self, path: Option<&Path>) -> Self {
         match path {
             Some(path) if self.about_study => self.within(path),
@@ -93,7 +93,7 @@ impl Failure {
         }
     }
 
-    /// Names the file that the message is about, unless it does.
+    /// Adds the name of the file unless the message has it.
     pub fn within(mut self, path: &Path) -> Self {
         let name = path.display().to_string();
         if !self.message.contains(&name) {
@@ -107,11 +107,12 @@ impl Failure {
         self.code
     }
 
-    /// As [`report`](Self::report), of what every process of a team finds: one says it.
+    /// Reports a failure that all ranks share; the root rank prints it.
     pub fn report_of(self, team: &Team) -> ExitCode {
-        match team.leads() {
-            true => self.report(),
-            false => ExitCode::from(self.code),
+        if team.leads() {
+            self.report()
+        } else {
+            ExitCode::from(self.code)
         }
     }
 
@@ -122,7 +123,6 @@ impl Failure {
             .split_whitespace()
             .collect::<Vec<_>>()
             .join(" ");
-        // What a message quotes may come from anywhere.
         output::say(&format!("error: {line}"));
         ExitCode::from(self.code)
     }
@@ -139,15 +139,12 @@ macro_rules! users {
     };
 }
 users!(
-    AdaptationError,
-    CsvError,
-    DriveError,
     EffectError,
     EffectFileError,
-    ParameterError,
     RecordError,
     SimulationError,
     TeamError,
+    TwinError,
     WorkError,
 );
 
@@ -163,15 +160,15 @@ macro_rules! studies {
 }
 studies!(FeatureError, PlanError, StudyError);
 
-impl From<WithheldError> for Failure {
-    fn from(error: WithheldError) -> Self {
+impl From<EvaluateError> for Failure {
+    fn from(error: EvaluateError) -> Self {
         match error {
-            WithheldError::Diagnose(error) => error.into(),
-            WithheldError::Threads(_) | WithheldError::Cancelled(_) => Self::internal(error),
-            WithheldError::Changed(_)
-            | WithheldError::NoEffect(_)
-            | WithheldError::Runaway(_)
-            | WithheldError::Plan(_) => Self {
+            EvaluateError::Diagnose(error) => error.into(),
+            EvaluateError::Threads(_) | EvaluateError::Cancelled(_) => Self::internal(error),
+            EvaluateError::Changed(_)
+            | EvaluateError::NoEffect(_)
+            | EvaluateError::Runaway(_)
+            | EvaluateError::Plan(_) => Self {
                 about_study: true,
                 ..Self::user(error)
             },
@@ -210,26 +207,6 @@ impl From<DiagnoseError> for Failure {
     fn from(error: DiagnoseError) -> Self {
         match error {
             DiagnoseError::Cancelled(_) => Self::internal(error),
-            _ => Self::user(error),
-        }
-    }
-}
-
-impl From<ScenarioError> for Failure {
-    fn from(error: ScenarioError) -> Self {
-        match error {
-            ScenarioError::Plan(error) => error.into(),
-            ScenarioError::Drive(error) => error.into(),
-            ScenarioError::NoPoint(_) | ScenarioError::Outside { .. } => Self::user(error),
-        }
-    }
-}
-
-impl From<MonteCarloError> for Failure {
-    fn from(error: MonteCarloError) -> Self {
-        match error {
-            MonteCarloError::Cancelled(_) | MonteCarloError::Threads(_) => Self::internal(error),
-            MonteCarloError::Scenario(error) => error.into(),
             _ => Self::user(error),
         }
     }

@@ -1,4 +1,4 @@
-//! `features`: records, compressed.
+//! `features`: compresses records to features.
 
 use super::args::{PresetArgument, Subject};
 use super::{Context, Failure, Verb, output};
@@ -10,7 +10,7 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Compress records to features, as a network would see them.
+/// Compress records to the features that the network sees.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
         truetwin features R1.csv R2.csv --twin tanks --out X.npy")]
@@ -20,10 +20,10 @@ pub(super) struct Features {
     records: Vec<PathBuf>,
     #[command(flatten)]
     subject: Subject,
-    /// Whose features.
+    /// Recipe of the features.
     #[arg(long, value_enum, default_value = "default")]
     preset: PresetArgument,
-    /// A new .npy, .npz or .csv file, one record a row; standard output, as CSV, unless given.
+    /// New .npy, .npz or .csv file, one record per row [default: CSV on standard output].
     #[arg(long, value_name = "X.npy")]
     out: Option<PathBuf>,
 }

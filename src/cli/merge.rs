@@ -1,4 +1,4 @@
-//! `merge`: the banks of a job array as one.
+//! `merge`: merges the banks of a job array.
 
 use super::{Context, Failure, Verb, output};
 use crate::estimator::bank::file;
@@ -8,17 +8,17 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Put the banks of a job array together, or turn a bank into one .npz or .csv file.
+/// Merge the banks of a job array, or convert a bank into one .npz or .csv file.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
         truetwin merge bank-1 bank-2 --out bank\n  \
         truetwin merge bank --out bank.npz\n\
         Next: truetwin pretrain with --bank bank")]
 pub(super) struct Merge {
-    /// Folders of one call of `truetwin bank`.
+    /// Folders filled by one `truetwin bank` command.
     #[arg(value_name = "DIR", required = true)]
     from: Vec<PathBuf>,
-    /// A new folder for the bank, or a file with the name of an .npz or .csv.
+    /// New folder for the bank, or new .npz or .csv file.
     #[arg(long, value_name = "OUT")]
     out: PathBuf,
 }
@@ -27,18 +27,20 @@ impl Verb for Merge {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         output::check_new(&self.out)?;
         let out = self.out.display();
-        let (what, count) = match file::is_named(&self.out) {
-            true => (
+        let (what, count) = if file::is_named(&self.out) {
+            (
                 "simulations",
                 merge_into_file(&self.from, &self.out, context.progress)?,
-            ),
-            false => ("shards", merge(&self.from, &self.out, context.progress)?),
+            )
+        } else {
+            ("shards", merge(&self.from, &self.out, context.progress)?)
         };
-        match context.json {
-            true => output::print_json(&json!({
+        if context.json {
+            output::print_json(&json!({
                 "schema": "truetwin.merge/1", "out": self.out, "what": what, "count": count,
-            }))?,
-            false => output::print(&format!("{out}: {count} {what}"))?,
+            }))?
+        } else {
+            output::print(&format!("{out}: {count} {what}"))?
         }
         Ok(ExitCode::SUCCESS)
     }

@@ -11,8 +11,8 @@
 //! }
 //! ```
 //!
-//! Results go to standard output, progress and messages to standard error. Exit 0: done; 2: the call or a file is
-//! wrong, in one line with the remedy; 1: anything else.
+//! Results go to standard output, progress and messages to standard error. Exit codes: 0 done; 2 wrong call or file, with
+//! one line that has the remedy; 1 anything else.
 
 mod args;
 mod bank;
@@ -46,7 +46,7 @@ use std::ffi::OsString;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// More threads than any machine has cores are a slip of the keyboard.
+/// Upper limit of --threads: larger numbers are typing errors.
 const MOST_THREADS: usize = 1024;
 
 /// Runs the command line of this process over studies or projects.
@@ -81,9 +81,10 @@ pub fn run_from<P: Into<Project>, E: Into<StudyError>>(
         Ok(parsed) => parsed,
         Err(error) if !error.use_stderr() => {
             // Help and version are results.
-            let shown = match team.leads() {
-                true => output::print(&error.to_string()),
-                false => Ok(()),
+            let shown = if team.leads() {
+                output::print(&error.to_string())
+            } else {
+                Ok(())
             };
             return shown.map_or_else(Failure::report, |()| ExitCode::SUCCESS);
         }
@@ -91,7 +92,7 @@ pub fn run_from<P: Into<Project>, E: Into<StudyError>>(
     };
     let verb = parsed.command.verb();
     if !team.is_alone() && !verb.is_shared_out() {
-        let failure = Failure::user("this verb runs as one process; start it without mpirun");
+        let failure = Failure::user("this verb runs in one process; start it without mpirun");
         return failure.report_of(&team);
     }
     let program = (words.first())
@@ -124,7 +125,7 @@ pub fn run_from<P: Into<Project>, E: Into<StudyError>>(
     }
 }
 
-/// Runs `work` in a pool of its own, where a number of threads is asked for; the global pool is left alone.
+/// Runs `work` in its own pool if a number of threads is given; the global pool stays untouched.
 fn in_pool<R: Send>(
     threads: Option<usize>,
     work: impl FnOnce() -> Result<R, Failure> + Send,
@@ -148,9 +149,10 @@ fn dispatch(
     registered: &[Project],
     team: &Team,
 ) -> Result<ExitCode, Failure> {
-    let progress = match team.leads() {
-        true => progress::bars(),
-        false => progress::bars().unshown(),
+    let progress = if team.leads() {
+        progress::bars()
+    } else {
+        progress::bars().unshown()
     };
     let external = external::study(&arguments.external, registered)?.map(Project::from);
     let projects: Vec<Project> = registered.iter().chain(&external).cloned().collect();
@@ -168,7 +170,7 @@ fn dispatch(
     (verb.run(&context)).map_err(|failure| failure.of_study(study))
 }
 
-/// The verbs, in the order of `--help`. Each is one file, and three lines here: its `mod`, its variant, its arm.
+/// The verbs, in the order of `--help`. A new verb needs a file, a `mod`, a variant and an arm.
 #[derive(Debug, Subcommand)]
 enum Command {
     Twins(twins::Twins),
@@ -210,33 +212,33 @@ impl Command {
     }
 }
 
-/// A verb: the options of a call, and what is done with them.
+/// A verb: its options and its work.
 trait Verb {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure>;
 
-    /// Which twin it is about, where it asks.
+    /// The twin of the call, for verbs that need one.
     fn subject(&self) -> Option<&Subject> {
         None
     }
 
-    /// Whether the same call goes on where this one stopped.
+    /// Tells whether rerunning the same command resumes the work.
     fn is_resumed(&self) -> bool {
         false
     }
 
-    /// Whether the ranks of a cluster share its work.
+    /// Tells whether the ranks of a cluster share the work.
     fn is_shared_out(&self) -> bool {
         false
     }
 }
 
-/// What every verb sees.
+/// Data that every verb gets.
 struct Context<'a> {
-    /// All there are, the external one among them.
+    /// All studies, including the external one.
     projects: &'a [Project],
-    /// The one that this call brings along.
+    /// The external study of this call.
     external: Option<&'a Project>,
-    /// What the command is called.
+    /// Name of the program.
     program: &'a str,
     json: bool,
     seed: u64,
@@ -245,7 +247,7 @@ struct Context<'a> {
 }
 
 impl Context<'_> {
-    /// The study that `--twin` or `--study` names, else the one that the call brings along.
+    /// Returns the study of `--twin` or `--study`, or else the external one.
     fn study(&self, subject: &Subject) -> Result<Study, Failure> {
         Ok(self.project(subject)?.study().clone())
     }
@@ -262,19 +264,19 @@ impl Context<'_> {
             }
             (None, None) => (self.external.cloned()).ok_or_else(|| {
                 Failure::user(
-                    "no twin is named; give --twin NAME (`truetwin twins` lists them), --study S.toml, --program 'COMMAND', or --fmu M.fmu",
+                    "no twin given; add --twin NAME (`truetwin twins` lists them), --study S.toml, --program 'COMMAND', or --fmu M.fmu",
                 )
             }),
         }
     }
 
-    /// What this process does of numbered work: the part of `--shard`, or its rank's.
+    /// Returns the share of this process in numbered work: that of `--shard`, or of its rank.
     fn share(&self, asked: Option<Share>) -> Result<Share, Failure> {
         match asked {
             None => Ok(self.team.share()),
             Some(share) if self.team.is_alone() => Ok(share),
             Some(_) => Err(Failure::user(
-                "--shard is for jobs of their own; under mpirun the ranks share the work out themselves",
+                "--shard cannot be used under mpirun, where ranks share the work; remove it",
             )),
         }
     }

@@ -1,4 +1,4 @@
-//! Results: standard output, files that appear whole, folders that appear whole.
+//! Output: standard output, and folders that appear complete.
 
 use super::{Context, Failure};
 use crate::storage::files::{self, folder, with_remedy};
@@ -10,8 +10,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Prints a result; a reader that has gone away (`| head`) is no failure. Names and units may come from a program or a file:
-/// nothing among them steers the terminal.
+/// Prints a result; a closed pipe (`| head`) is no failure. Control characters from names and units are escaped.
 pub(super) fn print(text: &str) -> Result<(), Failure> {
     let text = printable(text);
     let mut out = io::stdout().lock();
@@ -25,7 +24,7 @@ pub(super) fn print(text: &str) -> Result<(), Failure> {
     }
 }
 
-/// Says something to people beside the result; who listens no more misses it, and nothing else happens.
+/// Prints a message to standard error; a closed pipe is ignored.
 pub(super) fn say(text: &str) {
     let _ = writeln!(io::stderr().lock(), "{}", printable(text));
 }
@@ -36,7 +35,7 @@ pub(super) fn print_json(value: &Value) -> Result<(), Failure> {
     print(&hidden_escaped(&text))
 }
 
-/// JSON whose strings hold hidden characters as JSON writes them, so that they survive and steer nothing.
+/// Escapes hidden characters in the strings of a JSON text.
 fn hidden_escaped(json: &str) -> Cow<'_, str> {
     let odd = |c: char| hidden(c) && c != '\n';
     if !json.contains(odd) {
@@ -44,16 +43,16 @@ fn hidden_escaped(json: &str) -> Cow<'_, str> {
     }
     let mut text = String::with_capacity(json.len() + 16);
     for c in json.chars() {
-        match odd(c) {
-            // All of them are below U+10000.
-            true => text.push_str(&format!("\\u{:04x}", u32::from(c))),
-            false => text.push(c),
+        if odd(c) {
+            text.push_str(&format!("\\u{:04x}", u32::from(c)))
+        } else {
+            text.push(c)
         }
     }
     Cow::Owned(text)
 }
 
-/// Says how far a job array has come.
+/// Prints how much of a job array is done.
 pub(super) fn print_share(
     context: &Context<'_>,
     folder: &Path,
@@ -61,43 +60,45 @@ pub(super) fn print_share(
     there: usize,
     of: usize,
 ) -> Result<ExitCode, Failure> {
-    match context.json {
-        true => print_json(&json!({
+    if context.json {
+        print_json(&json!({
             "schema": "truetwin.share/1", "folder": folder, "pieces": what, "there": there, "of": of,
-        }))?,
-        false => print(&format!(
-            "{}: {there} of {of} {what} are there; once the other shares are done, the same call without --shard ends the work",
+        }))?
+    } else {
+        print(&format!(
+            "{}: {there} of {of} {what} done; when all shards are done, rerun without --shard to merge",
             folder.display()
-        ))?,
+        ))?
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// Refuses a path that is taken, and a folder that is not there, before the work starts.
+/// Refuses an existing path or a missing parent folder, before the work starts.
 pub(super) fn check_new(path: &Path) -> Result<(), Failure> {
     let name = path.display();
     if fs::symlink_metadata(path).is_ok() {
         return Err(Failure::user(format!(
-            "{name} exists already; choose another --out, or remove it"
+            "{name} exists already; choose another --out or remove it"
         )));
     }
     check_folder(path)
 }
 
-/// Refuses a path in a folder that is not there, before the work starts.
+/// Refuses a missing parent folder, before the work starts.
 pub(super) fn check_folder(path: &Path) -> Result<(), Failure> {
     let folder = folder(path);
-    match folder.is_dir() {
-        true => Ok(()),
-        false => Err(Failure::user(format!(
+    if folder.is_dir() {
+        Ok(())
+    } else {
+        Err(Failure::user(format!(
             "{}: the folder {} does not exist; make it first",
             path.display(),
             folder.display()
-        ))),
+        )))
     }
 }
 
-/// A folder that is filled beside its place and appears there whole.
+/// An output folder that appears complete: it is filled beside its place and then moved.
 pub(super) struct NewFolder {
     place: PathBuf,
     filling: files::NewFolder,
@@ -112,7 +113,7 @@ impl NewFolder {
         })
     }
 
-    /// Where a file of the folder is written.
+    /// Path of a file while the folder is filled.
     pub fn file(&self, name: &str) -> PathBuf {
         self.filling.file(name)
     }
@@ -121,7 +122,7 @@ impl NewFolder {
         fs::write(self.file(name), text).map_err(|error| failed(&self.place.join(name), &error))
     }
 
-    /// Puts the folder in its place.
+    /// Moves the folder to its place.
     pub fn finish(self) -> Result<(), Failure> {
         (self.filling.finish()).map_err(|error| failed(&self.place, &error))
     }

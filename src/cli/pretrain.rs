@@ -1,4 +1,4 @@
-//! `pretrain`: bank and network, into one file.
+//! `pretrain`: simulates a bank and trains the network.
 
 use super::args::{PresetArgument, Subject, seconds};
 use super::{Context, Failure, Verb, output};
@@ -17,27 +17,27 @@ use std::time::{Duration, Instant};
 #[command(after_help = "Examples:\n  \
         truetwin pretrain --twin tanks --out tanks.est\n  \
         truetwin pretrain --study S.toml --bank bank --out mine.est\n\
-        Stopped or killed, the same call goes on where it was: EST.part keeps bank and training until EST is there.\n\
+        After a stop, rerun the same command to resume: EST.part keeps bank and training until EST is complete.\n\
         Next: truetwin estimate R.csv --estimator tanks.est")]
 pub(super) struct Pretrain {
     #[command(flatten)]
     subject: Subject,
-    /// Where to write the estimator.
+    /// Output file of the estimator.
     #[arg(long, value_name = "EST")]
     out: PathBuf,
-    /// Simulations to train on; the preset's unless given.
+    /// Number of simulations [default: the preset's].
     #[arg(long, value_name = "M")]
     bank_size: Option<usize>,
-    /// A bank to train on, instead of simulating one: a folder of `truetwin bank`, or an .npz or .csv file of theta and features.
+    /// Existing bank: folder of `truetwin bank`, or .npz or .csv file with theta and features.
     #[arg(long, value_name = "BANK", conflicts_with = "bank_size")]
     bank: Option<PathBuf>,
-    /// Passes over the bank; the preset's unless given.
+    /// Passes over the bank [default: the preset's].
     #[arg(long)]
     epochs: Option<usize>,
-    /// Recipe.
+    /// Recipe of features, network and refinement.
     #[arg(long, value_enum, default_value = "default")]
     preset: PresetArgument,
-    /// Seconds after which the training is kept, again and again; 0: after each block of the bank.
+    /// Time between checkpoints of the training; 0: after each block of the bank.
     #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = seconds)]
     checkpoint: Duration,
 }

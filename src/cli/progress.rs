@@ -2,28 +2,28 @@
 
 use super::stop;
 use crate::progress::{Listener, Progress};
-use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::collections::HashMap;
 use std::io::{IsTerminal, stderr};
 use std::sync::{Arc, Mutex, Weak};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// A stage shows its bar once it has lasted this long.
+/// Time after which a stage gets its bar.
 const PATIENCE: Duration = Duration::from_millis(500);
-/// How often stages are looked at that report nothing: one unit of theirs may be long.
+/// Refresh interval; one unit of a stage may take long.
 const LOOK: Duration = Duration::from_millis(250);
 
-/// Before the first unit is done, nothing is known of the time left.
-const FIRST: &str = "{prefix:>13} {bar:32} {pos}/{len}  {elapsed} gone";
-const LATER: &str = "{prefix:>13} {bar:32} {pos}/{len}  {elapsed} gone, {eta} to go";
+/// The time left is unknown before the first unit is done.
+const FIRST: &str = "{prefix:>13} {bar:32} {pos}/{len}  {elapsed} elapsed";
+const LATER: &str = "{prefix:>13} {bar:32} {pos}/{len}  {elapsed} elapsed, {eta} left";
 
-/// Bars with the time left.
+/// Creates progress bars with the time left.
 pub(super) fn bars() -> Progress {
     let bars = Arc::new(Bars::default());
     if stderr().is_terminal() {
         let watched = Arc::downgrade(&bars);
-        // A bar is worth no failure: without this thread, bars come with the first unit.
+        // Without this thread, bars appear with the first unit.
         let _ = thread::Builder::new().spawn(move || watch(&watched));
     }
     Progress::new(bars)
@@ -45,7 +45,7 @@ struct Bars {
     open: Mutex<HashMap<String, Open>>,
 }
 
-/// A stage that has begun.
+/// A running stage.
 struct Open {
     since: Instant,
     done: u64,
@@ -54,16 +54,18 @@ struct Open {
 }
 
 impl Open {
-    /// Shows a bar, once the stage has lasted long enough.
+    /// Shows a bar once the stage has lasted long enough.
     fn show(&mut self, stage: &str, all: &MultiProgress) {
         if self.bar.is_some() || self.since.elapsed() < PATIENCE || self.done >= self.total {
             return;
         }
-        let bar = ProgressBar::new(self.total).with_elapsed(self.since.elapsed());
-        bar.set_prefix(stage.to_owned());
-        bar.set_position(self.done);
-        let bar = all.add(bar);
+        // Complete before it is drawn: a bar that changes its template leaves its first picture behind.
+        let bar = ProgressBar::with_draw_target(Some(self.total), ProgressDrawTarget::hidden())
+            .with_elapsed(self.since.elapsed())
+            .with_prefix(stage.to_owned())
+            .with_position(self.done);
         self.style(&bar);
+        let bar = all.add(bar);
         bar.enable_steady_tick(LOOK);
         self.bar = Some(bar);
     }
@@ -78,7 +80,7 @@ impl Open {
 
 impl Bars {
     fn show_what_lasts(&self) {
-        // A poisoned lock means that a thread panicked; bars are not worth another panic.
+        // A poisoned lock means that another thread panicked.
         if let Ok(mut open) = self.open.lock() {
             for (stage, entry) in open.iter_mut() {
                 entry.show(stage, &self.all);
@@ -88,7 +90,7 @@ impl Bars {
 }
 
 impl Drop for Bars {
-    /// What is left of a stage that failed would stand in the way of the message.
+    /// Clears the bars of failed stages before the error message.
     fn drop(&mut self) {
         let _ = self.all.clear();
     }

@@ -16,13 +16,13 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
-/// How often a job looks whether another one has trained the estimator.
+/// Interval between checks whether another job has trained the estimator.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// Where true parameters come from.
+/// Source of the true parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum ScenarioArgument {
-    /// Drawn from the prior, where the network was trained
+    /// Drawn from the prior of the training
     #[value(name = "0")]
     Prior,
     /// The paper's first point outside the prior, that of its table (OOD 1)
@@ -51,11 +51,11 @@ impl From<ScenarioArgument> for Scenario {
 ///
 /// Methods: the pretrained network (TS-pre), Gauss–Newton (GN), tuned heads (TS-fine), what `estimate` would answer
 /// (final), and as baselines the prediction-error method (PEM) and the dual Kalman filter (dual-EKF), each from a good
-/// start, from TS-pre, and from a bad start. Where the paper has a figure, it stands beside ours. Where records do not
-/// determine all of θ, a second table has the errors of what they do determine.
+/// start, from TS-pre, and from a bad start. The paper's figures stand beside ours. If records do not determine all of θ,
+/// a second table has the errors of the combinations that they determine.
 ///
-/// Run i depends on the seed and i alone. Records run in parallel, each on its share of the threads: for times of one
-/// core, say --threads 1.
+/// Run i depends only on the seed and i. Records run in parallel, each on its share of the threads: for times of one
+/// core, use --threads 1.
 #[derive(Debug, Args)]
 #[command(after_help = "The paper's table and figures:\n  \
         truetwin reproduce --twin van-der-pol --preset paper --out vdp-1\n  \
@@ -64,33 +64,33 @@ impl From<ScenarioArgument> for Scenario {
         A twin of your own, over all of its bounds:\n  \
         truetwin reproduce --study S.toml --scenario uniform --runs 200 --out study\n\n\
         DIR holds reproduce.json (as --json), table.txt, trajectories.svg (as in the paper: the truth and the mean\n\
-        predictions; scenarios 1 and 2), first-record.svg, and what it takes to go on: manifest.json, estimator.est,\n\
-        runs/0000.json and so on. Interrupted, the same call goes on where it stopped; another call is refused.")]
+        predictions; scenarios 1 and 2), first-record.svg, and the state of the work: manifest.json, estimator.est,\n\
+        runs/NNNN.json. Interrupted, the same command resumes it; a different command is refused.")]
 pub(super) struct Reproduce {
     #[command(flatten)]
     subject: Subject,
-    /// Where the true parameters of the records come from.
+    /// Source of the true parameters.
     #[arg(long, value_enum, default_value = "1")]
     scenario: ScenarioArgument,
-    /// Simulated records; the paper has 100.
+    /// Number of simulated records; the paper has 100.
     #[arg(long, default_value_t = 100, value_parser = at_least_one)]
     runs: usize,
-    /// Recipe.
+    /// Recipe of features, network and refinement.
     #[arg(long, value_enum, default_value = "default")]
     preset: PresetArgument,
-    /// An estimator to score, instead of pretraining one.
+    /// Existing estimator to score.
     #[arg(long, value_name = "EST", conflicts_with_all = ["preset", "bank_size", "epochs"])]
     estimator: Option<PathBuf>,
-    /// Simulations to train on; the preset's unless given.
+    /// Number of simulations [default: the preset's].
     #[arg(long, value_name = "M")]
     bank_size: Option<usize>,
-    /// Passes over the bank; the preset's unless given.
+    /// Passes over the bank [default: the preset's].
     #[arg(long)]
     epochs: Option<usize>,
-    /// A folder for the results: a new one, or one of this very call to go on with.
+    /// Output folder; rerunning the same command resumes it.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Only part i of n of the records, for job arrays; once all parts are done, the same call without it ends the work.
+    /// Share i of n of the records, for job arrays; when all shares are done, rerun without --shard to merge.
     #[arg(long, value_name = "I/N", requires = "out")]
     shard: Option<Share>,
 }
@@ -131,7 +131,7 @@ impl Verb for Reproduce {
             seed: context.seed,
         };
         if self.out.is_none() && !context.team.is_alone() {
-            return Err(Failure::user("ranks meet in a folder; name one with --out"));
+            return Err(Failure::user("--out is required under mpirun"));
         }
         let share = context.share(self.shard)?;
         let folder = match &self.out {
@@ -170,31 +170,32 @@ impl Verb for Reproduce {
             draw(folder, study, &plan, &runs)?;
             stage.finish();
             folder.write("table.txt", &text)?;
-            // Last: where it is, everything is.
+            // Written last: it marks the folder as complete.
             folder.write("reproduce.json", &format!("{json:#}\n"))?;
         }
-        match context.json {
-            true => output::print_json(&json)?,
-            false => output::print(&text)?,
+        if context.json {
+            output::print_json(&json)?
+        } else {
+            output::print(&text)?
         }
         Ok(ExitCode::SUCCESS)
     }
 }
 
-/// The estimator of a file, if it is one of this twin.
+/// Loads an estimator; refuses one of another twin.
 fn load(context: &Context<'_>, path: &Path, study: &Study) -> Result<Estimator, Failure> {
     let estimator = Estimator::load(path, context.projects)?;
     let (made_for, asked) = (estimator.study().name(), study.name());
     if made_for != asked {
         return Err(Failure::user(format!(
-            "{}: made for twin {made_for}, --twin says {asked}; name the same twin",
+            "{}: made for twin {made_for}, the call names {asked}; name the same twin",
             path.display()
         )));
     }
     Ok(estimator)
 }
 
-/// The folder's estimator: trained once, then read.
+/// Loads the folder's estimator; trains it first if needed.
 fn kept(
     context: &Context<'_>,
     project: &Project,
@@ -204,7 +205,7 @@ fn kept(
     let path = folder.file("estimator.est");
     while context.team.leads() && !path.exists() {
         match Pretraining::new(project, *training).write(&path, context.progress) {
-            // Another job trains the same.
+            // Another job is training it.
             Err(EstimatorError::Work(WorkError::Busy { .. })) => {
                 context.progress.checkpoint().map_err(Failure::internal)?;
                 std::thread::sleep(LOOK);
@@ -218,7 +219,7 @@ fn kept(
     Ok(Estimator::load(&path, context.projects)?)
 }
 
-/// `trajectories.svg`, where all records have the same truth, and `first-record.svg`.
+/// Draws `first-record.svg` and, if all records share one truth, `trajectories.svg`.
 fn draw(
     folder: &WorkFolder,
     study: &Study,

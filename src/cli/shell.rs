@@ -1,7 +1,8 @@
-//! `completions` and `man`: the command line at home in a shell, both made from the options themselves.
+//! `completions` and `man`: shell completion and manual pages, generated from the options.
 
 use super::args;
 use super::{Context, Failure, Verb, output};
+use crate::setting::did_you_mean;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Command};
 use clap_complete::Shell;
@@ -10,16 +11,16 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Print a script that completes verbs, options and names of twins in a shell.
+/// Print a shell script that completes verbs, options and twin names.
 #[derive(Debug, Args)]
-#[command(after_help = "Once, and again after an update:\n  \
+#[command(after_help = "Run once, and after each update:\n  \
         bash        truetwin completions bash > ~/.local/share/bash-completion/completions/truetwin\n  \
         zsh         truetwin completions zsh  > \"${fpath[1]}/_truetwin\"\n  \
         fish        truetwin completions fish > ~/.config/fish/completions/truetwin.fish\n  \
         PowerShell  truetwin completions powershell >> $PROFILE\n\
         Then open a new shell.")]
 pub(super) struct Completions {
-    /// The shell that reads the script.
+    /// Shell.
     #[arg(value_enum)]
     shell: Shell,
 }
@@ -30,26 +31,27 @@ impl Verb for Completions {
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut command, context.program, &mut script);
         let script = String::from_utf8(script).map_err(Failure::internal)?;
-        match context.json {
-            true => output::print_json(&json!({
+        if context.json {
+            output::print_json(&json!({
                 "schema": "truetwin.completions/1", "shell": self.shell.to_string(), "script": script,
-            }))?,
-            false => output::print(&script)?,
+            }))?
+        } else {
+            output::print(&script)?
         }
         Ok(ExitCode::SUCCESS)
     }
 }
 
-/// Write the manual: one page of the whole, and one for each verb.
+/// Print or write manual pages: one for the program, one for each verb.
 #[derive(Debug, Args)]
 #[command(after_help = "Read one page, or install all of them:\n  \
         truetwin man estimate | man -l -\n  \
         truetwin man --out man1 && sudo mv man1/* /usr/local/share/man/man1/")]
 pub(super) struct Man {
-    /// The verb whose page is printed; the page of the whole unless given.
+    /// Verb of the page to print [default: the program's page].
     #[arg(value_name = "VERB", conflicts_with = "out")]
     verb: Option<String>,
-    /// A new folder for all pages, instead of printing one.
+    /// New folder for all pages.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -65,16 +67,17 @@ impl Verb for Man {
             }
             folder.finish()?;
             let names: Vec<&String> = pages.iter().map(|(name, _)| name).collect();
-            match context.json {
-                true => output::print_json(&json!({
+            if context.json {
+                output::print_json(&json!({
                     "schema": "truetwin.man/1", "folder": out, "pages": names,
-                }))?,
-                false => output::print(&format!(
+                }))?
+            } else {
+                output::print(&format!(
                     "{0}: {1} pages\nnext: man {0}/{2}.1",
                     out.display(),
                     names.len(),
                     context.program
-                ))?,
+                ))?
             }
             return Ok(ExitCode::SUCCESS);
         }
@@ -84,43 +87,47 @@ impl Verb for Man {
         };
         let Some((name, text)) = pages.iter().find(|(name, _)| *name == asked) else {
             let verbs = command(context);
+            let verb = self.verb.as_deref().unwrap_or_default();
             let known: Vec<&str> = verbs.get_subcommands().map(Command::get_name).collect();
             return Err(Failure::user(format!(
-                "man: there is no verb {}; there are {}",
-                self.verb.as_deref().unwrap_or_default(),
+                "man: no verb is called {}{}; there are {}",
+                verb,
+                did_you_mean(verb, &known),
                 known.join(", ")
             )));
         };
-        match context.json {
-            true => output::print_json(&json!({
+        if context.json {
+            output::print_json(&json!({
                 "schema": "truetwin.man/1", "page": name, "text": text,
-            }))?,
-            false => output::print(text)?,
+            }))?
+        } else {
+            output::print(text)?
         }
         Ok(ExitCode::SUCCESS)
     }
 }
 
-/// The command line with the name of this program, and its twins as values of `--twin`.
+/// Returns the command line with this program's name, and its twins as values of `--twin`.
 fn command(context: &Context<'_>) -> Command {
     let names: Vec<String> = (context.projects.iter())
         .map(|project| project.study().name().to_owned())
         .collect();
     (args::command().name(context.program.to_owned())).mut_subcommands(|verb| {
         let takes_twin = verb.get_arguments().any(|option| option.get_id() == "twin");
-        match takes_twin {
-            true => verb.mut_arg("twin", |option| {
+        if takes_twin {
+            verb.mut_arg("twin", |option| {
                 option.value_parser(PossibleValuesParser::new(names.clone()))
-            }),
-            false => verb,
+            })
+        } else {
+            verb
         }
     })
 }
 
-/// Names and texts of all pages in the language of `man`.
+/// Renders all pages: names and roff texts.
 fn pages(context: &Context<'_>) -> Result<Vec<(String, String)>, Failure> {
     let mut whole = command(context).bin_name(context.program.to_owned());
-    // Hands the options that all verbs share to each of them.
+    // Copies the global options to each verb.
     whole.build();
     let verbs = (whole
         .get_subcommands()

@@ -1,10 +1,11 @@
-//! `simulate`: a synthetic record.
+//! `simulate`: simulates a record.
 
 use super::args::Subject;
 use super::{Context, Failure, Verb, output};
 use crate::effect::read_effects;
 use crate::effect::{augment, given_magnitudes};
 use crate::record::{Drive, Record, read_drive, record_csv_text, write_record};
+use crate::setting::did_you_mean;
 use crate::twin::{DigitalTwin, Noise, ParameterSpace, Role};
 use clap::Args;
 use serde_json::json;
@@ -12,7 +13,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Simulate a record of a twin: at these parameters, with noise and, if asked for, with effects.
+/// Simulate a record at given parameters, with noise and optional effects.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
         truetwin simulate --twin van-der-pol --theta nu=3 --out R.csv\n  \
@@ -21,19 +22,19 @@ use std::process::ExitCode;
 pub(super) struct Simulate {
     #[command(flatten)]
     subject: Subject,
-    /// Parameters: name=value, separated by commas. Unknown starts and noise levels may be left out.
+    /// Parameters as name=value, separated by commas; estimated starts and noise levels may be omitted.
     #[arg(long, value_name = "a=..,b=..")]
     theta: String,
-    /// Effects to add: a TOML file of [[effect]] tables.
+    /// TOML file of [[effect]] tables to add.
     #[arg(long, value_name = "E.toml")]
     effect: Option<PathBuf>,
-    /// Time and inputs to simulate with; random levels as in the study unless given.
+    /// Time and inputs [default: random levels as in the study].
     #[arg(long, value_name = "U.csv")]
     input: Option<PathBuf>,
-    /// Without process and measurement noise.
+    /// Simulate without process and measurement noise.
     #[arg(long)]
     noise_free: bool,
-    /// Where to write the record; standard output unless given.
+    /// Output file of the record [default: standard output].
     #[arg(long, value_name = "R.csv")]
     out: Option<PathBuf>,
 }
@@ -56,7 +57,7 @@ impl Verb for Simulate {
             magnitudes = given_magnitudes(&effects);
             twin = augment(twin, effects).map_err(|error| Failure::from(error).within(path))?;
         }
-        let theta = complete(&twin.parameters(), given, &magnitudes)?;
+        let theta = complete(&twin.parameters(), &given, &magnitudes)?;
         let noise = Noise::new(context.seed, "simulate", 0);
         let drive = match &self.input {
             Some(path) => read_drive(path)?,
@@ -90,7 +91,7 @@ impl Verb for Simulate {
     }
 }
 
-/// `a=1,b=2` as pairs.
+/// Parses `a=1,b=2`.
 fn parse_theta(text: &str) -> Result<BTreeMap<String, f64>, Failure> {
     let mut values = BTreeMap::new();
     for part in text.split(',').map(str::trim).filter(|p| !p.is_empty()) {
@@ -111,15 +112,23 @@ fn parse_theta(text: &str) -> Result<BTreeMap<String, f64>, Failure> {
     Ok(values)
 }
 
-/// θ from what the call and the effect file give; unknown starts and noise levels may stay at their prior's centre.
+/// Returns θ from the call and the effect file; omitted starts and noise levels take their prior's centre.
 fn complete(
     space: &ParameterSpace,
-    mut given: BTreeMap<String, f64>,
+    given: &BTreeMap<String, f64>,
     magnitudes: &BTreeMap<String, f64>,
 ) -> Result<Vec<f64>, Failure> {
+    let names = space.names();
+    if let Some(name) = given.keys().find(|name| !names.contains(&name.as_str())) {
+        return Err(Failure::user(format!(
+            "--theta: no parameter is called {name}{}; there are {}",
+            did_you_mean(name, &names),
+            names.join(", ")
+        )));
+    }
     let mut theta = Vec::new();
     for p in space.iter() {
-        let value = given.remove(&p.name);
+        let value = given.get(&p.name).copied();
         let value = match (value, magnitudes.get(&p.name), p.role) {
             (Some(value), _, _) if !p.bounds.contains(value) => {
                 return Err(Failure::user(format!(
@@ -128,26 +137,20 @@ fn complete(
                 )));
             }
             (Some(value), _, _) => value,
-            // Limits of magnitudes are checked with the effect; off values may be infinite.
+            // The effect has checked its limits; off values may be infinite.
             (None, Some(magnitude), _) => *magnitude,
             (None, None, Role::Start | Role::Noise) => p.prior.centre(),
             (None, None, _) => {
                 return Err(Failure::user(format!(
-                    "--theta gives no {}; give {}",
+                    "--theta: no value for {}; give {}",
                     p.name,
-                    space.names().join(", ")
+                    names.join(", ")
                 )));
             }
         };
         theta.push(value);
     }
-    match given.keys().next() {
-        Some(name) => Err(Failure::user(format!(
-            "--theta: no parameter is called {name}; there are {}",
-            space.names().join(", ")
-        ))),
-        None => Ok(theta),
-    }
+    Ok(theta)
 }
 
 fn check_inputs(twin: &dyn DigitalTwin, drive: &Drive, options: &Simulate) -> Result<(), Failure> {

@@ -1,39 +1,40 @@
-//! Ctrl-C: the work ends at its next step, and says how to go on; a second one ends the process at once.
+//! Ctrl-C stops the work at its next step and prints how to resume; a second one ends the process at once.
 
 use super::{Failure, Verb};
 use std::ffi::OsString;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What a shell reports of a process that Ctrl-C has ended.
+/// Exit code of a process stopped by Ctrl-C.
 pub(super) const CODE: u8 = 130;
 
 static ASKED: AtomicBool = AtomicBool::new(false);
 
-/// From now on, Ctrl-C asks the work to stop.
+/// Installs the handler of Ctrl-C.
 pub(super) fn listen() {
     let asked = || {
         if ASKED.swap(true, Ordering::Relaxed) {
             std::process::exit(CODE.into());
         }
     };
-    // An application around this command line may have a handler of its own; that one stays.
+    // An application around this command line keeps its own handler.
     let _ = ctrlc::set_handler(asked);
 }
 
-/// Whether the work is to stop.
+/// Tells whether the work is to stop.
 pub(super) fn asked() -> bool {
     ASKED.load(Ordering::Relaxed)
 }
 
-/// What is said of a call that was stopped; `call` is its words.
+/// Creates the failure of a stopped call; `call` holds its words.
 pub(super) fn failure(verb: &dyn Verb, call: &[OsString]) -> Failure {
     let words: Vec<_> = call.iter().map(|word| word.to_string_lossy()).collect();
-    let text = match verb.is_resumed() {
-        true => format!(
-            "stopped; what is finished is kept, and this goes on: {}",
+    let text = if verb.is_resumed() {
+        format!(
+            "stopped; finished work is kept; resume with: {}",
             shell_words::join(&words)
-        ),
-        false => "stopped; nothing was written".into(),
+        )
+    } else {
+        "stopped; nothing was written".into()
     };
     Failure::stopped(text, CODE)
 }

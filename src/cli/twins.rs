@@ -1,4 +1,4 @@
-//! `twins`: what there is.
+//! `twins`: lists the twins.
 
 use super::{Context, Failure, Verb, output};
 use crate::record::Quantity;
@@ -73,7 +73,7 @@ fn in_words(study: &Study) -> String {
     };
     let states = match twin.outline() {
         Some(outline) => names(&outline.states),
-        None => "not shown (black box)".into(),
+        None => "hidden (black box)".into(),
     };
     let mut text = format!(
         "{}\n  states  {states}\n  inputs  {}\n  outputs {}\n  record  {} samples, step {} s\n  {:<12} {:<8} {:<16} bounds\n",

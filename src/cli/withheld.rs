@@ -1,45 +1,46 @@
-//! `withheld`: what `diagnose` is worth, on trials whose truth is sealed.
+//! `withheld`: scores `diagnose` on trials with sealed truth.
 
 use super::args::{Subject, at_least_one};
 use super::{Context, Failure, Verb, output};
 use crate::evaluate::trials::{self, Kind, Settings};
 use crate::report::{scorecard_html, scorecard_json, scorecard_text};
+use crate::setting::did_you_mean;
 use crate::storage::work::Share;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Score `diagnose` on trials whose truth is sealed: false alarms, detection, which effect, where, when to abstain.
+/// Score `diagnose` on trials with sealed truth: false alarms, detection, effect, location, abstention.
 ///
-/// Records come from simulators written apart from the twins. The SHA-256 of the key file is printed before the first
-/// diagnosis; keys are read once every answer is there. What each score means: docs/withheld.md.
+/// Records come from reference simulators that share no code with the twins. The SHA-256 of the key file is printed before
+/// the first diagnosis; keys are read after the last one. Scores: docs/withheld.md.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
         truetwin withheld --twin tanks --trials 100 --out trials\n\n\
-        DIR holds scorecard.json (as --json), scorecard.html, and what it takes to go on: manifest.json, seal.txt,\n\
-        keys.json, records, answers. Interrupted, the same call goes on where it stopped; another call is refused.")]
+        DIR holds scorecard.json (as --json), scorecard.html, and the state of the work: manifest.json, seal.txt,\n\
+        keys.json, records, answers. Interrupted, the same command resumes it; a different command is refused.")]
 pub(super) struct Withheld {
     #[command(flatten)]
     subject: Subject,
-    /// Records.
+    /// Number of trials, one record each.
     #[arg(long, value_parser = at_least_one)]
     trials: usize,
-    /// A folder for the trials: a new one, or one of this very call to go on with.
+    /// Output folder; rerunning the same command resumes it.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Kinds of truth; all unless given.
+    /// Kinds of truth [default: all].
     #[arg(long, value_name = "KIND,..", value_delimiter = ',', value_parser = kind)]
     kinds: Option<Vec<Kind>>,
-    /// Take the true effects out of the library: where there is one, the right answer is to abstain.
+    /// Remove the true effects from the library: the right answer is then to abstain.
     #[arg(long)]
     without: bool,
-    /// Give each diagnosis a second record.
+    /// Give each diagnosis a validation record.
     #[arg(long)]
     validation: bool,
-    /// End each diagnosis with its verdict: false alarms and detection, in a third of the time.
+    /// Stop each diagnosis at its verdict: false alarms and detection only, in a third of the time.
     #[arg(long)]
     detection_only: bool,
-    /// Only part i of n of the diagnoses, for job arrays; once all parts are done, the same call without it ends the work.
+    /// Share i of n of the diagnoses, for job arrays; when all shares are done, rerun without --shard to merge.
     #[arg(long, value_name = "I/N")]
     shard: Option<Share>,
 }
@@ -69,7 +70,7 @@ impl Verb for Withheld {
         };
         let sealed = trials::Withheld::new(&study, settings)?.seal(&self.out, context.progress)?;
         if context.team.leads() {
-            // Published before the first diagnosis.
+            // Printed before the first diagnosis.
             output::say(&format!("keys sealed: sha256 {}", sealed.seal()));
         }
         let share = context.share(self.shard)?;
@@ -86,18 +87,25 @@ impl Verb for Withheld {
         let card = sealed.score(context.progress)?;
         let json = scorecard_json(&card);
         sealed.write("scorecard.html", &scorecard_html(&card))?;
-        // Last: where it is, everything is.
+        // Written last: it marks the folder as complete.
         sealed.write("scorecard.json", &format!("{json:#}\n"))?;
-        match context.json {
-            true => output::print_json(&json)?,
-            false => output::print(&scorecard_text(&card))?,
+        if context.json {
+            output::print_json(&json)?
+        } else {
+            output::print(&scorecard_text(&card))?
         }
         Ok(ExitCode::SUCCESS)
     }
 }
 
-/// A kind of truth.
+/// Parses a kind of truth.
 fn kind(text: &str) -> Result<Kind, String> {
-    let known = || Kind::ALL.map(Kind::id).join(", ");
-    Kind::named(text).ok_or_else(|| format!("kinds are {}", known()))
+    let known = Kind::ALL.map(Kind::id);
+    Kind::named(text).ok_or_else(|| {
+        let near = did_you_mean(text, known);
+        format!(
+            "no kind is called {text}{near}; there are {}",
+            known.join(", ")
+        )
+    })
 }

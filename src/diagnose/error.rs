@@ -5,7 +5,7 @@ use crate::likelihood::kalman::FilterError;
 use crate::progress::Cancelled;
 use crate::record::RecordError;
 use crate::setting::SettingError;
-use crate::twin::{ParameterError, SimulationError};
+use crate::twin::{SimulationError, TwinError};
 use std::fmt;
 
 /// Reasons for a diagnosis to fail.
@@ -70,7 +70,7 @@ pub enum DiagnoseError {
     Effect(#[from] EffectError),
     /// An error of parameters.
     #[error(transparent)]
-    Parameter(#[from] ParameterError),
+    Parameter(#[from] TwinError),
     /// An error of a simulation.
     #[error(transparent)]
     Simulation(#[from] SimulationError),

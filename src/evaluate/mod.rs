@@ -7,5 +7,8 @@
 //! | diagnose sealed records whose missing effect is withheld | [`trials`] |
 
 pub mod baseline;
+mod error;
 pub mod paper;
 pub mod trials;
+
+pub use error::EvaluateError;

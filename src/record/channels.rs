@@ -52,3 +52,12 @@ impl Default for Signals {
         }
     }
 }
+
+/// Column names of a record file: `u` for one channel, `u1,u2,…` for several, nothing for none.
+pub(super) fn column_names(letter: &str, channels: usize) -> Vec<String> {
+    match channels {
+        0 => vec![],
+        1 => vec![letter.into()],
+        _ => (1..=channels).map(|j| format!("{letter}{j}")).collect(),
+    }
+}

@@ -1,5 +1,6 @@
 //! The time grid and the inputs of one experiment.
 
+use crate::record::RecordError;
 use ndarray::Array2;
 
 /// Samples by channels: row k belongs to time k·Δt. A system without inputs has zero columns and N rows.
@@ -11,7 +12,7 @@ pub type Signal = Array2<f64>;
 /// use truetwin::record::Drive;
 /// let free = Drive::autonomous(0.05, 300)?;
 /// assert_eq!((free.samples(), free.inputs().ncols()), (300, 0));
-/// # Ok::<(), truetwin::record::DriveError>(())
+/// # Ok::<(), truetwin::record::RecordError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drive {
@@ -19,63 +20,36 @@ pub struct Drive {
     inputs: Signal,
 }
 
-/// Why there is no such drive.
-///
-/// ```
-/// use truetwin::record::{Drive, DriveError};
-///
-/// let error: DriveError = Drive::autonomous(-0.1, 20).unwrap_err();
-/// assert!(error.to_string().contains("-0.1"), "{error}");
-/// ```
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum DriveError {
-    /// A step that is no positive number.
-    #[error("step = {0} s; the step must be a positive number of seconds")]
-    Step(f64),
-    /// No sample at all.
-    #[error("no samples; at least one is needed")]
-    Empty,
-    /// An input that is NaN or infinite.
-    #[error("input {channel}, sample {sample} is {value}; inputs must be finite")]
-    NotFinite {
-        /// Channel, from 1.
-        channel: usize,
-        /// Sample, from 0.
-        sample: usize,
-        /// The value.
-        value: f64,
-    },
-}
-
 impl Drive {
     /// Step Δt in seconds, and inputs (N × channels).
-    pub fn new(dt: f64, inputs: Signal) -> Result<Self, DriveError> {
+    pub fn new(dt: f64, inputs: Signal) -> Result<Self, RecordError> {
         if !(dt > 0.0 && dt.is_finite()) {
-            return Err(DriveError::Step(dt));
+            return Err(RecordError::Step(dt));
         }
         if inputs.nrows() == 0 {
-            return Err(DriveError::Empty);
+            return Err(RecordError::Empty);
         }
         if let Some(((sample, channel), &value)) =
             inputs.indexed_iter().find(|(_, v)| !v.is_finite())
         {
-            return Err(DriveError::NotFinite {
+            return Err(RecordError::NotFinite {
+                what: "input",
                 channel: channel + 1,
                 sample,
                 value,
             });
         }
         // Rows are read as slices in the simulation loop.
-        let inputs = match inputs.is_standard_layout() {
-            true => inputs,
-            false => inputs.as_standard_layout().into_owned(),
+        let inputs = if inputs.is_standard_layout() {
+            inputs
+        } else {
+            inputs.as_standard_layout().into_owned()
         };
         Ok(Self { dt, inputs })
     }
 
     /// Without inputs, N = `samples`.
-    pub fn autonomous(dt: f64, samples: usize) -> Result<Self, DriveError> {
+    pub fn autonomous(dt: f64, samples: usize) -> Result<Self, RecordError> {
         Self::new(dt, Signal::zeros((samples, 0)))
     }
 
@@ -123,8 +97,9 @@ mod tests {
 
     #[test]
     fn bad_drives_are_refused() {
-        assert_eq!(Drive::autonomous(0.0, 3), Err(DriveError::Step(0.0)));
-        assert_eq!(Drive::autonomous(0.1, 0), Err(DriveError::Empty));
+        let error = |dt, samples| Drive::autonomous(dt, samples).unwrap_err();
+        assert!(matches!(error(0.0, 3), RecordError::Step(0.0)));
+        assert!(matches!(error(0.1, 0), RecordError::Empty));
         let mut inputs = Signal::zeros((3, 1));
         inputs[[1, 0]] = f64::NAN;
         let error = Drive::new(0.1, inputs).unwrap_err().to_string();

@@ -1,6 +1,7 @@
 //! A measured experiment.
 
-use crate::record::{Drive, DriveError, Signal, Signals};
+use super::channels::column_names;
+use crate::record::{Drive, RecordError, Signal, Signals};
 
 /// Inputs and outputs measured with one step Δt.
 ///
@@ -17,61 +18,8 @@ pub struct Record {
     outputs: Signal,
 }
 
-/// Why there is no such record, or why it does not fit a twin.
-///
-/// ```
-/// use truetwin::record::{Drive, Record, RecordError, Signal};
-///
-/// let drive = Drive::autonomous(0.1, 5)?;
-/// let error = Record::new(drive, Signal::zeros((4, 1))).unwrap_err();
-/// assert_eq!(error, RecordError::Lengths { inputs: 5, outputs: 4 });
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum RecordError {
-    /// A bad time grid or input.
-    #[error(transparent)]
-    Drive(#[from] DriveError),
-    /// Inputs and outputs differ in length.
-    #[error("{inputs} rows of inputs and {outputs} rows of outputs; both need the same number")]
-    Lengths {
-        /// Rows of inputs.
-        inputs: usize,
-        /// Rows of outputs.
-        outputs: usize,
-    },
-    /// No output channel.
-    #[error("the record has no output; give at least one column y")]
-    NoOutput,
-    /// An output that is NaN or infinite.
-    #[error("output {channel}, sample {sample} is {value}; outputs must be finite")]
-    NotFinite {
-        /// Channel, from 1.
-        channel: usize,
-        /// Sample, from 0.
-        sample: usize,
-        /// The value.
-        value: f64,
-    },
-    /// Channels differ from the twin's.
-    #[error(
-        "the record has {given} {what}, the twin has {expected} ({names}); name its columns so"
-    )]
-    Channels {
-        /// "inputs" or "outputs".
-        what: &'static str,
-        /// In the record.
-        given: usize,
-        /// In the twin.
-        expected: usize,
-        /// Columns that the file needs.
-        names: String,
-    },
-}
-
 impl Record {
-    /// What was put in, and what came out (N × channels).
+    /// A record of inputs under `drive` and outputs (N × channels).
     pub fn new(drive: Drive, outputs: Signal) -> Result<Self, RecordError> {
         if outputs.nrows() != drive.samples() {
             return Err(RecordError::Lengths {
@@ -86,6 +34,7 @@ impl Record {
             outputs.indexed_iter().find(|(_, v)| !v.is_finite())
         {
             return Err(RecordError::NotFinite {
+                what: "output",
                 channel: channel + 1,
                 sample,
                 value,
@@ -109,7 +58,7 @@ impl Record {
         self.drive.samples()
     }
 
-    /// Whether a twin with these channels can be compared with the record.
+    /// Checks that a twin with these channels can be compared with the record.
     pub fn check_channels(&self, signals: &Signals) -> Result<(), RecordError> {
         for (what, letter, given, expected) in [
             (
@@ -130,15 +79,6 @@ impl Record {
             }
         }
         Ok(())
-    }
-}
-
-/// Column names of a record file: `u` for one channel, `u1,u2,…` for several, nothing for none.
-pub(super) fn column_names(letter: &str, channels: usize) -> Vec<String> {
-    match channels {
-        0 => vec![],
-        1 => vec![letter.into()],
-        _ => (1..=channels).map(|j| format!("{letter}{j}")).collect(),
     }
 }
 

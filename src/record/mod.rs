@@ -9,12 +9,16 @@
 mod channels;
 mod csv;
 mod drive;
+mod error;
 mod measured;
 mod parquet;
+mod table;
+mod write;
 
 pub use channels::{Quantity, Signals};
-pub use csv::{
-    CsvError, drive_csv_text, parse_record, read_drive, read_record, record_csv_text, write_record,
-};
-pub use drive::{Drive, DriveError, Signal};
-pub use measured::{Record, RecordError};
+pub use csv::{parse_record, read_drive, read_record};
+pub use drive::{Drive, Signal};
+pub use error::RecordError;
+pub use measured::Record;
+pub use write::write_record;
+pub(crate) use write::{drive_csv_text, record_csv_text};

@@ -1,6 +1,6 @@
 //! Records in Parquet files: the same columns as in CSV, so the same rules and messages.
 
-use crate::record::CsvError;
+use crate::record::RecordError;
 use std::io::Read;
 use std::path::Path;
 
@@ -8,29 +8,26 @@ use std::path::Path;
 #[cfg(not(feature = "parquet"))]
 pub(super) fn with_rows<T>(
     path: &Path,
-    _: impl FnOnce(&mut dyn Read) -> Result<T, CsvError>,
-) -> Result<T, CsvError> {
-    Err(CsvError::Header {
-        path: path.into(),
-        problem: "this build reads no Parquet; install it with `--features parquet`, or save the record as CSV".into(),
-    })
+    _: impl FnOnce(&mut dyn Read) -> Result<T, RecordError>,
+) -> Result<T, RecordError> {
+    Err(RecordError::file(
+        path,
+        "this build reads no Parquet; install it with `--features parquet`, or save the record as CSV",
+    ))
 }
 
 /// Has `read` read the file as the text of a CSV file; every number keeps its bits. One row is text at a time.
 #[cfg(feature = "parquet")]
 pub(super) fn with_rows<T>(
     path: &Path,
-    read: impl FnOnce(&mut dyn Read) -> Result<T, CsvError>,
-) -> Result<T, CsvError> {
+    read: impl FnOnce(&mut dyn Read) -> Result<T, RecordError>,
+) -> Result<T, RecordError> {
     use parquet::file::reader::{FileReader, SerializedFileReader};
 
-    let file = std::fs::File::open(path).map_err(|error| CsvError::Io {
-        path: path.into(),
-        error,
-    })?;
-    let wrong = |error: parquet::errors::ParquetError| CsvError::Header {
-        path: path.into(),
-        problem: format!("{error}; a record has columns of numbers, snappy or not compressed"),
+    let file = std::fs::File::open(path).map_err(|error| RecordError::io(path, error))?;
+    let wrong = |error: parquet::errors::ParquetError| {
+        let remedy = "a record has columns of numbers, snappy or not compressed";
+        RecordError::file(path, format!("{error}; {remedy}"))
     };
     let reader = SerializedFileReader::new(file).map_err(wrong)?;
     let schema = reader.metadata().file_metadata().schema_descr();

@@ -58,9 +58,10 @@ impl Units {
 
     /// `rate of h1`, or `output y`.
     pub(super) fn equation_name(&self, name: &str) -> String {
-        match self.is_state(name) {
-            true => format!("rate of {name}"),
-            false => format!("output {name}"),
+        if self.is_state(name) {
+            format!("rate of {name}")
+        } else {
+            format!("output {name}")
         }
     }
 

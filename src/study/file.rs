@@ -2,7 +2,7 @@
 
 use crate::effect::Effects;
 use crate::feature::FeatureRecipe;
-use crate::record::{CsvError, read_drive};
+use crate::record::{RecordError, read_drive};
 use crate::storage::files::{folder, with_remedy};
 use crate::storage::untrusted::{MESSAGE, check_names, one_line, read_text};
 use crate::study::plan::InputPlan;
@@ -187,7 +187,7 @@ pub enum StudyFileError {
     },
     /// The input file cannot be read.
     #[error(transparent)]
-    Input(#[from] CsvError),
+    Input(#[from] RecordError),
     /// Step or samples contradict the input file.
     #[error(
         "{}: [record] contradicts {}, which has {samples} samples, step {step} s; leave step and samples out",
@@ -340,7 +340,7 @@ mod tests {
             ),
             (
                 "twin = 'tanks'\n[prior]\nk1 = [0.8, 0.4]\n",
-                "turned inside out",
+                "invalid interval",
             ),
             ("twin = 'x'\n[features]\nkind = 'arma'\n", "`arx`"),
             ("twin = \n", "s.toml, line 1"),

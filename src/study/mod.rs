@@ -8,9 +8,9 @@ pub use file::{Library, RecordTable, StudyFile, StudyFileError};
 pub use plan::{DriveSource, InputPlan, Levels, PlanError, RecordPlan};
 
 use crate::effect::{EffectError, Effects, UnmodelledEffect, augment, given_magnitudes};
-use crate::record::{CsvError, Record, RecordError};
+use crate::record::{Record, RecordError};
 use crate::setting::did_you_mean;
-use crate::twin::{Adaptation, AdaptationError, DigitalTwin, ParameterError, Twin, adapt, fix};
+use crate::twin::{Adaptation, DigitalTwin, Twin, TwinError, adapt, check_twin, fix};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -75,7 +75,7 @@ pub enum StudyError {
     },
     /// Of prior, bounds, limits, noise, start.
     #[error(transparent)]
-    Adaptation(#[from] AdaptationError),
+    Adaptation(#[from] TwinError),
     /// Of effects.
     #[error(transparent)]
     Effect(#[from] EffectError),
@@ -89,22 +89,19 @@ pub enum StudyError {
     Library(String),
     /// Of fixed parameters.
     #[error("[fixed]: {0}")]
-    Fixed(ParameterError),
+    Fixed(TwinError),
     /// Of the twin's own parameters.
     #[error("twin \"{name}\": {error}")]
     Parameters {
         /// Twin.
         name: String,
         /// What is wrong.
-        error: ParameterError,
+        error: TwinError,
     },
     /// Of step, length, input.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// The demo record cannot be read.
-    #[error(transparent)]
-    Demo(#[from] CsvError),
-    /// Of a record's channels.
+    /// Of a record's channels, or of the file of the demo record.
     #[error(transparent)]
     Record(#[from] RecordError),
 }
@@ -117,12 +114,10 @@ impl Study {
         plan: RecordPlan,
     ) -> Result<Self, StudyError> {
         let base = Twin::new(twin);
-        base.parameters()
-            .check()
-            .map_err(|error| StudyError::Parameters {
-                name: name.into(),
-                error,
-            })?;
+        check_twin(&base).map_err(|error| StudyError::Parameters {
+            name: name.into(),
+            error,
+        })?;
         Ok(Self {
             name: name.into(),
             twin: base.clone(),
@@ -199,7 +194,7 @@ impl Study {
         for (name, &value) in &file.fixed {
             let parameter = &space[space.position(name).map_err(StudyError::Fixed)?];
             if !parameter.bounds.contains(value) {
-                return Err(StudyError::Fixed(ParameterError::OutOfBounds {
+                return Err(StudyError::Fixed(TwinError::OutOfBounds {
                     name: name.clone(),
                     value,
                     bounds: parameter.bounds,

@@ -1,6 +1,6 @@
 //! What a simulated record looks like: step, length, input.
 
-use crate::record::{CsvError, Drive, DriveError, Record, Signal, Signals, read_drive};
+use crate::record::{Drive, Record, RecordError, Signal, Signals, read_drive};
 use crate::storage::untrusted::MOST_NUMBERS;
 use crate::twin::{Interval, Noise};
 use serde::{Deserialize, Serialize};
@@ -40,7 +40,7 @@ pub enum InputPlan {
 /// let levels = Levels { levels: Interval::new(0.0, 3.0)?, hold: 30 };
 /// let plan = RecordPlan { step: 0.5, samples: 100, input: Some(InputPlan::Levels(levels)) };
 /// assert_eq!(plan, RecordPlan::levels(0.5, 100, 0.0, 3.0, 30));
-/// # Ok::<(), truetwin::twin::IntervalError>(())
+/// # Ok::<(), truetwin::twin::TwinError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -83,9 +83,9 @@ pub struct RecordPlan {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
-    /// Step or samples that make no record.
+    /// Step or samples that make no record, or an input file that cannot be read.
     #[error(transparent)]
-    Drive(#[from] DriveError),
+    Record(#[from] RecordError),
     /// A hold of zero samples.
     #[error("[record] hold = 0; a level is held for at least 1 sample")]
     Hold,
@@ -112,9 +112,6 @@ pub enum PlanError {
         "the twin has {0} inputs; say what they look like: [record] input = {{ levels = [low, high], hold = n }}, or a file"
     )]
     NoInput(usize),
-    /// An input file that cannot be read.
-    #[error(transparent)]
-    Csv(#[from] CsvError),
     /// An input file with another number of inputs.
     #[error("{}: {given} inputs, the twin has {expected}; give each its column", path.display())]
     Channels {
@@ -235,7 +232,7 @@ pub struct DriveSource {
 
 impl DriveSource {
     /// The drive of one record; random levels come from the noise sources `input/1`, `input/2`, ….
-    pub fn draw(&self, noise: Noise) -> Result<Drive, DriveError> {
+    pub fn draw(&self, noise: Noise) -> Result<Drive, RecordError> {
         if let Some(drive) = &self.fixed {
             return Ok(drive.clone());
         }

@@ -1,10 +1,9 @@
 //! A twin in another setting: prior, bounds, limits, noise and start changed from outside.
 
 use crate::record::{Drive, Signal, Signals};
-use crate::setting::did_you_mean;
 use crate::twin::{
-    DigitalTwin, Interval, Modified, Modify, Noise, Now, Outline, Parameter, ParameterError,
-    ParameterSpace, Role, SimulationError, StateSpace, Twin,
+    DigitalTwin, Interval, Modified, Modify, Noise, Now, Outline, Parameter, ParameterSpace, Role,
+    SimulationError, StateSpace, Twin, TwinError,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -69,7 +68,7 @@ impl From<Level> for LevelText {
 ///
 /// ```
 /// use std::sync::Arc;
-/// use truetwin::twin::{Adaptation, AdaptationError, DigitalTwin, Level, adapt};
+/// use truetwin::twin::{Adaptation, Level, TwinError, adapt};
 /// use truetwin::twins::CascadedTanks;
 ///
 /// let mut adaptation = Adaptation::default();
@@ -79,7 +78,7 @@ impl From<Level> for LevelText {
 ///
 /// adaptation.start.insert("h3".into(), Level::Known(0.0));
 /// let refused = adapt(Arc::new(CascadedTanks), &adaptation, 4.0).err().ok_or("h3 is no state")?;
-/// assert!(matches!(refused, AdaptationError::Unknown { .. }));
+/// assert!(matches!(refused, TwinError::UnknownIn { .. }));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -96,58 +95,6 @@ pub struct Adaptation {
     pub start: BTreeMap<String, Level>,
 }
 
-/// Why a twin cannot be changed so.
-///
-/// ```
-/// use truetwin::twin::AdaptationError;
-///
-/// let error = AdaptationError::NoPrior { name: "start.h1".into() };
-/// assert!(error.to_string().ends_with("add [prior] \"start.h1\" = [low, high]"));
-/// ```
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum AdaptationError {
-    /// A name that the twin does not have.
-    #[error("[{table}] names {name}{}, the twin has {known}; use one of these", did_you_mean(name, known.split(", ")))]
-    Unknown {
-        /// Table of the study file.
-        table: &'static str,
-        /// The name.
-        name: String,
-        /// Known names.
-        known: String,
-    },
-    /// A black box has neither limits, noise levels nor starts.
-    #[error(
-        "[{table}] needs the twin's equations, which a black box does not show; remove the table or implement StateSpace"
-    )]
-    BlackBox {
-        /// Table of the study file.
-        table: &'static str,
-    },
-    /// A noise level or start that is no number of its kind.
-    #[error("[{table}] {name} = {value}; {remedy}")]
-    Value {
-        /// Table of the study file.
-        table: &'static str,
-        /// Name.
-        name: String,
-        /// Value.
-        value: f64,
-        /// What to write.
-        remedy: &'static str,
-    },
-    /// Nothing says where an unknown start or noise level lies.
-    #[error("nothing says where the unknown {name} lies; add [prior] \"{name}\" = [low, high]")]
-    NoPrior {
-        /// Parameter.
-        name: String,
-    },
-    /// Parameters that make no sense together.
-    #[error(transparent)]
-    Parameter(#[from] ParameterError),
-}
-
 /// The twin in another setting; θ is the twin's, then unknown noise levels, then unknown starts. `step` is the Δt, in
 /// seconds, at which the twin's own noise levels are taken.
 ///
@@ -162,11 +109,7 @@ pub enum AdaptationError {
 /// assert_eq!(twin.parameters().centre(), [1.5]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn adapt(
-    base: impl Into<Twin>,
-    adaptation: &Adaptation,
-    step: f64,
-) -> Result<Twin, AdaptationError> {
+pub fn adapt(base: impl Into<Twin>, adaptation: &Adaptation, step: f64) -> Result<Twin, TwinError> {
     let base = base.into();
     if *adaptation == Adaptation::default() {
         return Ok(base);
@@ -178,7 +121,7 @@ pub fn adapt(
     let mut outline = equations.outline();
     let n = outline.parameters.len();
     let position = |table, name: &str, known: &[String]| {
-        (known.iter().position(|k| k == name)).ok_or_else(|| AdaptationError::Unknown {
+        (known.iter().position(|k| k == name)).ok_or_else(|| TwinError::UnknownIn {
             table,
             name: name.into(),
             known: known.join(", "),
@@ -199,7 +142,7 @@ pub fn adapt(
         let what = match level {
             Level::Known(value) if value >= 0.0 && value.is_finite() => Setting::Known(value),
             Level::Known(value) => {
-                return Err(AdaptationError::Value {
+                return Err(TwinError::Value {
                     table: "noise",
                     name: name.clone(),
                     value,
@@ -228,7 +171,7 @@ pub fn adapt(
                 Setting::Known(value)
             }
             Level::Known(value) => {
-                return Err(AdaptationError::Value {
+                return Err(TwinError::Value {
                     table: "start",
                     name: name.clone(),
                     value,
@@ -260,17 +203,14 @@ pub fn adapt(
     }))))
 }
 
-fn adapt_black_box(
-    base: Arc<dyn DigitalTwin>,
-    adaptation: &Adaptation,
-) -> Result<Twin, AdaptationError> {
+fn adapt_black_box(base: Arc<dyn DigitalTwin>, adaptation: &Adaptation) -> Result<Twin, TwinError> {
     for (table, used) in [
         ("limits", !adaptation.limits.is_empty()),
         ("noise", !adaptation.noise.is_empty()),
         ("start", !adaptation.start.is_empty()),
     ] {
         if used {
-            return Err(AdaptationError::BlackBox { table });
+            return Err(TwinError::BlackBox(table));
         }
     }
     let mut parameters = base.parameters();
@@ -305,11 +245,11 @@ fn unknown(
     name: &str,
     guess: Option<Interval>,
     role: Role,
-) -> Result<Parameter, AdaptationError> {
+) -> Result<Parameter, TwinError> {
     let given = adaptation.prior.get(name).copied();
     let prior = given
         .or(guess)
-        .ok_or_else(|| AdaptationError::NoPrior { name: name.into() })?;
+        .ok_or_else(|| TwinError::NoPrior(name.into()))?;
     let mut parameter = Parameter::new(name, "", prior.low(), prior.high()).with_role(role);
     if let Some(guess) = guess {
         let (low, high) = (guess.low().min(prior.low()), guess.high().max(prior.high()));
@@ -319,14 +259,14 @@ fn unknown(
 }
 
 /// Sets prior boxes and bounds.
-fn rebox(parameters: &mut ParameterSpace, adaptation: &Adaptation) -> Result<(), AdaptationError> {
+fn rebox(parameters: &mut ParameterSpace, adaptation: &Adaptation) -> Result<(), TwinError> {
     for (table, boxes) in [("prior", &adaptation.prior), ("bounds", &adaptation.bounds)] {
         for (name, &interval) in boxes {
             let known = parameters.names().join(", ");
             let parameter = parameters
                 .iter_mut()
                 .find(|p| p.name == *name)
-                .ok_or_else(|| AdaptationError::Unknown {
+                .ok_or_else(|| TwinError::UnknownIn {
                     table,
                     name: name.clone(),
                     known,
@@ -337,7 +277,7 @@ fn rebox(parameters: &mut ParameterSpace, adaptation: &Adaptation) -> Result<(),
             }
         }
     }
-    Ok(parameters.check()?)
+    parameters.check()
 }
 
 /// Where a start or noise level comes from.

@@ -8,7 +8,7 @@
 //! let drive = Drive::new(4.0, ndarray::Array2::ones((50, 1)))?;
 //! let worst = check(&CascadedTanks, &drive, 1).into_iter().max_by_key(|f: &Finding| f.severity);
 //! assert!(worst.is_some_and(|finding| finding.severity < Severity::Failure));
-//! # Ok::<(), truetwin::record::DriveError>(())
+//! # Ok::<(), truetwin::record::RecordError>(())
 //! ```
 
 use crate::record::{Drive, Signal};
@@ -73,7 +73,7 @@ const PAIRED: f64 = 1e-2;
 /// let findings: Vec<Finding> = check(&VanDerPol, &Drive::autonomous(0.05, 100)?, 1);
 /// assert!(findings.iter().all(|finding| finding.severity < Severity::Failure));
 /// assert_eq!(findings[0].check, "parameters");
-/// # Ok::<(), truetwin::record::DriveError>(())
+/// # Ok::<(), truetwin::record::RecordError>(())
 /// ```
 pub fn check(twin: &dyn DigitalTwin, drive: &Drive, seed: u64) -> Vec<Finding> {
     let space = twin.parameters();

@@ -3,8 +3,8 @@
 use super::state_space::check_length;
 use crate::record::{Drive, Signal, Signals};
 use crate::twin::{
-    DigitalTwin, Modified, Modify, Noise, Outline, ParameterError, ParameterSpace, SimulationError,
-    StateSpace, Twin,
+    DigitalTwin, Modified, Modify, Noise, Outline, ParameterSpace, SimulationError, StateSpace,
+    Twin, TwinError,
 };
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
@@ -14,7 +14,7 @@ use std::sync::Arc;
 ///
 /// # Errors
 ///
-/// [`ParameterError`] for an unknown name, or when nothing is left to estimate. Whether values make sense is the
+/// [`TwinError`] for an unknown name, or when nothing is left to estimate. Whether values make sense is the
 /// caller's to check: a magnitude may be held at infinity.
 ///
 /// ```
@@ -28,7 +28,7 @@ use std::sync::Arc;
 /// assert_eq!(twin.parameters().names(), ["k1", "k2", "k3"]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn fix(base: impl Into<Twin>, values: &BTreeMap<String, f64>) -> Result<Twin, ParameterError> {
+pub fn fix(base: impl Into<Twin>, values: &BTreeMap<String, f64>) -> Result<Twin, TwinError> {
     let base = base.into();
     if values.is_empty() {
         return Ok(base);

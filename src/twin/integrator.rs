@@ -14,12 +14,8 @@ use serde::{Deserialize, Serialize};
 /// struct Decay(Integrator);
 /// impl StateSpace for Decay {
 ///     fn outline(&self) -> Outline {
-///         Outline {
-///             parameters: ParameterSpace::new([Parameter::new("k", "1/s", 0.5, 2.0)]),
-///             states: vec![Quantity::new("x", "-")],
-///             inputs: vec![],
-///             outputs: vec![Quantity::new("y", "-")],
-///         }
+///         let k = Parameter::new("k", "1/s", 0.5, 2.0);
+///         Outline::new().parameter(k).state("x", "-").output("y", "-")
 ///     }
 ///     fn start(&self, _: &Now, x: &mut [f64]) {
 ///         x[0] = 1.0;

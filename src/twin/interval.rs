@@ -1,5 +1,6 @@
 //! A closed interval of real numbers.
 
+use crate::twin::TwinError;
 use serde::{Deserialize, Serialize};
 
 /// `[low, high]`, in the unit of what it bounds; an end may be infinite. Files write it as `[low, high]`.
@@ -9,26 +10,11 @@ use serde::{Deserialize, Serialize};
 /// let prior = Interval::new(0.4, 0.8)?;
 /// assert_eq!(prior.centre(), 0.6000000000000001);
 /// assert!(Interval::new(0.8, 0.4).is_err());
-/// # Ok::<(), truetwin::twin::IntervalError>(())
+/// # Ok::<(), truetwin::twin::TwinError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "[f64; 2]", into = "[f64; 2]")]
 pub struct Interval {
-    low: f64,
-    high: f64,
-}
-
-/// An interval that is turned inside out.
-///
-/// ```
-/// use truetwin::twin::{Interval, IntervalError};
-///
-/// let error: IntervalError = Interval::new(2.0, 1.0).unwrap_err();
-/// assert!(error.to_string().contains('2'), "{error}");
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("[{low}, {high}] is turned inside out; write [low, high] with low < high")]
-pub struct IntervalError {
     low: f64,
     high: f64,
 }
@@ -41,11 +27,11 @@ impl Interval {
     };
 
     /// `[low, high]` with `low < high`, neither NaN.
-    pub fn new(low: f64, high: f64) -> Result<Self, IntervalError> {
+    pub fn new(low: f64, high: f64) -> Result<Self, TwinError> {
         if low < high {
             Ok(Self { low, high })
         } else {
-            Err(IntervalError { low, high })
+            Err(TwinError::Interval { low, high })
         }
     }
 
@@ -55,7 +41,7 @@ impl Interval {
     }
 
     /// Whether the ends are in order and not NaN.
-    pub(crate) fn check(self) -> Result<Self, IntervalError> {
+    pub(crate) fn check(self) -> Result<Self, TwinError> {
         Self::new(self.low, self.high)
     }
 
@@ -99,8 +85,8 @@ impl Interval {
 }
 
 impl TryFrom<[f64; 2]> for Interval {
-    type Error = IntervalError;
-    fn try_from([low, high]: [f64; 2]) -> Result<Self, IntervalError> {
+    type Error = TwinError;
+    fn try_from([low, high]: [f64; 2]) -> Result<Self, TwinError> {
         Self::new(low, high)
     }
 }

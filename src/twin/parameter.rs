@@ -1,7 +1,6 @@
 //! What is estimated: names, units, prior box and physical bounds.
 
-use crate::setting::did_you_mean;
-use crate::twin::{Interval, Noise};
+use crate::twin::{Interval, Noise, TwinError};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
@@ -90,79 +89,10 @@ impl Parameter {
 /// space.check()?;
 /// assert_eq!(space.centre(), [0.55]);
 /// assert!(space.check_point(&[3.0]).unwrap_err().to_string().contains("k = 3"));
-/// # Ok::<(), truetwin::twin::ParameterError>(())
+/// # Ok::<(), truetwin::twin::TwinError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ParameterSpace(Vec<Parameter>);
-
-/// What is wrong with parameters, or with a point.
-///
-/// ```
-/// use truetwin::twin::{Parameter, ParameterError, ParameterSpace};
-///
-/// let twice = ParameterSpace::new([Parameter::new("k", "-", 0.0, 1.0), Parameter::new("k", "-", 0.0, 1.0)]);
-/// assert_eq!(twice.check(), Err(ParameterError::Duplicate("k".into())));
-/// ```
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ParameterError {
-    /// No parameter at all.
-    #[error("the twin has no parameter to estimate; declare or free at least one")]
-    Empty,
-    /// The same name twice.
-    #[error("parameter {0} stands there twice; give each its own name")]
-    Duplicate(String),
-    /// A box with its ends exchanged, or not finite.
-    #[error("{what} of {name} is {interval}; write finite [low, high] with low < high")]
-    Box {
-        /// Parameter.
-        name: String,
-        /// "prior" or "bounds".
-        what: &'static str,
-        /// What was given.
-        interval: Interval,
-    },
-    /// A prior that leaves the physical bounds.
-    #[error(
-        "prior {prior} of {name} leaves its bounds {bounds}; shrink the prior or widen the bounds"
-    )]
-    PriorOutside {
-        /// Parameter.
-        name: String,
-        /// The prior box.
-        prior: Interval,
-        /// The physical bounds.
-        bounds: Interval,
-    },
-    /// A point with too many or too few numbers.
-    #[error("{given} values for {expected} parameters ({names})")]
-    Length {
-        /// How many were given.
-        given: usize,
-        /// How many are needed.
-        expected: usize,
-        /// Their names.
-        names: String,
-    },
-    /// A value outside the physical bounds, or not a number.
-    #[error("{name} = {value} is outside its bounds {bounds}; choose a value inside")]
-    OutOfBounds {
-        /// Parameter.
-        name: String,
-        /// The value.
-        value: f64,
-        /// Its bounds.
-        bounds: Interval,
-    },
-    /// A name that no parameter has.
-    #[error("no parameter is called {name}{}; there are {names}", did_you_mean(name, names.split(", ")))]
-    Unknown {
-        /// The name.
-        name: String,
-        /// The known names.
-        names: String,
-    },
-}
 
 impl ParameterSpace {
     /// From its parameters, in the order of θ. [`check`](Self::check) tells whether they make sense.
@@ -171,18 +101,21 @@ impl ParameterSpace {
     }
 
     /// Whether names are unique, boxes in order, and priors inside bounds.
-    pub fn check(&self) -> Result<(), ParameterError> {
+    pub fn check(&self) -> Result<(), TwinError> {
         if self.0.is_empty() {
-            return Err(ParameterError::Empty);
+            return Err(TwinError::NoParameter);
         }
         let mut seen = BTreeSet::new();
         for parameter in &self.0 {
             if !seen.insert(&parameter.name) {
-                return Err(ParameterError::Duplicate(parameter.name.clone()));
+                return Err(TwinError::Duplicate {
+                    kind: "parameter",
+                    name: parameter.name.clone(),
+                });
             }
             for (what, interval) in [("prior", parameter.prior), ("bounds", parameter.bounds)] {
                 if interval.check().is_err() || !interval.is_finite() {
-                    return Err(ParameterError::Box {
+                    return Err(TwinError::Box {
                         name: parameter.name.clone(),
                         what,
                         interval,
@@ -191,7 +124,7 @@ impl ParameterSpace {
             }
             let (prior, bounds) = (parameter.prior, parameter.bounds);
             if !bounds.contains(prior.low()) || !bounds.contains(prior.high()) {
-                return Err(ParameterError::PriorOutside {
+                return Err(TwinError::PriorOutside {
                     name: parameter.name.clone(),
                     prior,
                     bounds,
@@ -202,9 +135,9 @@ impl ParameterSpace {
     }
 
     /// Whether `theta` has the right length and lies in the bounds.
-    pub fn check_point(&self, theta: &[f64]) -> Result<(), ParameterError> {
+    pub fn check_point(&self, theta: &[f64]) -> Result<(), TwinError> {
         if theta.len() != self.len() {
-            return Err(ParameterError::Length {
+            return Err(TwinError::Length {
                 given: theta.len(),
                 expected: self.len(),
                 names: self.names().join(", "),
@@ -212,7 +145,7 @@ impl ParameterSpace {
         }
         for (parameter, &value) in self.0.iter().zip(theta) {
             if !parameter.bounds.contains(value) {
-                return Err(ParameterError::OutOfBounds {
+                return Err(TwinError::OutOfBounds {
                     name: parameter.name.clone(),
                     value,
                     bounds: parameter.bounds,
@@ -220,6 +153,11 @@ impl ParameterSpace {
             }
         }
         Ok(())
+    }
+
+    /// Adds a parameter at the end of θ.
+    pub(crate) fn push(&mut self, parameter: Parameter) {
+        self.0.push(parameter);
     }
 
     /// Number of parameters, d.
@@ -248,11 +186,11 @@ impl ParameterSpace {
     }
 
     /// Index in θ of the parameter called `name`.
-    pub fn position(&self, name: &str) -> Result<usize, ParameterError> {
+    pub fn position(&self, name: &str) -> Result<usize, TwinError> {
         self.0
             .iter()
             .position(|p| p.name == name)
-            .ok_or_else(|| ParameterError::Unknown {
+            .ok_or_else(|| TwinError::Unknown {
                 name: name.into(),
                 names: self.names().join(", "),
             })
@@ -332,10 +270,7 @@ mod tests {
     #[test]
     fn a_prior_outside_the_bounds_is_named() {
         let space = ParameterSpace::new([Parameter::new("k", "-", 0.0, 2.0).within(0.5, 3.0)]);
-        assert!(matches!(
-            space.check(),
-            Err(ParameterError::PriorOutside { .. })
-        ));
+        assert!(matches!(space.check(), Err(TwinError::PriorOutside { .. })));
     }
 
     #[test]

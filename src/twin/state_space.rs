@@ -1,8 +1,9 @@
 //! Twins that can show their equations, and the loop that simulates them.
 
-use crate::record::{Drive, Quantity, Signal, Signals};
+use crate::record::{Drive, Signal, Signals};
 use crate::twin::{
-    Advance, DigitalTwin, Integrator, Interval, Noise, ParameterSpace, SimulationError, Workspace,
+    Advance, DigitalTwin, Integrator, Interval, Noise, Outline, ParameterSpace, SimulationError,
+    Workspace,
 };
 use std::sync::Arc;
 
@@ -23,20 +24,17 @@ use std::sync::Arc;
 /// [`constrain`](Self::constrain), [`limits`](Self::limits). Row 0 is the start.
 ///
 /// ```
-/// use truetwin::effect::*;
-/// use truetwin::record::*;
-/// use truetwin::twin::*;
+/// use truetwin::prelude::*;
 ///
 /// /// A leaking tank: ḣ = u − k·h.
 /// struct Tank;
 /// impl StateSpace for Tank {
 ///     fn outline(&self) -> Outline {
-///         Outline {
-///             parameters: ParameterSpace::new([Parameter::new("k", "1/s", 0.1, 1.0)]),
-///             states: vec![Quantity::new("h", "m")],
-///             inputs: vec![Quantity::new("u", "m/s")],
-///             outputs: vec![Quantity::new("y", "m")],
-///         }
+///         Outline::new()
+///             .parameter(Parameter::new("k", "1/s", 0.1, 1.0))
+///             .state("h", "m")
+///             .input("u", "m/s")
+///             .output("y", "m")
 ///     }
 ///     fn drift(&self, now: &Now, x: &[f64], dx: &mut [f64]) {
 ///         dx[0] = now.u[0] - now.theta[0] * x[0];
@@ -147,38 +145,6 @@ pub struct Now<'a> {
     pub u: &'a [f64],
     /// Parameters θ.
     pub theta: &'a [f64],
-}
-
-/// Names and units of everything in the equations.
-///
-/// ```
-/// use truetwin::twin::StateSpace;
-/// use truetwin::twins::CascadedTanks;
-///
-/// let outline = CascadedTanks.outline();
-/// assert_eq!(outline.parameters.names(), ["k1", "k2", "k3", "k4"]);
-/// assert_eq!((outline.states.len(), outline.inputs.len(), outline.outputs.len()), (2, 1, 1));
-/// ```
-#[derive(Debug, Clone, PartialEq)]
-pub struct Outline {
-    /// Parameters, in the order of θ.
-    pub parameters: ParameterSpace,
-    /// States, in the order of x.
-    pub states: Vec<Quantity>,
-    /// Inputs, in the order of u.
-    pub inputs: Vec<Quantity>,
-    /// Outputs, in the order of y.
-    pub outputs: Vec<Quantity>,
-}
-
-impl Outline {
-    /// Input and output channels.
-    pub(crate) fn signals(self) -> Signals {
-        Signals {
-            inputs: self.inputs,
-            outputs: self.outputs,
-        }
-    }
 }
 
 impl<T: StateSpace + 'static> DigitalTwin for T {
@@ -314,12 +280,11 @@ mod tests {
     struct Walk;
     impl StateSpace for Walk {
         fn outline(&self) -> Outline {
-            Outline {
-                parameters: ParameterSpace::new([Parameter::new("rate", "1/s", -2.0, 30.0)]),
-                states: vec![Quantity::new("x", "m")],
-                inputs: vec![],
-                outputs: vec![Quantity::new("y1", "m"), Quantity::new("y2", "m")],
-            }
+            Outline::new()
+                .parameter(Parameter::new("rate", "1/s", -2.0, 30.0))
+                .state("x", "m")
+                .output("y1", "m")
+                .output("y2", "m")
         }
         fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
             dx[0] = now.theta[0] * x[0];

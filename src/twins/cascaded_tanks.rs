@@ -1,7 +1,6 @@
 //! Two water tanks, one above the other.
 
-use crate::record::Quantity;
-use crate::twin::{Interval, Now, Outline, Parameter, ParameterSpace, StateSpace};
+use crate::twin::{Interval, Now, Outline, Parameter, StateSpace};
 
 /// Below this level the outflow law √h is evaluated here, so that its slope stays finite.
 const SMALLEST_LEVEL: f64 = 1e-6;
@@ -34,20 +33,15 @@ pub struct CascadedTanks;
 
 impl StateSpace for CascadedTanks {
     fn outline(&self) -> Outline {
-        let flow = |name, prior: (f64, f64), bounds: (f64, f64)| {
-            Parameter::new(name, "-", prior.0, prior.1).within(bounds.0, bounds.1)
-        };
-        Outline {
-            parameters: ParameterSpace::new([
-                flow("k1", (0.4, 0.8), (0.1, 1.5)),
-                flow("k2", (0.4, 0.8), (0.1, 1.5)),
-                flow("k3", (0.4, 0.8), (0.1, 1.5)),
-                flow("k4", (0.8, 1.2), (0.5, 1.5)),
-            ]),
-            states: vec![Quantity::new("h1", "V"), Quantity::new("h2", "V")],
-            inputs: vec![Quantity::new("u", "V")],
-            outputs: vec![Quantity::new("y", "V")],
-        }
+        Outline::new()
+            .parameter(Parameter::new("k1", "-", 0.4, 0.8).within(0.1, 1.5))
+            .parameter(Parameter::new("k2", "-", 0.4, 0.8).within(0.1, 1.5))
+            .parameter(Parameter::new("k3", "-", 0.4, 0.8).within(0.1, 1.5))
+            .parameter(Parameter::new("k4", "-", 0.8, 1.2).within(0.5, 1.5))
+            .state("h1", "V")
+            .state("h2", "V")
+            .input("u", "V")
+            .output("y", "V")
     }
 
     #[inline]

@@ -1,7 +1,6 @@
 //! The van der Pol oscillator.
 
-use crate::record::Quantity;
-use crate::twin::{Now, Outline, Parameter, ParameterSpace, StateSpace};
+use crate::twin::{Now, Outline, Parameter, StateSpace};
 
 /// Van der Pol oscillator with unknown damping ν:
 ///
@@ -29,12 +28,11 @@ pub struct VanDerPol;
 
 impl StateSpace for VanDerPol {
     fn outline(&self) -> Outline {
-        Outline {
-            parameters: ParameterSpace::new([Parameter::new("nu", "-", 0.0, 2.5).within(0.0, 7.0)]),
-            states: vec![Quantity::new("x1", "-"), Quantity::new("x2", "1/s")],
-            inputs: vec![],
-            outputs: vec![Quantity::new("y", "-")],
-        }
+        Outline::new()
+            .parameter(Parameter::new("nu", "-", 0.0, 2.5).within(0.0, 7.0))
+            .state("x1", "-")
+            .state("x2", "1/s")
+            .output("y", "-")
     }
 
     #[inline]

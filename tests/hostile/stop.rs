@@ -65,7 +65,7 @@ fn a_bank_that_is_stopped_says_how_to_go_on_and_does() {
         assert!(said.contains("stopped") && said.contains(&call), "{said}");
         assert!((4..64).contains(&entries(&shards)));
         // The words of the message, run.
-        let words = said.trim().rsplit("goes on: ").next().unwrap();
+        let words = said.trim().rsplit("resume with: ").next().unwrap();
         let words = shell_words::split(words).unwrap();
         let again = Command::new(&words[0])
             .args(&words[1..])
@@ -94,7 +94,10 @@ fn a_training_that_is_stopped_says_how_to_go_on() {
     let output = interrupted(at, call, "-INT", || entries(&shards) > 0);
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(130), "{said}");
-    assert!(said.contains("goes on: ") && said.contains(call), "{said}");
+    assert!(
+        said.contains("resume with: ") && said.contains(call),
+        "{said}"
+    );
     assert_eq!(named(at), 1, "the work, and no estimator");
     // Another call does not go on with it.
     let other = call.replace("5000", "4000");

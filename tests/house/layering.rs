@@ -1,137 +1,99 @@
-//! Modules depend downward only: a module uses those that stand above it in `src/lib.rs`'s list.
+//! Rooms depend downward only, in the order of `src/lib.rs`; a large library is named in one room.
 
+use crate::source::Crate;
 use std::collections::BTreeMap;
-use std::fs;
-use std::path::{Path, PathBuf};
 
-/// The layers of docs/architecture.md, lowest first; within a layer, in order.
-const LAYERS: [&[&str]; 6] = [
-    &["setting", "math", "progress", "storage"],
-    &["record", "twin", "twins", "effect"],
-    &["fit", "likelihood", "feature", "network"],
-    &["study", "external", "estimator", "diagnose"],
-    &["evaluate", "report"],
-    &["cli", "prelude"],
+/// The rooms of docs/architecture.md, lowest first.
+const ROOMS: [&str; 20] = [
+    "setting",
+    "math",
+    "progress",
+    "storage",
+    "record",
+    "twin",
+    "twins",
+    "effect",
+    "fit",
+    "likelihood",
+    "feature",
+    "network",
+    "study",
+    "external",
+    "estimator",
+    "diagnose",
+    "evaluate",
+    "report",
+    "cli",
+    "prelude",
 ];
 
-fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            rust_files(&path, found);
-        } else if path.extension().is_some_and(|e| e == "rs") {
-            found.push(path);
-        }
-    }
-}
-
-/// Modules named as `crate::x` in code, also in `use crate::{x, y::z}`.
-fn uses(text: &str) -> Vec<String> {
-    let code: String = (text.lines())
-        .map(|line| line.split("//").next().unwrap_or("").trim_end())
-        .collect::<Vec<_>>()
-        .join("\n");
-    let word = |s: &str| {
-        s.chars()
-            .take_while(|c| c.is_alphanumeric() || *c == '_')
-            .collect()
-    };
-    let mut found = Vec::new();
-    for (at, _) in code.match_indices("crate::") {
-        let rest = code[at + "crate::".len()..].trim_start();
-        match rest.strip_prefix('{') {
-            None => found.push(word(rest)),
-            Some(list) => {
-                let (mut depth, mut item) = (0, String::new());
-                for c in list.chars() {
-                    match c {
-                        '{' => depth += 1,
-                        '}' if depth == 0 => break,
-                        '}' => depth -= 1,
-                        ',' if depth == 0 => found.push(word(std::mem::take(&mut item).trim())),
-                        _ => {}
-                    }
-                    if c != ',' && depth == 0 {
-                        item.push(c);
-                    }
-                }
-                found.push(word(item.trim()));
-            }
-        }
-    }
-    found.retain(|m: &String| !m.is_empty());
-    found
-}
-
 #[test]
-fn modules_depend_downward_only() {
-    let order: BTreeMap<&str, usize> = LAYERS.iter().copied().flatten().copied().zip(0..).collect();
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut files = Vec::new();
-    rust_files(&root, &mut files);
-    let mut wrong = Vec::new();
-    let mut checked = 0;
-    for path in files {
-        let inside = path.strip_prefix(&root).unwrap();
-        let first = inside
-            .components()
-            .next()
-            .unwrap()
-            .as_os_str()
-            .to_str()
-            .unwrap();
-        let module = first.trim_end_matches(".rs");
-        if matches!(module, "lib" | "main" | "book") {
-            continue;
-        }
-        let here = *order
-            .get(module)
-            .unwrap_or_else(|| panic!("{module} has no layer"));
-        for used in uses(&fs::read_to_string(&path).unwrap()) {
-            let there = *order
-                .get(used.as_str())
-                .unwrap_or_else(|| panic!("{}: crate::{used} has no layer", inside.display()));
+fn rooms_depend_downward_only() {
+    let sources = Crate::read();
+    let order: BTreeMap<&str, usize> = ROOMS.into_iter().zip(0..).collect();
+    let (mut wrong, mut checked) = (Vec::new(), 0);
+    for (module, source) in sources.sources.iter().filter(|(m, _)| !m.is_empty()) {
+        let room = |name: &str| {
+            *(order.get(name)).unwrap_or_else(|| panic!("{name} is no room: {:?}", source.file))
+        };
+        for used in sources.uses(module).iter().filter(|used| !used.is_empty()) {
             checked += 1;
-            if there > here {
-                wrong.push(format!("{} uses crate::{used}", inside.display()));
+            if room(&used[0]) > room(&module[0]) {
+                wrong.push(format!(
+                    "{} uses {}",
+                    source.file.display(),
+                    used.join("::")
+                ));
             }
         }
     }
-    assert!(checked > 100, "only {checked} uses were seen");
-    assert!(
-        wrong.is_empty(),
-        "upward dependencies:\n{}",
-        wrong.join("\n")
-    );
+    assert!(checked > 500, "only {checked} uses were seen");
+    assert!(wrong.is_empty(), "upward:\n{}", wrong.join("\n"));
 }
 
+/// The order of `src/lib.rs` is that of this test.
 #[test]
-fn grouped_uses_are_seen() {
-    let text = "use crate::{twin::{A, B}, math::C};\n// crate::cli\nlet x = crate::gate::G;";
-    assert_eq!(uses(text), ["twin", "math", "gate"]);
+fn the_library_lists_its_rooms_in_order() {
+    let text = std::fs::read_to_string(crate::source::root().join("src/lib.rs")).unwrap();
+    let listed: Vec<&str> = (text.lines())
+        .filter_map(|line| line.trim_start_matches("pub ").strip_prefix("mod "))
+        .filter_map(|line| line.strip_suffix(';'))
+        .filter(|name| *name != "book")
+        .collect();
+    assert_eq!(listed, ROOMS);
 }
 
-/// Only `network` names dfdx, only `optimise` argmin, only `external/fmu` fmi: each can be replaced in one place.
+/// A library that is named in one room can be replaced there.
 #[test]
-fn large_dependencies_have_one_room() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut files = Vec::new();
-    rust_files(&root, &mut files);
+fn large_libraries_have_one_room() {
+    let sources = Crate::read();
     for (library, room) in [
-        ("dfdx::", "network"),
-        ("argmin::", "fit"),
-        ("fmi::", "external/fmu"),
+        ("dfdx", "network"),
+        ("argmin", "fit"),
+        ("fmi", "external/fmu"),
+        ("clap", "cli"),
+        ("clap_complete", "cli"),
+        ("clap_mangen", "cli"),
+        ("indicatif", "cli"),
+        ("ctrlc", "cli"),
+        ("parquet", "record"),
+        ("mpi", "storage"),
     ] {
-        for path in &files {
-            let code: String = (fs::read_to_string(path).unwrap().lines())
-                .map(|l| l.split("//").next().unwrap_or("").to_owned() + "\n")
-                .collect();
-            let inside = path.strip_prefix(&root).unwrap();
-            assert!(
-                !code.contains(library) || inside.starts_with(room),
-                "{} names {library}",
-                inside.display()
-            );
+        let named = format!("{library} ::");
+        let mut users = 0;
+        for source in sources.sources.values() {
+            let mut before = source
+                .code
+                .match_indices(&named)
+                .map(|(at, _)| &source.code[..at]);
+            if before.any(|before| {
+                before.is_empty() || before.ends_with(' ') && !before.ends_with(":: ")
+            }) {
+                let inside = source.file.starts_with(room);
+                assert!(inside, "{} names {library}", source.file.display());
+                users += 1;
+            }
         }
+        assert!(users > 0, "nobody names {library}: is it still used?");
     }
 }

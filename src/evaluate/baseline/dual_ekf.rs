@@ -1,6 +1,6 @@
 //! Two Kalman filters side by side: one for the states, one for θ.
 
-use super::BaselineError;
+use crate::evaluate::EvaluateError;
 use crate::likelihood::kalman::FilterError;
 use crate::math::Stencil;
 use crate::record::{Record, Signal};
@@ -10,14 +10,6 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 /// Where the states of a [`DualFilter`] start.
-///
-/// ```
-/// use truetwin::evaluate::baseline::{DualFilter, DualStart};
-///
-/// let known_start = DualFilter { start: DualStart::Twin, ..DualFilter::default() };
-/// assert_eq!(DualFilter::default().start, DualStart::FirstOutput);
-/// assert_ne!(known_start, DualFilter::default());
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -98,23 +90,7 @@ impl Default for DualFilter {
     }
 }
 
-/// What a dual filter found.
-///
-/// ```
-/// use truetwin::evaluate::baseline::{DualFilter, DualFiltered};
-/// use truetwin::effect::*;
-/// use truetwin::record::*;
-/// use truetwin::twin::*;
-/// use truetwin::twins::VanDerPol;
-///
-/// let drive = Drive::autonomous(0.05, 300)?;
-/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
-/// let record = Record::new(drive, outputs)?;
-/// let found: DualFiltered = DualFilter::default().run(&VanDerPol, &record, &[1.3])?;
-/// assert_eq!(found.theta, found.trajectory.row(299).to_vec());
-/// assert_eq!(found.covariance.shape(), (1, 1));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
+/// Result of a dual filter.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct DualFiltered {
@@ -134,13 +110,13 @@ impl DualFilter {
     ///
     /// # Errors
     ///
-    /// [`BaselineError`]: what does not fit; [`FilterError::Diverged`] when the filter leaves the finite numbers.
+    /// [`EvaluateError`]: what does not fit; [`FilterError::Diverged`] when the filter leaves the finite numbers.
     pub fn run(
         &self,
         twin: &dyn StateSpace,
         record: &Record,
         start: &[f64],
-    ) -> Result<DualFiltered, BaselineError> {
+    ) -> Result<DualFiltered, EvaluateError> {
         for (name, value) in [
             ("state_variance", self.state_variance),
             ("parameter_variance", self.parameter_variance),
@@ -256,7 +232,6 @@ fn symmetric(matrix: DMatrix<f64>) -> DMatrix<f64> {
 struct Step<'a> {
     twin: &'a dyn StateSpace,
     limits: Vec<Interval>,
-    n: usize,
     p: usize,
     steps: Vec<f64>,
     lower: Vec<f64>,
@@ -269,7 +244,6 @@ impl<'a> Step<'a> {
         Self {
             twin,
             limits: twin.limits(),
-            n,
             p,
             steps: space.widths().iter().map(|w| DIFFERENCE * w).collect(),
             lower: space.bounds().iter().map(|b| b.low()).collect(),
@@ -298,30 +272,27 @@ impl<'a> Step<'a> {
         y
     }
 
-    fn around(x: &[f64]) -> Result<Stencil, BaselineError> {
+    fn around(x: &[f64]) -> Result<Stencil, EvaluateError> {
         let steps: Vec<f64> = x.iter().map(|v| DIFFERENCE * v.abs().max(1e-2)).collect();
         let free = vec![f64::INFINITY; x.len()];
         let below = vec![f64::NEG_INFINITY; x.len()];
         Ok(Stencil::new(x, &steps, &below, &free)?)
     }
 
-    fn observe_slope(&self, now: &Now<'_>, x: &[f64]) -> Result<DMatrix<f64>, BaselineError> {
+    fn observe_slope(&self, now: &Now<'_>, x: &[f64]) -> Result<DMatrix<f64>, EvaluateError> {
         Self::around(x)?.jacobian(|x| Ok(self.observe(now, x)))
     }
 
-    fn advance_slope(&mut self, now: &Now<'_>, x: &[f64]) -> Result<DMatrix<f64>, BaselineError> {
+    fn advance_slope(&mut self, now: &Now<'_>, x: &[f64]) -> Result<DMatrix<f64>, EvaluateError> {
         Self::around(x)?.jacobian(|x| Ok(DVector::from_vec(self.advance(now, x))))
     }
 
-    fn theta_slope(&mut self, now: &Now<'_>, x: &[f64]) -> Result<DMatrix<f64>, BaselineError> {
+    fn theta_slope(&mut self, now: &Now<'_>, x: &[f64]) -> Result<DMatrix<f64>, EvaluateError> {
         let stencil = Stencil::new(now.theta, &self.steps, &self.lower, &self.upper)?;
-        let n = self.n;
-        let slope = stencil.jacobian(|theta| {
+        stencil.jacobian(|theta| {
             let now = Now { theta, ..*now };
-            Ok::<_, BaselineError>(DVector::from_vec(self.advance(&now, x)))
-        })?;
-        debug_assert_eq!(slope.nrows(), n);
-        Ok(slope)
+            Ok(DVector::from_vec(self.advance(&now, x)))
+        })
     }
 }
 

@@ -1,6 +1,6 @@
 //! Where a baseline starts.
 
-use crate::twin::{Noise, ParameterError, ParameterSpace};
+use crate::twin::{Noise, ParameterSpace, TwinError};
 use std::fmt;
 
 /// Standard deviation of the factor of a good start.
@@ -21,7 +21,7 @@ const GOOD_SPREAD: f64 = 0.1;
 /// let noise = Noise::new(1, "start", 0);
 /// assert_eq!(Initialisation::Bad.theta(&space, &[3.0], &[2.4], noise)?, [7.0]);
 /// assert_eq!(Initialisation::Ts.theta(&space, &[3.0], &[2.4], noise)?, [2.4]);
-/// # Ok::<(), truetwin::twin::ParameterError>(())
+/// # Ok::<(), truetwin::twin::TwinError>(())
 /// ```
 ///
 /// Source: Lakshminarayanan, Guerrero & Rojas, section V; the spread is that of the authors' code.
@@ -45,14 +45,14 @@ impl Initialisation {
     ///
     /// # Errors
     ///
-    /// [`ParameterError`] for a truth or θ_init of another length, or a truth outside the bounds.
+    /// [`TwinError`] for a truth or θ_init of another length, or a truth outside the bounds.
     pub fn theta(
         self,
         space: &ParameterSpace,
         truth: &[f64],
         initial: &[f64],
         noise: Noise,
-    ) -> Result<Vec<f64>, ParameterError> {
+    ) -> Result<Vec<f64>, TwinError> {
         space.check_point(truth)?;
         Ok(match self {
             Self::Good => {

@@ -1,6 +1,6 @@
 //! Fitting the noise-free output.
 
-use super::BaselineError;
+use crate::evaluate::EvaluateError;
 use crate::fit::{Bounds, EvaluationError, GaussNewton, ResidualProblem};
 use crate::math::Stencil;
 use crate::record::Record;
@@ -48,9 +48,9 @@ pub struct PredictionErrorMethod {
     pub iterations: u64,
     /// λ; 0 for the search to convergence.
     pub ridge: f64,
-    /// Of differences, in prior widths.
+    /// Step of differences, in prior widths.
     pub step: f64,
-    /// Of a step before giving up.
+    /// Halvings of a step before giving up.
     pub halvings: u32,
 }
 
@@ -65,22 +65,7 @@ impl Default for PredictionErrorMethod {
     }
 }
 
-/// What the prediction-error method found.
-///
-/// ```
-/// use truetwin::evaluate::baseline::{PredictionErrorFit, PredictionErrorMethod};
-/// use truetwin::effect::*;
-/// use truetwin::record::*;
-/// use truetwin::twin::*;
-/// use truetwin::twins::VanDerPol;
-///
-/// let drive = Drive::autonomous(0.05, 300)?;
-/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
-/// let record = Record::new(drive, outputs)?;
-/// let fit: PredictionErrorFit = PredictionErrorMethod::converged().fit(&VanDerPol, &record, &[1.4])?;
-/// assert!(fit.rmse < 0.2 && fit.iterations > 0);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
+/// Result of the prediction-error method.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct PredictionErrorFit {
@@ -106,13 +91,13 @@ impl PredictionErrorMethod {
     ///
     /// # Errors
     ///
-    /// [`BaselineError`]: what does not fit, a twin that fails at the start. A point where it diverges later shortens the step.
+    /// [`EvaluateError`]: what does not fit, a twin that fails at the start. A point where it diverges later shortens the step.
     pub fn fit(
         &self,
         twin: &dyn DigitalTwin,
         record: &Record,
         start: &[f64],
-    ) -> Result<PredictionErrorFit, BaselineError> {
+    ) -> Result<PredictionErrorFit, EvaluateError> {
         let (ridge, step) = (self.ridge, self.step);
         SettingError::unless(
             ridge >= 0.0,
@@ -167,13 +152,13 @@ impl PredictionErrorMethod {
         problem: &OutputError<'_>,
         space: &ParameterSpace,
         mut theta: Vec<f64>,
-    ) -> Result<(Vec<f64>, DVector<f64>, usize), BaselineError> {
+    ) -> Result<(Vec<f64>, DVector<f64>, usize), EvaluateError> {
         let mut residual = problem.at(&theta)?;
         let mut taken = 0;
         for _ in 0..self.iterations {
             let jacobian = match problem.slopes(&theta) {
                 Ok(jacobian) => jacobian,
-                Err(BaselineError::Simulation(error)) if error.costs_one_run() => break,
+                Err(EvaluateError::Simulation(error)) if error.costs_one_run() => break,
                 Err(error) => return Err(error),
             };
             let d = theta.len();
@@ -192,7 +177,7 @@ impl PredictionErrorMethod {
                         break;
                     }
                     Ok(_) => {}
-                    Err(BaselineError::Simulation(error)) if error.costs_one_run() => {}
+                    Err(EvaluateError::Simulation(error)) if error.costs_one_run() => {}
                     Err(error) => return Err(error),
                 }
                 step *= 0.5;
@@ -215,7 +200,7 @@ struct OutputError<'a> {
 }
 
 impl OutputError<'_> {
-    fn at(&self, theta: &[f64]) -> Result<DVector<f64>, BaselineError> {
+    fn at(&self, theta: &[f64]) -> Result<DVector<f64>, EvaluateError> {
         let run = self.twin.free_run(theta, self.record.drive())?;
         let outputs = self.record.outputs();
         let pairs = run.iter().zip(outputs).map(|(a, b)| a - b);
@@ -227,16 +212,16 @@ impl OutputError<'_> {
         }
     }
 
-    fn slopes(&self, theta: &[f64]) -> Result<DMatrix<f64>, BaselineError> {
+    fn slopes(&self, theta: &[f64]) -> Result<DMatrix<f64>, EvaluateError> {
         let stencil = Stencil::new(theta, &self.steps, &self.lower, &self.upper)?;
         stencil.jacobian(|point| self.at(point))
     }
 }
 
-impl From<BaselineError> for EvaluationError {
-    fn from(error: BaselineError) -> Self {
+impl From<EvaluateError> for EvaluationError {
+    fn from(error: EvaluateError) -> Self {
         match &error {
-            BaselineError::Simulation(cause) if cause.costs_one_run() => Self::rejected(error),
+            EvaluateError::Simulation(cause) if cause.costs_one_run() => Self::rejected(error),
             _ => Self::fatal(error),
         }
     }

@@ -1,6 +1,6 @@
 //! The folder of a study of many records.
 
-use super::MonteCarlo;
+use super::monte_carlo::{MonteCarlo, RUNS};
 use crate::estimator::{PretrainOptions, Recipe};
 use crate::storage::work::{Manifest, WorkError, WorkFolder, checksum};
 use crate::study::Study;
@@ -9,10 +9,8 @@ use std::path::Path;
 
 /// Layout of the folder; raised when it changes.
 const LAYOUT: u32 = 3;
-/// Where runs are kept.
-pub(super) const RUNS: &str = "runs";
 
-/// Where the estimator of a study comes from.
+/// Source of a study's estimator.
 ///
 /// ```
 /// use truetwin::evaluate::paper::{Benchmark, MonteCarlo, Origin, Scenario, reference_projects};

@@ -1,7 +1,8 @@
-//! What the twin shows at the methods' answers.
+//! Noise-free runs of the twin at the methods' answers.
 
 use super::record::simulated;
-use super::{Method, MonteCarlo, MonteCarloError, Run};
+use super::{Method, MonteCarlo, Run};
+use crate::evaluate::EvaluateError;
 use crate::record::{Record, Signal};
 use crate::study::Study;
 
@@ -18,8 +19,8 @@ pub struct FreeRuns {
 }
 
 impl FreeRuns {
-    /// Of a run of `plan`.
-    pub fn of(study: &Study, plan: &MonteCarlo, run: &Run) -> Result<Self, MonteCarloError> {
+    /// Simulates the twin at the truth and the answers of a run of `plan`.
+    pub fn of(study: &Study, plan: &MonteCarlo, run: &Run) -> Result<Self, EvaluateError> {
         let draws = plan.draws(study)?;
         let record = simulated(study, &draws, plan.seed, run.run)?.record;
         // A free run may diverge where noisy runs do not.
@@ -50,12 +51,12 @@ pub struct MeanRuns {
 }
 
 impl MeanRuns {
-    /// Over runs of `plan`; `None` without runs, or where their true parameters differ so that a mean shows nothing.
+    /// Averages over runs of `plan`; `None` without runs, or where their true parameters differ so that a mean shows nothing.
     pub fn of(
         study: &Study,
         plan: &MonteCarlo,
         runs: &[Run],
-    ) -> Result<Option<Self>, MonteCarloError> {
+    ) -> Result<Option<Self>, EvaluateError> {
         if !plan.scenario.is_point() || runs.is_empty() {
             return Ok(None);
         }

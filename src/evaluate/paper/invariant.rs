@@ -1,22 +1,11 @@
-//! What a record can show of θ where it cannot show all of θ.
+//! Functions of θ that a record determines, and changes that it hardly shows.
 
 use crate::twin::ParameterSpace;
 
 /// A function of θ that a record determines, though it may not determine each parameter.
-///
-/// ```
-/// use truetwin::evaluate::paper::Invariant;
-/// use truetwin::twin::{Parameter, ParameterSpace};
-///
-/// let product = Invariant { name: "a·b", parameters: &["a", "b"], value: |p| p[0] * p[1] };
-/// let space = ParameterSpace::new(["b", "c", "a"].map(|n| Parameter::new(n, "-", 0.0, 9.0)));
-/// let value = product.bind(&space).ok_or("θ has both")?;
-/// assert_eq!(value(&[2.0, 0.0, 3.0]), 6.0);
-/// # Ok::<(), &str>(())
-/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Invariant {
-    /// How it is written: `k1·k2`.
+    /// Formula: `k1·k2`.
     pub name: &'static str,
     /// Parameters that it reads, by name.
     pub parameters: &'static [&'static str],
@@ -33,18 +22,6 @@ impl Invariant {
 }
 
 /// A change of θ that leaves every noise-free output as it is, so that a record hardly shows it.
-///
-/// ```
-/// use truetwin::evaluate::paper::Symmetry;
-/// use truetwin::twin::{Parameter, ParameterSpace};
-///
-/// // Only a·b is seen: (a, b) may move along (a, −b).
-/// let scale = Symmetry { parameters: &["a", "b"], direction: |p| vec![p[0], -p[1]] };
-/// let space = ParameterSpace::new(["a", "b"].map(|n| Parameter::new(n, "-", 0.0, 9.0)));
-/// let error = scale.bind(&space).ok_or("θ has both")?;
-/// assert!(error(&[1.1, 0.9], &[1.0, 1.0]) < 1e-12);
-/// # Ok::<(), &str>(())
-/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Symmetry {
     /// Parameters that change, by name.

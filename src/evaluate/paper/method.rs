@@ -4,7 +4,7 @@ use crate::evaluate::baseline::Initialisation;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// What is scored.
+/// Scored method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 #[non_exhaustive]
@@ -15,7 +15,7 @@ pub enum Method {
     GaussNewton,
     /// Tuned heads, whatever the gate says.
     TsFine,
-    /// What the estimator answers: gate, misfit and all.
+    /// The estimator's answer: gate, misfit and all.
     Final,
     /// The prediction-error method, the paper's six steps.
     PredictionError(Initialisation),
@@ -32,7 +32,7 @@ impl Method {
         all
     }
 
-    /// Where a baseline starts.
+    /// Start of a baseline.
     pub fn initialisation(self) -> Option<Initialisation> {
         match self {
             Self::PredictionError(start) | Self::DualFilter(start) => Some(start),

@@ -23,19 +23,9 @@
 //! // A twin of one's own has no published points; true parameters come from all of its bounds.
 //! let plan = MonteCarlo { benchmark: Benchmark::default(), scenario: Scenario::Uniform, runs: 2, seed: 1 };
 //! let runs: Vec<Run> = plan.run(&estimator, None, &Progress::silent())?;
-//! let answers: &[Answer] = &runs[0].answers;
-//! assert_eq!(answers.len(), Method::all().len());
-//!
 //! let scores: Scores = score(&study, &plan, &runs);
-//! let network: &MethodScore = &scores.methods[0];
-//! assert_eq!((network.method, network.failed), (Method::TsPre, 0));
-//! let coverage: &Coverage = &scores.coverage[0];
-//! assert_eq!((coverage.name.as_str(), coverage.of), ("nu", 2));
-//!
-//! // What the answers predict; a mean only where all records have the same truth.
-//! let free: FreeRuns = FreeRuns::of(&study, &plan, &runs[0])?;
-//! assert_eq!(free.answers.len(), answers.len());
-//! assert!(MeanRuns::of(&study, &plan, &runs)?.is_none());
+//! assert_eq!((scores.methods[0].method, scores.methods[0].failed), (Method::TsPre, 0));
+//! assert_eq!(scores.coverage[0].of, 2);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -52,11 +42,12 @@ mod score;
 
 pub use folder::Origin;
 pub use free_runs::{FreeRuns, MeanRuns};
-pub use invariant::{Invariant, Symmetry};
+use invariant::{Invariant, Symmetry};
 pub use method::Method;
-pub use monte_carlo::{MonteCarlo, MonteCarloError};
+pub use monte_carlo::MonteCarlo;
 pub use paper::{reference_projects, reference_studies};
-pub use run::{Answer, Run};
-pub use scenario::{Benchmark, Published, Scenario, ScenarioError, TestPoint};
-pub(crate) use score::COVERAGE_LEVEL;
-pub use score::{Coverage, MethodScore, Scores, score};
+pub use run::Run;
+pub use scenario::{Benchmark, Scenario};
+use scenario::{Published, TestPoint};
+pub(crate) use score::{COVERAGE_LEVEL, MethodScore};
+pub use score::{Scores, score};

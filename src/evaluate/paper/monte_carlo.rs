@@ -1,22 +1,24 @@
 //! Every method on many simulated records.
 
-use super::folder::RUNS;
 use super::record::simulated;
 use super::scenario::Draws;
-use super::{Benchmark, Run, Scenario, ScenarioError};
+use super::{Benchmark, Run, Scenario};
 use crate::estimator::Estimator;
-use crate::progress::{Cancelled, Progress};
-use crate::record::{Record, RecordError};
-use crate::storage::work::{Piece, Pieces, Share, WorkError, WorkFolder};
+use crate::evaluate::EvaluateError;
+use crate::progress::Progress;
+use crate::record::Record;
+use crate::storage::work::{Piece, Pieces, Share, WorkFolder};
 use crate::study::Study;
-use crate::twin::SimulationError;
 
-/// What is run.
+/// Folder of kept runs.
+pub(super) const RUNS: &str = "runs";
+
+/// Plan of a study over many simulated records.
 #[derive(Debug, Clone)]
 pub struct MonteCarlo {
-    /// What is known about the twin: [`Benchmark::of`] for the paper's, the default for any other.
+    /// Published knowledge about the twin: [`Benchmark::of`] for the paper's, the default for any other.
     pub benchmark: Benchmark,
-    /// Where θ comes from.
+    /// Source of θ.
     pub scenario: Scenario,
     /// Number of records.
     pub runs: usize,
@@ -24,53 +26,13 @@ pub struct MonteCarlo {
     pub seed: u64,
 }
 
-/// Why there are no scores.
-///
-/// ```
-/// use truetwin::evaluate::paper::{Benchmark, MonteCarlo, MonteCarloError, Scenario, ScenarioError};
-/// use truetwin::study::{RecordPlan, Study};
-/// use truetwin::twins::VanDerPol;
-///
-/// // No points of the paper's are known of this twin.
-/// let study = Study::new("mine", VanDerPol, RecordPlan::autonomous(0.05, 150))?;
-/// let plan = MonteCarlo { benchmark: Benchmark::default(), scenario: Scenario::First, runs: 2, seed: 1 };
-/// let error: MonteCarloError = plan.record(&study, 0).unwrap_err();
-/// assert!(matches!(error, MonteCarloError::Scenario(ScenarioError::NoPoint(_))));
-/// # Ok::<(), truetwin::study::StudyError>(())
-/// ```
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum MonteCarloError {
-    /// The study does not have such a scenario.
-    #[error(transparent)]
-    Scenario(#[from] ScenarioError),
-    /// A record could not be simulated.
-    #[error(transparent)]
-    Simulation(#[from] SimulationError),
-    /// A record could not be made.
-    #[error(transparent)]
-    Record(#[from] RecordError),
-    /// The estimator failed on every record.
-    #[error("the estimator failed on every record; on the first: {0}")]
-    Hopeless(String),
-    /// The folder of runs.
-    #[error(transparent)]
-    Work(#[from] WorkError),
-    /// No threads.
-    #[error("no threads could be started: {0}")]
-    Threads(#[from] rayon::ThreadPoolBuildError),
-    /// Stopped from outside.
-    #[error(transparent)]
-    Cancelled(#[from] Cancelled),
-}
-
 impl MonteCarlo {
-    /// Whether the study has this scenario; worth asking before an estimator is trained.
-    pub fn check(&self, study: &Study) -> Result<(), ScenarioError> {
+    /// Checks that the study has this scenario; worth asking before an estimator is trained.
+    pub fn check(&self, study: &Study) -> Result<(), EvaluateError> {
         self.draws(study).map(|_| ())
     }
 
-    pub(super) fn draws<'a>(&self, study: &'a Study) -> Result<Draws<'a>, ScenarioError> {
+    pub(super) fn draws<'a>(&self, study: &'a Study) -> Result<Draws<'a>, EvaluateError> {
         Draws::new(study, &self.benchmark, self.scenario)
     }
 
@@ -79,7 +41,7 @@ impl MonteCarlo {
     /// # Errors
     ///
     /// A study without this scenario, a twin that diverges there.
-    pub fn record(&self, study: &Study, run: usize) -> Result<(Vec<f64>, Record), MonteCarloError> {
+    pub fn record(&self, study: &Study, run: usize) -> Result<(Vec<f64>, Record), EvaluateError> {
         let simulated = simulated(study, &self.draws(study)?, self.seed, run)?;
         Ok((simulated.truth, simulated.record))
     }
@@ -95,14 +57,13 @@ impl MonteCarlo {
         estimator: &Estimator,
         folder: Option<&WorkFolder>,
         progress: &Progress,
-    ) -> Result<Vec<Run>, MonteCarloError> {
+    ) -> Result<Vec<Run>, EvaluateError> {
         let runs = self.run_share(estimator, folder, Share::WHOLE, progress)?;
-        match runs.iter().all(|run| run.failure.is_some()) {
-            true => Err(MonteCarloError::Hopeless(
-                (runs.into_iter().find_map(|run| run.failure)).unwrap_or_default(),
-            )),
-            false => Ok(runs),
+        if runs.iter().all(|run| run.failure.is_some()) {
+            let failure = runs.into_iter().find_map(|run| run.failure);
+            return Err(EvaluateError::Hopeless(failure.unwrap_or_default()));
         }
+        Ok(runs)
     }
 
     /// As [`run`](Self::run), but only the runs of a share; returns these and all that the folder had before.
@@ -112,7 +73,7 @@ impl MonteCarlo {
         folder: Option<&WorkFolder>,
         share: Share,
         progress: &Progress,
-    ) -> Result<Vec<Run>, MonteCarloError> {
+    ) -> Result<Vec<Run>, EvaluateError> {
         let study = estimator.study();
         let draws = self.draws(study)?;
         let parameters = study.twin().parameters().len();
@@ -149,8 +110,9 @@ mod tests {
     use crate::evaluate::paper::{Origin, reference_projects, score};
     use crate::progress::Listener;
     use crate::record::{Drive, Signal};
+    use crate::storage::work::WorkError;
     use crate::study::RecordPlan;
-    use crate::twin::{DigitalTwin, Noise, Parameter, ParameterSpace};
+    use crate::twin::{DigitalTwin, Noise, Parameter, ParameterSpace, SimulationError};
     use std::fs;
     use std::path::Path;
     use std::sync::{Arc, OnceLock};
@@ -294,7 +256,7 @@ mod tests {
         let folder = open(&place.path().join("study"), &plan).unwrap();
         let progress = Progress::new(Arc::new(Stopped));
         let error = plan.run(oscillator(), Some(&folder), &progress);
-        assert!(matches!(error, Err(MonteCarloError::Cancelled(_))));
+        assert!(matches!(error, Err(EvaluateError::Cancelled(_))));
         assert_eq!(fs::read_dir(folder.file("runs")).unwrap().count(), 0);
     }
 
@@ -341,7 +303,7 @@ mod tests {
         };
         assert!(matches!(
             point.check(&study),
-            Err(ScenarioError::NoPoint(_))
+            Err(EvaluateError::NoPoint(_))
         ));
     }
 }

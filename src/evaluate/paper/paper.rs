@@ -95,7 +95,7 @@ fn paper(width: f64, pull: f64, epochs: usize, orthogonality: f64, cloud: usize)
 }
 
 impl Benchmark {
-    /// What the paper has about a study's twin; nothing about other twins than its own. Its figures are left out where
+    /// Returns what the paper has about a study's twin; nothing about other twins than its own. Its figures are left out where
     /// the study changes prior, records, noise or start.
     pub fn of(study: &Study) -> Self {
         let paper = match study.name() {

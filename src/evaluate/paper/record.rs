@@ -1,7 +1,7 @@
 //! The records of a Monte-Carlo study.
 
-use super::MonteCarloError;
 use super::scenario::Draws;
+use crate::evaluate::EvaluateError;
 use crate::record::Record;
 use crate::study::Study;
 use crate::twin::Noise;
@@ -22,7 +22,7 @@ pub(super) fn simulated(
     draws: &Draws<'_>,
     seed: u64,
     run: usize,
-) -> Result<Simulated, MonteCarloError> {
+) -> Result<Simulated, EvaluateError> {
     let first = Noise::new(seed, "record", run as u64);
     let mut attempt = 0;
     loop {

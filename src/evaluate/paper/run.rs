@@ -1,20 +1,21 @@
 //! Every method on one simulated record.
 
+use super::Method;
 use super::record::Simulated;
-use super::{Method, MonteCarloError};
 use crate::estimator::{Estimate, EstimateOptions, Estimator};
+use crate::evaluate::EvaluateError;
 use crate::evaluate::baseline::{DualFilter, Initialisation, PredictionErrorMethod};
 use crate::progress::Progress;
 use crate::twin::Twin;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// What all methods answered on one record; what scores and figures are made of.
+/// Answers of all methods on one record; scores and figures are made of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Run {
-    /// Which, from 0.
+    /// Number, from 0.
     pub run: usize,
     /// True θ.
     pub truth: Vec<f64>,
@@ -27,7 +28,7 @@ pub struct Run {
     pub failure: Option<String>,
 }
 
-/// What one method answered.
+/// Answer of one method.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
@@ -45,13 +46,13 @@ impl Run {
     ///
     /// # Errors
     ///
-    /// [`MonteCarloError::Cancelled`] alone.
+    /// [`EvaluateError::Cancelled`] alone.
     pub(super) fn new(
         estimator: &Estimator,
         run: usize,
         simulated: &Simulated,
         progress: &Progress,
-    ) -> Result<Self, MonteCarloError> {
+    ) -> Result<Self, EvaluateError> {
         let twin = estimator.study().twin();
         let Simulated {
             truth,
@@ -128,7 +129,7 @@ impl Run {
         })
     }
 
-    /// Whether this may be a run of a study with `parameters` parameters.
+    /// Returns true if this may be a run of a study with `parameters` parameters.
     pub(super) fn fits(&self, parameters: usize) -> bool {
         let whole = |theta: &Vec<f64>| theta.len() == parameters;
         let methods = self.answers.iter().map(|answer| answer.method);

@@ -1,11 +1,12 @@
-//! Where true parameters and inputs of simulated records come from.
+//! Sources of true parameters and inputs of simulated records.
 
 use super::{Invariant, Method, Symmetry};
-use crate::record::{Drive, DriveError, Signal};
-use crate::study::{DriveSource, PlanError, RecordTable, Study};
-use crate::twin::{Interval, Noise};
+use crate::evaluate::EvaluateError;
+use crate::record::{Drive, RecordError, Signal};
+use crate::study::{DriveSource, RecordTable, Study};
+use crate::twin::Noise;
 
-/// Where true parameters come from.
+/// Source of true parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Scenario {
@@ -30,13 +31,13 @@ impl Scenario {
         }
     }
 
-    /// Whether every record has the same true parameters.
+    /// Returns true if every record has the same true parameters.
     pub fn is_point(self) -> bool {
         matches!(self, Self::First | Self::Second)
     }
 }
 
-/// What is published about a twin: where it was tested, what its records can show, what others found.
+/// Published knowledge about a twin: test points, quantities that a record determines, figures.
 #[derive(Debug, Clone, Default)]
 pub struct Benchmark {
     /// Parameters of the test points; empty where there are none.
@@ -45,24 +46,15 @@ pub struct Benchmark {
     pub levels: &'static [f64],
     /// Samples that a level is held.
     pub hold: usize,
-    /// What a record determines.
+    /// Functions of θ that a record determines.
     pub invariants: &'static [Invariant],
-    /// What it does not.
+    /// Change of θ that a record hardly shows.
     pub symmetry: Option<Symmetry>,
     /// Published figures, of [`Scenario::First`].
     pub published: &'static [(Method, Published)],
 }
 
 /// One parameter at the test points.
-///
-/// ```
-/// use truetwin::evaluate::paper::{Benchmark, TestPoint, reference_studies};
-///
-/// let benchmark = Benchmark::of(&reference_studies()?[0]);
-/// let nu: &TestPoint = &benchmark.points[0];
-/// assert_eq!((nu.name, nu.values), ("nu", [3.0, 5.0]));
-/// # Ok::<(), truetwin::study::StudyError>(())
-/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct TestPoint {
     /// Parameter.
@@ -72,61 +64,12 @@ pub struct TestPoint {
 }
 
 /// A published figure.
-///
-/// ```
-/// use truetwin::evaluate::paper::{Benchmark, Method, Published, reference_studies};
-///
-/// let benchmark = Benchmark::of(&reference_studies()?[0]);
-/// let (method, figures): &(Method, Published) = &benchmark.published[0];
-/// assert_eq!((*method, figures.mse), (Method::TsPre, 0.3204));
-/// # Ok::<(), truetwin::study::StudyError>(())
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Published {
     /// Mean squared error.
     pub mse: f64,
     /// Milliseconds a record, on the authors' machine.
     pub milliseconds: f64,
-}
-
-/// Why no true parameters or inputs can be had.
-///
-/// ```
-/// use truetwin::evaluate::paper::{Benchmark, MonteCarlo, Scenario, ScenarioError};
-/// use truetwin::study::{RecordPlan, Study};
-/// use truetwin::twins::VanDerPol;
-///
-/// let study = Study::new("mine", VanDerPol, RecordPlan::autonomous(0.05, 150))?;
-/// let plan = MonteCarlo { benchmark: Benchmark::default(), scenario: Scenario::Second, runs: 2, seed: 1 };
-/// assert!(matches!(plan.check(&study), Err(ScenarioError::NoPoint(_))));
-/// # Ok::<(), truetwin::study::StudyError>(())
-/// ```
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ScenarioError {
-    /// There are no test points.
-    #[error(
-        "the paper has no test points for twin \"{0}\"; take --scenario 0 (θ from the prior) or --scenario uniform (θ from the bounds)"
-    )]
-    NoPoint(String),
-    /// A test point is none of this study's.
-    #[error(
-        "the paper's test point {name} = {value} lies outside the study's bounds {bounds}; widen [bounds], or take --scenario 0 (θ from the prior) or --scenario uniform (θ from the bounds)"
-    )]
-    Outside {
-        /// Parameter.
-        name: &'static str,
-        /// Its value there.
-        value: f64,
-        /// Bounds of the study.
-        bounds: Interval,
-    },
-    /// The study's inputs.
-    #[error(transparent)]
-    Plan(#[from] PlanError),
-    /// A bad time grid.
-    #[error(transparent)]
-    Drive(#[from] DriveError),
 }
 
 /// A scenario of one study, ready to be drawn from.
@@ -151,9 +94,9 @@ impl<'a> Draws<'a> {
         study: &'a Study,
         benchmark: &Benchmark,
         scenario: Scenario,
-    ) -> Result<Self, ScenarioError> {
+    ) -> Result<Self, EvaluateError> {
         if scenario.is_point() && benchmark.points.is_empty() {
-            return Err(ScenarioError::NoPoint(study.name().into()));
+            return Err(EvaluateError::NoPoint(study.name().into()));
         }
         let held = (study.twin().parameters().iter())
             .map(|p| {
@@ -164,21 +107,22 @@ impl<'a> Draws<'a> {
                     _ => return Ok(None),
                 };
                 let bounds = p.bounds;
-                match bounds.contains(value) {
-                    true => Ok(Some(value)),
-                    false => Err(ScenarioError::Outside {
+                if !bounds.contains(value) {
+                    return Err(EvaluateError::Outside {
                         name,
                         value,
                         bounds,
-                    }),
+                    });
                 }
+                Ok(Some(value))
             })
             .collect::<Result<_, _>>()?;
         // A study that says what its records look like means its own.
         let own = benchmark.levels.is_empty() || study.file().record != RecordTable::default();
-        let inputs = match own {
-            true => Inputs::Study(study.drives()?),
-            false => Inputs::Fixed(staircase(study, benchmark)?),
+        let inputs = if own {
+            Inputs::Study(study.drives()?)
+        } else {
+            Inputs::Fixed(staircase(study, benchmark)?)
         };
         Ok(Self {
             study,
@@ -189,7 +133,7 @@ impl<'a> Draws<'a> {
     }
 
     /// True parameters and drive of the record with this noise.
-    pub(super) fn draw(&self, noise: Noise) -> Result<(Vec<f64>, Drive), ScenarioError> {
+    pub(super) fn draw(&self, noise: Noise) -> Result<(Vec<f64>, Drive), EvaluateError> {
         let space = self.study.twin().parameters();
         let drawn = match self.scenario {
             Scenario::Uniform => space.draw_bounds(noise),
@@ -206,14 +150,14 @@ impl<'a> Draws<'a> {
         Ok((theta, drive))
     }
 
-    /// Whether another draw may help where this one diverged.
+    /// Returns true if another draw may help where this one diverged.
     pub(super) fn can_redraw(&self) -> bool {
         !self.scenario.is_point()
     }
 }
 
 /// The benchmark's levels, over and over, as every input of the study's records.
-fn staircase(study: &Study, benchmark: &Benchmark) -> Result<Drive, DriveError> {
+fn staircase(study: &Study, benchmark: &Benchmark) -> Result<Drive, RecordError> {
     let (plan, channels) = (study.plan(), study.twin().signals().inputs.len());
     let levels = Signal::from_shape_fn((plan.samples, channels), |(k, _)| {
         benchmark.levels[(k / benchmark.hold.max(1)) % benchmark.levels.len()]
@@ -234,7 +178,7 @@ mod tests {
         (reference_studies().unwrap()[1].configure(&file)).unwrap()
     }
 
-    fn draws(study: &Study, scenario: Scenario) -> Result<Draws<'_>, ScenarioError> {
+    fn draws(study: &Study, scenario: Scenario) -> Result<Draws<'_>, EvaluateError> {
         Draws::new(study, &Benchmark::of(study), scenario)
     }
 

@@ -7,13 +7,13 @@ use crate::study::Study;
 /// Level of the intervals of a coverage.
 pub const COVERAGE_LEVEL: f64 = 0.95;
 
-/// What the runs of a study come to.
+/// Errors and coverage of the runs of a study.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Scores {
     /// In the order of [`Method::all`].
     pub methods: Vec<MethodScore>,
-    /// How often the refitted estimate's interval held the truth, by parameter.
+    /// Coverage of the truth by the refitted estimate's interval, by parameter.
     pub coverage: Vec<Coverage>,
     /// Runs without an estimate.
     pub failed: usize,
@@ -39,11 +39,11 @@ pub struct MethodScore {
     pub invariants: Vec<(&'static str, f64)>,
     /// As `mse`, without the part along what a record does not determine; `None` where there is no such part.
     pub mse_without_scale: Option<f64>,
-    /// What was published for this twin, scenario and method.
+    /// Published figures for this twin, scenario and method.
     pub published: Option<Published>,
 }
 
-/// How often an interval held the true value.
+/// Coverage of the true value by an interval.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Coverage {
@@ -156,7 +156,8 @@ fn std_error(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::paper::{Answer, Benchmark, reference_studies};
+    use crate::evaluate::paper::run::Answer;
+    use crate::evaluate::paper::{Benchmark, reference_studies};
 
     const TRUTH: [f64; 4] = [1.2, 1.2, 0.9, 1.0];
 

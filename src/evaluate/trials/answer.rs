@@ -1,4 +1,4 @@
-//! What the diagnoser said of one trial, from the record alone.
+//! Answer of the diagnoser to one trial, from the record alone.
 
 use crate::diagnose::{Decision, DiagnoseError, DiagnoseSettings, Diagnosis, Verdict, diagnose};
 use crate::progress::Progress;
@@ -13,9 +13,9 @@ use std::time::Instant;
 pub struct Answer {
     /// From 0.
     pub trial: usize,
-    /// What was found; none where the diagnosis failed.
+    /// Result; none where the diagnosis failed.
     pub outcome: Option<Outcome>,
-    /// Why there is none.
+    /// Reason for a missing result.
     pub failure: Option<String>,
     /// Wall-clock seconds.
     pub seconds: f64,
@@ -25,23 +25,23 @@ pub struct Answer {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Outcome {
-    /// Which kind of gap.
+    /// Kind of gap.
     pub verdict: Verdict,
-    /// Of the structural test.
+    /// p-value of the structural test.
     pub p_value: f64,
-    /// What is said about causes.
+    /// Answer about causes.
     pub decision: Decision,
     /// The place that it names.
     pub target: Option<String>,
     /// Effects, best first.
     pub effects: Vec<Named>,
-    /// What was added to the twin, as `id@target`.
+    /// Effects added to the twin, as `id@target`.
     pub accepted: Vec<String>,
     /// Rivals that the data cannot tell apart.
     pub class: Vec<String>,
     /// Free-run NRMSE of the refitted twin on held-out data; none where another metric is used.
     pub before: Option<f64>,
-    /// What noise alone leaves of it.
+    /// Remainder under noise alone.
     pub floor: Option<f64>,
     /// The share of the gap that closes.
     pub closed: Option<f64>,
@@ -111,12 +111,12 @@ impl Outcome {
         }
     }
 
-    /// Whether a structural gap was found.
+    /// Returns true if a structural gap was found.
     pub fn is_structural(&self) -> bool {
         self.verdict == Verdict::StructuralGap
     }
 
-    /// Whether a structural gap was found, and no listed effect for it.
+    /// Returns true if a structural gap was found, and no listed effect for it.
     pub fn abstains(&self) -> bool {
         self.decision == Decision::NoneOfThese
     }

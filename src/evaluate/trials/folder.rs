@@ -1,7 +1,7 @@
 //! The folder of the trials: sealed keys, records, answers.
 
-use super::WithheldError;
 use super::truth::Truth;
+use crate::evaluate::EvaluateError;
 use crate::record::{Record, read_record, record_csv_text};
 use crate::storage::files::sha256;
 use crate::storage::untrusted::check_file;
@@ -14,12 +14,10 @@ const KEYS: &str = "keys.json";
 const SEAL: &str = "seal.txt";
 const LEFT_OUT: &str = "left-out.json";
 const RECORDS: &str = "records";
-/// What the diagnoser said.
+/// Answers of the diagnoser.
 pub(super) const ANSWERS: &str = "answers";
-/// What the opened keys added.
+/// Additions of the opened keys.
 pub(super) const OPENED: &str = "opened";
-/// Of a key file that is not the one that was sealed.
-const AGAIN: &str = "remove the folder and start again";
 
 /// A folder of trials: what every [`WorkFolder`] has, and
 ///
@@ -41,10 +39,8 @@ pub(super) struct Folder {
 
 /// One trial's records, by number.
 fn record_name(trial: usize, validation: bool) -> String {
-    match validation {
-        true => format!("{RECORDS}/{trial:04}-validation.csv"),
-        false => format!("{RECORDS}/{trial:04}.csv"),
-    }
+    let end = if validation { "-validation" } else { "" };
+    format!("{RECORDS}/{trial:04}{end}.csv")
 }
 
 /// A new folder that is filled with sealed trials.
@@ -83,8 +79,8 @@ impl Folder {
     pub fn open(
         path: &Path,
         manifest: &Manifest,
-        fill: impl FnOnce(&Filling<'_>) -> Result<(), WithheldError>,
-    ) -> Result<Self, WithheldError> {
+        fill: impl FnOnce(&Filling<'_>) -> Result<(), EvaluateError>,
+    ) -> Result<Self, EvaluateError> {
         let parts = [RECORDS, ANSWERS, OPENED];
         let work = WorkFolder::open(path, manifest, &parts, |new| fill(&Filling(new)))?;
         let seal = work.read(SEAL)?.trim().into();
@@ -92,7 +88,7 @@ impl Folder {
     }
 
     /// Reads a trial's record.
-    pub fn record(&self, trial: usize, validation: bool) -> Result<Record, WithheldError> {
+    pub fn record(&self, trial: usize, validation: bool) -> Result<Record, EvaluateError> {
         self.work.part(RECORDS)?;
         let path = self.work.file(&record_name(trial, validation));
         check_file(&path).map_err(|error| WorkError::io(&path, error))?;
@@ -100,37 +96,37 @@ impl Folder {
     }
 
     /// Opens the keys of so many trials, if they are still those that were sealed.
-    pub fn keys(&self, trials: usize) -> Result<Vec<Truth>, WithheldError> {
+    pub fn keys(&self, trials: usize) -> Result<Vec<Truth>, EvaluateError> {
         let text = self.work.read(KEYS)?;
-        let damaged = |reason: String| WithheldError::Damaged {
-            path: self.work.file(KEYS),
-            reason,
-            remedy: AGAIN,
-        };
+        let damaged = |reason| self.damaged(KEYS, reason);
         if sha256(text.as_bytes()) != self.seal {
             return Err(damaged("its SHA-256 is not that of seal.txt".into()));
         }
         let keys: Vec<Truth> =
             serde_json::from_str(&text).map_err(|error| damaged(error.to_string()))?;
-        match keys.iter().map(|key| key.trial).eq(0..trials) {
-            true => Ok(keys),
-            false => Err(damaged("trials are missing".into())),
+        if !keys.iter().map(|key| key.trial).eq(0..trials) {
+            return Err(damaged("trials are missing".into()));
         }
+        Ok(keys)
     }
 
     /// The effects that the libraries of so many trials do without.
-    pub fn left_out(&self, trials: usize) -> Result<Vec<Vec<String>>, WithheldError> {
+    pub fn left_out(&self, trials: usize) -> Result<Vec<Vec<String>>, EvaluateError> {
         let text = self.work.read(LEFT_OUT)?;
-        let damaged = |reason: String| WithheldError::Damaged {
-            path: self.work.file(LEFT_OUT),
-            reason,
-            remedy: AGAIN,
-        };
-        let found: Vec<Vec<String>> =
+        let damaged = |reason| self.damaged(LEFT_OUT, reason);
+        let left_out: Vec<Vec<String>> =
             serde_json::from_str(&text).map_err(|error| damaged(error.to_string()))?;
-        match found.len() == trials {
-            true => Ok(found),
-            false => Err(damaged("trials are missing".into())),
+        if left_out.len() != trials {
+            return Err(damaged("trials are missing".into()));
+        }
+        Ok(left_out)
+    }
+
+    fn damaged(&self, file: &str, reason: String) -> EvaluateError {
+        EvaluateError::Damaged {
+            path: self.work.file(file),
+            reason,
+            remedy: "remove the folder and start again",
         }
     }
 }

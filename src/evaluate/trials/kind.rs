@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// What may be wrong with the twin in a trial, and what is the right answer.
+/// Kind of truth of a trial, which decides the right answer.
 ///
 /// ```
 /// use truetwin::evaluate::trials::Kind;
@@ -65,12 +65,12 @@ impl Kind {
         Self::ALL.into_iter().find(|kind| kind.id() == id)
     }
 
-    /// Whether no θ explains the record.
+    /// Returns true if no θ explains the record.
     pub fn is_structural(self) -> bool {
         !matches!(self, Self::None | Self::Outside | Self::Absorbed)
     }
 
-    /// Of every twenty trials, how many are of this kind.
+    /// Number of trials of this kind among twenty.
     fn weight(self) -> usize {
         match self {
             Self::None | Self::Outside | Self::Listed => 4,
@@ -86,9 +86,9 @@ impl fmt::Display for Kind {
     }
 }
 
-/// The kinds of so many trials, in the proportions of the weights and in no order that could be guessed: `pick` gives
-/// numbers below its argument.
-pub(super) fn deal(
+/// Assigns kinds to trials in the proportions of the weights and in random order: `pick` gives numbers below its
+/// argument.
+pub(super) fn assign_kinds(
     kinds: &[Kind],
     trials: usize,
     mut pick: impl FnMut(usize) -> usize,
@@ -99,11 +99,11 @@ pub(super) fn deal(
         .flat_map(|round| kinds.iter().filter(move |kind| kind.weight() > round))
         .copied()
         .collect();
-    let mut dealt: Vec<Kind> = pack.into_iter().cycle().take(trials).collect();
-    for i in (1..dealt.len()).rev() {
-        dealt.swap(i, pick(i + 1));
+    let mut assigned: Vec<Kind> = pack.into_iter().cycle().take(trials).collect();
+    for i in (1..assigned.len()).rev() {
+        assigned.swap(i, pick(i + 1));
     }
-    dealt
+    assigned
 }
 
 #[cfg(test)]
@@ -112,13 +112,13 @@ mod tests {
 
     #[test]
     fn twenty_trials_have_every_kind_by_its_weight() {
-        let dealt = deal(&Kind::ALL, 40, |n| n / 2);
+        let assigned = assign_kinds(&Kind::ALL, 40, |n| n / 2);
         for kind in Kind::ALL {
-            let count = dealt.iter().filter(|k| **k == kind).count();
+            let count = assigned.iter().filter(|k| **k == kind).count();
             assert_eq!(count, 2 * kind.weight(), "{kind}");
             assert_eq!(Kind::named(kind.id()), Some(kind));
         }
-        assert_eq!(deal(&[Kind::Pair], 3, |_| 0), [Kind::Pair; 3]);
-        assert!(deal(&[], 3, |_| 0).is_empty());
+        assert_eq!(assign_kinds(&[Kind::Pair], 3, |_| 0), [Kind::Pair; 3]);
+        assert!(assign_kinds(&[], 3, |_| 0).is_empty());
     }
 }

@@ -1,6 +1,6 @@
-//! Effects of the library as bends of a world: in the library's own terms, or the same physics written otherwise.
+//! Effects of the library as perturbations of a world: in the library's own terms, or the same physics written otherwise.
 
-use super::world::{Bend, ForceLaw, Lack, ParameterLaw, SignalLaw, Wave, World};
+use super::world::{ForceLaw, MissingEffect, ParameterLaw, Perturbation, SignalLaw, Wave, World};
 use crate::record::Drive;
 use crate::twin::{Noise, Source};
 use std::f64::consts::{PI, TAU};
@@ -51,41 +51,45 @@ impl World {
     /// not have.
     pub(super) fn listed(
         &self,
-        lack: &Lack,
+        missing: &MissingEffect,
         amount: f64,
         form: Form,
         scene: &Scene,
         source: &mut Source,
-    ) -> Option<Bend> {
+    ) -> Option<Perturbation> {
         let draw = Draw {
             form,
             scene,
             amount,
             signed: if source.happens(0.5) { -amount } else { amount },
         };
-        let (kind, law) = lack.id.split_once('-')?;
+        let (kind, law) = missing.id.split_once('-')?;
         match kind {
-            "sensor" if law == "noise" => Some(Bend::MeasurementNoise {
+            "sensor" if law == "noise" => Some(Perturbation::MeasurementNoise {
                 std: amount,
                 uniform: draw.other(),
             }),
             "sensor" => {
                 let range = scene.states[self.output];
-                let bent = draw.signal(law, range, source)?;
+                let perturbed = draw.signal(law, range, source)?;
                 // Noise enters between the two.
                 Some(match law {
-                    "saturation" | "quantization" | "outliers" => Bend::Reading(bent),
-                    _ => Bend::Sensor(bent),
+                    "saturation" | "quantization" | "outliers" => Perturbation::Reading(perturbed),
+                    _ => Perturbation::Sensor(perturbed),
                 })
             }
-            "actuator" => Some(Bend::Actuator(draw.signal(law, scene.input, source)?)),
-            "parameter" => Some(Bend::Parameter {
-                number: self.parameters.iter().position(|p| *p == lack.target)?,
+            "actuator" => Some(Perturbation::Actuator(draw.signal(
+                law,
+                scene.input,
+                source,
+            )?)),
+            "parameter" => Some(Perturbation::Parameter {
+                number: self.parameters.iter().position(|p| *p == missing.target)?,
                 law: draw.parameter(law, source)?,
             }),
             _ => {
-                let on = self.state_names.iter().position(|s| *s == lack.target)?;
-                draw.on_state(lack.id, on, self.state_sizes, source)
+                let on = self.state_names.iter().position(|s| *s == missing.target)?;
+                draw.on_state(missing.id, on, self.state_sizes, source)
             }
         }
     }
@@ -188,7 +192,13 @@ impl Draw<'_> {
     }
 
     /// A force, a ceiling or noise on the state number `on`.
-    fn on_state(&self, id: &str, on: usize, sizes: [f64; 2], source: &mut Source) -> Option<Bend> {
+    fn on_state(
+        &self,
+        id: &str,
+        on: usize,
+        sizes: [f64; 2],
+        source: &mut Source,
+    ) -> Option<Perturbation> {
         let (amount, signed) = (self.amount, self.signed);
         let power = |exponent, of: usize| ForceLaw::Power {
             coefficient: amount,
@@ -241,7 +251,7 @@ impl Draw<'_> {
             "state-ceiling" => {
                 let (low, high) = self.scene.states[on];
                 let span = high - low;
-                return Some(Bend::Ceiling {
+                return Some(Perturbation::Ceiling {
                     on,
                     level: high - amount * span,
                     spill: source.uniform(),
@@ -249,7 +259,7 @@ impl Draw<'_> {
                 });
             }
             "process-noise" => {
-                return Some(Bend::ProcessNoise {
+                return Some(Perturbation::ProcessNoise {
                     on,
                     std: amount,
                     uniform: self.other(),
@@ -257,7 +267,7 @@ impl Draw<'_> {
             }
             _ => return None,
         };
-        Some(Bend::Force { on, law })
+        Some(Perturbation::Force { on, law })
     }
 }
 
@@ -266,7 +276,7 @@ mod tests {
     use super::*;
     use crate::record::Signal;
 
-    /// Every listed effect of both worlds can be bent in both forms, moves the output, and the forms are close.
+    /// Every listed effect of both worlds can be perturbed in both forms, moves the output, and the forms are close.
     #[test]
     fn both_forms_show_and_are_close() {
         for (name, theta) in [
@@ -283,7 +293,9 @@ mod tests {
                 .unwrap(),
             };
             let noise = Noise::new(1, "forms", 0);
-            let run = |bends: &[Bend]| world.run(&theta, &drive, bends, 1, noise).unwrap();
+            let run = |perturbations: &[Perturbation]| {
+                world.run(&theta, &drive, perturbations, 1, noise).unwrap()
+            };
             let scene = Scene::of(world, &theta, &drive).unwrap();
             let distance = |a: &[f64], b: &[f64]| -> f64 {
                 a.iter()
@@ -293,26 +305,29 @@ mod tests {
                     .sqrt()
             };
             let plain = run(&[]);
-            for lack in world.lacks.iter().chain(world.absorbed) {
-                let amount = (lack.range.0 * lack.range.1).sqrt();
-                let bend = |form| {
-                    let mut source = noise.source(lack.id);
+            for missing in world.missing_effects.iter().chain(world.absorbed) {
+                let amount = (missing.range.0 * missing.range.1).sqrt();
+                let perturbation = |form| {
+                    let mut source = noise.source(missing.id);
                     world
-                        .listed(lack, amount, form, &scene, &mut source)
+                        .listed(missing, amount, form, &scene, &mut source)
                         .unwrap()
                 };
-                let (listed, other) = (run(&[bend(Form::Listed)]), run(&[bend(Form::Other)]));
+                let (listed, other) = (
+                    run(&[perturbation(Form::Listed)]),
+                    run(&[perturbation(Form::Other)]),
+                );
                 let (moved, apart) = (distance(&listed, &plain), distance(&listed, &other));
-                assert!(moved > 0.0, "{} of {name} shows nothing", lack.id);
+                assert!(moved > 0.0, "{} of {name} shows nothing", missing.id);
                 // Noise and outliers of another distribution and levels half-way between are other draws altogether.
                 let redrawn = ["noise", "quantization", "outliers"]
                     .iter()
-                    .any(|law| lack.id.ends_with(law));
+                    .any(|law| missing.id.ends_with(law));
                 assert!(
                     redrawn || apart < 0.8 * moved,
                     "{}@{}: {apart} of {moved}",
-                    lack.id,
-                    lack.target
+                    missing.id,
+                    missing.target
                 );
             }
         }

@@ -1,9 +1,9 @@
-//! What the opened key adds to a trial: how clear the true effect is, and how far it closes the gap.
+//! Additions of the opened key to a trial: how clear the true effect is, and how far it closes the gap.
 
-use super::WithheldError;
 use super::answer::Outcome;
-use super::truth::{Truth, Urn};
+use super::truth::{Truth, TruthSampler};
 use crate::diagnose::{DiagnoseError, DiagnoseSettings, gain_of, held_out_from, held_out_score};
+use crate::evaluate::EvaluateError;
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::twin::Noise;
@@ -16,12 +16,12 @@ pub(super) struct Opened {
     pub trial: usize,
     /// Nats that the true effects gain when the diagnoser fits them; none where they are not listed or cannot be fitted.
     pub gain: Option<f64>,
-    /// Of a pair: nats that the weaker effect adds to the other one.
+    /// For a pair: nats that the weaker effect adds to the other one.
     pub added: Option<f64>,
     /// (before − after)/(before − floor) of the held-out data, `after` being the free run of the world itself; none where
     /// the diagnosis gave no share.
     pub share: Option<f64>,
-    /// Of a gap that no effect of the trial's library describes: held-out nats by which the best listed effect falls short of
+    /// For a gap that no effect of the trial's library describes: held-out nats by which the best listed effect falls short of
     /// what the twin scores without the departure, the same noise given; none where that was not looked at.
     pub shortfall: Option<f64>,
 }
@@ -30,17 +30,17 @@ impl Opened {
     /// Fits the true effects to the records, and runs the world without noise beside the held-out one. `noise` is the trial's,
     /// `settings` those of its diagnosis.
     pub fn of(
-        urn: &Urn<'_>,
+        sampler: &TruthSampler<'_>,
         truth: &Truth,
         outcome: Option<&Outcome>,
         (record, validation): (Record, Option<Record>),
         noise: Noise,
         settings: &DiagnoseSettings,
         progress: &Progress,
-    ) -> Result<Self, WithheldError> {
+    ) -> Result<Self, EvaluateError> {
         let validation = validation.as_ref();
         let share = match outcome {
-            Some(outcome) => share(urn, truth, outcome, &record, validation)?,
+            Some(outcome) => share(sampler, truth, outcome, &record, validation)?,
             None => None,
         };
         let records = [record];
@@ -49,7 +49,7 @@ impl Opened {
             ..settings.clone()
         };
         let gain_of = |effects: &[String]| match gain_of(
-            urn.study(),
+            sampler.study(),
             &records,
             validation,
             effects,
@@ -57,7 +57,7 @@ impl Opened {
             progress,
         ) {
             Ok(gain) => Ok(gain),
-            Err(error @ DiagnoseError::Cancelled(_)) => Err(WithheldError::from(error)),
+            Err(error @ DiagnoseError::Cancelled(_)) => Err(EvaluateError::from(error)),
             // Said of the answer already.
             Err(_) => Ok(None),
         };
@@ -76,9 +76,17 @@ impl Opened {
         }
         let abstains = truth.kind.is_structural()
             && (truth.right.iter()).all(|key| settings.without.contains(key));
-        let shortfall = match abstains && !settings.detection_only {
-            true => shortfall(urn, truth, validation.is_some(), noise, settings, progress)?,
-            false => None,
+        let shortfall = if abstains && !settings.detection_only {
+            shortfall(
+                sampler,
+                truth,
+                validation.is_some(),
+                noise,
+                settings,
+                progress,
+            )?
+        } else {
+            None
         };
         Ok(Self {
             trial: truth.trial,
@@ -92,12 +100,12 @@ impl Opened {
 
 /// The share that the world's own free run closes, on the data that the diagnosis held out.
 fn share(
-    urn: &Urn<'_>,
+    sampler: &TruthSampler<'_>,
     truth: &Truth,
     outcome: &Outcome,
     record: &Record,
     validation: Option<&Record>,
-) -> Result<Option<f64>, WithheldError> {
+) -> Result<Option<f64>, EvaluateError> {
     let (Some(before), Some(floor), Some(_)) = (outcome.before, outcome.floor, outcome.interval)
     else {
         return Ok(None);
@@ -106,7 +114,7 @@ fn share(
         Some(record) => (record, 0),
         None => (record, held_out_from(record.samples())),
     };
-    let free = urn.record(truth, held_out.drive().clone(), Noise::OFF)?;
+    let free = sampler.record(truth, held_out.drive().clone(), Noise::OFF)?;
     Ok(free.map(|free| {
         let (y, free) = (held_out.outputs(), free.outputs());
         let squares: f64 = (from..y.nrows())
@@ -117,31 +125,31 @@ fn share(
     }))
 }
 
-/// How far the best listed effect stays behind the generator's own law on a held-out record. The law itself cannot be filtered;
+/// Distance by which the best listed effect stays behind the generator's own law on a held-out record. The law itself cannot be filtered;
 /// what it would score is what the twin scores on the same record without the departure.
 fn shortfall(
-    urn: &Urn<'_>,
+    sampler: &TruthSampler<'_>,
     truth: &Truth,
     validation: bool,
     noise: Noise,
     settings: &DiagnoseSettings,
     progress: &Progress,
-) -> Result<Option<f64>, WithheldError> {
-    let Some([own, held_out]) = urn.twofold(truth, validation, noise)? else {
+) -> Result<Option<f64>, EvaluateError> {
+    let Some([own, held_out]) = sampler.paired(truth, validation, noise)? else {
         return Ok(None);
     };
     let score = |record, held_out, listed| match held_out_score(
-        urn.study(),
+        sampler.study(),
         record,
         held_out,
         listed,
         settings,
         progress,
     ) {
-        Err(error @ DiagnoseError::Cancelled(_)) => Err(WithheldError::from(error)),
+        Err(error @ DiagnoseError::Cancelled(_)) => Err(EvaluateError::from(error)),
         other => Ok(other.ok().flatten()),
     };
     let law = score(own.plain, held_out.plain, false)?;
-    let best = score(own.bent, held_out.bent, true)?;
+    let best = score(own.perturbed, held_out.perturbed, true)?;
     Ok(law.zip(best).map(|(law, best)| law - best))
 }

@@ -1,4 +1,4 @@
-//! One trial with its key opened: what was there, what was said, and whether that is right.
+//! One trial with its key opened: truth, answer, and the judgement of it.
 
 use super::Kind;
 use super::answer::{Answer, Outcome};
@@ -18,34 +18,34 @@ pub struct Row {
     pub trial: usize,
     /// Kind of truth.
     pub kind: Kind,
-    /// What was there: `none`, `id@target`, two of them, or the name of something unlisted.
+    /// Truth: `none`, `id@target`, two of them, or the name of something unlisted.
     pub truth: String,
     /// Listed effects that are right answers; none where the right answer is to abstain, or that nothing is wrong.
     pub right: Vec<String>,
     /// Effects that all have to be accepted.
     pub effects: Vec<String>,
-    /// Where the twin is wrong.
+    /// Places where the twin is wrong.
     pub targets: Vec<String>,
     /// From 0, hardly visible, to 1, obvious; of a pair, that of the weaker effect.
     pub strength: Option<f64>,
     /// Nats that the true effects gain when the diagnoser fits them.
     pub gain: Option<f64>,
-    /// Of a pair: nats that the weaker effect adds to the other one.
+    /// For a pair: nats that the weaker effect adds to the other one.
     pub added: Option<f64>,
     /// The share of the gap that the true system closes on the held-out data.
     pub share: Option<f64>,
     /// Held-out nats by which the best listed effect falls short of a law that is not listed.
     pub shortfall: Option<f64>,
-    /// What was said; none where the diagnosis failed.
+    /// Result; none where the diagnosis failed.
     pub outcome: Option<Outcome>,
-    /// Why there is nothing.
+    /// Reason for a missing result.
     pub failure: Option<String>,
     /// Wall-clock seconds of the diagnosis.
     pub seconds: f64,
 }
 
 impl Row {
-    /// Of a truth, an answer and what the key added; `without`: the true effects were not in the library.
+    /// Joins a truth, an answer and the additions of the key; `without`: the true effects were not in the library.
     pub(super) fn new(truth: &Truth, answer: &Answer, opened: &Opened, without: bool) -> Self {
         let right = match truth.kind.is_structural() {
             true => (truth.right.iter())
@@ -79,60 +79,60 @@ impl Row {
         }
     }
 
-    /// Whether a structural gap was found.
+    /// Returns true if a structural gap was found.
     pub fn called(&self) -> bool {
         self.outcome.as_ref().is_some_and(Outcome::is_structural)
     }
 
-    /// Whether a structural gap was found, and none of the listed effects.
+    /// Returns true if a structural gap was found, and none of the listed effects.
     pub fn abstained(&self) -> bool {
         self.outcome.as_ref().is_some_and(Outcome::abstains)
     }
 
-    /// Whether the truth is a gap that no effect of the trial's library describes.
+    /// Returns true if the truth is a gap that no effect of the trial's library describes.
     pub fn must_abstain(&self) -> bool {
         self.kind.is_structural() && self.right.is_empty()
     }
 
-    /// Whether the truth is such a gap, and no listed effect imitates it either.
+    /// Returns true if the truth is such a gap, and no listed effect imitates it either.
     pub fn nothing_fits(&self) -> bool {
         self.must_abstain() && self.shortfall.is_some_and(|nats| nats > IMITATES)
     }
 
-    /// Whether the truth is one effect that the trial's library has, and no double of it counts.
+    /// Returns true if the truth is one effect that the trial's library has, and no double of it counts.
     pub fn is_single(&self) -> bool {
         matches!(self.kind, Kind::Listed | Kind::Parametrised) && !self.right.is_empty()
     }
 
-    /// Whether the true effects gain more than chance could.
+    /// Returns true if the true effects gain more than chance could.
     pub fn is_clear(&self) -> bool {
         self.gain.is_some_and(|gain| gain > CLEAR)
     }
 
-    /// Whether each effect of a pair gains more than chance could beside the other one.
+    /// Returns true if each effect of a pair gains more than chance could beside the other one.
     pub fn is_clear_pair(&self) -> bool {
         self.kind == Kind::Pair && self.added.is_some_and(|added| added > CLEAR)
     }
 
-    /// Whether the effect on top is a true one.
+    /// Returns true if the effect on top is a true one.
     pub fn top_is_right(&self) -> bool {
         let top = self.outcome.as_ref().and_then(Outcome::top);
         top.is_some_and(|top| self.right.contains(&top.key))
     }
 
-    /// Whether the true effect is in the class.
+    /// Returns true if the true effect is in the class.
     pub fn class_is_right(&self) -> bool {
         let class = self.outcome.as_ref().map(|o| &o.class);
         class.is_some_and(|class| self.right.iter().any(|key| class.contains(key)))
     }
 
-    /// Whether the place that is named is the true one.
+    /// Returns true if the place that is named is the true one.
     pub fn place_is_right(&self) -> bool {
         let target = self.outcome.as_ref().and_then(|o| o.target.as_ref());
         target.is_some_and(|target| self.targets.contains(target))
     }
 
-    /// Whether every true effect, and nothing else, was accepted.
+    /// Returns true if every true effect, and nothing else, was accepted.
     pub fn accepted_are_right(&self) -> bool {
         let accepted = self.outcome.as_ref().map(|o| &o.accepted);
         accepted.is_some_and(|accepted| {
@@ -141,7 +141,7 @@ impl Row {
         })
     }
 
-    /// Whether the answer is right by the rule of its kind.
+    /// Returns true if the answer is right by the rule of its kind.
     pub fn is_right(&self) -> bool {
         match self.kind {
             Kind::None | Kind::Outside | Kind::Absorbed => self.outcome.is_some() && !self.called(),
@@ -159,7 +159,7 @@ impl Row {
         Some((interval, self.share.filter(|_| named)?))
     }
 
-    /// What was said, in one word or as `id@target`.
+    /// Answer in one word or as `id@target`.
     pub fn answer(&self) -> String {
         match &self.outcome {
             None => "failed".into(),

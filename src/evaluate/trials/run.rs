@@ -1,12 +1,13 @@
 //! The trials from end to end: sealed, diagnosed, opened, scored.
 
 use super::folder::{ANSWERS, Filling, Folder, OPENED};
-use super::kind::deal;
+use super::kind::assign_kinds;
 use super::opened::Opened;
-use super::truth::Urn;
+use super::truth::TruthSampler;
 use super::unlisted::index;
-use super::{Answer, Kind, Row, Scorecard, WithheldError};
+use super::{Answer, Kind, Row, Scorecard};
 use crate::diagnose::DiagnoseSettings;
+use crate::evaluate::EvaluateError;
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::storage::work::{Manifest, Piece, Pieces, Share, WorkError};
@@ -18,13 +19,13 @@ use std::path::Path;
 /// Layout of the folder; raised when it changes.
 const LAYOUT: u32 = 4;
 
-/// What is tried.
+/// Settings of sealed trials.
 ///
 /// | setting | default | meaning |
 /// |---|---|---|
 /// | `trials` | 100 | records |
 /// | `seed` | 1 | of truths, records and diagnoses |
-/// | `kinds` | all | kinds of truth, dealt in the proportions of docs/withheld.md |
+/// | `kinds` | all | kinds of truth, assigned in the proportions of docs/withheld.md |
 /// | `without` | no | whether the true effects are taken out of the library: then every trial with one must abstain |
 /// | `validation` | no | whether each trial has a second record |
 /// | `detection_only` | no | whether a diagnosis ends with its verdict: for false alarms over many trials |
@@ -32,15 +33,15 @@ const LAYOUT: u32 = 4;
 pub struct Settings {
     /// Records.
     pub trials: usize,
-    /// Of everything random.
+    /// Seed of everything random.
     pub seed: u64,
     /// Kinds of truth.
     pub kinds: Vec<Kind>,
-    /// Whether the true effects are taken out of the library.
+    /// True if the true effects are taken out of the library.
     pub without: bool,
-    /// Whether each trial has a validation record.
+    /// True if each trial has a validation record.
     pub validation: bool,
-    /// Whether a diagnosis ends with its verdict.
+    /// True if a diagnosis ends with its verdict.
     pub detection_only: bool,
 }
 
@@ -74,7 +75,7 @@ impl Default for Settings {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Withheld<'a> {
-    urn: Urn<'a>,
+    sampler: TruthSampler<'a>,
     settings: Settings,
 }
 
@@ -85,27 +86,27 @@ impl<'a> Withheld<'a> {
     ///
     /// # Errors
     ///
-    /// [`WithheldError`]: a twin without a world, a study that changes the twin, kinds that cannot be drawn, no trials.
-    pub fn new(study: &'a Study, settings: Settings) -> Result<Self, WithheldError> {
-        let urn = Urn::new(study)?;
+    /// [`EvaluateError`]: a twin without a world, a study that changes the twin, kinds that cannot be drawn, no trials.
+    pub fn new(study: &'a Study, settings: Settings) -> Result<Self, EvaluateError> {
+        let sampler = TruthSampler::new(study)?;
         if settings.trials == 0 {
-            return Err(WithheldError::Nothing("trials"));
+            return Err(EvaluateError::Nothing("trials"));
         }
         if settings.kinds.is_empty() {
-            return Err(WithheldError::Nothing("kinds"));
+            return Err(EvaluateError::Nothing("kinds"));
         }
         for kind in &settings.kinds {
-            urn.check(*kind)?;
+            sampler.check(*kind)?;
         }
-        Ok(Self { urn, settings })
+        Ok(Self { sampler, settings })
     }
 
     /// Draws every truth, writes records, keys and seal into a new folder; or goes on with the folder of the same call.
     ///
     /// # Errors
     ///
-    /// [`WithheldError`]: a folder of another call, a place that cannot be written.
-    pub fn seal(self, path: &Path, progress: &Progress) -> Result<Sealed<'a>, WithheldError> {
+    /// [`EvaluateError`]: a folder of another call, a place that cannot be written.
+    pub fn seal(self, path: &Path, progress: &Progress) -> Result<Sealed<'a>, EvaluateError> {
         let fill = |filling: &Filling<'_>| self.fill(filling, progress);
         let folder = Folder::open(path, &self.manifest()?, fill)?;
         Ok(Sealed {
@@ -114,15 +115,15 @@ impl<'a> Withheld<'a> {
         })
     }
 
-    fn fill(&self, filling: &Filling<'_>, progress: &Progress) -> Result<(), WithheldError> {
+    fn fill(&self, filling: &Filling<'_>, progress: &Progress) -> Result<(), EvaluateError> {
         let Settings { trials, seed, .. } = self.settings;
         let stage = progress.stage("seal", trials);
-        let mut dealer = Noise::new(seed, "withheld kinds", 0).source("deal");
-        let kinds = deal(&self.settings.kinds, trials, |n| index(&mut dealer, n));
+        let mut source = Noise::new(seed, "withheld kinds", 0).source("deal");
+        let kinds = assign_kinds(&self.settings.kinds, trials, |n| index(&mut source, n));
         let mut keys = Vec::with_capacity(trials);
         for (trial, kind) in kinds.into_iter().enumerate() {
             let noise = Noise::new(seed, "withheld", trial as u64);
-            let drawn = (self.urn).draw(trial, kind, self.settings.validation, noise)?;
+            let drawn = (self.sampler).draw(trial, kind, self.settings.validation, noise)?;
             filling.record(trial, false, &drawn.record)?;
             if let Some(validation) = &drawn.validation {
                 filling.record(trial, true, validation)?;
@@ -137,9 +138,9 @@ impl<'a> Withheld<'a> {
         Ok(filling.keys(&keys)?)
     }
 
-    /// What the trials depend on.
+    /// Everything that the trials depend on.
     fn manifest(&self) -> Result<Manifest, WorkError> {
-        let study = self.urn.study();
+        let study = self.sampler.study();
         let settings = &self.settings;
         let kinds: Vec<&str> = settings.kinds.iter().map(|kind| kind.id()).collect();
         Ok(study
@@ -173,8 +174,8 @@ impl Sealed<'_> {
     ///
     /// # Errors
     ///
-    /// [`WithheldError`]: files that cannot be read or written, keys that are not those that were sealed, a stop.
-    pub fn score(&self, progress: &Progress) -> Result<Scorecard, WithheldError> {
+    /// [`EvaluateError`]: files that cannot be read or written, keys that are not those that were sealed, a stop.
+    pub fn score(&self, progress: &Progress) -> Result<Scorecard, EvaluateError> {
         let answers = self.answer(Share::WHOLE, progress)?;
         let opened = self.open(Share::WHOLE, progress)?;
         let keys = self.folder.keys(self.trials.settings.trials)?;
@@ -182,7 +183,7 @@ impl Sealed<'_> {
         let rows: Vec<Row> = (keys.iter().zip(&answers).zip(&opened))
             .map(|((truth, answer), opened)| Row::new(truth, answer, opened, without))
             .collect();
-        let twin = self.trials.urn.study().name();
+        let twin = self.trials.sampler.study().name();
         let alpha = DiagnoseSettings::default().alpha;
         let seed = self.trials.settings.seed;
         Ok(Scorecard::new(twin, seed, alpha, self.seal(), rows))
@@ -193,7 +194,7 @@ impl Sealed<'_> {
     /// # Errors
     ///
     /// As [`score`](Self::score).
-    pub fn answer(&self, share: Share, progress: &Progress) -> Result<Vec<Answer>, WithheldError> {
+    pub fn answer(&self, share: Share, progress: &Progress) -> Result<Vec<Answer>, EvaluateError> {
         let left_out = self.left_out()?;
         self.pieces(ANSWERS, share).all(
             &progress.stage("trials", self.trials.settings.trials),
@@ -201,7 +202,7 @@ impl Sealed<'_> {
             |trial| {
                 let (record, validation) = self.records(trial)?;
                 let settings = self.diagnosis(trial, left_out[trial].clone());
-                let study = self.trials.urn.study();
+                let study = self.trials.sampler.study();
                 let answer = Answer::of(
                     trial,
                     study,
@@ -210,7 +211,7 @@ impl Sealed<'_> {
                     &settings,
                     progress,
                 );
-                Ok::<_, WithheldError>(answer?)
+                Ok::<_, EvaluateError>(answer?)
             },
         )
     }
@@ -219,17 +220,17 @@ impl Sealed<'_> {
     ///
     /// # Errors
     ///
-    /// As [`score`](Self::score); [`WithheldError::Unanswered`] before every answer is there, whatever the share.
-    pub fn open_keys(&self, share: Share, progress: &Progress) -> Result<usize, WithheldError> {
+    /// As [`score`](Self::score); [`EvaluateError::Unanswered`] before every answer is there, whatever the share.
+    pub fn open_keys(&self, share: Share, progress: &Progress) -> Result<usize, EvaluateError> {
         Ok(self.open(share, progress)?.len())
     }
 
-    fn open(&self, share: Share, progress: &Progress) -> Result<Vec<Opened>, WithheldError> {
+    fn open(&self, share: Share, progress: &Progress) -> Result<Vec<Opened>, EvaluateError> {
         let Settings { trials, seed, .. } = self.trials.settings;
         let answers: Vec<Answer> = self.pieces(ANSWERS, share).kept(|_| Ok(()))?;
         if answers.len() < trials {
-            return Err(WithheldError::Unanswered {
-                there: answers.len(),
+            return Err(EvaluateError::Unanswered {
+                done: answers.len(),
                 of: trials,
             });
         }
@@ -241,7 +242,7 @@ impl Sealed<'_> {
             |_: &Opened| Ok(()),
             |trial| {
                 Opened::of(
-                    &self.trials.urn,
+                    &self.trials.sampler,
                     &keys[trial],
                     answers[trial].outcome.as_ref(),
                     self.records(trial)?,
@@ -254,7 +255,7 @@ impl Sealed<'_> {
     }
 
     /// Puts a result into the folder, in place of an earlier one.
-    pub fn write(&self, name: &str, text: &str) -> Result<(), WithheldError> {
+    pub fn write(&self, name: &str, text: &str) -> Result<(), EvaluateError> {
         Ok(self.folder.work.write(name, text)?)
     }
 
@@ -268,22 +269,21 @@ impl Sealed<'_> {
     }
 
     /// The effects that each trial's library does without.
-    fn left_out(&self) -> Result<Vec<Vec<String>>, WithheldError> {
+    fn left_out(&self) -> Result<Vec<Vec<String>>, EvaluateError> {
         let Settings {
             trials, without, ..
         } = self.trials.settings;
-        match without {
-            true => self.folder.left_out(trials),
-            false => Ok(vec![vec![]; trials]),
+        if without {
+            self.folder.left_out(trials)
+        } else {
+            Ok(vec![vec![]; trials])
         }
     }
 
-    fn records(&self, trial: usize) -> Result<(Record, Option<Record>), WithheldError> {
-        let validation = match self.trials.settings.validation {
-            true => Some(self.folder.record(trial, true)?),
-            false => None,
-        };
-        Ok((self.folder.record(trial, false)?, validation))
+    fn records(&self, trial: usize) -> Result<(Record, Option<Record>), EvaluateError> {
+        let validation = self.trials.settings.validation;
+        let validation = validation.then(|| self.folder.record(trial, true));
+        Ok((self.folder.record(trial, false)?, validation.transpose()?))
     }
 
     /// Settings of a trial's diagnosis.

@@ -72,7 +72,7 @@ pub struct Range {
 /// The trials of one kind.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KindScore {
-    /// Which.
+    /// Kind.
     pub kind: Kind,
     /// Called structural.
     pub structural: Count,
@@ -85,16 +85,16 @@ pub struct KindScore {
 pub struct StatedBin {
     /// Mean of what was stated.
     pub stated: f64,
-    /// How often the effect on top was a true one.
+    /// Answers whose effect on top was a true one.
     pub right: Count,
 }
 
-/// All scores. What each is of, and when an answer counts as right, stands in docs/withheld.md.
+/// All scores; docs/withheld.md defines each.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scorecard {
     /// Name of the twin.
     pub twin: String,
-    /// Of everything random.
+    /// Seed of everything random.
     pub seed: u64,
     /// Level of the structural test.
     pub alpha: f64,
@@ -152,7 +152,7 @@ pub struct Scorecard {
     pub by_strength: Vec<Range>,
     /// Detection by what the true effects gain, in nats.
     pub by_gain: Vec<Range>,
-    /// How often each truth was given each answer.
+    /// Counts of each truth and answer.
     pub confusion: Vec<(String, String, u64)>,
     /// Every trial.
     pub rows: Vec<Row>,

@@ -1,9 +1,10 @@
 //! The truth of one trial.
 
+use super::Kind;
 use super::listed::{Form, Scene};
 use super::unlisted::index;
-use super::world::{Bend, Lack, World};
-use super::{Kind, WithheldError};
+use super::world::{MissingEffect, Perturbation, World};
+use crate::evaluate::EvaluateError;
 use crate::record::{Drive, Record, Signal};
 use crate::study::{DriveSource, Study};
 use crate::twin::{Noise, ParameterSpace, Source};
@@ -16,13 +17,13 @@ const MIDDLE: (f64, f64) = (0.1, 0.75);
 /// Least strength of effects that are to be told from each other, not only to be seen.
 const CLEAR: f64 = 0.5;
 
-/// What is wrong in a trial: the key that is sealed.
+/// Difference between system and twin in a trial: the key that is sealed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Truth {
     pub trial: usize,
     pub kind: Kind,
-    /// Of the twin.
+    /// True parameters of the twin.
     pub theta: Vec<f64>,
     /// Euler steps a sample.
     pub substeps: usize,
@@ -32,12 +33,13 @@ pub(super) struct Truth {
     pub right: Vec<String>,
     /// Name of an unlisted departure.
     pub unlisted: Option<String>,
-    /// Where the twin is wrong.
+    /// Places where the twin is wrong.
     pub targets: Vec<String>,
     /// From 0, hardly visible, to 1, obvious; of a pair, that of the weaker effect.
     pub strength: Option<f64>,
     /// The departures, in order.
-    pub bends: Vec<Bend>,
+    #[serde(rename = "bends")]
+    pub perturbations: Vec<Perturbation>,
 }
 
 /// A truth with its records.
@@ -45,18 +47,25 @@ pub(super) struct Drawn {
     pub truth: Truth,
     pub record: Record,
     pub validation: Option<Record>,
-    /// Of everything random in it.
+    /// Noise of everything random in it.
     noise: Noise,
 }
 
 /// A record of a world beside that of the same world without its departures: same input, same noise.
-pub(super) struct Twofold {
-    pub bent: Record,
+pub(super) struct PairedRecord {
+    pub perturbed: Record,
     pub plain: Record,
 }
 
-/// Where truths come from.
-pub(super) struct Urn<'a> {
+fn no_reference(twin: String) -> EvaluateError {
+    EvaluateError::NoReference {
+        twin,
+        known: World::known().join(" or "),
+    }
+}
+
+/// Source of truths and their records.
+pub(super) struct TruthSampler<'a> {
     pub world: &'static World,
     pub space: ParameterSpace,
     drives: DriveSource,
@@ -65,11 +74,10 @@ pub(super) struct Urn<'a> {
     study: &'a Study,
 }
 
-impl<'a> Urn<'a> {
-    /// Of a study whose twin has a world and is as it is in that world.
-    pub fn new(study: &'a Study) -> Result<Self, WithheldError> {
-        let world =
-            World::of(study.name()).ok_or_else(|| WithheldError::NoWorld(study.name().into()))?;
+impl<'a> TruthSampler<'a> {
+    /// Creates a sampler for a study whose twin has a world and is as it is in that world.
+    pub fn new(study: &'a Study) -> Result<Self, EvaluateError> {
+        let world = World::of(study.name()).ok_or_else(|| no_reference(study.name().into()))?;
         let file = study.file();
         let changed = [
             ("[fixed]", !file.fixed.is_empty()),
@@ -79,12 +87,12 @@ impl<'a> Urn<'a> {
             ("[[effect]]", !file.effect.is_empty()),
         ];
         if let Some((table, _)) = changed.into_iter().find(|(_, changed)| *changed) {
-            return Err(WithheldError::Changed(table));
+            return Err(EvaluateError::Changed(table));
         }
         let space = study.twin().parameters();
         // A twin of the same name that is another one.
         if space.names() != world.parameters {
-            return Err(WithheldError::NoWorld(format!("this {}", study.name())));
+            return Err(no_reference(format!("this {}", study.name())));
         }
         let library = (study.candidates().iter())
             .map(|e| format!("{}@{}", e.typetag_name(), e.target()))
@@ -98,19 +106,20 @@ impl<'a> Urn<'a> {
         })
     }
 
-    /// Whether a truth of this kind can be drawn.
-    pub fn check(&self, kind: Kind) -> Result<(), WithheldError> {
+    /// Checks that a truth of this kind can be drawn.
+    pub fn check(&self, kind: Kind) -> Result<(), EvaluateError> {
         let enough = match kind {
             Kind::None | Kind::Outside | Kind::Unlisted => true,
-            Kind::Listed | Kind::Parametrised => !self.lacks().is_empty(),
-            Kind::Pair => (self.lacks().iter()).any(|l| l.target != self.lacks()[0].target),
+            Kind::Listed | Kind::Parametrised => !self.missing_effects().is_empty(),
+            Kind::Pair => (self.missing_effects().iter())
+                .any(|l| l.target != self.missing_effects()[0].target),
             Kind::Confounded => !self.doubles().is_empty(),
             Kind::Absorbed => !self.world.absorbed.is_empty(),
         };
-        match enough {
-            true => Ok(()),
-            false => Err(WithheldError::NoEffect(kind.id())),
+        if !enough {
+            return Err(EvaluateError::NoEffect(kind.id()));
         }
+        Ok(())
     }
 
     /// Number `trial`, of this kind: the same for the same noise.
@@ -120,14 +129,14 @@ impl<'a> Urn<'a> {
         kind: Kind,
         validation: bool,
         noise: Noise,
-    ) -> Result<Drawn, WithheldError> {
+    ) -> Result<Drawn, EvaluateError> {
         for attempt in 0..ATTEMPTS {
             let noise = noise.child("attempt").sample(attempt);
             if let Some(drawn) = self.attempt(trial, kind, validation, noise)? {
                 return Ok(drawn);
             }
         }
-        Err(WithheldError::Runaway(trial))
+        Err(EvaluateError::Runaway(trial))
     }
 
     /// `None` where a record runs away or θ cannot be used.
@@ -137,7 +146,7 @@ impl<'a> Urn<'a> {
         kind: Kind,
         validation: bool,
         noise: Noise,
-    ) -> Result<Option<Drawn>, WithheldError> {
+    ) -> Result<Option<Drawn>, EvaluateError> {
         let Some(theta) = self.theta(kind, noise) else {
             return Ok(None);
         };
@@ -161,7 +170,7 @@ impl<'a> Urn<'a> {
             unlisted: None,
             targets: vec![],
             strength: None,
-            bends: vec![],
+            perturbations: vec![],
         };
         if self.depart(&mut truth, &scene, &mut source).is_none() {
             return Ok(None);
@@ -189,21 +198,23 @@ impl<'a> Urn<'a> {
 
     /// The record of a trial and a held-out one, each beside what would have been measured without the departures; `None`
     /// where such a record runs away.
-    pub fn twofold(
+    pub fn paired(
         &self,
         truth: &Truth,
         validation: bool,
         noise: Noise,
-    ) -> Result<Option<[Twofold; 2]>, WithheldError> {
+    ) -> Result<Option<[PairedRecord; 2]>, EvaluateError> {
         let drawn = self.draw(truth.trial, truth.kind, validation, noise)?;
         let plain = Truth {
-            bends: vec![],
+            perturbations: vec![],
             ..truth.clone()
         };
-        let both = |drive: Drive, noise: Noise| -> Result<Option<Twofold>, WithheldError> {
-            let bent = self.record(truth, drive.clone(), noise)?;
+        let both = |drive: Drive, noise: Noise| -> Result<Option<PairedRecord>, EvaluateError> {
+            let perturbed = self.record(truth, drive.clone(), noise)?;
             let plain = self.record(&plain, drive, noise)?;
-            Ok(bent.zip(plain).map(|(bent, plain)| Twofold { bent, plain }))
+            Ok(perturbed
+                .zip(plain)
+                .map(|(perturbed, plain)| PairedRecord { perturbed, plain }))
         };
         let own = both(drawn.record.drive().clone(), drawn.noise)?;
         let noise = drawn.noise.child("held out");
@@ -217,8 +228,14 @@ impl<'a> Urn<'a> {
         truth: &Truth,
         drive: Drive,
         noise: Noise,
-    ) -> Result<Option<Record>, WithheldError> {
-        let run = (self.world).run(&truth.theta, &drive, &truth.bends, truth.substeps, noise);
+    ) -> Result<Option<Record>, EvaluateError> {
+        let run = (self.world).run(
+            &truth.theta,
+            &drive,
+            &truth.perturbations,
+            truth.substeps,
+            noise,
+        );
         let Some(y) = run else { return Ok(None) };
         let outputs = Signal::from_shape_fn((y.len(), 1), |(k, _)| y[k]);
         Ok(Some(Record::new(drive, outputs)?))
@@ -241,11 +258,11 @@ impl<'a> Urn<'a> {
         (outside && middle).then_some(theta)
     }
 
-    /// What sets this trial apart from the twin.
+    /// Adds the departures of this trial to its truth.
     fn depart(&self, truth: &mut Truth, scene: &Scene, source: &mut Source) -> Option<()> {
         let any = |source: &mut Source| source.uniform();
         let clear = |source: &mut Source| CLEAR + (1.0 - CLEAR) * source.uniform();
-        let lacks = self.lacks();
+        let missing_effects = self.missing_effects();
         match truth.kind {
             Kind::None | Kind::Outside => {}
             Kind::Listed | Kind::Parametrised => {
@@ -253,40 +270,42 @@ impl<'a> Urn<'a> {
                     Kind::Listed => Form::Listed,
                     _ => Form::Other,
                 };
-                let lack = lacks.get(index(source, lacks.len()))?;
+                let missing = missing_effects.get(index(source, missing_effects.len()))?;
                 let strength = any(source);
-                self.add(truth, lack, strength, form, scene, source)?;
+                self.add(truth, missing, strength, form, scene, source)?;
             }
             Kind::Absorbed => {
-                let lack = &self.world.absorbed[index(source, self.world.absorbed.len())];
+                let missing = &self.world.absorbed[index(source, self.world.absorbed.len())];
                 let strength = any(source);
-                self.add(truth, lack, strength, Form::Listed, scene, source)?;
+                self.add(truth, missing, strength, Form::Listed, scene, source)?;
                 // A parameter that has jumped before the record began is another parameter.
-                for bend in &mut truth.bends {
-                    bend.at_once();
+                for perturbation in &mut truth.perturbations {
+                    perturbation.at_once();
                 }
             }
             Kind::Pair => {
-                let first = lacks.get(index(source, lacks.len()))?;
-                let others: Vec<&&Lack> =
-                    lacks.iter().filter(|l| l.target != first.target).collect();
+                let first = missing_effects.get(index(source, missing_effects.len()))?;
+                let others: Vec<&&MissingEffect> = missing_effects
+                    .iter()
+                    .filter(|l| l.target != first.target)
+                    .collect();
                 let second = others.get(index(source, others.len()))?;
-                for lack in [first, second] {
+                for missing in [first, second] {
                     let strength = clear(source);
-                    self.add(truth, lack, strength, Form::Listed, scene, source)?;
+                    self.add(truth, missing, strength, Form::Listed, scene, source)?;
                 }
             }
             Kind::Confounded => {
                 let doubles = self.doubles();
-                let (lack, double) = doubles.get(index(source, doubles.len()))?;
+                let (missing, double) = doubles.get(index(source, doubles.len()))?;
                 let strength = clear(source);
-                self.add(truth, lack, strength, Form::Listed, scene, source)?;
+                self.add(truth, missing, strength, Form::Listed, scene, source)?;
                 truth.right.push((*double).into());
             }
             Kind::Unlisted => {
                 let strength = any(source);
                 let unlisted = self.world.unlisted(strength, scene, source);
-                truth.bends.push(unlisted.bend);
+                truth.perturbations.push(unlisted.perturbation);
                 truth.unlisted = Some(unlisted.name.into());
                 truth.targets.push(unlisted.target);
                 truth.strength = Some(strength);
@@ -299,35 +318,38 @@ impl<'a> Urn<'a> {
     fn add(
         &self,
         truth: &mut Truth,
-        lack: &Lack,
+        missing: &MissingEffect,
         strength: f64,
         form: Form,
         scene: &Scene,
         source: &mut Source,
     ) -> Option<()> {
-        let (faint, strong) = lack.range;
+        let (faint, strong) = missing.range;
         let amount = faint * (strong / faint).powf(strength);
-        (truth.bends).push(self.world.listed(lack, amount, form, scene, source)?);
-        truth.effects.push(lack.key());
-        truth.right.push(lack.key());
-        truth.targets.push(lack.target.into());
+        (truth.perturbations).push(self.world.listed(missing, amount, form, scene, source)?);
+        truth.effects.push(missing.key());
+        truth.right.push(missing.key());
+        truth.targets.push(missing.target.into());
         truth.strength = Some(truth.strength.map_or(strength, |s| s.min(strength)));
         Some(())
     }
 
     /// Effects that the world can have and the study lists.
-    fn lacks(&self) -> Vec<&'static Lack> {
-        (self.world.lacks.iter())
-            .filter(|lack| self.library.contains(&lack.key()))
+    fn missing_effects(&self) -> Vec<&'static MissingEffect> {
+        (self.world.missing_effects.iter())
+            .filter(|missing| self.library.contains(&missing.key()))
             .collect()
     }
 
     /// The first of each pair of doubles that the study lists, and the other.
-    fn doubles(&self) -> Vec<(&'static Lack, &'static str)> {
+    fn doubles(&self) -> Vec<(&'static MissingEffect, &'static str)> {
         (self.world.doubles.iter())
             .filter_map(|[first, second]| {
-                let lack = self.lacks().into_iter().find(|lack| lack.key() == *first)?;
-                Some((lack, *second))
+                let missing = self
+                    .missing_effects()
+                    .into_iter()
+                    .find(|missing| missing.key() == *first)?;
+                Some((missing, *second))
             })
             .filter(|(_, second)| self.library.iter().any(|key| key == second))
             .collect()
@@ -347,28 +369,31 @@ mod tests {
     #[test]
     fn every_kind_can_be_drawn_and_repeats() {
         for study in reference_studies().unwrap() {
-            let urn = Urn::new(&study).unwrap();
+            let sampler = TruthSampler::new(&study).unwrap();
             for kind in Kind::ALL {
-                urn.check(kind).unwrap();
+                sampler.check(kind).unwrap();
                 for trial in 0..10 {
                     let noise = Noise::new(5, "truth", trial as u64);
-                    let drawn = urn.draw(trial, kind, true, noise).unwrap();
-                    let again = urn.draw(trial, kind, true, noise).unwrap();
+                    let drawn = sampler.draw(trial, kind, true, noise).unwrap();
+                    let again = sampler.draw(trial, kind, true, noise).unwrap();
                     assert_eq!(drawn.truth, again.truth);
                     assert_eq!(drawn.record, again.record);
                     // The same noise once more, and without departures as many records as with none.
-                    if let Some([own, _]) = urn.twofold(&drawn.truth, true, noise).unwrap() {
-                        assert_eq!(own.bent, drawn.record);
-                        assert_eq!(own.plain == own.bent, drawn.truth.bends.is_empty());
+                    if let Some([own, _]) = sampler.paired(&drawn.truth, true, noise).unwrap() {
+                        assert_eq!(own.perturbed, drawn.record);
+                        assert_eq!(
+                            own.plain == own.perturbed,
+                            drawn.truth.perturbations.is_empty()
+                        );
                     }
                     let truth = drawn.truth;
-                    let bends = match kind {
+                    let perturbations = match kind {
                         Kind::None | Kind::Outside => 0,
                         Kind::Pair => 2,
                         _ => 1,
                     };
-                    assert_eq!(truth.bends.len(), bends, "{truth:?}");
-                    assert_eq!(truth.strength.is_some(), bends > 0);
+                    assert_eq!(truth.perturbations.len(), perturbations, "{truth:?}");
+                    assert_eq!(truth.strength.is_some(), perturbations > 0);
                     let text = serde_json::to_string(&truth).unwrap();
                     assert_eq!(serde_json::from_str::<Truth>(&text).unwrap(), truth);
                     if kind == Kind::Pair {
@@ -383,11 +408,18 @@ mod tests {
     #[test]
     fn worlds_and_library_use_the_same_names() {
         for study in reference_studies().unwrap() {
-            let urn = Urn::new(&study).unwrap();
-            assert_eq!(urn.lacks().len(), urn.world.lacks.len());
-            assert_eq!(urn.doubles().len(), urn.world.doubles.len());
-            for lack in urn.world.absorbed {
-                assert!(urn.library.contains(&lack.key()), "{}", lack.key());
+            let sampler = TruthSampler::new(&study).unwrap();
+            assert_eq!(
+                sampler.missing_effects().len(),
+                sampler.world.missing_effects.len()
+            );
+            assert_eq!(sampler.doubles().len(), sampler.world.doubles.len());
+            for missing in sampler.world.absorbed {
+                assert!(
+                    sampler.library.contains(&missing.key()),
+                    "{}",
+                    missing.key()
+                );
             }
         }
     }

@@ -1,21 +1,21 @@
 //! What nobody listed: departures that no effect of the library describes, one a row.
 
 use super::listed::Scene;
-use super::world::{Bend, ForceLaw, ParameterLaw, SignalLaw, World};
+use super::world::{ForceLaw, ParameterLaw, Perturbation, SignalLaw, World};
 use crate::twin::Source;
 
 /// A departure with its name and its target.
 pub(super) struct Unlisted {
     pub name: &'static str,
     pub target: String,
-    pub bend: Bend,
+    pub perturbation: Perturbation,
 }
 
 /// A kind of departure.
 struct Departure {
     name: &'static str,
     needs_input: bool,
-    make: fn(&Frame<'_>) -> (Bend, String),
+    make: fn(&Frame<'_>) -> (Perturbation, String),
 }
 
 /// What the numbers of a departure are measured by.
@@ -54,29 +54,29 @@ impl Frame<'_> {
         self.scene.input.1.abs().max(1e-9)
     }
 
-    fn force(&self, law: ForceLaw) -> (Bend, String) {
-        let bend = Bend::Force { on: self.on, law };
-        (bend, self.world.state_names[self.on].into())
+    fn force(&self, law: ForceLaw) -> (Perturbation, String) {
+        let perturbation = Perturbation::Force { on: self.on, law };
+        (perturbation, self.world.state_names[self.on].into())
     }
 
-    fn parameter(&self, law: ParameterLaw) -> (Bend, String) {
-        let bend = Bend::Parameter {
+    fn parameter(&self, law: ParameterLaw) -> (Perturbation, String) {
+        let perturbation = Perturbation::Parameter {
             number: self.number,
             law,
         };
-        (bend, self.world.parameters[self.number].into())
+        (perturbation, self.world.parameters[self.number].into())
     }
 }
 
-fn sensor(law: SignalLaw) -> (Bend, String) {
-    (Bend::Sensor(law), "sensor".into())
+fn sensor(law: SignalLaw) -> (Perturbation, String) {
+    (Perturbation::Sensor(law), "sensor".into())
 }
 
-fn actuator(law: SignalLaw) -> (Bend, String) {
-    (Bend::Actuator(law), "actuator".into())
+fn actuator(law: SignalLaw) -> (Perturbation, String) {
+    (Perturbation::Actuator(law), "actuator".into())
 }
 
-const fn anywhere(name: &'static str, make: fn(&Frame<'_>) -> (Bend, String)) -> Departure {
+const fn anywhere(name: &'static str, make: fn(&Frame<'_>) -> (Perturbation, String)) -> Departure {
     Departure {
         name,
         needs_input: false,
@@ -84,7 +84,10 @@ const fn anywhere(name: &'static str, make: fn(&Frame<'_>) -> (Bend, String)) ->
     }
 }
 
-const fn with_input(name: &'static str, make: fn(&Frame<'_>) -> (Bend, String)) -> Departure {
+const fn with_input(
+    name: &'static str,
+    make: fn(&Frame<'_>) -> (Perturbation, String),
+) -> Departure {
     Departure {
         name,
         needs_input: true,
@@ -231,11 +234,11 @@ impl World {
             number: index(source, self.parameters.len()),
             shape: source.uniform(),
         };
-        let (bend, target) = (departure.make)(&frame);
+        let (perturbation, target) = (departure.make)(&frame);
         Unlisted {
             name: departure.name,
             target,
-            bend,
+            perturbation,
         }
     }
 }
@@ -264,10 +267,14 @@ mod tests {
             for departure in world.departures() {
                 let moved = |strength: f64| -> f64 {
                     let mut source = noise.source(departure.name);
-                    let bend = world.made(departure, strength, &scene, &mut source).bend;
-                    let bent = world.run(&theta, &drive, &[bend], 1, noise).unwrap();
+                    let perturbation = world
+                        .made(departure, strength, &scene, &mut source)
+                        .perturbation;
+                    let perturbed = world
+                        .run(&theta, &drive, &[perturbation], 1, noise)
+                        .unwrap();
                     let square = |(a, b): (&f64, &f64)| (a - b).powi(2);
-                    bent.iter().zip(&plain).map(square).sum::<f64>().sqrt()
+                    perturbed.iter().zip(&plain).map(square).sum::<f64>().sqrt()
                 };
                 let (weak, strong) = (moved(0.1), moved(0.9));
                 let name = (departure.name, study.name());

@@ -162,7 +162,7 @@ mod tests {
             ("\"lag\"", "\"a lag\"", "\"a lag\" holds ' '"),
             ("\"s\"", "\"\\u001b[2J\"", "the unit \"\\u{1b}[2J\" holds"),
             ("\"k\"", "\"tau\"", "parameters: tau stands there twice"),
-            ("[1, 3]", "[3, 1]", "turned inside out"),
+            ("[1, 3]", "[3, 1]", "invalid interval"),
             ("[0.1, 9]", "[2, 9]", "leaves its bounds"),
             ("[{\"name\": \"y\"}]", "[]", "no output"),
             ("\"samples\": 60,", "", "step and samples are needed"),

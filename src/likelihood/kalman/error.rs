@@ -4,7 +4,7 @@ use crate::fit::EvaluationError;
 use crate::math::DifferenceError;
 use crate::record::RecordError;
 use crate::setting::SettingError;
-use crate::twin::{ParameterError, SimulationError};
+use crate::twin::{SimulationError, TwinError};
 
 /// Why a record could not be filtered. [`Diverged`](Self::Diverged), [`NoSpread`](Self::NoSpread) and a twin that
 /// refuses θ cost this θ alone; the rest ends the work.
@@ -32,7 +32,7 @@ pub enum FilterError {
     Record(#[from] RecordError),
     /// θ does not fit the twin.
     #[error(transparent)]
-    Parameter(#[from] ParameterError),
+    Parameter(#[from] TwinError),
     /// The twin cannot be simulated at this θ.
     #[error(transparent)]
     Simulation(#[from] SimulationError),

@@ -6,7 +6,7 @@ use super::pass::{Pass, Sink};
 use super::size::{Any, Fixed};
 use super::{FilterError, FilterSettings, Filtered, Method};
 use crate::record::Record;
-use crate::twin::{Interval, ParameterError, ParameterSpace, StateSpace};
+use crate::twin::{Interval, ParameterSpace, StateSpace, TwinError};
 
 /// A filter for many θ on one record: what does not depend on θ is prepared once.
 ///
@@ -142,11 +142,11 @@ impl<'a> Kalman<'a> {
     }
 
     /// Whether θ has the twin's length.
-    pub(super) fn check(&self, theta: &[f64]) -> Result<(), ParameterError> {
+    pub(super) fn check(&self, theta: &[f64]) -> Result<(), TwinError> {
         if theta.len() == self.parameters.len() {
             return Ok(());
         }
-        Err(ParameterError::Length {
+        Err(TwinError::Length {
             given: theta.len(),
             expected: self.parameters.len(),
             names: self.parameters.names().join(", "),

@@ -92,9 +92,10 @@ impl Mark {
             out,
             r##"<path d="M{x:.1} {top:.1}V{bottom:.1}" stroke="#222222" stroke-width="1.5" stroke-dasharray="2 3"/>"##
         );
-        let (at, anchor) = match x + width(&self.label, TEXT) + 6.0 <= frame.right {
-            true => (x + 5.0, "start"),
-            false => (x - 5.0, "end"),
+        let (at, anchor) = if x + width(&self.label, TEXT) + 6.0 <= frame.right {
+            (x + 5.0, "start")
+        } else {
+            (x - 5.0, "end")
         };
         let at = (at, top + TEXT);
         text(out, at, anchor, TEXT, false, &self.label);

@@ -63,10 +63,7 @@ impl Span {
 
 /// Room that the strip takes below the axis.
 pub(super) fn height(spans: &[Span]) -> f64 {
-    match spans.is_empty() {
-        true => 0.0,
-        false => GAP + HEIGHT,
-    }
+    if spans.is_empty() { 0.0 } else { GAP + HEIGHT }
 }
 
 /// Draws the strip below an axis at `bottom`.

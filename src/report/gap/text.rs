@@ -170,9 +170,10 @@ fn explored(discovery: &Discovery) -> String {
             )
         })
         .collect();
-    let terms = match terms.is_empty() {
-        true => "no term".into(),
-        false => terms.join(", "),
+    let terms = if terms.is_empty() {
+        "no term".into()
+    } else {
+        terms.join(", ")
     };
     format!(
         "Exploratory, what {} lacks: {terms}; {} of its variance.",

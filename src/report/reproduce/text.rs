@@ -95,14 +95,15 @@ fn coverage(scores: &Scores) -> String {
             ]
         })
         .collect();
-    match rows.is_empty() {
-        true => String::new(),
-        false => format!(
+    if rows.is_empty() {
+        String::new()
+    } else {
+        format!(
             "Runs whose {:.0} % interval of the refitted estimate held the truth, and what that rate may be ({:.0} %)\n\n{}",
             100.0 * INTERVAL_LEVEL,
             100.0 * COVERAGE_LEVEL,
             table(&rows)
-        ),
+        )
     }
 }
 
@@ -118,9 +119,10 @@ fn failures(plan: &MonteCarlo, scores: &Scores) -> String {
 
 /// A squared error: three significant digits.
 fn figure(value: f64) -> String {
-    match value.is_finite() {
-        true => format!("{value:.2e}"),
-        false => "–".into(),
+    if value.is_finite() {
+        format!("{value:.2e}")
+    } else {
+        "–".into()
     }
 }
 

@@ -106,13 +106,14 @@ impl Shares {
         if dots.is_empty() {
             return None;
         }
-        let series = match self.diagonal {
-            true => vec![Series::new(
+        let series = if self.diagonal {
+            vec![Series::new(
                 "as stated",
                 Style::RECORD,
                 [(0.5, 0.5), (1.0, 1.0)],
-            )],
-            false => vec![],
+            )]
+        } else {
+            vec![]
         };
         let dots = Dots {
             label: "share, 95 % interval".into(),

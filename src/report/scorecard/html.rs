@@ -172,9 +172,10 @@ fn confusion(card: &Scorecard) -> String {
     let mut counts: BTreeMap<&str, BTreeMap<String, u64>> = BTreeMap::new();
     for row in card.rows.iter().filter(|row| row.is_single()) {
         let answer = row.answer();
-        let short = match answer.contains(" + ") {
-            true => "a pair".to_owned(),
-            false => id(&answer).to_owned(),
+        let short = if answer.contains(" + ") {
+            "a pair".to_owned()
+        } else {
+            id(&answer).to_owned()
         };
         *(counts.entry(id(&row.truth)).or_default().entry(short)).or_insert(0) += 1;
     }

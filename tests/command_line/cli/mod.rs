@@ -280,7 +280,7 @@ fn wrong_calls_are_refused_with_the_remedy() {
     );
     refused(
         &["simulate", "--twin", "tanks", "--theta", "k1=0.6"],
-        &["no k2", "k1, k2, k3, k4"],
+        &["no value for k2", "k1, k2, k3, k4"],
     );
     refused(
         &["simulate", "--twin", "tanks", "--theta", "k9=0.6"],
@@ -393,7 +393,7 @@ fn wrong_studies_are_refused_with_file_and_line() {
     };
     check(
         "twin = 'tanks'\n[prior]\nk1 = [0.8, 0.4]\n",
-        &["line 2", "k1: [0.8, 0.4] is turned inside out"],
+        &["line 2", "k1: invalid interval [0.8, 0.4]"],
     );
     check(
         "twin = 'tanks'\n[prior]\nk7 = [0.4, 0.8]\n",

@@ -183,7 +183,7 @@ fn bars_are_shown_on_a_terminal_alone() {
         Ok(shown) => {
             let text = String::from_utf8_lossy(&shown.stdout).into_owned();
             assert!(shown.status.success(), "{text}");
-            assert!(text.contains("bank") && text.contains("to go"), "{text}");
+            assert!(text.contains("bank") && text.contains(" left"), "{text}");
         }
     }
 }

@@ -68,7 +68,7 @@ fn a_few_sealed_trials_are_scored_kept_and_refused_to_another_call() {
     ];
     refused(
         &[&strange[..], &["--kinds", "odd"]].concat(),
-        &["kinds are none, outside"],
+        &["there are none, outside"],
     );
     refused(
         &[

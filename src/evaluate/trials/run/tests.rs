@@ -20,7 +20,7 @@ fn sealed<'a>(
     study: &'a Study,
     settings: Settings,
     path: &Path,
-) -> Result<Sealed<'a>, WithheldError> {
+) -> Result<Sealed<'a>, EvaluateError> {
     Withheld::new(study, settings)?.seal(path, &Progress::silent())
 }
 

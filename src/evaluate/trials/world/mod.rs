@@ -1,7 +1,7 @@
-//! Worlds: the reference systems once more, written apart from the twins, and bent in ways of their own.
+//! Worlds: the reference systems once more, written apart from the twins, and perturbed in ways of their own.
 //!
 //! Nothing here uses the crate's integrators, twins, effects or `augment`: what is shared is the physics alone. Signals are
-//! bent as whole series, not sample by sample with memories, and forces are plain functions of the moment, so that a
+//! perturbed as whole series, not sample by sample with memories, and forces are plain functions of the moment, so that a
 //! mistake in the library of effects cannot be made here in the same way.
 
 mod force;
@@ -23,12 +23,12 @@ use signal::above;
 /// One departure of a world from its twin.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum Bend {
-    /// What reaches the system of the input.
+pub(super) enum Perturbation {
+    /// Distortion of the input on its way to the system.
     Actuator(SignalLaw),
-    /// What the sensor makes of the state, before its noise.
+    /// Distortion of the measured state, before noise.
     Sensor(SignalLaw),
-    /// What is made of the noisy reading.
+    /// Distortion of the noisy reading.
     Reading(SignalLaw),
     /// More measurement noise, normal or uniform.
     MeasurementNoise { std: f64, uniform: bool },
@@ -47,7 +47,7 @@ pub(super) enum Bend {
     Parameter { number: usize, law: ParameterLaw },
 }
 
-impl Bend {
+impl Perturbation {
     /// A parameter's step, moved to the start of the record; anything else stays as it is.
     pub fn at_once(&mut self) {
         if let Self::Parameter {
@@ -62,7 +62,7 @@ impl Bend {
 
 /// A listed effect that a world can have, with magnitudes from hardly visible to obvious.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Lack {
+pub(super) struct MissingEffect {
     /// As in the library.
     pub id: &'static str,
     /// As in the library.
@@ -72,7 +72,7 @@ pub(super) struct Lack {
     pub range: (f64, f64),
 }
 
-impl Lack {
+impl MissingEffect {
     /// `id@target`.
     pub fn key(&self) -> String {
         format!("{}@{}", self.id, self.target)
@@ -95,17 +95,17 @@ pub(super) struct World {
     limits: [(f64, f64); 2],
     /// Rates from θ, u and x.
     rates: fn(&[f64], f64, [f64; 2]) -> [f64; 2],
-    /// How many steps a sample may be integrated in without being another system.
+    /// Numbers of steps a sample that give the same system.
     pub substeps: &'static [usize],
     /// Usual size of each state, and of each state's rate.
     pub state_sizes: [f64; 2],
     pub rate_sizes: [f64; 2],
     /// The listed effects that show.
-    pub lacks: &'static [Lack],
+    pub missing_effects: &'static [MissingEffect],
     /// Pairs of listed effects that imitate each other.
     pub doubles: &'static [[&'static str; 2]],
     /// Listed effects that some θ stands in for.
-    pub absorbed: &'static [Lack],
+    pub absorbed: &'static [MissingEffect],
 }
 
 impl World {
@@ -121,37 +121,37 @@ impl World {
         [van_der_pol::WORLD.twin, tanks::WORLD.twin]
     }
 
-    /// The output at every sample, or `None` where the bent system runs away.
+    /// The output at every sample, or `None` where the perturbed system runs away.
     pub fn run(
         &self,
         theta: &[f64],
         drive: &Drive,
-        bends: &[Bend],
+        perturbations: &[Perturbation],
         substeps: usize,
         noise: Noise,
     ) -> Option<Vec<f64>> {
-        let states = self.states(theta, drive, bends, substeps, noise)?;
+        let states = self.states(theta, drive, perturbations, substeps, noise)?;
         let truth = states.iter().map(|x| x[self.output]).collect();
-        Some(self.measured(truth, drive.dt(), bends, noise))
+        Some(self.measured(truth, drive.dt(), perturbations, noise))
     }
 
-    /// The states at every sample, or `None` where the bent system runs away.
+    /// The states at every sample, or `None` where the perturbed system runs away.
     pub fn states(
         &self,
         theta: &[f64],
         drive: &Drive,
-        bends: &[Bend],
+        perturbations: &[Perturbation],
         substeps: usize,
         noise: Noise,
     ) -> Option<Vec<[f64; 2]>> {
         let (n, dt) = (drive.samples(), drive.dt());
-        let input = self.input(drive, bends, noise);
-        let factors = self.factors(n, dt, bends, noise);
+        let input = self.input(drive, perturbations, noise);
+        let factors = self.factors(n, dt, perturbations, noise);
         let mut process: Vec<Source> = (0..2)
             .map(|i| noise.source(&format!("world/state {i}")))
             .collect();
-        let mut added: Vec<Source> = (0..bends.len())
-            .map(|i| noise.source(&format!("world/bend {i}")))
+        let mut added: Vec<Source> = (0..perturbations.len())
+            .map(|i| noise.source(&format!("world/perturbation {i}")))
             .collect();
         let own = (self.process)(dt);
         let mut x = self.start;
@@ -173,14 +173,14 @@ impl World {
                 };
                 let rate = (self.rates)(&theta_now, now.u, x);
                 for i in 0..2 {
-                    x[i] += h * (rate[i] + forces(bends, i, &now));
+                    x[i] += h * (rate[i] + forces(perturbations, i, &now));
                 }
             }
             for i in 0..2 {
                 x[i] += own[i] * process[i].normal();
             }
-            for (bend, source) in bends.iter().zip(&mut added) {
-                after_step(bend, &mut x, source);
+            for (perturbation, source) in perturbations.iter().zip(&mut added) {
+                after_step(perturbation, &mut x, source);
             }
             for (x, (low, high)) in x.iter_mut().zip(self.limits) {
                 *x = x.max(low).min(high);
@@ -198,13 +198,13 @@ impl World {
     }
 
     /// The input as it reaches the system.
-    fn input(&self, drive: &Drive, bends: &[Bend], noise: Noise) -> Vec<f64> {
+    fn input(&self, drive: &Drive, perturbations: &[Perturbation], noise: Noise) -> Vec<f64> {
         let mut u: Vec<f64> = match self.has_input {
             true => drive.inputs().column(0).to_vec(),
             false => vec![],
         };
-        for bend in bends {
-            if let Bend::Actuator(law) = bend {
+        for perturbation in perturbations {
+            if let Perturbation::Actuator(law) = perturbation {
                 u = law.apply(&u, drive.dt(), noise.child("actuator"));
             }
         }
@@ -212,10 +212,16 @@ impl World {
     }
 
     /// The factor on each parameter at each sample.
-    fn factors(&self, n: usize, dt: f64, bends: &[Bend], noise: Noise) -> Vec<Vec<f64>> {
+    fn factors(
+        &self,
+        n: usize,
+        dt: f64,
+        perturbations: &[Perturbation],
+        noise: Noise,
+    ) -> Vec<Vec<f64>> {
         let mut all = vec![vec![1.0; n]; self.parameters.len()];
-        for bend in bends {
-            if let Bend::Parameter { number, law } = bend {
+        for perturbation in perturbations {
+            if let Perturbation::Parameter { number, law } = perturbation {
                 let factors = law.factors(n, dt, noise.child("parameter"));
                 for (all, factor) in all[*number].iter_mut().zip(factors) {
                     *all *= factor;
@@ -226,24 +232,30 @@ impl World {
     }
 
     /// What is read: the sensor's laws, noise, what is made of the reading.
-    fn measured(&self, truth: Vec<f64>, dt: f64, bends: &[Bend], noise: Noise) -> Vec<f64> {
+    fn measured(
+        &self,
+        truth: Vec<f64>,
+        dt: f64,
+        perturbations: &[Perturbation],
+        noise: Noise,
+    ) -> Vec<f64> {
         let mut y = truth;
-        for bend in bends {
-            if let Bend::Sensor(law) = bend {
+        for perturbation in perturbations {
+            if let Perturbation::Sensor(law) = perturbation {
                 y = law.apply(&y, dt, noise.child("sensor"));
             }
         }
         let mut own = noise.source("world/sensor");
         y.iter_mut()
             .for_each(|y| *y += self.measurement * own.normal());
-        for bend in bends {
-            match bend {
-                Bend::MeasurementNoise { std, uniform } => {
+        for perturbation in perturbations {
+            match perturbation {
+                Perturbation::MeasurementNoise { std, uniform } => {
                     let mut more = noise.source("world/more sensor noise");
                     y.iter_mut()
                         .for_each(|y| *y += std * draw(&mut more, *uniform));
                 }
-                Bend::Reading(law) => y = law.apply(&y, dt, noise.child("reading")),
+                Perturbation::Reading(law) => y = law.apply(&y, dt, noise.child("reading")),
                 _ => {}
             }
         }
@@ -252,20 +264,20 @@ impl World {
 }
 
 /// The sum of the forces on a state.
-fn forces(bends: &[Bend], state: usize, now: &Moment<'_>) -> f64 {
-    (bends.iter())
-        .map(|bend| match bend {
-            Bend::Force { on, law } if *on == state => law.at(now),
+fn forces(perturbations: &[Perturbation], state: usize, now: &Moment<'_>) -> f64 {
+    (perturbations.iter())
+        .map(|perturbation| match perturbation {
+            Perturbation::Force { on, law } if *on == state => law.at(now),
             _ => 0.0,
         })
         .sum()
 }
 
 /// Added noise and overflow at the end of a step.
-fn after_step(bend: &Bend, x: &mut [f64; 2], source: &mut Source) {
-    match *bend {
-        Bend::ProcessNoise { on, std, uniform } => x[on] += std * draw(source, uniform),
-        Bend::Ceiling {
+fn after_step(perturbation: &Perturbation, x: &mut [f64; 2], source: &mut Source) {
+    match *perturbation {
+        Perturbation::ProcessNoise { on, std, uniform } => x[on] += std * draw(source, uniform),
+        Perturbation::Ceiling {
             on,
             level,
             spill,
@@ -292,7 +304,7 @@ mod tests {
     use super::*;
     use crate::evaluate::paper::reference_studies;
 
-    /// Without noise and bends, integrated as the twin is, a world is its twin to rounding.
+    /// Without noise and perturbations, integrated as the twin is, a world is its twin to rounding.
     #[test]
     fn unbent_worlds_are_their_twins() {
         for study in reference_studies().unwrap() {
@@ -344,7 +356,7 @@ mod tests {
     #[test]
     fn an_overflow_spills_and_a_runaway_is_noticed() {
         let mut x = [5.0, 1.0];
-        let ceiling = Bend::Ceiling {
+        let ceiling = Perturbation::Ceiling {
             on: 0,
             level: 3.0,
             spill: 0.25,
@@ -354,7 +366,7 @@ mod tests {
         assert_eq!(x, [3.0, 1.5]);
         let world = World::of("van-der-pol").unwrap();
         let drive = Drive::autonomous(0.05, 300).unwrap();
-        let bend = Bend::Force {
+        let perturbation = Perturbation::Force {
             on: 1,
             law: ForceLaw::Linear {
                 rate: 5.0,
@@ -362,6 +374,9 @@ mod tests {
                 span: None,
             },
         };
-        assert_eq!(world.run(&[0.1], &drive, &[bend], 1, Noise::OFF), None);
+        assert_eq!(
+            world.run(&[0.1], &drive, &[perturbation], 1, Noise::OFF),
+            None
+        );
     }
 }

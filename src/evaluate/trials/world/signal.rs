@@ -1,4 +1,4 @@
-//! How a world bends a signal on its way from a sensor or to an actuator: whole series at once, in formulas of its own.
+//! How a world perturbations a signal on its way from a sensor or to an actuator: whole series at once, in formulas of its own.
 
 use crate::twin::Noise;
 use serde::{Deserialize, Serialize};
@@ -56,14 +56,14 @@ pub(in crate::evaluate::trials) enum SignalLaw {
     Glitches { height: f64, each: f64 },
     /// Now and then the value stays, for `length` seconds.
     Sticking { length: f64, each: f64 },
-    /// A bent characteristic: s + c·s².
+    /// A perturbed characteristic: s + c·s².
     Curve { coefficient: f64 },
     /// The factor falls with use, to 1 − loss, over `capacity` of accumulated |s|·Δt.
     Fading { loss: f64, capacity: f64 },
 }
 
 impl SignalLaw {
-    /// The bent series; random laws draw from `noise`.
+    /// The perturbed series; random laws draw from `noise`.
     pub fn apply(&self, s: &[f64], dt: f64, noise: Noise) -> Vec<f64> {
         let time = |k: usize| k as f64 * dt;
         let each = |f: &dyn Fn(usize, f64) -> f64| -> Vec<f64> {
@@ -255,14 +255,14 @@ mod tests {
         (0..200).map(|k| 0.1 * f64::from(k) - 5.0).collect()
     }
 
-    fn bent(law: &SignalLaw) -> Vec<f64> {
+    fn perturbed(law: &SignalLaw) -> Vec<f64> {
         law.apply(&ramp(), 0.1, Noise::new(1, "t", 0))
     }
 
     /// Behind a ramp of slope 1 a second both forms of a lag end up τ late, and both of a delay its length.
     #[test]
     fn two_forms_of_one_law_agree_where_theory_says() {
-        let late = |law: SignalLaw| ramp()[199] - bent(&law)[199];
+        let late = |law: SignalLaw| ramp()[199] - perturbed(&law)[199];
         let (tau, cutoff) = (0.8, 1.0 / (2.0 * PI * 0.8));
         assert!((late(SignalLaw::LowPass { cutoff }) - tau).abs() < 0.02);
         assert!((late(SignalLaw::Lag { tau }) - tau).abs() < 0.06);
@@ -308,7 +308,7 @@ mod tests {
                 },
             ),
         ] {
-            let apart = (bent(&hard).iter().zip(bent(&soft)))
+            let apart = (perturbed(&hard).iter().zip(perturbed(&soft)))
                 .map(|(a, b)| (a - b).abs())
                 .fold(0.0, f64::max);
             assert!(apart > 1e-3 && apart < 0.1, "{hard:?}: {apart}");
@@ -329,8 +329,8 @@ mod tests {
                 each: 2.0,
             },
         ] {
-            assert_eq!(bent(&law), bent(&law));
-            assert_ne!(bent(&law), ramp());
+            assert_eq!(perturbed(&law), perturbed(&law));
+            assert_ne!(perturbed(&law), ramp());
         }
     }
 }

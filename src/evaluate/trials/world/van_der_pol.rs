@@ -1,9 +1,9 @@
 //! The van der Pol oscillator as a world.
 
-use super::{Lack, World};
+use super::{MissingEffect, World};
 
-const fn lack(id: &'static str, target: &'static str, low: f64, high: f64) -> Lack {
-    Lack {
+const fn missing(id: &'static str, target: &'static str, low: f64, high: f64) -> MissingEffect {
+    MissingEffect {
         id,
         target,
         range: (low, high),
@@ -27,37 +27,37 @@ pub(super) const WORLD: World = World {
     substeps: &[1],
     state_sizes: [2.0, 2.5],
     rate_sizes: [1.5, 1.5],
-    lacks: &[
-        lack("sensor-bias", "sensor", 0.003, 0.3),
-        lack("sensor-gain", "sensor", 0.003, 0.2),
-        lack("sensor-drift", "sensor", 0.0005, 0.03),
-        lack("sensor-lag", "sensor", 0.01, 0.3),
-        lack("sensor-delay", "sensor", 0.01, 0.3),
-        lack("sensor-rectification", "sensor", 0.01, 0.6),
-        lack("sensor-noise", "sensor", 0.0005, 0.03),
-        lack("sensor-outliers", "sensor", 0.005, 0.08),
-        lack("sensor-saturation", "sensor", 0.02, 0.5),
-        lack("sensor-quantization", "sensor", 0.005, 0.3),
-        lack("constant-forcing", "x1", 0.01, 0.4),
-        lack("constant-forcing", "x2", 0.01, 0.4),
-        lack("coulomb-friction", "x2", 0.01, 0.4),
-        lack("linear-loss", "x1", 0.01, 0.3),
-        lack("linear-loss", "x2", 0.01, 0.4),
-        lack("cross-coupling", "x1", 0.01, 0.3),
-        lack("cross-coupling", "x2", 0.01, 0.3),
-        lack("quadratic-drag", "x2", 0.005, 0.2),
-        lack("cubic-stiffness", "x2", 0.005, 0.3),
-        lack("power-law", "x2", 0.005, 0.2),
-        lack("periodic-disturbance", "x1", 0.01, 0.4),
-        lack("periodic-disturbance", "x2", 0.02, 0.6),
-        lack("state-ceiling", "x1", 0.02, 0.5),
-        lack("process-noise", "x2", 0.003, 0.05),
-        lack("parameter-drift", "nu", 0.002, 0.06),
-        lack("parameter-step", "nu", 0.03, 0.6),
+    missing_effects: &[
+        missing("sensor-bias", "sensor", 0.003, 0.3),
+        missing("sensor-gain", "sensor", 0.003, 0.2),
+        missing("sensor-drift", "sensor", 0.0005, 0.03),
+        missing("sensor-lag", "sensor", 0.01, 0.3),
+        missing("sensor-delay", "sensor", 0.01, 0.3),
+        missing("sensor-rectification", "sensor", 0.01, 0.6),
+        missing("sensor-noise", "sensor", 0.0005, 0.03),
+        missing("sensor-outliers", "sensor", 0.005, 0.08),
+        missing("sensor-saturation", "sensor", 0.02, 0.5),
+        missing("sensor-quantization", "sensor", 0.005, 0.3),
+        missing("constant-forcing", "x1", 0.01, 0.4),
+        missing("constant-forcing", "x2", 0.01, 0.4),
+        missing("coulomb-friction", "x2", 0.01, 0.4),
+        missing("linear-loss", "x1", 0.01, 0.3),
+        missing("linear-loss", "x2", 0.01, 0.4),
+        missing("cross-coupling", "x1", 0.01, 0.3),
+        missing("cross-coupling", "x2", 0.01, 0.3),
+        missing("quadratic-drag", "x2", 0.005, 0.2),
+        missing("cubic-stiffness", "x2", 0.005, 0.3),
+        missing("power-law", "x2", 0.005, 0.2),
+        missing("periodic-disturbance", "x1", 0.01, 0.4),
+        missing("periodic-disturbance", "x2", 0.02, 0.6),
+        missing("state-ceiling", "x1", 0.02, 0.5),
+        missing("process-noise", "x2", 0.003, 0.05),
+        missing("parameter-drift", "nu", 0.002, 0.06),
+        missing("parameter-step", "nu", 0.03, 0.6),
     ],
     doubles: &[
         ["linear-loss@x2", "power-law@x2"],
         ["quadratic-drag@x2", "power-law@x2"],
     ],
-    absorbed: &[lack("parameter-step", "nu", 0.05, 0.5)],
+    absorbed: &[missing("parameter-step", "nu", 0.05, 0.5)],
 };

@@ -68,13 +68,14 @@ fn test(diagnosis: &Diagnosis) -> String {
 
 /// Measured and twin.
 fn runs(study: &Study, diagnosis: &Diagnosis) -> Section {
-    let marked = match diagnosis.place.maps.notable().windows.is_empty() {
-        true => String::new(),
-        false => format!(
+    let marked = if diagnosis.place.maps.notable().windows.is_empty() {
+        String::new()
+    } else {
+        format!(
             " The strip below the axis marks windows in which the twin does not follow, with their shares of the gap: unbroken \
-             frame and bold text p < {}, dashed frame p ≤ 0.1.",
+         frame and bold text p < {}, dashed frame p ≤ 0.1.",
             diagnosis.detection.alpha
-        ),
+        )
     };
     let caption = format!(
         "The twin sees the inputs of the record alone and runs without noise. Its parameters are fitted to this record.{marked}"

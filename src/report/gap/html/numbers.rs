@@ -7,9 +7,10 @@ use crate::report::page::{Section, paragraph, table};
 use crate::report::units::Units;
 
 pub(super) fn section_of(units: &Units, diagnosis: &Diagnosis) -> Section {
-    let beside = match diagnosis.which.accepted.is_empty() {
-        true => "refitted",
-        false => "refitted beside the accepted effects",
+    let beside = if diagnosis.which.accepted.is_empty() {
+        "refitted"
+    } else {
+        "refitted beside the accepted effects"
     };
     let rows: Vec<Vec<String>> = (diagnosis.parameters.iter())
         .map(|p| {

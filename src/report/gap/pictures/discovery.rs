@@ -55,9 +55,10 @@ pub fn terms(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
         })
         .collect();
     let unit = unit_suffix(&Units::of(study).equation_unit(&d.equation));
-    let label = match unit.is_empty() {
-        true => "included in so many; factor (90 % interval)".to_owned(),
-        false => format!("included in so many; factor in{unit} (90 % interval)"),
+    let label = if unit.is_empty() {
+        "included in so many; factor (90 % interval)".to_owned()
+    } else {
+        format!("included in so many; factor in{unit} (90 % interval)")
     };
     let chart = BarChart {
         title: "Terms that may be missing".into(),

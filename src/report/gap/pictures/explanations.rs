@@ -27,12 +27,13 @@ pub fn explanations(diagnosis: &Diagnosis) -> Option<String> {
         let rest = (1.0 - listed).max(0.0);
         others.push(Bar::new("all others, unlisted too", rest, &chance(rest)));
     }
-    let groups = match rivals.is_empty() {
-        true => vec![BarGroup::new("", Some(1.0), others)],
-        false => vec![
+    let groups = if rivals.is_empty() {
+        vec![BarGroup::new("", Some(1.0), others)]
+    } else {
+        vec![
             BarGroup::new("One class: not told apart by these data", Some(1.0), rivals),
             BarGroup::new("Outside the class", Some(1.0), others),
-        ],
+        ]
     };
     let chart = BarChart {
         title: "Explanations by probability".into(),

@@ -109,9 +109,12 @@ pub fn channels(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
 pub fn lags(diagnosis: &Diagnosis) -> Option<String> {
     let lags = diagnosis.place.maps.notable().lags;
     let clearest = lags.first()?;
-    let between = |l: &Lag| match l.from == l.to {
-        true => format!("{} s", short(l.from)),
-        false => format!("{} … {} s", short(l.from), short(l.to)),
+    let between = |l: &Lag| {
+        if l.from == l.to {
+            format!("{} s", short(l.from))
+        } else {
+            format!("{} … {} s", short(l.from), short(l.to))
+        }
     };
     let groups = grouped(&lags, |l| (l.channel.as_str(), l.signal.as_str()))
         .map(|((channel, signal), mut own)| {
@@ -138,9 +141,10 @@ pub fn lags(diagnosis: &Diagnosis) -> Option<String> {
 
 /// Whose past an output depends on.
 fn past(channel: &str, signal: &str) -> String {
-    match channel == signal {
-        true => format!("{channel} on its own past"),
-        false => format!("{channel} on the past of {signal}"),
+    if channel == signal {
+        format!("{channel} on its own past")
+    } else {
+        format!("{channel} on the past of {signal}")
     }
 }
 

@@ -12,21 +12,23 @@ use crate::study::Study;
 ///
 /// What leaves the picture far above or below the measured values is broken off.
 pub fn runs(study: &Study, diagnosis: &Diagnosis, validation: bool) -> Option<String> {
-    let runs = match validation {
-        true => diagnosis.validation_runs.as_ref()?,
-        false => &diagnosis.free_runs,
+    let runs = if validation {
+        diagnosis.validation_runs.as_ref()?
+    } else {
+        &diagnosis.free_runs
     };
     let outputs = Units::of(study).outputs;
     let panels = (outputs.iter().enumerate())
         .map(|(j, output)| {
             let panel = Panel::new(&named(output), series(runs, j));
-            match validation {
-                true => panel,
-                false => (panel.spans(windows(diagnosis, &output.name))).marks(
+            if validation {
+                panel
+            } else {
+                (panel.spans(windows(diagnosis, &output.name))).marks(
                     onset(diagnosis.place.onset.as_ref(), 0, &output.name)
                         .into_iter()
                         .collect(),
-                ),
+                )
             }
         })
         .collect();

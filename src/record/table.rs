@@ -1,0 +1,186 @@
+//! The numbers of a record file, checked cell by cell.
+
+use super::channels::column_names;
+use crate::record::{Drive, Record, RecordError, Signal};
+use crate::storage::untrusted::{MOST_NUMBERS, Rows, excerpt};
+use std::path::Path;
+
+/// Longest record: a sample a millisecond for half a day.
+const MOST_SAMPLES: usize = 50_000_000;
+/// Most columns: t and a thousand inputs and outputs each.
+const MOST_COLUMNS: usize = 2001;
+
+/// The numbers of a file.
+pub(super) struct Table {
+    pub dt: f64,
+    pub inputs: Signal,
+    outputs: Signal,
+}
+
+impl Table {
+    /// The table as a record, which needs outputs.
+    pub fn record(self, path: &Path) -> Result<Record, RecordError> {
+        if self.outputs.ncols() == 0 {
+            let problem = "no output column; a record needs y, or y1,y2,…";
+            return Err(RecordError::file(path, problem));
+        }
+        (Drive::new(self.dt, self.inputs))
+            .and_then(|drive| Record::new(drive, self.outputs))
+            .map_err(|error| RecordError::file(path, error))
+    }
+
+    pub fn parse(text: impl std::io::Read, path: &Path) -> Result<Self, RecordError> {
+        let mut reader = Rows::new(text);
+        let header = reader.header().map_err(|e| csv_error(path, e))?;
+        let large = |problem: String| {
+            let remedy = "cut the record into shorter ones, or resample it";
+            RecordError::file(path, format!("{problem}; {remedy}"))
+        };
+        if header.len() > MOST_COLUMNS {
+            let given = header.len();
+            return Err(large(format!(
+                "{given} columns, at most {MOST_COLUMNS} are read"
+            )));
+        }
+        let (inputs, outputs) =
+            channels(&header).map_err(|problem| RecordError::file(path, problem))?;
+        let columns = 1 + inputs + outputs;
+        // Where column j of the file goes in a row ordered t, u1, u2, …, y1, y2, ….
+        let places: Vec<usize> = header.iter().map(|name| place(name, inputs)).collect();
+        // Numbers alone are kept, and each once: a record may fill half of the memory.
+        let (mut t, mut u, mut y) = (Vec::new(), Vec::new(), Vec::new());
+        let mut row = vec![0.0; columns];
+        let mut cells = csv::StringRecord::new();
+        while reader.read(&mut cells).map_err(|e| csv_error(path, e))? {
+            if t.len() == MOST_SAMPLES {
+                return Err(large(format!("more than {MOST_SAMPLES} samples")));
+            }
+            if (t.len() + 1) * columns > MOST_NUMBERS {
+                return Err(large(format!("more than {MOST_NUMBERS} numbers")));
+            }
+            for ((cell, &place), name) in cells.iter().zip(&places).zip(&header) {
+                let number = cell.parse::<f64>().ok().filter(|v| v.is_finite());
+                row[place] = number.ok_or_else(|| {
+                    let row = cells.position().map_or(t.len() + 2, |p| p.line() as usize);
+                    let value = excerpt(cell);
+                    let problem =
+                        format!("\"{value}\" is no finite number; correct or remove the row");
+                    RecordError::cell(path, row, name, problem)
+                })?;
+            }
+            t.push(row[0]);
+            u.extend_from_slice(&row[1..=inputs]);
+            y.extend_from_slice(&row[1 + inputs..]);
+        }
+        let rows = t.len();
+        if rows < 2 {
+            let problem = format!("{rows} rows of data; at least 2 are needed to know the step");
+            return Err(RecordError::file(path, problem));
+        }
+        let dt = uniform_step(path, t)?;
+        let signal = |width: usize, values: Vec<f64>| {
+            Signal::from_shape_vec((rows, width), values)
+                .map_err(|error| RecordError::file(path, error))
+        };
+        Ok(Self {
+            dt,
+            inputs: signal(inputs, u)?,
+            outputs: signal(outputs, y)?,
+        })
+    }
+}
+
+/// The parser's error, by row.
+fn csv_error(path: &Path, error: csv::Error) -> RecordError {
+    let row = |position: Option<csv::Position>| position.map_or(0, |p| p.line());
+    let problem = match error.into_kind() {
+        csv::ErrorKind::Io(error) => return RecordError::io(path, error),
+        csv::ErrorKind::UnequalLengths {
+            pos,
+            expected_len,
+            len,
+        } => format!(
+            "row {} has {len} cells, the header has {expected_len}",
+            row(pos)
+        ),
+        csv::ErrorKind::Utf8 { pos, err } => format!("row {}: {err}", row(pos)),
+        other => format!("{other:?}"),
+    };
+    let remedy = "a record is UTF-8 text, each row with as many cells as the header";
+    RecordError::file(path, format!("{problem}; {remedy}"))
+}
+
+/// Number of inputs and outputs that a header names: each of t, u…, y… once and without gaps.
+fn channels(header: &csv::StringRecord) -> Result<(usize, usize), String> {
+    let count = |letter: char| header.iter().filter(|n| n.starts_with(letter)).count();
+    let (inputs, outputs) = (count('u'), count('y'));
+    let mut expected = vec!["t".to_owned()];
+    expected.extend(column_names("u", inputs));
+    expected.extend(column_names("y", outputs));
+    let known = |name: &str| {
+        expected.iter().any(|e| e == name)
+            || [("u", inputs), ("y", outputs)]
+                .iter()
+                .any(|(l, n)| *n == 1 && name == format!("{l}1"))
+    };
+    if let Some(name) = header.iter().find(|name| !known(name)) {
+        return Err(format!(
+            "column \"{}\" is not part of a record; name the columns t, u or u1,u2,…, y or y1,y2,… and remove others",
+            excerpt(name)
+        ));
+    }
+    if header.iter().all(str::is_empty) {
+        return Err("the file is empty; a record needs a header t,u,y and rows".into());
+    }
+    if header.len() != expected.len() || !header.iter().any(|name| name == "t") {
+        return Err(format!(
+            "columns {} are not {}; t and each channel must stand there once",
+            excerpt(&header.iter().collect::<Vec<_>>().join(",")),
+            excerpt(&expected.join(","))
+        ));
+    }
+    let mut names: Vec<_> = header.iter().collect();
+    names.sort_unstable();
+    names.dedup();
+    if names.len() != header.len() {
+        return Err("a column stands there twice; give each its own name".into());
+    }
+    Ok((inputs, outputs))
+}
+
+/// Where a column goes: t first, then inputs, then outputs.
+fn place(name: &str, inputs: usize) -> usize {
+    let number = name[1..].parse::<usize>().unwrap_or(1);
+    match name.as_bytes()[0] {
+        b'u' => number,
+        b'y' => inputs + number,
+        _ => 0,
+    }
+}
+
+/// The common step of a time column.
+fn uniform_step(path: &Path, t: Vec<f64>) -> Result<f64, RecordError> {
+    let span = t[t.len() - 1] - t[0];
+    let dt = span / (t.len() - 1) as f64;
+    let off = |k: usize, expected: f64| {
+        let problem = format!(
+            "{} s where {expected} s was expected; time must increase by the same step to 1e-3 of it: resample the record",
+            t[k]
+        );
+        RecordError::cell(path, k + 2, "t", problem)
+    };
+    if let Some(k) = (1..t.len()).find(|&k| t[k] <= t[k - 1]) {
+        let step = if k > 1 { t[1] - t[0] } else { dt.abs() };
+        return Err(off(k, t[k - 1] + step));
+    }
+    // A single gap shifts the mean step: name the row where the steps first change, not where they add up.
+    let first = t[1] - t[0];
+    if let Some(k) = (1..t.len()).find(|&k| (t[k] - t[0] - k as f64 * dt).abs() > 1e-3 * dt) {
+        let jump = (1..t.len()).find(|&k| (t[k] - t[k - 1] - first).abs() > 1e-3 * first);
+        return Err(jump.map_or_else(
+            || off(k, t[0] + k as f64 * dt),
+            |k| off(k, t[k - 1] + first),
+        ));
+    }
+    Ok(dt)
+}

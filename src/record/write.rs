@@ -1,0 +1,56 @@
+//! Records and inputs as text and as new files.
+
+use super::channels::column_names;
+use crate::record::{Drive, Record, RecordError, Signal};
+use crate::storage::files::write_new;
+use std::path::Path;
+
+/// The text of an input file, as [`read_drive`] reads it.
+pub(crate) fn drive_csv_text(drive: &Drive) -> String {
+    csv_text(drive, &Signal::zeros((drive.samples(), 0)))
+}
+
+/// The text of a record file; reading it gives the same bits of u and y.
+pub(crate) fn record_csv_text(record: &Record) -> String {
+    csv_text(record.drive(), record.outputs())
+}
+
+fn csv_text(drive: &Drive, outputs: &Signal) -> String {
+    let mut header = vec!["t".to_owned()];
+    header.extend(column_names("u", drive.inputs().ncols()));
+    header.extend(column_names("y", outputs.ncols()));
+    let mut text = header.join(",");
+    text.push('\n');
+    for k in 0..drive.samples() {
+        text.push_str(&rounded_time(drive.time(k), drive.dt()).to_string());
+        for value in drive.input(k).iter().chain(outputs.row(k)) {
+            text.push_str(&format!(",{value}"));
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// Writes a record to a new file, which appears whole or not at all.
+///
+/// ```
+/// use truetwin::record::{Drive, Record, Signal, write_record};
+///
+/// let record = Record::new(Drive::new(0.5, Signal::ones((3, 1)))?, Signal::zeros((3, 1)))?;
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("R.csv");
+/// write_record(&path, &record)?;
+/// assert!(write_record(&path, &record).is_err()); // nothing is overwritten
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn write_record(path: &Path, record: &Record) -> Result<(), RecordError> {
+    write_new(path, record_csv_text(record).as_bytes())
+        .map_err(|error| RecordError::io(path, error))
+}
+
+/// Time to a billionth of the step, so that 3·0.1 is written as 0.3.
+fn rounded_time(t: f64, dt: f64) -> f64 {
+    let digits = 10f64.powi(9 - dt.log10().floor() as i32);
+    let rounded = (t * digits).round() / digits;
+    if rounded.is_finite() { rounded } else { t }
+}

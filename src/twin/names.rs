@@ -1,0 +1,152 @@
+//! Names that files, the command line and effects can tell apart.
+
+use crate::record::Quantity;
+use crate::twin::{Outline, Parameter, Role, Twin, TwinError};
+use std::collections::BTreeSet;
+
+/// Characters with a meaning in names that are put together: `start.h1`, `id@target.magnitude`, `disturbance/0`.
+const RESERVED: [char; 3] = ['/', '@', '.'];
+
+/// Checks the names, priors and bounds of a twin of one's own.
+///
+/// Parameters of a black box may hold a dot, as the variables of most FMUs do: no effect targets them.
+pub(crate) fn check_twin(twin: &Twin) -> Result<(), TwinError> {
+    let parameters = twin.parameters();
+    parameters.check()?;
+    match twin.outline() {
+        Some(outline) => check_outline(&outline),
+        None => {
+            let signals = twin.signals();
+            unique("input", names(&signals.inputs))?;
+            unique("output", names(&signals.outputs))?;
+            parameters.iter().try_for_each(check_composed)
+        }
+    }
+}
+
+fn check_outline(outline: &Outline) -> Result<(), TwinError> {
+    let parameters: Vec<&str> = outline.parameters.names();
+    let states: Vec<&str> = names(&outline.states).collect();
+    for (kind, all) in [
+        ("parameter", &parameters),
+        ("state", &states),
+        ("input", &names(&outline.inputs).collect()),
+        ("output", &names(&outline.outputs).collect()),
+    ] {
+        unique(kind, all.iter().copied())?;
+        for name in all {
+            let problem = if name.is_empty() {
+                "is empty; give it one"
+            } else if name.contains(RESERVED) {
+                "holds one of / @ .; use letters, digits, _ and - instead"
+            } else if matches!(kind, "parameter" | "state") && is_channel(name) {
+                "is what effects call a channel; rename it"
+            } else if kind == "output" && states.contains(name) {
+                "is a state's name too; rename one, since [noise] goes by both"
+            } else {
+                continue;
+            };
+            return Err(named(kind, name, problem));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a black box's parameter that reads like one of another role.
+fn check_composed(parameter: &Parameter) -> Result<(), TwinError> {
+    let (name, role) = (&parameter.name, parameter.role);
+    let problem = if name.contains('@') {
+        "holds an @, which stands in names of magnitudes; use _ instead"
+    } else if name.starts_with("start.") && role != Role::Start {
+        "begins as an unknown start does; rename it, or give it Role::Start"
+    } else if name.starts_with("noise.") && role != Role::Noise {
+        "begins as an unknown noise level does; rename it, or give it Role::Noise"
+    } else {
+        return Ok(());
+    };
+    Err(named("parameter", name, problem))
+}
+
+/// Whether effects may call a channel so: `sensor`, `actuator2`.
+fn is_channel(name: &str) -> bool {
+    let number = name
+        .strip_prefix("sensor")
+        .or(name.strip_prefix("actuator"));
+    number.is_some_and(|digits| digits.chars().all(|c| c.is_ascii_digit()))
+}
+
+fn unique<'a>(
+    kind: &'static str,
+    names: impl IntoIterator<Item = &'a str>,
+) -> Result<(), TwinError> {
+    let mut seen = BTreeSet::new();
+    match names.into_iter().find(|name| !seen.insert(*name)) {
+        Some(name) => Err(TwinError::Duplicate {
+            kind,
+            name: name.into(),
+        }),
+        None => Ok(()),
+    }
+}
+
+fn names(quantities: &[Quantity]) -> impl Iterator<Item = &str> {
+    quantities.iter().map(|quantity| quantity.name.as_str())
+}
+
+fn named(kind: &'static str, name: &str, problem: &'static str) -> TwinError {
+    TwinError::Name {
+        kind,
+        name: name.into(),
+        problem,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn problem(outline: Outline) -> String {
+        check_outline(&outline).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn names_that_cannot_be_told_apart_are_refused() {
+        let tank = || {
+            Outline::new()
+                .parameter(Parameter::new("k", "", 0.0, 1.0))
+                .state("h", "m")
+                .input("u", "")
+                .output("y", "m")
+        };
+        assert_eq!(check_outline(&tank()), Ok(()));
+        for (outline, text) in [
+            (
+                tank().state("dp/dt", ""),
+                "state name \"dp/dt\" holds one of / @ .",
+            ),
+            (tank().input("pump.speed", ""), "input name \"pump.speed\""),
+            (tank().state("h", "m"), "duplicate state name h; rename one"),
+            (tank().output("y", "m"), "duplicate output name y"),
+            (tank().output("h", "m"), "is a state's name too; rename one"),
+            (
+                tank().state("sensor2", ""),
+                "is what effects call a channel",
+            ),
+            (tank().output("", "m"), "output name \"\" is empty"),
+        ] {
+            let error = problem(outline);
+            assert!(error.contains(text), "{error}");
+        }
+    }
+
+    #[test]
+    fn variables_of_fmus_keep_their_dots() {
+        let parameter = |name| Parameter::new(name, "", 0.0, 1.0);
+        assert_eq!(check_composed(&parameter("body.mass")), Ok(()));
+        for bad in ["gain@u", "start.h1", "noise.y"] {
+            assert!(check_composed(&parameter(bad)).is_err(), "{bad}");
+        }
+        let start = parameter("start.h1").with_role(Role::Start);
+        assert_eq!(check_composed(&start), Ok(()));
+    }
+}
