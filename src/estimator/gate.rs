@@ -172,17 +172,17 @@ impl GateSettings {
 }
 
 /// The test's answer.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct GateOutcome {
-    /// s of the record.
-    pub statistic: f64,
     /// (1 + number of simulations at least as far) / (B + 1).
     pub p_value: f64,
     /// Nominal rate.
     pub alpha: f64,
     /// Whether the record is not what the twin makes at this θ.
     pub out_of_distribution: bool,
+    /// s of the record.
+    pub statistic: f64,
 }
 
 /// What the test simulates with.

@@ -24,33 +24,12 @@ pub fn read_record(path: &Path) -> Result<Record, RecordError> {
     read(path)?.record(path)
 }
 
-/// Reads time and inputs to simulate with; outputs, if the file is a record, are ignored.
-///
-/// ```
-/// use truetwin::record::{Drive, Record, Signal, read_drive, write_record};
-///
-/// let record = Record::new(Drive::new(0.5, Signal::ones((3, 1)))?, Signal::zeros((3, 1)))?;
-/// let folder = tempfile::tempdir()?;
-/// let path = folder.path().join("R.csv");
-/// write_record(&path, &record)?;
-/// assert_eq!(read_drive(&path)?, *record.drive());
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
+/// Reads time and inputs to simulate with; a file with outputs is refused.
 pub fn read_drive(path: &Path) -> Result<Drive, RecordError> {
-    let table = read(path)?;
-    Drive::new(table.dt, table.inputs).map_err(|error| RecordError::file(path, error))
+    read(path)?.drive(path)
 }
 
 /// Parses the text of a record that stands in the program itself; `path` is for messages.
-///
-/// ```
-/// use std::path::Path;
-/// use truetwin::record::parse_record;
-///
-/// let record = parse_record("t,u,y\n0,1,0\n0.5,1,0.2\n1,0,0.3\n", Path::new("embedded.csv"))?;
-/// assert_eq!((record.samples(), record.drive().dt()), (3, 0.5));
-/// # Ok::<(), truetwin::record::RecordError>(())
-/// ```
 pub fn parse_record(text: &str, path: &Path) -> Result<Record, RecordError> {
     Table::parse(text.as_bytes(), path)?.record(path)
 }

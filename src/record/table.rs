@@ -2,22 +2,36 @@
 
 use super::channels::column_names;
 use crate::record::{Drive, Record, RecordError, Signal};
-use crate::storage::untrusted::{MOST_NUMBERS, Rows, excerpt};
+use crate::storage::untrusted::{MOST_NUMBERS, Rows, excerpt, quoted};
+use std::io::{Cursor, Read};
 use std::path::Path;
 
 /// Longest record: a sample a millisecond for half a day.
 const MOST_SAMPLES: usize = 50_000_000;
 /// Most columns: t and a thousand inputs and outputs each.
 const MOST_COLUMNS: usize = 2001;
+/// Largest measured value: squares and sums of squares of a record must stay finite.
+const LARGEST: f64 = 1e100;
 
 /// The numbers of a file.
 pub(super) struct Table {
-    pub dt: f64,
-    pub inputs: Signal,
+    dt: f64,
+    inputs: Signal,
     outputs: Signal,
 }
 
 impl Table {
+    /// The table as time and inputs alone.
+    pub fn drive(self, path: &Path) -> Result<Drive, RecordError> {
+        if self.outputs.ncols() > 0 {
+            let names = excerpt(&column_names("y", self.outputs.ncols()).join(","));
+            let problem =
+                format!("{names}: an input file has t and inputs alone; remove the output columns");
+            return Err(RecordError::file(path, problem));
+        }
+        Drive::new(self.dt, self.inputs).map_err(|error| RecordError::file(path, error))
+    }
+
     /// The table as a record, which needs outputs.
     pub fn record(self, path: &Path) -> Result<Record, RecordError> {
         if self.outputs.ncols() == 0 {
@@ -29,8 +43,12 @@ impl Table {
             .map_err(|error| RecordError::file(path, error))
     }
 
-    pub fn parse(text: impl std::io::Read, path: &Path) -> Result<Self, RecordError> {
-        let mut reader = Rows::new(text);
+    pub fn parse(mut text: impl Read, path: &Path) -> Result<Self, RecordError> {
+        let mut start = Vec::new();
+        (text.by_ref().take(START).read_to_end(&mut start))
+            .map_err(|error| RecordError::io(path, error))?;
+        check_encoding(&start).map_err(|problem| RecordError::file(path, problem))?;
+        let mut reader = Rows::new(Cursor::new(start).chain(text));
         let header = reader.header().map_err(|e| csv_error(path, e))?;
         let large = |problem: String| {
             let remedy = "cut the record into shorter ones, or resample it";
@@ -45,7 +63,7 @@ impl Table {
         let (inputs, outputs) =
             channels(&header).map_err(|problem| RecordError::file(path, problem))?;
         let columns = 1 + inputs + outputs;
-        // Where column j of the file goes in a row ordered t, u1, u2, …, y1, y2, ….
+        // Index of column j of the file in a row ordered t, u1, u2, …, y1, y2, ….
         let places: Vec<usize> = header.iter().map(|name| place(name, inputs)).collect();
         // Numbers alone are kept, and each once: a record may fill half of the memory.
         let (mut t, mut u, mut y) = (Vec::new(), Vec::new(), Vec::new());
@@ -59,12 +77,8 @@ impl Table {
                 return Err(large(format!("more than {MOST_NUMBERS} numbers")));
             }
             for ((cell, &place), name) in cells.iter().zip(&places).zip(&header) {
-                let number = cell.parse::<f64>().ok().filter(|v| v.is_finite());
-                row[place] = number.ok_or_else(|| {
+                row[place] = number(cell).map_err(|problem| {
                     let row = cells.position().map_or(t.len() + 2, |p| p.line() as usize);
-                    let value = excerpt(cell);
-                    let problem =
-                        format!("\"{value}\" is no finite number; correct or remove the row");
                     RecordError::cell(path, row, name, problem)
                 })?;
             }
@@ -90,6 +104,38 @@ impl Table {
     }
 }
 
+/// Bytes of a file that tell its encoding.
+const START: u64 = 64;
+
+/// Refuses text that is not UTF-8 by its first bytes.
+fn check_encoding(start: &[u8]) -> Result<(), String> {
+    let utf16 = start.starts_with(b"\xff\xfe") || start.starts_with(b"\xfe\xff");
+    if utf16 || start.contains(&0) {
+        let encoding = if utf16 { "UTF-16" } else { "UTF-16 or binary" };
+        return Err(format!("the file is {encoding}; save it as UTF-8 text"));
+    }
+    Ok(())
+}
+
+/// Parses a cell.
+fn number(cell: &str) -> Result<f64, String> {
+    match cell.parse::<f64>() {
+        Ok(value) if value.is_finite() && value.abs() > LARGEST => Err(format!(
+            "{} is beyond ±{LARGEST:e}, the largest value of a record; correct or remove the row",
+            excerpt(cell)
+        )),
+        Ok(value) if value.is_finite() => Ok(value),
+        _ if cell.replacen(',', ".", 1).parse::<f64>().is_ok() => Err(format!(
+            "\"{}\" has a decimal comma; write decimal points",
+            quoted(cell)
+        )),
+        _ => Err(format!(
+            "\"{}\" is no finite number; correct or remove the row",
+            quoted(cell)
+        )),
+    }
+}
+
 /// The parser's error, by row.
 fn csv_error(path: &Path, error: csv::Error) -> RecordError {
     let row = |position: Option<csv::Position>| position.map_or(0, |p| p.line());
@@ -99,10 +145,17 @@ fn csv_error(path: &Path, error: csv::Error) -> RecordError {
             pos,
             expected_len,
             len,
-        } => format!(
-            "row {} has {len} cells, the header has {expected_len}",
-            row(pos)
-        ),
+        } => {
+            let comma = if len > expected_len {
+                "; write decimal points, not commas"
+            } else {
+                ""
+            };
+            format!(
+                "row {} has {len} cells, the header has {expected_len}{comma}",
+                row(pos)
+            )
+        }
         csv::ErrorKind::Utf8 { pos, err } => format!("row {}: {err}", row(pos)),
         other => format!("{other:?}"),
     };
@@ -112,43 +165,57 @@ fn csv_error(path: &Path, error: csv::Error) -> RecordError {
 
 /// Number of inputs and outputs that a header names: each of t, u…, y… once and without gaps.
 fn channels(header: &csv::StringRecord) -> Result<(usize, usize), String> {
-    let count = |letter: char| header.iter().filter(|n| n.starts_with(letter)).count();
+    if header.iter().all(str::is_empty) {
+        return Err("the file is empty; a record needs a header t,u,y and rows".into());
+    }
+    for (separator, name) in [(';', "semicolons"), ('\t', "tabs")] {
+        if header.len() == 1 && header[0].contains(separator) {
+            return Err(format!(
+                "columns are separated by {name}; separate them by commas, and write decimal points"
+            ));
+        }
+    }
+    let names: Vec<&str> = header.iter().collect();
+    let count = |letter: char| names.iter().filter(|n| n.starts_with(letter)).count();
     let (inputs, outputs) = (count('u'), count('y'));
     let mut expected = vec!["t".to_owned()];
     expected.extend(column_names("u", inputs));
     expected.extend(column_names("y", outputs));
-    let known = |name: &str| {
-        expected.iter().any(|e| e == name)
-            || [("u", inputs), ("y", outputs)]
-                .iter()
-                .any(|(l, n)| *n == 1 && name == format!("{l}1"))
-    };
-    if let Some(name) = header.iter().find(|name| !known(name)) {
+    let rename = || format!("rename the columns to {}", excerpt(&expected.join(",")));
+    if let Some((_, name)) = (names.iter().enumerate()).find(|(j, name)| names[..*j].contains(name))
+    {
+        return Err(match *name {
+            "t" => "column t appears twice; remove one".into(),
+            name => format!("column \"{}\" appears twice; {}", quoted(name), rename()),
+        });
+    }
+    let channel =
+        |name: &str| name.starts_with(['u', 'y']) && name[1..].chars().all(|c| c.is_ascii_digit());
+    if let Some(name) = names.iter().find(|name| **name != "t" && !channel(name)) {
         return Err(format!(
             "column \"{}\" is not part of a record; name the columns t, u or u1,u2,…, y or y1,y2,… and remove others",
-            excerpt(name)
+            quoted(name)
         ));
     }
-    if header.iter().all(str::is_empty) {
-        return Err("the file is empty; a record needs a header t,u,y and rows".into());
-    }
-    if header.len() != expected.len() || !header.iter().any(|name| name == "t") {
+    let known = |name: &str| {
+        expected.iter().any(|e| e == name)
+            || (name == "u1" && inputs == 1)
+            || (name == "y1" && outputs == 1)
+    };
+    if let Some(name) = names.iter().find(|name| !known(name)) {
         return Err(format!(
-            "columns {} are not {}; t and each channel must stand there once",
-            excerpt(&header.iter().collect::<Vec<_>>().join(",")),
-            excerpt(&expected.join(","))
+            "column \"{}\" is out of order; {}",
+            excerpt(name),
+            rename()
         ));
     }
-    let mut names: Vec<_> = header.iter().collect();
-    names.sort_unstable();
-    names.dedup();
-    if names.len() != header.len() {
-        return Err("a column stands there twice; give each its own name".into());
+    if !names.contains(&"t") {
+        return Err("column t is missing; add the time of each row in seconds".into());
     }
     Ok((inputs, outputs))
 }
 
-/// Where a column goes: t first, then inputs, then outputs.
+/// Index of a column in a row: t first, then inputs, then outputs.
 fn place(name: &str, inputs: usize) -> usize {
     let number = name[1..].parse::<usize>().unwrap_or(1);
     match name.as_bytes()[0] {
@@ -162,6 +229,14 @@ fn place(name: &str, inputs: usize) -> usize {
 fn uniform_step(path: &Path, t: Vec<f64>) -> Result<f64, RecordError> {
     let span = t[t.len() - 1] - t[0];
     let dt = span / (t.len() - 1) as f64;
+    if let Some(k) = (1..t.len()).find(|&k| t[k] <= t[k - 1]) {
+        let problem = format!(
+            "{} s follows {} s; time must increase: sort the rows, remove repeated ones",
+            t[k],
+            t[k - 1]
+        );
+        return Err(RecordError::cell(path, k + 2, "t", problem));
+    }
     let off = |k: usize, expected: f64| {
         let problem = format!(
             "{} s where {expected} s was expected; time must increase by the same step to 1e-3 of it: resample the record",
@@ -169,10 +244,6 @@ fn uniform_step(path: &Path, t: Vec<f64>) -> Result<f64, RecordError> {
         );
         RecordError::cell(path, k + 2, "t", problem)
     };
-    if let Some(k) = (1..t.len()).find(|&k| t[k] <= t[k - 1]) {
-        let step = if k > 1 { t[1] - t[0] } else { dt.abs() };
-        return Err(off(k, t[k - 1] + step));
-    }
     // A single gap shifts the mean step: name the row where the steps first change, not where they add up.
     let first = t[1] - t[0];
     if let Some(k) = (1..t.len()).find(|&k| (t[k] - t[0] - k as f64 * dt).abs() > 1e-3 * dt) {

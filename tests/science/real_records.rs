@@ -1,5 +1,6 @@
 //! Measured records, where they are at hand: `../shared/data`, or the folder that `TRUETWIN_DATA` names.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use truetwin::diagnose::{Decision, DiagnoseSettings, Diagnosis, FreeRuns, Verdict, diagnose};
 use truetwin::estimator::{EstimateOptions, PretrainOptions, pretrain};
@@ -9,17 +10,17 @@ use truetwin::record::{Record, Signal, read_record};
 use truetwin::report::gap_pictures;
 use truetwin::study::{Study, StudyFile};
 
+/// The path of a file of measured data; says in the output of the tests, past libtest's capture, whether it is at hand.
 fn data(name: &str) -> Option<PathBuf> {
     let folder = std::env::var_os("TRUETWIN_DATA").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
         PathBuf::from,
     );
     let path = folder.join(name);
-    if !path.exists() {
-        println!("skipped: no {}", path.display());
-        return None;
-    }
-    Some(path)
+    let found = path.exists();
+    let what = if found { "ran with" } else { "skipped, no" };
+    writeln!(std::io::stderr(), "real records: {what} {}", path.display()).unwrap();
+    found.then_some(path)
 }
 
 /// The study of the real tanks.
@@ -96,12 +97,12 @@ fn the_cascaded_tanks_lack_their_overflow() {
     assert_eq!(found.verdict, Verdict::StructuralGap);
     assert!(
         found
-            .which
+            .cause
             .accepted
             .iter()
             .any(|key| key == "state-ceiling@h1"),
         "{:?}",
-        found.which.accepted
+        found.cause.accepted
     );
     let shrinkage = found.shrinkage.as_ref().unwrap();
     let (before, after) = (shrinkage.before, shrinkage.after.unwrap());
@@ -128,7 +129,7 @@ fn what_the_cascaded_tanks_lack_is_explored() {
     };
     let silent = Progress::silent();
     let found = diagnose(&study, &[record], Some(&validation), &settings, &silent).unwrap();
-    assert_eq!(found.which.decision, Decision::NoneOfThese);
+    assert_eq!(found.cause.decision, Decision::NoneOfThese);
     let discovery = found.discovery.as_ref().expect("no regression");
     println!(
         "{}: explained {:.2}",
@@ -137,7 +138,7 @@ fn what_the_cascaded_tanks_lack_is_explored() {
     for term in &discovery.terms {
         println!("{term:?}");
     }
-    assert_eq!(found.place.target.as_ref(), Some(&discovery.equation));
+    assert_eq!(found.location.target.as_ref(), Some(&discovery.equation));
     assert!(["h1", "h2"].contains(&discovery.equation.as_str()));
     assert!(discovery.explained > 0.1 && discovery.terms[0].inclusion > 0.3);
 }

@@ -3,14 +3,16 @@
 mod location;
 
 pub use location::{
-    Band, Cell, Channel, Equation, Lag, Maps, Onset, Region, TargetShare, TermRange, Where, Window,
+    Band, Cell, Channel, Equation, Lag, Location, Maps, Onset, Region, TargetShare, TermRange,
+    Window,
 };
 
 use crate::record::{Drive, Signal};
 use crate::twin::Interval;
+use serde::ser::{SerializeStruct, Serializer};
 use serde::{Deserialize, Serialize};
 
-/// Which kind of gap there is.
+/// Kind of gap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -23,7 +25,7 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// As in reports.
+    /// Id in reports.
     pub fn id(self) -> &'static str {
         match self {
             Self::NoGap => "no-gap",
@@ -33,7 +35,7 @@ impl Verdict {
     }
 }
 
-/// What is said about causes.
+/// Decision about the cause.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Decision {
@@ -50,7 +52,7 @@ pub enum Decision {
 }
 
 impl Decision {
-    /// As in reports.
+    /// Id in reports.
     pub fn id(self) -> &'static str {
         match self {
             Self::Named => "named",
@@ -62,14 +64,14 @@ impl Decision {
     }
 }
 
-/// Whether the twin, refitted, can have made the record.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Structural test: can the refitted twin have made the record?
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Detection {
     /// p-value of the structural test; with a validation record, of rank and e-value together.
     pub p_value: f64,
     /// Level of the test.
     pub alpha: f64,
-    /// How far the record stands out of simulations, in their standard deviations.
+    /// Distance of the record from simulations, in their standard deviations.
     pub statistic: f64,
     /// p-value by the record alone.
     pub rank_p_value: f64,
@@ -78,7 +80,7 @@ pub struct Detection {
 }
 
 /// One parameter of the twin.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FittedParameter {
     /// Name.
     pub name: String,
@@ -90,14 +92,14 @@ pub struct FittedParameter {
     pub refitted: f64,
     /// Standard deviation by information and weak prior.
     pub std_error: f64,
-    /// Whether the record knows it better than the prior.
+    /// True where the record determines it better than the prior.
     pub identified: bool,
     /// The prior box.
     pub prior: Interval,
 }
 
 /// An unknown start, noise level or magnitude that the study itself estimates.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FittedNuisance {
     /// State, output or magnitude.
     pub name: String,
@@ -110,7 +112,7 @@ pub struct FittedNuisance {
 }
 
 /// One listed effect, fitted.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EffectFit {
     /// Id of the effect.
     pub id: String,
@@ -119,10 +121,11 @@ pub struct EffectFit {
     /// Among listed effects and catch-alls.
     pub probability: f64,
     /// Names and values, those held at an infinite off value included.
+    #[serde(serialize_with = "as_map")]
     pub magnitudes: Vec<(String, f64)>,
     /// Nats over the twin, on the record and, if there is one, the validation record.
     pub log_score_gain: f64,
-    /// Of its scan, family-wise.
+    /// Family-wise p-value of its scan.
     pub p_value: Option<f64>,
 }
 
@@ -133,61 +136,70 @@ impl EffectFit {
     }
 }
 
-/// Which effect the twin lacks.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Which {
-    /// What is decided.
+/// Cause of the gap: the effect that the twin lacks.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Cause {
+    /// The decision.
     pub decision: Decision,
     /// Best first.
     pub effects: Vec<EffectFit>,
-    /// What was added to the twin.
+    /// Effects added to the twin.
     pub accepted: Vec<String>,
     /// Rivals that the data cannot tell apart, the accepted among them.
     pub class: Vec<String>,
     /// p-value of the structural test with the accepted, or else the best, effect added.
     pub unexplained_p_value: Option<f64>,
-    /// The catch-all that beats every listed effect.
-    pub catch_all: Option<String>,
     /// A record that would split the class; none where there is no class, or no input splits it.
     pub next_input: Option<NextInput>,
+    /// The catch-all that beats every listed effect.
+    pub catch_all: Option<String>,
 }
 
 /// A record to measure next, so that rivals are told apart.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "file", rename = "next-input.csv")]
 pub struct NextInput {
-    /// Inputs and length of it.
-    pub drive: Drive,
-    /// What kind of input it is.
+    /// Kind of input.
     pub kind: String,
     /// The rivals, as `id@target`.
     pub rivals: Vec<String>,
-    /// Of how many simulated pairs of the present record and such a next one the rival that made them stood out.
+    /// Inputs and length of it.
+    #[serde(flatten, serialize_with = "size")]
+    pub drive: Drive,
+    /// Simulated pairs of the present record and such a next one: those whose true rival stood out, and all.
+    #[serde(serialize_with = "share_of")]
     pub split: [u64; 2],
     /// The same with the present inputs measured once more.
+    #[serde(serialize_with = "share_of")]
     pub again: [u64; 2],
 }
 
-/// What a regression of the missing term found: exploratory, not a test.
-#[derive(Debug, Clone, PartialEq)]
+/// Regression of the missing term: exploratory, not a test.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Discovery {
     /// The equation that lacks the term: a state or an output.
+    #[serde(flatten, serialize_with = "exploratory")]
     pub equation: String,
     /// Terms by how often resampled records include them.
     pub terms: Vec<Term>,
     /// Share of the variance of the smoothed missing term that the terms explain.
     pub explained: f64,
     /// Instants of the first record, in seconds.
+    #[serde(skip)]
     pub times: Vec<f64>,
     /// The smoothed missing term there.
+    #[serde(skip)]
     pub missing: Vec<f64>,
     /// Its standard deviation.
+    #[serde(skip)]
     pub std_error: Vec<f64>,
-    /// What the regression says there.
+    /// The regression there.
+    #[serde(skip)]
     pub fitted: Vec<f64>,
 }
 
 /// One term of a regression.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Term {
     /// Such as `h1²` or `u`.
     pub name: String,
@@ -200,7 +212,7 @@ pub struct Term {
 }
 
 /// The smallest magnitude of a listed effect that records like these reveal in 80 of 100 cases.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Visible {
     /// Id of the effect.
     pub id: String,
@@ -219,63 +231,68 @@ pub struct FreeRuns {
     pub times: Vec<f64>,
     /// Measured outputs.
     pub measured: Signal,
-    /// Of the twin, refitted.
+    /// Free run of the refitted twin.
     pub before: Option<Signal>,
-    /// With the accepted effects.
+    /// The same with the accepted effects.
     pub after: Option<Signal>,
 }
 
-/// Everything that a diagnosis found.
-#[derive(Debug, Clone)]
+/// Result of a diagnosis.
+#[derive(Debug, Clone, Serialize)]
+#[serde(tag = "schema", rename = "truetwin.gap/1")]
 pub struct Diagnosis {
     /// Name of the twin.
     pub twin: String,
-    /// Which kind of gap.
+    /// Kind of gap.
     pub verdict: Verdict,
     /// The test.
     pub detection: Detection,
     /// The twin's own parameters.
     pub parameters: Vec<FittedParameter>,
-    /// Everything else that was estimated.
+    /// All other estimates.
     pub nuisance: Vec<FittedNuisance>,
-    /// Where.
-    pub place: Where,
-    /// Which.
-    pub which: Which,
-    /// How far; none without held-out data.
+    /// Location of the gap.
+    #[serde(rename = "where")]
+    pub location: Location,
+    /// Cause of the gap.
+    #[serde(rename = "which")]
+    pub cause: Cause,
+    /// Extent on held-out data, if there are any.
     pub shrinkage: Option<Shrinkage>,
-    /// What the missing term depends on, where no listed effect is accepted.
+    /// Regression of the missing term, where no listed effect is accepted.
     pub discovery: Option<Discovery>,
-    /// What each listed effect would have had to be to be seen.
+    /// Smallest visible magnitude of each listed effect.
     pub power: Vec<Visible>,
-    /// Free runs beside the first record.
-    pub free_runs: FreeRuns,
-    /// Free runs beside the validation record.
-    pub validation_runs: Option<FreeRuns>,
-    /// Effects that this twin may lack and that were not looked at, as `id@target`.
-    pub not_tested: Vec<String>,
-    /// Explanations that were looked at: listed effects and catch-alls.
+    /// Number of explanations tested: listed effects and disturbances.
     pub candidates: usize,
+    /// Effects of this twin that were not tested, as `id@target`.
+    pub not_tested: Vec<String>,
     /// Wall-clock seconds.
     pub seconds: f64,
+    /// Free runs beside the first record.
+    #[serde(skip)]
+    pub free_runs: FreeRuns,
+    /// Free runs beside the validation record.
+    #[serde(skip)]
+    pub validation_runs: Option<FreeRuns>,
 }
 
 /// Free-run errors before and after, on held-out data.
 #[derive(Debug, Clone)]
 pub struct Shrinkage {
-    /// What is measured: [`Shrinkage::FREE_RUN`] or [`Shrinkage::LOG_SCORE`].
+    /// Measure: [`Shrinkage::FREE_RUN`] or [`Shrinkage::LOG_SCORE`].
     pub metric: &'static str,
-    /// Of the twin alone, θ refitted.
+    /// Error of the refitted twin alone.
     pub before: f64,
-    /// With the accepted effects.
+    /// The same with the accepted effects.
     pub after: Option<f64>,
-    /// What noise alone leaves: the median over records simulated from the accepted twin.
+    /// Error by noise alone: the median over records simulated from the accepted twin.
     pub floor: Option<f64>,
     /// (before − after)/(before − floor); none where the gap's own interval touches zero.
     pub closed: Option<f64>,
     /// 90 % of what draws of θ given all data close: the uncertainty of the share that the true effects close.
     pub interval: Option<[f64; 2]>,
-    /// Which data: `validation record` or `last third of the record`.
+    /// Held-out data: `validation record` or `last third of the record`.
     pub held_out: &'static str,
     /// The same error at the prior's centre or the estimator's first estimate, without any refit.
     pub unfitted: Option<f64>,
@@ -288,4 +305,59 @@ impl Shrinkage {
     pub const FREE_RUN: &str = "free-run NRMSE";
     /// Mean log density of a sample, for effects that move no free run.
     pub const LOG_SCORE: &str = "held-out log score";
+}
+
+impl Serialize for Shrinkage {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Controls {
+            unfitted: Option<f64>,
+            theta_only: f64,
+            placebo: Option<f64>,
+        }
+        let mut object = serializer.serialize_struct("Shrinkage", 8)?;
+        object.serialize_field("metric", self.metric)?;
+        object.serialize_field("before", &self.before)?;
+        object.serialize_field("after", &self.after)?;
+        object.serialize_field("floor", &self.floor)?;
+        object.serialize_field("closed", &self.closed)?;
+        object.serialize_field("interval", &self.interval)?;
+        object.serialize_field("held_out", self.held_out)?;
+        let controls = Controls {
+            unfitted: self.unfitted,
+            theta_only: self.before,
+            placebo: self.placebo,
+        };
+        object.serialize_field("controls", &controls)?;
+        object.end()
+    }
+}
+
+/// Writes names and values as one object.
+fn as_map<S: Serializer>(pairs: &[(String, f64)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(pairs.iter().map(|(name, value)| (name, value)))
+}
+
+/// Writes the length of a record.
+fn size<S: Serializer>(drive: &Drive, serializer: S) -> Result<S::Ok, S::Error> {
+    let mut object = serializer.serialize_struct("Size", 2)?;
+    object.serialize_field("samples", &drive.samples())?;
+    object.serialize_field("step", &drive.dt())?;
+    object.end()
+}
+
+/// Writes a count and the number of cases.
+fn share_of<S: Serializer>([count, of]: &[u64; 2], serializer: S) -> Result<S::Ok, S::Error> {
+    let mut object = serializer.serialize_struct("Count", 2)?;
+    object.serialize_field("count", count)?;
+    object.serialize_field("of", of)?;
+    object.end()
+}
+
+/// Marks a regression as exploratory.
+fn exploratory<S: Serializer>(equation: &str, serializer: S) -> Result<S::Ok, S::Error> {
+    let mut object = serializer.serialize_struct("Exploratory", 2)?;
+    object.serialize_field("exploratory", &true)?;
+    object.serialize_field("equation", equation)?;
+    object.end()
 }

@@ -7,6 +7,7 @@ use crate::estimator::recipe::PresetName;
 use crate::estimator::refine::Information;
 use crate::record::Record;
 use crate::twin::Role;
+use serde::Serialize;
 
 /// What may be chosen for an estimate.
 #[derive(Debug, Clone, Default)]
@@ -67,7 +68,7 @@ pub struct Estimate {
 }
 
 /// Wall-clock seconds of each stage; `None` for skipped ones.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 #[non_exhaustive]
 pub struct Seconds {
     /// Features and network.
@@ -85,7 +86,7 @@ pub struct Seconds {
 }
 
 /// A parameter that is estimated without being asked for.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Nuisance {
     /// State, output, or `id@target.magnitude`.

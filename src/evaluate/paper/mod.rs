@@ -49,5 +49,5 @@ pub use paper::{reference_projects, reference_studies};
 pub use run::Run;
 pub use scenario::{Benchmark, Scenario};
 use scenario::{Published, TestPoint};
-pub(crate) use score::{COVERAGE_LEVEL, MethodScore};
+pub(crate) use score::COVERAGE_LEVEL;
 pub use score::{Scores, score};

@@ -7,7 +7,7 @@ mod rows;
 mod show;
 
 pub(crate) use rows::Rows;
-pub(crate) use show::{check_names, excerpt, hidden, one_line, printable};
+pub(crate) use show::{check_names, excerpt, hidden, one_line, printable, quoted};
 
 use std::fs::File;
 use std::io::{self, Read};

@@ -28,6 +28,16 @@ pub(crate) fn excerpt(text: &str) -> String {
     one_line(text, QUOTED)
 }
 
+/// The beginning of a name or cell as it stands: hidden characters and unusual spaces as `\u{…}`.
+pub(crate) fn quoted(text: &str) -> String {
+    let odd = |c: char| hidden(c) || (c.is_whitespace() && c != ' ');
+    let shown = |c: char| match odd(c) {
+        true => c.escape_unicode().to_string(),
+        false => c.to_string(),
+    };
+    excerpt(&text.chars().take(QUOTED + 1).map(shown).collect::<String>())
+}
+
 /// As [`excerpt`], with `most` characters: for messages of parsers, which list what they know.
 pub(crate) fn one_line(text: &str, most: usize) -> String {
     let (mut line, mut length, mut space) = (String::new(), 0, false);
@@ -94,6 +104,7 @@ mod tests {
         assert_eq!(excerpt(&"ä".repeat(500)).chars().count(), QUOTED + 2);
         assert_eq!(excerpt("a\u{202e}b"), "a b");
         assert_eq!(excerpt(&" ".repeat(500)), "");
+        assert_eq!(quoted("t\u{feff}1\u{a0}0"), "t\\u{feff}1\\u{a0}0");
     }
 
     #[test]

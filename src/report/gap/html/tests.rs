@@ -15,13 +15,13 @@ fn cases() -> Vec<Diagnosis> {
     let mut parameter = no_gap.clone();
     parameter.verdict = Verdict::ParameterGap;
     let mut class = named.clone();
-    class.which.decision = Decision::Class;
-    class.which.class = vec!["cubic-stiffness@x2".into(), "power-law@x2".into()];
+    class.cause.decision = Decision::Class;
+    class.cause.class = vec!["cubic-stiffness@x2".into(), "power-law@x2".into()];
     let mut none = named.clone();
-    none.which.decision = Decision::NoneOfThese;
-    none.which.accepted.clear();
-    none.which.class.clear();
-    none.which.catch_all = Some("x2".into());
+    none.cause.decision = Decision::NoneOfThese;
+    none.cause.accepted.clear();
+    none.cause.class.clear();
+    none.cause.catch_all = Some("x2".into());
     let mut short = named.clone();
     short.shrinkage = None;
     short.validation_runs = None;
@@ -116,7 +116,7 @@ fn every_section_is_there_under_every_verdict() {
     }
 }
 
-/// What the JSON says in numbers, the page says too.
+/// The page has the numbers of the JSON.
 #[test]
 fn the_numbers_of_the_json_are_on_the_page() {
     use crate::report::digits::{bare, chance, error, percent, probability, short};
@@ -180,9 +180,9 @@ fn each_answer_says_what_to_do_with_it() {
         "Use the twin with the refitted parameters",
         "Add cubic-stiffness@x2 to the twin",
         "Take the refitted parameters",
-        "Tell the rivals apart (cubic-stiffness@x2, power-law@x2)",
+        "Separate the rivals (cubic-stiffness@x2, power-law@x2)",
         "examples/own_effect.rs",
-        "Too short to hold anything back: no share",
+        "No share of the gap closed: the record is too short",
     ]) {
         let page = gap_html(&oscillator(), diagnosis);
         assert!(page.contains(expected), "{expected}");
@@ -197,28 +197,28 @@ fn each_answer_says_what_to_do_with_it() {
 fn every_part_of_the_answer_has_its_place() {
     let class = gap_html(&tanks(), &made::tanks_class());
     for text in [
-        "Fitted to all before it, the twin foresees each stretch until 612 s; there y departs (p = 0.012).",
-        "With state-ceiling@h1 added: no window stands out.",
+        "Fitted to all earlier samples, the twin predicts each stretch until 612 s; from there on y deviates (p = 0.012).",
+        "With state-ceiling@h1 added: no window is significant.",
         "<title>Windows of time</title>",
         ">onset 612 s<",
-        "A disturbance in the rate of h1 follows the record best (93 %",
+        "A disturbance in the rate of h1 explains the record best (93 %",
         ">93 %, p = 0.002: rate of h1 in V/s<",
         ">h2 in V<",
         ">y on the past of u<",
         ">40.0 … 77.5 s<",
         ">0.00625 … 0.0125 Hz<",
-        "One class: not told apart by these data",
+        "One class: not separated by this record",
         "rival, same class",
         "next-input.csv, beside this page, holds steps over the whole range",
-        "18 of 20 simulated pairs",
-        "again, 6 of 20",
+        "in 18 of 20 cases",
+        "again do so in 6 of 20",
         "<title>The input to measure with next</title>",
         "measure the record below",
-        "log E 31.2; above 3.69 it would be enough alone",
-        "Not tested, left out by the call, by the study, or because no filter models them: outliers@sensor",
+        "log E 31.2; above 3.69 it suffices without the rank",
+        "Not tested (excluded by the call or the study, or without a filter model): outliers@sensor",
         "<td class=\"n\">5.20 V</td>",
-        "<td class=\"n\">none in reach</td>",
-        "1 of 4 listed effects could not have been seen",
+        "<td class=\"n\">not detectable</td>",
+        "1 of 4 listed effects are not detectable",
     ] {
         assert!(class.contains(text), "{text}");
     }
@@ -226,7 +226,7 @@ fn every_part_of_the_answer_has_its_place() {
     let none = gap_html(&oscillator(), &made::oscillator_none());
     for text in [
         "Exploratory, not a test",
-        "what the rate of x2 lacks",
+        "missing term of the rate of x2",
         "explain 83 % of its variance",
         ">98 %, −0.620 (−0.744 to −0.496)<",
         "± 1 standard deviation",
@@ -235,7 +235,7 @@ fn every_part_of_the_answer_has_its_place() {
         assert!(none.contains(text), "{text}");
     }
     let no_gap = gap_html(&oscillator(), &made::oscillator_no_gap());
-    assert!(no_gap.contains("What this record could have revealed"));
+    assert!(no_gap.contains("Detectable magnitudes"));
     let (parameters, place) = (
         no_gap.find("<section id=\"parameters"),
         no_gap.find("<section id=\"where"),
@@ -249,9 +249,9 @@ fn every_part_of_the_answer_has_its_place() {
 #[test]
 fn a_twin_without_inputs_is_told_to_measure_instants() {
     let mut diagnosis = made::oscillator_none();
-    diagnosis.which.next_input = made::tanks_class().which.next_input;
+    diagnosis.cause.next_input = made::tanks_class().cause.next_input;
     let page = gap_html(&oscillator(), &diagnosis);
-    assert!(page.contains("the file holds the instants alone"));
+    assert!(page.contains("the file holds only the time column"));
     assert!(!page.contains("The input to measure with next"));
 }
 
@@ -260,7 +260,7 @@ fn absurd_numbers_and_hostile_names_stay_short_and_harmless() {
     let mut diagnosis = diagnoses()[1].clone();
     assert_eq!(diagnosis.verdict, Verdict::StructuralGap);
     diagnosis.twin = "<script>alert(1)</script>".into();
-    diagnosis.which.effects.push(EffectFit {
+    diagnosis.cause.effects.push(EffectFit {
         id: "a&b".into(),
         target: "\"x\"".into(),
         probability: 1e-300,
@@ -293,17 +293,17 @@ fn hostile_names_are_text_on_the_page() {
         for parameter in &mut diagnosis.parameters {
             (parameter.name, parameter.unit) = (hostile(), hostile());
         }
-        diagnosis.place.target = diagnosis.place.target.as_ref().map(|_| hostile());
-        for window in &mut diagnosis.place.maps.windows {
+        diagnosis.location.target = diagnosis.location.target.as_ref().map(|_| hostile());
+        for window in &mut diagnosis.location.maps.windows {
             window.channel = hostile();
         }
-        for region in &mut diagnosis.place.maps.regions {
+        for region in &mut diagnosis.location.maps.regions {
             region.variable = hostile();
         }
-        for effect in &mut diagnosis.which.effects {
+        for effect in &mut diagnosis.cause.effects {
             effect.target = hostile();
         }
-        for key in (diagnosis.which.accepted.iter_mut()).chain(&mut diagnosis.which.class) {
+        for key in (diagnosis.cause.accepted.iter_mut()).chain(&mut diagnosis.cause.class) {
             *key = hostile();
         }
         diagnosis.not_tested = vec![hostile()];

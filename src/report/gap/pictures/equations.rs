@@ -1,4 +1,4 @@
-//! Where in the equations: what each would have to gain or lose, by ranges of states and inputs.
+//! Missing terms of the equations by ranges of states and inputs.
 
 use crate::diagnose::{Diagnosis, Equation};
 use crate::report::chart::{Facet, FacetRow, Multiples, Step};
@@ -12,7 +12,7 @@ const SHOWN: usize = 3;
 /// The mean missing term of the most probable equations by ranges of states and inputs; `None` where none was looked for.
 pub fn equations(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
     let units = Units::of(study);
-    let with_term = || (diagnosis.place.equations.iter()).filter(|e| !e.term.is_empty());
+    let with_term = || (diagnosis.location.equations.iter()).filter(|e| !e.term.is_empty());
     let first = with_term().next()?;
     let rows = (with_term().take(SHOWN))
         .map(|equation| FacetRow {
@@ -27,7 +27,7 @@ pub fn equations(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
         })
         .collect();
     let picture = Multiples {
-        title: "What the equations lack".into(),
+        title: "Missing terms of the equations".into(),
         description: format!(
             "Mean missing term by ranges of states and inputs; most probable in {} with {}.",
             units.equation(&first.equation),

@@ -1,4 +1,4 @@
-//! Where in time: windows of all outputs, before and after the accepted effects.
+//! Windows of time of all outputs, before and after the accepted effects.
 
 use super::windows::{largest, onset, spans};
 use crate::diagnose::{Diagnosis, Maps, Onset};
@@ -9,15 +9,15 @@ use crate::report::digits::{percent, short};
 ///
 /// Each cell has its share; frames say which cells stand out.
 pub fn time(diagnosis: &Diagnosis) -> Option<String> {
-    let maps = &diagnosis.place.maps;
+    let maps = &diagnosis.location.maps;
     let clearest = maps.windows.first()?;
-    let after = (diagnosis.place.after.as_ref()).filter(|m| !m.windows.is_empty());
+    let after = (diagnosis.location.after.as_ref()).filter(|m| !m.windows.is_empty());
     let full = largest(maps).max(after.map_or(0.0, largest));
     let alpha = diagnosis.detection.alpha;
     let mut groups = of_records(
         "twin, refitted",
         maps,
-        diagnosis.place.onset.as_ref(),
+        diagnosis.location.onset.as_ref(),
         alpha,
         full,
     );
@@ -32,12 +32,15 @@ pub fn time(diagnosis: &Diagnosis) -> Option<String> {
     }
     let windows = |maps: &Maps| maps.notable().windows.len();
     let after = after.map_or(String::new(), |after| {
-        format!("; with the effect added {} stand out", windows(after))
+        format!(
+            "; with the effect added, {} are significant",
+            windows(after)
+        )
     });
     let map = HeatMap {
         title: "Windows of time".into(),
         description: format!(
-            "{} of {} windows stand out, the clearest of {} from {} to {} s with {} of the gap{after}.",
+            "{} of {} windows are significant, the clearest in {} from {} to {} s with {} of the gap{after}.",
             windows(maps),
             maps.windows.len(),
             clearest.channel,
@@ -51,9 +54,9 @@ pub fn time(diagnosis: &Diagnosis) -> Option<String> {
     Some(map.svg())
 }
 
-/// What the second map is of.
+/// Returns the label of the second map.
 fn with_effects(diagnosis: &Diagnosis) -> String {
-    match diagnosis.which.accepted.as_slice() {
+    match diagnosis.cause.accepted.as_slice() {
         [] => "with the best explanation added".into(),
         accepted => format!("with {} added", accepted.join(" and ")),
     }
