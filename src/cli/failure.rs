@@ -10,7 +10,7 @@ use crate::feature::FeatureError;
 use crate::network::NetworkError;
 use crate::record::RecordError;
 use crate::storage::work::{Team, TeamError, WorkError};
-use crate::study::{PlanError, StudyError};
+use crate::study::StudyError;
 use crate::twin::{SimulationError, TwinError};
 use std::fmt::Display;
 use std::path::Path;
@@ -158,7 +158,7 @@ macro_rules! studies {
         })*
     };
 }
-studies!(FeatureError, PlanError, StudyError);
+studies!(FeatureError, StudyError);
 
 impl From<EvaluateError> for Failure {
     fn from(error: EvaluateError) -> Self {

@@ -4,7 +4,7 @@ use crate::estimator::bank::{Draw, Draws, FeatureSimulator};
 use crate::estimator::error::EstimatorError;
 use crate::feature::FeatureRecipe;
 use crate::progress::Stage;
-use crate::study::{DriveSource, Study, StudyError};
+use crate::study::{DriveSource, Study};
 use crate::twin::{Noise, ParameterSpace};
 use std::borrow::Cow;
 use std::ops::Range;
@@ -45,7 +45,7 @@ impl Prior {
         Ok(Self {
             simulator: FeatureSimulator::new(study.twin().clone(), features)?,
             space: study.twin().parameters(),
-            drives: study.drives().map_err(StudyError::from)?,
+            drives: study.drives()?,
         })
     }
 
