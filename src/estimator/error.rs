@@ -1,8 +1,7 @@
 //! The error of the estimator's room.
 
 use crate::feature::FeatureError;
-use crate::fit::OptimiseError;
-use crate::math::WhiteningError;
+use crate::math::MathError;
 use crate::network::NetworkError;
 use crate::progress::Cancelled;
 use crate::setting::SettingError;
@@ -79,13 +78,13 @@ pub enum EstimatorError {
     #[error(
         "the features simulated at the estimate cannot be whitened: {0}; a twin without noise has no statistics: give it noise levels ([noise] in a study)"
     )]
-    Whitening(WhiteningError),
+    Whitening(MathError),
     /// The record does not determine the parameters.
     #[error("{0}")]
     Undetermined(String),
     /// A numerical search failed.
     #[error(transparent)]
-    Search(#[from] OptimiseError),
+    Search(#[from] MathError),
     /// The cloud cannot be drawn.
     #[error("{0}")]
     Cloud(String),

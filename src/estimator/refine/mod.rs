@@ -54,10 +54,8 @@ pub use settings::RefineSettings;
 use crate::estimator::bank::FeatureSimulator;
 use crate::estimator::error::EstimatorError;
 use crate::estimator::gate::GateSettings;
-use crate::fit::{
-    Bounds, EvaluationError, GaussNewton, OptimiseError, ResidualProblem, space_filling,
-};
-use crate::math::Whitening;
+use crate::fit::{Bounds, GaussNewton, ResidualProblem, space_filling};
+use crate::math::{MathError, Whitening};
 use crate::progress::Progress;
 use crate::record::Drive;
 use crate::twin::{Noise, ParameterSpace};
@@ -105,7 +103,7 @@ impl Refined {
 fn is_fatal(error: &EstimatorError) -> bool {
     use EstimatorError::{Hopeless, Search, Undetermined, Whitening};
     match error {
-        Search(error) => matches!(error, OptimiseError::Fatal(_)),
+        Search(error) => matches!(error, MathError::Fatal(_)),
         error => !matches!(error, Hopeless { .. } | Undetermined(_) | Whitening(_)),
     }
 }
@@ -373,15 +371,16 @@ impl Refinement<'_> {
 }
 
 /// An evaluation that failed outside of a search.
-fn not_evaluated(error: EvaluationError) -> OptimiseError {
+fn not_evaluated(error: MathError) -> MathError {
     match error {
-        EvaluationError::Fatal(error) => OptimiseError::Fatal(error),
-        rejected => OptimiseError::Start(rejected.into()),
+        MathError::Fatal(error) => MathError::Fatal(error),
+        MathError::Rejected(_) => MathError::Start(error.into()),
+        other => MathError::fatal(other),
     }
 }
 
 /// The bounds of a space, as the minimiser wants them.
-fn bounds(space: &ParameterSpace) -> Result<Bounds, OptimiseError> {
+fn bounds(space: &ParameterSpace) -> Result<Bounds, MathError> {
     let side = |of: fn(crate::twin::Interval) -> f64| {
         DVector::from_iterator(space.len(), space.bounds().into_iter().map(of))
     };
@@ -389,7 +388,7 @@ fn bounds(space: &ParameterSpace) -> Result<Bounds, OptimiseError> {
         side(crate::twin::Interval::low),
         side(crate::twin::Interval::high),
     )
-    .map_err(|error| OptimiseError::Fatal(error.into()))
+    .map_err(|error| MathError::Fatal(error.into()))
 }
 
 /// θ_init, then space-filling points in the bounds.

@@ -2,8 +2,8 @@
 
 use crate::estimator::bank::FeatureSimulator;
 use crate::estimator::error::EstimatorError;
-use crate::fit::{EvaluationError, ResidualProblem};
-use crate::math::{DifferenceError, Stencil, Whitening};
+use crate::fit::ResidualProblem;
+use crate::math::{MathError, Stencil, Whitening};
 use crate::progress::Progress;
 use crate::record::Drive;
 use crate::twin::Noise;
@@ -29,7 +29,7 @@ pub(super) struct FeatureResidual<'a> {
     pub upper: Vec<f64>,
 }
 
-impl From<EstimatorError> for EvaluationError {
+impl From<EstimatorError> for MathError {
     fn from(error: EstimatorError) -> Self {
         match error {
             EstimatorError::Rejected(reason) => Self::rejected(reason),
@@ -38,16 +38,10 @@ impl From<EstimatorError> for EvaluationError {
     }
 }
 
-impl From<DifferenceError> for EvaluationError {
-    fn from(error: DifferenceError) -> Self {
-        Self::fatal(error)
-    }
-}
-
 impl FeatureResidual<'_> {
     /// f̄(θ).
-    pub fn mean_features(&self, theta: &DVector<f64>) -> Result<DVector<f64>, EvaluationError> {
-        self.progress.checkpoint().map_err(EvaluationError::fatal)?;
+    pub fn mean_features(&self, theta: &DVector<f64>) -> Result<DVector<f64>, MathError> {
+        self.progress.checkpoint().map_err(MathError::fatal)?;
         let noise = |i| self.noise.sample(i);
         let mean =
             (self.simulator).mean_features(theta.as_slice(), self.drive, noise, self.seeds)?;
@@ -55,21 +49,21 @@ impl FeatureResidual<'_> {
     }
 
     /// ∂f/∂θ of each seed by itself.
-    pub fn jacobians(&self, theta: &DVector<f64>) -> Result<Vec<DMatrix<f64>>, EvaluationError> {
+    pub fn jacobians(&self, theta: &DVector<f64>) -> Result<Vec<DMatrix<f64>>, MathError> {
         let stencil = Stencil::new(theta.as_slice(), &self.steps, &self.lower, &self.upper)?;
         let one = |seed: u64| {
-            self.progress.checkpoint().map_err(EvaluationError::fatal)?;
+            self.progress.checkpoint().map_err(MathError::fatal)?;
             stencil.jacobian(|point| {
                 let noise = self.noise.sample(seed);
                 let features = self.simulator.features(point, self.drive, noise)?;
-                Ok::<_, EvaluationError>(DVector::from_vec(features))
+                Ok::<_, MathError>(DVector::from_vec(features))
             })
         };
         (0..self.seeds as u64).into_par_iter().map(one).collect()
     }
 
     /// ∂f̄/∂θ: the same seeds on both sides of θ.
-    pub fn feature_jacobian(&self, theta: &DVector<f64>) -> Result<DMatrix<f64>, EvaluationError> {
+    pub fn feature_jacobian(&self, theta: &DVector<f64>) -> Result<DMatrix<f64>, MathError> {
         let stencil = Stencil::new(theta.as_slice(), &self.steps, &self.lower, &self.upper)?;
         let values: Vec<DVector<f64>> = (stencil.points().par_iter())
             .map(|point| self.mean_features(&DVector::from_column_slice(point)))
@@ -77,9 +71,8 @@ impl FeatureResidual<'_> {
         Ok(stencil.assemble(&values)?)
     }
 
-    fn whitening(&self) -> Result<&Whitening, EvaluationError> {
-        (self.whitening.as_ref())
-            .ok_or_else(|| EvaluationError::fatal("no covariance was simulated"))
+    fn whitening(&self) -> Result<&Whitening, MathError> {
+        (self.whitening.as_ref()).ok_or_else(|| MathError::fatal("no covariance was simulated"))
     }
 }
 
@@ -88,7 +81,7 @@ impl ResidualProblem for FeatureResidual<'_> {
         self.initial.len()
     }
 
-    fn residual(&self, theta: &DVector<f64>) -> Result<DVector<f64>, EvaluationError> {
+    fn residual(&self, theta: &DVector<f64>) -> Result<DVector<f64>, MathError> {
         let misfit = self
             .whitening()?
             .apply(&(self.mean_features(theta)? - self.observed));
@@ -97,7 +90,7 @@ impl ResidualProblem for FeatureResidual<'_> {
         Ok(DVector::from_iterator(misfit.len() + prior.len(), rows))
     }
 
-    fn jacobian(&self, theta: &DVector<f64>) -> Result<DMatrix<f64>, EvaluationError> {
+    fn jacobian(&self, theta: &DVector<f64>) -> Result<DMatrix<f64>, MathError> {
         let whitened = self
             .whitening()?
             .apply_columns(&self.feature_jacobian(theta)?);
