@@ -3,7 +3,6 @@
 use super::output;
 use crate::diagnose::DiagnoseError;
 use crate::effect::EffectError;
-use crate::effect::EffectFileError;
 use crate::estimator::EstimatorError;
 use crate::evaluate::EvaluateError;
 use crate::feature::FeatureError;
@@ -140,7 +139,6 @@ macro_rules! users {
 }
 users!(
     EffectError,
-    EffectFileError,
     RecordError,
     SimulationError,
     TeamError,

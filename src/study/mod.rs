@@ -9,7 +9,9 @@ pub use error::StudyError;
 pub use file::{Library, RecordTable, StudyFile};
 pub use plan::{DriveSource, InputPlan, Levels, RecordPlan};
 
-use crate::effect::{Effects, UnmodelledEffect, augment, given_magnitudes};
+use crate::effect::{
+    Catalogue, Effect, EffectKey, EffectKind, EffectPattern, augment, given_magnitudes,
+};
 use crate::record::Record;
 use crate::setting::did_you_mean;
 use crate::twin::{Adaptation, DigitalTwin, Role, Twin, TwinError, adapt, check_twin, fix};
@@ -35,8 +37,8 @@ pub struct Study {
     plan: RecordPlan,
     file: StudyFile,
     demo: Option<Arc<Record>>,
-    /// Beside those of the library.
-    own_effects: Effects,
+    /// The library's effects and the study's own.
+    catalogue: Catalogue,
 }
 
 impl std::fmt::Debug for Study {
@@ -69,17 +71,15 @@ impl Study {
                 ..StudyFile::default()
             },
             demo: None,
-            own_effects: Effects::new(),
+            catalogue: Catalogue::default(),
         })
     }
 
-    /// With effects that the twin may lack and the library does not have, one for each target.
+    /// Adds effects that the twin may lack and the library does not have. Each is offered at every place that it can stand at,
+    /// and files know its id.
     #[must_use]
-    pub fn with_effects(
-        mut self,
-        effects: impl IntoIterator<Item = Arc<dyn UnmodelledEffect>>,
-    ) -> Self {
-        self.own_effects.extend(effects);
+    pub fn with_effects(mut self, kinds: impl IntoIterator<Item = EffectKind>) -> Self {
+        self.catalogue = kinds.into_iter().fold(self.catalogue, Catalogue::with);
         self
     }
 
@@ -100,7 +100,7 @@ impl Study {
             });
         }
         // Boxes of magnitudes apply once the effects are there; all others before.
-        let of_effects = |name: &str| name.contains('@');
+        let of_effects = |name: &str| name.parse::<EffectKey>().is_ok();
         let part = |boxes: &BTreeMap<String, _>, effects: bool| {
             (boxes.iter())
                 .filter(|(name, _)| of_effects(name) == effects)
@@ -128,9 +128,12 @@ impl Study {
             bounds: part(&file.bounds, true),
             ..Adaptation::default()
         };
+        let effects = (file.effect.iter())
+            .map(|entry| self.catalogue.resolve(entry))
+            .collect::<Result<Vec<_>, _>>()?;
         let mut twin = adapt(self.base.clone(), &first, step)
-            .map_err(|error| self.naming_magnitudes(error, file))?;
-        twin = augment(twin, file.effect.clone())?;
+            .map_err(|error| self.naming_magnitudes(error, &effects))?;
+        twin = augment(twin, effects.clone())?;
         if second != Adaptation::default() {
             twin = adapt(twin, &second, step)?;
         }
@@ -141,7 +144,7 @@ impl Study {
             parameter.check_value(value).map_err(fixed)?;
         }
         let mut held = file.fixed.clone();
-        held.extend(given_magnitudes(&file.effect));
+        held.extend(given_magnitudes(&effects));
         twin = fix(twin, &held).map_err(fixed)?;
         let RecordTable {
             step,
@@ -161,8 +164,8 @@ impl Study {
     }
 
     /// Adds the magnitudes of the file's effects to the names that an unknown name in `[prior]` or `[bounds]` is told.
-    fn naming_magnitudes(&self, error: TwinError, file: &StudyFile) -> TwinError {
-        match (error, augment(self.base.clone(), file.effect.clone())) {
+    fn naming_magnitudes(&self, error: TwinError, effects: &[Effect]) -> TwinError {
+        match (error, augment(self.base.clone(), effects.to_vec())) {
             (TwinError::UnknownIn { table, name, known }, Ok(twin))
                 if matches!(table, "prior" | "bounds") =>
             {
@@ -175,17 +178,9 @@ impl Study {
         }
     }
 
-    /// Whether a name is that of an effect: an `id` of the library or of the study's own, or an `id@target` of this twin.
-    pub fn knows_effect(&self, name: &str) -> bool {
-        match name.split_once('@') {
-            Some((id, target)) => {
-                (self.effects().iter()).any(|e| e.typetag_name() == id && e.target() == target)
-            }
-            None => {
-                crate::effect::library().iter().any(|d| d.id == name)
-                    || self.own_effects.iter().any(|e| e.typetag_name() == name)
-            }
-        }
+    /// Returns whether a pattern names an effect of the library or of the study's own.
+    pub fn knows_effect(&self, pattern: &EffectPattern) -> bool {
+        self.catalogue.knows(pattern, &self.twin)
     }
 
     fn check_library(&self, library: &Library) -> Result<(), StudyError> {
@@ -200,29 +195,31 @@ impl Study {
     }
 
     /// Adds to the name of an unknown effect the known one that is nearest.
-    pub(crate) fn with_nearest_effect(&self, name: &str) -> String {
+    pub(crate) fn with_nearest_effect(&self, pattern: &EffectPattern) -> String {
         let effects = self.effects();
-        let known = effects.iter().map(|e| match name.contains('@') {
-            true => format!("{}@{}", e.typetag_name(), e.target()),
-            false => e.typetag_name().to_owned(),
+        let known = effects.iter().map(|e| match pattern.target {
+            Some(_) => e.key().to_string(),
+            None => e.id().to_owned(),
         });
-        format!("{name}{}", did_you_mean(name, known))
+        let name = pattern.to_string();
+        format!("{name}{}", did_you_mean(&name, known))
     }
 
-    /// The library's effects and the study's own, each once for each target of this twin, all magnitudes free.
-    pub fn effects(&self) -> Effects {
-        let library = crate::effect::applicable(&self.twin);
-        (library.into_iter())
-            .chain(self.own_effects.iter().cloned())
-            .collect()
+    /// Returns all effects that this program knows.
+    pub fn catalogue(&self) -> &Catalogue {
+        &self.catalogue
     }
 
-    /// What the twin may lack: those of [`Study::effects`] that `[library]` lets through.
-    pub fn candidates(&self) -> Effects {
+    /// Returns the library's effects and the study's own, each once for each target of this twin, all magnitudes free.
+    pub fn effects(&self) -> Vec<Effect> {
+        self.catalogue.applicable(&self.twin)
+    }
+
+    /// Returns what the twin may lack: those of [`Study::effects`] that `[library]` lets through.
+    pub fn candidates(&self) -> Vec<Effect> {
         let Library { only, without } = &self.file.library;
-        let named = |list: &[String], effect: &Arc<dyn UnmodelledEffect>| {
-            let id = effect.typetag_name();
-            (list.iter()).any(|n| n == id || *n == format!("{id}@{}", effect.target()))
+        let named = |list: &[EffectPattern], effect: &Effect| {
+            list.iter().any(|pattern| pattern.matches(effect.key()))
         };
         (self.effects().into_iter())
             .filter(|effect| only.is_empty() || named(only, effect))
