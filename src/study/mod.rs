@@ -158,7 +158,7 @@ impl Study {
                 known: self.name.clone(),
             });
         }
-        // Boxes of magnitudes apply once the effects are there; all others before.
+        // Boxes of magnitudes apply once the effects are added; all others before.
         let of_effects = |name: &str| name.parse::<EffectKey>().is_ok();
         let part = |boxes: &BTreeMap<String, _>, effects: bool| {
             (boxes.iter())
@@ -185,10 +185,11 @@ impl Study {
             bounds: part(&file.bounds, true),
             ..Adaptation::default()
         };
-        let mut twin = adapt(self.base.clone(), &first, step)?;
         let effects = (file.effect.iter())
             .map(|entry| self.catalogue.resolve(entry))
             .collect::<Result<Vec<_>, _>>()?;
+        let mut twin = adapt(self.base.clone(), &first, step)
+            .map_err(|error| name_magnitudes(error, &effects))?;
         twin = augment(twin, effects.clone())?;
         if second != Adaptation::default() {
             twin = adapt(twin, &second, step)?;
@@ -299,4 +300,22 @@ impl Study {
         record.check_channels(&self.twin.signals())?;
         Ok(self.plan.check_step(record)?)
     }
+}
+
+/// Adds the free magnitudes of the file's effects to the names that `[prior]` and `[bounds]` may hold.
+fn name_magnitudes(mut error: TwinError, effects: &[Effect]) -> TwinError {
+    if let TwinError::UnknownIn {
+        table: "prior" | "bounds",
+        known,
+        ..
+    } = &mut error
+    {
+        for effect in effects {
+            let free = |name: &&str| effect.given().get(name).is_none();
+            for name in effect.magnitudes().iter().map(|m| m.name).filter(free) {
+                known.push_str(&format!(", {}", effect.key().magnitude(name)));
+            }
+        }
+    }
+    error
 }

@@ -79,7 +79,7 @@ fn any_number_of_parameters_fits_the_terminal() {
     let mut estimate = estimates().refined.clone();
     let space = study.twin().parameters();
     estimate.names = space.names().into_iter().map(str::to_owned).collect();
-    estimate.roles = vec![Role::Physical; 40];
+    estimate.roles = vec![Role::Parameter; 40];
     for all in [
         &mut estimate.initial,
         &mut estimate.theta,
