@@ -2,7 +2,9 @@
 
 use super::args::{PresetArgument, Subject, at_least_one};
 use super::{Context, Failure, Verb, output};
-use crate::estimator::{Estimator, PretrainError, PretrainOptions, Pretraining, Project, pretrain};
+use crate::estimator::{
+    Estimator, EstimatorError, PretrainOptions, Pretraining, Project, pretrain,
+};
 use crate::evaluate::paper::{
     Benchmark, FreeRuns, MeanRuns, MonteCarlo, Origin, Run, Scenario, score,
 };
@@ -204,7 +206,7 @@ fn kept(
     while context.team.leads() && !path.exists() {
         match Pretraining::new(project, *training).write(&path, context.progress) {
             // Another job is training it.
-            Err(PretrainError::Work(WorkError::Busy { .. })) => {
+            Err(EstimatorError::Work(WorkError::Busy { .. })) => {
                 context.progress.checkpoint().map_err(Failure::internal)?;
                 std::thread::sleep(LOOK);
             }
