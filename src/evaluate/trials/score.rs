@@ -44,7 +44,7 @@ impl Serialize for Count {
 }
 
 impl Count {
-    /// How many of the rows in `of` are in `count`, too.
+    /// Counts the rows in `of` that are in `count`, too.
     fn over<'r>(
         rows: impl IntoIterator<Item = &'r Row>,
         of: impl Fn(&Row) -> bool,
