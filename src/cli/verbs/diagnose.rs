@@ -5,6 +5,7 @@ use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
 use crate::diagnose::{DiagnoseSettings, GivenRecord, diagnose};
+use crate::effect::EffectPattern;
 use crate::estimator::Estimator;
 use crate::record::{Record, drive_csv_text, read_record};
 use crate::report::{NEXT_INPUT, gap_html, gap_json, gap_text};
@@ -36,7 +37,7 @@ pub(in crate::cli) struct Diagnose {
     validation: Option<PathBuf>,
     /// Effects to exclude.
     #[arg(long, value_name = "ID[@TARGET],..", value_delimiter = ',')]
-    without: Vec<String>,
+    without: Vec<EffectPattern>,
     /// New folder for report.json, report.html and next-input.csv.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,

@@ -4,7 +4,6 @@ use crate::cli::args::Subject;
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
-use crate::effect::read_effects;
 use crate::effect::{augment, given_magnitudes};
 use crate::record::{Drive, Record, read_drive, record_csv_text, write_record};
 use crate::setting::did_you_mean;
@@ -55,7 +54,7 @@ impl Verb for Simulate {
         let mut twin = study.twin().clone();
         let mut magnitudes = BTreeMap::new();
         if let Some(path) = &self.effect {
-            let effects = read_effects(path)?;
+            let effects = study.catalogue().read(path)?;
             magnitudes = given_magnitudes(&effects);
             twin = augment(twin, effects).map_err(|error| Failure::from(error).within(path))?;
         }
