@@ -56,7 +56,7 @@ impl Context<'_> {
         match (&subject.twin, &subject.study) {
             (Some(name), _) => Ok(self.named(name)?.clone()),
             (None, Some(path)) => {
-                let file = StudyFile::read(path).map_err(StudyError::from)?;
+                let file = StudyFile::read(path)?;
                 let at = |failure: Failure| failure.within(path);
                 let project = self.named(&file.twin).map_err(at)?;
                 project.configure(&file).map_err(|error| at(error.into()))

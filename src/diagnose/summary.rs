@@ -19,9 +19,9 @@ pub(in crate::diagnose) fn reported(
 ) -> Vec<EffectFit> {
     let chances = probabilities(explanations);
     let mut all: Vec<EffectFit> = (explanations.iter().zip(chances))
-        .filter(|(e, _)| model.dictionary.candidates[e.candidate].is_listed())
+        .filter(|(e, _)| model.candidate(e).is_listed())
         .map(|(e, probability)| {
-            let candidate = &model.dictionary.candidates[e.candidate];
+            let candidate = model.candidate(e);
             EffectFit {
                 id: candidate.id.clone(),
                 target: candidate.target.clone(),

@@ -4,7 +4,9 @@ use crate::cli::args::{PresetArgument, Subject, at_least_one};
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
-use crate::estimator::{Estimator, PretrainError, PretrainOptions, Pretraining, Project, pretrain};
+use crate::estimator::{
+    Estimator, EstimatorError, PretrainOptions, Pretraining, Project, pretrain,
+};
 use crate::evaluate::paper::{
     Benchmark, FreeRuns, MeanRuns, MonteCarlo, Origin, Run, Scenario, score,
 };
@@ -206,7 +208,7 @@ fn kept(
     while context.team.leads() && !path.exists() {
         match Pretraining::new(project, *training).write(&path, context.progress) {
             // Another job is training it.
-            Err(PretrainError::Work(WorkError::Busy { .. })) => {
+            Err(EstimatorError::Work(WorkError::Busy { .. })) => {
                 context.progress.checkpoint().map_err(Failure::internal)?;
                 std::thread::sleep(LOOK);
             }

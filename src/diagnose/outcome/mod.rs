@@ -2,9 +2,9 @@
 
 mod location;
 
+pub(crate) use location::Cell;
 pub use location::{
-    Band, Cell, Channel, Equation, Lag, Location, Maps, Onset, Region, TargetShare, TermRange,
-    Window,
+    Band, Channel, Equation, Lag, Location, Maps, Onset, Region, TargetShare, TermRange, Window,
 };
 
 use crate::record::{Drive, Signal};
