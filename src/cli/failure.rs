@@ -1,6 +1,6 @@
 //! Turns errors into one line and an exit code.
 
-use super::output;
+use super::say::say;
 use crate::diagnose::DiagnoseError;
 use crate::effect::EffectError;
 use crate::estimator::EstimatorError;
@@ -122,7 +122,7 @@ impl Failure {
             .split_whitespace()
             .collect::<Vec<_>>()
             .join(" ");
-        output::say(&format!("error: {line}"));
+        say(&format!("error: {line}"));
         ExitCode::from(self.code)
     }
 }

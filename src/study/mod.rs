@@ -99,7 +99,7 @@ impl Study {
                 known: self.name.clone(),
             });
         }
-        // Boxes of magnitudes apply once the effects are there; all others before.
+        // Boxes of magnitudes apply once the effects are added; all others before.
         let of_effects = |name: &str| name.parse::<EffectKey>().is_ok();
         let part = |boxes: &BTreeMap<String, _>, effects: bool| {
             (boxes.iter())
@@ -170,7 +170,7 @@ impl Study {
                 if matches!(table, "prior" | "bounds") =>
             {
                 let space = twin.parameters();
-                let magnitudes = space.iter().filter(|p| p.role == Role::Effect);
+                let magnitudes = space.iter().filter(|p| p.role == Role::Magnitude);
                 let known = magnitudes.fold(known, |known, p| format!("{known}, {}", p.name));
                 TwinError::UnknownIn { table, name, known }
             }

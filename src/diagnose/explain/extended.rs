@@ -24,7 +24,7 @@ pub(in crate::diagnose) struct Accepted {
 
 impl Accepted {
     pub fn key(&self) -> String {
-        format!("{}@{}", self.id, self.target)
+        crate::effect::EffectKey::new(&self.id, &self.target).to_string()
     }
 
     /// Returns true where only the noise changes, so that no free run moves.

@@ -132,7 +132,7 @@ pub struct EffectFit {
 impl EffectFit {
     /// `id@target`.
     pub fn key(&self) -> String {
-        format!("{}@{}", self.id, self.target)
+        crate::effect::EffectKey::new(&self.id, &self.target).to_string()
     }
 }
 

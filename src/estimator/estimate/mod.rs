@@ -368,13 +368,4 @@ mod tests {
             assert!(estimate.std_error[0].is_finite());
         }
     }
-
-    #[test]
-    fn nothing_to_estimate_is_refused() {
-        let error = pretrain(fixed(""), &SMALL, &Progress::silent()).unwrap_err();
-        assert!(
-            error.to_string().contains("remove one from [fixed]"),
-            "{error}"
-        );
-    }
 }

@@ -105,14 +105,13 @@ impl Estimate {
         (0..self.names.len())
             .filter_map(|j| {
                 let role = match self.roles[j] {
-                    Role::Physical => return None,
+                    Role::Parameter => return None,
                     Role::Start => "start",
                     Role::Noise => "noise",
-                    Role::Effect => "effect",
+                    Role::Magnitude => "effect",
                 };
-                let name = self.names[j].strip_prefix(&format!("{role}."));
                 Some(Nuisance {
-                    name: name.unwrap_or(&self.names[j]).into(),
+                    name: self.roles[j].target(&self.names[j]).into(),
                     role,
                     value: self.theta[j],
                     std_error: self.std_error[j],
@@ -124,7 +123,7 @@ impl Estimate {
     /// The twin's own parameters out of a vector over all of θ.
     pub fn physical<T: Clone>(&self, all: &[T]) -> Vec<T> {
         (all.iter().zip(&self.roles))
-            .filter(|(_, role)| **role == Role::Physical)
+            .filter(|(_, role)| **role == Role::Parameter)
             .map(|(value, _)| value.clone())
             .collect()
     }

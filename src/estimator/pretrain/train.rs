@@ -151,10 +151,6 @@ pub(super) fn settings(
 /// The prior through the preset's features, which the network must take.
 pub(super) fn prior(project: &Project, options: &PretrainOptions) -> Result<Prior, EstimatorError> {
     let preset = project.recipe(options.preset);
-    if project.study().twin().parameters().is_empty() {
-        let nothing = "all parameters are fixed and none is estimated; remove one from [fixed], or estimate a start or noise level";
-        return Err(EstimatorError::Undetermined(nothing.into()));
-    }
     let prior = Prior::new(project.study(), preset.features.as_ref())?;
     let most = preset.architecture.max_features();
     if prior.dim() > most {

@@ -88,7 +88,7 @@ impl Information {
 /// Eigen-directions of the covariance (prior widths) of the physical parameters; nuisances are marginalised out.
 fn directions(covariance: &DMatrix<f64>, space: &ParameterSpace) -> Vec<Direction> {
     let physical: Vec<usize> = (0..space.len())
-        .filter(|&j| space[j].role == Role::Physical)
+        .filter(|&j| space[j].role == Role::Parameter)
         .collect();
     if physical.is_empty() {
         return Vec::new();

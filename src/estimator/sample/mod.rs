@@ -54,7 +54,9 @@ impl CloudSampler {
             let jacobian = refined.whitened_jacobian();
             let sensitivities: Vec<f64> = jacobian.column_iter().map(|c| c.norm()).collect();
             let typical = median(&refined.spread).unwrap_or(1.0);
-            let reach: Vec<f64> = space.bounds().iter().map(|b| 0.5 * b.width()).collect();
+            let reach: Vec<f64> = (space.iter())
+                .map(|p| 0.5 * p.start_range().width())
+                .collect();
             let length = typical * refined.residual.norm();
             Sensitivity::new(centre.clone(), &sensitivities, length, &reach)
         };

@@ -1,8 +1,8 @@
 //! What a diagnosis says beside the name: since when, what is left, what else could have been seen, what to measure next.
 
 use super::trials::*;
+use crate::binomial_bounds;
 use truetwin::diagnose::{Decision, DiagnoseSettings, Diagnosis, Verdict, diagnose};
-use truetwin::math::binomial_bounds;
 use truetwin::progress::Progress;
 use truetwin::record::Record;
 use truetwin::study::Study;
@@ -149,7 +149,7 @@ fn power_is_what_it_says() {
         }
         println!("{id} {name} = {value}: {seen} of {records} so far");
     }
-    let bounds = binomial_bounds(records, 0.8, 0.999).unwrap();
+    let bounds = binomial_bounds(records, 0.8, 0.999);
     // To first order, and for this θ̂: somewhat more or less than 80 %.
     assert!(
         (bounds.start().saturating_sub(3)..=*bounds.end()).contains(&seen),

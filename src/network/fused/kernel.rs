@@ -120,7 +120,7 @@ pub(super) fn backward(
 
 /// sums ← sums + x.
 #[inline(always)]
-pub(super) fn add(sums: &mut [f32], x: &[f32]) {
+pub(in crate::network) fn add(sums: &mut [f32], x: &[f32]) {
     for (sum, x) in sums.iter_mut().zip(x) {
         *sum += x;
     }

@@ -7,7 +7,7 @@
 use super::activation::Activation;
 use super::gemm::{Existing, Matrix, multiply};
 use super::kernel::{self, Affine, Mask};
-use super::{Batch, TapedBatch};
+use crate::network::{Batch, TapedBatch};
 use dfdx::nn::modules::{BuildOnDevice, ModuleVisitor, TensorCollection};
 use dfdx::nn::{Module, ModuleMut, ScalarOptions, TensorOptions};
 use dfdx::prelude::*;
@@ -151,7 +151,7 @@ impl<const I: usize, const O: usize> Layer<'_, I, O> {
 }
 
 /// The numbers of a contiguous tensor, row-major. A copy, since dfdx lends no slice of a tensor.
-pub(super) fn numbers<S: Shape>(tensor: &Tensor<S, f32, Cpu>) -> Vec<f32> {
+pub(in crate::network) fn numbers<S: Shape>(tensor: &Tensor<S, f32, Cpu>) -> Vec<f32> {
     let mut numbers = vec![0.0; tensor.shape().num_elements()];
     tensor.copy_into(&mut numbers);
     numbers

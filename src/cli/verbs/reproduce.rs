@@ -1,7 +1,9 @@
 //! `reproduce`: the paper's table and figures, on any twin.
 
-use super::args::{PresetArgument, Subject, at_least_one};
-use super::{Context, Failure, Verb, output};
+use crate::cli::args::{PresetArgument, Subject, at_least_one};
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
 use crate::estimator::{
     Estimator, EstimatorError, PretrainOptions, Pretraining, Project, pretrain,
 };
@@ -66,7 +68,7 @@ impl From<ScenarioArgument> for Scenario {
         DIR holds reproduce.json (as --json), table.txt, trajectories.svg (as in the paper: the truth and the mean\n\
         predictions; scenarios 1 and 2), first-record.svg, and the state of the work: manifest.json, estimator.est,\n\
         runs/NNNN.json. Interrupted, the same command resumes it; a different command is refused.")]
-pub(super) struct Reproduce {
+pub(in crate::cli) struct Reproduce {
     #[command(flatten)]
     subject: Subject,
     /// Source of the true parameters.

@@ -4,7 +4,7 @@ use crate::math::{Kernel, widest};
 
 /// A read-only matrix over a slice, with strides, so that blocks and transposes need no copy.
 #[derive(Clone, Copy)]
-pub(super) struct Matrix<'a> {
+pub(in crate::network) struct Matrix<'a> {
     data: &'a [f32],
     rows: usize,
     cols: usize,
@@ -14,7 +14,12 @@ pub(super) struct Matrix<'a> {
 
 impl<'a> Matrix<'a> {
     /// Row-major `rows` × `cols`, its rows `row_stride` ≥ `cols` apart. Panics where `data` is too short: a bug here.
-    pub(super) fn new(data: &'a [f32], rows: usize, cols: usize, row_stride: usize) -> Self {
+    pub(in crate::network) fn new(
+        data: &'a [f32],
+        rows: usize,
+        cols: usize,
+        row_stride: usize,
+    ) -> Self {
         assert!(rows > 0 && cols > 0 && row_stride >= cols);
         assert!(data.len() >= (rows - 1) * row_stride + cols);
         Self {
@@ -27,7 +32,7 @@ impl<'a> Matrix<'a> {
     }
 
     /// The same numbers, rows and columns exchanged.
-    pub(super) fn transposed(self) -> Self {
+    pub(in crate::network) fn transposed(self) -> Self {
         Self {
             rows: self.cols,
             cols: self.rows,
@@ -40,7 +45,7 @@ impl<'a> Matrix<'a> {
 
 /// What happens to the numbers that are already in the product's place.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Existing {
+pub(in crate::network) enum Existing {
     Replace,
     Add,
 }
@@ -54,7 +59,7 @@ const FEW: usize = 256;
 ///
 /// Each element is one chain of fused multiply-adds, in the order of the inner index; where a few elements each have
 /// two contiguous vectors, in sixteen lanes. So no bit depends on the width of the processor's vectors.
-pub(super) fn multiply(
+pub(in crate::network) fn multiply(
     scale: f32,
     a: Matrix,
     b: Matrix,
