@@ -102,7 +102,7 @@ macro_rules! debug_by_name {
 // Rooms, lowest first; a room uses only what stands above it here (tests/house/layering.rs holds it so).
 pub mod setting;
 
-pub mod math;
+mod math;
 pub mod progress;
 pub mod storage;
 

@@ -1,7 +1,5 @@
 use super::MathError;
-use std::ops::RangeInclusive;
-
-use statrs::distribution::{Beta, Binomial, ContinuousCDF, DiscreteCDF};
+use statrs::distribution::{Beta, ContinuousCDF};
 
 /// The exact interval for a probability after `count` successes in `of` trials.
 ///
@@ -16,17 +14,6 @@ use statrs::distribution::{Beta, Binomial, ContinuousCDF, DiscreteCDF};
 /// # Errors
 ///
 /// [`MathError`]: more successes than trials, or `level` outside (0, 1).
-///
-/// # Example
-///
-/// ```
-/// use truetwin::math::clopper_pearson;
-///
-/// let (low, high) = clopper_pearson(0, 10, 0.95)?;
-/// assert_eq!(low, 0.0);
-/// assert!((high - 0.3085).abs() < 1e-4);
-/// # Ok::<(), truetwin::math::MathError>(())
-/// ```
 ///
 /// # Reference
 ///
@@ -62,21 +49,14 @@ pub fn clopper_pearson(count: u64, of: u64, level: f64) -> Result<(f64, f64), Ma
 /// # Errors
 ///
 /// [`MathError`]: `probability` outside [0, 1] or `level` outside (0, 1).
-///
-/// # Example
-///
-/// ```
-/// use truetwin::math::binomial_bounds;
-///
-/// let false_alarms = 17;
-/// assert!(binomial_bounds(200, 0.10, 0.999)?.contains(&false_alarms));
-/// # Ok::<(), truetwin::math::MathError>(())
-/// ```
+#[cfg(test)]
 pub fn binomial_bounds(
     trials: u64,
     probability: f64,
     level: f64,
-) -> Result<RangeInclusive<u64>, MathError> {
+) -> Result<std::ops::RangeInclusive<u64>, MathError> {
+    use statrs::distribution::{Binomial, DiscreteCDF};
+
     let tail = tail(level)?;
     let binomial =
         Binomial::new(probability, trials).map_err(|_| MathError::Probability(probability))?;
@@ -96,7 +76,7 @@ fn tail(level: f64) -> Result<f64, MathError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use statrs::distribution::Discrete;
+    use statrs::distribution::{Binomial, Discrete, DiscreteCDF};
 
     /// The ends solve P(X ≥ k) = α/2 and P(X ≤ k) = α/2.
     #[test]

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`Whitening`] | distances between features, in units of their own scatter |
 //! | [`quantile`], [`median`], [`rank_p_value`] | empirical distributions |
-//! | [`clopper_pearson`], [`binomial_bounds`] | what a count of successes says, and what it may be |
+//! | [`clopper_pearson`] | the probability behind a count of successes |
 
 mod cholesky;
 mod clopper_pearson;
@@ -20,15 +20,16 @@ mod svd;
 mod whitening;
 mod widest;
 
-pub use clopper_pearson::{binomial_bounds, clopper_pearson};
+#[cfg(test)]
+pub(crate) use clopper_pearson::binomial_bounds;
+pub(crate) use clopper_pearson::clopper_pearson;
 pub(crate) use difference::Stencil;
 pub use error::MathError;
 pub(crate) use lagged::{Lagged, LaggedSignals};
 pub(crate) use least_squares::{Fit, LeastSquares, Regressors};
-pub use quantile::{median, quantile, rank_p_value};
+pub(crate) use quantile::{median, quantile, rank_p_value};
 pub(crate) use rounding::six_digits;
 pub(crate) use sample::{deviation, ends, largest};
-pub(crate) use solve::solve_above;
-pub(crate) use solve::solve_truncated;
-pub use whitening::Whitening;
+pub(crate) use solve::{solve_above, solve_truncated};
+pub(crate) use whitening::Whitening;
 pub(crate) use widest::{Kernel, widest};

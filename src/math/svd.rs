@@ -87,6 +87,8 @@ impl Kernel for Rotations<'_> {
     fn run(self) -> bool {
         let n = self.columns;
         let rounding = n as f64 * f64::EPSILON;
+        // The square of a column that is nothing but rounding; the largest entry was one.
+        let zero = rounding * rounding;
         for _ in 0..SWEEPS {
             let mut squares: Vec<f64> = self.rotated.chunks_exact(n).map(|c| dot(c, c)).collect();
             let mut converged = true;
@@ -94,17 +96,20 @@ impl Kernel for Rotations<'_> {
                 for p in 0..q {
                     let [a, b] = pair(self.rotated, n, p, q);
                     let product = dot(a, b);
-                    if product.abs() <= rounding * (squares[p] * squares[q]).sqrt() {
+                    let (p_square, q_square) = (squares[p], squares[q]);
+                    if product.abs() <= rounding * (p_square * q_square).sqrt()
+                        || p_square.min(q_square) <= zero
+                    {
                         continue;
                     }
                     converged = false;
-                    let zeta = (squares[q] - squares[p]) / (2.0 * product);
+                    let zeta = (q_square - p_square) / (2.0 * product);
                     let tangent = zeta.signum() / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
                     let cosine = (1.0 + tangent * tangent).sqrt().recip();
                     turn([a, b], cosine, cosine * tangent);
                     turn(pair(self.right, n, p, q), cosine, cosine * tangent);
                     // Rounding must not make a square negative.
-                    squares[p] = (squares[p] - tangent * product).max(0.0);
+                    squares[p] = (p_square - tangent * product).max(0.0);
                     squares[q] += tangent * product;
                 }
             }
@@ -158,7 +163,11 @@ mod tests {
     #[test]
     fn zeros_and_repeated_columns_converge() {
         let repeated = DMatrix::from_fn(9, 4, |i, j| (i + j / 2) as f64);
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let mut random =
+            |rows, columns| DMatrix::from_fn(rows, columns, |_, _| rng.gen_range(-1.0..1.0));
         for matrix in [
+            random(30, 4) * random(4, 20),
             DMatrix::zeros(5, 3),
             repeated,
             DMatrix::from_element(3, 3, 1e-300),

@@ -29,21 +29,6 @@ const RELATIVE_VARIANCE: f64 = 1e-16;
 /// ([`rank_p_value`](super::rank_p_value)), and take K ≥ 16 n. With K ≤ n the map has rank K − 1 and sees only the directions in
 /// which the draws happened to differ.
 ///
-/// # Example
-///
-/// ```
-/// use nalgebra::dvector;
-/// use ndarray::array;
-/// use truetwin::math::Whitening;
-///
-/// let draws = array![[1.0, 1e6], [2.0, 3e6], [3.0, 2e6], [2.0, 2e6]];
-/// let whitening = Whitening::calibrated(&draws)?;
-/// assert_eq!(whitening.rank(), 2);
-/// assert!(whitening.squared_distance(&dvector![2.0, 2e6]) < 1e-20);
-/// assert!(whitening.squared_distance(&dvector![2.0, 9e6]) > 50.0);
-/// # Ok::<(), truetwin::math::MathError>(())
-/// ```
-///
 /// # Reference
 ///
 /// Lakshminarayanan, Guerrero & Rojas, "Fine-Tuning a Simulation-Driven Estimator", section IV, step 1; Kessy, Lewin &

@@ -109,7 +109,7 @@ impl TensorVisitor<f32, Cpu> for Step<'_> {
         self.next += 1;
 
         // The gradient is not needed afterwards: its place takes the new weights.
-        let weights = super::dense::numbers(tensor);
+        let weights = super::fused::numbers(tensor);
         let gradient = self.gradients.get_or_alloc_mut(tensor)?;
         let (decay, rate, unbias_second) = (self.adam.weight_decay, self.rate, self.unbias_second);
         let each = gradient

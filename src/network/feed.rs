@@ -2,7 +2,7 @@
 
 use super::NetworkError;
 use super::rows::Rows;
-use super::train::{Purpose, derive};
+use super::seed::{Purpose, derive};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;

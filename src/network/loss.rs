@@ -1,8 +1,7 @@
 //! The loss: a weighted Huber error of the heads, and the penalty that keeps their first layers apart.
 
-use super::dense::numbers;
-use super::gemm::{Existing, Matrix, multiply};
-use super::{FirstWeight, NetworkError, TapedBatch, kernel};
+use super::fused::{Existing, Matrix, kernel, multiply, numbers};
+use super::{FirstWeight, NetworkError, TapedBatch};
 use dfdx::prelude::{
     Const, ConstDim, Cpu, Merge, OwnedTape, PutTape, Rank0, SplitTape, Tape, Tensor, TensorFromVec,
 };

@@ -32,34 +32,31 @@
 //! Training is repeatable to the bit: initial weights, the holdout split, the order of rows and dropout are pure
 //! functions of the seed and of the epoch or step.
 
-mod activation;
 mod adam;
 mod architectures;
 mod checkpoints;
-mod dense;
 mod error;
 mod feed;
 mod first_weight;
-mod gemm;
-mod kernel;
+mod fused;
 mod loss;
 mod model;
 mod multi_head;
 mod rows;
 mod samples;
+mod seed;
 mod settings;
 mod tensors;
 #[cfg(test)]
 mod tests;
 mod train;
 
-pub use activation::{Activation, Leaky};
 pub use architectures::{Compact, Deep};
 pub use checkpoints::Checkpoints;
-pub(crate) use dense::{BuiltDense, BuiltNormDense};
-pub use dense::{Dense, NormDense};
 pub use error::NetworkError;
 pub use first_weight::FirstWeight;
+pub use fused::{Activation, Dense, Leaky, NormDense};
+pub(crate) use fused::{BuiltDense, BuiltNormDense};
 pub use multi_head::architecture;
 pub use samples::{Part, Samples};
 pub use settings::{History, Schedule, Training};

@@ -3,7 +3,8 @@
 use super::feed::{Data, Feed};
 use super::model::{self, Model, ModelOf};
 use super::rows::Rows;
-use super::train::{Course, Purpose, derive, train};
+use super::seed::{Purpose, derive};
+use super::train::{Course, train};
 use super::{
     Architecture, Checkpoints, HeadArchitecture, History, NamedTensor, Network, NetworkError,
     Samples, Training,

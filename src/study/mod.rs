@@ -1,16 +1,20 @@
 //! A twin together with everything that estimating its parameters needs, checked.
 
+mod error;
 mod file;
 mod manifest;
 mod plan;
 
-pub use file::{Library, RecordTable, StudyFile, StudyFileError};
-pub use plan::{DriveSource, InputPlan, Levels, PlanError, RecordPlan};
+pub use error::StudyError;
+pub use file::{Library, RecordTable, StudyFile};
+pub use plan::{DriveSource, InputPlan, Levels, RecordPlan};
 
-use crate::effect::{EffectError, Effects, UnmodelledEffect, augment, given_magnitudes};
-use crate::record::{Record, RecordError};
+use crate::effect::{
+    Catalogue, Effect, EffectKey, EffectKind, EffectPattern, augment, given_magnitudes,
+};
+use crate::record::Record;
 use crate::setting::did_you_mean;
-use crate::twin::{Adaptation, DigitalTwin, Twin, TwinError, adapt, check_twin, fix};
+use crate::twin::{Adaptation, DigitalTwin, Role, Twin, TwinError, adapt, check_twin, fix};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -33,8 +37,8 @@ pub struct Study {
     plan: RecordPlan,
     file: StudyFile,
     demo: Option<Arc<Record>>,
-    /// Beside those of the library.
-    own_effects: Effects,
+    /// The library's effects and the study's own.
+    catalogue: Catalogue,
 }
 
 impl std::fmt::Debug for Study {
@@ -47,65 +51,6 @@ impl std::fmt::Debug for Study {
     }
 }
 
-/// Why there is no such study, or why a record does not belong to it.
-///
-/// ```
-/// use truetwin::study::{RecordPlan, Study, StudyError, StudyFile};
-/// use truetwin::twins::VanDerPol;
-///
-/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 300))?;
-/// let file = StudyFile::parse("twin = 'oscillator'\n[fixed]\nmu = 1.0", "S.toml".as_ref())?;
-/// let error: StudyError = study.configure(&file).unwrap_err();
-/// assert!(error.to_string().contains("mu"), "{error}");
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum StudyError {
-    /// Of the file.
-    #[error(transparent)]
-    File(#[from] StudyFileError),
-    /// The file is about another twin.
-    #[error("no twin is called \"{given}\"{}; there are {known}", did_you_mean(given, known.split(", ")))]
-    Twin {
-        /// In the file.
-        given: String,
-        /// Known twins.
-        known: String,
-    },
-    /// Of prior, bounds, limits, noise, start.
-    #[error(transparent)]
-    Adaptation(#[from] TwinError),
-    /// Of effects.
-    #[error(transparent)]
-    Effect(#[from] EffectError),
-    /// A parameter is fixed, and has a prior or bounds.
-    #[error("{0} stands in [fixed] and in [prior] or [bounds]; remove one of them")]
-    Contradiction(String),
-    /// `[library]` names an effect that there is not.
-    #[error(
-        "[library] names {0}, which is no effect of this twin; `truetwin effects --twin T` lists them"
-    )]
-    Library(String),
-    /// Of fixed parameters.
-    #[error("[fixed]: {0}")]
-    Fixed(TwinError),
-    /// Of the twin's own parameters.
-    #[error("twin \"{name}\": {error}")]
-    Parameters {
-        /// Twin.
-        name: String,
-        /// What is wrong.
-        error: TwinError,
-    },
-    /// Of step, length, input.
-    #[error(transparent)]
-    Plan(#[from] PlanError),
-    /// Of a record's channels, or of the file of the demo record.
-    #[error(transparent)]
-    Record(#[from] RecordError),
-}
-
 impl Study {
     /// Creates a study of `twin` under `name`.
     pub fn new(
@@ -114,10 +59,8 @@ impl Study {
         plan: RecordPlan,
     ) -> Result<Self, StudyError> {
         let base = Twin::new(twin);
-        check_twin(&base).map_err(|error| StudyError::Parameters {
-            name: name.into(),
-            error,
-        })?;
+        check_twin(&base)
+            .map_err(|error| StudyError::Table(format!("twin \"{name}\": {error}")))?;
         Ok(Self {
             name: name.into(),
             twin: base.clone(),
@@ -128,17 +71,15 @@ impl Study {
                 ..StudyFile::default()
             },
             demo: None,
-            own_effects: Effects::new(),
+            catalogue: Catalogue::default(),
         })
     }
 
-    /// With effects that the twin may lack and the library does not have, one for each target.
+    /// Adds effects that the twin may lack and the library does not have. Each is offered at every place that it can stand at,
+    /// and files know its id.
     #[must_use]
-    pub fn with_effects(
-        mut self,
-        effects: impl IntoIterator<Item = Arc<dyn UnmodelledEffect>>,
-    ) -> Self {
-        self.own_effects.extend(effects);
+    pub fn with_effects(mut self, kinds: impl IntoIterator<Item = EffectKind>) -> Self {
+        self.catalogue = kinds.into_iter().fold(self.catalogue, Catalogue::with);
         self
     }
 
@@ -158,8 +99,8 @@ impl Study {
                 known: self.name.clone(),
             });
         }
-        // Boxes of magnitudes apply once the effects are there; all others before.
-        let of_effects = |name: &str| name.contains('@');
+        // Boxes of magnitudes apply once the effects are added; all others before.
+        let of_effects = |name: &str| name.parse::<EffectKey>().is_ok();
         let part = |boxes: &BTreeMap<String, _>, effects: bool| {
             (boxes.iter())
                 .filter(|(name, _)| of_effects(name) == effects)
@@ -167,9 +108,11 @@ impl Study {
                 .collect()
         };
         let step = file.record.step.unwrap_or(self.plan.step);
-        for table in [&file.prior, &file.bounds] {
-            if let Some(name) = table.keys().find(|name| file.fixed.contains_key(*name)) {
-                return Err(StudyError::Contradiction(name.clone()));
+        for (table, boxes) in [("prior", &file.prior), ("bounds", &file.bounds)] {
+            if let Some(name) = boxes.keys().find(|name| file.fixed.contains_key(*name)) {
+                return Err(StudyError::Table(format!(
+                    "{name} appears in both [fixed] and [{table}]; remove one"
+                )));
             }
         }
         self.check_library(&file.library)?;
@@ -185,19 +128,24 @@ impl Study {
             bounds: part(&file.bounds, true),
             ..Adaptation::default()
         };
-        let mut twin = adapt(self.base.clone(), &first, step)?;
-        twin = augment(twin, file.effect.clone())?;
+        let effects = (file.effect.iter())
+            .map(|entry| self.catalogue.resolve(entry))
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut twin = adapt(self.base.clone(), &first, step)
+            .map_err(|error| self.naming_magnitudes(error, &effects))?;
+        twin = augment(twin, effects.clone())?;
         if second != Adaptation::default() {
             twin = adapt(twin, &second, step)?;
         }
+        let fixed = |error: TwinError| StudyError::Table(format!("[fixed]: {error}"));
         let space = twin.parameters();
         for (name, &value) in &file.fixed {
-            let parameter = &space[space.position(name).map_err(StudyError::Fixed)?];
-            parameter.check_value(value).map_err(StudyError::Fixed)?;
+            let parameter = &space[space.position(name).map_err(fixed)?];
+            parameter.check_value(value).map_err(fixed)?;
         }
         let mut held = file.fixed.clone();
-        held.extend(given_magnitudes(&file.effect));
-        twin = fix(twin, &held).map_err(StudyError::Fixed)?;
+        held.extend(given_magnitudes(&effects));
+        twin = fix(twin, &held).map_err(fixed)?;
         let RecordTable {
             step,
             samples,
@@ -215,51 +163,63 @@ impl Study {
         })
     }
 
-    /// Whether a name is that of an effect: an `id` of the library or of the study's own, or an `id@target` of this twin.
-    pub fn knows_effect(&self, name: &str) -> bool {
-        match name.split_once('@') {
-            Some((id, target)) => {
-                (self.effects().iter()).any(|e| e.typetag_name() == id && e.target() == target)
+    /// Adds the magnitudes of the file's effects to the names that an unknown name in `[prior]` or `[bounds]` is told.
+    fn naming_magnitudes(&self, error: TwinError, effects: &[Effect]) -> TwinError {
+        match (error, augment(self.base.clone(), effects.to_vec())) {
+            (TwinError::UnknownIn { table, name, known }, Ok(twin))
+                if matches!(table, "prior" | "bounds") =>
+            {
+                let space = twin.parameters();
+                let magnitudes = space.iter().filter(|p| p.role == Role::Magnitude);
+                let known = magnitudes.fold(known, |known, p| format!("{known}, {}", p.name));
+                TwinError::UnknownIn { table, name, known }
             }
-            None => {
-                crate::effect::library().iter().any(|d| d.id == name)
-                    || self.own_effects.iter().any(|e| e.typetag_name() == name)
-            }
+            (error, _) => error,
         }
+    }
+
+    /// Returns whether a pattern names an effect of the library or of the study's own.
+    pub fn knows_effect(&self, pattern: &EffectPattern) -> bool {
+        self.catalogue.knows(pattern, &self.twin)
     }
 
     fn check_library(&self, library: &Library) -> Result<(), StudyError> {
         let mut named = library.only.iter().chain(&library.without);
         let unknown = named.find(|name| !self.knows_effect(name));
         unknown.map_or(Ok(()), |name| {
-            Err(StudyError::Library(self.with_nearest_effect(name)))
+            Err(StudyError::Table(format!(
+                "[library] names {}, which is no effect of this twin; `truetwin effects --twin T` lists them",
+                self.with_nearest_effect(name)
+            )))
         })
     }
 
     /// Adds to the name of an unknown effect the known one that is nearest.
-    pub(crate) fn with_nearest_effect(&self, name: &str) -> String {
+    pub(crate) fn with_nearest_effect(&self, pattern: &EffectPattern) -> String {
         let effects = self.effects();
-        let known = effects.iter().map(|e| match name.contains('@') {
-            true => format!("{}@{}", e.typetag_name(), e.target()),
-            false => e.typetag_name().to_owned(),
+        let known = effects.iter().map(|e| match pattern.target {
+            Some(_) => e.key().to_string(),
+            None => e.id().to_owned(),
         });
-        format!("{name}{}", did_you_mean(name, known))
+        let name = pattern.to_string();
+        format!("{name}{}", did_you_mean(&name, known))
     }
 
-    /// The library's effects and the study's own, each once for each target of this twin, all magnitudes free.
-    pub fn effects(&self) -> Effects {
-        let library = crate::effect::applicable(&self.twin);
-        (library.into_iter())
-            .chain(self.own_effects.iter().cloned())
-            .collect()
+    /// Returns all effects that this program knows.
+    pub fn catalogue(&self) -> &Catalogue {
+        &self.catalogue
     }
 
-    /// What the twin may lack: those of [`Study::effects`] that `[library]` lets through.
-    pub fn candidates(&self) -> Effects {
+    /// Returns the library's effects and the study's own, each once for each target of this twin, all magnitudes free.
+    pub fn effects(&self) -> Vec<Effect> {
+        self.catalogue.applicable(&self.twin)
+    }
+
+    /// Returns what the twin may lack: those of [`Study::effects`] that `[library]` lets through.
+    pub fn candidates(&self) -> Vec<Effect> {
         let Library { only, without } = &self.file.library;
-        let named = |list: &[String], effect: &Arc<dyn UnmodelledEffect>| {
-            let id = effect.typetag_name();
-            (list.iter()).any(|n| n == id || *n == format!("{id}@{}", effect.target()))
+        let named = |list: &[EffectPattern], effect: &Effect| {
+            list.iter().any(|pattern| pattern.matches(effect.key()))
         };
         (self.effects().into_iter())
             .filter(|effect| only.is_empty() || named(only, effect))
@@ -293,7 +253,7 @@ impl Study {
     }
 
     /// What drives are drawn from.
-    pub fn drives(&self) -> Result<DriveSource, PlanError> {
+    pub fn drives(&self) -> Result<DriveSource, StudyError> {
         self.plan.prepare(&self.twin.signals())
     }
 
@@ -301,5 +261,37 @@ impl Study {
     pub fn check_record(&self, record: &Record) -> Result<(), StudyError> {
         record.check_channels(&self.twin.signals())?;
         Ok(self.plan.check_step(record)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::twins::CascadedTanks;
+
+    fn refused(tables: &str) -> String {
+        let text = format!("twin = 'tanks'\n{tables}");
+        let file = StudyFile::parse(&text, "s.toml".as_ref()).unwrap();
+        let plan = RecordPlan::levels(0.5, 60, 0.0, 3.0, 30);
+        let study = Study::new("tanks", CascadedTanks, plan).unwrap();
+        study.configure(&file).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn an_unknown_name_lists_parameters_and_magnitudes() {
+        let effect = "[[effect]]\nid = 'sensor-lag'\ntarget = 'sensor'\n";
+        let message = refused(&format!("[prior]\nk9 = [0.0, 1.0]\n{effect}"));
+        for name in ["k9", "k1, k2, k3, k4", "sensor-lag@sensor.tau"] {
+            assert!(message.contains(name), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_parameter_in_two_tables_is_refused() {
+        let message = refused("[fixed]\nk1 = 0.5\n[bounds]\nk1 = [0.1, 1.0]");
+        assert_eq!(
+            message,
+            "k1 appears in both [fixed] and [bounds]; remove one"
+        );
     }
 }

@@ -3,6 +3,7 @@
 //! The full figure for the tanks' 128 features takes minutes:
 //! `cargo test --release --test science gate_calibration -- --ignored --nocapture`.
 
+use crate::binomial_bounds;
 use nalgebra::DVector;
 use rayon::prelude::*;
 use truetwin::estimator::bank::FeatureSimulator;
@@ -11,7 +12,6 @@ use truetwin::estimator::refine::{RefineSettings, Refinement};
 use truetwin::estimator::{PresetName, Project};
 use truetwin::evaluate::paper::reference_projects;
 use truetwin::feature::{Ar, Arx, FeatureRecipe};
-use truetwin::math::binomial_bounds;
 use truetwin::progress::Progress;
 use truetwin::twin::Noise;
 
@@ -56,7 +56,7 @@ fn paper() -> GateSettings {
 }
 
 fn assert_calibrated(name: &str, rejected: u64, records: u64) {
-    let bounds = binomial_bounds(records, 0.10, 0.999).unwrap();
+    let bounds = binomial_bounds(records, 0.10, 0.999);
     println!("{name}: calibrated form rejects {rejected} of {records} at 10 %");
     assert!(
         bounds.contains(&rejected),
@@ -128,7 +128,7 @@ fn after_a_refit_the_test_is_still_calibrated() {
             })
             .count() as u64;
         println!("{name}: after a refit {rejected} of {records} rejected at 10 %");
-        let bounds = binomial_bounds(records, 0.10, 0.999).unwrap();
+        let bounds = binomial_bounds(records, 0.10, 0.999);
         assert!(
             bounds.contains(&rejected),
             "{name}: {rejected}, expected {bounds:?}"

@@ -17,3 +17,11 @@ mod gate_calibration;
 mod limits;
 mod numbers;
 mod real_records;
+
+/// Counts that `trials` of this probability give with at least `level`; each tail outside has at most (1 − level)/2.
+fn binomial_bounds(trials: u64, probability: f64, level: f64) -> std::ops::RangeInclusive<u64> {
+    use statrs::distribution::{Binomial, DiscreteCDF};
+    let binomial = Binomial::new(probability, trials).unwrap();
+    let tail = (1.0 - level) / 2.0;
+    binomial.inverse_cdf(tail)..=binomial.inverse_cdf(1.0 - tail)
+}

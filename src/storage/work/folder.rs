@@ -49,7 +49,7 @@ pub struct WorkFolder {
 ///
 /// ```
 /// use truetwin::progress::Progress;
-/// use truetwin::estimator::shards::{BankPlan, ShardsError};
+/// use truetwin::estimator::{EstimatorError, shards::BankPlan};
 /// use truetwin::estimator::PresetName;
 /// use truetwin::study::{RecordPlan, Study};
 /// use truetwin::twins::VanDerPol;
@@ -59,7 +59,7 @@ pub struct WorkFolder {
 /// let plan = BankPlan { project: study.into(), preset: PresetName::Paper, size: 10, seed: 1 };
 /// let error = plan.fill("no/such/place".as_ref(), Share::WHOLE, &Progress::silent()).unwrap_err();
 /// let of_the_folder: Option<&WorkError> = match &error {
-///     ShardsError::Work(error) => Some(error),
+///     EstimatorError::Work(error) => Some(error),
 ///     _ => None,
 /// };
 /// assert!(of_the_folder.is_some(), "{error}");

@@ -1,9 +1,9 @@
 //! Twins that show nothing but `simulate`: as rarely accused, and their signals' effects named.
 
 use super::trials::*;
+use crate::binomial_bounds;
 use std::sync::Arc;
 use truetwin::diagnose::{Decision, DiagnoseSettings, Diagnosis, Verdict, diagnose};
-use truetwin::math::binomial_bounds;
 use truetwin::progress::Progress;
 use truetwin::record::{Drive, Record, Signal};
 use truetwin::study::{RecordPlan, Study};
@@ -51,7 +51,7 @@ fn alarms(name: &str, records: u64, theta: impl Fn(&Study, u64, Noise) -> Vec<f6
 }
 
 fn few(alarms: u64, records: u64) {
-    let bounds = binomial_bounds(records, 0.05, 0.99).unwrap();
+    let bounds = binomial_bounds(records, 0.05, 0.99);
     assert!(alarms <= *bounds.end(), "{alarms} of {records}");
 }
 

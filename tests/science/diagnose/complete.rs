@@ -1,8 +1,8 @@
 //! Parts of a diagnosis beside the name: onset, residuals, power, next input.
 
 use super::trials::*;
-use truetwin::diagnose::{Cell, Decision, DiagnoseSettings, Diagnosis, Verdict, diagnose};
-use truetwin::math::binomial_bounds;
+use crate::binomial_bounds;
+use truetwin::diagnose::{Decision, DiagnoseSettings, Diagnosis, Verdict, diagnose};
 use truetwin::progress::Progress;
 use truetwin::record::Record;
 use truetwin::study::Study;
@@ -28,11 +28,11 @@ fn a_gap_begins_where_it_begins() {
     assert!((85.0..140.0).contains(&onset.time), "{onset:?}");
     assert!(onset.p_value <= 0.05 && onset.channel == "y");
     let sums = [
-        maps.windows.iter().map(Cell::share).sum::<f64>(),
-        maps.regions.iter().map(Cell::share).sum(),
-        maps.channels.iter().map(Cell::share).sum(),
-        maps.lags.iter().map(Cell::share).sum(),
-        maps.bands.iter().map(Cell::share).sum(),
+        maps.windows.iter().map(|cell| cell.share).sum::<f64>(),
+        maps.regions.iter().map(|cell| cell.share).sum(),
+        maps.channels.iter().map(|cell| cell.share).sum(),
+        maps.lags.iter().map(|cell| cell.share).sum(),
+        maps.bands.iter().map(|cell| cell.share).sum(),
     ];
     assert!(sums.iter().all(|sum| *sum <= 1.0 + 1e-9), "{sums:?}");
     assert!(!maps.notable().windows.is_empty() || !maps.notable().bands.is_empty());
@@ -89,7 +89,7 @@ fn the_missing_term_is_regressed() {
     let record = record(study.twin(), text, &[1.4], drive, noise);
     let every = study.effects();
     let settings = DiagnoseSettings {
-        without: every.iter().map(|e| e.typetag_name().into()).collect(),
+        without: every.iter().map(|e| e.id().into()).collect(),
         ..DiagnoseSettings::default()
     };
     let found = with_settings(&study, record, &settings);
@@ -149,7 +149,7 @@ fn power_is_what_it_says() {
         }
         println!("{id} {name} = {value}: {seen} of {records} so far");
     }
-    let bounds = binomial_bounds(records, 0.8, 0.999).unwrap();
+    let bounds = binomial_bounds(records, 0.8, 0.999);
     // To first order, and for this θ̂: somewhat more or less than 80 %.
     assert!(
         (bounds.start().saturating_sub(3)..=*bounds.end()).contains(&seen),

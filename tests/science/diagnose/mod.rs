@@ -5,10 +5,10 @@ mod complete;
 mod study_of_many;
 mod trials;
 
+use crate::binomial_bounds;
 use std::sync::Arc;
 use trials::*;
 use truetwin::diagnose::{Decision, DiagnoseSettings, Verdict, diagnose};
-use truetwin::math::binomial_bounds;
 use truetwin::progress::{Listener, Progress};
 use truetwin::record::{Drive, Record, Signal};
 use truetwin::twin::{Noise, Twin};
@@ -32,7 +32,7 @@ fn a_perfect_twin_is_rarely_accused() {
             }
         }
     }
-    let bounds = binomial_bounds(RECORDS, 0.05, 0.99).unwrap();
+    let bounds = binomial_bounds(RECORDS, 0.05, 0.99);
     assert!(alarms as u64 <= *bounds.end(), "{alarms} of {RECORDS}");
 }
 

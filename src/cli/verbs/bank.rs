@@ -1,0 +1,107 @@
+//! `bank`: simulates a bank to disk.
+
+use crate::cli::args::{PresetArgument, Subject, at_least_one};
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
+use crate::estimator::shards::BankPlan;
+use crate::storage::work::Share;
+use clap::Args;
+use serde_json::json;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// Simulate a bank from the prior to disk; rerunning the same command resumes it.
+///
+/// DIR holds manifest.json and shards/*.npz; each shard has `theta` and `features`, for `pretrain --bank DIR` or numpy.load.
+/// Row i depends only on the seed and i: threads, jobs (--shard) and ranks (mpirun) give the same bytes.
+#[derive(Debug, Args)]
+#[command(after_help = "A job array of four, merged into one bank:\n  \
+        truetwin bank --twin tanks --size 1000000 --shard $I/4 --out bank-$I\n  \
+        truetwin merge bank-1 bank-2 bank-3 bank-4 --out bank\n  \
+        truetwin pretrain --twin tanks --bank bank --out tanks.est\n\
+        On a shared file system, give all jobs one DIR; no merge is needed. See docs/scaling.md.")]
+pub(in crate::cli) struct Bank {
+    #[command(flatten)]
+    subject: Subject,
+    /// Number of simulations.
+    #[arg(long, value_name = "M", value_parser = at_least_one)]
+    size: usize,
+    /// Output folder; rerunning the same command resumes it.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Share i of n of the shards, for job arrays that count from 0 or from 1.
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Share>,
+    /// Recipe of the features.
+    #[arg(long, value_enum, default_value = "default")]
+    preset: PresetArgument,
+}
+
+impl Verb for Bank {
+    fn subject(&self) -> Option<&Subject> {
+        Some(&self.subject)
+    }
+
+    fn is_resumed(&self) -> bool {
+        true
+    }
+
+    fn is_shared_out(&self) -> bool {
+        true
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        let project = context.project(&self.subject)?;
+        let plan = BankPlan {
+            project: project.clone(),
+            preset: self.preset.into(),
+            size: self.size,
+            seed: context.seed,
+        };
+        let share = context.share(self.shard)?;
+        // Rows of all ranks are counted, by one rank.
+        let before = if context.team.leads() {
+            plan.finish(&self.out).map_or(0, |filled| filled.rows)
+        } else {
+            0
+        };
+        context.team.wait();
+        let clock = Instant::now();
+        plan.fill(&self.out, share, context.progress)?;
+        context.team.wait();
+        if !context.team.leads() {
+            return Ok(ExitCode::SUCCESS);
+        }
+        let seconds = clock.elapsed().as_secs_f64();
+        let filled = plan.finish(&self.out)?;
+        let made = filled.rows.saturating_sub(before);
+        let rate = made as f64 / seconds;
+        let folder = self.out.display();
+        if context.json {
+            output::print_json(&json!({
+                "schema": "truetwin.bank/1",
+                "twin": project.study().name(),
+                "folder": self.out,
+                "size": self.size,
+                "seed": context.seed,
+                "shards": { "there": filled.there, "of": filled.of },
+                "simulated": made,
+                "simulations_per_second": rate,
+                "seconds": seconds,
+            }))?;
+        } else {
+            let next = if filled.there == filled.of {
+                format!("next: truetwin pretrain … --bank {folder} --out EST")
+            } else {
+                "other jobs make the other shards; merge their folders with truetwin merge".into()
+            };
+            output::print(&format!(
+                "{folder}: {} of {} shards, {} of {} simulations; {made} new in {seconds:.1} s ({rate:.0} per second)\n{next}",
+                filled.there, filled.of, filled.rows, self.size,
+            ))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}

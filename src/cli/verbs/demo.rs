@@ -1,0 +1,92 @@
+//! `demo`: estimates the parameters behind an embedded record.
+
+use super::estimate::{show, write_results};
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
+use crate::estimator::{EstimateOptions, PresetName, PretrainOptions, pretrain};
+use crate::record::{Record, write_record};
+use crate::study::Study;
+use crate::twin::Noise;
+use clap::Args;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// A small bank and few epochs keep the demo short; the refinement corrects the rough network.
+const BANK: usize = 2000;
+const EPOCHS: usize = 40;
+
+/// Calibrate a twin to an embedded record: a first look in seconds.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+        truetwin demo --out demo\n\
+        Next: look at demo/overlay.svg, then truetwin twins")]
+pub(in crate::cli) struct Demo {
+    /// Name of the twin [default: the first one that has a demo record].
+    #[arg(long)]
+    twin: Option<String>,
+    /// New folder for result, picture and record.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+impl Verb for Demo {
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        if let Some(out) = &self.out {
+            output::check_new(out)?;
+        }
+        let project = match &self.twin {
+            Some(name) => context.named(name)?,
+            None => (context.projects.iter().find(|p| p.study().demo().is_some()))
+                .or(context.projects.first())
+                .ok_or_else(|| {
+                    Failure::user("no twin is registered; give --program 'COMMAND' or --fmu M.fmu")
+                })?,
+        };
+        let study = project.study();
+        let (record, origin) = match study.demo() {
+            Some(record) => (record.clone(), "embedded record"),
+            None => (
+                simulated(context, study)?,
+                "record simulated at parameters drawn from the bounds",
+            ),
+        };
+        output::say(&format!(
+            "demo: {origin}, twin {}; training on {BANK} simulations from the prior",
+            study.name()
+        ));
+        let settings = PretrainOptions {
+            preset: PresetName::Default,
+            bank_size: Some(BANK),
+            epochs: Some(EPOCHS),
+            seed: context.seed,
+        };
+        let (estimator, _) = pretrain(project, &settings, context.progress)?;
+        let settings = EstimateOptions {
+            seed: context.seed,
+            ..EstimateOptions::default()
+        };
+        let estimate = estimator.estimate(&record, &settings, context.progress)?;
+        if let Some(out) = &self.out {
+            let folder = output::NewFolder::new(out)?;
+            write_record(&folder.file("record.csv"), &record)?;
+            write_results(&folder, study, &record, &estimate)?;
+            folder.finish()?;
+            output::say(&format!(
+                "demo: {0}/overlay.svg shows measured and twin, {0}/record.csv is the record",
+                out.display()
+            ));
+        }
+        show(context, study, &estimate)?;
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Simulates a record at parameters drawn from the bounds, most likely outside the prior.
+fn simulated(context: &Context<'_>, study: &Study) -> Result<Record, Failure> {
+    let noise = Noise::new(context.seed, "demo", 0);
+    let drive = study.drives()?.draw(noise)?;
+    let theta = study.twin().parameters().draw_bounds(noise);
+    let outputs = study.twin().simulate(&theta, &drive, noise)?;
+    Ok(Record::new(drive, outputs)?)
+}

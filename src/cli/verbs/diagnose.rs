@@ -1,0 +1,134 @@
+//! `diagnose`: tests whether the twin explains the record, and finds what it lacks.
+
+use crate::cli::args::Subject;
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
+use crate::diagnose::{DiagnoseSettings, GivenRecord, diagnose};
+use crate::effect::EffectPattern;
+use crate::estimator::Estimator;
+use crate::record::{Record, drive_csv_text, read_record};
+use crate::report::{NEXT_INPUT, gap_html, gap_json, gap_text};
+use crate::study::Study;
+use clap::Args;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Diagnose what the twin lacks: can parameters explain the record; if not, where, which effect, how much of the gap closes.
+///
+/// Needs no training. DIR holds report.json, report.html and, if another record can separate rivals, next-input.csv.
+/// For a black-box twin, only sensor and actuator effects can be named.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+        truetwin diagnose R.csv --twin tanks --validation V.csv --out gap\n  \
+        truetwin diagnose R1.csv R2.csv --study S.toml --without sensor-bias,state-ceiling@h1 --out gap\n\
+        Next: open gap/report.html; docs/diagnosing-a-gap.md says how to read it")]
+pub(in crate::cli) struct Diagnose {
+    /// Measured records of one system; they share all parameters except unknown starts.
+    #[arg(value_name = "R.csv", required = true)]
+    records: Vec<PathBuf>,
+    #[command(flatten)]
+    subject: Subject,
+    /// Estimator of the same twin; its estimate is one starting point of the fit.
+    #[arg(long, value_name = "EST")]
+    estimator: Option<PathBuf>,
+    /// Record that no fit uses: sharper test and ranking, share of the gap closed.
+    #[arg(long, value_name = "V.csv")]
+    validation: Option<PathBuf>,
+    /// Effects to exclude.
+    #[arg(long, value_name = "ID[@TARGET],..", value_delimiter = ',')]
+    without: Vec<EffectPattern>,
+    /// New folder for report.json, report.html and next-input.csv.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+impl Verb for Diagnose {
+    fn subject(&self) -> Option<&Subject> {
+        Some(&self.subject)
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        if let Some(out) = &self.out {
+            output::check_new(out)?;
+        }
+        let study = context.study(&self.subject)?;
+        let records: Vec<Record> = (self.records.iter())
+            .map(|path| read_record(path))
+            .collect::<Result<_, _>>()?;
+        let validation = self.validation.as_deref().map(read_record).transpose()?;
+        let initial = match &self.estimator {
+            Some(path) => Some(first_estimate(context, &study, path, &records[0])?),
+            None => None,
+        };
+        let settings = DiagnoseSettings {
+            seed: context.seed,
+            without: self.without.clone(),
+            initial,
+            ..DiagnoseSettings::default()
+        };
+        let found = diagnose(
+            &study,
+            &records,
+            validation.as_ref(),
+            &settings,
+            context.progress,
+        )
+        .map_err(|error| {
+            let path = match error.record() {
+                Some(GivenRecord::Validation) => self.validation.as_ref(),
+                Some(GivenRecord::Measured(index)) => self.records.get(index),
+                None => None,
+            };
+            let failure = Failure::from(error);
+            match path {
+                Some(path) => failure.within(path),
+                None => failure,
+            }
+        })?;
+        let json = gap_json(&found);
+        if let Some(out) = &self.out {
+            let folder = output::NewFolder::new(out)?;
+            let text = serde_json::to_string_pretty(&json).map_err(Failure::internal)?;
+            folder.write("report.json", &text)?;
+            folder.write("report.html", &gap_html(&study, &found))?;
+            if let Some(next) = &found.cause.next_input {
+                folder.write(NEXT_INPUT, &drive_csv_text(&next.drive))?;
+            }
+            folder.finish()?;
+        }
+        if context.json {
+            output::print_json(&json)?;
+        } else {
+            output::print(&gap_text(&found))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Returns the network's estimate for the first record.
+fn first_estimate(
+    context: &Context<'_>,
+    study: &Study,
+    path: &Path,
+    record: &Record,
+) -> Result<Vec<f64>, Failure> {
+    let estimator = Estimator::load(path, context.projects)?;
+    let names = |study: &Study| -> Vec<String> {
+        let space = study.twin().parameters();
+        space.names().into_iter().map(Into::into).collect()
+    };
+    let (theirs, ours) = (names(estimator.study()), names(study));
+    if theirs != ours {
+        return Err(Failure::user(format!(
+            "{}: the estimator has parameters {}, the study has {}; pretrain one for this twin and study",
+            path.display(),
+            theirs.join(", "),
+            ours.join(", ")
+        )));
+    }
+    let checked = estimator.study().check_record(record);
+    checked.map_err(Failure::from)?;
+    let features = estimator.observe(record)?;
+    Ok(estimator.predict_one(&features)?)
+}

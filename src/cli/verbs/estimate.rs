@@ -1,0 +1,105 @@
+//! `estimate`: estimates the parameters behind a record.
+
+use crate::cli::args::PresetArgument;
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
+use crate::estimator::bank::file;
+use crate::estimator::{self, EstimateOptions, Estimator};
+use crate::record::{Record, read_record};
+use crate::report::{estimate_json, estimate_text, overlay_svg, trajectories_csv};
+use crate::study::Study;
+use clap::Args;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Estimate the parameters behind a measured record.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+        truetwin estimate R.csv --estimator tanks.est --validation V.csv --out result\n\
+        If the calibrated twin does not explain the record, next: truetwin diagnose R.csv")]
+pub(in crate::cli) struct Estimate {
+    /// Measured record.
+    #[arg(value_name = "R.csv")]
+    record: PathBuf,
+    /// Estimator from `truetwin pretrain`.
+    #[arg(long, value_name = "EST")]
+    estimator: PathBuf,
+    /// Second record of the same system, to score the calibrated twin.
+    #[arg(long, value_name = "V.csv")]
+    validation: Option<PathBuf>,
+    /// Settings of the refinement [default: the estimator's own].
+    #[arg(long, value_enum)]
+    preset: Option<PresetArgument>,
+    /// Refine even if the record is consistent with the network's estimate.
+    #[arg(long)]
+    always_refine: bool,
+    /// New folder for estimate.json, overlay.svg, trajectories.csv and, after a refit, the cloud of simulations (cloud.npz).
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+impl Verb for Estimate {
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        if let Some(out) = &self.out {
+            output::check_new(out)?;
+        }
+        let estimator = Estimator::load(&self.estimator, context.projects)?;
+        let record = read_record(&self.record)?;
+        let settings = EstimateOptions {
+            seed: context.seed,
+            preset: self.preset.map(Into::into),
+            always_refine: self.always_refine,
+            validation: self.validation.as_deref().map(read_record).transpose()?,
+        };
+        if let Some((validation, path)) = settings.validation.as_ref().zip(self.validation.as_ref())
+        {
+            let checked = estimator.study().check_record(validation);
+            checked.map_err(|error| Failure::from(error).within(path))?;
+        }
+        let estimate = (estimator.estimate(&record, &settings, context.progress))
+            .map_err(|error| Failure::from(error).within(&self.record))?;
+        if let Some(out) = &self.out {
+            let folder = output::NewFolder::new(out)?;
+            write_results(&folder, estimator.study(), &record, &estimate)?;
+            folder.finish()?;
+        }
+        show(context, estimator.study(), &estimate)?;
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Prints an estimate.
+pub(super) fn show(
+    context: &Context<'_>,
+    study: &Study,
+    estimate: &estimator::Estimate,
+) -> Result<(), Failure> {
+    if context.json {
+        output::print_json(&estimate_json(study, estimate))
+    } else {
+        output::print(&estimate_text(study, estimate))
+    }
+}
+
+/// Writes `estimate.json`, `overlay.svg`, `trajectories.csv`, `cloud.npz`.
+pub(super) fn write_results(
+    folder: &output::NewFolder,
+    study: &Study,
+    record: &Record,
+    estimate: &estimator::Estimate,
+) -> Result<(), Failure> {
+    let json = serde_json::to_string_pretty(&estimate_json(study, estimate));
+    folder.write("estimate.json", &json.map_err(Failure::internal)?)?;
+    if let Some(cloud) = &estimate.cloud {
+        let names: Vec<&str> = estimate.names.iter().map(String::as_str).collect();
+        file::write(&folder.file("cloud.npz"), cloud, &names)?;
+    }
+    let before = estimate.tracking_initial.as_ref().map(|t| &t.outputs);
+    // A free run that diverged cannot be drawn; the text reports it.
+    let Some(after) = estimate.tracking.as_ref().map(|t| &t.outputs) else {
+        return Ok(());
+    };
+    folder.write("overlay.svg", &overlay_svg(study, record, before, after))?;
+    folder.write("trajectories.csv", &trajectories_csv(record, before, after))
+}

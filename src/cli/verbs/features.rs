@@ -1,0 +1,80 @@
+//! `features`: compresses records to features.
+
+use crate::cli::args::{PresetArgument, Subject};
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
+use crate::estimator::bank::file;
+use crate::record::read_record;
+use clap::Args;
+use ndarray::Array2;
+use serde_json::json;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Compress records to the features that the network sees.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+        truetwin features R1.csv R2.csv --twin tanks --out X.npy")]
+pub(in crate::cli) struct Features {
+    /// Records, measured or simulated.
+    #[arg(value_name = "R.csv", required = true)]
+    records: Vec<PathBuf>,
+    #[command(flatten)]
+    subject: Subject,
+    /// Recipe of the features.
+    #[arg(long, value_enum, default_value = "default")]
+    preset: PresetArgument,
+    /// New .npy, .npz or .csv file, one record per row [default: CSV on standard output].
+    #[arg(long, value_name = "X.npy")]
+    out: Option<PathBuf>,
+}
+
+impl Verb for Features {
+    fn subject(&self) -> Option<&Subject> {
+        Some(&self.subject)
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        if let Some(out) = &self.out {
+            output::check_new(out)?;
+        }
+        let project = context.project(&self.subject)?;
+        let study = project.study();
+        let map = (project.recipe(self.preset.into()).features).bind(study.twin())?;
+        let mut all = Vec::new();
+        let stage = context.progress.stage("records", self.records.len());
+        for path in &self.records {
+            let at = |failure: Failure| failure.within(path);
+            let record = read_record(path)?;
+            study
+                .check_record(&record)
+                .map_err(|error| at(error.into()))?;
+            let features = map.extract(record.drive(), record.outputs());
+            all.extend(features.map_err(|error| at(error.into()))?);
+            stage.tick().map_err(Failure::internal)?;
+        }
+        let features = Array2::from_shape_vec((self.records.len(), map.dim()), all)
+            .map_err(Failure::internal)?;
+        if let Some(out) = &self.out {
+            file::write_features(out, &features)?;
+        }
+        match (context.json, &self.out) {
+            (true, _) => {
+                let rows: Vec<Vec<f64>> = features.rows().into_iter().map(|r| r.to_vec()).collect();
+                output::print_json(&json!({
+                    "schema": "truetwin.features/1", "twin": study.name(), "features": rows,
+                }))?;
+            }
+            (false, None) => {
+                let text = file::features_csv_text(&features).map_err(Failure::internal)?;
+                output::print(&text)?;
+            }
+            (false, Some(out)) => {
+                let (rows, n) = features.dim();
+                output::print(&format!("{}: {rows} × {n} features", out.display()))?;
+            }
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}

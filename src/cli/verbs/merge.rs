@@ -1,0 +1,49 @@
+//! `merge`: merges the banks of a job array.
+
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
+use crate::estimator::bank::file;
+use crate::estimator::shards::{merge, merge_into_file};
+use clap::Args;
+use serde_json::json;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Merge the banks of a job array, or convert a bank into one .npz or .csv file.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+        truetwin merge bank-1 bank-2 --out bank\n  \
+        truetwin merge bank --out bank.npz\n\
+        Next: truetwin pretrain with --bank bank")]
+pub(in crate::cli) struct Merge {
+    /// Folders filled by one `truetwin bank` command.
+    #[arg(value_name = "DIR", required = true)]
+    from: Vec<PathBuf>,
+    /// New folder for the bank, or new .npz or .csv file.
+    #[arg(long, value_name = "OUT")]
+    out: PathBuf,
+}
+
+impl Verb for Merge {
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        output::check_new(&self.out)?;
+        let out = self.out.display();
+        let (what, count) = if file::is_named(&self.out) {
+            (
+                "simulations",
+                merge_into_file(&self.from, &self.out, context.progress)?,
+            )
+        } else {
+            ("shards", merge(&self.from, &self.out, context.progress)?)
+        };
+        if context.json {
+            output::print_json(&json!({
+                "schema": "truetwin.merge/1", "out": self.out, "what": what, "count": count,
+            }))?
+        } else {
+            output::print(&format!("{out}: {count} {what}"))?
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}

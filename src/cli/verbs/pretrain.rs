@@ -1,0 +1,128 @@
+//! `pretrain`: simulates a bank and trains the network.
+
+use crate::cli::args::{PresetArgument, Subject, seconds};
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
+use crate::estimator::bank::{Bank, file};
+use crate::estimator::shards::{BankPlan, ShardedBank};
+use crate::estimator::{GivenBank, PretrainOptions, Pretraining, Project};
+use crate::storage::work::checksum;
+use clap::Args;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+/// Simulate a bank from the prior, train the network, write one estimator file.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+        truetwin pretrain --twin tanks --out tanks.est\n  \
+        truetwin pretrain --study S.toml --bank bank --out mine.est\n\
+        After a stop, rerun the same command to resume: EST.part keeps bank and training until EST is complete.\n\
+        Next: truetwin estimate R.csv --estimator tanks.est")]
+pub(in crate::cli) struct Pretrain {
+    #[command(flatten)]
+    subject: Subject,
+    /// Output file of the estimator.
+    #[arg(long, value_name = "EST")]
+    out: PathBuf,
+    /// Number of simulations [default: the preset's].
+    #[arg(long, value_name = "M")]
+    bank_size: Option<usize>,
+    /// Existing bank: folder of `truetwin bank`, or .npz or .csv file with theta and features.
+    #[arg(long, value_name = "BANK", conflicts_with = "bank_size")]
+    bank: Option<PathBuf>,
+    /// Passes over the bank [default: the preset's].
+    #[arg(long)]
+    epochs: Option<usize>,
+    /// Recipe of features, network and refinement.
+    #[arg(long, value_enum, default_value = "default")]
+    preset: PresetArgument,
+    /// Time between checkpoints of the training; 0: after each block of the bank.
+    #[arg(long, value_name = "SECONDS", default_value = "10", value_parser = seconds)]
+    checkpoint: Duration,
+}
+
+impl Verb for Pretrain {
+    fn subject(&self) -> Option<&Subject> {
+        Some(&self.subject)
+    }
+
+    fn is_resumed(&self) -> bool {
+        true
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        output::check_folder(&self.out)?;
+        let project = context.project(&self.subject)?;
+        let study = project.study();
+        let clock = Instant::now();
+        let settings = PretrainOptions {
+            preset: self.preset.into(),
+            bank_size: self.bank_size,
+            epochs: self.epochs,
+            seed: context.seed,
+        };
+        let pretraining = Pretraining::new(&project, settings).with_checkpoints(self.checkpoint);
+        let (estimator, history) = match &self.bank {
+            None => pretraining.write(&self.out, context.progress)?,
+            Some(path) => {
+                let (bank, checksum) = given(&project, path, &settings)?;
+                let bank = bank.as_ref();
+                (pretraining.with_bank(GivenBank { bank, checksum }))
+                    .write(&self.out, context.progress)?
+            }
+        };
+        let seconds = clock.elapsed().as_secs_f64();
+        let bank = estimator.settings().bank_size;
+        let loss = history.training.last().copied().unwrap_or(f64::NAN);
+        if context.json {
+            output::print_json(&json!({
+                "schema": "truetwin.pretrain/1",
+                "twin": study.name(),
+                "estimator": self.out,
+                "preset": estimator.preset(),
+                "bank_size": bank,
+                "features": estimator.network().inputs(),
+                "epochs": history.epochs_run,
+                "loss": if loss.is_finite() { Some(loss) } else { None },
+                "seed": context.seed,
+                "seconds": seconds,
+            }))?;
+        } else {
+            output::print(&format!(
+                "{}: estimator of {} from {bank} simulations, {} features, {} epochs, loss {loss:.4}, {seconds:.1} s\n\
+                 next: truetwin estimate RECORD.csv --estimator {}",
+                self.out.display(),
+                study.twin().parameters().names().join(", "),
+                estimator.network().inputs(),
+                history.epochs_run,
+                self.out.display(),
+            ))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// A bank that is there, and its checksum.
+fn given(
+    project: &Project,
+    path: &Path,
+    settings: &PretrainOptions,
+) -> Result<(Box<dyn Bank>, String), Failure> {
+    if file::is_named(path) {
+        let bank = file::read(path, &project.study().twin().parameters().names())?;
+        return Ok((Box::new(bank), checksum(path)?));
+    }
+    let bank = ShardedBank::open(path)?;
+    let plan = BankPlan {
+        project: project.clone(),
+        preset: settings.preset,
+        size: bank.size(),
+        seed: bank.seed(),
+    };
+    plan.check(&bank)?;
+    let checksum = bank.checksum();
+    Ok((Box::new(bank), checksum))
+}

@@ -1,0 +1,241 @@
+//! `reproduce`: the paper's table and figures, on any twin.
+
+use crate::cli::args::{PresetArgument, Subject, at_least_one};
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
+use crate::estimator::{
+    Estimator, EstimatorError, PretrainOptions, Pretraining, Project, pretrain,
+};
+use crate::evaluate::paper::{
+    Benchmark, FreeRuns, MeanRuns, MonteCarlo, Origin, Run, Scenario, score,
+};
+use crate::report::{first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
+use crate::storage::work::{Share, WorkError, WorkFolder};
+use crate::study::Study;
+use clap::{Args, ValueEnum};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Duration;
+
+/// Interval between checks whether another job has trained the estimator.
+const LOOK: Duration = Duration::from_millis(200);
+
+/// Source of the true parameters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ScenarioArgument {
+    /// Drawn from the prior of the training
+    #[value(name = "0")]
+    Prior,
+    /// The paper's first point outside the prior, that of its table (OOD 1)
+    #[value(name = "1")]
+    First,
+    /// The paper's second point outside the prior, that of its figures (OOD 2)
+    #[value(name = "2")]
+    Second,
+    /// Drawn from the physical bounds
+    #[value(name = "uniform", alias = "3")]
+    Uniform,
+}
+
+impl From<ScenarioArgument> for Scenario {
+    fn from(argument: ScenarioArgument) -> Self {
+        match argument {
+            ScenarioArgument::Prior => Self::InDistribution,
+            ScenarioArgument::First => Self::First,
+            ScenarioArgument::Second => Self::Second,
+            ScenarioArgument::Uniform => Self::Uniform,
+        }
+    }
+}
+
+/// Score every method on simulated records: the paper's table and figures.
+///
+/// Methods: the pretrained network (TS-pre), Gauss–Newton (GN), tuned heads (TS-fine), what `estimate` would answer
+/// (final), and as baselines the prediction-error method (PEM) and the dual Kalman filter (dual-EKF), each from a good
+/// start, from TS-pre, and from a bad start. The paper's figures stand beside ours. If records do not determine all of θ,
+/// a second table has the errors of the combinations that they determine.
+///
+/// Run i depends only on the seed and i. Records run in parallel, each on its share of the threads: for times of one
+/// core, use --threads 1.
+#[derive(Debug, Args)]
+#[command(after_help = "The paper's table and figures:\n  \
+        truetwin reproduce --twin van-der-pol --preset paper --out vdp-1\n  \
+        truetwin reproduce --twin tanks --preset paper --out tanks-1\n  \
+        truetwin reproduce --twin tanks --preset paper --scenario 2 --out tanks-2\n\
+        A twin of your own, over all of its bounds:\n  \
+        truetwin reproduce --study S.toml --scenario uniform --runs 200 --out study\n\n\
+        DIR holds reproduce.json (as --json), table.txt, trajectories.svg (as in the paper: the truth and the mean\n\
+        predictions; scenarios 1 and 2), first-record.svg, and the state of the work: manifest.json, estimator.est,\n\
+        runs/NNNN.json. Interrupted, the same command resumes it; a different command is refused.")]
+pub(in crate::cli) struct Reproduce {
+    #[command(flatten)]
+    subject: Subject,
+    /// Source of the true parameters.
+    #[arg(long, value_enum, default_value = "1")]
+    scenario: ScenarioArgument,
+    /// Number of simulated records; the paper has 100.
+    #[arg(long, default_value_t = 100, value_parser = at_least_one)]
+    runs: usize,
+    /// Recipe of features, network and refinement.
+    #[arg(long, value_enum, default_value = "default")]
+    preset: PresetArgument,
+    /// Existing estimator to score.
+    #[arg(long, value_name = "EST", conflicts_with_all = ["preset", "bank_size", "epochs"])]
+    estimator: Option<PathBuf>,
+    /// Number of simulations [default: the preset's].
+    #[arg(long, value_name = "M")]
+    bank_size: Option<usize>,
+    /// Passes over the bank [default: the preset's].
+    #[arg(long)]
+    epochs: Option<usize>,
+    /// Output folder; rerunning the same command resumes it.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Share i of n of the records, for job arrays; when all shares are done, rerun without --shard to merge.
+    #[arg(long, value_name = "I/N", requires = "out")]
+    shard: Option<Share>,
+}
+
+impl Verb for Reproduce {
+    fn subject(&self) -> Option<&Subject> {
+        Some(&self.subject)
+    }
+
+    fn is_resumed(&self) -> bool {
+        self.out.is_some()
+    }
+
+    fn is_shared_out(&self) -> bool {
+        true
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        let project = context.project(&self.subject)?;
+        let given = match &self.estimator {
+            Some(path) => Some((path, load(context, path, project.study())?)),
+            None => None,
+        };
+        // An estimator carries the setting that it was made for.
+        let study = (given.as_ref()).map_or(project.study(), |(_, estimator)| estimator.study());
+        let study = &study.clone();
+        let plan = MonteCarlo {
+            benchmark: Benchmark::of(study),
+            scenario: self.scenario.into(),
+            runs: self.runs,
+            seed: context.seed,
+        };
+        plan.check(study)?;
+        let training = PretrainOptions {
+            preset: self.preset.into(),
+            bank_size: self.bank_size,
+            epochs: self.epochs,
+            seed: context.seed,
+        };
+        if self.out.is_none() && !context.team.is_alone() {
+            return Err(Failure::user("--out is required under mpirun"));
+        }
+        let share = context.share(self.shard)?;
+        let folder = match &self.out {
+            Some(out) => {
+                let origin = match &given {
+                    Some((path, _)) => Origin::File(path),
+                    None => Origin::Trained(project.recipe(training.preset), &training),
+                };
+                Some(plan.folder(out, study, origin)?)
+            }
+            None => None,
+        };
+        let estimator = match (given, &folder) {
+            (Some((_, estimator)), _) => estimator,
+            (None, None) => pretrain(&project, &training, context.progress)?.0,
+            (None, Some(folder)) => kept(context, &project, &training, folder)?,
+        };
+        if let (Some(out), Some(folder)) = (&self.out, &folder) {
+            let there = plan
+                .run_share(&estimator, Some(folder), share, context.progress)?
+                .len();
+            if self.shard.is_some() && there < self.runs {
+                return output::print_share(context, out, "records", there, self.runs);
+            }
+            context.team.wait();
+            if !context.team.leads() {
+                return Ok(ExitCode::SUCCESS);
+            }
+        }
+        let runs = plan.run(&estimator, folder.as_ref(), context.progress)?;
+        let scores = score(study, &plan, &runs);
+        let json = reproduce_json(study, &plan, estimator.preset(), &scores);
+        let text = reproduce_text(study, &plan, estimator.preset(), &scores);
+        if let Some(folder) = &folder {
+            let stage = context.progress.stage("figures", 1);
+            draw(folder, study, &plan, &runs)?;
+            stage.finish();
+            folder.write("table.txt", &text)?;
+            // Written last: it marks the folder as complete.
+            folder.write("reproduce.json", &format!("{json:#}\n"))?;
+        }
+        if context.json {
+            output::print_json(&json)?
+        } else {
+            output::print(&text)?
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Loads an estimator; refuses one of another twin.
+fn load(context: &Context<'_>, path: &Path, study: &Study) -> Result<Estimator, Failure> {
+    let estimator = Estimator::load(path, context.projects)?;
+    let (made_for, asked) = (estimator.study().name(), study.name());
+    if made_for != asked {
+        return Err(Failure::user(format!(
+            "{}: made for twin {made_for}, the call names {asked}; name the same twin",
+            path.display()
+        )));
+    }
+    Ok(estimator)
+}
+
+/// Loads the folder's estimator; trains it first if needed.
+fn kept(
+    context: &Context<'_>,
+    project: &Project,
+    training: &PretrainOptions,
+    folder: &WorkFolder,
+) -> Result<Estimator, Failure> {
+    let path = folder.file("estimator.est");
+    while context.team.leads() && !path.exists() {
+        match Pretraining::new(project, *training).write(&path, context.progress) {
+            // Another job is training it.
+            Err(EstimatorError::Work(WorkError::Busy { .. })) => {
+                context.progress.checkpoint().map_err(Failure::internal)?;
+                std::thread::sleep(LOOK);
+            }
+            // Another job was faster.
+            Err(_) if path.exists() => {}
+            trained => drop(trained?),
+        }
+    }
+    context.team.wait();
+    Ok(Estimator::load(&path, context.projects)?)
+}
+
+/// Draws `first-record.svg` and, if all records share one truth, `trajectories.svg`.
+fn draw(
+    folder: &WorkFolder,
+    study: &Study,
+    plan: &MonteCarlo,
+    runs: &[Run],
+) -> Result<(), Failure> {
+    if let Some(means) = MeanRuns::of(study, plan, runs)?
+        && let Some(svg) = mean_runs_svg(study, &means)
+    {
+        folder.write("trajectories.svg", &svg)?;
+    }
+    if let Some(first) = runs.first() {
+        let free = FreeRuns::of(study, plan, first)?;
+        folder.write("first-record.svg", &first_run_svg(study, &free))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,148 @@
+//! `completions` and `man`: shell completion and manual pages, generated from the options.
+
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
+use crate::setting::did_you_mean;
+use clap::builder::PossibleValuesParser;
+use clap::{Args, Command};
+use clap_complete::Shell;
+use clap_mangen::Man as Page;
+use serde_json::json;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Print a shell script that completes verbs, options and twin names.
+#[derive(Debug, Args)]
+#[command(after_help = "Run once, and after each update:\n  \
+        bash        truetwin completions bash > ~/.local/share/bash-completion/completions/truetwin\n  \
+        zsh         truetwin completions zsh  > \"${fpath[1]}/_truetwin\"\n  \
+        fish        truetwin completions fish > ~/.config/fish/completions/truetwin.fish\n  \
+        PowerShell  truetwin completions powershell >> $PROFILE\n\
+        Then open a new shell.")]
+pub(in crate::cli) struct Completions {
+    /// Shell.
+    #[arg(value_enum)]
+    shell: Shell,
+}
+
+impl Verb for Completions {
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        let mut command = command(context);
+        let mut script = Vec::new();
+        clap_complete::generate(self.shell, &mut command, context.program, &mut script);
+        let script = String::from_utf8(script).map_err(Failure::internal)?;
+        if context.json {
+            output::print_json(&json!({
+                "schema": "truetwin.completions/1", "shell": self.shell.to_string(), "script": script,
+            }))?
+        } else {
+            output::print(&script)?
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Print or write manual pages: one for the program, one for each verb.
+#[derive(Debug, Args)]
+#[command(after_help = "Read one page, or install all of them:\n  \
+        truetwin man estimate | man -l -\n  \
+        truetwin man --out man1 && sudo mv man1/* /usr/local/share/man/man1/")]
+pub(in crate::cli) struct Man {
+    /// Verb of the page to print [default: the program's page].
+    #[arg(value_name = "VERB", conflicts_with = "out")]
+    verb: Option<String>,
+    /// New folder for all pages.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+impl Verb for Man {
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        let pages = pages(context)?;
+        if let Some(out) = &self.out {
+            output::check_new(out)?;
+            let folder = output::NewFolder::new(out)?;
+            for (name, text) in &pages {
+                folder.write(&format!("{name}.1"), text)?;
+            }
+            folder.finish()?;
+            let names: Vec<&String> = pages.iter().map(|(name, _)| name).collect();
+            if context.json {
+                output::print_json(&json!({
+                    "schema": "truetwin.man/1", "folder": out, "pages": names,
+                }))?
+            } else {
+                output::print(&format!(
+                    "{0}: {1} pages\nnext: man {0}/{2}.1",
+                    out.display(),
+                    names.len(),
+                    context.program
+                ))?
+            }
+            return Ok(ExitCode::SUCCESS);
+        }
+        let asked = match &self.verb {
+            Some(verb) => format!("{}-{verb}", context.program),
+            None => context.program.to_owned(),
+        };
+        let Some((name, text)) = pages.iter().find(|(name, _)| *name == asked) else {
+            let verbs = command(context);
+            let verb = self.verb.as_deref().unwrap_or_default();
+            let known: Vec<&str> = verbs.get_subcommands().map(Command::get_name).collect();
+            return Err(Failure::user(format!(
+                "man: no verb is called {}{}; there are {}",
+                verb,
+                did_you_mean(verb, &known),
+                known.join(", ")
+            )));
+        };
+        if context.json {
+            output::print_json(&json!({
+                "schema": "truetwin.man/1", "page": name, "text": text,
+            }))?
+        } else {
+            output::print(text)?
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Returns the command line with this program's name, and its twins as values of `--twin`.
+fn command(context: &Context<'_>) -> Command {
+    let names: Vec<String> = (context.projects.iter())
+        .map(|project| project.study().name().to_owned())
+        .collect();
+    ((context.command)().name(context.program.to_owned())).mut_subcommands(|verb| {
+        let takes_twin = verb.get_arguments().any(|option| option.get_id() == "twin");
+        if takes_twin {
+            verb.mut_arg("twin", |option| {
+                option.value_parser(PossibleValuesParser::new(names.clone()))
+            })
+        } else {
+            verb
+        }
+    })
+}
+
+/// Renders all pages: names and roff texts.
+fn pages(context: &Context<'_>) -> Result<Vec<(String, String)>, Failure> {
+    let mut whole = command(context).bin_name(context.program.to_owned());
+    // Copies the global options to each verb.
+    whole.build();
+    let verbs = (whole
+        .get_subcommands()
+        .filter(|verb| verb.get_name() != "help"))
+    .cloned();
+    let named = verbs.map(|verb| (format!("{}-{}", context.program, verb.get_name()), verb));
+    std::iter::once((context.program.to_owned(), whole.clone()))
+        .chain(named)
+        .map(|(name, verb)| {
+            let mut text = Vec::new();
+            (Page::new(verb).title(name.to_uppercase()))
+                .render(&mut text)
+                .map_err(Failure::internal)?;
+            Ok((name, String::from_utf8(text).map_err(Failure::internal)?))
+        })
+        .collect()
+}

@@ -1,0 +1,170 @@
+//! `simulate`: simulates a record.
+
+use crate::cli::args::Subject;
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
+use crate::effect::{augment, given_magnitudes};
+use crate::record::{Drive, Record, read_drive, record_csv_text, write_record};
+use crate::setting::did_you_mean;
+use crate::twin::{DigitalTwin, Noise, ParameterSpace, Role};
+use clap::Args;
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Simulate a record at given parameters, with noise and optional effects.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+        truetwin simulate --twin van-der-pol --theta nu=3 --out R.csv\n  \
+        truetwin simulate --twin tanks --theta k1=0.6,k2=0.5,k3=0.55,k4=1 --effect E.toml --seed 4 --out R.csv\n\
+        Next: truetwin estimate R.csv --estimator EST, or truetwin diagnose R.csv --twin NAME --out gap")]
+pub(in crate::cli) struct Simulate {
+    #[command(flatten)]
+    subject: Subject,
+    /// Parameters as name=value, separated by commas; estimated starts and noise levels may be omitted.
+    #[arg(long, value_name = "a=..,b=..")]
+    theta: String,
+    /// TOML file of [[effect]] tables to add.
+    #[arg(long, value_name = "E.toml")]
+    effect: Option<PathBuf>,
+    /// Time and inputs [default: random levels as in the study].
+    #[arg(long, value_name = "U.csv")]
+    input: Option<PathBuf>,
+    /// Simulate without process and measurement noise.
+    #[arg(long)]
+    noise_free: bool,
+    /// Output file of the record [default: standard output].
+    #[arg(long, value_name = "R.csv")]
+    out: Option<PathBuf>,
+}
+
+impl Verb for Simulate {
+    fn subject(&self) -> Option<&Subject> {
+        Some(&self.subject)
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        if let Some(out) = &self.out {
+            output::check_new(out)?;
+        }
+        let study = context.study(&self.subject)?;
+        let given = parse_theta(&self.theta)?;
+        let mut twin = study.twin().clone();
+        let mut magnitudes = BTreeMap::new();
+        if let Some(path) = &self.effect {
+            let effects = study.catalogue().read(path)?;
+            magnitudes = given_magnitudes(&effects);
+            twin = augment(twin, effects).map_err(|error| Failure::from(error).within(path))?;
+        }
+        let theta = complete(&twin.parameters(), &given, &magnitudes)?;
+        let noise = Noise::new(context.seed, "simulate", 0);
+        let drive = match &self.input {
+            Some(path) => read_drive(path)?,
+            None => study.drives()?.draw(noise)?,
+        };
+        check_inputs(&twin, &drive, self)?;
+        let noise = if self.noise_free { Noise::OFF } else { noise };
+        let outputs = twin.simulate(&theta, &drive, noise)?;
+        let record = Record::new(drive, outputs)?;
+        match &self.out {
+            Some(out) => write_record(out, &record)?,
+            None if !context.json => output::print(&record_csv_text(&record))?,
+            None => {}
+        }
+        if context.json {
+            let names = twin.parameters();
+            output::print_json(&json!({
+                "schema": "truetwin.simulate/1",
+                "twin": study.name(),
+                "names": names.names(),
+                "theta": theta,
+                "seed": context.seed,
+                "noise_free": self.noise_free,
+                "samples": record.samples(),
+                "step": record.drive().dt(),
+                "record": self.out,
+                "y": if self.out.is_none() { Some(record.outputs().rows().into_iter().map(|r| r.to_vec()).collect::<Vec<_>>()) } else { None },
+            }))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Parses `a=1,b=2`.
+fn parse_theta(text: &str) -> Result<BTreeMap<String, f64>, Failure> {
+    let mut values = BTreeMap::new();
+    for part in text.split(',').map(str::trim).filter(|p| !p.is_empty()) {
+        let wrong = || {
+            Failure::user(format!(
+                "--theta: \"{part}\" is not name=value; write k=0.5, with commas between"
+            ))
+        };
+        let (name, value) = part.split_once('=').ok_or_else(wrong)?;
+        let value: f64 = value.trim().parse().map_err(|_| wrong())?;
+        if values.insert(name.trim().to_owned(), value).is_some() {
+            let name = name.trim();
+            return Err(Failure::user(format!(
+                "--theta gives {name} twice; give it once"
+            )));
+        }
+    }
+    Ok(values)
+}
+
+/// Returns θ from the call and the effect file; omitted starts and noise levels take their prior's centre.
+fn complete(
+    space: &ParameterSpace,
+    given: &BTreeMap<String, f64>,
+    magnitudes: &BTreeMap<String, f64>,
+) -> Result<Vec<f64>, Failure> {
+    let names = space.names();
+    if let Some(name) = given.keys().find(|name| !names.contains(&name.as_str())) {
+        return Err(Failure::user(format!(
+            "--theta: no parameter is called {name}{}; there are {}",
+            did_you_mean(name, &names),
+            names.join(", ")
+        )));
+    }
+    let mut theta = Vec::new();
+    for p in space.iter() {
+        let value = given.get(&p.name).copied();
+        let value = match (value, magnitudes.get(&p.name), p.role) {
+            (Some(value), _, _) if !p.bounds.contains(value) => {
+                return Err(Failure::user(format!(
+                    "--theta: {} = {value} is outside its bounds {}; choose a value inside",
+                    p.name, p.bounds
+                )));
+            }
+            (Some(value), _, _) => value,
+            // The effect has checked its limits; off values may be infinite.
+            (None, Some(magnitude), _) => *magnitude,
+            (None, None, Role::Start | Role::Noise) => p.prior.centre(),
+            (None, None, _) => {
+                return Err(Failure::user(format!(
+                    "--theta: no value for {}; give {}",
+                    p.name,
+                    names.join(", ")
+                )));
+            }
+        };
+        theta.push(value);
+    }
+    Ok(theta)
+}
+
+fn check_inputs(twin: &dyn DigitalTwin, drive: &Drive, options: &Simulate) -> Result<(), Failure> {
+    let (given, expected) = (drive.inputs().ncols(), twin.signals().inputs.len());
+    if given == expected {
+        return Ok(());
+    }
+    let path = options
+        .input
+        .as_deref()
+        .unwrap_or(std::path::Path::new("input"));
+    Err(Failure::user(format!(
+        "{}: {given} inputs, the twin has {expected}; give t and one column for each input",
+        path.display()
+    )))
+}

@@ -1,0 +1,90 @@
+//! `twins`: lists the twins.
+
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
+use crate::record::Quantity;
+use crate::study::Study;
+use clap::Args;
+use serde_json::{Value, json};
+use std::process::ExitCode;
+
+/// List the twins: parameters, units, prior, bounds, channels.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+        truetwin twins\n\
+        Next: truetwin check --twin NAME, then truetwin pretrain --twin NAME --out NAME.est")]
+pub(in crate::cli) struct Twins {}
+
+impl Verb for Twins {
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        if context.json {
+            let twins: Vec<Value> = context
+                .projects
+                .iter()
+                .map(|p| describe(p.study()))
+                .collect();
+            output::print_json(&json!({ "schema": "truetwin.twins/1", "twins": twins }))?;
+        } else {
+            let blocks: Vec<String> = context
+                .projects
+                .iter()
+                .map(|p| in_words(p.study()))
+                .collect();
+            output::print(&blocks.join("\n"))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+fn describe(study: &Study) -> Value {
+    let twin = study.twin();
+    let signals = twin.signals();
+    let states = twin.outline().map(|outline| outline.states);
+    json!({
+        "name": study.name(),
+        "equations": states.is_some(),
+        "parameters": twin.parameters().iter().collect::<Vec<_>>(),
+        "states": states.unwrap_or_default(),
+        "inputs": signals.inputs,
+        "outputs": signals.outputs,
+        "record": { "step": study.plan().step, "samples": study.plan().samples },
+    })
+}
+
+fn in_words(study: &Study) -> String {
+    let twin = study.twin();
+    let signals = twin.signals();
+    let names = |all: &[Quantity]| match all.len() {
+        0 => "none".to_owned(),
+        _ => (all.iter())
+            .map(|q| format!("{} [{}]", q.name, q.unit))
+            .collect::<Vec<_>>()
+            .join(", "),
+    };
+    let states = match twin.outline() {
+        Some(outline) => names(&outline.states),
+        None => "hidden (black box)".into(),
+    };
+    let mut text = format!(
+        "{}\n  states  {states}\n  inputs  {}\n  outputs {}\n  record  {} samples, step {} s\n  {:<12} {:<8} {:<16} bounds\n",
+        study.name(),
+        names(&signals.inputs),
+        names(&signals.outputs),
+        study.plan().samples,
+        study.plan().step,
+        "parameter",
+        "unit",
+        "prior",
+    );
+    for p in twin.parameters().iter() {
+        text.push_str(&format!(
+            "  {:<12} {:<8} {:<16} {}\n",
+            p.name,
+            p.unit,
+            p.prior.to_string(),
+            p.bounds
+        ));
+    }
+    text
+}

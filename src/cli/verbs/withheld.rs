@@ -1,0 +1,113 @@
+//! `withheld`: scores `diagnose` on trials with sealed truth.
+
+use crate::cli::args::{Subject, at_least_one};
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
+use crate::evaluate::trials::{self, Kind, Settings};
+use crate::report::{scorecard_html, scorecard_json, scorecard_text};
+use crate::setting::did_you_mean;
+use crate::storage::work::Share;
+use clap::Args;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Score `diagnose` on trials with sealed truth: false alarms, detection, effect, location, abstention.
+///
+/// Records come from reference simulators that share no code with the twins. The SHA-256 of the key file is printed before
+/// the first diagnosis; keys are read after the last one. Scores: docs/withheld.md.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+        truetwin withheld --twin tanks --trials 100 --out trials\n\n\
+        DIR holds scorecard.json (as --json), scorecard.html, and the state of the work: manifest.json, seal.txt,\n\
+        keys.json, records, answers. Interrupted, the same command resumes it; a different command is refused.")]
+pub(in crate::cli) struct Withheld {
+    #[command(flatten)]
+    subject: Subject,
+    /// Number of trials, one record each.
+    #[arg(long, value_parser = at_least_one)]
+    trials: usize,
+    /// Output folder; rerunning the same command resumes it.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Kinds of truth [default: all].
+    #[arg(long, value_name = "KIND,..", value_delimiter = ',', value_parser = kind)]
+    kinds: Option<Vec<Kind>>,
+    /// Remove the true effects from the library: the right answer is then to abstain.
+    #[arg(long)]
+    without: bool,
+    /// Give each diagnosis a validation record.
+    #[arg(long)]
+    validation: bool,
+    /// Stop each diagnosis at its verdict: false alarms and detection only, in a third of the time.
+    #[arg(long)]
+    detection_only: bool,
+    /// Share i of n of the diagnoses, for job arrays; when all shares are done, rerun without --shard to merge.
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Share>,
+}
+
+impl Verb for Withheld {
+    fn subject(&self) -> Option<&Subject> {
+        Some(&self.subject)
+    }
+
+    fn is_resumed(&self) -> bool {
+        true
+    }
+
+    fn is_shared_out(&self) -> bool {
+        true
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        let study = context.study(&self.subject)?;
+        let settings = Settings {
+            trials: self.trials,
+            seed: context.seed,
+            kinds: self.kinds.clone().unwrap_or(Kind::ALL.to_vec()),
+            without: self.without,
+            validation: self.validation,
+            detection_only: self.detection_only,
+        };
+        let sealed = trials::Withheld::new(&study, settings)?.seal(&self.out, context.progress)?;
+        if context.team.leads() {
+            // Printed before the first diagnosis.
+            output::say(&format!("keys sealed: sha256 {}", sealed.seal()));
+        }
+        let share = context.share(self.shard)?;
+        let answers = sealed.answer(share, context.progress)?.len();
+        if self.shard.is_some() && answers < self.trials {
+            return output::print_share(context, &self.out, "trials", answers, self.trials);
+        }
+        context.team.wait();
+        sealed.open_keys(share, context.progress)?;
+        context.team.wait();
+        if !context.team.leads() {
+            return Ok(ExitCode::SUCCESS);
+        }
+        let card = sealed.score(context.progress)?;
+        let json = scorecard_json(&card);
+        sealed.write("scorecard.html", &scorecard_html(&card))?;
+        // Written last: it marks the folder as complete.
+        sealed.write("scorecard.json", &format!("{json:#}\n"))?;
+        if context.json {
+            output::print_json(&json)?
+        } else {
+            output::print(&scorecard_text(&card))?
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Parses a kind of truth.
+fn kind(text: &str) -> Result<Kind, String> {
+    let known = Kind::ALL.map(Kind::id);
+    Kind::named(text).ok_or_else(|| {
+        let near = did_you_mean(text, known);
+        format!(
+            "no kind is called {text}{near}; there are {}",
+            known.join(", ")
+        )
+    })
+}

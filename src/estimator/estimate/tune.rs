@@ -1,0 +1,110 @@
+//! Heads tuned on the cloud.
+
+use crate::estimator::bank::Draws;
+use crate::estimator::error::EstimatorError;
+use crate::estimator::estimator::{Estimator, one_row};
+use crate::estimator::readout::{
+    Calibration, INTERVAL_LEVEL, Layer, Readout, Scaler, Spread, Standardiser,
+};
+use crate::estimator::refine::Refined;
+use crate::estimator::settings::Settings;
+use crate::network::Training;
+use crate::progress::Progress;
+use nalgebra::DVector;
+use ndarray::{Array2, s};
+
+/// Largest network input, in standard deviations of the cloud.
+const LIMIT: f64 = 8.0;
+
+/// Heads tuned to one record.
+#[derive(Debug, Clone)]
+pub struct Tuned {
+    /// θ_fine, within the bounds.
+    pub theta: Vec<f64>,
+    /// Errors to expect, measured on a part of the cloud that the heads never saw.
+    pub spread: Option<Spread>,
+}
+
+/// Tunes the heads on a cloud, the trunk frozen, and reads the record with them.
+///
+/// Each target's weight is w_j = d·G_jj/Σ G_kk, with G in the units that the targets are standardised in.
+///
+/// Source: Lakshminarayanan, Guerrero & Rojas, section IV-C; the quadratic layer is ours.
+pub fn tune(
+    estimator: &Estimator,
+    draws: &Draws,
+    refined: &Refined,
+    observed: &DVector<f64>,
+    settings: &Settings,
+    seed: u64,
+    progress: &Progress,
+) -> Result<Tuned, EstimatorError> {
+    let size = (settings.cloud.draws(draws.theta.ncols())).min(draws.theta.nrows());
+    let rows = |all: &Array2<f64>, from: usize, to: usize| all.slice(s![from..to, ..]).to_owned();
+    let (features, theta) = (rows(&draws.features, 0, size), rows(&draws.theta, 0, size));
+    // On a cloud that is small against the prior, features and targets standardised as in pretraining are all but
+    // constant, and the heads learn little.
+    let (inputs, targets) = if settings.cloud.rescale {
+        let inputs = Standardiser::principal(&features, LIMIT);
+        (
+            inputs.unwrap_or_else(|_| Standardiser::each(&features)),
+            Scaler::fit(&theta),
+        )
+    } else {
+        (
+            estimator.readout.inputs.clone(),
+            estimator.readout.targets.clone(),
+        )
+    };
+    let (z, y) = (inputs.apply(&features), targets.apply(&theta));
+    let mut layer = (settings.cloud.quadratic.then(|| Layer::fit(&z, &y))).flatten();
+    let goal = layer
+        .as_ref()
+        .map_or_else(|| y.clone(), |layer| layer.rest(&z, &y));
+    let (network, _) = estimator.readout.network.tune_heads(
+        &z,
+        &goal,
+        &Training {
+            target_weights: weights(refined, &targets),
+            ..settings.tuning.clone()
+        },
+        seed,
+        progress,
+    )?;
+    let end = draws.theta.nrows();
+    let (unseen, truth) = (
+        rows(&draws.features, size, end),
+        rows(&draws.theta, size, end),
+    );
+    if let Some(layer) = &mut layer {
+        let z = inputs.apply(&unseen);
+        let said = network.predict(&z)?;
+        layer.weigh(&layer.rest(&z, &targets.apply(&truth)), &said);
+    }
+    let readout = Readout {
+        inputs,
+        targets,
+        layer,
+        network,
+    };
+    let space = estimator.study().twin().parameters();
+    let theta = space.clamp(&readout.predict(&one_row(observed))?.row(0).to_vec());
+    let calibration = Calibration {
+        predicted: readout.predict(&unseen)?,
+        truth,
+    };
+    Ok(Tuned {
+        spread: calibration.spread(&theta, &readout.targets.scale, INTERVAL_LEVEL),
+        theta,
+    })
+}
+
+/// w_j for standardised targets.
+fn weights(refined: &Refined, targets: &Scaler) -> Vec<f64> {
+    let information: Vec<f64> = (targets.scale.iter().enumerate())
+        .map(|(j, scale)| refined.information.matrix[(j, j)] * scale * scale)
+        .collect();
+    let total: f64 = information.iter().sum();
+    let d = information.len() as f64;
+    information.iter().map(|g| d * g / total).collect()
+}

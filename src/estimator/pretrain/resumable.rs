@@ -1,0 +1,227 @@
+//! A pretraining that can be interrupted.
+
+use super::train::{PretrainOptions, fits_into_memory, pretrain_from, prior, settings};
+use crate::estimator::bank::{Bank, Draws};
+use crate::estimator::error::EstimatorError;
+use crate::estimator::estimator::Estimator;
+use crate::estimator::project::Project;
+use crate::estimator::shards::{BankPlan, ShardedBank};
+use crate::network::{Checkpoints, History, NetworkError};
+use crate::progress::Progress;
+use crate::storage::work::{Manifest, Share, WorkFolder};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Layout of the folder; raised when it changes.
+const LAYOUT: u32 = 1;
+const VERB: &str = "pretrain";
+/// What the name of the folder ends in, after that of the estimator.
+const ENDING: &str = ".part";
+const BANK: &str = "bank";
+const TRAINING: &str = "training";
+/// How often the training is kept unless said: often enough that little is lost, seldom enough that nobody waits for the disk.
+pub const CHECKPOINT: Duration = Duration::from_secs(10);
+
+/// A pretraining whose work is kept beside the estimator's place until that is there.
+///
+/// The folder `EST.part` takes the bank, shard by shard, and the state of the training. Interrupted at any moment, the same
+/// pretraining goes on with it, and gives the bytes of one that nothing has disturbed, which are also those of
+/// [`pretrain`](super::pretrain()) and [`save`](Estimator::save).
+///
+/// ```
+/// use truetwin::evaluate::paper::reference_studies;
+/// use truetwin::progress::Progress;
+/// use truetwin::estimator::{Estimator, PretrainOptions, Pretraining};
+///
+/// let studies = reference_studies()?;
+/// let options = PretrainOptions { bank_size: Some(100), epochs: Some(1), ..PretrainOptions::default() };
+/// let place = tempfile::tempdir()?;
+/// let path = place.path().join("first.est");
+/// let (_, history) = Pretraining::new(&studies[0], options).write(&path, &Progress::silent())?;
+/// assert_eq!(history.epochs_run, 1);
+/// assert_eq!(Estimator::load(&path, &studies)?.settings().bank_size, 100);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Pretraining<'a> {
+    project: Project,
+    options: PretrainOptions,
+    bank: Option<GivenBank<'a>>,
+    every: Duration,
+}
+
+/// A bank to train on that is there.
+///
+/// ```
+/// use truetwin::evaluate::paper::reference_studies;
+/// use truetwin::progress::Progress;
+/// use truetwin::estimator::shards::{BankPlan, ShardedBank};
+/// use truetwin::estimator::{GivenBank, PresetName, PretrainOptions, Pretraining, Project};
+/// use truetwin::storage::work::Share;
+///
+/// let project = &Project::from(&reference_studies()?[0]);
+/// let (place, silent) = (tempfile::tempdir()?, Progress::silent());
+/// let folder = place.path().join("bank");
+/// let plan = BankPlan { project: project.clone(), preset: PresetName::Default, size: 100, seed: 1 };
+/// plan.fill(&folder, Share::WHOLE, &silent)?;
+/// let bank = ShardedBank::open(&folder)?;
+/// let given = GivenBank { bank: &bank, checksum: bank.checksum() };
+/// let options = PretrainOptions { epochs: Some(1), ..PretrainOptions::default() };
+/// let pretraining = Pretraining::new(project, options).with_bank(given);
+/// let (estimator, _) = pretraining.write(&place.path().join("first.est"), &silent)?;
+/// assert_eq!(estimator.settings().bank_size, 100);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct GivenBank<'a> {
+    /// Its rows.
+    pub bank: &'a dyn Bank,
+    /// What tells it from any other.
+    pub checksum: String,
+}
+
+impl<'a> Pretraining<'a> {
+    /// On simulations of its own.
+    pub fn new(project: impl Into<Project>, options: PretrainOptions) -> Self {
+        Self {
+            project: project.into(),
+            options,
+            bank: None,
+            every: CHECKPOINT,
+        }
+    }
+
+    /// On a bank that is there; [`PretrainOptions::bank_size`] says nothing then.
+    #[must_use]
+    pub fn with_bank(self, bank: GivenBank<'a>) -> Self {
+        Self {
+            bank: Some(bank),
+            ..self
+        }
+    }
+
+    /// Keeps the state of the training so often, instead of each [`CHECKPOINT`].
+    #[must_use]
+    pub fn with_checkpoints(self, every: Duration) -> Self {
+        Self { every, ..self }
+    }
+
+    /// Pretrains, or goes on with it, and writes the estimator.
+    ///
+    /// An estimator that is there already is written again only where the folder of this very pretraining is still there: what
+    /// made it was interrupted before it had cleared up.
+    ///
+    /// # Errors
+    ///
+    /// [`EstimatorError`]; among them a path that is taken, another process at work, and a folder of another pretraining.
+    pub fn write(
+        &self,
+        path: &Path,
+        progress: &Progress,
+    ) -> Result<(Estimator, History), EstimatorError> {
+        let manifest = self.manifest()?;
+        let place = beside(path);
+        WorkFolder::sweep_removed(&place)?;
+        if path.symlink_metadata().is_ok() && WorkFolder::resume(&place, &manifest).is_err() {
+            let problem = "exists already; choose another --out, or remove it";
+            return Err(EstimatorError::file(path, problem));
+        }
+        let folder = WorkFolder::open::<EstimatorError>(&place, &manifest, &[], |_| Ok(()))?;
+        let lock = folder.lock()?;
+        let made = self.made(&folder, progress).and_then(|made| {
+            made.0.save_again(path)?;
+            Ok(made)
+        });
+        drop(lock);
+        match &made {
+            Ok(_) => folder.remove()?,
+            // It would only stand in the way of the next call. What is wrong is said, not that it cannot be removed either.
+            Err(error) if ends_for_good(error) || is_bare(&folder) => drop(folder.remove()),
+            Err(_) => {}
+        }
+        made
+    }
+
+    /// The estimator, by what is in the folder and what is still to be done.
+    fn made(
+        &self,
+        folder: &WorkFolder,
+        progress: &Progress,
+    ) -> Result<(Estimator, History), EstimatorError> {
+        let checkpoints = Checkpoints::new(folder.file(TRAINING), self.every);
+        let simulated;
+        let bank = match &self.bank {
+            Some(given) => given.bank,
+            None => {
+                simulated = self.simulated(&folder.file(BANK), progress)?;
+                &simulated
+            }
+        };
+        pretrain_from(&self.project, bank, &self.options, &checkpoints, progress)
+    }
+
+    /// The bank in the folder, made as far as it is missing, as one part: rows in the order in which they would be without a
+    /// folder.
+    fn simulated(&self, path: &Path, progress: &Progress) -> Result<Draws, EstimatorError> {
+        let size = settings(&self.project, &self.options)?.bank_size;
+        fits_into_memory(size)?;
+        // What the network cannot take is said before anything is simulated.
+        prior(&self.project, &self.options)?;
+        let plan = BankPlan {
+            project: self.project.clone(),
+            preset: self.options.preset,
+            size,
+            seed: self.options.seed,
+        };
+        plan.fill(path, Share::WHOLE, progress)?;
+        Ok(ShardedBank::open(path)?.read()?)
+    }
+
+    /// Everything that the estimator depends on.
+    fn manifest(&self) -> Result<Manifest, EstimatorError> {
+        let preset = self.project.recipe(self.options.preset);
+        let mut settings = settings(&self.project, &self.options)?;
+        let bank = match &self.bank {
+            Some(given) => {
+                settings.bank_size = given.bank.rows();
+                given.checksum.clone()
+            }
+            None => "simulated".into(),
+        };
+        Ok(self
+            .project
+            .study()
+            .manifest(VERB, LAYOUT)?
+            .with("features", json!(preset.features))
+            .with("network", preset.architecture.id())
+            .with("settings", json!(settings))
+            .with("bank", bank)
+            .with("seed", self.options.seed))
+    }
+}
+
+/// Whether the same call would end with the same error again.
+fn ends_for_good(error: &EstimatorError) -> bool {
+    matches!(
+        error,
+        EstimatorError::Setting(_)
+            | EstimatorError::Study(_)
+            | EstimatorError::Feature(_)
+            | EstimatorError::Inputs(_)
+            | EstimatorError::Undetermined(_)
+            | EstimatorError::Network(NetworkError::Diverged { .. })
+    )
+}
+
+/// Whether nothing is kept in the folder yet.
+fn is_bare(folder: &WorkFolder) -> bool {
+    !folder.file(TRAINING).exists() && !ShardedBank::is_begun(&folder.file(BANK))
+}
+
+/// Where the work on the estimator at `path` is kept.
+fn beside(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(ENDING);
+    name.into()
+}
+
+debug_by_name!(Pretraining<'_>, GivenBank<'_>);
