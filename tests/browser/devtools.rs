@@ -38,7 +38,7 @@ pub struct Browser {
     messages: Receiver<Value>,
     session: String,
     count: u64,
-    /// What happened while an answer was waited for.
+    /// Events that came while an answer was awaited.
     events: Vec<Value>,
     _profile: tempfile::TempDir,
 }
@@ -163,7 +163,7 @@ impl Browser {
         }
     }
 
-    /// What the page complained of, and what it asked the network for, since it was opened.
+    /// Complaints of the page and its requests to the network since it was opened.
     pub fn complaints(&mut self) -> Vec<String> {
         // An answer comes after all events before it.
         self.evaluate("0");

@@ -30,7 +30,7 @@ use truetwin::twin::{Interval, Now, Outline, Parameter, ParameterSpace, StateSpa
 
 /// Phone, tablet, desktop.
 const WIDTHS: [u32; 3] = [360, 800, 1280];
-/// Of all of them.
+/// Checks of all pages.
 const HEIGHT: u64 = 800;
 /// A sheet of A4 between its margins, in CSS pixels.
 const SHEET: u32 = 718;
@@ -149,7 +149,7 @@ fn measured(browser: &mut Browser, width: u32) -> impl Iterator<Item = String> +
     found.into_iter()
 }
 
-/// What takes the focus, but not by the Tab key, or without showing it.
+/// Elements that take the focus, but not by the Tab key, or without showing it.
 fn unreached(browser: &mut Browser) -> Vec<String> {
     let count = browser.evaluate(
         "window.stops = [...document.querySelectorAll('a, summary, .wide')]; document.activeElement.blur(); scrollTo(0, 0); stops.length",

@@ -46,7 +46,7 @@ fn said(text: &[u8], words: &[&str]) {
     }
 }
 
-/// What each verb writes.
+/// One call of each verb that writes.
 const WRITERS: [&str; 8] = [
     "bank --twin van-der-pol --size 4000 --out disk/new",
     "pretrain --twin van-der-pol --bank-size 4000 --epochs 2 --checkpoint 0 --out disk/new",

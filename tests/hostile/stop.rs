@@ -22,7 +22,7 @@ fn entries(folder: &Path) -> usize {
     fs::read_dir(folder).map_or(0, |folder| folder.count())
 }
 
-/// What has its name in a folder; a process that dies while it makes a folder leaves a nameless one beside its place.
+/// Number of named entries of a folder; a process that dies while it makes a folder leaves a nameless one beside its place.
 fn named(folder: &Path) -> usize {
     let unnamed = |entry: &fs::DirEntry| {
         let name = entry.file_name();

@@ -1,4 +1,4 @@
-//! What is depended on: licences of deny.toml alone, and crates.io alone. Needs nothing but cargo; `cargo deny check` says more.
+//! Dependencies: licences of deny.toml alone, and crates.io alone. Needs nothing but cargo; `cargo deny check` says more.
 
 use serde_json::Value;
 use std::path::Path;
@@ -20,7 +20,7 @@ fn allowed() -> Vec<String> {
         .collect()
 }
 
-/// Whether an SPDX expression can be met with these licences.
+/// Returns true if an SPDX expression can be met with these licences.
 fn met(expression: &str, allowed: &[String]) -> bool {
     // Older crates write a slash for OR.
     let spaced = (expression.replace('/', " OR "))
@@ -174,7 +174,7 @@ fn expressions_are_understood() {
     }
 }
 
-/// What only this repository needs is not in the package.
+/// The package leaves out files that only this repository needs.
 #[test]
 fn the_package_leaves_the_fuzzing_out() {
     let text = std::fs::read_to_string(root().join("Cargo.toml")).unwrap();

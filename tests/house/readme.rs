@@ -1,4 +1,4 @@
-//! What the README shows is what there is; its links and calls are tested with the book's (`tests/house/book`).
+//! Code of the README; its links and calls are tested with the book's (`tests/house/book`).
 
 use std::fs;
 use std::path::Path;

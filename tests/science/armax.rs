@@ -1,4 +1,4 @@
-//! What ARMAX features tell of a black box with coloured noise, beside AR and ARX: Cramér–Rao bounds from simulated
+//! Information of ARMAX features on a black box with coloured noise, beside AR and ARX: Cramér–Rao bounds from simulated
 //! features. The table of docs/method.md: `cargo test --release --test science armax -- --nocapture`.
 
 use nalgebra::{DMatrix, DVector};

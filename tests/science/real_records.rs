@@ -82,7 +82,7 @@ fn the_cascaded_tanks_are_followed_on_a_record_never_seen() {
     assert_eq!(nuisance, [("h1".into(), "start"), ("h2".into(), "start")]);
 }
 
-/// What these tanks lack is known: the upper one overflows. The share that closes is on a record that no fit has seen.
+/// These tanks overflow at the upper one, which the twin lacks. The share that closes is on a record that no fit has seen.
 ///
 /// With `TRUETWIN_PICTURES=docs/pictures` the pictures of docs/diagnosing-a-gap.md are drawn anew.
 #[test]

@@ -120,7 +120,7 @@ fn the_manual_has_every_verb_and_every_option() {
     assert_eq!(json(&["man", "bank", "--json"])["page"], "truetwin-bank");
 }
 
-/// What a newcomer needs of each verb: what it is for, a call to copy, what it ends with.
+/// Each verb tells a newcomer its purpose, a call to copy, and its exit codes.
 #[test]
 fn every_help_has_a_purpose_an_example_and_exit_codes() {
     let whole = done(&["--help"]);

@@ -1,4 +1,4 @@
-//! What is too large, endless or nested without end is refused in one line that names the limit, with little memory.
+//! Input that is too large, endless or nested without end is refused in one line that names the limit, with little memory.
 
 use super::readers;
 use crate::memory;

@@ -24,7 +24,7 @@ use truetwin::storage::work::fuzzing as work;
 use truetwin::study::{RecordPlan, Study, StudyFile};
 use truetwin::twins::VanDerPol;
 
-/// What reads bytes: `Ok`, or the message that a user would see.
+/// Reader of bytes: `Ok`, or the message that a user would see.
 pub type Reader = fn(&[u8]) -> Result<(), String>;
 
 /// All of them, by name.
@@ -162,7 +162,7 @@ fn signed(bytes: &[u8]) -> Option<Vec<u8>> {
     safetensors::serialize(tensors, &Some(metadata)).ok()
 }
 
-/// What parts the text of a manifest from names in the folder of shards.
+/// Separator between the text of a manifest and names in the folder of shards.
 pub const NAMES: &str = "\n=== shards\n";
 
 /// A folder of a bank: the text of its manifest, then the names of what lies among its shards.
@@ -270,17 +270,17 @@ fn line(data: &[u8]) -> Result<&str, String> {
     str::from_utf8(data).map_err(text)
 }
 
-/// What a program says about itself.
+/// Reads a program's description of itself.
 pub fn description(data: &[u8]) -> Result<(), String> {
     program::description(line(data)?)
 }
 
-/// What a program answers.
+/// Reads a program's answer.
 pub fn answer(data: &[u8]) -> Result<(), String> {
     program::answer(line(data)?)
 }
 
-/// What an FMU says about itself.
+/// Reads an FMU's description of itself.
 #[cfg(feature = "fmi")]
 pub fn fmu(data: &[u8]) -> Result<(), String> {
     truetwin::external::fmu::fuzzing::description(line(data)?)
@@ -294,7 +294,7 @@ pub fn hold(name: &str, read: Reader, data: &[u8]) {
     }
 }
 
-/// What a message must be: one line, not endless, without what steers a terminal; of readers that a user calls, with a remedy.
+/// Checks a message: one line, not endless, without what steers a terminal; of readers that a user calls, with a remedy.
 pub fn check_message(reader: &str, message: &str) {
     assert!(!message.is_empty(), "an empty message");
     let odd = |c: char| c.is_control() || matches!(c, '\u{202a}'..='\u{202e}');

@@ -1,4 +1,4 @@
-//! What runs is named on the command line; what a program says is shown as text.
+//! Programs run only when the command line names them; their words are shown as text.
 
 use super::{done, refused, truetwin};
 use std::fs;
@@ -120,7 +120,7 @@ for line in sys.stdin:
     )
 }
 
-/// What a program may call itself, and what it may not.
+/// Names that a program may give itself, and names that it may not.
 #[test]
 fn hostile_names_steer_no_terminal_and_are_no_elements() {
     let Some(python) = python() else { return };
@@ -185,7 +185,7 @@ fn hostile_names_steer_no_terminal_and_are_no_elements() {
     }
 }
 
-/// What a program writes to standard error, and what it answers instead of a description, is quoted without its escapes.
+/// Standard error of a program, and its answer instead of a description, are quoted without escapes.
 #[test]
 fn what_a_program_says_is_quoted_plainly() {
     let Some(python) = python() else { return };

@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 #[derive(Debug, PartialEq)]
 struct Call {
     arguments: Vec<String>,
-    /// Whether nothing is left out: required arguments are asked for, too.
+    /// True if nothing is left out: required arguments are asked for, too.
     whole: bool,
 }
 
@@ -63,7 +63,7 @@ fn call(line: &str, whole: bool) -> Option<Call> {
     })
 }
 
-/// What a page tells its readers to type.
+/// Calls that a page tells its readers to type.
 fn calls(text: &str) -> Vec<Call> {
     let mut found = vec![];
     for piece in pieces(text) {

@@ -21,7 +21,7 @@ fn affected(name: &str, effect: &str, theta: &[f64], noise: Noise) -> (Study, Re
     (shown, record)
 }
 
-/// What must hold of every answer.
+/// Checks rules that every answer obeys.
 fn sound(found: &Diagnosis) {
     let shares = |all: &mut dyn Iterator<Item = f64>| all.sum::<f64>() <= 1.0 + 1e-9;
     assert!(shares(&mut found.location.targets.iter().map(|t| t.share)));
@@ -112,7 +112,7 @@ fn effects_of_signals_are_named() {
     }
 }
 
-/// What happens inside the box, and no effect of a signal imitates, is detected; no signal is blamed for it.
+/// A gap inside the box that no effect of a signal imitates is detected, and no signal is blamed for it.
 #[test]
 fn an_effect_inside_the_box_is_named_by_nobody() {
     for (name, key, sample) in [

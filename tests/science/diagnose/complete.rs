@@ -1,4 +1,4 @@
-//! What a diagnosis says beside the name: since when, what is left, what else could have been seen, what to measure next.
+//! Parts of a diagnosis beside the name: onset, residuals, power, next input.
 
 use super::trials::*;
 use crate::binomial_bounds;

@@ -1,4 +1,4 @@
-//! Whether a diagnosis alarms as rarely as it says, and names what is there.
+//! False-alarm rates and named effects of diagnoses.
 
 mod black_box;
 mod complete;

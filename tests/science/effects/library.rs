@@ -1,4 +1,4 @@
-//! What the library lists and offers.
+//! Contents of the library.
 
 use super::*;
 

@@ -45,7 +45,7 @@ fn all_off_together_change_no_bit() {
     }
 }
 
-/// And each does something once it is on, at one of its starts at least.
+/// Each effect does something once it is on, at one of its starts at least.
 #[test]
 fn on_changes_the_record() {
     for (name, base, theta, drive) in twins() {

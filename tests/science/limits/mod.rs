@@ -1,4 +1,4 @@
-//! How near the estimator comes to what a record can tell, and what did not bring it nearer. Studies of minutes, run by
+//! Distance of the estimator from the information bound of a record, and attempts that did not shorten it. Studies of minutes, run by
 //! name; `RUNS=100` sets the number of records.
 //!
 //! ```text

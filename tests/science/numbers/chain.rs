@@ -4,7 +4,7 @@ use truetwin::record::*;
 use truetwin::study::{RecordPlan, Study};
 use truetwin::twin::*;
 
-/// How large the numbers of a twin are: each is the plain one times its unit.
+/// Units of a twin's numbers: each is the plain one times its unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Units {
     pub parameters: f64,

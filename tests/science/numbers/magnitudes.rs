@@ -65,7 +65,7 @@ fn all(what: &str, units: Units, given: &[f64], plain: &[f64], unit: f64, tolera
 }
 
 /// Far from the prior, so that all steps of an estimate are taken; the network learns in 32 bits, and differs in the last of them.
-/// Of the default recipe: the paper's adds ε in squared units of the features to their covariance, and so depends on units.
+/// Estimates of the default recipe: the paper's adds ε in squared units of the features to their covariance, and so depends on units.
 #[test]
 fn estimates_do_not_depend_on_units() {
     let estimate = |units: Units| -> Estimate {

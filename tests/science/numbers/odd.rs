@@ -8,7 +8,7 @@ use truetwin::record::{Record, Signal};
 
 const SAMPLES: usize = 200;
 
-/// What becomes of sample k.
+/// Change of sample k.
 type Change = fn(usize, f64) -> f64;
 
 #[test]
