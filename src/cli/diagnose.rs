@@ -89,7 +89,7 @@ impl Verb for Diagnose {
             let text = serde_json::to_string_pretty(&json).map_err(Failure::internal)?;
             folder.write("report.json", &text)?;
             folder.write("report.html", &gap_html(&study, &found))?;
-            if let Some(next) = &found.which.next_input {
+            if let Some(next) = &found.cause.next_input {
                 folder.write(NEXT_INPUT, &drive_csv_text(&next.drive))?;
             }
             folder.finish()?;

@@ -4,22 +4,22 @@ use crate::record::Record;
 use crate::study::Study;
 use crate::twin::{Now, Twin};
 
-/// What all steps share.
+/// Inputs that all steps of a diagnosis share.
 pub(super) struct Context<'a> {
     pub study: &'a Study,
     pub twin: &'a Twin,
     pub validation: Option<&'a [Record]>,
     /// The records and the validation record.
     pub together: Option<&'a [Record]>,
-    /// Whether the twin has no process noise: its free run is to follow the record, and neither noise nor a disturbance
+    /// True for a twin without process noise: its free run is to follow the record, and neither noise nor a disturbance
     /// is a rival: either would explain anything.
     pub follows: bool,
-    /// Whether the twin is a simulator without noise of its own, and has been given measurement noise.
+    /// True for a simulator without noise of its own, which has been given measurement noise.
     pub silent: bool,
 }
 
 impl<'a> Context<'a> {
-    /// Of the twin as [`measured`](crate::likelihood::ensemble::measured) shows it.
+    /// Collects the inputs; the twin is that of [`measured`](crate::likelihood::ensemble::measured).
     pub fn new(
         study: &'a Study,
         (twin, silent): &'a (Twin, bool),
@@ -38,7 +38,7 @@ impl<'a> Context<'a> {
     }
 }
 
-/// Whether no state of the twin is noisy, with any noise level that the study leaves open; nobody knows of a black box.
+/// Returns true where no state of the twin is noisy; false for a black box, of which nobody knows.
 fn without_process_noise(twin: &Twin, record: &Record) -> bool {
     let Some(twin) = twin.equations() else {
         return false;

@@ -1,4 +1,4 @@
-//! Whether the twin can have made the records.
+//! Fit and structural test of the twin.
 
 use crate::diagnose::context::Context;
 use crate::diagnose::error::DiagnoseError;
@@ -19,18 +19,18 @@ use crate::twin::{Noise, Role};
 
 /// The twin, fitted and tested.
 pub(in crate::diagnose) struct Detected<'a> {
-    /// The refitted twin with everything that records are looked at with.
-    pub bench: FittedTwin<'a>,
-    /// What simulations of it look like.
-    pub nulls: NullDistribution,
+    /// The refitted twin.
+    pub model: FittedTwin<'a>,
+    /// Statistics of its simulations.
+    pub null: NullDistribution,
     pub test: Test,
     pub detection: Detection,
     pub verdict: Verdict,
     /// Explanations, where the e-value needed them.
-    pub found: Option<Vec<Explanation>>,
+    pub explanations: Option<Vec<Explanation>>,
     /// The fit with θ inside the prior, where θ left it.
     pub within: Option<Fitted>,
-    /// Effects that were not looked at.
+    /// Effects that were not tested.
     pub not_tested: Vec<String>,
 }
 
@@ -51,33 +51,33 @@ pub(in crate::diagnose) fn detect<'a>(
         all.retain(|c| c.is_listed() && !c.is_noise());
     }
     let not_tested = not_tested(context.study, &all);
-    let bench = (FittedTwin::new(context.twin, problem.clone(), fitted.clone(), &[], all)?)
+    let model = (FittedTwin::new(context.twin, problem.clone(), fitted.clone(), &[], all)?)
         .ok_or(DiagnoseError::NoFit)?;
     let stage = progress.stage("test", settings.replicates);
     // With a validation record, p is twice the rank's; and without one it is not to end at the edge of the level.
     let level = 0.5 * settings.alpha;
-    let nulls = bench.nulls(
+    let null = model.null_distribution(
         settings.replicates,
         0.999 * level,
         noise.child("null"),
         &stage,
     )?;
-    let nulls = nulls.ok_or(DiagnoseError::NoFit)?;
-    if nulls.others.iter().all(Option::is_none) {
+    let null = null.ok_or(DiagnoseError::NoFit)?;
+    if null.others.iter().all(Option::is_none) {
         return Err(DiagnoseError::NoSimulation);
     }
-    let test = nulls.test();
-    let mut found = None;
+    let test = null.test();
+    let mut explanations = None;
     let mut e_value = None;
     if let Some(records) = context.validation {
-        let list = explained(context, &bench, &nulls, progress)?;
+        let list = explained(context, &model, &null, progress)?;
         e_value = against(&problem, &fitted, records, &list)?;
-        found = Some(list);
+        explanations = Some(list);
     }
     let p_value = combined(test.p_value, e_value);
     let (outside, within) = left_the_prior(&problem, &fitted, settings.alpha)?;
     Ok(Detected {
-        bench,
+        model,
         detection: Detection {
             p_value,
             alpha: settings.alpha,
@@ -86,9 +86,9 @@ pub(in crate::diagnose) fn detect<'a>(
             log_e: e_value,
         },
         verdict: verdict(p_value, outside, settings.alpha),
-        nulls,
+        null,
         test,
-        found,
+        explanations,
         within,
         not_tested,
     })
@@ -97,12 +97,12 @@ pub(in crate::diagnose) fn detect<'a>(
 /// Every candidate, fitted.
 pub(in crate::diagnose) fn explained(
     context: &Context<'_>,
-    bench: &FittedTwin<'_>,
-    nulls: &NullDistribution,
+    model: &FittedTwin<'_>,
+    null: &NullDistribution,
     progress: &Progress,
 ) -> Result<Vec<Explanation>, DiagnoseError> {
-    let stage = progress.stage("explain", bench.dictionary.candidates.len());
-    explanations(bench, &nulls.own, context.validation, None, &stage)
+    let stage = progress.stage("explain", model.dictionary.candidates.len());
+    explanations(model, &null.own, context.validation, None, &stage)
 }
 
 /// log E of the validation record against the twin refitted on it.
@@ -110,12 +110,12 @@ fn against(
     problem: &Problem<'_>,
     fitted: &Fitted,
     records: &[Record],
-    found: &[Explanation],
+    explanations: &[Explanation],
 ) -> Result<Option<f64>, DiagnoseError> {
     let there = problem.on(records);
     let space = problem.twin.parameters();
     let starts = space.iter().filter(|p| p.role == Role::Start).count();
     let begin = there.full(&problem.of_record(0, &fitted.theta));
     let refitted = fit(&there, &[begin, there.centre()], ITERATIONS)?;
-    Ok(refitted.and_then(|f| log_e(found, f.log_likelihood, starts, there.samples())))
+    Ok(refitted.and_then(|f| log_e(explanations, f.log_likelihood, starts, there.samples())))
 }

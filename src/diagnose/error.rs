@@ -56,7 +56,7 @@ pub enum DiagnoseError {
     Channels {
         /// The record.
         record: GivenRecord,
-        /// What is wrong.
+        /// The error.
         error: RecordError,
     },
     /// An error in a part of a record.

@@ -1,9 +1,9 @@
-//! What a known effect would gain: the yardstick of trials whose truth is known.
+//! Gain of a known effect: the yardstick of trials whose truth is known.
 
 use crate::diagnose::context::Context;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::explain::attribute::{elsewhere, explanations};
-use crate::diagnose::explain::step::grown;
+use crate::diagnose::explain::extended::extend;
 use crate::diagnose::fitting::base_fit::base_fit;
 use crate::diagnose::fitting::problem::Problem;
 use crate::diagnose::hypotheses::candidate::{Candidate, candidates};
@@ -16,7 +16,7 @@ use crate::record::Record;
 use crate::study::Study;
 use crate::twin::Noise;
 
-/// Nats over the refitted twin that the listed effects `id@target` gain together on the records and, if there is one, on the
+/// Returns the nats over the refitted twin that the listed effects `id@target` gain together on the records and, if there is one, on the
 /// validation record, each fitted with θ as the explanations of a diagnosis are. `None` where the study does not list one of
 /// them, or where the twin cannot be fitted.
 ///
@@ -24,7 +24,7 @@ use crate::twin::Noise;
 ///
 /// # Errors
 ///
-/// As [`diagnose`](super::diagnose).
+/// Those of [`diagnose`](super::diagnose).
 pub fn gain_of(
     study: &Study,
     records: &[Record],
@@ -51,37 +51,37 @@ pub fn gain_of(
     let Some(fitted) = base_fit(&problem, settings, noise)? else {
         return Ok(None);
     };
-    let Some(mut bench) = FittedTwin::new(context.twin, problem, fitted, &[], named)? else {
+    let Some(mut model) = FittedTwin::new(context.twin, problem, fitted, &[], named)? else {
         return Ok(None);
     };
     let mut accepted = vec![];
     let mut gain = 0.0;
     let stage = progress.unseen();
     for left in (0..effects.len()).rev() {
-        let Some(look) = bench.own_look()? else {
+        let Some(statistics) = model.own_statistics()? else {
             return Ok(None);
         };
-        let found = explanations(&bench, &look, context.validation, None, &stage)?;
-        let Some(best) = found.first() else {
+        let explanations = explanations(&model, &statistics, context.validation, None, &stage)?;
+        let Some(best) = explanations.first() else {
             return Ok(None);
         };
         gain += best.gain + best.validation.unwrap_or(0.0);
         if left > 0 {
-            let Some(step) = grown(&context, &bench, &accepted, best, 1.0)? else {
+            let Some(extended) = extend(&context, &model, &accepted, best, 1.0)? else {
                 return Ok(None);
             };
-            (bench, accepted) = (step.bench, step.accepted);
+            (model, accepted) = (extended.model, extended.accepted);
         }
     }
     Ok(Some(gain))
 }
 
-/// The log-likelihood, in nats, of a held-out record: of the twin fitted to the record, or with `listed` the best of the twin
+/// Returns the log-likelihood, in nats, of a held-out record: that of the twin fitted to the record, or with `listed` the best of the twin
 /// with each listed effect. Unknown starts are refitted there. `None` where nothing can be fitted.
 ///
 /// # Errors
 ///
-/// As [`diagnose`](super::diagnose).
+/// Those of [`diagnose`](super::diagnose).
 pub fn held_out_score(
     study: &Study,
     record: Record,
@@ -104,15 +104,15 @@ pub fn held_out_score(
     }
     let mut all = candidates(study, &settings.without)?;
     all.retain(Candidate::is_listed);
-    let Some(bench) = FittedTwin::new(context.twin, problem, fitted, &[], all)? else {
+    let Some(model) = FittedTwin::new(context.twin, problem, fitted, &[], all)? else {
         return Ok(None);
     };
-    let Some(look) = bench.own_look()? else {
+    let Some(statistics) = model.own_statistics()? else {
         return Ok(None);
     };
     let stage = progress.unseen();
-    let found = explanations(&bench, &look, context.validation, None, &stage)?;
-    Ok((found.iter())
+    let explanations = explanations(&model, &statistics, context.validation, None, &stage)?;
+    Ok((explanations.iter())
         .filter_map(|e| e.validation_likelihood)
         .reduce(f64::max))
 }

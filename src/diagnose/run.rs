@@ -1,11 +1,11 @@
-//! The way of one diagnosis.
+//! Entry of a diagnosis, and the order of its steps.
 
 use crate::diagnose::context::Context;
 use crate::diagnose::detect::{Detected, detect, explained};
 use crate::diagnose::error::{DiagnoseError, GivenRecord};
 use crate::diagnose::explain::attribute::Explanation;
-use crate::diagnose::explain::decide::{Answer, decide};
-use crate::diagnose::explain::step::{Accepted, Step};
+use crate::diagnose::explain::decide::{Conclusion, decide};
+use crate::diagnose::explain::extended::{Accepted, ExtendedTwin};
 use crate::diagnose::explain::verdict::absorbing;
 use crate::diagnose::hypotheses::candidate::Addition;
 use crate::diagnose::locate::location::{locate, maps};
@@ -32,7 +32,7 @@ use std::time::Instant;
 /// Diagnoses the gap between a twin and records of one real system.
 ///
 /// All records share θ, but for unknown starts. A validation record is used for the test, the order of explanations, and
-/// the share closed. A twin without equations is looked at through ensembles of its simulations instead of a filter; only effects of its
+/// the share closed. The likelihood of a twin without equations is an ensemble's instead of a filter's; only effects of its
 /// signals can then be named. The same seed gives the same bits on any number of threads.
 ///
 /// ```
@@ -48,8 +48,8 @@ use std::time::Instant;
 /// let drive = Drive::autonomous(0.05, 300)?;
 /// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
 /// let record = Record::new(drive, outputs)?;
-/// let found = diagnose(&study, &[record], None, &DiagnoseSettings::default(), &Progress::silent())?;
-/// assert_eq!(found.verdict, Verdict::NoGap);
+/// let diagnosis = diagnose(&study, &[record], None, &DiagnoseSettings::default(), &Progress::silent())?;
+/// assert_eq!(diagnosis.verdict, Verdict::NoGap);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
@@ -79,102 +79,109 @@ pub fn diagnose(
     let context = Context::new(study, &twin, records, validation, together.as_deref());
     let mut detected = detect(&context, records, settings, noise, progress)?;
     let Attributed {
-        answer,
-        step,
+        conclusion,
+        extended,
         after,
         effects,
-        found,
+        explanations,
     } = match settings.detection_only {
         true => Attributed::nothing(),
         false => attribute(&context, &mut detected, settings, noise, progress)?,
     };
-    let Detected { bench, nulls, .. } = &detected;
+    let Detected { model, null, .. } = &detected;
     let structural = detected.verdict == Verdict::StructuralGap;
-    let (mut place, mut discovery, mut next) = Default::default();
+    let (mut location, mut discovery, mut next) = Default::default();
     let (mut visible, mut shrunk) = (vec![], None);
     if !settings.detection_only {
-        if let Some(found) = found.as_deref().filter(|_| structural) {
+        if let Some(explanations) = explanations.as_deref().filter(|_| structural) {
             let alpha = settings.alpha;
-            (place, discovery) =
-                locate(&context, &detected, found, &answer, alpha, noise, progress)?;
-            place.after = after;
-            if answer.decision == Decision::Class {
+            (location, discovery) = locate(
+                &context,
+                &detected,
+                explanations,
+                &conclusion,
+                alpha,
+                noise,
+                progress,
+            )?;
+            location.after = after;
+            if conclusion.decision == Decision::Class {
                 let stage = progress.stage("next input", 1);
-                next = next_input(bench, found, &answer.class, noise.child("next"))?;
+                next = next_input(model, explanations, &conclusion.class, noise.child("next"))?;
                 stage.tick()?;
             }
         }
         let stage = progress.stage("how far", 2);
-        visible = power(bench, nulls, settings.alpha)?;
+        visible = power(model, null, settings.alpha)?;
         stage.tick()?;
-        let found = found.as_deref();
+        let explanations = explanations.as_deref();
         shrunk = shrinkage(
             &context,
-            bench,
-            step.as_ref(),
-            &answer,
-            found,
+            model,
+            extended.as_ref(),
+            &conclusion,
+            explanations,
             settings,
             noise,
         )?;
         stage.tick()?;
     }
-    let last = step.as_ref().map_or(bench, |step| &step.bench);
+    let last = extended.as_ref().map_or(model, |extended| &extended.model);
     let space = context.twin.parameters();
     let (parameters, nuisance) =
         fitted_parameters(&space.iter().collect::<Vec<_>>(), last, settings);
-    let runs = |record: &Record| beside(&context, bench, last, &answer, record);
+    let runs = |record: &Record| beside(&context, model, last, &conclusion, record);
     Ok(Diagnosis {
         twin: study.name().into(),
         verdict: detected.verdict,
         parameters,
         nuisance,
-        place,
-        which: Which {
-            decision: answer.decision,
+        location,
+        cause: Cause {
+            decision: conclusion.decision,
             effects,
-            accepted: answer.accepted.iter().map(Accepted::key).collect(),
-            unexplained_p_value: answer.unexplained,
+            accepted: conclusion.accepted.iter().map(Accepted::key).collect(),
+            unexplained_p_value: conclusion.unexplained,
             next_input: next,
-            class: answer.class.clone(),
-            catch_all: answer.catch_all.clone(),
+            class: conclusion.class.clone(),
+            catch_all: conclusion.catch_all.clone(),
         },
         shrinkage: shrunk,
         discovery,
         power: visible,
         free_runs: runs(&records[0])?,
         validation_runs: validation.map(|v| runs(&v[0])).transpose()?,
-        candidates: bench.dictionary.candidates.len(),
+        candidates: model.dictionary.candidates.len(),
         detection: detected.detection,
         not_tested: detected.not_tested,
         seconds: clock.elapsed().as_secs_f64(),
     })
 }
 
-/// Which effect, as far as the verdict asks for one.
+/// Attribution, as far as the verdict asks for one.
 struct Attributed<'a> {
-    answer: Answer,
-    step: Option<Step<'a>>,
+    conclusion: Conclusion,
+    extended: Option<ExtendedTwin<'a>>,
     /// Maps with what was accepted, or else came nearest, added.
     after: Option<Maps>,
     effects: Vec<EffectFit>,
-    found: Option<Vec<Explanation>>,
+    explanations: Option<Vec<Explanation>>,
 }
 
 impl Attributed<'_> {
     fn nothing() -> Self {
         Self {
-            answer: Answer {
+            conclusion: Conclusion {
                 decision: Decision::NotNeeded,
                 accepted: vec![],
                 class: vec![],
                 unexplained: None,
                 catch_all: None,
             },
-            step: None,
+            extended: None,
             after: None,
             effects: vec![],
-            found: None,
+            explanations: None,
         }
     }
 }
@@ -186,42 +193,42 @@ fn attribute<'a>(
     noise: Noise,
     progress: &Progress,
 ) -> Result<Attributed<'a>, DiagnoseError> {
-    let (found, within) = (detected.found.take(), detected.within.take());
+    let (explanations, within) = (detected.explanations.take(), detected.within.take());
     let Detected {
-        bench, nulls, test, ..
+        model, null, test, ..
     } = &*detected;
     let mut all = Attributed {
-        found,
+        explanations,
         ..Attributed::nothing()
     };
     match (detected.verdict, within) {
         (Verdict::StructuralGap, _) => {
-            let list = match all.found.take() {
+            let list = match all.explanations.take() {
                 Some(list) => list,
-                None => explained(context, bench, nulls, progress)?,
+                None => explained(context, model, null, progress)?,
             };
             let stage = progress.stage("accept", 2 * settings.unexplained);
-            let decided = decide(context, bench, &list, settings, noise, &stage)?;
+            let decided = decide(context, model, &list, settings, noise, &stage)?;
             stage.finish();
-            let added = decided.step.as_ref().or(decided.best.as_ref());
+            let added = decided.extended.as_ref().or(decided.best.as_ref());
             if let (Some(added), Some(left)) = (added, &decided.left) {
-                all.after = Some(maps(&added.bench, &left.test, None)?);
+                all.after = Some(maps(&added.model, &left.test, None)?);
             }
-            (all.answer, all.step) = (decided.answer, decided.step);
-            all.effects = reported(bench, &list, test, &all.answer);
-            all.found = Some(list);
+            (all.conclusion, all.extended) = (decided.conclusion, decided.extended);
+            all.effects = reported(model, &list, test, &all.conclusion);
+            all.explanations = Some(list);
         }
         (Verdict::ParameterGap, Some(within)) => {
-            let stage = progress.stage("explain", bench.dictionary.candidates.len());
-            let list = absorbing(bench, &nulls.own, within, &stage)?;
+            let stage = progress.stage("explain", model.dictionary.candidates.len());
+            let list = absorbing(model, &null.own, within, &stage)?;
             stage.finish();
             if !list.is_empty() {
-                all.answer.decision = Decision::Absorbed;
-                all.answer.class = (list.iter())
-                    .map(|e| bench.dictionary.candidates[e.candidate].key())
+                all.conclusion.decision = Decision::Absorbed;
+                all.conclusion.class = (list.iter())
+                    .map(|e| model.dictionary.candidates[e.candidate].key())
                     .collect();
             }
-            all.effects = reported(bench, &list, test, &all.answer);
+            all.effects = reported(model, &list, test, &all.conclusion);
         }
         _ => {}
     }
@@ -231,21 +238,25 @@ fn attribute<'a>(
 /// Free runs beside a record: of the twin, and with the accepted effects.
 fn beside(
     context: &Context<'_>,
-    bench: &FittedTwin<'_>,
+    model: &FittedTwin<'_>,
     last: &FittedTwin<'_>,
-    answer: &Answer,
+    conclusion: &Conclusion,
     record: &Record,
 ) -> Result<FreeRuns, DiagnoseError> {
-    let runner = |bench: &FittedTwin<'_>, additions: &[Addition]| {
-        let theta = bench.problem.of_record(0, &bench.fitted.theta);
+    let runner = |model: &FittedTwin<'_>, additions: &[Addition]| {
+        let theta = model.problem.of_record(0, &model.fitted.theta);
         Runner::new(context.twin, additions, theta)
     };
-    let additions: Vec<Addition> = answer.accepted.iter().map(|a| a.addition.clone()).collect();
+    let additions: Vec<Addition> = conclusion
+        .accepted
+        .iter()
+        .map(|a| a.addition.clone())
+        .collect();
     let grown = match additions.is_empty() {
         true => None,
         false => Some(runner(last, &additions)?),
     };
-    Ok(free_runs(record, &runner(bench, &[])?, grown.as_ref()))
+    Ok(free_runs(record, &runner(model, &[])?, grown.as_ref()))
 }
 
 pub(in crate::diagnose) fn check(
@@ -311,7 +322,7 @@ mod tests {
     use crate::study::RecordPlan;
     use crate::twins::VanDerPol;
 
-    /// An oscillator with a cubic spring, its step given in milliseconds where seconds are expected: an answer or an error,
+    /// An oscillator with a cubic spring, its extended given in milliseconds where seconds are expected: an conclusion or an error,
     /// never a panic.
     #[test]
     fn a_record_in_milliseconds_does_not_panic() {
@@ -326,10 +337,10 @@ mod tests {
         let record = Record::new(Drive::autonomous(50.0, 200).unwrap(), outputs).unwrap();
         let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 200)).unwrap();
         let settings = DiagnoseSettings::default();
-        let answer = diagnose(&study, &[record], None, &settings, &Progress::silent());
+        let conclusion = diagnose(&study, &[record], None, &settings, &Progress::silent());
         assert!(
-            matches!(answer, Err(DiagnoseError::NoSimulation)),
-            "{answer:?}"
+            matches!(conclusion, Err(DiagnoseError::NoSimulation)),
+            "{conclusion:?}"
         );
     }
 }

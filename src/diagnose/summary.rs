@@ -1,8 +1,8 @@
-//! What was found, in the words of a report.
+//! Summary of fits for a report.
 
 use crate::diagnose::explain::attribute::{Explanation, probabilities};
-use crate::diagnose::explain::decide::Answer;
-use crate::diagnose::explain::step::magnitudes;
+use crate::diagnose::explain::decide::Conclusion;
+use crate::diagnose::explain::extended::magnitudes;
 use crate::diagnose::outcome::{EffectFit, FittedNuisance, FittedParameter};
 use crate::diagnose::settings::DiagnoseSettings;
 use crate::diagnose::test::fitted_twin::FittedTwin;
@@ -12,31 +12,31 @@ use crate::twin::{PRIOR_DEVIATION, Parameter, Role};
 
 /// Explanations as they are reported: the accepted ones first.
 pub(in crate::diagnose) fn reported(
-    bench: &FittedTwin<'_>,
-    found: &[Explanation],
+    model: &FittedTwin<'_>,
+    explanations: &[Explanation],
     test: &Test,
-    answer: &Answer,
+    conclusion: &Conclusion,
 ) -> Vec<EffectFit> {
-    let chances = probabilities(found);
-    let mut all: Vec<EffectFit> = (found.iter().zip(chances))
-        .filter(|(e, _)| bench.dictionary.candidates[e.candidate].is_listed())
+    let chances = probabilities(explanations);
+    let mut all: Vec<EffectFit> = (explanations.iter().zip(chances))
+        .filter(|(e, _)| model.dictionary.candidates[e.candidate].is_listed())
         .map(|(e, probability)| {
-            let candidate = &bench.dictionary.candidates[e.candidate];
+            let candidate = &model.dictionary.candidates[e.candidate];
             EffectFit {
                 id: candidate.id.clone(),
                 target: candidate.target.clone(),
                 probability,
-                magnitudes: magnitudes(bench, e),
+                magnitudes: magnitudes(model, e),
                 log_score_gain: e.gain + e.validation.unwrap_or(0.0),
                 p_value: test.candidates.get(e.candidate).copied(),
             }
         })
         .collect();
     // Of several, magnitudes and gains are those of all together; what is left is any other one's alone.
-    if answer.accepted.len() > 1 {
-        let together: f64 = answer.accepted.iter().map(|a| a.probability).product();
+    if conclusion.accepted.len() > 1 {
+        let together: f64 = conclusion.accepted.iter().map(|a| a.probability).product();
         all.iter_mut().for_each(|e| e.probability *= 1.0 - together);
-        for accepted in answer.accepted.iter().rev() {
+        for accepted in conclusion.accepted.iter().rev() {
             let at = all.iter().position(|e| e.key() == accepted.key());
             let mut effect = match at {
                 Some(at) => all.remove(at),
@@ -55,11 +55,11 @@ pub(in crate::diagnose) fn reported(
 /// The twin's own parameters, and everything else that the study estimates.
 pub(in crate::diagnose) fn fitted_parameters(
     space: &[&Parameter],
-    bench: &FittedTwin<'_>,
+    model: &FittedTwin<'_>,
     settings: &DiagnoseSettings,
 ) -> (Vec<FittedParameter>, Vec<FittedNuisance>) {
-    let errors = bench.fitted.std_errors(&bench.problem);
-    let theta = &bench.fitted.theta;
+    let errors = model.fitted.std_errors(&model.problem);
+    let theta = &model.fitted.theta;
     let (mut own, mut nuisance) = (vec![], vec![]);
     for (j, p) in space.iter().enumerate() {
         if p.role == Role::Physical {
@@ -89,7 +89,7 @@ pub(in crate::diagnose) fn fitted_parameters(
     }
     // Starts of further records stand behind everything else.
     let starts: Vec<&&Parameter> = space.iter().filter(|p| p.role == Role::Start).collect();
-    let d = bench.problem.twin.parameters().len();
+    let d = model.problem.twin.parameters().len();
     for (i, j) in (d..theta.len()).enumerate() {
         let (record, which) = (i / starts.len().max(1) + 2, i % starts.len().max(1));
         let name = starts[which].name.trim_start_matches("start.");

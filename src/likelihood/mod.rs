@@ -2,3 +2,6 @@
 
 pub(crate) mod ensemble;
 pub mod kalman;
+mod of_twin;
+
+pub(crate) use of_twin::{Likelihood, likelihood_of};

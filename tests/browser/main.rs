@@ -17,9 +17,9 @@ use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
 use truetwin::diagnose::{
-    Band, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit, Equation, FittedNuisance,
-    FittedParameter, FreeRuns, Lag, Maps, NextInput, Onset, Region, Shrinkage, TargetShare, Term,
-    TermRange, Verdict, Visible, Where, Which, Window,
+    Band, Cause, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit, Equation,
+    FittedNuisance, FittedParameter, FreeRuns, Lag, Location, Maps, NextInput, Onset, Region,
+    Shrinkage, TargetShare, Term, TermRange, Verdict, Visible, Window,
 };
 use truetwin::evaluate::paper::reference_studies;
 use truetwin::evaluate::trials::{Kind, Named, Outcome, Row, Scorecard};

@@ -96,12 +96,12 @@ fn the_cascaded_tanks_lack_their_overflow() {
     assert_eq!(found.verdict, Verdict::StructuralGap);
     assert!(
         found
-            .which
+            .cause
             .accepted
             .iter()
             .any(|key| key == "state-ceiling@h1"),
         "{:?}",
-        found.which.accepted
+        found.cause.accepted
     );
     let shrinkage = found.shrinkage.as_ref().unwrap();
     let (before, after) = (shrinkage.before, shrinkage.after.unwrap());
@@ -128,7 +128,7 @@ fn what_the_cascaded_tanks_lack_is_explored() {
     };
     let silent = Progress::silent();
     let found = diagnose(&study, &[record], Some(&validation), &settings, &silent).unwrap();
-    assert_eq!(found.which.decision, Decision::NoneOfThese);
+    assert_eq!(found.cause.decision, Decision::NoneOfThese);
     let discovery = found.discovery.as_ref().expect("no regression");
     println!(
         "{}: explained {:.2}",
@@ -137,7 +137,7 @@ fn what_the_cascaded_tanks_lack_is_explored() {
     for term in &discovery.terms {
         println!("{term:?}");
     }
-    assert_eq!(found.place.target.as_ref(), Some(&discovery.equation));
+    assert_eq!(found.location.target.as_ref(), Some(&discovery.equation));
     assert!(["h1", "h2"].contains(&discovery.equation.as_str()));
     assert!(discovery.explained > 0.1 && discovery.terms[0].inclusion > 0.3);
 }

@@ -1,4 +1,4 @@
-//! Which explanation fits best, all of them fitted with θ.
+//! Fits of the explanations together with θ, and their order.
 
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::explain::frequency::peaks;
@@ -23,22 +23,22 @@ pub(super) const ITERATIONS: usize = 15;
 /// A fitted explanation.
 #[derive(Debug, Clone)]
 pub(in crate::diagnose) struct Explanation {
-    /// Index among the bench's candidates.
+    /// Index among the fitted twin's candidates.
     pub candidate: usize,
     pub variant: usize,
     pub fitted: Fitted,
-    /// Nats over the bench's own twin, on the record.
+    /// Nats over the fitted twin's own twin, on the record.
     pub gain: f64,
     /// gain − ½·k·log N, and what a mark on the outputs is worth.
     pub penalised: f64,
-    /// Nats over the bench's own twin on the validation record, unknown starts refitted there.
+    /// Nats over the fitted twin's own twin on the validation record, unknown starts refitted there.
     pub validation: Option<f64>,
     /// log-likelihood of the validation record.
     pub validation_likelihood: Option<f64>,
 }
 
 impl Explanation {
-    /// What explanations are ordered by.
+    /// Score by which explanations are ordered.
     pub fn score(&self) -> f64 {
         self.penalised + self.validation.unwrap_or(0.0)
     }
@@ -58,27 +58,27 @@ pub(in crate::diagnose) fn elsewhere(
 
 /// Fits every candidate from its best points; best first.
 pub(in crate::diagnose) fn explanations(
-    bench: &FittedTwin<'_>,
-    look: &Statistics,
+    model: &FittedTwin<'_>,
+    statistics: &Statistics,
     validation: Option<&[Record]>,
     only: Option<&[usize]>,
     stage: &Stage,
 ) -> Result<Vec<Explanation>, DiagnoseError> {
-    let base_validation = base_validation(bench, validation)?;
-    let reference = Reference::new(&bench.problem, &bench.fitted.theta)?;
+    let base_validation = base_validation(model, validation)?;
+    let reference = Reference::new(&model.problem, &model.fitted.theta)?;
     let tasks: Vec<usize> = match only {
         Some(list) => list.to_vec(),
-        None => (0..bench.dictionary.candidates.len()).collect(),
+        None => (0..model.dictionary.candidates.len()).collect(),
     };
-    let mut found: Vec<Explanation> = tasks
+    let mut explanations: Vec<Explanation> = tasks
         .into_par_iter()
         .map(|candidate| {
             let mut starts = match &reference {
-                Some(reference) => peaks(bench, reference, candidate)?,
+                Some(reference) => peaks(model, reference, candidate)?,
                 None => vec![],
             };
-            starts.extend(best_points(&bench.dictionary, look, candidate));
-            let explained = explain(bench, &starts, candidate, validation, base_validation)?;
+            starts.extend(best_points(&model.dictionary, statistics, candidate));
+            let explained = explain(model, &starts, candidate, validation, base_validation)?;
             stage.tick()?;
             Ok(explained)
         })
@@ -86,36 +86,39 @@ pub(in crate::diagnose) fn explanations(
         .into_iter()
         .flatten()
         .collect();
-    let order = |found: &mut Vec<Explanation>| {
-        found.sort_by(|a, b| b.score().total_cmp(&a.score()));
+    let order = |explanations: &mut Vec<Explanation>| {
+        explanations.sort_by(|a, b| b.score().total_cmp(&a.score()));
     };
-    order(&mut found);
+    order(&mut explanations);
     // Once more from where the best ended: a poor θ leads to poor fits.
     if only.is_none() {
-        let (round, draws) = match bench.problem.twin.equations() {
-            Some(_) => (Thresholds::SECOND_ROUND, Thresholds::SECOND_DRAWS),
-            None => (
+        let (round, draws) = if model.problem.is_simulated() {
+            (
                 Thresholds::SECOND_ROUND_SIMULATED,
                 Thresholds::SECOND_DRAWS_SIMULATED,
-            ),
+            )
+        } else {
+            (Thresholds::SECOND_ROUND, Thresholds::SECOND_DRAWS)
         };
-        let space = bench.problem.twin.parameters();
+        let space = model.problem.twin.parameters();
         let d = space.len();
         let anywhere = Noise::new(0, "second round", 0);
-        let thetas: Vec<Vec<f64>> = (found.iter().take(Thresholds::SECOND_STARTS))
-            .map(|e| bench.explained(e).of_record(0, &e.fitted.theta)[..d].to_vec())
+        let thetas: Vec<Vec<f64>> = (explanations.iter().take(Thresholds::SECOND_STARTS))
+            .map(|e| model.explained(e).of_record(0, &e.fitted.theta)[..d].to_vec())
             .chain((0..draws).map(|i| space.draw_prior(anywhere.sample(i))))
             .collect();
-        let again: Vec<usize> = (0..found.len())
-            .filter(|&i| bench.dictionary.candidates[found[i].candidate].is_listed() || i < 3)
+        let again: Vec<usize> = (0..explanations.len())
+            .filter(|&i| {
+                model.dictionary.candidates[explanations[i].candidate].is_listed() || i < 3
+            })
             .take(round)
             .collect();
         let better: Vec<Option<Fitted>> = again
             .par_iter()
             .map(|&i| {
-                let e = &found[i];
-                let variant = &bench.dictionary.variants[e.variant];
-                let problem = variant.problem(&bench.problem);
+                let e = &explanations[i];
+                let variant = &model.dictionary.variants[e.variant];
+                let problem = variant.problem(&model.problem);
                 let own = problem.of_record(0, &e.fitted.theta);
                 let starts: Vec<Vec<f64>> = (thetas.iter())
                     .filter(|theta| theta[..] != own[..d])
@@ -127,9 +130,9 @@ pub(in crate::diagnose) fn explanations(
             .collect::<Result<_, DiagnoseError>>()?;
         for (i, fitted) in again.into_iter().zip(better) {
             if let Some(fitted) = fitted {
-                let (candidate, variant) = (found[i].candidate, found[i].variant);
-                found[i] = scored(
-                    bench,
+                let (candidate, variant) = (explanations[i].candidate, explanations[i].variant);
+                explanations[i] = scored(
+                    model,
                     candidate,
                     variant,
                     fitted,
@@ -138,19 +141,19 @@ pub(in crate::diagnose) fn explanations(
                 )?;
             }
         }
-        order(&mut found);
+        order(&mut explanations);
     }
-    Ok(found)
+    Ok(explanations)
 }
 
 /// The best points of a candidate: (variant, magnitudes as the secant says), best first.
 fn best_points(
     dictionary: &Dictionary,
-    look: &Statistics,
+    statistics: &Statistics,
     candidate: usize,
 ) -> Vec<(usize, Vec<f64>)> {
     let mut points: Vec<(&Point, Gain)> = (dictionary.points.iter())
-        .zip(look.points.iter().copied())
+        .zip(statistics.points.iter().copied())
         .filter(|(p, _)| dictionary.variants[p.variant].candidate == candidate)
         .collect();
     points.sort_by(|a, b| b.1.nats.total_cmp(&a.1.nats));
@@ -181,24 +184,24 @@ fn best_points(
 }
 
 fn explain(
-    bench: &FittedTwin<'_>,
+    model: &FittedTwin<'_>,
     points: &[(usize, Vec<f64>)],
     candidate: usize,
     validation: Option<&[Record]>,
     base_validation: Option<f64>,
 ) -> Result<Option<Explanation>, DiagnoseError> {
-    let dictionary = &bench.dictionary;
+    let dictionary = &model.dictionary;
     let mut best: Option<(f64, usize, Fitted)> = None;
-    let price = 0.5 * (bench.problem.samples() as f64).ln();
+    let price = 0.5 * (model.problem.samples() as f64).ln();
     for (n, (v, m)) in points.iter().enumerate() {
         let variant = &dictionary.variants[*v];
-        let problem = variant.problem(&bench.problem);
+        let problem = variant.problem(&model.problem);
         let start = |theta: &[f64], m: &[f64]| -> Vec<f64> {
-            problem.clamp(&variant.at(&bench.problem, theta, m).1)
+            problem.clamp(&variant.at(&model.problem, theta, m).1)
         };
-        let mut starts = vec![start(&bench.fitted.theta, m)];
+        let mut starts = vec![start(&model.fitted.theta, m)];
         if n == 0 {
-            starts.push(start(&bench.problem.centre(), m));
+            starts.push(start(&model.problem.centre(), m));
         }
         let Some(mut fitted) = fit(&problem, &starts, ITERATIONS)? else {
             continue;
@@ -215,7 +218,7 @@ fn explain(
         return Ok(None);
     };
     Ok(Some(scored(
-        bench,
+        model,
         candidate,
         v,
         fitted,
@@ -224,36 +227,36 @@ fn explain(
     )?))
 }
 
-/// The likelihood of the validation record under the bench's own twin.
+/// The likelihood of the validation record under the fitted twin's own twin.
 pub(super) fn base_validation(
-    bench: &FittedTwin<'_>,
+    model: &FittedTwin<'_>,
     validation: Option<&[Record]>,
 ) -> Result<Option<f64>, FilterError> {
     let Some(records) = validation else {
         return Ok(None);
     };
-    let theta = bench.problem.of_record(0, &bench.fitted.theta);
-    elsewhere(&bench.problem.on(records), &theta)
+    let theta = model.problem.of_record(0, &model.fitted.theta);
+    elsewhere(&model.problem.on(records), &theta)
 }
 
 /// A fit with its scores.
 pub(super) fn scored(
-    bench: &FittedTwin<'_>,
+    model: &FittedTwin<'_>,
     candidate: usize,
     v: usize,
     fitted: Fitted,
     validation: Option<&[Record]>,
     base_validation: Option<f64>,
 ) -> Result<Explanation, DiagnoseError> {
-    let dictionary = &bench.dictionary;
+    let dictionary = &model.dictionary;
     let variant = &dictionary.variants[v];
     let numbers = if dictionary.candidates[candidate].is_listed() {
         variant.free.len() as f64
     } else {
         Thresholds::DISTURBANCE_NUMBERS
     };
-    let gain = fitted.value() - bench.fitted.value();
-    let samples = bench.problem.samples() as f64;
+    let gain = fitted.value() - model.fitted.value();
+    let samples = model.problem.samples() as f64;
     let mut explanation = Explanation {
         candidate,
         variant: v,
@@ -264,9 +267,9 @@ pub(super) fn scored(
         fitted,
     };
     if let (Some(records), Some(base)) = (validation, base_validation) {
-        let problem = variant.problem(&bench.problem.on(records));
+        let problem = variant.problem(&model.problem.on(records));
         let theta = variant
-            .problem(&bench.problem)
+            .problem(&model.problem)
             .of_record(0, &explanation.fitted.theta);
         let there = elsewhere(&problem, &theta)?;
         explanation.validation_likelihood = there;
@@ -288,10 +291,10 @@ fn jump(problem: &Problem<'_>, variant: &Variant, mut best: Fitted) -> Result<Fi
             for side in [-1.0, 1.0] {
                 let mut start = best.theta.clone();
                 start[at] = bounds.clamp(start[at] + side * step);
-                if let Some(found) = climb(problem, &start, 4)?
-                    && found.objective > best.objective
+                if let Some(trial) = climb(problem, &start, 4)?
+                    && trial.objective > best.objective
                 {
-                    best = found;
+                    best = trial;
                     break;
                 }
             }
@@ -302,12 +305,12 @@ fn jump(problem: &Problem<'_>, variant: &Variant, mut best: Fitted) -> Result<Fi
 }
 
 /// Probabilities over explanations, by softmax of score/temperature; what is missing to one is an imitated law's.
-pub(in crate::diagnose) fn probabilities(found: &[Explanation]) -> Vec<f64> {
-    let top = found
+pub(in crate::diagnose) fn probabilities(explanations: &[Explanation]) -> Vec<f64> {
+    let top = explanations
         .iter()
         .map(Explanation::score)
         .fold(f64::NEG_INFINITY, f64::max);
-    let weights: Vec<f64> = (found.iter())
+    let weights: Vec<f64> = (explanations.iter())
         .map(|e| ((e.score() - top) / Thresholds::TEMPERATURE).exp())
         .collect();
     let sum: f64 = weights.iter().sum();

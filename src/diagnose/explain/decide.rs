@@ -1,10 +1,10 @@
-//! From fitted explanations to an answer: named, a class of rivals, a pair, or none of these.
+//! Decision among fitted explanations: one, a class of rivals, several together, or none of these.
 
 use crate::diagnose::context::Context;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::explain::attribute::{Explanation, probabilities};
+use crate::diagnose::explain::extended::{Accepted, ExtendedTwin, extend, improves};
 use crate::diagnose::explain::several::{promises, several};
-use crate::diagnose::explain::step::{Accepted, Step, grown, improves};
 use crate::diagnose::fitting::base_fit::ITERATIONS;
 use crate::diagnose::fitting::climb::fit;
 use crate::diagnose::outcome::Decision;
@@ -16,66 +16,70 @@ use crate::diagnose::thresholds::Thresholds;
 use crate::progress::Stage;
 use crate::twin::Noise;
 
-/// What was decided, and with which fits.
-pub(in crate::diagnose) struct Answer {
+/// Decision with the accepted fits.
+pub(in crate::diagnose) struct Conclusion {
     pub decision: Decision,
-    /// Accepted fits with their benches' own numbering already resolved.
+    /// Accepted fits with their fitted twins' own numbering already resolved.
     pub accepted: Vec<Accepted>,
     pub class: Vec<String>,
     pub unexplained: Option<f64>,
     pub catch_all: Option<String>,
 }
 
-/// An answer, and the twins that it rests on.
+/// An conclusion, and the twins that it rests on.
 pub(in crate::diagnose) struct Decided<'a> {
-    pub answer: Answer,
+    pub conclusion: Conclusion,
     /// The twin with the accepted effects.
-    pub step: Option<Step<'a>>,
-    /// Where none is accepted: the twin with the best listed effect.
-    pub best: Option<Step<'a>>,
-    /// What the one or the other leaves.
-    pub left: Option<Left>,
+    pub extended: Option<ExtendedTwin<'a>>,
+    /// The twin with the best listed effect, where none is accepted.
+    pub best: Option<ExtendedTwin<'a>>,
+    /// Test of the twin with the accepted or best effects.
+    pub left: Option<Remainder>,
 }
 
-/// What a twin with effects leaves unexplained.
-pub(in crate::diagnose) struct Left {
+/// Structural test of a twin with effects.
+pub(in crate::diagnose) struct Remainder {
     /// On the records, and on these and the validation record together: the smaller one.
     pub p_value: f64,
     /// On the records.
     pub test: Test,
-    /// How the records look.
-    pub look: Statistics,
+    /// Statistics of the records.
+    pub statistics: Statistics,
 }
 
 impl<'a> Decided<'a> {
-    /// The effects of a step; of a single one also its rivals among the listed effects with their scores.
-    fn among(listed: &[(String, f64)], step: Step<'a>, left: Option<Left>) -> Self {
-        let score = step.score;
-        let mut decided = Self::named(step, left);
-        let answer = &mut decided.answer;
-        if let [only] = &answer.class[..] {
+    /// The effects of a extended; of a single one also its rivals among the listed effects with their scores.
+    fn among(
+        listed: &[(String, f64)],
+        extended: ExtendedTwin<'a>,
+        left: Option<Remainder>,
+    ) -> Self {
+        let score = extended.score;
+        let mut decided = Self::named(extended, left);
+        let conclusion = &mut decided.conclusion;
+        if let [only] = &conclusion.class[..] {
             let rivals = (listed.iter())
                 .filter(|(key, s)| key != only && *s >= score - Thresholds::RIVALS)
                 .map(|(key, _)| key.clone());
-            answer.class = [only.clone()].into_iter().chain(rivals).collect();
-            if answer.class.len() > 1 {
-                answer.decision = Decision::Class;
+            conclusion.class = [only.clone()].into_iter().chain(rivals).collect();
+            if conclusion.class.len() > 1 {
+                conclusion.decision = Decision::Class;
             }
         }
         decided
     }
 
-    /// The effects of a step, all of them and nothing else.
-    fn named(step: Step<'a>, left: Option<Left>) -> Self {
+    /// The effects of a extended, all of them and nothing else.
+    fn named(extended: ExtendedTwin<'a>, left: Option<Remainder>) -> Self {
         Self {
-            answer: Answer {
+            conclusion: Conclusion {
                 decision: Decision::Named,
-                accepted: step.accepted.clone(),
-                class: step.accepted.iter().map(Accepted::key).collect(),
+                accepted: extended.accepted.clone(),
+                class: extended.accepted.iter().map(Accepted::key).collect(),
                 unexplained: left.as_ref().map(|left| left.p_value),
                 catch_all: None,
             },
-            step: Some(step),
+            extended: Some(extended),
             best: None,
             left,
         }
@@ -85,32 +89,34 @@ impl<'a> Decided<'a> {
 /// Decides about a structural gap: the best single effect, more beside it where the data ask for them, or none.
 pub(in crate::diagnose) fn decide<'a>(
     context: &Context<'a>,
-    bench: &FittedTwin<'a>,
-    found: &[Explanation],
+    model: &FittedTwin<'a>,
+    explanations: &[Explanation],
     settings: &DiagnoseSettings,
     noise: Noise,
     stage: &Stage,
 ) -> Result<Decided<'a>, DiagnoseError> {
-    let candidates = &bench.dictionary.candidates;
-    let listed: Vec<&Explanation> = (found.iter())
+    let candidates = &model.dictionary.candidates;
+    let listed: Vec<&Explanation> = (explanations.iter())
         .filter(|e| candidates[e.candidate].is_listed())
         .collect();
-    let catch_all = found.iter().find(|e| !candidates[e.candidate].is_listed());
+    let catch_all = explanations
+        .iter()
+        .find(|e| !candidates[e.candidate].is_listed());
     let catch_score = catch_all.map_or(f64::NEG_INFINITY, Explanation::score);
     let catch_name = catch_all.map(|e| candidates[e.candidate].target.clone());
     // A noise is nothing but a disturbance without memory: it must do better without the memory's price.
-    let price = 0.5 * (bench.problem.samples() as f64).ln();
+    let price = 0.5 * (model.problem.samples() as f64).ln();
     let beaten = |score: f64, noisy: bool| score < catch_score + if noisy { price } else { 0.0 };
-    let nothing = |left: Option<Left>, step| Decided {
-        answer: Answer {
+    let nothing = |left: Option<Remainder>, extended| Decided {
+        conclusion: Conclusion {
             decision: Decision::NoneOfThese,
             accepted: vec![],
             class: vec![],
             unexplained: left.as_ref().map(|left| left.p_value),
             catch_all: catch_name.clone(),
         },
-        step: None,
-        best: step,
+        extended: None,
+        best: extended,
         left,
     };
     let Some(&first) = listed.first() else {
@@ -119,21 +125,21 @@ pub(in crate::diagnose) fn decide<'a>(
     let keys: Vec<(String, f64)> = (listed.iter())
         .map(|e| (candidates[e.candidate].key(), e.score()))
         .collect();
-    let chances = probabilities(found);
-    let chance = (found.iter().zip(&chances))
+    let chances = probabilities(explanations);
+    let chance = (explanations.iter().zip(&chances))
         .find(|(e, _)| e.candidate == first.candidate)
         .map_or(f64::NAN, |(_, chance)| *chance);
-    let Some(single) = grown(context, bench, &[], first, chance)? else {
+    let Some(single) = extend(context, model, &[], first, chance)? else {
         return Ok(nothing(None, None));
     };
     let tests = noise.child("unexplained");
-    let Some(left) = left_over(context, &single.bench, settings, tests, stage)? else {
+    let Some(left) = left_over(context, &single.model, settings, tests, stage)? else {
         return Ok(nothing(None, None));
     };
     let passes = left.p_value > Thresholds::UNEXPLAINED
         && !beaten(first.score(), candidates[first.candidate].is_noise());
     // More than one, where one is not enough, or where a second one promises much.
-    if !passes || promises(&single, &left.look) {
+    if !passes || promises(&single, &left.statistics) {
         let margin = if passes {
             Thresholds::WORTH_BESIDE_SUFFICIENT
         } else {
@@ -141,25 +147,25 @@ pub(in crate::diagnose) fn decide<'a>(
         };
         let several = several(
             context,
-            bench,
+            model,
             &listed,
-            (&single, &left.look),
+            (&single, &left.statistics),
             margin,
             noise,
             stage,
         )?;
-        if let Some(step) = several
+        if let Some(extended) = several
             && !beaten(
-                step.score - Thresholds::SEVERAL_OVER_DISTURBANCE,
-                step.accepted.iter().any(Accepted::is_noise),
+                extended.score - Thresholds::SEVERAL_OVER_DISTURBANCE,
+                extended.accepted.iter().any(Accepted::is_noise),
             )
         {
             let tests = tests.child("several");
-            if let Some(rest) = left_over(context, &step.bench, settings, tests, stage)?
+            if let Some(rest) = left_over(context, &extended.model, settings, tests, stage)?
                 && (rest.p_value > Thresholds::UNEXPLAINED
-                    || (!passes && improves(context, (bench, &[]), &step, noise)?))
+                    || (!passes && improves(context, (model, &[]), &extended, noise)?))
             {
-                return Ok(Decided::among(&keys, step, Some(rest)));
+                return Ok(Decided::among(&keys, extended, Some(rest)));
             }
         }
     }
@@ -167,7 +173,7 @@ pub(in crate::diagnose) fn decide<'a>(
         return Ok(Decided::among(&keys, single, Some(left)));
     }
     // A single effect that leaves something, but follows a record never seen much better.
-    if improves(context, (bench, &[]), &single, noise)? {
+    if improves(context, (model, &[]), &single, noise)? {
         return Ok(Decided::named(single, Some(left)));
     }
     Ok(nothing(Some(left), Some(single)))
@@ -177,13 +183,13 @@ pub(in crate::diagnose) fn decide<'a>(
 /// record together.
 fn left_over<'a>(
     context: &Context<'a>,
-    bench: &FittedTwin<'a>,
+    model: &FittedTwin<'a>,
     settings: &DiagnoseSettings,
     noise: Noise,
     stage: &Stage,
-) -> Result<Option<Left>, DiagnoseError> {
+) -> Result<Option<Remainder>, DiagnoseError> {
     let count = settings.unexplained;
-    let Some(nulls) = bench.nulls(
+    let Some(null) = model.null_distribution(
         count,
         Thresholds::UNEXPLAINED,
         noise.child("records"),
@@ -192,12 +198,12 @@ fn left_over<'a>(
     else {
         return Ok(None);
     };
-    let test = nulls.test();
+    let test = null.test();
     let left = |also: f64| {
-        Some(Left {
+        Some(Remainder {
             p_value: test.p_value.min(also),
             test: test.clone(),
-            look: nulls.own,
+            statistics: null.own,
         })
     };
     let Some(records) = context
@@ -206,17 +212,17 @@ fn left_over<'a>(
     else {
         return Ok(left(1.0));
     };
-    let (there, start) = bench.on(records);
+    let (there, start) = model.on(records);
     let Some(fitted) = fit(&there, &[start], ITERATIONS)? else {
         return Ok(left(1.0));
     };
-    let seen = bench.with_problem(there, fitted, |bench| {
-        bench.nulls(
+    let seen = model.with_problem(there, fitted, |model| {
+        model.null_distribution(
             count,
             Thresholds::UNEXPLAINED,
             noise.child("together"),
             stage,
         )
     })?;
-    Ok(left(seen.map_or(1.0, |nulls| nulls.test().p_value)))
+    Ok(left(seen.map_or(1.0, |null| null.test().p_value)))
 }

@@ -1,4 +1,4 @@
-//! What a validation record says against the twin, whatever θ.
+//! E-value of a validation record against the twin, for any θ.
 
 use crate::diagnose::explain::attribute::Explanation;
 
@@ -14,12 +14,12 @@ use crate::diagnose::explain::attribute::Explanation;
 ///
 /// Source: Wasserman, Ramdas & Balakrishnan, "Universal inference" (2020).
 pub(in crate::diagnose) fn log_e(
-    found: &[Explanation],
+    explanations: &[Explanation],
     refitted: f64,
     starts: usize,
     samples: usize,
 ) -> Option<f64> {
-    let usable: Vec<(f64, f64)> = (found.iter())
+    let usable: Vec<(f64, f64)> = (explanations.iter())
         .filter_map(|e| Some((e.penalised, e.validation_likelihood?)))
         .collect();
     let weight = log_sum(&usable.iter().map(|(w, _)| *w).collect::<Vec<_>>())?;

@@ -1,4 +1,4 @@
-//! Where a periodic effect is fitted from: the likelihood has a narrow top at each frequency, far narrower than a dictionary.
+//! Start frequencies of a periodic effect: the likelihood has tops far narrower than a dictionary.
 
 use crate::diagnose::fitting::reference::Reference;
 use crate::diagnose::test::fitted_twin::FittedTwin;
@@ -13,17 +13,17 @@ use crate::likelihood::kalman::{FilterError, recoverable};
 /// α₀·sin(ωt) + α₁·sin(ωt + π/2) = √(α₀² + α₁²)·sin(ωt + atan2(α₁, α₀))
 /// ```
 pub(in crate::diagnose) fn peaks(
-    bench: &FittedTwin<'_>,
+    model: &FittedTwin<'_>,
     reference: &Reference,
     candidate: usize,
 ) -> Result<Vec<(usize, Vec<f64>)>, FilterError> {
-    let dictionary = &bench.dictionary;
-    let found = (dictionary.variants.iter().enumerate())
+    let dictionary = &model.dictionary;
+    let periodic = (dictionary.variants.iter().enumerate())
         .find(|(_, v)| v.candidate == candidate && is_periodic(v));
-    let Some((index, variant)) = found else {
+    let Some((index, variant)) = periodic else {
         return Ok(vec![]);
     };
-    let record = &bench.problem.records[0];
+    let record = &model.problem.records[0];
     let (dt, samples) = (record.drive().dt(), record.samples() as f64);
     let unit = variant.axes[0].width;
     let count = ((Thresholds::FREQUENCIES_PER_CYCLE * Thresholds::HIGHEST_FREQUENCY * samples)
@@ -36,7 +36,7 @@ pub(in crate::diagnose) fn peaks(
         let mut parts = [0.0; 2];
         for (part, phase) in parts.iter_mut().zip([0.0, std::f64::consts::FRAC_PI_2]) {
             let m = [unit, frequency, phase];
-            let (problem, full) = variant.at(&bench.problem, &bench.fitted.theta, &m);
+            let (problem, full) = variant.at(&model.problem, &model.fitted.theta, &m);
             let Some(there) = recoverable(problem.filtered(&full))? else {
                 continue;
             };

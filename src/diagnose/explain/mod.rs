@@ -3,7 +3,7 @@
 pub(super) mod attribute;
 pub(super) mod decide;
 pub(super) mod evalue;
+pub(super) mod extended;
 pub(super) mod frequency;
 pub(super) mod several;
-pub(super) mod step;
 pub(super) mod verdict;

@@ -1,4 +1,4 @@
-//! Which kind of gap: the rules.
+//! Rules for the kind of gap.
 
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::explain::attribute::{Explanation, explanations};
@@ -36,8 +36,8 @@ pub(in crate::diagnose) fn inside<'a>(problem: &Problem<'a>) -> Problem<'a> {
     Problem::new(problem.twin.clone(), axes, problem.records)
 }
 
-/// Whether θ lies significantly outside its prior box: the likelihood ratio of the best θ anywhere over the best inside.
-/// Also the fit inside.
+/// Tests whether θ lies outside its prior box: likelihood ratio of the best θ anywhere over the best inside.
+/// Returns the fit inside as well.
 pub(in crate::diagnose) fn left_the_prior(
     problem: &Problem<'_>,
     fitted: &Fitted,
@@ -64,20 +64,20 @@ pub(in crate::diagnose) fn left_the_prior(
 
 /// Listed effects that explain a parameter gap with θ inside the prior: fits within 2 nats of θ outside, best first.
 pub(in crate::diagnose) fn absorbing(
-    bench: &FittedTwin<'_>,
-    look: &Statistics,
+    model: &FittedTwin<'_>,
+    statistics: &Statistics,
     within: Fitted,
     stage: &Stage,
 ) -> Result<Vec<Explanation>, DiagnoseError> {
-    let free = bench.fitted.log_likelihood;
-    let boxed = inside(&bench.problem);
-    let listed: Vec<usize> = (0..bench.dictionary.candidates.len())
-        .filter(|&c| bench.dictionary.candidates[c].is_listed())
+    let free = model.fitted.log_likelihood;
+    let boxed = inside(&model.problem);
+    let listed: Vec<usize> = (0..model.dictionary.candidates.len())
+        .filter(|&c| model.dictionary.candidates[c].is_listed())
         .collect();
-    let found = bench.with_problem(boxed, within, |bench| {
-        explanations(bench, look, None, Some(&listed), stage)
+    let explanations = model.with_problem(boxed, within, |model| {
+        explanations(model, statistics, None, Some(&listed), stage)
     })?;
-    Ok((found.into_iter())
+    Ok((explanations.into_iter())
         .filter(|e| e.fitted.log_likelihood >= free - Thresholds::ABSORBS)
         .collect())
 }

@@ -1,4 +1,4 @@
-//! How one entry of θ moves in a fit.
+//! Axis of one entry of θ in a fit.
 
 use crate::twin::{Interval, Parameter, Role};
 
@@ -9,10 +9,10 @@ const FACTOR: f64 = 4.0;
 /// Longest step of a fit in a logarithm; otherwise, as a share of the width.
 const LONGEST: f64 = 0.5;
 
-/// How one entry of θ moves in a fit.
+/// Axis of one entry of θ in a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::diagnose) struct Axis {
-    /// What it may be; a logarithm is taken where the lower end is positive.
+    /// Range; a logarithm is taken where the lower end is positive.
     pub bounds: Interval,
     /// Centre of the weak prior, in θ.
     pub centre: f64,
@@ -22,14 +22,14 @@ pub(in crate::diagnose) struct Axis {
     pub width: f64,
     /// Longest step of a fit in φ.
     pub longest: f64,
-    /// Whether the prior counts in comparisons: that of the twin's own parameters does.
+    /// True where the prior counts in comparisons: that of the twin's own parameters does.
     pub counts: bool,
-    /// Whether a fit leaves it where it starts.
+    /// True where a fit leaves it at its start.
     pub held: bool,
 }
 
 impl Axis {
-    /// Of a parameter of the twin itself, an unknown start or noise level.
+    /// Returns the axis of a parameter of the twin itself, an unknown start or noise level.
     pub fn of(p: &Parameter) -> Self {
         let (prior, bounds) = (p.prior, p.bounds);
         let centre = prior.centre();

@@ -20,7 +20,7 @@ pub(in crate::diagnose) fn base_fit(
     settings: &DiagnoseSettings,
     noise: Noise,
 ) -> Result<Option<Fitted>, FilterError> {
-    if problem.twin.equations().is_none() {
+    if problem.is_simulated() {
         return growing::base_fit(problem, settings, noise);
     }
     let space = problem.twin.parameters();

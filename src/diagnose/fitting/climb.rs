@@ -5,7 +5,7 @@ use crate::diagnose::fitting::slope::{Slope, slope as slope_at};
 use crate::likelihood::kalman::{FilterError, recoverable};
 use nalgebra::{DMatrix, DVector};
 
-/// Where a fit ended.
+/// Result of a fit.
 #[derive(Debug, Clone)]
 pub(in crate::diagnose) struct Fitted {
     /// Full θ.
@@ -13,14 +13,14 @@ pub(in crate::diagnose) struct Fitted {
     pub log_likelihood: f64,
     /// Log-density of the priors that count in comparisons.
     pub log_prior: f64,
-    /// What the fit maximises: likelihood and all priors.
+    /// Objective of the fit: likelihood and all priors.
     pub objective: f64,
     /// Information in φ, that of the priors included.
     pub information: DMatrix<f64>,
 }
 
 impl Fitted {
-    /// What fits of different twins are compared by.
+    /// Value by which fits of different twins are compared.
     pub fn value(&self) -> f64 {
         self.log_likelihood + self.log_prior
     }
@@ -146,10 +146,10 @@ pub(in crate::diagnose) fn fit(
 ) -> Result<Option<Fitted>, FilterError> {
     let mut best: Option<Fitted> = None;
     for start in starts {
-        if let Some(found) = climb(problem, start, iterations)?
-            && best.as_ref().is_none_or(|b| found.objective > b.objective)
+        if let Some(fitted) = climb(problem, start, iterations)?
+            && best.as_ref().is_none_or(|b| fitted.objective > b.objective)
         {
-            best = Some(found);
+            best = Some(fitted);
         }
     }
     Ok(best)

@@ -74,10 +74,10 @@ pub(in crate::diagnose) fn base_fit(
 
 /// Fits from all starts, best first.
 fn fits(problem: &Problem<'_>, starts: &[Vec<f64>]) -> Result<Vec<Fitted>, FilterError> {
-    let found: Vec<Option<Fitted>> = (starts.par_iter())
+    let fits: Vec<Option<Fitted>> = (starts.par_iter())
         .map(|start| climb(problem, start, ITERATIONS))
         .collect::<Result<_, _>>()?;
-    let mut found: Vec<Fitted> = found.into_iter().flatten().collect();
-    found.sort_by(|a, b| b.objective.total_cmp(&a.objective));
-    Ok(found)
+    let mut fits: Vec<Fitted> = fits.into_iter().flatten().collect();
+    fits.sort_by(|a, b| b.objective.total_cmp(&a.objective));
+    Ok(fits)
 }

@@ -11,9 +11,9 @@ use rayon::prelude::*;
 const SAMPLES: usize = 200_000;
 const LEAST: usize = 100;
 const MOST: usize = 500;
-/// How much wider than the posterior draws are proposed.
+/// Width of the proposal over that of the posterior.
 const WIDER: f64 = 1.25;
-/// What the second round's covariance keeps of the first one's.
+/// Share of the first round's covariance in that of the second.
 const KEPT: f64 = 0.05;
 
 /// Draws of θ of the first record, from the posterior of likelihood and weak priors within the bounds.
@@ -119,7 +119,7 @@ impl Round {
         Some((mean, spread))
     }
 
-    /// As many draws as asked for, each as often as its weight says.
+    /// Resamples draws by their weights.
     fn taken(&self, count: usize) -> Vec<&DVector<f64>> {
         let cumulated: Vec<f64> = (self.weights.iter())
             .scan(0.0, |sum, w| {

@@ -2,9 +2,11 @@
 
 use crate::diagnose::fitting::axis::Axis;
 use crate::likelihood::ensemble::{self, Predictor};
-use crate::likelihood::kalman::{Coordinates, FilterError, FilterSettings, Filtered, Kalman};
+use crate::likelihood::kalman::{Coordinates, FilterError, Filtered, Score};
+use crate::likelihood::{Likelihood, likelihood_of};
 use crate::record::{Record, Signal};
 use crate::twin::{Outline, Parameter, ParameterSpace, Role, Twin};
+use std::sync::Arc;
 
 /// Longest step of a fit in the logarithm of a black box's noise level.
 const LONGEST_NOISE: f64 = 2.0;
@@ -16,12 +18,12 @@ const LONGEST_NOISE: f64 = 2.0;
 pub(in crate::diagnose) struct Problem<'a> {
     pub twin: Twin,
     pub records: &'a [Record],
-    /// For each record, where the twin's parameters stand in the full θ.
+    /// Indices of the twin's parameters in the full θ, for each record.
     pub(super) places: Vec<Vec<usize>>,
     pub axes: Vec<Axis>,
     pub coordinates: Coordinates,
-    pub(super) coordinates_of: Vec<Coordinates>,
-    pub(super) filter: FilterSettings,
+    coordinates_of: Vec<Coordinates>,
+    likelihood: Arc<dyn Likelihood>,
 }
 
 /// Log-likelihood at one θ.
@@ -64,25 +66,31 @@ impl<'a> Problem<'a> {
                 .collect(),
             places,
             axes: all,
+            likelihood: likelihood_of(&twin),
             twin,
             records,
-            filter: FilterSettings::default(),
         }
     }
 
     /// A twin with the weak priors of its own parameters.
     pub fn of_twin(twin: &Twin, records: &'a [Record]) -> Self {
-        let mut axes: Vec<Axis> = twin.parameters().iter().map(Axis::of).collect();
-        if twin.equations().is_none() {
-            // What an effect explains of a simulator's misfit may be all of it.
-            let noise = |p: &Parameter| p.role == Role::Noise;
-            for (axis, _) in
-                (axes.iter_mut().zip(twin.parameters().iter())).filter(|(_, p)| noise(p))
-            {
-                axis.longest = LONGEST_NOISE;
+        let space = twin.parameters();
+        let axes = space.iter().map(Axis::of).collect();
+        let mut problem = Self::new(twin.clone(), axes, records);
+        if problem.is_simulated() {
+            // An effect may explain all of a simulator's misfit.
+            for (axis, p) in problem.axes.iter_mut().zip(space.iter()) {
+                if p.role == Role::Noise {
+                    axis.longest = LONGEST_NOISE;
+                }
             }
         }
-        Self::new(twin.clone(), axes, records)
+        problem
+    }
+
+    /// True where each likelihood costs an ensemble of simulations.
+    pub fn is_simulated(&self) -> bool {
+        self.likelihood.is_simulated()
     }
 
     /// The same twin on other records.
@@ -105,21 +113,10 @@ impl<'a> Problem<'a> {
 
     /// States, inputs and outputs; of a black box, its predicted outputs stand for states.
     pub fn outline(&self) -> Outline {
-        match self.twin.equations() {
-            Some(equations) => equations.outline(),
-            None => {
-                let signals = self.twin.signals();
-                Outline {
-                    parameters: self.twin.parameters(),
-                    states: signals.outputs.clone(),
-                    inputs: signals.inputs,
-                    outputs: signals.outputs,
-                }
-            }
-        }
+        self.likelihood.outline()
     }
 
-    /// Of a black box: what predicts each record at θ.
+    /// Returns the predictors of all records of a black box at θ.
     pub fn predictors(&self, theta: &[f64]) -> Result<Vec<Predictor>, FilterError> {
         (self.records.iter().enumerate())
             .map(|(r, record)| ensemble::predictor(&self.twin, &self.of_record(r, theta), record))
@@ -203,87 +200,51 @@ impl<'a> Problem<'a> {
 
     /// Log-likelihood of all records at θ, with the innovations of a black box.
     pub(super) fn evaluate(&self, theta: &[f64]) -> Result<Evaluation, FilterError> {
-        let Some(equations) = self.twin.equations() else {
-            let innovations = self.filtered(theta)?;
-            return Ok(Evaluation {
-                log_likelihood: innovations.iter().map(|f| f.log_likelihood).sum(),
-                innovations: Some(innovations),
-            });
-        };
-        let mut log_likelihood = 0.0;
+        let (mut log_likelihood, mut innovations) = (0.0, Some(vec![]));
         for (r, record) in self.records.iter().enumerate() {
-            let kalman = Kalman::new(equations, record, &self.filter)?;
-            log_likelihood += kalman.log_likelihood(&self.of_record(r, theta))?;
+            let theta = self.of_record(r, theta);
+            let (value, filtered) = self.likelihood.log_likelihood(&theta, record)?;
+            log_likelihood += value;
+            innovations = innovations.zip(filtered).map(|(mut all, filtered)| {
+                all.push(filtered);
+                all
+            });
         }
         Ok(Evaluation {
             log_likelihood,
-            innovations: None,
+            innovations,
         })
+    }
+
+    /// Gradient and information of one record at the full θ; `None` where only differences give them.
+    pub(super) fn score(&self, r: usize, theta: &[f64]) -> Result<Option<Score>, FilterError> {
+        let (own, coordinates) = (self.of_record(r, theta), &self.coordinates_of[r]);
+        self.likelihood.score(&own, &self.records[r], coordinates)
     }
 
     /// Gain at which a fit is done, in nats; what simulations say is not worth the last of them.
     pub fn done(&self) -> f64 {
-        match self.twin.equations() {
-            Some(_) => 5e-3,
-            None => 5e-2,
-        }
+        if self.is_simulated() { 5e-2 } else { 5e-3 }
     }
 
     /// Innovations of each record.
     pub fn filtered(&self, theta: &[f64]) -> Result<Vec<Filtered>, FilterError> {
-        self.filtered_by(theta, &self.filter)
+        (self.records.iter().enumerate())
+            .map(|(r, record)| self.likelihood.filtered(&self.of_record(r, theta), record))
+            .collect()
     }
 
     /// Innovations and filtered states of each record.
     pub fn states(&self, theta: &[f64]) -> Result<Vec<(Filtered, Signal)>, FilterError> {
-        if self.twin.equations().is_none() {
-            let all = self.filtered(theta)?.into_iter().zip(self.records);
-            return Ok(all
-                .map(|(f, record)| {
-                    let predicted = f.predictions(record.outputs());
-                    (f, predicted)
-                })
-                .collect());
-        }
-        let keep = FilterSettings {
-            keep_states: true,
-            ..self.filter.clone()
-        };
-        let all = self.filtered_by(theta, &keep)?;
-        Ok((all.into_iter())
-            .map(|mut f| {
-                let states = f
-                    .states
-                    .take()
-                    .map_or_else(|| Signal::zeros((0, 0)), |s| s.means);
-                (f, states)
-            })
-            .collect())
-    }
-
-    fn filtered_by(
-        &self,
-        theta: &[f64],
-        settings: &FilterSettings,
-    ) -> Result<Vec<Filtered>, FilterError> {
         (self.records.iter().enumerate())
-            .map(|(r, record)| {
-                let theta = self.of_record(r, theta);
-                match self.twin.equations() {
-                    Some(equations) => Kalman::new(equations, record, settings)?.filter(&theta),
-                    None => ensemble::filtered(&self.twin, &theta, record),
-                }
-            })
+            .map(|(r, record)| self.likelihood.states(&self.of_record(r, theta), record))
             .collect()
     }
 
     /// Points around θ whose innovations tell their derivatives: (moved θ, distance in φ), one for each entry.
     pub fn neighbours(&self, theta: &[f64]) -> Vec<(Vec<f64>, f64)> {
         // Runs are smooth in θ up to a simulator's own tolerance only.
-        let share = match self.twin.equations() {
-            Some(_) => 0.1,
-            None => 1.0,
-        };
+        let share = if self.is_simulated() { 1.0 } else { 0.1 };
         let phi = self.coordinates.of(theta);
         (0..phi.len())
             .map(|j| {

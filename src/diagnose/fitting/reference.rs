@@ -1,4 +1,4 @@
-//! How much each explanation would gain, to second order, with θ free to answer.
+//! Gain of an explanation to second order, with θ free to answer.
 //!
 //! With innovations e and their covariances S = C·Cᵀ at θ̂, stack for each row
 //!
@@ -31,7 +31,7 @@ pub(in crate::diagnose) struct Reference {
     answer: DVector<f64>,
 }
 
-/// What the scan says about one point.
+/// Gain at one point.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(in crate::diagnose) struct Gain {
     /// Nats.
@@ -41,12 +41,12 @@ pub(in crate::diagnose) struct Gain {
 }
 
 impl Reference {
-    /// With θ as free as the weak priors leave it.
+    /// Filters at θ, which is as free as the weak priors leave it.
     pub fn new(problem: &Problem<'_>, theta: &[f64]) -> Result<Option<Self>, FilterError> {
         Self::knowing(problem, theta, &weak(problem))
     }
 
-    /// With `known` about θ already, an information in φ.
+    /// Filters at θ, about which the information `known` (in φ) exists already.
     pub fn knowing(
         problem: &Problem<'_>,
         theta: &[f64],
@@ -63,7 +63,7 @@ impl Reference {
         Ok(Self::with(filtered, &beside, known))
     }
 
-    /// From innovations at θ̂, a step beside it along each axis, and what is known about θ already.
+    /// Builds the reference from innovations at θ̂ and a step beside it along each axis, and the information about θ.
     pub fn with(
         filtered: Vec<Filtered>,
         beside: &[(Vec<Filtered>, f64)],
@@ -177,7 +177,7 @@ impl Reference {
     }
 }
 
-/// What the weak priors know about θ, in φ.
+/// Information of the weak priors about θ, in φ.
 pub(in crate::diagnose) fn weak(problem: &Problem<'_>) -> DMatrix<f64> {
     let precisions = problem.prior_terms().map(|(_, precision)| precision);
     DMatrix::from_diagonal(&DVector::from_iterator(problem.dimension(), precisions))

@@ -5,7 +5,7 @@
 
 use crate::diagnose::fitting::problem::Problem;
 use crate::diagnose::fitting::reference::Reference;
-use crate::likelihood::kalman::{FilterError, Filtered, Kalman, Score};
+use crate::likelihood::kalman::{FilterError, Filtered};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -19,6 +19,17 @@ pub(super) struct Slope {
 }
 
 impl Slope {
+    /// Slope of the weak prior's density alone, its gradient yet to be added.
+    fn zero(problem: &Problem<'_>, theta: &[f64]) -> Self {
+        let d = problem.dimension();
+        Self {
+            log_likelihood: 0.0,
+            log_prior: problem.log_prior(theta, true),
+            gradient: DVector::zeros(d),
+            information: DMatrix::zeros(d, d),
+        }
+    }
+
     pub fn objective(&self) -> f64 {
         self.log_likelihood + self.log_prior
     }
@@ -30,27 +41,23 @@ pub(super) fn slope(
     theta: &[f64],
     innovations: Option<Vec<Filtered>>,
 ) -> Result<Slope, FilterError> {
-    let Some(equations) = problem.twin.equations() else {
+    let mut slope = if problem.is_simulated() {
         let innovations = innovations.map_or_else(|| problem.filtered(theta), Ok)?;
-        let mut slope = by_differences(problem, theta, innovations)?;
-        add_priors(problem, theta, &mut slope);
-        return Ok(slope);
+        by_differences(problem, theta, innovations)?
+    } else {
+        by_scores(problem, theta)?
     };
-    let d = problem.dimension();
-    let mut slope = Slope {
-        log_likelihood: 0.0,
-        log_prior: problem.log_prior(theta, true),
-        gradient: DVector::zeros(d),
-        information: DMatrix::zeros(d, d),
-    };
-    for (r, record) in problem.records.iter().enumerate() {
-        let kalman = Kalman::new(equations, record, &problem.filter)?;
-        let place = &problem.places[r];
-        let score = Score::forward(
-            &kalman,
-            &problem.of_record(r, theta),
-            &problem.coordinates_of[r],
-        )?;
+    add_priors(problem, theta, &mut slope);
+    Ok(slope)
+}
+
+/// Gradient and information from the filter's score of each record.
+fn by_scores(problem: &Problem<'_>, theta: &[f64]) -> Result<Slope, FilterError> {
+    let mut slope = Slope::zero(problem, theta);
+    for (r, place) in problem.places.iter().enumerate() {
+        let Some(score) = problem.score(r, theta)? else {
+            continue;
+        };
         slope.log_likelihood += score.log_likelihood;
         for (a, &i) in place.iter().enumerate() {
             slope.gradient[i] += score.gradient[a];
@@ -59,7 +66,6 @@ pub(super) fn slope(
             }
         }
     }
-    add_priors(problem, theta, &mut slope);
     Ok(slope)
 }
 
@@ -78,7 +84,6 @@ fn by_differences(
     innovations: Vec<Filtered>,
 ) -> Result<Slope, FilterError> {
     let here = Reference::bare(innovations);
-    let d = problem.dimension();
     let directions: Vec<Option<DVector<f64>>> = (problem.neighbours(theta).into_par_iter())
         .enumerate()
         .map(|(j, (moved, distance))| {
@@ -89,12 +94,8 @@ fn by_differences(
             Ok(Some(here.direction(&there) / distance))
         })
         .collect::<Result<_, FilterError>>()?;
-    let mut slope = Slope {
-        log_likelihood: here.filtered.iter().map(|f| f.log_likelihood).sum(),
-        log_prior: problem.log_prior(theta, true),
-        gradient: DVector::zeros(d),
-        information: DMatrix::zeros(d, d),
-    };
+    let mut slope = Slope::zero(problem, theta);
+    slope.log_likelihood = here.filtered.iter().map(|f| f.log_likelihood).sum();
     for (i, a) in directions.iter().enumerate() {
         let Some(a) = a else { continue };
         slope.gradient[i] = here.residual().dot(a);

@@ -1,4 +1,4 @@
-//! What a twin may lack: listed effects, and disturbances for everything else.
+//! Candidates for a gap: listed effects, and disturbances for everything else.
 
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::disturbed_equations::disturbed;
@@ -38,7 +38,7 @@ impl Candidate {
         matches!(self.kind, Kind::Listed(_))
     }
 
-    /// Whether only the noise is changed, so that no free run moves.
+    /// Returns true where only the noise changes, so that no free run moves.
     pub fn is_noise(&self) -> bool {
         match &self.kind {
             Kind::Listed(effect) => {
@@ -86,8 +86,8 @@ pub(in crate::diagnose) fn with(
 }
 
 /// The twin with a catch-all on top.
-pub(in crate::diagnose) fn with_disturbance(base: &Twin, place: Entry, memory: f64) -> Twin {
-    disturbed(base.clone(), place, memory)
+pub(in crate::diagnose) fn with_disturbance(base: &Twin, entry: Entry, memory: f64) -> Twin {
+    disturbed(base.clone(), entry, memory)
 }
 
 /// Magnitudes that a fit may start from.
@@ -122,14 +122,14 @@ pub(in crate::diagnose) fn candidates(
         .filter(|c| !named(&c.id, &c.target))
         .filter(|c| !already.contains(&c.key()))
         .collect();
-    all.extend(match twin.equations() {
-        Some(equations) => catch_alls(&equations.outline()),
+    all.extend(match twin.outline() {
+        Some(outline) => catch_alls(&outline),
         None => catch_alls_of_signals(&twin.signals()),
     });
     Ok(all)
 }
 
-/// What the twin may lack beside these and its own effects.
+/// Effects that the twin may lack beside these candidates and its own effects.
 pub(in crate::diagnose) fn not_tested(study: &Study, candidates: &[Candidate]) -> Vec<String> {
     let known: Vec<String> = candidates
         .iter()
@@ -162,7 +162,7 @@ fn catch_alls(outline: &Outline) -> Vec<Candidate> {
     disturbances(states.chain(sensors).chain(parameters))
 }
 
-/// Of a twin that shows nothing but its signals.
+/// Disturbances of a twin without equations.
 fn catch_alls_of_signals(signals: &Signals) -> Vec<Candidate> {
     let sensors = numbered("sensor", signals.outputs.len(), Entry::Sensor);
     let actuators = numbered("actuator", signals.inputs.len(), Entry::Actuator);
@@ -173,21 +173,21 @@ fn catch_alls_of_signals(signals: &Signals) -> Vec<Candidate> {
 fn numbered(
     word: &str,
     count: usize,
-    place: fn(usize) -> Entry,
+    entry: fn(usize) -> Entry,
 ) -> impl Iterator<Item = (Entry, String)> {
     (0..count).map(move |j| match count {
-        1 => (place(j), word.to_owned()),
-        _ => (place(j), format!("{word}{}", j + 1)),
+        1 => (entry(j), word.to_owned()),
+        _ => (entry(j), format!("{word}{}", j + 1)),
     })
 }
 
-fn disturbances(places: impl Iterator<Item = (Entry, String)>) -> Vec<Candidate> {
-    places
-        .flat_map(|(place, target)| {
+fn disturbances(entries: impl Iterator<Item = (Entry, String)>) -> Vec<Candidate> {
+    entries
+        .flat_map(|(entry, target)| {
             Thresholds::MEMORIES.map(|memory| Candidate {
                 id: "disturbance".into(),
                 target: target.clone(),
-                kind: Kind::CatchAll(place, memory),
+                kind: Kind::CatchAll(entry, memory),
             })
         })
         .collect()

@@ -1,11 +1,11 @@
-//! What a plan is made of: which magnitudes of an effect are in use, how each moves, and what its unit is worth.
+//! Parts of a plan: choices of magnitudes in use, their axes and units.
 
 use crate::diagnose::fitting::axis::Axis;
 use crate::diagnose::thresholds::Thresholds;
 use crate::effect::{Mark, UnmodelledEffect};
 use crate::twin::Interval;
 
-/// Which of an effect's magnitudes are in use.
+/// A choice of an effect's magnitudes to use.
 pub(in crate::diagnose) struct Choice {
     /// Magnitudes that are off.
     pub off: Vec<usize>,

@@ -1,4 +1,4 @@
-//! Where the candidates are looked for: magnitudes in the units of this record.
+//! Dictionary of candidates: magnitudes to try, in the units of the record.
 
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::fitting::problem::Problem;
@@ -13,7 +13,7 @@ use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::twin::Twin;
 use rayon::prelude::*;
 
-/// One place to look at.
+/// One point to try.
 #[derive(Debug, Clone)]
 pub(in crate::diagnose) struct Point {
     /// Index among the variants.
@@ -22,11 +22,11 @@ pub(in crate::diagnose) struct Point {
     pub m: Vec<f64>,
     /// Multiples of the secant that make sense.
     pub range: (f64, f64),
-    /// Whether a multiple of the secant is that multiple of the first magnitude.
+    /// True where a multiple of the secant is that multiple of the first magnitude.
     pub linear: bool,
 }
 
-/// All places, and the twins to look with.
+/// All points, and the twins to try them with.
 pub(in crate::diagnose) struct Dictionary {
     pub candidates: Vec<Candidate>,
     pub variants: Vec<Variant>,
@@ -34,7 +34,7 @@ pub(in crate::diagnose) struct Dictionary {
 }
 
 impl Dictionary {
-    /// Of candidates on the twin `study` with the effects `accepted`; `problem` and `reference` are that twin's.
+    /// Plans and tries the points of all candidates on the twin `study` with the effects `accepted`; `problem` and `reference` are that twin's.
     pub fn new(
         study: &Twin,
         accepted: &[Addition],
@@ -69,7 +69,7 @@ impl Dictionary {
             .into_par_iter()
             .map(|(v, lead, shape)| {
                 let plan = &plans[v];
-                let look = |first: f64| -> Result<Option<f64>, FilterError> {
+                let visibility = |first: f64| -> Result<Option<f64>, FilterError> {
                     let m: Vec<f64> = [first].into_iter().chain(shape.iter().copied()).collect();
                     let of = plan.variant.problem(problem);
                     let there = recoverable(of.filtered(
@@ -77,8 +77,8 @@ impl Dictionary {
                     ))?;
                     Ok(there.map(|there| reference.direction(&there).norm_squared()))
                 };
-                let found = try_lead(lead, look)?;
-                Ok(found.map(|(first, linear)| Point {
+                let lead_point = try_lead(lead, visibility)?;
+                Ok(lead_point.map(|(first, linear)| Point {
                     variant: v,
                     m: [first].into_iter().chain(shape.iter().copied()).collect(),
                     range: plan.range,
@@ -139,17 +139,19 @@ impl Dictionary {
     }
 }
 
-/// Finds the first magnitude to look at; `None` where nothing can be seen or filtered. Also whether it is linear.
+/// Finds the first magnitude to visibility at; `None` where nothing can be seen or filtered. Also whether it is linear.
 fn try_lead(
     lead: Lead,
-    look: impl Fn(f64) -> Result<Option<f64>, FilterError>,
+    visibility: impl Fn(f64) -> Result<Option<f64>, FilterError>,
 ) -> Result<Option<(f64, bool)>, FilterError> {
     let seen = |q: f64| q.is_finite() && q > 1e-6;
     match lead {
-        Lead::At(value) => Ok(look(value)?.filter(|q| seen(*q)).map(|_| (value, false))),
+        Lead::At(value) => Ok(visibility(value)?
+            .filter(|q| seen(*q))
+            .map(|_| (value, false))),
         Lead::Shrink(mut value) => {
             for _ in 0..12 {
-                match look(value)? {
+                match visibility(value)? {
                     Some(q) if q <= Thresholds::COARSE => {
                         return Ok(seen(q).then_some((value, false)));
                     }
@@ -161,7 +163,7 @@ fn try_lead(
         Lead::Visible { guess, linear } => {
             let mut value = guess;
             for _ in 0..20 {
-                let factor = match look(value)? {
+                let factor = match visibility(value)? {
                     Some(q)
                         if (0.3 * Thresholds::VISIBLE..=4.0 * Thresholds::VISIBLE).contains(&q) =>
                     {

@@ -16,10 +16,10 @@ use std::sync::Arc;
 /// ```
 ///
 /// θ is longer by σ > 0. A filter that may follow d gains on every gap at the right place, and on one elsewhere less.
-pub(in crate::diagnose) fn disturbed(base: Twin, place: Entry, memory: f64) -> Twin {
+pub(in crate::diagnose) fn disturbed(base: Twin, entry: Entry, memory: f64) -> Twin {
     let base = match base {
         Twin::Equations(base) => base,
-        Twin::BlackBox(base) => return disturbed_signals::disturbed(base, place, memory),
+        Twin::BlackBox(base) => return disturbed_signals::disturbed(base, entry, memory),
     };
     let mut outline = base.outline();
     outline.states.push(Quantity::new("disturbance/0", ""));
@@ -27,7 +27,7 @@ pub(in crate::diagnose) fn disturbed(base: Twin, place: Entry, memory: f64) -> T
     outline.parameters = ParameterSpace::new(outline.parameters.iter().cloned().chain([sigma]));
     Twin::Equations(Arc::new(Modified(Disturbed {
         base,
-        place,
+        entry,
         memory,
         outline,
     })))
@@ -35,7 +35,7 @@ pub(in crate::diagnose) fn disturbed(base: Twin, place: Entry, memory: f64) -> T
 
 struct Disturbed {
     base: Arc<dyn StateSpace>,
-    place: Entry,
+    entry: Entry,
     memory: f64,
     outline: Outline,
 }
@@ -53,7 +53,7 @@ impl Modify for Disturbed {
     /// A disturbed parameter moves with the disturbance, the added state.
     fn now<R>(&self, now: &Now<'_>, added: &[f64], then: impl FnOnce(&Now<'_>) -> R) -> R {
         let own = &now.theta[..now.theta.len() - 1];
-        let Entry::Parameter(i) = self.place else {
+        let Entry::Parameter(i) = self.entry else {
             return then(&Now { theta: own, ..*now });
         };
         let d = added.first().copied().unwrap_or(0.0);
@@ -72,14 +72,14 @@ impl Modify for Disturbed {
         let (dx, rate) = dx.split_at_mut(x.len());
         rate[0] = 0.0;
         self.now(now, d, |now| self.base.drift(now, x, dx));
-        if let Entry::State(i) = self.place {
+        if let Entry::State(i) = self.entry {
             dx[i] += d[0];
         }
     }
     fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
         let (x, d) = x.split_at(x.len() - 1);
         self.now(now, d, |now| self.base.observe(now, x, y));
-        if let Entry::Sensor(j) = self.place {
+        if let Entry::Sensor(j) = self.entry {
             y[j] += d[0];
         }
     }

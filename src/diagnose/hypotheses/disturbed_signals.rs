@@ -12,19 +12,19 @@ use std::sync::Arc;
 /// ```
 pub(in crate::diagnose) fn disturbed(
     base: Arc<dyn DigitalTwin>,
-    place: Entry,
+    entry: Entry,
     memory: f64,
 ) -> Twin {
     Twin::BlackBox(Arc::new(Disturbed {
         base,
-        place,
+        entry,
         memory,
     }))
 }
 
 struct Disturbed {
     base: Arc<dyn DigitalTwin>,
-    place: Entry,
+    entry: Entry,
     memory: f64,
 }
 
@@ -55,7 +55,7 @@ impl DigitalTwin for Disturbed {
         noise: Noise,
     ) -> Result<Signal, SimulationError> {
         let (own, sigma) = theta.split_at(theta.len() - 1);
-        if let Entry::Actuator(j) = self.place {
+        if let Entry::Actuator(j) = self.entry {
             let mut inputs = drive.inputs().clone();
             self.add(sigma[0], noise, j, &mut inputs);
             let drive = Drive::new(drive.dt(), inputs)
@@ -63,7 +63,7 @@ impl DigitalTwin for Disturbed {
             return self.base.simulate(own, &drive, noise);
         }
         let mut outputs = self.base.simulate(own, drive, noise)?;
-        if let Entry::Sensor(j) = self.place {
+        if let Entry::Sensor(j) = self.entry {
             self.add(sigma[0], noise, j, &mut outputs);
         }
         Ok(outputs)

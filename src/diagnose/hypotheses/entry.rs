@@ -1,6 +1,6 @@
-//! Where a disturbance enters a twin.
+//! Point at which a disturbance enters a twin.
 
-/// Where a disturbance enters.
+/// Point at which a disturbance enters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(in crate::diagnose) enum Entry {
     /// Added to the rate of a state.

@@ -1,4 +1,4 @@
-//! Where one candidate is looked for: its variants, magnitudes to start from, and how each magnitude moves in a fit.
+//! Plan of one candidate: its variants, start magnitudes, and the axis of each magnitude in a fit.
 
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::fitting::axis::Axis;
@@ -27,24 +27,24 @@ pub(in crate::diagnose) struct Plan {
     pub range: (f64, f64),
 }
 
-/// How a first magnitude to look at is found.
+/// Search for the first magnitude to try.
 #[derive(Clone, Copy)]
 pub(in crate::diagnose) enum Lead {
-    /// As it is.
+    /// The value itself.
     At(f64),
-    /// As it is, halved while it is coarse.
+    /// The value, halved while it is coarse.
     Shrink(f64),
     /// Scaled until it is just visible; a multiple of the secant is one of the magnitude if `linear`.
     Visible { guess: f64, linear: bool },
 }
 
-/// What plans are made from: the study's twin, the effects that it has been given, and the fit of that.
+/// Inputs of the plans: the study's twin, its accepted effects, and the fit of both.
 pub(in crate::diagnose) struct Planner<'a> {
     pub study: &'a Twin,
     pub accepted: &'a [Addition],
     pub problem: &'a Problem<'a>,
     pub scales: &'a Scales<'a>,
-    /// Whether fewer points are enough.
+    /// True where fewer points are enough.
     pub coarse: bool,
 }
 
@@ -52,12 +52,12 @@ pub(in crate::diagnose) struct Planner<'a> {
 type First = (Vec<Lead>, Axis, (f64, f64));
 
 impl Planner<'_> {
-    /// Variants of a candidate, and where to look.
+    /// Variants of a candidate, and where to statistics.
     pub fn plans(&self, index: usize, candidate: &Candidate) -> Result<Vec<Plan>, DiagnoseError> {
         match &candidate.kind {
-            Kind::CatchAll(place, memory) => {
+            Kind::CatchAll(entry, memory) => {
                 let free = candidate.magnitudes();
-                Ok(vec![self.disturbance(index, free, *place, *memory)])
+                Ok(vec![self.disturbance(index, free, *entry, *memory)])
             }
             Kind::Listed(effect) => {
                 let values = self.values(effect.as_ref());
@@ -66,7 +66,7 @@ impl Planner<'_> {
                     _ => Mark::Unmarked,
                 };
                 let plan = |choice: &Choice| self.listed(index, effect, &values, &mark, choice);
-                let filtered = self.study.equations().is_some();
+                let filtered = !self.problem.is_simulated();
                 (choices(effect.as_ref(), &mark, filtered).iter())
                     .filter_map(|choice| plan(choice).transpose())
                     .collect()
@@ -74,9 +74,9 @@ impl Planner<'_> {
         }
     }
 
-    fn disturbance(&self, index: usize, free: Vec<Magnitude>, place: Entry, memory: f64) -> Plan {
+    fn disturbance(&self, index: usize, free: Vec<Magnitude>, entry: Entry, memory: f64) -> Plan {
         let scales = self.scales;
-        let guess = match place {
+        let guess = match entry {
             Entry::State(i) => 0.05 * deviation(&scales.columns(Law::Force, i)) / scales.dt(),
             Entry::Sensor(j) => 0.05 * deviation(&scales.columns(Law::Sensor, j)),
             Entry::Actuator(j) => 0.05 * deviation(&scales.columns(Law::Actuator, j)),
@@ -93,7 +93,7 @@ impl Planner<'_> {
         Plan {
             variant: Variant {
                 candidate: index,
-                twin: with_disturbance(&self.problem.twin, place, memory),
+                twin: with_disturbance(&self.problem.twin, entry, memory),
                 free,
                 held: BTreeMap::new(),
                 kept: None,
@@ -109,7 +109,7 @@ impl Planner<'_> {
 
     /// Values of the signal or state that an effect sits at.
     fn values(&self, effect: &dyn UnmodelledEffect) -> Vec<f64> {
-        let outline = self.study.equations().map(|t| t.outline());
+        let outline = self.study.outline();
         let law = effect.law();
         let known = crate::effect::targets(law, outline.as_ref(), &self.study.signals());
         let target = known.iter().position(|k| k == effect.target()).unwrap_or(0);
@@ -192,7 +192,7 @@ impl Planner<'_> {
         }))
     }
 
-    /// Where the first magnitude of an effect is looked for, at a signal or state with such values.
+    /// Plans the first magnitude of an effect at a signal or state with these values.
     fn first(&self, m: &Magnitude, law: Law, values: &[f64], register: Option<usize>) -> First {
         let (dt, duration) = (self.scales.dt(), self.scales.duration());
         let size = deviation(values).max(1e-9 * largest(values)).max(1e-12);

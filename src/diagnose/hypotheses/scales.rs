@@ -1,9 +1,9 @@
-//! What a record's units are: sizes of its signals and states.
+//! Scales of a record: sizes of its signals and states.
 
 use crate::effect::Law;
 use crate::record::{Record, Signal};
 
-/// What the dictionary's units are taken from.
+/// Records and states that the units of a dictionary are taken from.
 pub(in crate::diagnose) struct Scales<'a> {
     pub records: &'a [Record],
     /// Filtered states of each record at θ̂.

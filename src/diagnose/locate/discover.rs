@@ -1,4 +1,4 @@
-//! What a missing term depends on: a sparse regression of the smoothed disturbance. Exploratory, not a test.
+//! Sparse regression of the smoothed missing term. Exploratory, not a test.
 //!
 //! ```text
 //! d(t) ≈ c₀ + Σ_j c_j·f_j(x(t), u(t), t)        f: powers, products, x·|x|, time
@@ -295,7 +295,7 @@ mod tests {
     use super::*;
     use crate::record::Drive;
 
-    /// Of d = 0.3·x² + noise with correlation, x² is in nearly every resampled record, and hardly anything else.
+    /// With d = 0.3·x² and correlated noise, x² is in nearly every resampled record, and hardly anything else.
     #[test]
     fn a_square_is_found() {
         let n = 800;
@@ -323,10 +323,10 @@ mod tests {
             };
             let drive = Drive::autonomous(0.1, n).unwrap();
             let record = Record::new(drive, Signal::zeros((n, 1))).unwrap();
-            let found = discover(&term, &[record], Noise::new(seed, "t", 0)).unwrap();
-            let top = &found.terms[0];
-            assert_eq!(top.name, "x²", "seed {seed}: {:?}", found.terms);
-            assert!(top.inclusion > 0.9 && found.explained > 0.5);
+            let discovery = discover(&term, &[record], Noise::new(seed, "t", 0)).unwrap();
+            let top = &discovery.terms[0];
+            assert_eq!(top.name, "x²", "seed {seed}: {:?}", discovery.terms);
+            assert!(top.inclusion > 0.9 && discovery.explained > 0.5);
             assert!(top.interval[0] < top.coefficient && top.coefficient < top.interval[1]);
             right += usize::from(top.interval[0] < 0.3 && 0.3 < top.interval[1]);
         }
@@ -357,8 +357,8 @@ mod tests {
             };
             let drive = Drive::autonomous(0.1, n).unwrap();
             let record = Record::new(drive, Signal::zeros((n, 1))).unwrap();
-            let found = discover(&term, &[record], Noise::new(seed, "t", 0)).unwrap();
-            often += usize::from(found.terms.iter().any(|t| t.inclusion > 0.8));
+            let discovery = discover(&term, &[record], Noise::new(seed, "t", 0)).unwrap();
+            often += usize::from(discovery.terms.iter().any(|t| t.inclusion > 0.8));
         }
         assert!(often <= 3, "{often} of 20");
     }

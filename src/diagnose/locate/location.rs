@@ -1,14 +1,14 @@
-//! Where the gap lies: targets, and what simulations say of each cut.
+//! Location of a gap: targets, equations and maps.
 
 use crate::diagnose::context::Context;
 use crate::diagnose::detect::Detected;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::explain::attribute::{Explanation, probabilities};
-use crate::diagnose::explain::decide::Answer;
+use crate::diagnose::explain::decide::Conclusion;
 use crate::diagnose::locate::discover::discover;
 use crate::diagnose::locate::missing_term::{apart, disturbances, equations, missing_term};
 use crate::diagnose::locate::onset::onset;
-use crate::diagnose::outcome::{Band, Cell, Channel, Lag, Maps, Region, Where, Window};
+use crate::diagnose::outcome::{Band, Cell, Channel, Lag, Location, Maps, Region, Window};
 use crate::diagnose::outcome::{Decision, Discovery, TargetShare};
 use crate::diagnose::residuals::cut::Cut;
 use crate::diagnose::residuals::cut::Past;
@@ -19,82 +19,87 @@ use crate::likelihood::kalman::{Filtered, recoverable};
 use crate::progress::Progress;
 use crate::twin::Noise;
 
-/// `where` of the report but for what is drawn again, and, where nothing listed is accepted, what the missing term depends on.
+/// Locates a structural gap; where nothing listed is accepted, also regresses the missing term.
 pub(in crate::diagnose) fn locate(
     context: &Context<'_>,
     detected: &Detected<'_>,
-    found: &[Explanation],
-    answer: &Answer,
+    explanations: &[Explanation],
+    conclusion: &Conclusion,
     alpha: f64,
     noise: Noise,
     progress: &Progress,
-) -> Result<(Where, Option<Discovery>), DiagnoseError> {
-    let (bench, test) = (&detected.bench, &detected.test);
-    let mut place = Where {
-        onset: onset(bench, alpha, noise)?,
-        maps: maps(bench, test, found.first())?,
-        ..targets(bench, found, test, answer)
+) -> Result<(Location, Option<Discovery>), DiagnoseError> {
+    let (model, test) = (&detected.model, &detected.test);
+    let mut location = Location {
+        onset: onset(model, alpha, noise)?,
+        maps: maps(model, test, explanations.first())?,
+        ..targets(model, explanations, test, conclusion)
     };
-    let shows = context.twin.equations().is_some();
-    let apart = match context.follows && shows {
-        true => apart(
+    let apart = if context.follows && !model.problem.is_simulated() {
+        apart(
             context,
-            bench,
-            &progress.stage("where", equations_of(bench)),
-        )?,
-        false => None,
+            model,
+            &progress.stage("where", equations_of(model)),
+        )?
+    } else {
+        None
     };
-    let (bench, found, test) = match &apart {
-        Some((bench, found)) => (bench, found.as_slice(), None),
-        None => (bench, found, Some(test)),
+    let (model, explanations, test) = match &apart {
+        Some((model, explanations)) => (model, explanations.as_slice(), None),
+        None => (model, explanations, Some(test)),
     };
-    place.equations = equations(bench, found, test)?;
-    if answer.decision == Decision::NoneOfThese && test.is_none() {
+    location.equations = equations(model, explanations, test)?;
+    if conclusion.decision == Decision::NoneOfThese && test.is_none() {
         // No disturbance was among the candidates: the best one says where.
-        place.target = disturbances(bench, found)
+        location.target = disturbances(model, explanations)
             .first()
-            .map(|(e, _)| bench.dictionary.candidates[e.candidate].target.clone());
+            .map(|(e, _)| model.dictionary.candidates[e.candidate].target.clone());
     }
-    let discovery = match answer.decision {
+    let discovery = match conclusion.decision {
         Decision::NoneOfThese => regressed(
-            bench,
-            found,
-            place.target.as_deref(),
+            model,
+            explanations,
+            location.target.as_deref(),
             noise.child("discover"),
         )?,
         _ => None,
     };
-    Ok((place, discovery))
+    Ok((location, discovery))
 }
 
-/// How many equations the twin has.
-fn equations_of(bench: &FittedTwin<'_>) -> usize {
-    bench.bins.states + bench.problem.twin.signals().outputs.len()
+/// Number of equations of the twin.
+fn equations_of(model: &FittedTwin<'_>) -> usize {
+    model.bins.states + model.problem.twin.signals().outputs.len()
 }
 
-/// What the missing term depends on, in the equation of the named target, or else in the most probable one.
+/// Regresses the missing term in the equation of the named target, or else in the most probable one.
 fn regressed(
-    bench: &FittedTwin<'_>,
-    found: &[Explanation],
+    model: &FittedTwin<'_>,
+    explanations: &[Explanation],
     target: Option<&str>,
     noise: Noise,
 ) -> Result<Option<Discovery>, DiagnoseError> {
-    let all = disturbances(bench, found);
-    let name = |e: &Explanation| &bench.dictionary.candidates[e.candidate].target;
+    let all = disturbances(model, explanations);
+    let name = |e: &Explanation| &model.dictionary.candidates[e.candidate].target;
     let named = all.iter().find(|(e, _)| Some(name(e).as_str()) == target);
     let Some((explanation, _)) = named.or(all.first()) else {
         return Ok(None);
     };
-    let term = missing_term(bench, explanation)?;
-    Ok(term.and_then(|term| discover(&term, bench.problem.records, noise)))
+    let term = missing_term(model, explanation)?;
+    Ok(term.and_then(|term| discover(&term, model.problem.records, noise)))
 }
 
 /// Targets by what explains the record there, and the one that is named.
-fn targets(bench: &FittedTwin<'_>, found: &[Explanation], test: &Test, answer: &Answer) -> Where {
-    let candidates = &bench.dictionary.candidates;
-    let chances = probabilities(found);
+fn targets(
+    model: &FittedTwin<'_>,
+    explanations: &[Explanation],
+    test: &Test,
+    conclusion: &Conclusion,
+) -> Location {
+    let candidates = &model.dictionary.candidates;
+    let chances = probabilities(explanations);
     let mut targets: Vec<TargetShare> = vec![];
-    for (e, chance) in found.iter().zip(&chances) {
+    for (e, chance) in explanations.iter().zip(&chances) {
         let candidate = &candidates[e.candidate];
         let p_value = test.candidates.get(e.candidate).copied().unwrap_or(1.0);
         match targets.iter_mut().find(|t| t.target == candidate.target) {
@@ -110,38 +115,38 @@ fn targets(bench: &FittedTwin<'_>, found: &[Explanation], test: &Test, answer: &
         }
     }
     targets.sort_by(|a, b| b.share.total_cmp(&a.share));
-    let target = match answer.accepted.first() {
+    let target = match conclusion.accepted.first() {
         Some(accepted) => Some(accepted.target.clone()),
-        None => answer
+        None => conclusion
             .catch_all
             .clone()
             .or_else(|| targets.first().map(|t| t.target.clone())),
     };
-    Where {
+    Location {
         target,
         targets,
-        ..Where::default()
+        ..Location::default()
     }
 }
 
-/// How the records differ from what the bench's twin makes, cut in all ways. `best`, where there is one, says when it helps.
+/// Maps the difference between the records and simulations of the fitted twin. `best` divides the shares by where it helps.
 pub(in crate::diagnose) fn maps(
-    bench: &FittedTwin<'_>,
+    model: &FittedTwin<'_>,
     test: &Test,
     best: Option<&Explanation>,
 ) -> Result<Maps, DiagnoseError> {
-    let states = bench.problem.states(&bench.fitted.theta)?;
+    let states = model.problem.states(&model.fitted.theta)?;
     let after: Option<Vec<Filtered>> = match best {
-        Some(best) => recoverable(bench.explained(best).filtered(&best.fitted.theta))?,
+        Some(best) => recoverable(model.explained(best).filtered(&best.fitted.theta))?,
         None => None,
     };
-    let records = bench.problem.records;
-    let shares = shares(&bench.bins, &states, records, after.as_deref());
-    let signals = bench.problem.twin.signals();
+    let records = model.problem.records;
+    let shares = shares(&model.bins, &states, records, after.as_deref());
+    let signals = model.problem.twin.signals();
     let output = |channel: usize| signals.outputs[channel].name.clone();
     let dt = records[0].drive().dt();
     let mut maps = Maps::default();
-    for ((cut, &p_value), share) in bench.bins.cuts.iter().zip(&test.local).zip(shares) {
+    for ((cut, &p_value), share) in model.bins.cuts.iter().zip(&test.local).zip(shares) {
         match *cut {
             Cut::Window {
                 record,
@@ -161,7 +166,7 @@ pub(in crate::diagnose) fn maps(
                 low,
                 high,
             } => maps.regions.push(Region {
-                variable: bench.bins.variables[variable].clone(),
+                variable: model.bins.variables[variable].clone(),
                 low,
                 high,
                 p_value,

@@ -1,4 +1,4 @@
-//! What an equation lacks, as the disturbance there that a smoother follows; and what it does in ranges of states and inputs.
+//! Missing term of an equation: the smoothed disturbance there, and its means in ranges of states and inputs.
 
 use crate::diagnose::context::Context;
 use crate::diagnose::error::DiagnoseError;
@@ -34,21 +34,21 @@ pub(in crate::diagnose) struct Smoothed {
 
 /// The best disturbance of each equation, most probable first, with its probability among these.
 pub(in crate::diagnose) fn disturbances<'e>(
-    bench: &FittedTwin<'_>,
-    found: &'e [Explanation],
+    model: &FittedTwin<'_>,
+    explanations: &'e [Explanation],
 ) -> Vec<(&'e Explanation, f64)> {
     let mut best: Vec<Explanation> = vec![];
-    let mut places: Vec<Entry> = vec![];
+    let mut entries: Vec<Entry> = vec![];
     let mut which: Vec<&Explanation> = vec![];
-    for e in found {
+    for e in explanations {
         // Best first.
-        let Kind::CatchAll(place, _) = &bench.dictionary.candidates[e.candidate].kind else {
+        let Kind::CatchAll(entry, _) = &model.dictionary.candidates[e.candidate].kind else {
             continue;
         };
-        if matches!(place, Entry::Parameter(_)) || places.contains(place) {
+        if matches!(entry, Entry::Parameter(_)) || entries.contains(entry) {
             continue;
         }
-        places.push(*place);
+        entries.push(*entry);
         best.push(e.clone());
         which.push(e);
     }
@@ -57,15 +57,15 @@ pub(in crate::diagnose) fn disturbances<'e>(
 
 /// Smooths the disturbance of an explanation; `None` where its filter does not work.
 pub(in crate::diagnose) fn missing_term(
-    bench: &FittedTwin<'_>,
+    model: &FittedTwin<'_>,
     explanation: &Explanation,
 ) -> Result<Option<MissingTerm>, FilterError> {
-    let problem = bench.explained(explanation);
+    let problem = model.explained(explanation);
     let twin = problem.twin.clone();
     let Some(equations) = twin.equations() else {
         return Ok(None);
     };
-    let own = bench.bins.states;
+    let own = model.bins.states;
     let mut records = vec![];
     for (r, record) in problem.records.iter().enumerate() {
         let theta = problem.of_record(r, &explanation.fitted.theta);
@@ -75,7 +75,7 @@ pub(in crate::diagnose) fn missing_term(
         records.push(smoothed);
     }
     let inputs = problem.records[0].drive().inputs().ncols();
-    let candidate = &bench.dictionary.candidates[explanation.candidate];
+    let candidate = &model.dictionary.candidates[explanation.candidate];
     let equation = match &candidate.kind {
         Kind::CatchAll(Entry::Sensor(j), _) => twin.signals().outputs[*j].name.clone(),
         _ => candidate.target.clone(),
@@ -83,7 +83,7 @@ pub(in crate::diagnose) fn missing_term(
     Ok(Some(MissingTerm {
         equation,
         records,
-        variables: bench.bins.variables[..own + inputs].to_vec(),
+        variables: model.bins.variables[..own + inputs].to_vec(),
     }))
 }
 
@@ -121,45 +121,45 @@ fn smooth(
 /// map alone.
 pub(in crate::diagnose) fn apart<'a>(
     context: &Context<'a>,
-    bench: &FittedTwin<'a>,
+    model: &FittedTwin<'a>,
     stage: &Stage,
 ) -> Result<Option<(FittedTwin<'a>, Vec<Explanation>)>, DiagnoseError> {
     let all = candidates(context.study, &[])?;
     let disturbances = all
         .into_iter()
-        .filter(|c| matches!(c.kind, Kind::CatchAll(place, memory) if is_long(place, memory)))
+        .filter(|c| matches!(c.kind, Kind::CatchAll(entry, memory) if is_long(entry, memory)))
         .collect();
-    let (problem, fitted) = (bench.problem.clone(), bench.fitted.clone());
-    let Some(bench) = FittedTwin::new(context.twin, problem, fitted, &[], disturbances)? else {
+    let (problem, fitted) = (model.problem.clone(), model.fitted.clone());
+    let Some(model) = FittedTwin::new(context.twin, problem, fitted, &[], disturbances)? else {
         return Ok(None);
     };
-    let Some(look) = bench.own_look()? else {
+    let Some(statistics) = model.own_statistics()? else {
         return Ok(None);
     };
-    let found = explanations(&bench, &look, None, None, stage)?;
-    Ok(Some((bench, found)))
+    let explanations = explanations(&model, &statistics, None, None, stage)?;
+    Ok(Some((model, explanations)))
 }
 
 /// A disturbance of an equation that wanders freely.
-fn is_long(place: Entry, memory: f64) -> bool {
-    memory == 1.0 && !matches!(place, Entry::Parameter(_))
+fn is_long(entry: Entry, memory: f64) -> bool {
+    memory == 1.0 && !matches!(entry, Entry::Parameter(_))
 }
 
 /// `where.equations`: each with the disturbance's probability, and what it does by ranges. Without a test of the disturbances, p is
 /// that of the likelihood ratio, χ² with two degrees, times the number of equations.
 pub(in crate::diagnose) fn equations(
-    bench: &FittedTwin<'_>,
-    found: &[Explanation],
+    model: &FittedTwin<'_>,
+    explanations: &[Explanation],
     test: Option<&Test>,
 ) -> Result<Vec<Equation>, FilterError> {
-    let places = disturbances(bench, found);
-    let count = places.len() as f64;
+    let entries = disturbances(model, explanations);
+    let count = entries.len() as f64;
     let mut all = vec![];
-    for (explanation, share) in places {
-        let Some(term) = missing_term(bench, explanation)? else {
+    for (explanation, share) in entries {
+        let Some(term) = missing_term(model, explanation)? else {
             continue;
         };
-        let candidates = &bench.dictionary.candidates;
+        let candidates = &model.dictionary.candidates;
         let target = &candidates[explanation.candidate].target;
         let p_value = match test {
             Some(test) => (candidates.iter().zip(&test.candidates))

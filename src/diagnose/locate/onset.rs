@@ -24,21 +24,21 @@ use rayon::prelude::*;
 /// Iterations of a fit that starts where that of a block before ended.
 const WARM: usize = 2;
 
-/// Of the first record that has one.
+/// Returns the onset of the first record that has one.
 pub(in crate::diagnose) fn onset(
-    bench: &FittedTwin<'_>,
+    model: &FittedTwin<'_>,
     alpha: f64,
     noise: Noise,
 ) -> Result<Option<Onset>, DiagnoseError> {
     // Each block would take ensembles of a black box.
-    if bench.problem.twin.equations().is_none() {
+    if model.problem.is_simulated() {
         return Ok(None);
     }
     let replicates = (1.0 / alpha + Thresholds::ONSET_BEYOND) as u64;
-    let signals = bench.problem.twin.signals();
-    for (r, record) in bench.problem.records.iter().enumerate() {
-        let theta = bench.problem.of_record(r, &bench.fitted.theta);
-        let Some(own) = foresight(&bench.problem, &theta, record)? else {
+    let signals = model.problem.twin.signals();
+    for (r, record) in model.problem.records.iter().enumerate() {
+        let theta = model.problem.of_record(r, &model.fitted.theta);
+        let Some(own) = foresight(&model.problem, &theta, record)? else {
             continue;
         };
         let others: Vec<Option<Vec<f64>>> = (0..replicates)
@@ -49,13 +49,13 @@ pub(in crate::diagnose) fn onset(
                     .child("record")
                     .sample(i + replicates * r as u64);
                 let drive = record.drive();
-                let outputs = match bench.problem.twin.simulate(&theta, drive, noise) {
+                let outputs = match model.problem.twin.simulate(&theta, drive, noise) {
                     Ok(outputs) => outputs,
                     Err(error) if error.costs_one_run() => return Ok(None),
                     Err(error) => return Err(error.into()),
                 };
                 let record = Record::new(drive.clone(), outputs)?;
-                foresight(&bench.problem, &theta, &record)
+                foresight(&model.problem, &theta, &record)
             })
             .collect::<Result<_, DiagnoseError>>()?;
         let failed = others.iter().filter(|o| o.is_none()).count();
@@ -82,7 +82,7 @@ pub(in crate::diagnose) fn onset(
     Ok(None)
 }
 
-/// For each block but the first few and each output, √(n·mean² + n/2·(mean square − 1)²) of its innovations at the θ of all
+/// Returns for each block but the first few and each output √(n·mean² + n/2·(mean square − 1)²) of its innovations at the θ of all
 /// samples before; `None` for short records and where a filter does not work.
 fn foresight(
     problem: &Problem<'_>,
@@ -121,8 +121,8 @@ fn foresight(
 
 /// Standardised innovations of the one record, by output.
 fn innovations(problem: &Problem<'_>, theta: &[f64]) -> Result<Option<Vec<Vec<f64>>>, FilterError> {
-    let found = recoverable(problem.filtered(&problem.full(theta)))?;
-    Ok(found.map(|all| {
+    let filtered = recoverable(problem.filtered(&problem.full(theta)))?;
+    Ok(filtered.map(|all| {
         let columns = all[0].standardised.columns();
         columns.into_iter().map(|c| c.to_vec()).collect()
     }))

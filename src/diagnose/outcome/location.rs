@@ -1,19 +1,19 @@
-//! Where a gap lies: in the equations, in time, in the states, by lag and by frequency.
+//! Location of a gap: in the equations, in time, in the states, by lag and by frequency.
 
 use crate::diagnose::thresholds::Thresholds;
 
-/// Where the gap is.
+/// Location of a gap.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Where {
+pub struct Location {
     /// The most probable place of a structural gap.
     pub target: Option<String>,
     /// All places, most probable first.
     pub targets: Vec<TargetShare>,
     /// Equations and what each would have to gain or lose to follow the record, most probable first.
     pub equations: Vec<Equation>,
-    /// Since when the twin does not follow.
+    /// Onset of the gap.
     pub onset: Option<Onset>,
-    /// How the record differs from simulations of the refitted twin.
+    /// Difference between the record and simulations of the refitted twin.
     pub maps: Maps,
     /// The same with the accepted effects, or else the best explanation, added.
     pub after: Option<Maps>,
@@ -30,7 +30,7 @@ pub struct TargetShare {
     pub share: f64,
 }
 
-/// How innovations differ from those of simulations, cut in several ways. All p-values are corrected for all cells of all cuts
+/// Difference between innovations and those of simulations, cut in several ways. All p-values are corrected for all cells of all cuts
 /// together; shares add up to at most one in each list.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Maps {
@@ -49,20 +49,20 @@ pub struct Maps {
 /// The start of the first block of time that the twin, fitted to all before it, does not foresee.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Onset {
-    /// Which record, from 0.
+    /// Index of the record, from 0.
     pub record: usize,
-    /// In seconds.
+    /// Time in seconds.
     pub time: f64,
     /// Output.
     pub channel: String,
-    /// Of the block that begins there, corrected for all blocks.
+    /// p-value of the block that begins there, corrected for all blocks.
     pub p_value: f64,
 }
 
 /// A stretch of time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Window {
-    /// Which record, from 0.
+    /// Index of the record, from 0.
     pub record: usize,
     /// First instant, in seconds.
     pub start: f64,
@@ -102,7 +102,7 @@ pub struct Channel {
     pub share: f64,
 }
 
-/// What an innovation still depends on.
+/// Dependence of an innovation on the past.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lag {
     /// Output.
@@ -134,7 +134,7 @@ pub struct Band {
     pub share: f64,
 }
 
-/// What an equation lacks, as a disturbance there that a smoother follows.
+/// Missing term of an equation, as the smoothed disturbance there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Equation {
     /// The state whose rate, or the output whose value, the equation gives.
@@ -168,7 +168,7 @@ pub trait Cell {
     fn p_value(&self) -> f64;
     /// Share of what the list divides.
     fn share(&self) -> f64;
-    /// Whether the cell stands out of simulations: p ≤ 0.1.
+    /// Returns true where the cell stands out of simulations: p ≤ 0.1.
     fn is_notable(&self) -> bool {
         self.p_value() <= Thresholds::NOTABLE
     }

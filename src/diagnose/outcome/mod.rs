@@ -3,14 +3,15 @@
 mod location;
 
 pub use location::{
-    Band, Cell, Channel, Equation, Lag, Maps, Onset, Region, TargetShare, TermRange, Where, Window,
+    Band, Cell, Channel, Equation, Lag, Location, Maps, Onset, Region, TargetShare, TermRange,
+    Window,
 };
 
 use crate::record::{Drive, Signal};
 use crate::twin::Interval;
 use serde::{Deserialize, Serialize};
 
-/// Which kind of gap there is.
+/// Kind of gap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -23,7 +24,7 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// As in reports.
+    /// Id in reports.
     pub fn id(self) -> &'static str {
         match self {
             Self::NoGap => "no-gap",
@@ -33,7 +34,7 @@ impl Verdict {
     }
 }
 
-/// What is said about causes.
+/// Decision about the cause.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Decision {
@@ -50,7 +51,7 @@ pub enum Decision {
 }
 
 impl Decision {
-    /// As in reports.
+    /// Id in reports.
     pub fn id(self) -> &'static str {
         match self {
             Self::Named => "named",
@@ -62,14 +63,14 @@ impl Decision {
     }
 }
 
-/// Whether the twin, refitted, can have made the record.
+/// Structural test: can the refitted twin have made the record?
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Detection {
     /// p-value of the structural test; with a validation record, of rank and e-value together.
     pub p_value: f64,
     /// Level of the test.
     pub alpha: f64,
-    /// How far the record stands out of simulations, in their standard deviations.
+    /// Distance of the record from simulations, in their standard deviations.
     pub statistic: f64,
     /// p-value by the record alone.
     pub rank_p_value: f64,
@@ -90,7 +91,7 @@ pub struct FittedParameter {
     pub refitted: f64,
     /// Standard deviation by information and weak prior.
     pub std_error: f64,
-    /// Whether the record knows it better than the prior.
+    /// True where the record determines it better than the prior.
     pub identified: bool,
     /// The prior box.
     pub prior: Interval,
@@ -122,7 +123,7 @@ pub struct EffectFit {
     pub magnitudes: Vec<(String, f64)>,
     /// Nats over the twin, on the record and, if there is one, the validation record.
     pub log_score_gain: f64,
-    /// Of its scan, family-wise.
+    /// Family-wise p-value of its scan.
     pub p_value: Option<f64>,
 }
 
@@ -133,14 +134,14 @@ impl EffectFit {
     }
 }
 
-/// Which effect the twin lacks.
+/// Cause of the gap: the effect that the twin lacks.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Which {
-    /// What is decided.
+pub struct Cause {
+    /// The decision.
     pub decision: Decision,
     /// Best first.
     pub effects: Vec<EffectFit>,
-    /// What was added to the twin.
+    /// Effects added to the twin.
     pub accepted: Vec<String>,
     /// Rivals that the data cannot tell apart, the accepted among them.
     pub class: Vec<String>,
@@ -157,17 +158,17 @@ pub struct Which {
 pub struct NextInput {
     /// Inputs and length of it.
     pub drive: Drive,
-    /// What kind of input it is.
+    /// Kind of input.
     pub kind: String,
     /// The rivals, as `id@target`.
     pub rivals: Vec<String>,
-    /// Of how many simulated pairs of the present record and such a next one the rival that made them stood out.
+    /// Simulated pairs of the present record and such a next one: those whose true rival stood out, and all.
     pub split: [u64; 2],
     /// The same with the present inputs measured once more.
     pub again: [u64; 2],
 }
 
-/// What a regression of the missing term found: exploratory, not a test.
+/// Regression of the missing term: exploratory, not a test.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Discovery {
     /// The equation that lacks the term: a state or an output.
@@ -182,7 +183,7 @@ pub struct Discovery {
     pub missing: Vec<f64>,
     /// Its standard deviation.
     pub std_error: Vec<f64>,
-    /// What the regression says there.
+    /// The regression there.
     pub fitted: Vec<f64>,
 }
 
@@ -219,42 +220,42 @@ pub struct FreeRuns {
     pub times: Vec<f64>,
     /// Measured outputs.
     pub measured: Signal,
-    /// Of the twin, refitted.
+    /// Free run of the refitted twin.
     pub before: Option<Signal>,
-    /// With the accepted effects.
+    /// The same with the accepted effects.
     pub after: Option<Signal>,
 }
 
-/// Everything that a diagnosis found.
+/// Result of a diagnosis.
 #[derive(Debug, Clone)]
 pub struct Diagnosis {
     /// Name of the twin.
     pub twin: String,
-    /// Which kind of gap.
+    /// Kind of gap.
     pub verdict: Verdict,
     /// The test.
     pub detection: Detection,
     /// The twin's own parameters.
     pub parameters: Vec<FittedParameter>,
-    /// Everything else that was estimated.
+    /// All other estimates.
     pub nuisance: Vec<FittedNuisance>,
-    /// Where.
-    pub place: Where,
-    /// Which.
-    pub which: Which,
-    /// How far; none without held-out data.
+    /// Location of the gap.
+    pub location: Location,
+    /// Cause of the gap.
+    pub cause: Cause,
+    /// Extent on held-out data, if there are any.
     pub shrinkage: Option<Shrinkage>,
-    /// What the missing term depends on, where no listed effect is accepted.
+    /// Regression of the missing term, where no listed effect is accepted.
     pub discovery: Option<Discovery>,
-    /// What each listed effect would have had to be to be seen.
+    /// Smallest visible magnitude of each listed effect.
     pub power: Vec<Visible>,
     /// Free runs beside the first record.
     pub free_runs: FreeRuns,
     /// Free runs beside the validation record.
     pub validation_runs: Option<FreeRuns>,
-    /// Effects that this twin may lack and that were not looked at, as `id@target`.
+    /// Effects of this twin that were not tested, as `id@target`.
     pub not_tested: Vec<String>,
-    /// Explanations that were looked at: listed effects and catch-alls.
+    /// Number of explanations tested: listed effects and disturbances.
     pub candidates: usize,
     /// Wall-clock seconds.
     pub seconds: f64,
@@ -263,19 +264,19 @@ pub struct Diagnosis {
 /// Free-run errors before and after, on held-out data.
 #[derive(Debug, Clone)]
 pub struct Shrinkage {
-    /// What is measured: [`Shrinkage::FREE_RUN`] or [`Shrinkage::LOG_SCORE`].
+    /// Measure: [`Shrinkage::FREE_RUN`] or [`Shrinkage::LOG_SCORE`].
     pub metric: &'static str,
-    /// Of the twin alone, θ refitted.
+    /// Error of the refitted twin alone.
     pub before: f64,
-    /// With the accepted effects.
+    /// The same with the accepted effects.
     pub after: Option<f64>,
-    /// What noise alone leaves: the median over records simulated from the accepted twin.
+    /// Error by noise alone: the median over records simulated from the accepted twin.
     pub floor: Option<f64>,
     /// (before − after)/(before − floor); none where the gap's own interval touches zero.
     pub closed: Option<f64>,
     /// 90 % of what draws of θ given all data close: the uncertainty of the share that the true effects close.
     pub interval: Option<[f64; 2]>,
-    /// Which data: `validation record` or `last third of the record`.
+    /// Held-out data: `validation record` or `last third of the record`.
     pub held_out: &'static str,
     /// The same error at the prior's centre or the estimator's first estimate, without any refit.
     pub unfitted: Option<f64>,

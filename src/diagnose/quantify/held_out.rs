@@ -1,10 +1,10 @@
-//! Which data are held out, and what is measured on them.
+//! Share of the gap closed on held-out data.
 
 use crate::diagnose::context::Context;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::explain::attribute::Explanation;
-use crate::diagnose::explain::decide::Answer;
-use crate::diagnose::explain::step::{Accepted, Step};
+use crate::diagnose::explain::decide::Conclusion;
+use crate::diagnose::explain::extended::{Accepted, ExtendedTwin};
 use crate::diagnose::fitting::climb::{Fitted, fit};
 use crate::diagnose::fitting::first_part::first_part;
 use crate::diagnose::fitting::posterior::posterior;
@@ -27,25 +27,29 @@ pub(crate) fn held_out_from(samples: usize) -> usize {
     2 * samples / 3
 }
 
-/// How far the accepted effects close the gap on held-out data.
+/// Measures how far the accepted effects close the gap on held-out data.
 pub(in crate::diagnose) fn shrinkage(
     context: &Context<'_>,
-    bench: &FittedTwin<'_>,
-    step: Option<&Step<'_>>,
-    answer: &Answer,
-    found: Option<&[Explanation]>,
+    model: &FittedTwin<'_>,
+    extended: Option<&ExtendedTwin<'_>>,
+    conclusion: &Conclusion,
+    explanations: Option<&[Explanation]>,
     settings: &DiagnoseSettings,
     noise: Noise,
 ) -> Result<Option<Shrinkage>, DiagnoseError> {
     let twin = context.twin;
-    let additions: Vec<Addition> = answer.accepted.iter().map(|a| a.addition.clone()).collect();
-    let whole = &bench.problem.records[0];
+    let additions: Vec<Addition> = conclusion
+        .accepted
+        .iter()
+        .map(|a| a.addition.clone())
+        .collect();
+    let whole = &model.problem.records[0];
     // The held-out record, its first sample that counts, and θ fitted without it.
     let short: Vec<Record>;
     let (record, from, base, grown, held_out) = match context.validation {
         Some(records) => {
-            let base = bench.problem.of_record(0, &bench.fitted.theta);
-            let grown = step.map(|s| s.bench.problem.of_record(0, &s.bench.fitted.theta));
+            let base = model.problem.of_record(0, &model.fitted.theta);
+            let grown = extended.map(|s| s.model.problem.of_record(0, &s.model.fitted.theta));
             (&records[0], 0, Some(base), grown, "validation record")
         }
         None if whole.samples() >= SHORTEST_SPLIT => {
@@ -55,12 +59,12 @@ pub(in crate::diagnose) fn shrinkage(
                 let problem = problem.on(&short);
                 Ok(fit(&problem, &[problem.full(theta)], 10)?.map(|f| f.theta))
             };
-            let base = bench.problem.of_record(0, &bench.fitted.theta);
-            let base = refit(&bench.problem, &base)?;
-            let grown = match step {
+            let base = model.problem.of_record(0, &model.fitted.theta);
+            let base = refit(&model.problem, &base)?;
+            let grown = match extended {
                 Some(s) => refit(
-                    &s.bench.problem,
-                    &s.bench.problem.of_record(0, &s.bench.fitted.theta),
+                    &s.model.problem,
+                    &s.model.problem.of_record(0, &s.model.fitted.theta),
                 )?,
                 None => None,
             };
@@ -78,7 +82,8 @@ pub(in crate::diagnose) fn shrinkage(
         .clone()
         .unwrap_or_else(|| twin.parameters().centre());
     let unfitted = Runner::new(twin, &[], unfitted)?.errors(record, from);
-    let noisy = !answer.accepted.is_empty() && answer.accepted.iter().all(Accepted::is_noise);
+    let noisy =
+        !conclusion.accepted.is_empty() && conclusion.accepted.iter().all(Accepted::is_noise);
     let mut result = Shrinkage {
         metric: Shrinkage::FREE_RUN,
         before: root(&before),
@@ -94,7 +99,7 @@ pub(in crate::diagnose) fn shrinkage(
         result.floor = runner.floor(record, from, noise.child("floor"));
         return Ok(Some(result));
     };
-    if noisy && let Some(step) = step {
+    if noisy && let Some(extended) = extended {
         // No free run moves: the density of what was held out does.
         result.metric = Shrinkage::LOG_SCORE;
         let records = std::slice::from_ref(record);
@@ -106,11 +111,11 @@ pub(in crate::diagnose) fn shrinkage(
                 d.iter().sum::<f64>() / d.len() as f64
             }))
         };
-        let Some(before) = score(&bench.problem, &base)? else {
+        let Some(before) = score(&model.problem, &base)? else {
             return Ok(None);
         };
         result.before = before;
-        result.after = score(&step.bench.problem, &grown)?;
+        result.after = score(&extended.model.problem, &grown)?;
         (result.unfitted, result.placebo) = (None, None);
         return Ok(Some(result));
     }
@@ -135,11 +140,11 @@ pub(in crate::diagnose) fn shrinkage(
     if let (Some(after), Some(floor)) = (&after, floor) {
         (result.closed, result.interval) = closed(&before, after, floor, noise.child("bootstrap"));
     }
-    if let (Some(closed), Some(floor), Some(step)) = (result.closed, floor, step) {
-        let all = all_data(context, step)?;
+    if let (Some(closed), Some(floor), Some(extended)) = (result.closed, floor, extended) {
+        let all = all_data(context, extended)?;
         let (problem, fitted) = match &all {
             Some((problem, fitted)) => (problem, fitted),
-            None => (&step.bench.problem, &step.bench.fitted),
+            None => (&extended.model.problem, &extended.model.fitted),
         };
         let draws = posterior(problem, fitted, noise.child("posterior"))?;
         let afters: Vec<f64> = (draws.into_par_iter())
@@ -151,45 +156,45 @@ pub(in crate::diagnose) fn shrinkage(
             .collect();
         result.interval = interval(result.before, closed, floor, &afters).or(result.interval);
     }
-    result.placebo = placebo(context, bench, found, answer, record, from)?;
+    result.placebo = placebo(context, model, explanations, conclusion, record, from)?;
     Ok(Some(result))
 }
 
 /// The accepted twin fitted to the records and the validation record together; `None` where there is none.
 fn all_data<'a>(
     context: &Context<'a>,
-    step: &Step<'_>,
+    extended: &ExtendedTwin<'_>,
 ) -> Result<Option<(Problem<'a>, Fitted)>, DiagnoseError> {
     let Some(records) = context.together else {
         return Ok(None);
     };
-    let (problem, start) = step.bench.on(records);
+    let (problem, start) = extended.model.on(records);
     Ok(fit(&problem, &[start], 10)?.map(|fitted| (problem, fitted)))
 }
 
 /// The error with the listed effect that explains least, fitted as the accepted one was.
 fn placebo(
     context: &Context<'_>,
-    bench: &FittedTwin<'_>,
-    found: Option<&[Explanation]>,
-    answer: &Answer,
+    model: &FittedTwin<'_>,
+    explanations: Option<&[Explanation]>,
+    conclusion: &Conclusion,
     record: &Record,
     from: usize,
 ) -> Result<Option<f64>, DiagnoseError> {
-    let candidates = &bench.dictionary.candidates;
-    let last = found.and_then(|list| {
+    let candidates = &model.dictionary.candidates;
+    let last = explanations.and_then(|list| {
         list.iter().rev().find(|e| {
             let candidate = &candidates[e.candidate];
             candidate.is_listed()
                 && !candidate.is_noise()
-                && !answer.class.contains(&candidate.key())
+                && !conclusion.class.contains(&candidate.key())
         })
     });
     let Some(last) = last else { return Ok(None) };
-    let Some(addition) = bench.addition(last) else {
+    let Some(addition) = model.addition(last) else {
         return Ok(None);
     };
-    let theta = bench.explained(last).of_record(0, &last.fitted.theta);
+    let theta = model.explained(last).of_record(0, &last.fitted.theta);
     let runner = Runner::new(context.twin, &[addition], theta)?;
     Ok(runner.errors(record, from).map(|e| root(&e)))
 }

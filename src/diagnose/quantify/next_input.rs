@@ -35,34 +35,34 @@ struct Rival<'a> {
     key: String,
     problem: Problem<'a>,
     theta: Vec<f64>,
-    /// What the present records know of θ, in φ.
+    /// Information of the present records about θ, in φ.
     information: DMatrix<f64>,
     numbers: f64,
 }
 
 /// The input that tells the members of a class apart best; `None` where none does better than the present one once more.
 pub(in crate::diagnose) fn next_input(
-    bench: &FittedTwin<'_>,
-    found: &[Explanation],
+    model: &FittedTwin<'_>,
+    explanations: &[Explanation],
     class: &[String],
     noise: Noise,
 ) -> Result<Option<NextInput>, DiagnoseError> {
-    let candidates = &bench.dictionary.candidates;
-    let rivals: Vec<Rival<'_>> = (found.iter())
+    let candidates = &model.dictionary.candidates;
+    let rivals: Vec<Rival<'_>> = (explanations.iter())
         .filter(|e| class.contains(&candidates[e.candidate].key()))
         .take(Thresholds::MOST_RIVALS)
         .map(|e| Rival {
             key: candidates[e.candidate].key(),
-            problem: bench.explained(e),
+            problem: model.explained(e),
             theta: e.fitted.theta.clone(),
             information: e.fitted.information.clone(),
-            numbers: bench.dictionary.variants[e.variant].free.len() as f64,
+            numbers: model.dictionary.variants[e.variant].free.len() as f64,
         })
         .collect();
     if rivals.len() < 2 {
         return Ok(None);
     }
-    let records = bench.problem.records;
+    let records = model.problem.records;
     let proof = noise.child("proof");
     let again = told_apart(
         &rivals,
@@ -102,7 +102,7 @@ fn best_of(
 ) -> Result<Option<Proposal>, DiagnoseError> {
     let looks = proposals(&records[0], times, noise)?
         .into_par_iter()
-        .map(|proposal| Ok((first_look(rivals, &proposal.drive, noise)?, proposal)))
+        .map(|proposal| Ok((first_statistics(rivals, &proposal.drive, noise)?, proposal)))
         .collect::<Result<Vec<_>, DiagnoseError>>()?;
     let best = (looks.into_iter()).max_by(|a, b| a.0.total_cmp(&b.0));
     Ok(best
@@ -182,7 +182,7 @@ fn proposals(record: &Record, times: usize, noise: Noise) -> Result<Vec<Proposal
 }
 
 impl Rival<'_> {
-    /// What this rival would measure; `None` where it diverges.
+    /// Simulates a record of this rival; `None` where it diverges.
     fn record(&self, drive: &Drive, noise: Noise) -> Result<Option<Record>, DiagnoseError> {
         let theta = self.problem.of_record(0, &self.theta);
         match self.problem.twin.simulate(&theta, drive, noise) {
@@ -202,9 +202,13 @@ impl Rival<'_> {
     }
 }
 
-/// What the closest two rivals would differ by, in nats: half of what the change from the innovations of the one to those of the
+/// Difference of the closest two rivals in nats: half of what the change from the innovations of the one to those of the
 /// other holds that θ of the other, as far as the present records leave it free, cannot imitate.
-fn first_look(rivals: &[Rival<'_>], drive: &Drive, noise: Noise) -> Result<f64, DiagnoseError> {
+fn first_statistics(
+    rivals: &[Rival<'_>],
+    drive: &Drive,
+    noise: Noise,
+) -> Result<f64, DiagnoseError> {
     let mut least = f64::INFINITY;
     for (i, truth) in rivals.iter().enumerate() {
         let noise = noise.child("look").sample(i as u64);
@@ -239,7 +243,7 @@ fn first_look(rivals: &[Rival<'_>], drive: &Drive, noise: Noise) -> Result<f64, 
     Ok(if least.is_finite() { least } else { 0.0 })
 }
 
-/// Of how many simulated records, each beside the present ones, the rival that made them leads all others by more than a
+/// Counts the simulated records, each beside the present ones, of which the rival that made them leads all others by more than a
 /// class is wide.
 fn told_apart(
     rivals: &[Rival<'_>],

@@ -1,7 +1,7 @@
-//! What a record could have revealed: the smallest magnitude of each listed effect that the structural test would see in 80 of
+//! Power: the smallest magnitude of each listed effect that the structural test would see in 80 of
 //! 100 records like this one.
 //!
-//! With d⊥ what the effect of magnitude m changes in the innovations and θ cannot imitate (`scan.rs`), the scan's root √(2·gain)
+//! Let d⊥ be the change of the innovations by an effect of magnitude m that θ cannot imitate (`reference.rs`). The scan's root √(2·gain)
 //! is about |N(‖d⊥(m)‖, 1)|. The simulations of the test say from which root c on an effect alone makes it alarm, and so
 //!
 //! ```text
@@ -26,17 +26,17 @@ use rayon::prelude::*;
 const STEPS: usize = 10;
 const NEAR: f64 = 0.03;
 
-/// For each listed candidate of the bench, in its order.
+/// Returns the smallest visible magnitude of each listed candidate.
 pub(in crate::diagnose) fn power(
-    bench: &FittedTwin<'_>,
-    nulls: &NullDistribution,
+    model: &FittedTwin<'_>,
+    null: &NullDistribution,
     level: f64,
 ) -> Result<Vec<Visible>, FilterError> {
-    let Some(reference) = Reference::new(&bench.problem, &bench.fitted.theta)? else {
+    let Some(reference) = Reference::new(&model.problem, &model.fitted.theta)? else {
         return Ok(vec![]);
     };
-    let dictionary = &bench.dictionary;
-    let needed = nulls.roots_needed(level);
+    let dictionary = &model.dictionary;
+    let needed = null.roots_needed(level);
     (0..dictionary.candidates.len())
         .into_par_iter()
         .filter(|&c| dictionary.candidates[c].is_listed())
@@ -50,11 +50,11 @@ pub(in crate::diagnose) fn power(
                 if variant.free[1..].iter().any(Magnitude::is_threshold) {
                     continue;
                 }
-                let root = |first: f64| root(bench, &reference, variant, point, first);
-                if let Some(found) = least(variant, point, need, root)?
-                    && best.as_ref().is_none_or(|b| found.distance < b.distance)
+                let root = |first: f64| root(model, &reference, variant, point, first);
+                if let Some(visible) = least(variant, point, need, root)?
+                    && best.as_ref().is_none_or(|b| visible.distance < b.distance)
                 {
-                    best = Some(found);
+                    best = Some(visible);
                 }
             }
             let candidate = &dictionary.candidates[c];
@@ -79,13 +79,13 @@ pub(in crate::diagnose) fn power(
 struct Least {
     name: &'static str,
     value: f64,
-    /// How far from nothing, as a share of the way to the point.
+    /// Distance from no effect, as a share of the way to the point.
     distance: f64,
 }
 
 /// ‖d⊥‖ of a variant with this first magnitude; `None` where the filter does not work.
 fn root(
-    bench: &FittedTwin<'_>,
+    model: &FittedTwin<'_>,
     reference: &Reference,
     variant: &Variant,
     point: &Point,
@@ -95,7 +95,7 @@ fn root(
         .into_iter()
         .chain(point.m[1..].iter().copied())
         .collect();
-    let (problem, full) = variant.at(&bench.problem, &bench.fitted.theta, &m);
+    let (problem, full) = variant.at(&model.problem, &model.fitted.theta, &m);
     let there = recoverable(problem.filtered(&full))?;
     Ok(there.map(|there| reference.own(&reference.direction(&there)).sqrt()))
 }

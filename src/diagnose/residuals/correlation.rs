@@ -6,7 +6,7 @@ pub(in crate::diagnose) fn centred(values: &[f64]) -> Vec<f64> {
     values.iter().map(|v| v - mean).collect()
 }
 
-/// Of a(k) with b(k − lag), both centred.
+/// Correlation of a(k) with b(k − lag), both centred.
 pub(in crate::diagnose) fn correlation(a: &[f64], b: &[f64], lag: usize) -> f64 {
     if lag >= a.len() {
         return 0.0;

@@ -1,4 +1,4 @@
-//! How records are cut into windows, regions, lags and bands.
+//! Cuts of records into windows, regions, lags and bands.
 
 use crate::diagnose::thresholds::Thresholds;
 use crate::likelihood::kalman::Filtered;
@@ -17,7 +17,7 @@ pub(in crate::diagnose) enum Cut {
         to: usize,
     },
 
-    /// Where a variable is in a range.
+    /// Samples with a variable in a range.
     Region {
         variable: usize,
         low: f64,
@@ -25,7 +25,7 @@ pub(in crate::diagnose) enum Cut {
     },
     /// An output.
     Channel { channel: usize },
-    /// What an output still owes to the past of a signal.
+    /// Correlation of an output with the past of a signal.
     Lag {
         channel: usize,
         past: Past,
@@ -51,14 +51,14 @@ pub(in crate::diagnose) struct Bins {
     pub cuts: Vec<Cut>,
     /// Names of states, inputs and outputs.
     pub variables: Vec<String>,
-    /// How many of them are states.
+    /// Number of states among them.
     pub states: usize,
-    /// Which outputs are among them.
+    /// Outputs among them.
     predicted: Vec<usize>,
 }
 
 impl Bins {
-    /// Of filtered states and records.
+    /// Cuts filtered states and records.
     pub fn new(outline: &Outline, states: &[(Filtered, Signal)], records: &[Record]) -> Self {
         let own: Vec<String> = (outline.states.iter())
             .map(|s| s.name.clone())
@@ -122,7 +122,7 @@ impl Bins {
         bins
     }
 
-    /// What each sample is sorted by: states and inputs a step before, as what a sample says is about the step that led to
+    /// Variables that sort a sample: states and inputs a step before, since a sample tells about the step that led to
     /// it, and predicted outputs.
     pub fn columns(&self, filtered: &Filtered, states: &Signal, record: &Record) -> Signal {
         let (drive, y) = (record.drive(), record.outputs());

@@ -1,4 +1,4 @@
-//! How little the innovations of each cut look like N(0, 1) and white.
+//! Statistic of each cut: departure of its innovations from white noise N(0, 1).
 
 use crate::diagnose::residuals::correlation::{centred, correlation};
 use crate::diagnose::residuals::cut::{Bins, Cut, Past};
@@ -8,7 +8,7 @@ use crate::record::{Record, Signal};
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
-/// What is left of a cut beyond chance.
+/// Excess of a cut beyond chance.
 #[derive(Debug, Clone, Copy, Default)]
 pub(in crate::diagnose) struct Excess {
     /// A statistic that is about χ² where nothing is wrong.
@@ -17,7 +17,7 @@ pub(in crate::diagnose) struct Excess {
     pub expected: f64,
 }
 
-/// For each cut, with standardised innovations v:
+/// Returns for each cut, with standardised innovations v:
 ///
 /// | cut | square of the statistic |
 /// |---|---|
@@ -71,7 +71,7 @@ pub(in crate::diagnose) fn excess(
         .collect()
 }
 
-/// Of (count, sum, sum of squares).
+/// Statistic of a count, a sum and a sum of squares.
 pub(in crate::diagnose) fn level((n, sum, square): (f64, f64, f64)) -> Excess {
     if n < Thresholds::LEAST_IN_CUT {
         return Excess::default();

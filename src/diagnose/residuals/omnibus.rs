@@ -1,4 +1,4 @@
-//! Whether innovations look like white noise: what sees gaps that no candidate imitates.
+//! Omnibus statistics of whiteness: they see gaps that no candidate imitates.
 
 use crate::diagnose::residuals::correlation::{centred, correlation};
 use crate::diagnose::thresholds::Thresholds;
@@ -8,7 +8,7 @@ use crate::record::{Record, Signal};
 /// The statistics, each larger the less white the innovations are; no one has a known distribution, and none is needed:
 /// each is compared with simulations of the twin.
 ///
-/// For each output: the mean square, kurtosis, correlations of v and of v² over several lags, of v and v² with the predicted
+/// Returns for each output: the mean square, kurtosis, correlations of v and of v² over several lags, of v and v² with the predicted
 /// output, of v with past inputs and with products of states and inputs, means in windows, the largest line of the
 /// periodogram. Of the filtered states, the first `own` are the twin's.
 pub(in crate::diagnose) fn omnibus(

@@ -1,4 +1,4 @@
-//! What each cut holds of the whole.
+//! Share of the misfit in each cut.
 
 use crate::diagnose::residuals::cut::{Bins, Cut};
 use crate::diagnose::residuals::local::excess;

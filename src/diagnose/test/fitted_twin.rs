@@ -12,7 +12,7 @@ use crate::record::{Record, Signal};
 use crate::twin::Twin;
 use std::sync::Arc;
 
-/// A fitted twin and everything that its records are looked at with.
+/// A fitted twin, its dictionary of effects and the cuts of its records.
 pub(in crate::diagnose) struct FittedTwin<'a> {
     pub problem: Problem<'a>,
     pub fitted: Fitted,
@@ -21,7 +21,7 @@ pub(in crate::diagnose) struct FittedTwin<'a> {
 }
 
 impl<'a> FittedTwin<'a> {
-    /// Everything that is needed to look at a fitted twin; `None` where it cannot be filtered around the fit.
+    /// Builds the dictionary of effects around a fit; `None` where the twin cannot be filtered there.
     pub fn new(
         twin: &Twin,
         problem: Problem<'a>,
@@ -71,7 +71,7 @@ impl<'a> FittedTwin<'a> {
         })
     }
 
-    /// The bench's twin on other records, the first of which are its own, and θ to start a fit from.
+    /// The fitted twin's twin on other records, the first of which are its own, and θ to start a fit from.
     pub fn on<'b>(&self, records: &'b [Record]) -> (Problem<'b>, Vec<f64>) {
         let problem = self.problem.on(records);
         let start = problem.carried(&self.problem, &self.fitted.theta);

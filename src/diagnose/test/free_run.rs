@@ -1,4 +1,4 @@
-//! How far the accepted effects close the gap, on data that no fit has seen.
+//! Free-run errors, and the share of a gap that effects close.
 
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::candidate::{Addition, with};

@@ -1,4 +1,4 @@
-//! What the statistics are where nothing is wrong: the twin itself simulated, refitted and looked at in the same way.
+//! Null distribution of the statistics: the fitted twin simulated, refitted and evaluated like the records.
 
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::fitting::climb::climb;
@@ -19,7 +19,7 @@ use rayon::prelude::*;
 
 /// Iterations of a refit that starts where the simulation was made.
 const WARM: usize = 6;
-/// What two statistics may differ by and still be the same: rounding.
+/// Difference of two equal statistics: rounding.
 const HAIR: f64 = 1e-6;
 
 /// The record's statistics and those of simulations; `None`: a simulation that could not be filtered.
@@ -28,7 +28,7 @@ pub(in crate::diagnose) struct NullDistribution {
     pub others: Vec<Option<Statistics>>,
 }
 
-/// What a test says.
+/// Result of a structural test.
 #[derive(Debug, Clone)]
 pub(in crate::diagnose) struct Test {
     pub p_value: f64,
@@ -43,26 +43,27 @@ pub(in crate::diagnose) struct Test {
 }
 
 impl<'a> FittedTwin<'a> {
-    /// How the records themselves look.
-    pub fn own_look(&self) -> Result<Option<Statistics>, FilterError> {
-        if self.problem.twin.equations().is_none() {
+    /// Returns the statistics of the records themselves.
+    pub fn own_statistics(&self) -> Result<Option<Statistics>, FilterError> {
+        if self.problem.is_simulated() {
             return Ok(self
                 .shared()?
-                .and_then(|s| s.look(self, self.problem.records)));
+                .and_then(|s| s.statistics(self, self.problem.records)));
         }
-        self.look(&self.problem, &self.fitted.theta)
+        self.statistics(&self.problem, &self.fitted.theta)
     }
 
-    /// Of a black box: what all looks share.
+    /// Returns the ensembles that all statistics of a black box share.
     fn shared(&self) -> Result<Option<Shared>, FilterError> {
-        match self.problem.twin.equations() {
-            Some(_) => Ok(None),
-            None => Shared::new(self),
+        if self.problem.is_simulated() {
+            Shared::new(self)
+        } else {
+            Ok(None)
         }
     }
 
-    /// Looks at records of `problem`, fitted at θ.
-    fn look(
+    /// Returns the statistics of the records of `problem`, fitted at θ.
+    fn statistics(
         &self,
         problem: &Problem<'_>,
         theta: &[f64],
@@ -81,7 +82,7 @@ impl<'a> FittedTwin<'a> {
         }))
     }
 
-    /// One simulation of the fitted twin, refitted and looked at.
+    /// Returns the statistics of one simulation of the fitted twin, refitted.
     fn replicate(
         &self,
         noise: Noise,
@@ -101,22 +102,22 @@ impl<'a> FittedTwin<'a> {
             }
         }
         if let Some(shared) = shared {
-            return Ok(shared.look(self, &records));
+            return Ok(shared.statistics(self, &records));
         }
         let problem = self.problem.on(&records);
         let Some(fitted) = climb(&problem, &self.fitted.theta, WARM)? else {
             return Ok(None);
         };
-        match self.look(&problem, &fitted.theta) {
-            Ok(look) => Ok(look),
+        match self.statistics(&problem, &fitted.theta) {
+            Ok(statistics) => Ok(statistics),
             Err(error) if error.is_recoverable() => Ok(None),
             Err(error) => Err(error.into()),
         }
     }
 
-    /// The record's statistics beside those of as many simulations, or of fewer once it is clear whether p ≤ `level`;
-    /// `None` where the record cannot be looked at.
-    pub fn nulls(
+    /// Returns the record's statistics beside those of `replicates` simulations, or of fewer once it is clear whether p ≤ `level`;
+    /// `None` where the record cannot be evaluated.
+    pub fn null_distribution(
         &self,
         replicates: usize,
         level: f64,
@@ -125,42 +126,42 @@ impl<'a> FittedTwin<'a> {
     ) -> Result<Option<NullDistribution>, DiagnoseError> {
         let shared = self.shared()?;
         let own = match &shared {
-            Some(shared) => shared.look(self, self.problem.records),
-            None => self.own_look()?,
+            Some(shared) => shared.statistics(self, self.problem.records),
+            None => self.own_statistics()?,
         };
         let Some(own) = own else {
             return Ok(None);
         };
-        let mut nulls = NullDistribution {
+        let mut null = NullDistribution {
             own,
             others: vec![],
         };
-        while nulls.others.len() < replicates {
-            let from = nulls.others.len();
+        while null.others.len() < replicates {
+            let from = null.others.len();
             let to = (from + Thresholds::BATCH).min(replicates);
             let batch = (from as u64..to as u64)
                 .into_par_iter()
                 .map(|i| {
-                    let look =
+                    let statistics =
                         self.replicate(noise.child("replicate").sample(i), shared.as_ref())?;
                     stage.tick()?;
-                    Ok(look)
+                    Ok(statistics)
                 })
                 .collect::<Result<Vec<_>, DiagnoseError>>()?;
-            nulls.others.extend(batch);
-            let test = nulls.test();
+            null.others.extend(batch);
+            let test = null.test();
             let overwhelming = test.statistic > Thresholds::OVERWHELMING && test.p_value <= level;
             if overwhelming || test.as_extreme >= Thresholds::ENOUGH_EXTREME {
                 break;
             }
         }
         stage.finish();
-        Ok(Some(nulls))
+        Ok(Some(null))
     }
 }
 
 impl NullDistribution {
-    /// For each candidate, the root √(2·gain) from which on it alone would make the test alarm at `level`.
+    /// Returns for each candidate the root √(2·gain) from which on it alone would raise an alarm at `level`.
     pub fn roots_needed(&self, level: f64) -> Vec<f64> {
         let others: Vec<&Statistics> = self.others.iter().flatten().collect();
         let rows =
@@ -183,7 +184,7 @@ impl NullDistribution {
             .collect()
     }
 
-    /// The test that all of it comes from the twin.
+    /// Tests whether the records come from the twin.
     ///
     /// Each statistic is expressed in standard deviations over *all others*, simulations and record alike; the largest of
     /// the candidates' and the largest of the omnibus' are expressed so once more, and the larger of the two is ranked. As
@@ -194,7 +195,12 @@ impl NullDistribution {
             .collect();
         let failed = self.others.iter().filter(|o| o.is_none()).count();
         let of = |take: fn(&Statistics) -> &Vec<f64>| -> Vec<Vec<f64>> {
-            standardised(&pool.iter().map(|look| take(look)).collect::<Vec<_>>())
+            standardised(
+                &pool
+                    .iter()
+                    .map(|statistics| take(statistics))
+                    .collect::<Vec<_>>(),
+            )
         };
         let ranked = |all: &[f64], own: f64| {
             let mut null = all[1..].to_vec();

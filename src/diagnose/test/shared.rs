@@ -25,19 +25,19 @@ use rayon::prelude::*;
 /// A variance keeps this share of itself when θ moves.
 const KEPT: f64 = 0.25;
 
-/// Ensembles of all records at the places that a look needs.
+/// Ensembles of all records at the places that a statistics needs.
 pub(in crate::diagnose) struct Shared {
     here: Vec<Predictor>,
     /// A step beside θ̂ along each axis.
     beside: Vec<(Vec<Predictor>, f64)>,
-    /// Of each point of the dictionary that can be simulated.
+    /// At each point of the dictionary that can be simulated.
     points: Vec<Option<Vec<Predictor>>>,
 }
 
 impl Shared {
-    /// For the records of a bench; `None` where the twin cannot be simulated around θ̂.
-    pub fn new(bench: &FittedTwin<'_>) -> Result<Option<Self>, FilterError> {
-        let (problem, theta) = (&bench.problem, &bench.fitted.theta);
+    /// Simulates all ensembles of a fitted twin; `None` where it cannot be simulated around θ̂.
+    pub fn new(model: &FittedTwin<'_>) -> Result<Option<Self>, FilterError> {
+        let (problem, theta) = (&model.problem, &model.fitted.theta);
         let Some(here) = recoverable(problem.predictors(theta))? else {
             return Ok(None);
         };
@@ -51,9 +51,9 @@ impl Shared {
         let Some(beside) = beside.into_iter().collect() else {
             return Ok(None);
         };
-        let points = (bench.dictionary.points.par_iter())
+        let points = (model.dictionary.points.par_iter())
             .map(|point| {
-                let (of, full) = bench.dictionary.at(problem, theta, point);
+                let (of, full) = model.dictionary.at(problem, theta, point);
                 recoverable(of.predictors(&full))
             })
             .collect::<Result<_, FilterError>>()?;
@@ -64,8 +64,8 @@ impl Shared {
         }))
     }
 
-    /// How records under the bench's drives look.
-    pub fn look(&self, bench: &FittedTwin<'_>, records: &[Record]) -> Option<Statistics> {
+    /// Returns the statistics of records under the drives of the fitted twin.
+    pub fn statistics(&self, model: &FittedTwin<'_>, records: &[Record]) -> Option<Statistics> {
         let through = |predictors: &[Predictor]| -> Vec<Filtered> {
             let pairs = predictors.iter().zip(records);
             pairs
@@ -75,16 +75,16 @@ impl Shared {
         let beside: Vec<(Vec<Filtered>, f64)> = (self.beside.iter())
             .map(|(p, distance)| (through(p), *distance))
             .collect();
-        let problem = &bench.problem;
+        let problem = &model.problem;
         let reference = Reference::with(through(&self.here), &beside, &weak(problem))?;
-        let points: Vec<Gain> = (self.points.iter().zip(&bench.dictionary.points))
+        let points: Vec<Gain> = (self.points.iter().zip(&model.dictionary.points))
             .map(|(predictors, point)| {
                 predictors.as_ref().map_or(Gain::default(), |predictors| {
                     reference.gain(&reference.direction(&through(predictors)), point.range)
                 })
             })
             .collect();
-        let step = reference.step(&pull(problem, &bench.fitted.theta));
+        let step = reference.step(&pull(problem, &model.fitted.theta));
         let states: Vec<(Filtered, Signal)> = (0..records.len())
             .map(|r| {
                 let moved = moved(&reference.filtered[r], &beside, r, &step);
@@ -92,11 +92,11 @@ impl Shared {
                 (moved, predicted)
             })
             .collect();
-        let gains = bench.dictionary.best(&points);
+        let gains = model.dictionary.best(&points);
         Some(Statistics {
             gains: gains.iter().map(|g| (2.0 * g).sqrt()).collect(),
-            omnibus: omnibus(&states, records, bench.bins.states),
-            local: local(&states, records, &bench.bins),
+            omnibus: omnibus(&states, records, model.bins.states),
+            local: local(&states, records, &model.bins),
             points,
         })
     }

@@ -93,17 +93,17 @@ impl Outcome {
         Self {
             verdict: found.verdict,
             p_value: found.detection.p_value,
-            decision: found.which.decision,
-            target: found.place.target.clone(),
-            effects: (found.which.effects.iter())
+            decision: found.cause.decision,
+            target: found.location.target.clone(),
+            effects: (found.cause.effects.iter())
                 .map(|e| Named {
                     key: e.key(),
                     probability: e.probability,
                     gain: e.log_score_gain,
                 })
                 .collect(),
-            accepted: found.which.accepted.clone(),
-            class: found.which.class.clone(),
+            accepted: found.cause.accepted.clone(),
+            class: found.cause.class.clone(),
             before: free_run.map(|s| s.before),
             floor: free_run.and_then(|s| s.floor),
             closed: free_run.and_then(|s| s.closed),

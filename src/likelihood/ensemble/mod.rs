@@ -19,19 +19,10 @@ mod tail;
 pub(crate) use predictor::{Predictor, standardised};
 pub(crate) use silent::{dithered, measured};
 
-use crate::likelihood::kalman::{FilterError, Filtered};
+use crate::likelihood::kalman::FilterError;
 use crate::record::Record;
 use crate::twin::DigitalTwin;
 use runs::Ensemble;
-
-/// Innovations of a record under the ensemble at θ.
-pub(crate) fn filtered(
-    twin: &dyn DigitalTwin,
-    theta: &[f64],
-    record: &Record,
-) -> Result<Filtered, FilterError> {
-    Ok(predictor(twin, theta, record)?.filter(record.outputs()))
-}
 
 /// Predictor of records under the drive of `record`, at θ.
 pub(crate) fn predictor(

@@ -27,13 +27,13 @@ const LAGS: usize = 4;
 const RUNS_EACH: usize = 6;
 /// Independent noise that everything measured has, as a share of the output's size.
 const FLOOR: f64 = 1e-5;
-/// And as a share of what most rows have: a known start or a clipped output is not believed to the last bit.
+/// The same as a share of what most rows have: a known start or a clipped output is not believed to the last bit.
 const LEAST: f64 = 0.3;
 const MOST_ROWS: f64 = 0.9;
 /// Rows with less than this share of the largest variance are clipped, or the start.
 const ALIVE: f64 = 1e-3;
 
-/// What predicts all rows at one θ.
+/// Predictor of all rows at one θ.
 #[derive(Debug, Clone)]
 pub(crate) struct Predictor {
     mean: Signal,
@@ -44,7 +44,7 @@ pub(crate) struct Predictor {
 }
 
 impl Predictor {
-    /// From runs; `outputs` say how large the outputs are.
+    /// Fits all rows to the runs; `outputs` give the scale of each output.
     pub(crate) fn new(ensemble: &Ensemble, outputs: &Signal) -> Self {
         let p = ensemble.outputs();
         let m = ensemble.runs;
@@ -148,7 +148,7 @@ mod tests {
     use crate::twin::{DigitalTwin, Noise};
     use crate::twins::CascadedTanks;
 
-    /// Where a filter can tell what the best prediction is, the ensemble's is nearly as good.
+    /// Checks the ensemble's prediction against a filter's, which is the best.
     #[test]
     fn an_ensemble_predicts_about_as_well_as_a_filter() {
         let theta = [0.6, 0.5, 0.55, 1.0];

@@ -1,4 +1,4 @@
-//! How heavy the tails of innovations are: outliers make them so, and a Gaussian density would take them for noise.
+//! Density of innovations with heavy tails: outliers make them so, and a Gaussian density would take them for noise.
 //!
 //! ```text
 //! κ = mean(v⁴)/mean(v²)² − 3 over all runs, rows and outputs          1/ν = (κ − ½)/(4κ + 6), 0 below κ = ½
@@ -27,7 +27,7 @@ pub(crate) enum Tail {
 }
 
 impl Tail {
-    /// Of the runs' own residuals, in rows of more than the least variance.
+    /// Estimates the tail from the runs' own residuals, in rows of more than the least variance.
     pub fn of(ensemble: &Ensemble, rows: &[Row], lags: usize, least: &[f64]) -> Self {
         let p = ensemble.outputs();
         let (mut squares, mut fourths, mut count) = (0.0, 0.0, 0.0);
@@ -55,7 +55,7 @@ impl Tail {
         Self::new(count * fourths / (squares * squares) - 3.0)
     }
 
-    /// Of an excess kurtosis.
+    /// Returns the tail with an excess kurtosis.
     fn new(kurtosis: f64) -> Self {
         if kurtosis.is_nan() || kurtosis <= NORMAL {
             return Self::Normal;
@@ -67,7 +67,7 @@ impl Tail {
         Self::Student(freedom, centre)
     }
 
-    /// Of uncorrelated innovations of unit variance.
+    /// Log-density of uncorrelated innovations of unit variance.
     pub fn log_density(self, v: &DVector<f64>) -> f64 {
         match self {
             Self::Normal => -0.5 * (v.norm_squared() + v.len() as f64 * TAU.ln()),

@@ -1,7 +1,7 @@
 //! A diagnosis as JSON, `truetwin.gap/1`.
 
 use crate::diagnose::{
-    Diagnosis, Discovery, EffectFit, Maps, NextInput, Shrinkage, Visible, Where,
+    Diagnosis, Discovery, EffectFit, Location, Maps, NextInput, Shrinkage, Visible,
 };
 use serde_json::{Map, Value, json};
 
@@ -35,11 +35,11 @@ pub fn gap_json(diagnosis: &Diagnosis) -> Value {
     let nuisance: Vec<Value> = (diagnosis.nuisance.iter())
         .map(|n| json!({ "name": n.name, "role": n.role, "value": n.value, "std_error": n.std_error }))
         .collect();
-    let place = &diagnosis.place;
+    let place = &diagnosis.location;
     let targets: Vec<Value> = (place.targets.iter())
         .map(|t| json!({ "target": t.target, "p_value": t.p_value, "share": t.share }))
         .collect();
-    let which = &diagnosis.which;
+    let which = &diagnosis.cause;
     json!({
         "schema": "truetwin.gap/1",
         "twin": diagnosis.twin,
@@ -73,7 +73,7 @@ pub fn gap_json(diagnosis: &Diagnosis) -> Value {
 }
 
 /// The contract's `where`: targets, and the notable cells of all maps beside them.
-fn place_json(place: &Where, targets: Vec<Value>) -> Value {
+fn place_json(place: &Location, targets: Vec<Value>) -> Value {
     let equations: Vec<Value> = (place.equations.iter())
         .map(|e| {
             let term: Vec<Value> = (e.term.iter())
@@ -226,7 +226,7 @@ mod tests {
     #[test]
     fn what_is_infinite_is_null() {
         let mut diagnosis = diagnoses()[1].clone();
-        diagnosis.which.effects[0].magnitudes = vec![("level".into(), f64::INFINITY)];
+        diagnosis.cause.effects[0].magnitudes = vec![("level".into(), f64::INFINITY)];
         let value = gap_json(&diagnosis);
         assert!(value["which"]["effects"][0]["magnitudes"]["level"].is_null());
     }

@@ -48,8 +48,8 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
         })
         .collect();
     lines.push(parameters.join(", "));
-    if let Some(target) = &diagnosis.place.target {
-        let maps = diagnosis.place.maps.notable();
+    if let Some(target) = &diagnosis.location.target {
+        let maps = diagnosis.location.maps.notable();
         let windows = maps.windows.iter().take(2);
         let when: Vec<String> = windows
             .map(|w| format!("{} to {} s", short(w.start), short(w.end)))
@@ -58,7 +58,7 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
             .map(|r| format!("{} in {} … {}", r.variable, short(r.low), short(r.high)))
             .collect();
         let mut line = format!("Where: {target}");
-        if let Some(onset) = diagnosis.place.onset.as_ref().filter(|o| o.time > 0.0) {
+        if let Some(onset) = diagnosis.location.onset.as_ref().filter(|o| o.time > 0.0) {
             line.push_str(&format!("; from {} s on", short(onset.time)));
         }
         for (what, list) in [("clearest", when), ("at", regions)] {
@@ -68,9 +68,9 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
         }
         lines.push(line + ".");
     }
-    if !diagnosis.which.effects.is_empty() {
+    if !diagnosis.cause.effects.is_empty() {
         lines.push("  probability   gain   effect".into());
-        for effect in diagnosis.which.effects.iter().take(SHOWN) {
+        for effect in diagnosis.cause.effects.iter().take(SHOWN) {
             lines.push(format!(
                 "  {:>11} {:>6}   {}",
                 chance(effect.probability),
@@ -79,7 +79,7 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
             ));
         }
     }
-    if let Some(p) = diagnosis.which.unexplained_p_value {
+    if let Some(p) = diagnosis.cause.unexplained_p_value {
         lines.push(format!(
             "What the best explanation leaves: {}.",
             probability(p)
@@ -90,7 +90,7 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
         Some(s) => closed_sentence(s),
         None => no_share(diagnosis),
     });
-    lines.extend(diagnosis.which.next_input.as_ref().map(measure_next));
+    lines.extend(diagnosis.cause.next_input.as_ref().map(measure_next));
     lines.push(format!(
         "{} explanations, {} s.",
         diagnosis.candidates,
@@ -103,11 +103,11 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
 /// The answer in one sentence.
 pub fn verdict_sentence(diagnosis: &Diagnosis) -> String {
     let listed = |keys: &[String]| keys.join(" and ");
-    match (diagnosis.verdict, diagnosis.which.decision) {
+    match (diagnosis.verdict, diagnosis.cause.decision) {
         (Verdict::NoGap, _) => "No gap: the twin explains the record within its prior.".into(),
         (Verdict::ParameterGap, Decision::Absorbed) => format!(
             "Parameter gap: parameters outside the prior explain the record; so would {} with parameters inside.",
-            diagnosis.which.class.first().cloned().unwrap_or_default()
+            diagnosis.cause.class.first().cloned().unwrap_or_default()
         ),
         (Verdict::ParameterGap, _) => {
             "Parameter gap: the twin explains the record with parameters outside its prior.".into()
@@ -115,15 +115,15 @@ pub fn verdict_sentence(diagnosis: &Diagnosis) -> String {
         (_, Decision::Named) => {
             format!(
                 "Structural gap: the twin lacks {}.",
-                listed(&diagnosis.which.accepted)
+                listed(&diagnosis.cause.accepted)
             )
         }
         (_, Decision::Class) => format!(
             "Structural gap: the twin lacks {}, or a rival that these data cannot tell apart ({}).",
-            listed(&diagnosis.which.accepted),
-            diagnosis.which.class[1..].join(", ")
+            listed(&diagnosis.cause.accepted),
+            diagnosis.cause.class[1..].join(", ")
         ),
-        _ => match &diagnosis.place.target {
+        _ => match &diagnosis.location.target {
             Some(target) => format!(
                 "Structural gap that no listed effect explains; what is missing acts on {target}."
             ),
@@ -238,7 +238,7 @@ mod tests {
             "{none}"
         );
         let mut all = made::oscillator_none();
-        all.which.next_input = made::tanks_class().which.next_input;
+        all.cause.next_input = made::tanks_class().cause.next_input;
         for text in [class, none, gap_text(&all)] {
             assert!(text.lines().count() <= LINES, "{text}");
             assert!(text.ends_with("explanations, 5.20 s.\n"), "{text}");

@@ -24,16 +24,16 @@ fn affected(name: &str, effect: &str, theta: &[f64], noise: Noise) -> (Study, Re
 /// What must hold of every answer.
 fn sound(found: &Diagnosis) {
     let shares = |all: &mut dyn Iterator<Item = f64>| all.sum::<f64>() <= 1.0 + 1e-9;
-    assert!(shares(&mut found.place.targets.iter().map(|t| t.share)));
+    assert!(shares(&mut found.location.targets.iter().map(|t| t.share)));
     assert!(shares(
-        &mut found.place.maps.windows.iter().map(|w| w.share)
+        &mut found.location.maps.windows.iter().map(|w| w.share)
     ));
     assert!(shares(
-        &mut found.place.maps.regions.iter().map(|r| r.share)
+        &mut found.location.maps.regions.iter().map(|r| r.share)
     ));
     let structural = found.verdict == Verdict::StructuralGap;
-    assert_eq!(structural, found.place.target.is_some());
-    assert!(structural || found.which.accepted.is_empty());
+    assert_eq!(structural, found.location.target.is_some());
+    assert!(structural || found.cause.accepted.is_empty());
 }
 
 fn alarms(name: &str, records: u64, theta: impl Fn(&Study, u64, Noise) -> Vec<f64>) -> u64 {
@@ -107,8 +107,8 @@ fn effects_of_signals_are_named() {
         println!("{}", line(key, &found));
         sound(&found);
         assert_eq!(found.verdict, Verdict::StructuralGap, "{key}");
-        assert!(found.which.class.iter().any(|c| c == key), "{key}");
-        assert_eq!(found.place.target.as_deref(), key.split('@').nth(1));
+        assert!(found.cause.class.iter().any(|c| c == key), "{key}");
+        assert_eq!(found.location.target.as_deref(), key.split('@').nth(1));
     }
 }
 
@@ -130,7 +130,7 @@ fn an_effect_inside_the_box_is_named_by_nobody() {
         println!("{}", line(key, &found));
         sound(&found);
         assert_eq!(found.verdict, Verdict::StructuralGap, "{key}");
-        assert_eq!(found.which.decision, Decision::NoneOfThese, "{key}");
+        assert_eq!(found.cause.decision, Decision::NoneOfThese, "{key}");
     }
 }
 
@@ -198,7 +198,7 @@ fn a_box_without_noise_is_no_trouble() {
         let found = found(&study, record, None);
         println!("{}", line("actuator-dead-zone@actuator", &found));
         sound(&found);
-        assert_eq!(found.which.accepted, ["actuator-dead-zone@actuator"]);
+        assert_eq!(found.cause.accepted, ["actuator-dead-zone@actuator"]);
         let shrinkage = found.shrinkage.unwrap();
         assert!(shrinkage.closed.is_some_and(|c| c > 0.9), "{shrinkage:?}");
     }
@@ -227,7 +227,7 @@ fn two_records_share_their_parameters() {
     let found = run(&biased);
     println!("{}", line("sensor-bias@sensor", &found));
     assert_eq!(found.verdict, Verdict::StructuralGap);
-    assert!(found.which.class.contains(&"sensor-bias@sensor".into()));
+    assert!(found.cause.class.contains(&"sensor-bias@sensor".into()));
 }
 
 /// Each record has unknown starts of its own.

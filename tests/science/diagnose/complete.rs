@@ -22,8 +22,8 @@ fn a_gap_begins_where_it_begins() {
     let record = record(study.twin(), text, &theta, drive(&study, noise), noise);
     let found = found(&study, record, None);
     println!("{}", line("parameter-step@k3", &found));
-    let maps = &found.place.maps;
-    let onset = found.place.onset.as_ref().expect("no onset");
+    let maps = &found.location.maps;
+    let onset = found.location.onset.as_ref().expect("no onset");
     // Of 200 s, in blocks of 17 s.
     assert!((85.0..140.0).contains(&onset.time), "{onset:?}");
     assert!(onset.p_value <= 0.05 && onset.channel == "y");
@@ -36,11 +36,15 @@ fn a_gap_begins_where_it_begins() {
     ];
     assert!(sums.iter().all(|sum| *sum <= 1.0 + 1e-9), "{sums:?}");
     assert!(!maps.notable().windows.is_empty() || !maps.notable().bands.is_empty());
-    let equations: Vec<&str> = (found.place.equations.iter())
+    let equations: Vec<&str> = (found.location.equations.iter())
         .map(|e| e.equation.as_str())
         .collect();
     assert_eq!(equations.len(), 3, "{equations:?}");
-    let after = found.place.after.as_ref().expect("nothing was drawn again");
+    let after = found
+        .location
+        .after
+        .as_ref()
+        .expect("nothing was drawn again");
     assert!(after.notable().windows.is_empty(), "{:?}", after.notable());
 }
 
@@ -60,14 +64,14 @@ fn rivals_get_a_record_that_tells_more() {
             });
         let found = found(&study, record, None);
         println!("{}", line("quadratic-drag@h1", &found));
-        let Some(next) = &found.which.next_input else {
+        let Some(next) = &found.cause.next_input else {
             continue;
         };
         println!("{}: {:?}, again {:?}", next.kind, next.split, next.again);
         proposed += 1;
-        assert_eq!(found.which.decision, Decision::Class);
+        assert_eq!(found.cause.decision, Decision::Class);
         assert!(next.split[0] > next.again[0] && next.split[1] == next.again[1]);
-        assert!(next.rivals.iter().all(|r| found.which.class.contains(r)));
+        assert!(next.rivals.iter().all(|r| found.cause.class.contains(r)));
         let inputs = next.drive.inputs();
         assert!(inputs.iter().all(|u| (range.0..=range.1).contains(u)));
     }
@@ -89,7 +93,7 @@ fn the_missing_term_is_regressed() {
         ..DiagnoseSettings::default()
     };
     let found = with_settings(&study, record, &settings);
-    assert_eq!(found.which.decision, Decision::NoneOfThese);
+    assert_eq!(found.cause.decision, Decision::NoneOfThese);
     let discovery = found.discovery.as_ref().expect("no regression");
     println!("{:?}, explained {}", discovery.terms, discovery.explained);
     assert_eq!(discovery.equation, "x2");
@@ -139,7 +143,7 @@ fn power_is_what_it_says() {
             let drive = drive(&study, noise);
             let record = record(study.twin(), &text, &theta, drive, noise);
             let found = with_settings(&study, record, &only);
-            assert!(found.place.targets.is_empty() && found.shrinkage.is_none());
+            assert!(found.location.targets.is_empty() && found.shrinkage.is_none());
             seen += u64::from(found.verdict == Verdict::StructuralGap);
             records += 1;
         }
@@ -163,12 +167,12 @@ fn two_effects_are_both_accepted() {
     let record = record(study.twin(), text, &[1.4], drive(&study, noise), noise);
     let found = found(&study, record, None);
     println!("{}", line("pair", &found));
-    let mut accepted = found.which.accepted.clone();
+    let mut accepted = found.cause.accepted.clone();
     accepted.sort();
     assert_eq!(accepted, ["coulomb-friction@x2", "sensor-bias@sensor"]);
-    assert_eq!(found.which.decision, Decision::Named);
+    assert_eq!(found.cause.decision, Decision::Named);
     let sum: f64 = found
-        .which
+        .cause
         .effects
         .iter()
         .skip(2)

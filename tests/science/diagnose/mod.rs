@@ -28,7 +28,7 @@ fn a_perfect_twin_is_rarely_accused() {
             let found = found(&study, record(study.twin(), "", &theta, drive, noise), None);
             alarms += usize::from(found.verdict == Verdict::StructuralGap);
             if found.verdict != Verdict::StructuralGap {
-                assert!(found.which.accepted.is_empty() && found.place.targets.is_empty());
+                assert!(found.cause.accepted.is_empty() && found.location.targets.is_empty());
             }
         }
     }
@@ -55,12 +55,12 @@ fn clear_effects_are_found_and_named() {
         println!("{}", line(key, &found));
         assert_eq!(found.verdict, Verdict::StructuralGap, "{key}");
         assert!(
-            found.which.class.iter().any(|c| c == key),
+            found.cause.class.iter().any(|c| c == key),
             "{key}: {:?}",
-            found.which.class
+            found.cause.class
         );
-        assert_eq!(found.place.target.as_deref(), key.split('@').nth(1));
-        let shares: f64 = found.place.targets.iter().map(|t| t.share).sum();
+        assert_eq!(found.location.target.as_deref(), key.split('@').nth(1));
+        let shares: f64 = found.location.targets.iter().map(|t| t.share).sum();
         assert!(shares <= 1.0 + 1e-9);
     }
 }
@@ -94,8 +94,8 @@ fn an_unlisted_push_is_named_by_nobody() {
     let found = found(&study, record, None);
     println!("{}", line("unlisted", &found));
     assert_eq!(found.verdict, Verdict::StructuralGap);
-    assert_eq!(found.which.decision, Decision::NoneOfThese);
-    assert!(found.which.accepted.is_empty());
+    assert_eq!(found.cause.decision, Decision::NoneOfThese);
+    assert!(found.cause.accepted.is_empty());
 }
 
 /// The same seed gives the same bits on one thread and on three; another seed does not.

@@ -77,25 +77,25 @@ fn study_of_many_records() {
         if found.verdict == Verdict::StructuralGap {
             structural += 1;
             let first = found
-                .which
+                .cause
                 .accepted
                 .first()
                 .cloned()
-                .or(found.which.effects.first().map(|e| e.key()))
+                .or(found.cause.effects.first().map(|e| e.key()))
                 .unwrap_or_default();
             top += usize::from(
                 found
-                    .which
+                    .cause
                     .effects
                     .first()
                     .is_some_and(|e| e.key() == truth)
                     || first == truth,
             );
-            class += usize::from(found.which.class.contains(&truth));
-            sizes += found.which.class.len();
-            abstained += usize::from(found.which.decision == Decision::NoneOfThese);
+            class += usize::from(found.cause.class.contains(&truth));
+            sizes += found.cause.class.len();
+            abstained += usize::from(found.cause.decision == Decision::NoneOfThese);
             let target = truth.split('@').nth(1);
-            place += usize::from(found.place.target.as_deref() == target);
+            place += usize::from(found.location.target.as_deref() == target);
         }
     }
     println!(

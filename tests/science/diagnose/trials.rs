@@ -317,7 +317,7 @@ pub fn found(study: &Study, record: Record, validation: Option<Record>) -> Diagn
 }
 
 pub fn line(truth: &str, found: &Diagnosis) -> String {
-    let which = &found.which;
+    let which = &found.cause;
     let top: Vec<String> = (which.effects.iter().take(2))
         .map(|e| {
             format!(
@@ -340,7 +340,7 @@ pub fn line(truth: &str, found: &Diagnosis) -> String {
         top,
         which.unexplained_p_value,
         which.catch_all,
-        found.place.target,
+        found.location.target,
         found
             .shrinkage
             .as_ref()

@@ -164,9 +164,9 @@ fn diagnoses_do_not_depend_on_units() {
                     1e-2,
                 );
             }
-            assert_eq!(given.which.decision, plain.which.decision, "{units:?}");
+            assert_eq!(given.cause.decision, plain.cause.decision, "{units:?}");
             let named = |d: &Diagnosis| -> Vec<String> {
-                let likely = d.which.effects.iter().filter(|fit| fit.probability > 0.05);
+                let likely = d.cause.effects.iter().filter(|fit| fit.probability > 0.05);
                 likely.map(|fit| fit.key()).collect()
             };
             assert_eq!(named(&given), named(&plain), "{units:?}");

@@ -74,7 +74,7 @@ fn odd_records_give_numbers_or_reasons() {
                         "{name}: {p:?}"
                     );
                 }
-                for fit in diagnosis.which.effects {
+                for fit in diagnosis.cause.effects {
                     assert!(
                         !fit.log_score_gain.is_nan() && !fit.probability.is_nan(),
                         "{name}"

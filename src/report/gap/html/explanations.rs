@@ -13,7 +13,7 @@ pub(super) fn section_of(units: &Units, diagnosis: &Diagnosis) -> Section {
 }
 
 fn body(units: &Units, diagnosis: &Diagnosis) -> String {
-    let which = &diagnosis.which;
+    let which = &diagnosis.cause;
     let mut body = paragraph(&decision(diagnosis));
     if let Some(svg) = pictures::explanations(diagnosis) {
         let caption = match which.decision {
@@ -56,7 +56,7 @@ fn body(units: &Units, diagnosis: &Diagnosis) -> String {
 
 /// What was decided, in a sentence.
 fn decision(diagnosis: &Diagnosis) -> String {
-    let which = &diagnosis.which;
+    let which = &diagnosis.cause;
     match which.decision {
         Decision::Named if which.accepted.len() > 1 => {
             "A pair of effects is accepted. Probabilities are of each alone; the gain of the second is what it adds to the first."
@@ -83,7 +83,7 @@ fn decision(diagnosis: &Diagnosis) -> String {
 
 fn row(units: &Units, diagnosis: &Diagnosis, effect: &EffectFit) -> Vec<String> {
     let key = effect.key();
-    let which = &diagnosis.which;
+    let which = &diagnosis.cause;
     let standing = if which.accepted.contains(&key) {
         "accepted"
     } else if which.class.contains(&key) {

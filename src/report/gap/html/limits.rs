@@ -33,7 +33,7 @@ fn sure(diagnosis: &Diagnosis) -> Vec<String> {
         ),
         None => "No validation record was given: an explanation that fits this record by luck is not caught.".into(),
     });
-    if !diagnosis.which.effects.is_empty() {
+    if !diagnosis.cause.effects.is_empty() {
         items.push(
             "Probabilities of effects compare what was looked at, 5 % kept for a law that is not listed and that one of these \
              imitates; sealed trials say how often they are right (docs/diagnosing-a-gap.md). p-values of effects are corrected for \

@@ -68,7 +68,7 @@ fn test(diagnosis: &Diagnosis) -> String {
 
 /// Measured and twin.
 fn runs(study: &Study, diagnosis: &Diagnosis) -> Section {
-    let marked = if diagnosis.place.maps.notable().windows.is_empty() {
+    let marked = if diagnosis.location.maps.notable().windows.is_empty() {
         String::new()
     } else {
         format!(

@@ -7,7 +7,7 @@ use crate::report::page::{Section, paragraph, table};
 use crate::report::units::Units;
 
 pub(super) fn section_of(units: &Units, diagnosis: &Diagnosis) -> Section {
-    let beside = if diagnosis.which.accepted.is_empty() {
+    let beside = if diagnosis.cause.accepted.is_empty() {
         "refitted"
     } else {
         "refitted beside the accepted effects"

@@ -1,6 +1,6 @@
 //! Where: in time, in the equations, in the twin, at which values, lags and frequencies.
 
-use crate::diagnose::{Diagnosis, Maps, Verdict, Where, Window};
+use crate::diagnose::{Diagnosis, Location, Maps, Verdict, Window};
 use crate::report::digits::{bare, error, percent, probability, short, unit_suffix};
 use crate::report::gap::pictures;
 use crate::report::page::Column::{self, Number, Text};
@@ -17,7 +17,7 @@ pub(super) fn section_of(study: &Study, diagnosis: &Diagnosis) -> Section {
 }
 
 fn body(study: &Study, diagnosis: &Diagnosis) -> String {
-    let mut body = match &diagnosis.place.target {
+    let mut body = match &diagnosis.location.target {
         Some(target) => paragraph(&format!("What is missing acts on {target}.")),
         None => String::new(),
     };
@@ -65,7 +65,7 @@ fn targets(diagnosis: &Diagnosis, filled: &str) -> String {
     let Some(svg) = pictures::targets(diagnosis) else {
         return String::new();
     };
-    let place = &diagnosis.place;
+    let place = &diagnosis.location;
     let alone = match (place.targets.first(), &place.target) {
         (Some(first), Some(target)) if first.target != *target => {
             format!(" Shares are of single explanations; what is accepted acts on {target}.")
@@ -85,7 +85,7 @@ fn targets(diagnosis: &Diagnosis, filled: &str) -> String {
 /// Ranges in numbers.
 fn ranges(study: &Study, diagnosis: &Diagnosis) -> String {
     let units = Units::of(study);
-    let rows: Vec<Vec<String>> = (diagnosis.place.maps.notable().regions.iter())
+    let rows: Vec<Vec<String>> = (diagnosis.location.maps.notable().regions.iter())
         .map(|r| {
             let unit = unit_suffix(units.variable(&r.variable));
             vec![
@@ -108,7 +108,7 @@ fn ranges(study: &Study, diagnosis: &Diagnosis) -> String {
 
 /// When, before and after the effect.
 fn time(diagnosis: &Diagnosis) -> String {
-    let place = &diagnosis.place;
+    let place = &diagnosis.location;
     let Some(svg) = pictures::time(diagnosis) else {
         return String::new();
     };
@@ -129,7 +129,7 @@ fn time(diagnosis: &Diagnosis) -> String {
     };
     lead.push_str(&format!(" {}.", standing(&place.maps)));
     if let Some(after) = &place.after {
-        let added = match diagnosis.which.accepted.as_slice() {
+        let added = match diagnosis.cause.accepted.as_slice() {
             [] => "the best explanation".into(),
             accepted => accepted.join(" and "),
         };
@@ -168,7 +168,7 @@ fn channel(channel: &str, record: usize) -> String {
 }
 
 /// Columns of the windows' table.
-fn head(place: &Where) -> Vec<(&'static str, Column)> {
+fn head(place: &Location) -> Vec<(&'static str, Column)> {
     let mut head = vec![
         ("output", Text),
         ("from, s", Number),
@@ -183,7 +183,7 @@ fn head(place: &Where) -> Vec<(&'static str, Column)> {
 }
 
 /// A row a window.
-fn rows(place: &Where) -> Vec<Vec<String>> {
+fn rows(place: &Location) -> Vec<Vec<String>> {
     let mut windows: Vec<&Window> = place.maps.windows.iter().collect();
     windows.sort_by(|a, b| {
         let key = |w: &Window| (w.record, w.channel.clone());
@@ -217,7 +217,7 @@ fn equations(study: &Study, diagnosis: &Diagnosis) -> String {
         return String::new();
     };
     let units = Units::of(study);
-    let equations = &diagnosis.place.equations;
+    let equations = &diagnosis.location.equations;
     let lead = match equations.first() {
         Some(first) => format!(
             "A disturbance in the {} follows the record best ({} among all equations, {}).",

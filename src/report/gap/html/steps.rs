@@ -12,9 +12,9 @@ use crate::study::Study;
 
 pub(super) fn section_of(study: &Study, units: &Units, diagnosis: &Diagnosis) -> Section {
     let mut body = list(&steps(diagnosis));
-    let accepted = &diagnosis.which.accepted;
+    let accepted = &diagnosis.cause.accepted;
     if !accepted.is_empty() {
-        let tables: Vec<String> = (diagnosis.which.effects.iter())
+        let tables: Vec<String> = (diagnosis.cause.effects.iter())
             .filter(|e| accepted.contains(&e.key()))
             .filter_map(|e| study_table(units, e))
             .collect();
@@ -23,7 +23,7 @@ pub(super) fn section_of(study: &Study, units: &Units, diagnosis: &Diagnosis) ->
         ));
         body.push_str(&preformatted(&tables.join("\n")));
     }
-    if let Some(next) = &diagnosis.which.next_input {
+    if let Some(next) = &diagnosis.cause.next_input {
         body.push_str(&measure(study, diagnosis, next));
     }
     Section::new("next", "What to do next", body)
@@ -64,7 +64,7 @@ fn measure(study: &Study, diagnosis: &Diagnosis, next: &NextInput) -> String {
 }
 
 fn steps(diagnosis: &Diagnosis) -> Vec<String> {
-    let which = &diagnosis.which;
+    let which = &diagnosis.cause;
     let mut steps = Vec::new();
     match (diagnosis.verdict, which.decision) {
         (Verdict::NoGap, _) => steps.push("Use the twin with the refitted parameters.".into()),
@@ -114,7 +114,7 @@ fn steps(diagnosis: &Diagnosis) -> Vec<String> {
 
 /// Where to look for a law that is not listed.
 fn none_of_these(diagnosis: &Diagnosis) -> Vec<String> {
-    let (place, maps) = (&diagnosis.place, diagnosis.place.maps.notable());
+    let (place, maps) = (&diagnosis.location, diagnosis.location.maps.notable());
     let mut look = match &place.target {
         Some(target) => format!("Look at {target}"),
         None => "Look at the twin".into(),

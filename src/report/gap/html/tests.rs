@@ -15,13 +15,13 @@ fn cases() -> Vec<Diagnosis> {
     let mut parameter = no_gap.clone();
     parameter.verdict = Verdict::ParameterGap;
     let mut class = named.clone();
-    class.which.decision = Decision::Class;
-    class.which.class = vec!["cubic-stiffness@x2".into(), "power-law@x2".into()];
+    class.cause.decision = Decision::Class;
+    class.cause.class = vec!["cubic-stiffness@x2".into(), "power-law@x2".into()];
     let mut none = named.clone();
-    none.which.decision = Decision::NoneOfThese;
-    none.which.accepted.clear();
-    none.which.class.clear();
-    none.which.catch_all = Some("x2".into());
+    none.cause.decision = Decision::NoneOfThese;
+    none.cause.accepted.clear();
+    none.cause.class.clear();
+    none.cause.catch_all = Some("x2".into());
     let mut short = named.clone();
     short.shrinkage = None;
     short.validation_runs = None;
@@ -249,7 +249,7 @@ fn every_part_of_the_answer_has_its_place() {
 #[test]
 fn a_twin_without_inputs_is_told_to_measure_instants() {
     let mut diagnosis = made::oscillator_none();
-    diagnosis.which.next_input = made::tanks_class().which.next_input;
+    diagnosis.cause.next_input = made::tanks_class().cause.next_input;
     let page = gap_html(&oscillator(), &diagnosis);
     assert!(page.contains("the file holds the instants alone"));
     assert!(!page.contains("The input to measure with next"));
@@ -260,7 +260,7 @@ fn absurd_numbers_and_hostile_names_stay_short_and_harmless() {
     let mut diagnosis = diagnoses()[1].clone();
     assert_eq!(diagnosis.verdict, Verdict::StructuralGap);
     diagnosis.twin = "<script>alert(1)</script>".into();
-    diagnosis.which.effects.push(EffectFit {
+    diagnosis.cause.effects.push(EffectFit {
         id: "a&b".into(),
         target: "\"x\"".into(),
         probability: 1e-300,
@@ -293,17 +293,17 @@ fn hostile_names_are_text_on_the_page() {
         for parameter in &mut diagnosis.parameters {
             (parameter.name, parameter.unit) = (hostile(), hostile());
         }
-        diagnosis.place.target = diagnosis.place.target.as_ref().map(|_| hostile());
-        for window in &mut diagnosis.place.maps.windows {
+        diagnosis.location.target = diagnosis.location.target.as_ref().map(|_| hostile());
+        for window in &mut diagnosis.location.maps.windows {
             window.channel = hostile();
         }
-        for region in &mut diagnosis.place.maps.regions {
+        for region in &mut diagnosis.location.maps.regions {
             region.variable = hostile();
         }
-        for effect in &mut diagnosis.which.effects {
+        for effect in &mut diagnosis.cause.effects {
             effect.target = hostile();
         }
-        for key in (diagnosis.which.accepted.iter_mut()).chain(&mut diagnosis.which.class) {
+        for key in (diagnosis.cause.accepted.iter_mut()).chain(&mut diagnosis.cause.class) {
             *key = hostile();
         }
         diagnosis.not_tested = vec![hostile()];

@@ -12,7 +12,7 @@ const SHOWN: usize = 3;
 /// The mean missing term of the most probable equations by ranges of states and inputs; `None` where none was looked for.
 pub fn equations(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
     let units = Units::of(study);
-    let with_term = || (diagnosis.place.equations.iter()).filter(|e| !e.term.is_empty());
+    let with_term = || (diagnosis.location.equations.iter()).filter(|e| !e.term.is_empty());
     let first = with_term().next()?;
     let rows = (with_term().take(SHOWN))
         .map(|equation| FacetRow {

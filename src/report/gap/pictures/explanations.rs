@@ -9,7 +9,7 @@ const SHOWN: usize = 8;
 
 /// Listed effects by probability, then everything else together; `None` where none was fitted.
 pub fn explanations(diagnosis: &Diagnosis) -> Option<String> {
-    let which = &diagnosis.which;
+    let which = &diagnosis.cause;
     let first = which.effects.first()?;
     let bar = |effect: &EffectFit| {
         let (key, gain) = (effect.key(), short(effect.log_score_gain));

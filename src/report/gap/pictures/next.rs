@@ -8,7 +8,7 @@ use crate::study::Study;
 
 /// The proposed inputs against time, held over each step; `None` where none is proposed, or the twin has no input.
 pub fn next_input(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
-    let next = diagnosis.which.next_input.as_ref()?;
+    let next = diagnosis.cause.next_input.as_ref()?;
     let drive = &next.drive;
     let inputs = Units::of(study).inputs;
     if inputs.is_empty() {

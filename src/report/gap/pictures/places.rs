@@ -29,7 +29,7 @@ fn grouped<'c, C, K: Ord + Copy>(
 
 /// Places in the twin by the probability of what explains the gap there; `None` where nothing was looked for.
 pub fn targets(diagnosis: &Diagnosis) -> Option<String> {
-    let targets = &diagnosis.place.targets;
+    let targets = &diagnosis.location.targets;
     let first = targets.first()?;
     let bars = (targets.iter())
         .filter(|t| t.share >= VISIBLE)
@@ -54,7 +54,7 @@ pub fn targets(diagnosis: &Diagnosis) -> Option<String> {
 /// Ranges of states, inputs and predicted outputs that stand out; `None` where none does.
 pub fn regions(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
     let units = Units::of(study);
-    let mut regions = diagnosis.place.maps.notable().regions;
+    let mut regions = diagnosis.location.maps.notable().regions;
     regions.retain(|r| r.share >= VISIBLE);
     let clearest = regions.first()?;
     let groups = grouped(&regions, |r| &r.variable)
@@ -84,7 +84,7 @@ pub fn regions(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
 
 /// Outputs that stand out; `None` where none does, or there is but one.
 pub fn channels(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
-    let channels = diagnosis.place.maps.notable().channels;
+    let channels = diagnosis.location.maps.notable().channels;
     let clearest = channels.first()?;
     if Units::of(study).outputs.len() < 2 {
         return None;
@@ -107,7 +107,7 @@ pub fn channels(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
 
 /// Lags at which innovations still depend on the past; `None` where they do not.
 pub fn lags(diagnosis: &Diagnosis) -> Option<String> {
-    let lags = diagnosis.place.maps.notable().lags;
+    let lags = diagnosis.location.maps.notable().lags;
     let clearest = lags.first()?;
     let between = |l: &Lag| {
         if l.from == l.to {
@@ -150,7 +150,7 @@ fn past(channel: &str, signal: &str) -> String {
 
 /// Frequency bands that stand out; `None` where none does.
 pub fn bands(diagnosis: &Diagnosis) -> Option<String> {
-    let bands = diagnosis.place.maps.notable().bands;
+    let bands = diagnosis.location.maps.notable().bands;
     let clearest = bands.first()?;
     let between = |b: &Band| format!("{} … {} Hz", short(b.low), short(b.high));
     let groups = grouped(&bands, |b| b.channel.as_str())

@@ -25,7 +25,7 @@ pub fn runs(study: &Study, diagnosis: &Diagnosis, validation: bool) -> Option<St
                 panel
             } else {
                 (panel.spans(windows(diagnosis, &output.name))).marks(
-                    onset(diagnosis.place.onset.as_ref(), 0, &output.name)
+                    onset(diagnosis.location.onset.as_ref(), 0, &output.name)
                         .into_iter()
                         .collect(),
                 )

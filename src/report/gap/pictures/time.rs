@@ -9,15 +9,15 @@ use crate::report::digits::{percent, short};
 ///
 /// Each cell has its share; frames say which cells stand out.
 pub fn time(diagnosis: &Diagnosis) -> Option<String> {
-    let maps = &diagnosis.place.maps;
+    let maps = &diagnosis.location.maps;
     let clearest = maps.windows.first()?;
-    let after = (diagnosis.place.after.as_ref()).filter(|m| !m.windows.is_empty());
+    let after = (diagnosis.location.after.as_ref()).filter(|m| !m.windows.is_empty());
     let full = largest(maps).max(after.map_or(0.0, largest));
     let alpha = diagnosis.detection.alpha;
     let mut groups = of_records(
         "twin, refitted",
         maps,
-        diagnosis.place.onset.as_ref(),
+        diagnosis.location.onset.as_ref(),
         alpha,
         full,
     );
@@ -53,7 +53,7 @@ pub fn time(diagnosis: &Diagnosis) -> Option<String> {
 
 /// What the second map is of.
 fn with_effects(diagnosis: &Diagnosis) -> String {
-    match diagnosis.which.accepted.as_slice() {
+    match diagnosis.cause.accepted.as_slice() {
         [] => "with the best explanation added".into(),
         accepted => format!("with {} added", accepted.join(" and ")),
     }

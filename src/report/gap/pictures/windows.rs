@@ -6,7 +6,7 @@ use crate::report::digits::{percent, short};
 
 /// Windows of the first record that stand out.
 pub(super) fn windows(diagnosis: &Diagnosis, channel: &str) -> Vec<Span> {
-    let notable = diagnosis.place.maps.notable();
+    let notable = diagnosis.location.maps.notable();
     let full = largest(&notable);
     spans(&notable, diagnosis.detection.alpha, full, (0, channel))
 }

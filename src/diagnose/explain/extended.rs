@@ -28,7 +28,7 @@ impl Accepted {
         format!("{}@{}", self.id, self.target)
     }
 
-    /// Whether only the noise is changed, so that no free run moves.
+    /// Returns true where only the noise changes, so that no free run moves.
     pub fn is_noise(&self) -> bool {
         matches!(
             self.addition.effect.law(),
@@ -38,42 +38,42 @@ impl Accepted {
 }
 
 /// A twin with accepted effects, fitted.
-pub(in crate::diagnose) struct Step<'a> {
-    pub bench: FittedTwin<'a>,
+pub(in crate::diagnose) struct ExtendedTwin<'a> {
+    pub model: FittedTwin<'a>,
     pub accepted: Vec<Accepted>,
     /// Score over the twin alone.
     pub score: f64,
 }
 
-/// The bench of a twin with effects, whose fit is `explanation` on `bench`, with its probability there.
-pub(in crate::diagnose) fn grown<'a>(
+/// The model of a twin with effects, whose fit is `explanation` on `model`, with its probability there.
+pub(in crate::diagnose) fn extend<'a>(
     context: &Context<'a>,
-    bench: &FittedTwin<'a>,
+    model: &FittedTwin<'a>,
     accepted: &[Accepted],
     explanation: &Explanation,
     probability: f64,
-) -> Result<Option<Step<'a>>, DiagnoseError> {
-    let Some(addition) = bench.addition(explanation) else {
+) -> Result<Option<ExtendedTwin<'a>>, DiagnoseError> {
+    let Some(addition) = model.addition(explanation) else {
         return Ok(None);
     };
-    let variant = &bench.dictionary.variants[explanation.variant];
-    let candidate = &bench.dictionary.candidates[explanation.candidate];
+    let variant = &model.dictionary.variants[explanation.variant];
+    let candidate = &model.dictionary.candidates[explanation.candidate];
     let mut all = accepted.to_vec();
     all.push(Accepted {
         addition,
         id: candidate.id.clone(),
         target: candidate.target.clone(),
-        magnitudes: magnitudes(bench, explanation),
+        magnitudes: magnitudes(model, explanation),
         gain: explanation.gain + explanation.validation.unwrap_or(0.0),
         probability,
     });
     let additions: Vec<Addition> = all.iter().map(|a| a.addition.clone()).collect();
-    let left: Vec<Candidate> = (bench.dictionary.candidates.iter())
+    let left: Vec<Candidate> = (model.dictionary.candidates.iter())
         .filter(|c| !c.is_listed() || !all.iter().any(|a| a.key() == c.key()))
         .cloned()
         .collect();
-    let problem = variant.problem(&bench.problem);
-    let Some(bench) = FittedTwin::new(
+    let problem = variant.problem(&model.problem);
+    let Some(model) = FittedTwin::new(
         context.twin,
         problem,
         explanation.fitted.clone(),
@@ -83,8 +83,8 @@ pub(in crate::diagnose) fn grown<'a>(
     else {
         return Ok(None);
     };
-    Ok(Some(Step {
-        bench,
+    Ok(Some(ExtendedTwin {
+        model,
         accepted: all,
         score: explanation.score(),
     }))
@@ -92,12 +92,12 @@ pub(in crate::diagnose) fn grown<'a>(
 
 /// Names and values of an explanation's magnitudes, those held at their off values included.
 pub(in crate::diagnose) fn magnitudes(
-    bench: &FittedTwin<'_>,
+    model: &FittedTwin<'_>,
     explanation: &Explanation,
 ) -> Vec<(String, f64)> {
-    let candidate = &bench.dictionary.candidates[explanation.candidate];
-    let variant = &bench.dictionary.variants[explanation.variant];
-    let problem = variant.problem(&bench.problem);
+    let candidate = &model.dictionary.candidates[explanation.candidate];
+    let variant = &model.dictionary.variants[explanation.variant];
+    let problem = variant.problem(&model.problem);
     let theta = problem.of_record(0, &explanation.fitted.theta);
     let mut free = theta[theta.len() - variant.free.len()..].iter();
     (candidate.magnitudes().into_iter())
@@ -109,24 +109,27 @@ pub(in crate::diagnose) fn magnitudes(
         .collect()
 }
 
-/// Of a twin whose free run is to follow the record: whether a step's effects let it follow the validation record better than
+/// For a twin whose free run is to follow the record: returns true where the effects let it follow the validation record better than
 /// those `before` by a good part, beyond chance. A real system is never explained to the last bit, and without process noise
 /// nothing else would be accepted.
 pub(in crate::diagnose) fn improves(
     context: &Context<'_>,
-    (bench, before): (&FittedTwin<'_>, &[Accepted]),
-    step: &Step<'_>,
+    (model, before): (&FittedTwin<'_>, &[Accepted]),
+    extended: &ExtendedTwin<'_>,
     noise: Noise,
 ) -> Result<bool, DiagnoseError> {
     let Some(records) = context.validation.filter(|_| context.follows) else {
         return Ok(false);
     };
-    let errors = |bench: &FittedTwin<'_>, accepted: &[Accepted]| -> Result<_, DiagnoseError> {
+    let errors = |model: &FittedTwin<'_>, accepted: &[Accepted]| -> Result<_, DiagnoseError> {
         let additions: Vec<Addition> = accepted.iter().map(|a| a.addition.clone()).collect();
-        let theta = bench.problem.of_record(0, &bench.fitted.theta);
+        let theta = model.problem.of_record(0, &model.fitted.theta);
         Ok(Runner::new(context.twin, &additions, theta)?.errors(&records[0], 0))
     };
-    let (before, after) = (errors(bench, before)?, errors(&step.bench, &step.accepted)?);
+    let (before, after) = (
+        errors(model, before)?,
+        errors(&extended.model, &extended.accepted)?,
+    );
     Ok(before.zip(after).is_some_and(|(before, after)| {
         let (_, interval) = closed(&before, &after, 0.0, noise.child("improves"));
         interval.is_some_and(|[low, _]| low > Thresholds::GOOD_PART)

@@ -1,0 +1,117 @@
+//! Likelihood of a record under a twin of either kind, chosen once.
+
+use super::ensemble;
+use super::kalman::{Coordinates, FilterError, FilterSettings, Filtered, Kalman, Score};
+use crate::record::{Record, Signal};
+use crate::twin::{DigitalTwin, Outline, StateSpace, Twin};
+use std::sync::Arc;
+
+/// Likelihood of a record at θ.
+pub(crate) trait Likelihood: Send + Sync {
+    /// States, inputs and outputs.
+    fn outline(&self) -> Outline;
+    /// Innovations and their densities.
+    fn filtered(&self, theta: &[f64], record: &Record) -> Result<Filtered, FilterError>;
+    /// Innovations with the filtered states.
+    fn states(&self, theta: &[f64], record: &Record) -> Result<(Filtered, Signal), FilterError>;
+    /// Log-likelihood, with the innovations where they come at no extra cost.
+    fn log_likelihood(
+        &self,
+        theta: &[f64],
+        record: &Record,
+    ) -> Result<(f64, Option<Filtered>), FilterError>;
+    /// Gradient and information; `None` where only differences give them.
+    fn score(
+        &self,
+        theta: &[f64],
+        record: &Record,
+        coordinates: &Coordinates,
+    ) -> Result<Option<Score>, FilterError>;
+    /// True where each likelihood costs an ensemble of simulations.
+    fn is_simulated(&self) -> bool;
+}
+
+/// Returns a filter's likelihood for a twin with equations, an ensemble's for any other.
+pub(crate) fn likelihood_of(twin: &Twin) -> Arc<dyn Likelihood> {
+    match twin {
+        Twin::Equations(twin) => Arc::new(Filter(twin.clone(), FilterSettings::default())),
+        Twin::BlackBox(twin) => Arc::new(Ensemble(twin.clone())),
+    }
+}
+
+struct Filter(Arc<dyn StateSpace>, FilterSettings);
+
+impl Likelihood for Filter {
+    fn outline(&self) -> Outline {
+        self.0.outline()
+    }
+    fn filtered(&self, theta: &[f64], record: &Record) -> Result<Filtered, FilterError> {
+        Kalman::new(self.0.as_ref(), record, &self.1)?.filter(theta)
+    }
+    fn states(&self, theta: &[f64], record: &Record) -> Result<(Filtered, Signal), FilterError> {
+        let settings = FilterSettings {
+            keep_states: true,
+            ..self.1.clone()
+        };
+        let mut filtered = Kalman::new(self.0.as_ref(), record, &settings)?.filter(theta)?;
+        let states = (filtered.states.take()).map_or_else(|| Signal::zeros((0, 0)), |s| s.means);
+        Ok((filtered, states))
+    }
+    fn log_likelihood(
+        &self,
+        theta: &[f64],
+        record: &Record,
+    ) -> Result<(f64, Option<Filtered>), FilterError> {
+        let kalman = Kalman::new(self.0.as_ref(), record, &self.1)?;
+        Ok((kalman.log_likelihood(theta)?, None))
+    }
+    fn score(
+        &self,
+        theta: &[f64],
+        record: &Record,
+        coordinates: &Coordinates,
+    ) -> Result<Option<Score>, FilterError> {
+        let kalman = Kalman::new(self.0.as_ref(), record, &self.1)?;
+        Score::forward(&kalman, theta, coordinates).map(Some)
+    }
+    fn is_simulated(&self) -> bool {
+        false
+    }
+}
+
+struct Ensemble(Arc<dyn DigitalTwin>);
+
+impl Likelihood for Ensemble {
+    /// The predicted outputs stand for states.
+    fn outline(&self) -> Outline {
+        let signals = self.0.signals();
+        Outline {
+            parameters: self.0.parameters(),
+            states: signals.outputs.clone(),
+            inputs: signals.inputs,
+            outputs: signals.outputs,
+        }
+    }
+    fn filtered(&self, theta: &[f64], record: &Record) -> Result<Filtered, FilterError> {
+        Ok(ensemble::predictor(self.0.as_ref(), theta, record)?.filter(record.outputs()))
+    }
+    fn states(&self, theta: &[f64], record: &Record) -> Result<(Filtered, Signal), FilterError> {
+        let filtered = self.filtered(theta, record)?;
+        let predicted = filtered.predictions(record.outputs());
+        Ok((filtered, predicted))
+    }
+    fn log_likelihood(
+        &self,
+        theta: &[f64],
+        record: &Record,
+    ) -> Result<(f64, Option<Filtered>), FilterError> {
+        let filtered = self.filtered(theta, record)?;
+        Ok((filtered.log_likelihood, Some(filtered)))
+    }
+    fn score(&self, _: &[f64], _: &Record, _: &Coordinates) -> Result<Option<Score>, FilterError> {
+        Ok(None)
+    }
+    fn is_simulated(&self) -> bool {
+        true
+    }
+}
