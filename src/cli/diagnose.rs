@@ -1,10 +1,10 @@
 //! `diagnose`: tests whether the twin explains the record, and finds what it lacks.
 
 use super::args::Subject;
-use super::{Context, Failure, Verb, output};
+use super::{Context, Failure, Verb, output, records};
 use crate::diagnose::{DiagnoseSettings, GivenRecord, diagnose};
 use crate::estimator::Estimator;
-use crate::record::{Record, drive_csv_text, read_record};
+use crate::record::{Record, drive_csv_text};
 use crate::report::{NEXT_INPUT, gap_html, gap_json, gap_text};
 use crate::study::Study;
 use clap::Args;
@@ -46,14 +46,10 @@ impl Verb for Diagnose {
     }
 
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        if let Some(out) = &self.out {
-            output::check_new(out)?;
-        }
+        let folder = self.out.as_deref().map(output::NewFolder::new);
+        let folder = folder.transpose()?;
         let study = context.study(&self.subject)?;
-        let records: Vec<Record> = (self.records.iter())
-            .map(|path| read_record(path))
-            .collect::<Result<_, _>>()?;
-        let validation = self.validation.as_deref().map(read_record).transpose()?;
+        let (records, validation) = records::read(&self.records, self.validation.as_deref())?;
         let initial = match &self.estimator {
             Some(path) => Some(first_estimate(context, &study, path, &records[0])?),
             None => None,
@@ -84,8 +80,7 @@ impl Verb for Diagnose {
             }
         })?;
         let json = gap_json(&found);
-        if let Some(out) = &self.out {
-            let folder = output::NewFolder::new(out)?;
+        if let Some(folder) = folder {
             let text = serde_json::to_string_pretty(&json).map_err(Failure::internal)?;
             folder.write("report.json", &text)?;
             folder.write("report.html", &gap_html(&study, &found))?;

@@ -13,7 +13,7 @@ use crate::math::WhiteningError;
 use crate::network::{Checkpoints, History, NetworkError, Part, Samples};
 use crate::progress::Progress;
 use crate::setting::SettingError;
-use crate::storage::work::WorkError;
+use crate::storage::StorageError;
 use crate::study::PlanError;
 use ndarray::Array2;
 use std::borrow::Cow;
@@ -93,7 +93,7 @@ pub enum PretrainError {
     },
     /// Of the folder in which a pretraining is kept.
     #[error(transparent)]
-    Work(#[from] WorkError),
+    Work(#[from] StorageError),
     /// Of the bank in that folder.
     #[error(transparent)]
     Shards(#[from] ShardsError),

@@ -6,6 +6,7 @@ use crate::estimator::bank::{Bank, Draws};
 use crate::estimator::shards::{BankPlan, ShardedBank};
 use crate::network::{Checkpoints, History, NetworkError};
 use crate::progress::Progress;
+use crate::storage::sweep_beside;
 use crate::storage::work::{Manifest, Share, WorkFolder};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -118,7 +119,7 @@ impl<'a> Pretraining<'a> {
     ) -> Result<(Estimator, History), PretrainError> {
         let manifest = self.manifest()?;
         let place = beside(path);
-        WorkFolder::sweep_removed(&place)?;
+        sweep_beside(path);
         if path.symlink_metadata().is_ok() && WorkFolder::resume(&place, &manifest).is_err() {
             return Err(PretrainError::Taken(path.into()));
         }

@@ -7,7 +7,7 @@ use crate::math::DifferenceError;
 use crate::progress::Cancelled;
 use crate::record::RecordError;
 use crate::setting::SettingError;
-use crate::storage::work::WorkError;
+use crate::storage::StorageError;
 use crate::study::PlanError;
 use crate::twin::{Interval, SimulationError, TwinError};
 use std::path::PathBuf;
@@ -80,7 +80,7 @@ pub enum EvaluateError {
     },
     /// The work folder cannot be used.
     #[error(transparent)]
-    Work(#[from] WorkError),
+    Work(#[from] StorageError),
     /// The study's inputs cannot be drawn.
     #[error(transparent)]
     Plan(#[from] PlanError),
@@ -111,9 +111,6 @@ pub enum EvaluateError {
     /// The diagnosis failed.
     #[error(transparent)]
     Diagnose(#[from] DiagnoseError),
-    /// No threads.
-    #[error("no threads could be started: {0}")]
-    Threads(#[from] rayon::ThreadPoolBuildError),
     /// The caller stopped the work.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),

@@ -56,7 +56,9 @@ pub(crate) fn with_remedy(error: &io::Error) -> String {
         io::ErrorKind::NotFound => "check the path",
         io::ErrorKind::IsADirectory => "name a file, not a folder",
         io::ErrorKind::PermissionDenied => "change its permissions, or choose another place",
-        io::ErrorKind::AlreadyExists => "choose another name, or remove it",
+        io::ErrorKind::AlreadyExists | io::ErrorKind::DirectoryNotEmpty => {
+            "choose another name, or remove it"
+        }
         io::ErrorKind::ReadOnlyFilesystem => "choose another place",
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
             "make room, or choose another place"

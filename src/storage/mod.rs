@@ -14,4 +14,4 @@ pub(crate) mod untrusted;
 pub mod work;
 
 pub use error::StorageError;
-pub(crate) use unfinished::NewFolder;
+pub(crate) use unfinished::{NewFolder, sweep_beside};

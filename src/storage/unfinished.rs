@@ -74,6 +74,11 @@ pub(super) fn sweep(place: &Path) {
     }
 }
 
+/// Removes leftovers beside an output.
+pub(crate) fn sweep_beside(path: &Path) {
+    sweep(folder(path));
+}
+
 fn remove_abandoned(path: &Path) {
     // A link or a pipe is none of ours, and opening it may have effects.
     let Ok(data) = path.symlink_metadata() else {
@@ -155,7 +160,10 @@ impl NewFolder {
 
     fn locked(place: &Path, filling: TempDir) -> Option<Self> {
         let open = File::open(filling.path()).ok();
-        if open.as_ref().is_some_and(|file| !holds(file, filling.path())) {
+        if open
+            .as_ref()
+            .is_some_and(|file| !holds(file, filling.path()))
+        {
             // Removed by a sweep; the name may be another process's by now.
             let _ = filling.keep();
             return None;

@@ -3,7 +3,7 @@
 use super::PriorError;
 use crate::estimator::bank::BankError;
 use crate::estimator::bank::file::BankFileError;
-use crate::storage::work::WorkError;
+use crate::storage::StorageError;
 use std::path::PathBuf;
 
 /// Why a bank on disk cannot be made or used.
@@ -30,7 +30,7 @@ pub enum ShardsError {
     Size(usize),
     /// Of the folder.
     #[error(transparent)]
-    Work(#[from] WorkError),
+    Work(#[from] StorageError),
     /// Of a shard.
     #[error(transparent)]
     File(#[from] BankFileError),

@@ -4,9 +4,10 @@ use super::ShardsError;
 use super::plan::{MOST, VERB, rows_of_a_shard};
 use crate::estimator::bank::file::{self, BankFileError};
 use crate::estimator::bank::{Bank, Draws};
-use crate::storage::files::{sha256, sweep, write_new};
+use crate::storage::StorageError;
+use crate::storage::files::{sha256, write_new};
 use crate::storage::untrusted::{MESSAGE, MOST_NUMBERS, one_line, read_kept};
-use crate::storage::work::{Manifest, WorkError, WorkFolder};
+use crate::storage::work::{Manifest, WorkFolder};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -71,7 +72,7 @@ impl Shards {
         let of = size.div_ceil(rows);
         let place = folder.part(SHARDS)?;
         let mut there = BTreeMap::new();
-        let failed = |error| ShardsError::from(WorkError::io(&place, error));
+        let failed = |error| ShardsError::from(StorageError::io(&place, error));
         for entry in std::fs::read_dir(&place).map_err(failed)? {
             let found = entry.map_err(failed)?.file_name();
             let Some((number, checksum)) = found.to_str().and_then(parse) else {
@@ -191,8 +192,7 @@ impl Shards {
         if self.there.len() == self.of {
             let checksums: Vec<&String> = self.there.values().collect();
             self.folder.finish(&self.manifest, json!(checksums))?;
-            let place = self.folder.part(SHARDS)?;
-            sweep(&place).map_err(|error| WorkError::io(&place, error))?;
+            self.folder.sweep();
         }
         Ok(())
     }
@@ -204,9 +204,13 @@ impl Shards {
 }
 
 /// Of a folder whose manifest says too little.
-fn foreign(path: &Path) -> WorkError {
+fn foreign(path: &Path) -> StorageError {
     let path = path.into();
-    WorkError::Foreign { path, verb: VERB }
+    StorageError::Foreign {
+        path,
+        verb: VERB,
+        reason: "its manifest.json is damaged".into(),
+    }
 }
 
 fn damaged(path: PathBuf, reason: &str) -> BankFileError {

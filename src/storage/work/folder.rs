@@ -208,7 +208,12 @@ impl WorkFolder {
 fn read_manifest(path: &Path, verb: &'static str) -> Result<Manifest, String> {
     if !path.is_dir() {
         let is_file = path.symlink_metadata().is_ok();
-        return Err(if is_file { "it is no folder" } else { "it does not exist" }.into());
+        return Err(if is_file {
+            "it is no folder"
+        } else {
+            "it does not exist"
+        }
+        .into());
     }
     let text = read_kept_text(&path.join(MANIFEST), MOST);
     let text = text.map_err(|error| match error.kind() {

@@ -78,16 +78,28 @@ impl Manifest {
     ///
     /// A text that is no manifest of this verb, in words.
     pub(super) fn parse(verb: &'static str, text: &str) -> Result<Self, String> {
-        let entries: Map<String, Value> = serde_json::from_str(text)
-            .map_err(|error| format!("its manifest.json is damaged: {}", excerpt(&error.to_string())))?;
-        let schema = entries.get("schema").and_then(Value::as_str).unwrap_or_default();
+        let entries: Map<String, Value> = serde_json::from_str(text).map_err(|error| {
+            format!(
+                "its manifest.json is damaged: {}",
+                excerpt(&error.to_string())
+            )
+        })?;
+        let schema = entries
+            .get("schema")
+            .and_then(Value::as_str)
+            .unwrap_or_default();
         if schema.starts_with(&format!("truetwin.{verb}-folder/")) {
             return Ok(Self { verb, entries });
         }
-        Err(match schema.strip_prefix("truetwin.").and_then(|s| s.split_once("-folder/")) {
-            Some((other, _)) => format!("it is one of `truetwin {}`", excerpt(other)),
-            None => "its manifest.json has another schema".into(),
-        })
+        Err(
+            match schema
+                .strip_prefix("truetwin.")
+                .and_then(|s| s.split_once("-folder/"))
+            {
+                Some((other, _)) => format!("it is one of `truetwin {}`", excerpt(other)),
+                None => "its manifest.json has another schema".into(),
+            },
+        )
     }
 
     /// Returns the first difference from the `kept` manifest in words, finished or not; `None` if there is none.
@@ -98,7 +110,11 @@ impl Manifest {
         let (old, new) = (shown(kept.get(key)), shown(self.get(key)));
         let both = format!("{key} was {old}, now it is {new}");
         let short = old.chars().count().max(new.chars().count()) <= SHORT;
-        Some(excerpt(&if short { both } else { format!("{key} differs") }))
+        Some(excerpt(&if short {
+            both
+        } else {
+            format!("{key} differs")
+        }))
     }
 }
 

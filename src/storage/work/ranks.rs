@@ -58,8 +58,8 @@ impl Ranks {
     fn of_launch(_: usize) -> Result<Self, StorageError> {
         use mpi::traits::Communicator;
         // Work runs in thread pools; of all threads, one at a time speaks to MPI.
-        let (universe, _) =
-            mpi::initialize_with_threading(mpi::Threading::Serialized).ok_or(StorageError::MpiStart)?;
+        let (universe, _) = mpi::initialize_with_threading(mpi::Threading::Serialized)
+            .ok_or(StorageError::MpiStart)?;
         let world = universe.world();
         let (rank, size) = (world.rank() as usize, world.size() as usize);
         Ok(Self {

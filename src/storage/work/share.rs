@@ -48,7 +48,7 @@ impl Share {
 }
 
 impl FromStr for Share {
-    type Err = ShareError;
+    type Err = StorageError;
 
     fn from_str(text: &str) -> Result<Self, StorageError> {
         let wrong = || StorageError::Share(text.into());
