@@ -1,7 +1,6 @@
 //! # truetwin
 //!
-//! A simulator ("digital twin") is fitted to the one real system in front of you, told when it cannot be trusted, and
-//! calibrated where its training never went. When no parameters fit, it is told what it lacks.
+//! Calibrates simulators ("digital twins") against measured data and diagnoses what they are missing.
 //!
 //! ```text
 //! prior ─ simulate ─▶ bank ─ features ─▶ train ─▶ estimator            pretrain, once
@@ -42,7 +41,7 @@
 //! let small = PretrainOptions { bank_size: Some(300), epochs: Some(5), ..PretrainOptions::default() };
 //! let (estimator, _) = pretrain(&study, &small, &Progress::silent())?;
 //!
-//! // The measurement, here of a tank whose k = 1.5 is outside of the prior.
+//! // The measured record, here of a tank with k = 1.5, outside the prior.
 //! let noise = Noise::new(7, "measured", 0);
 //! let drive = study.drives()?.draw(noise)?;
 //! let outputs = Tank.simulate(&[1.5], &drive, noise)?;
@@ -52,47 +51,44 @@
 //! assert!((estimate.theta[0] - 1.5).abs() < 4.0 * estimate.std_error[0]);
 //!
 //! let settings = DiagnoseSettings { detection_only: true, ..DiagnoseSettings::default() };
-//! let found = diagnose(&study, &[record], None, &settings, &Progress::silent())?;
-//! assert_eq!(found.verdict, Verdict::ParameterGap); // k is not what we thought, and nothing else is wrong
+//! let diagnosis = diagnose(&study, &[record], None, &settings, &Progress::silent())?;
+//! assert_eq!(diagnosis.verdict, Verdict::ParameterGap); // k is outside its prior; the equations are right
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! | to … | look at |
+//! | task | module |
 //! |---|---|
-//! | have the usual names at hand | [`prelude`] |
-//! | plug in a simulator | [`twin::StateSpace`], [`twin::DigitalTwin`] |
-//! | plug in a program written in any language, or an FMU | [`external`] |
-//! | say what records look like and which recipe to use | [`study::Study`] |
-//! | train, save, load, estimate | [`estimator::pretrain`], [`estimator::Estimator`] |
-//! | learn what a twin lacks | [`diagnose::diagnose`] |
-//! | add an effect that a twin lacks | [`effect`], [`effect::augment`] |
-//! | give a twin the whole command line | [`cli::run`] |
-//! | compress records otherwise; shape the network | [`feature::FeatureRecipe`], [`network::HeadArchitecture`] |
-//! | filter a record, or take its likelihood | [`likelihood`] |
-//! | fill a bank on disk, from many processes | [`estimator::shards::BankPlan`], [`storage::work`] |
-//! | judge an estimator or a diagnosis | [`evaluate`] |
+//! | write a simulator | [`twin`]: [`twin::StateSpace`], [`twin::DigitalTwin`] |
+//! | use a program in any language, or an FMU | [`external`] |
+//! | read and write records | [`record`] |
+//! | combine twin, record plan and effects | [`study`] |
+//! | train, save, load, estimate; own features and networks | [`estimator`], [`feature`], [`network`] |
+//! | find missing effects | [`diagnose`] |
+//! | add effects to a twin | [`effect`] |
+//! | filter a record, compute its likelihood | [`likelihood`] |
+//! | score estimators and diagnoses | [`evaluate`] |
+//! | render results | [`report`] |
+//! | run the command line over own twins | [`cli`] |
 //! | show progress, stop long work | [`progress`] |
-//! | print, draw, hand on results | [`report`] |
+//! | import the usual names | [`prelude`] |
 //!
-//! The library never prints, never exits and sets no global thread pool. Cargo features: `cli` (the command line; the one
-//! default), `mpi` (ranks of a cluster share work), `fmi` (FMUs as twins), `parquet` (records in Parquet files).
+//! The library never prints, never exits and sets no global thread pool. Cargo features: `cli` (command line; default),
+//! `mpi` (ranks of a cluster share work), `fmi` (FMUs as twins), `parquet` (records in Parquet files).
 //!
-//! Public items, the command line and the schemas of files follow semantic versioning; bits of results and hidden items do
-//! not. What raises which number: [docs/architecture.md](../../../docs/architecture.md#versions).
+//! Public items, the command line and the schemas of files follow semantic versioning; bits of results do not
+//! ([docs/architecture.md](../../../docs/architecture.md#versions)).
 //!
-//! Examples: each item has one, but for getters, fields and variants; theirs is that of their type or module.
-//!
-//! Source of the method: Lakshminarayanan, Guerrero & Rojas, "Fine-Tuning a Simulation-Driven Estimator".
+//! Method: Lakshminarayanan, Guerrero & Rojas, "Fine-Tuning a Simulation-Driven Estimator".
 
 // The library never prints and never panics on data; tests may.
 #![cfg_attr(
     not(test),
     warn(clippy::print_stdout, clippy::print_stderr, clippy::unwrap_used)
 )]
-// A few functions of the rooms serve the command line alone.
+// Some functions serve the command line alone.
 #![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
 
-/// `Debug` by name, of types that hold what has no `Debug`: twins, maps, listeners.
+/// Implements `Debug` by name, for types that hold twins, maps or listeners.
 macro_rules! debug_by_name {
     ($($type:ident $(<$life:lifetime>)?),+ $(,)?) => {
         $(impl std::fmt::Debug for $type $(<$life>)? {

@@ -1,4 +1,4 @@
-//! The `truetwin` command: the generic command line over the reference twins.
+//! The `truetwin` program: the command line over the reference twins.
 
 use std::process::ExitCode;
 use truetwin::estimator::Project;

@@ -4,9 +4,9 @@ use super::args::Subject;
 use super::{Context, Failure, Verb, output};
 use crate::estimator::PresetName;
 use crate::twin::conformance::{Severity, check};
-use crate::twin::{FREE_RUNS, Noise, SimulationError, Twin};
+use crate::twin::{Noise, SimulationError, Twin};
 use clap::Args;
-use serde_json::{Value, json};
+use serde_json::json;
 use std::process::ExitCode;
 use std::sync::Arc;
 
@@ -49,11 +49,6 @@ impl Verb for Check {
         };
         let failed = findings.iter().any(|f| f.severity == Severity::Failure);
         if context.json {
-            let findings: Vec<Value> = (findings.iter())
-                .map(
-                    |f| json!({ "check": f.check, "severity": word(f.severity), "message": f.message }),
-                )
-                .collect();
             output::print_json(&json!({
                 "schema": "truetwin.check/1", "twin": study.name(), "passed": !failed, "findings": findings,
             }))?;
@@ -75,9 +70,6 @@ impl Verb for Check {
 /// of 32.
 fn runs(twin: &Twin) -> usize {
     let d = twin.parameters().len();
-    let free = match twin {
-        Twin::Equations(_) => 1,
-        Twin::BlackBox(_) => FREE_RUNS as usize,
-    };
+    let free = twin.runs_of_a_free_run();
     (1 << d.min(6)) + 2 * d * free + 4
 }

@@ -27,7 +27,7 @@ const USER: u8 = 2;
 /// Exit code of everything else.
 const INTERNAL: u8 = 1;
 
-/// Why a verb ended early.
+/// The reason why a verb ended early.
 #[derive(Debug)]
 pub(super) struct Failure {
     message: String,

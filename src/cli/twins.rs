@@ -3,7 +3,6 @@
 use super::{Context, Failure, Verb, output};
 use crate::record::Quantity;
 use crate::study::Study;
-use crate::twin::Parameter;
 use clap::Args;
 use serde_json::{Value, json};
 use std::process::ExitCode;
@@ -36,27 +35,17 @@ impl Verb for Twins {
     }
 }
 
-fn quantities(all: &[Quantity]) -> Vec<Value> {
-    (all.iter())
-        .map(|q| json!({ "name": q.name, "unit": q.unit }))
-        .collect()
-}
-
-fn parameter(p: &Parameter) -> Value {
-    json!({ "name": p.name, "unit": p.unit, "prior": p.prior, "bounds": p.bounds, "role": p.role })
-}
-
 fn describe(study: &Study) -> Value {
     let twin = study.twin();
     let signals = twin.signals();
-    let states = twin.outline().map(|outline| quantities(&outline.states));
+    let states = twin.outline().map(|outline| outline.states);
     json!({
         "name": study.name(),
         "equations": states.is_some(),
-        "parameters": twin.parameters().iter().map(parameter).collect::<Vec<_>>(),
+        "parameters": twin.parameters().iter().collect::<Vec<_>>(),
         "states": states.unwrap_or_default(),
-        "inputs": quantities(&signals.inputs),
-        "outputs": quantities(&signals.outputs),
+        "inputs": signals.inputs,
+        "outputs": signals.outputs,
         "record": { "step": study.plan().step, "samples": study.plan().samples },
     })
 }

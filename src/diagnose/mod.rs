@@ -45,3 +45,6 @@ pub use outcome::{
 pub(crate) use quantify::held_out::{SHORTEST_SPLIT, held_out_from};
 pub use run::diagnose;
 pub use settings::DiagnoseSettings;
+
+/// Nats within which explanations are rivals.
+pub(crate) const RIVALS: f64 = thresholds::Thresholds::RIVALS;

@@ -17,6 +17,7 @@ use crate::setting::SettingError;
 use crate::study::StudyError;
 use crate::twin::{Noise, Role};
 use nalgebra::DVector;
+use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::time::Instant;
 
@@ -84,7 +85,7 @@ pub struct Estimate {
 }
 
 /// Wall-clock seconds of each stage; `None` for skipped ones.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 #[non_exhaustive]
 pub struct Seconds {
     /// Features and network.
@@ -102,7 +103,7 @@ pub struct Seconds {
 }
 
 /// A parameter that is estimated without being asked for.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Nuisance {
     /// State, output, or `id@target.magnitude`.

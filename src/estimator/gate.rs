@@ -40,7 +40,7 @@
 //! ```
 
 use crate::estimator::bank::{BankError, FeatureSimulator};
-use crate::math::{Whitening, WhiteningError, median, rank_p_value};
+use crate::math::{MathError, Whitening, median, rank_p_value};
 use crate::progress::Progress;
 use crate::record::Drive;
 use crate::setting::SettingError;
@@ -161,7 +161,7 @@ impl GateSettings {
     }
 
     /// μ and S^{-1/2} from simulated features, in the form of the test.
-    pub fn whiten(&self, features: &Array2<f64>) -> Result<Whitening, WhiteningError> {
+    pub fn whiten(&self, features: &Array2<f64>) -> Result<Whitening, MathError> {
         match self.form {
             GateForm::Calibrated => Whitening::calibrated(features),
             GateForm::Paper => Whitening::regularised(features, self.epsilon),
@@ -170,17 +170,17 @@ impl GateSettings {
 }
 
 /// The test's answer.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct GateOutcome {
-    /// s of the record.
-    pub statistic: f64,
     /// (1 + number of simulations at least as far) / (B + 1).
     pub p_value: f64,
     /// Nominal rate.
     pub alpha: f64,
     /// Whether the record is not what the twin makes at this θ.
     pub out_of_distribution: bool,
+    /// s of the record.
+    pub statistic: f64,
 }
 
 /// Why the test could not be made.
@@ -202,7 +202,7 @@ pub enum GateError {
     #[error(
         "the features simulated at the estimate cannot be whitened: {0}; a twin without noise has no statistics: give it noise levels ([noise] in a study)"
     )]
-    Whitening(#[from] WhiteningError),
+    Whitening(#[from] MathError),
 }
 
 /// What the test simulates with.

@@ -9,7 +9,7 @@ use crate::estimator::bank::file::BankFileError;
 use crate::estimator::bank::{Bank, BankError, Draws};
 use crate::estimator::shards::{Prior, PriorError, ShardsError};
 use crate::feature::FeatureError;
-use crate::math::WhiteningError;
+use crate::math::MathError;
 use crate::network::{Checkpoints, History, NetworkError, Part, Samples};
 use crate::progress::Progress;
 use crate::setting::SettingError;
@@ -108,7 +108,7 @@ pub enum PretrainError {
     Network(#[from] NetworkError),
     /// The features of the bank do not vary, or are not finite.
     #[error("the features of the bank cannot be standardised: {0}")]
-    Standardise(#[from] WhiteningError),
+    Standardise(#[from] MathError),
     /// More features than the network takes.
     #[error(
         "the features are {features} numbers, network \"{network}\" takes at most {most}; lower their order or choose a wider network"

@@ -1,7 +1,7 @@
 //! What stands between features and a network: an affine map to unit variance.
 
 use super::Scaler;
-use crate::math::{Whitening, WhiteningError};
+use crate::math::{MathError, Whitening};
 use ndarray::{Array1, Array2};
 
 /// Network inputs z = clip((x − mean)·W, ±limit), as many as features.
@@ -44,7 +44,7 @@ impl Standardiser {
     /// # Errors
     ///
     /// As [`Whitening::calibrated`].
-    pub fn principal(samples: &Array2<f64>, limit: f64) -> Result<Self, WhiteningError> {
+    pub fn principal(samples: &Array2<f64>, limit: f64) -> Result<Self, MathError> {
         let whitening = Whitening::calibrated(samples)?;
         let (mean, axes) = (whitening.mean(), whitening.matrix());
         let n = mean.len();

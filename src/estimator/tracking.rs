@@ -1,6 +1,7 @@
 //! How well the calibrated twin follows a record, free of noise.
 
-use crate::fit::{Bounds, EvaluationError, GaussNewton, OptimiseError, ResidualProblem};
+use crate::fit::{Bounds, GaussNewton, ResidualProblem};
+use crate::math::MathError;
 use crate::math::Stencil;
 use crate::record::{Record, Signal};
 use crate::twin::{DigitalTwin, Interval, ParameterSpace, Role};
@@ -23,7 +24,7 @@ pub fn track(
     twin: &dyn DigitalTwin,
     theta: &[f64],
     record: &Record,
-) -> Result<Tracking, OptimiseError> {
+) -> Result<Tracking, MathError> {
     let space = twin.parameters();
     let starts: Vec<usize> = (0..space.len())
         .filter(|&j| space[j].role == Role::Start)
@@ -41,7 +42,7 @@ pub fn track(
             DVector::from_iterator(starts.len(), starts.iter().map(|&j| of(space[j].bounds)))
         };
         let bounds = Bounds::new(at(Interval::low), at(Interval::high))
-            .map_err(|error| OptimiseError::Fatal(error.into()))?;
+            .map_err(|error| MathError::Fatal(error.into()))?;
         let begin = DVector::from_iterator(starts.len(), starts.iter().map(|&j| theta[j]));
         let scale =
             DVector::from_iterator(starts.len(), starts.iter().map(|&j| space[j].prior.width()));
@@ -52,7 +53,7 @@ pub fn track(
     }
     let outputs = twin
         .free_run(&fitted, record.drive())
-        .map_err(|error| OptimiseError::Start(error.into()))?;
+        .map_err(|error| MathError::Start(error.into()))?;
     let squares = (record.outputs() - &outputs).mapv(|d| d * d);
     Ok(Tracking {
         rmse: squares.mean().unwrap_or(0.0).sqrt(),
@@ -75,18 +76,17 @@ impl ResidualProblem for StartFit<'_> {
         self.starts.len()
     }
 
-    fn residual(&self, starts: &DVector<f64>) -> Result<DVector<f64>, EvaluationError> {
+    fn residual(&self, starts: &DVector<f64>) -> Result<DVector<f64>, MathError> {
         let mut theta = self.theta.to_vec();
         for (&j, value) in self.starts.iter().zip(starts.iter()) {
             theta[j] = *value;
         }
-        let run =
-            (self.twin.free_run(&theta, self.record.drive())).map_err(EvaluationError::rejected)?;
+        let run = (self.twin.free_run(&theta, self.record.drive())).map_err(MathError::rejected)?;
         let rows = self.record.outputs().iter().zip(&run).map(|(y, f)| f - y);
         Ok(DVector::from_iterator(run.len(), rows))
     }
 
-    fn jacobian(&self, starts: &DVector<f64>) -> Result<DMatrix<f64>, EvaluationError> {
+    fn jacobian(&self, starts: &DVector<f64>) -> Result<DMatrix<f64>, MathError> {
         let of = |value: fn(&crate::twin::Parameter) -> f64| -> Vec<f64> {
             self.starts.iter().map(|&j| value(&self.space[j])).collect()
         };
@@ -96,7 +96,7 @@ impl ResidualProblem for StartFit<'_> {
             &of(|p| p.bounds.low()),
             &of(|p| p.bounds.high()),
         )
-        .map_err(EvaluationError::fatal)?;
+        .map_err(MathError::fatal)?;
         stencil.jacobian(|point| self.residual(&DVector::from_column_slice(point)))
     }
 }

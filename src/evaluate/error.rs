@@ -1,9 +1,8 @@
 //! Errors of baselines, studies over many records, and sealed trials.
 
 use crate::diagnose::DiagnoseError;
-use crate::fit::{BoundsError, OptimiseError};
 use crate::likelihood::kalman::FilterError;
-use crate::math::DifferenceError;
+use crate::math::MathError;
 use crate::progress::Cancelled;
 use crate::record::RecordError;
 use crate::setting::SettingError;
@@ -73,9 +72,9 @@ pub enum EvaluateError {
     Damaged {
         /// File.
         path: PathBuf,
-        /// What does not fit.
+        /// Mismatch.
         reason: String,
-        /// What can be done.
+        /// Remedy.
         remedy: &'static str,
     },
     /// The work folder cannot be used.
@@ -93,15 +92,9 @@ pub enum EvaluateError {
     /// The twin failed.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
-    /// The search failed.
+    /// The search failed, or a derivative could not be taken.
     #[error(transparent)]
-    Optimise(#[from] OptimiseError),
-    /// The bounds have no inside.
-    #[error(transparent)]
-    Bounds(#[from] BoundsError),
-    /// No derivative could be taken.
-    #[error(transparent)]
-    Difference(#[from] DifferenceError),
+    Math(#[from] MathError),
     /// The filter failed.
     #[error(transparent)]
     Filter(#[from] FilterError),

@@ -24,7 +24,7 @@ pub use deviation::Deviation;
 pub use score::Score;
 
 use crate::likelihood::kalman::FilterError;
-use crate::math::LeastSquaresError;
+use crate::math::MathError;
 use crate::record::{Drive, Record, Signal};
 use crate::twin::{Noise, SimulationError, Twin};
 use nalgebra::DMatrix;
@@ -199,7 +199,7 @@ pub enum FeatureError {
     },
     /// The regression failed.
     #[error("the regression of the features failed: {0}")]
-    Regression(#[from] LeastSquaresError),
+    Regression(#[from] MathError),
     /// The filter failed.
     #[error("the filter of the features failed: {0}")]
     Filter(#[from] FilterError),

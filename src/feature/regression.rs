@@ -1,7 +1,7 @@
 //! Least squares of a signal on its own past and that of other signals.
 
 use super::{FeatureError, check_varies};
-use crate::math::{Fit, Lagged, LaggedSignals, LeastSquares, LeastSquaresError};
+use crate::math::{Fit, Lagged, LaggedSignals, LeastSquares, MathError};
 use crate::record::Signal;
 use nalgebra::DMatrix;
 
@@ -43,7 +43,7 @@ pub(super) fn coefficients(
 }
 
 /// Regresses the first signal on the lags of all, from sample `start` on.
-pub(super) fn regress(signals: Vec<Lagged>, start: usize) -> Result<Fit, LeastSquaresError> {
+pub(super) fn regress(signals: Vec<Lagged>, start: usize) -> Result<Fit, MathError> {
     let target = &signals[0].values[start..];
     let target = DMatrix::from_column_slice(target.len(), 1, target);
     let phi = LaggedSignals::new(signals, start);

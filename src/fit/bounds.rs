@@ -1,6 +1,5 @@
+use crate::math::MathError;
 use nalgebra::DVector;
-
-use super::OptimiseError;
 
 /// A box: lower ≤ θ ≤ upper for each parameter, each side finite or not.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,10 +13,10 @@ impl Bounds {
     ///
     /// # Errors
     ///
-    /// [`BoundsError`]: lengths that disagree, NaN, or a lower bound above its upper bound.
-    pub fn new(lower: DVector<f64>, upper: DVector<f64>) -> Result<Self, BoundsError> {
+    /// [`MathError`]: lengths that disagree, NaN, or a lower bound above its upper bound.
+    pub fn new(lower: DVector<f64>, upper: DVector<f64>) -> Result<Self, MathError> {
         if lower.len() != upper.len() {
-            return Err(BoundsError::Length {
+            return Err(MathError::BoundCounts {
                 lower: lower.len(),
                 upper: upper.len(),
             });
@@ -27,7 +26,7 @@ impl Bounds {
             low.is_nan() || high.is_nan() || low > high || (low == high && low.is_infinite())
         };
         if let Some(index) = lower.iter().zip(upper.iter()).position(holds_none) {
-            return Err(BoundsError::Empty {
+            return Err(MathError::EmptyInterval {
                 index,
                 lower: lower[index],
                 upper: upper[index],
@@ -79,38 +78,12 @@ impl Bounds {
     }
 
     /// Fails at the first side that is open.
-    pub(super) fn check_finite(&self) -> Result<(), OptimiseError> {
+    pub(super) fn check_finite(&self) -> Result<(), MathError> {
         match self.width().iter().position(|w| !w.is_finite()) {
-            Some(index) => Err(OptimiseError::Unbounded { index }),
+            Some(index) => Err(MathError::Unbounded { index }),
             None => Ok(()),
         }
     }
-}
-
-/// Why there is no box.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum BoundsError {
-    /// Not as many lower as upper bounds.
-    #[error("{lower} lower and {upper} upper bounds; give one of each for every parameter")]
-    Length {
-        /// Number of lower bounds.
-        lower: usize,
-        /// Number of upper bounds.
-        upper: usize,
-    },
-    /// An interval that holds no number.
-    #[error(
-        "parameter {index} has the bounds [{lower}, {upper}]; the lower must be at most the upper"
-    )]
-    Empty {
-        /// Which parameter.
-        index: usize,
-        /// Its lower bound.
-        lower: f64,
-        /// Its upper bound.
-        upper: f64,
-    },
 }
 
 #[cfg(test)]
@@ -146,8 +119,11 @@ mod tests {
                 .contains("parameter 1 has the bounds [2, 1]")
         );
         let error = Bounds::new(dvector![f64::NAN], dvector![1.0]).unwrap_err();
-        assert!(matches!(error, BoundsError::Empty { index: 0, .. }));
+        assert!(matches!(error, MathError::EmptyInterval { index: 0, .. }));
         let error = Bounds::new(dvector![0.0], dvector![]).unwrap_err();
-        assert_eq!(error, BoundsError::Length { lower: 1, upper: 0 });
+        assert!(matches!(
+            error,
+            MathError::BoundCounts { lower: 1, upper: 0 }
+        ));
     }
 }

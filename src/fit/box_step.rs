@@ -1,6 +1,6 @@
 use nalgebra::{DMatrix, DVector};
 
-use crate::math::{SolveError, solve_above, solve_truncated};
+use crate::math::{MathError, solve_above, solve_truncated};
 
 /// The step that minimises the linear model ½‖r + J p‖² over `low` ≤ p ≤ `high`, which contains 0.
 ///
@@ -17,7 +17,7 @@ pub(super) fn box_step(
     low: &DVector<f64>,
     high: &DVector<f64>,
     relative_cutoff: f64,
-) -> Result<DVector<f64>, SolveError> {
+) -> Result<DVector<f64>, MathError> {
     let dimension = jacobian.ncols();
     let mut step = DVector::<f64>::zeros(dimension);
     let mut left = residual.clone();
@@ -131,7 +131,7 @@ mod tests {
             &dvector![0.0, 1.0],
             1e-6,
         );
-        assert_eq!(p, Ok(dvector![0.0, 0.0]));
+        assert_eq!(p.unwrap(), dvector![0.0, 0.0]);
     }
 
     #[test]

@@ -1,3 +1,4 @@
+use crate::math::MathError;
 use std::fmt;
 
 use argmin::core::Executor;
@@ -5,7 +6,7 @@ use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 use super::solver::{DampedGaussNewton, GaussNewtonState, Residuals};
-use super::{Bounds, OptimiseError, ResidualProblem};
+use super::{Bounds, ResidualProblem};
 use crate::setting::SettingError;
 
 /// Settings of a bounded, damped Gauss–Newton search for the least ½‖r(θ)‖².
@@ -78,7 +79,7 @@ impl GaussNewton {
     ///
     /// # Errors
     ///
-    /// [`OptimiseError`]: lengths or settings that do not fit, no value at the start, a fatal evaluation. A search that
+    /// [`MathError`]: lengths or settings that do not fit, no value at the start, a fatal evaluation. A search that
     /// merely ends early is no error: see [`Minimum::reason`].
     pub fn minimise<P: ResidualProblem + ?Sized>(
         &self,
@@ -86,7 +87,7 @@ impl GaussNewton {
         start: &DVector<f64>,
         bounds: &Bounds,
         scale: &DVector<f64>,
-    ) -> Result<Minimum, OptimiseError> {
+    ) -> Result<Minimum, MathError> {
         self.check(problem.dimension(), start, bounds, scale)?;
         let solver = DampedGaussNewton {
             bounds,
@@ -100,11 +101,11 @@ impl GaussNewton {
             .configure(|state: GaussNewtonState| state.param(start).max_iters(self.max_iterations))
             .ctrlc(false)
             .run()
-            .map_err(OptimiseError::from_argmin)?;
+            .map_err(search_error)?;
         let count = |what: &str| result.problem.counts.get(what).copied().unwrap_or(0);
         let (evaluations, jacobians) = (count("operator_count"), count("jacobian_count"));
         let mut state = result.state;
-        let lost = || OptimiseError::Fatal("argmin lost its state".into());
+        let lost = || MathError::Fatal("argmin lost its state".into());
         Ok(Minimum {
             cost: state.get_cost(),
             theta: state.take_param().ok_or_else(lost)?,
@@ -122,10 +123,10 @@ impl GaussNewton {
         start: &DVector<f64>,
         bounds: &Bounds,
         scale: &DVector<f64>,
-    ) -> Result<(), OptimiseError> {
-        OptimiseError::check_length("start", start.len(), dimension)?;
-        OptimiseError::check_length("bounds", bounds.dimension(), dimension)?;
-        OptimiseError::check_length("scale", scale.len(), dimension)?;
+    ) -> Result<(), MathError> {
+        MathError::check_length("start", start.len(), dimension)?;
+        MathError::check_length("bounds", bounds.dimension(), dimension)?;
+        MathError::check_length("scale", scale.len(), dimension)?;
         let setting = |name: &str, value: f64, valid: bool, remedy: &str| {
             SettingError::unless(valid, name, value, remedy)
         };
@@ -228,6 +229,16 @@ impl fmt::Display for StopReason {
     }
 }
 
+/// Recovers an evaluation's error from argmin's.
+fn search_error(error: argmin::core::Error) -> MathError {
+    match error.downcast::<MathError>() {
+        Ok(MathError::Rejected(cause)) => MathError::Start(cause),
+        Ok(MathError::Fatal(cause)) => MathError::Fatal(cause),
+        Ok(other) => MathError::fatal(other),
+        Err(other) => MathError::Fatal(other.into()),
+    }
+}
+
 #[cfg(test)]
 mod tests;
 
@@ -235,7 +246,8 @@ mod tests;
 mod examples {
     #[test]
     fn the_example() -> Result<(), Box<dyn std::error::Error>> {
-        use crate::fit::{Bounds, EvaluationError, GaussNewton, ResidualProblem};
+        use crate::fit::{Bounds, GaussNewton, ResidualProblem};
+        use crate::math::MathError;
         use nalgebra::{DMatrix, DVector, dmatrix, dvector};
 
         struct Rosenbrock;
@@ -243,10 +255,10 @@ mod examples {
             fn dimension(&self) -> usize {
                 2
             }
-            fn residual(&self, x: &DVector<f64>) -> Result<DVector<f64>, EvaluationError> {
+            fn residual(&self, x: &DVector<f64>) -> Result<DVector<f64>, MathError> {
                 Ok(dvector![10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]])
             }
-            fn jacobian(&self, x: &DVector<f64>) -> Result<DMatrix<f64>, EvaluationError> {
+            fn jacobian(&self, x: &DVector<f64>) -> Result<DMatrix<f64>, MathError> {
                 Ok(dmatrix![-20.0 * x[0], 10.0; -1.0, 0.0])
             }
         }

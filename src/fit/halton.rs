@@ -2,7 +2,8 @@ use nalgebra::DVector;
 use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 
-use super::{Bounds, OptimiseError};
+use super::Bounds;
+use crate::math::MathError;
 
 /// `count` points that fill a finite box evenly, in any dimension, from one seed.
 ///
@@ -17,7 +18,7 @@ use super::{Bounds, OptimiseError};
 ///
 /// # Errors
 ///
-/// [`OptimiseError::Unbounded`] where a bound is infinite.
+/// [`MathError::Unbounded`] where a bound is infinite.
 ///
 /// # Example
 ///
@@ -28,7 +29,7 @@ pub fn space_filling(
     bounds: &Bounds,
     count: usize,
     seed: u64,
-) -> Result<Vec<DVector<f64>>, OptimiseError> {
+) -> Result<Vec<DVector<f64>>, MathError> {
     bounds.check_finite()?;
     let mut points = vec![DVector::zeros(bounds.dimension()); count];
     for (j, prime) in primes().take(bounds.dimension()).enumerate() {

@@ -5,19 +5,17 @@
 //! | residuals with a Jacobian | [`GaussNewton::minimise`] |
 //! | starts that are spread over a box | [`space_filling`] |
 //!
-//! What is minimised implements [`ResidualProblem`]; it says with [`EvaluationError`] whether a failure costs one point (a
+//! What is minimised implements [`ResidualProblem`]; it says with [`MathError`](crate::math::MathError) whether a failure costs one point (a
 //! twin that diverged) or everything. Nothing here prints or draws unseeded randomness.
 
 mod bounds;
 mod box_step;
-mod error;
 mod gauss_newton;
 mod halton;
 mod problem;
 mod solver;
 
-pub use bounds::{Bounds, BoundsError};
-pub use error::OptimiseError;
+pub use bounds::Bounds;
 pub use gauss_newton::GaussNewton;
 pub use halton::space_filling;
-pub use problem::{EvaluationError, ResidualProblem};
+pub use problem::ResidualProblem;

@@ -1,5 +1,4 @@
-use std::error::Error;
-
+use crate::math::MathError;
 use nalgebra::{DMatrix, DVector};
 
 /// A vector of residuals r(θ) whose half squared norm is to be small.
@@ -14,37 +13,13 @@ pub trait ResidualProblem {
     ///
     /// # Errors
     ///
-    /// [`EvaluationError::Rejected`] where θ has no residual, [`EvaluationError::Fatal`] to stop.
-    fn residual(&self, theta: &DVector<f64>) -> Result<DVector<f64>, EvaluationError>;
+    /// [`MathError::Rejected`] where θ has no residual, [`MathError::Fatal`] to stop.
+    fn residual(&self, theta: &DVector<f64>) -> Result<DVector<f64>, MathError>;
 
     /// ∂r/∂θ; [`Stencil`](crate::math::Stencil) has finite differences.
     ///
     /// # Errors
     ///
     /// As [`residual`](Self::residual).
-    fn jacobian(&self, theta: &DVector<f64>) -> Result<DMatrix<f64>, EvaluationError>;
-}
-
-/// Why a function has no value at θ, and whether that matters elsewhere.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum EvaluationError {
-    /// There is nothing at *this* θ, as when the twin diverged. The search goes on elsewhere.
-    #[error("no value at this point: {0}")]
-    Rejected(#[source] Box<dyn Error + Send + Sync>),
-    /// No θ will do, or the work was cancelled. The search ends.
-    #[error(transparent)]
-    Fatal(Box<dyn Error + Send + Sync>),
-}
-
-impl EvaluationError {
-    /// [`Rejected`](Self::Rejected), from an error or a message.
-    pub fn rejected(cause: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
-        Self::Rejected(cause.into())
-    }
-
-    /// [`Fatal`](Self::Fatal), from an error or a message.
-    pub fn fatal(cause: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
-        Self::Fatal(cause.into())
-    }
+    fn jacobian(&self, theta: &DVector<f64>) -> Result<DMatrix<f64>, MathError>;
 }

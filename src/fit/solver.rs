@@ -1,3 +1,4 @@
+use crate::math::MathError;
 use argmin::core::{
     Error, IterState, Jacobian, KV, Operator, Problem, Solver, State, TerminationReason,
 };
@@ -5,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::box_step::box_step;
 use super::gauss_newton::StopReason;
-use super::{Bounds, EvaluationError, GaussNewton, ResidualProblem};
+use super::{Bounds, GaussNewton, ResidualProblem};
 
 /// Armijo's constant: the part of the slope that a step must deliver.
 const SUFFICIENT: f64 = 1e-4;
@@ -26,7 +27,7 @@ impl<P: ResidualProblem + ?Sized> Operator for Residuals<'_, P> {
         if residual.iter().all(|r| r.is_finite()) {
             return Ok(residual);
         }
-        Err(EvaluationError::rejected("a residual is not finite").into())
+        Err(MathError::rejected("a residual is not finite").into())
     }
 }
 
@@ -39,7 +40,7 @@ impl<P: ResidualProblem + ?Sized> Jacobian for Residuals<'_, P> {
         if jacobian.iter().all(|r| r.is_finite()) {
             return Ok(jacobian);
         }
-        Err(EvaluationError::rejected("an entry of the Jacobian is not finite").into())
+        Err(MathError::rejected("an entry of the Jacobian is not finite").into())
     }
 }
 
@@ -113,14 +114,14 @@ fn tolerate<T>(result: Result<T, Error>) -> Result<Option<T>, Error> {
     match result {
         Ok(value) => Ok(Some(value)),
         Err(error) => match error.downcast_ref() {
-            Some(EvaluationError::Rejected(_)) => Ok(None),
+            Some(MathError::Rejected(_)) => Ok(None),
             _ => Err(error),
         },
     }
 }
 
 fn missing(what: &str) -> Error {
-    EvaluationError::fatal(format!("argmin lost its {what}")).into()
+    MathError::fatal(format!("argmin lost its {what}")).into()
 }
 
 impl<O> Solver<O, GaussNewtonState> for DampedGaussNewton<'_>
@@ -157,7 +158,7 @@ where
         };
         if jacobian.shape() != (residual.len(), theta.len()) {
             let (rows, columns) = jacobian.shape();
-            return Err(EvaluationError::fatal(format!(
+            return Err(MathError::fatal(format!(
                 "the Jacobian is {rows} × {columns}, for {} residuals and {} parameters",
                 residual.len(),
                 theta.len()
@@ -177,7 +178,7 @@ where
         }
         let cutoff = self.settings.relative_cutoff;
         let mut step =
-            box_step(&residual, &jacobian, &low, &high, cutoff).map_err(EvaluationError::fatal)?;
+            box_step(&residual, &jacobian, &low, &high, cutoff).map_err(MathError::fatal)?;
         let model = &jacobian * &step;
         let slope = residual.dot(&model);
         let predicted = -slope - model.norm_squared() / 2.0;
@@ -203,7 +204,7 @@ where
                 && merit <= cost + SUFFICIENT * fraction * shortened * slope
             {
                 if found.len() != residual.len() {
-                    return Err(EvaluationError::fatal("the number of residuals changed").into());
+                    return Err(MathError::fatal("the number of residuals changed").into());
                 }
                 self.steps += 1;
                 let state = state.param(moved).residuals(found).cost(merit);

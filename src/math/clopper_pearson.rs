@@ -1,3 +1,4 @@
+use super::MathError;
 use std::ops::RangeInclusive;
 
 use statrs::distribution::{Beta, Binomial, ContinuousCDF, DiscreteCDF};
@@ -14,7 +15,7 @@ use statrs::distribution::{Beta, Binomial, ContinuousCDF, DiscreteCDF};
 ///
 /// # Errors
 ///
-/// [`BinomialError`]: more successes than trials, or `level` outside (0, 1).
+/// [`MathError`]: more successes than trials, or `level` outside (0, 1).
 ///
 /// # Example
 ///
@@ -24,23 +25,23 @@ use statrs::distribution::{Beta, Binomial, ContinuousCDF, DiscreteCDF};
 /// let (low, high) = clopper_pearson(0, 10, 0.95)?;
 /// assert_eq!(low, 0.0);
 /// assert!((high - 0.3085).abs() < 1e-4);
-/// # Ok::<(), truetwin::math::BinomialError>(())
+/// # Ok::<(), truetwin::math::MathError>(())
 /// ```
 ///
 /// # Reference
 ///
 /// Clopper & Pearson, "The use of confidence or fiducial limits illustrated in the case of the binomial",
 /// *Biometrika* 26, 1934.
-pub fn clopper_pearson(count: u64, of: u64, level: f64) -> Result<(f64, f64), BinomialError> {
+pub fn clopper_pearson(count: u64, of: u64, level: f64) -> Result<(f64, f64), MathError> {
     if count > of {
-        return Err(BinomialError::Count { count, of });
+        return Err(MathError::Count { count, of });
     }
     let tail = tail(level)?;
     let (k, n) = (count as f64, of as f64);
     let quantile = |a: f64, b: f64, p: f64| {
         Beta::new(a, b)
             .map(|beta| beta.inverse_cdf(p))
-            .map_err(|_| BinomialError::Count { count, of })
+            .map_err(|_| MathError::Count { count, of })
     };
     let low = match count {
         0 => 0.0,
@@ -60,7 +61,7 @@ pub fn clopper_pearson(count: u64, of: u64, level: f64) -> Result<(f64, f64), Bi
 ///
 /// # Errors
 ///
-/// [`BinomialError`]: `probability` outside [0, 1] or `level` outside (0, 1).
+/// [`MathError`]: `probability` outside [0, 1] or `level` outside (0, 1).
 ///
 /// # Example
 ///
@@ -69,54 +70,27 @@ pub fn clopper_pearson(count: u64, of: u64, level: f64) -> Result<(f64, f64), Bi
 ///
 /// let false_alarms = 17;
 /// assert!(binomial_bounds(200, 0.10, 0.999)?.contains(&false_alarms));
-/// # Ok::<(), truetwin::math::BinomialError>(())
+/// # Ok::<(), truetwin::math::MathError>(())
 /// ```
 pub fn binomial_bounds(
     trials: u64,
     probability: f64,
     level: f64,
-) -> Result<RangeInclusive<u64>, BinomialError> {
+) -> Result<RangeInclusive<u64>, MathError> {
     let tail = tail(level)?;
     let binomial =
-        Binomial::new(probability, trials).map_err(|_| BinomialError::Probability(probability))?;
+        Binomial::new(probability, trials).map_err(|_| MathError::Probability(probability))?;
     // The quantile is the smallest k with P(X ≤ k) ≥ p, hence P(X < low) < tail and P(X > high) ≤ tail.
     Ok(binomial.inverse_cdf(tail)..=binomial.inverse_cdf(1.0 - tail))
 }
 
 /// Half of what lies outside of `level`.
-fn tail(level: f64) -> Result<f64, BinomialError> {
+fn tail(level: f64) -> Result<f64, MathError> {
     if level > 0.0 && level < 1.0 {
         Ok((1.0 - level) / 2.0)
     } else {
-        Err(BinomialError::Level(level))
+        Err(MathError::Level(level))
     }
-}
-
-/// Why there is no interval.
-///
-/// ```
-/// use truetwin::math::{BinomialError, clopper_pearson};
-///
-/// let refused: Result<_, BinomialError> = clopper_pearson(3, 2, 0.95); // three of two
-/// assert!(refused.is_err());
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum BinomialError {
-    /// More successes than trials.
-    #[error("count = {count} of {of}; there cannot be more successes than trials")]
-    Count {
-        /// Successes.
-        count: u64,
-        /// Trials.
-        of: u64,
-    },
-    /// Not a probability.
-    #[error("probability = {0}; it must lie in [0, 1]")]
-    Probability(f64),
-    /// Not a level.
-    #[error("level = {0}; it must lie strictly between 0 and 1, such as 0.95")]
-    Level(f64),
 }
 
 #[cfg(test)]
@@ -138,7 +112,7 @@ mod tests {
 
     #[test]
     fn edges() {
-        assert_eq!(clopper_pearson(0, 0, 0.9), Ok((0.0, 1.0)));
+        assert_eq!(clopper_pearson(0, 0, 0.9).unwrap(), (0.0, 1.0));
         let (low, high) = clopper_pearson(8, 8, 0.9).unwrap();
         assert!((low - 0.05_f64.powf(0.125)).abs() < 1e-9 && high == 1.0);
     }
@@ -178,15 +152,18 @@ mod tests {
                 "not wider than needed"
             );
         }
-        assert_eq!(binomial_bounds(20, 0.0, 0.99), Ok(0..=0));
-        assert_eq!(binomial_bounds(20, 1.0, 0.99), Ok(20..=20));
+        assert_eq!(binomial_bounds(20, 0.0, 0.99).unwrap(), 0..=0);
+        assert_eq!(binomial_bounds(20, 1.0, 0.99).unwrap(), 20..=20);
     }
 
     #[test]
     fn bad_input_is_named() {
         let error = clopper_pearson(3, 2, 0.9).unwrap_err();
-        assert_eq!(error, BinomialError::Count { count: 3, of: 2 });
-        assert_eq!(clopper_pearson(1, 2, 1.0), Err(BinomialError::Level(1.0)));
+        assert!(matches!(error, MathError::Count { count: 3, of: 2 }));
+        assert!(matches!(
+            clopper_pearson(1, 2, 1.0),
+            Err(MathError::Level(1.0))
+        ));
         let error = binomial_bounds(3, f64::NAN, 0.9).unwrap_err();
         assert!(error.to_string().contains("probability = NaN"));
     }

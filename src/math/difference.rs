@@ -1,3 +1,4 @@
+use super::MathError;
 use nalgebra::{DMatrix, DVector};
 
 /// Where to evaluate a function of θ for its Jacobian, and how to put the values together.
@@ -34,14 +35,14 @@ impl Stencil {
     ///
     /// # Errors
     ///
-    /// [`DifferenceError`]: lengths that disagree, a step that is not positive or vanishes in rounding, θ outside of
+    /// [`MathError`]: lengths that disagree, a step that is not positive or vanishes in rounding, θ outside of
     /// its bounds, bounds without room.
     pub fn new(
         theta: &[f64],
         steps: &[f64],
         lower: &[f64],
         upper: &[f64],
-    ) -> Result<Self, DifferenceError> {
+    ) -> Result<Self, MathError> {
         let dimension = theta.len();
         for (name, length) in [
             ("steps", steps.len()),
@@ -49,7 +50,7 @@ impl Stencil {
             ("upper", upper.len()),
         ] {
             if length != dimension {
-                return Err(DifferenceError::Length {
+                return Err(MathError::Length {
                     name,
                     length,
                     dimension,
@@ -64,14 +65,14 @@ impl Stencil {
         for (index, (&at, &step)) in theta.iter().zip(steps).enumerate() {
             let (low, high) = (lower[index], upper[index]);
             if !(at.is_finite() && low <= at && at <= high) {
-                return Err(DifferenceError::Outside {
+                return Err(MathError::Outside {
                     index,
                     value: at,
                     lower: low,
                     upper: high,
                 });
             }
-            let invalid = DifferenceError::Step { index, step };
+            let invalid = MathError::Step { index, step };
             if !(step.is_finite() && step > 0.0) {
                 return Err(invalid);
             }
@@ -97,7 +98,7 @@ impl Stencil {
                 let (a, b) = (near - at, far - at);
                 if a == 0.0 || a == b {
                     return Err(if room == 0.0 {
-                        DifferenceError::NoRoom { index, value: at }
+                        MathError::NoRoom { index, value: at }
                     } else {
                         invalid
                     });
@@ -131,11 +132,11 @@ impl Stencil {
     ///
     /// # Errors
     ///
-    /// [`DifferenceError::Values`] unless there is one value for each point, all of the same length.
-    pub fn assemble(&self, values: &[DVector<f64>]) -> Result<DMatrix<f64>, DifferenceError> {
+    /// [`MathError::Values`] unless there is one value for each point, all of the same length.
+    pub fn assemble(&self, values: &[DVector<f64>]) -> Result<DMatrix<f64>, MathError> {
         let rows = values.first().map_or(0, DVector::len);
         if values.len() != self.points.len() || values.iter().any(|v| v.len() != rows) {
-            return Err(DifferenceError::Values {
+            return Err(MathError::Values {
                 points: self.points.len(),
                 values: values.len(),
             });
@@ -154,7 +155,7 @@ impl Stencil {
     /// # Errors
     ///
     /// Those of `f` and of [`assemble`](Self::assemble).
-    pub fn jacobian<E: From<DifferenceError>>(
+    pub fn jacobian<E: From<MathError>>(
         &self,
         f: impl FnMut(&[f64]) -> Result<DVector<f64>, E>,
     ) -> Result<DMatrix<f64>, E> {
@@ -162,76 +163,6 @@ impl Stencil {
         let values = points.map(f).collect::<Result<Vec<_>, E>>()?;
         Ok(self.assemble(&values)?)
     }
-}
-
-/// Why there is no finite-difference Jacobian.
-///
-/// ```
-/// use truetwin::likelihood::kalman::FilterError;
-/// use truetwin::math::DifferenceError;
-///
-/// /// Whether a filter's search failed for want of derivatives.
-/// fn no_derivative(error: &FilterError) -> bool {
-///     matches!(error, FilterError::Difference(_))
-/// }
-/// assert!(!no_derivative(&FilterError::Diverged { at: 3.0 }));
-/// # let _: fn(DifferenceError) -> FilterError = FilterError::from;
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum DifferenceError {
-    /// A slice is not as long as θ.
-    #[error("{name} has {length} entries for {dimension} parameters; give one for each")]
-    Length {
-        /// Which slice.
-        name: &'static str,
-        /// Its length.
-        length: usize,
-        /// The number of parameters.
-        dimension: usize,
-    },
-    /// A step is not positive, or too small beside its parameter.
-    #[error(
-        "step = {step} of parameter {index} cannot be taken; choose about 1e-5 of the parameter's scale"
-    )]
-    Step {
-        /// Which parameter.
-        index: usize,
-        /// The step.
-        step: f64,
-    },
-    /// θ is not inside of its bounds.
-    #[error(
-        "parameter {index} = {value} is outside of its bounds [{lower}, {upper}]; clamp it first"
-    )]
-    Outside {
-        /// Which parameter.
-        index: usize,
-        /// Its value.
-        value: f64,
-        /// Its lower bound.
-        lower: f64,
-        /// Its upper bound.
-        upper: f64,
-    },
-    /// The bounds of a parameter are equal.
-    #[error("parameter {index} is held at {value} by its bounds; take it out of θ or widen them")]
-    NoRoom {
-        /// Which parameter.
-        index: usize,
-        /// Where it is held.
-        value: f64,
-    },
-    /// Not one value for each point, or of different lengths.
-    #[error(
-        "{values} values for {points} points, or of unequal lengths; give one for each point, all equally long"
-    )]
-    Values {
-        /// Points of the stencil.
-        points: usize,
-        /// Values that were given.
-        values: usize,
-    },
 }
 
 #[cfg(test)]
@@ -256,7 +187,7 @@ mod tests {
     const FREE: [f64; 2] = [f64::INFINITY; 2];
     const BELOW: [f64; 2] = [f64::NEG_INFINITY; 2];
 
-    fn smooth(p: &[f64]) -> Result<DVector<f64>, DifferenceError> {
+    fn smooth(p: &[f64]) -> Result<DVector<f64>, MathError> {
         Ok(dvector![p[0].exp() * p[1], p[0].sin(), p[1].powi(3)])
     }
 
@@ -298,7 +229,7 @@ mod tests {
                 "{point:?}"
             );
         }
-        let linear = |p: &[f64]| Ok::<_, DifferenceError>(dvector![2.0 * p[0] - 3.0 * p[1]]);
+        let linear = |p: &[f64]| Ok::<_, MathError>(dvector![2.0 * p[0] - 3.0 * p[1]]);
         assert!((stencil.jacobian(linear).unwrap() - dmatrix![2.0, -3.0]).amax() < 1e-9);
     }
 
@@ -309,8 +240,8 @@ mod tests {
             Diverged,
             Difference,
         }
-        impl From<DifferenceError> for Failure {
-            fn from(_: DifferenceError) -> Self {
+        impl From<MathError> for Failure {
+            fn from(_: MathError) -> Self {
                 Self::Difference
             }
         }
@@ -330,13 +261,13 @@ mod tests {
     #[test]
     fn bad_input_is_named() {
         let error = Stencil::new(&[1.0], &[0.1], &[1.0], &[1.0]).unwrap_err();
-        assert_eq!(
+        assert!(matches!(
             error,
-            DifferenceError::NoRoom {
+            MathError::NoRoom {
                 index: 0,
                 value: 1.0
             }
-        );
+        ));
         let error = Stencil::new(&[1e9], &[1e-12], &[0.0], &[1e10]).unwrap_err();
         assert!(error.to_string().contains("1e-5 of the parameter's scale"));
         let error = Stencil::new(&[2.0], &[0.1], &[0.0], &[1.0]).unwrap_err();

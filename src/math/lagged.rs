@@ -1,6 +1,7 @@
 //! Regressors made of the past of signals.
 
 use super::Regressors;
+use super::widest::{Kernel, widest};
 use nalgebra::DMatrix;
 
 /// A signal and how many of its lags are regressors.
@@ -131,22 +132,21 @@ impl Regressors for LaggedSignals {
 
 /// out_k ← out_k + Σ_j c_j·x_{j+k}; each sum runs in the order of j, whatever the width of vectors.
 fn correlate(c: &[f64], x: &[f64], out: &mut [f64]) {
-    pulp::Arch::new().dispatch(Correlation { c, x, out });
+    widest(Correlation { c, x, out });
 }
 
-/// [`correlate`], to be compiled for the widest vectors of the processor. A closure in its place is not inlined, and so
-/// compiled for the narrowest.
+/// [`correlate`] as a kernel.
 struct Correlation<'a> {
     c: &'a [f64],
     x: &'a [f64],
     out: &'a mut [f64],
 }
 
-impl pulp::NullaryFnOnce for Correlation<'_> {
+impl Kernel for Correlation<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn call(self) {
+    fn run(self) {
         let Self { c, mut x, out } = self;
         let (wide, rest) = out.as_chunks_mut::<32>();
         for sums in wide {

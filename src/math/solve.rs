@@ -1,3 +1,4 @@
+use super::MathError;
 use nalgebra::{DMatrix, DVector};
 
 use super::svd::thin_svd;
@@ -17,7 +18,7 @@ use super::svd::thin_svd;
 ///
 /// # Errors
 ///
-/// [`SolveError`]: lengths that disagree, a cutoff outside [0, 1), entries that are not finite.
+/// [`MathError`]: lengths that disagree, a cutoff outside [0, 1), entries that are not finite.
 ///
 /// # Reference
 ///
@@ -26,9 +27,9 @@ pub fn solve_truncated(
     matrix: &DMatrix<f64>,
     right_side: &DVector<f64>,
     relative_cutoff: f64,
-) -> Result<TruncatedSolution, SolveError> {
+) -> Result<TruncatedSolution, MathError> {
     if !(0.0..1.0).contains(&relative_cutoff) {
-        return Err(SolveError::Cutoff(relative_cutoff));
+        return Err(MathError::Cutoff(relative_cutoff));
     }
     solve_above(matrix, right_side, |largest| relative_cutoff * largest)
 }
@@ -38,9 +39,9 @@ pub(crate) fn solve_above(
     matrix: &DMatrix<f64>,
     right_side: &DVector<f64>,
     threshold: impl Fn(f64) -> f64,
-) -> Result<TruncatedSolution, SolveError> {
+) -> Result<TruncatedSolution, MathError> {
     if matrix.nrows() != right_side.len() {
-        return Err(SolveError::Shape {
+        return Err(MathError::RightSide {
             rows: matrix.nrows(),
             length: right_side.len(),
         });
@@ -48,9 +49,9 @@ pub(crate) fn solve_above(
     // The decomposition reports NaN by not converging; an infinity or a bad right side would pass silently.
     let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
     if !finite(matrix.as_slice()) || !finite(right_side.as_slice()) {
-        return Err(SolveError::NotFinite);
+        return Err(MathError::NotFinite);
     }
-    let svd = thin_svd(matrix).ok_or(SolveError::NotFinite)?;
+    let svd = thin_svd(matrix).ok_or(MathError::NotFinite)?;
     let threshold = threshold(svd.values.iter().copied().fold(0.0, f64::max));
     let rank = svd
         .values
@@ -79,28 +80,6 @@ pub struct TruncatedSolution {
     pub rank: usize,
     /// All singular values, descending, length min(m, d).
     pub singular_values: DVector<f64>,
-}
-
-/// Why a least-squares problem has no solution.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SolveError {
-    /// The right side does not fit the matrix.
-    #[error("matrix has {rows} rows, the right side {length} entries; both need the same number")]
-    Shape {
-        /// Rows of the matrix.
-        rows: usize,
-        /// Length of the right side.
-        length: usize,
-    },
-    /// The cutoff is no fraction.
-    #[error("relative_cutoff = {0}; choose one in [0, 1), such as 1e-8")]
-    Cutoff(f64),
-    /// NaN or infinity among the entries.
-    #[error(
-        "the matrix or right side has an entry that is not finite; check the evaluations behind it"
-    )]
-    NotFinite,
 }
 
 #[cfg(test)]
@@ -159,9 +138,9 @@ mod tests {
     fn bad_input_is_named() {
         let j = DMatrix::identity(2, 2);
         let error = solve_truncated(&j, &dvector![f64::INFINITY, 0.0], 1e-9).unwrap_err();
-        assert_eq!(error, SolveError::NotFinite);
+        assert!(matches!(error, MathError::NotFinite));
         let error = solve_truncated(&j, &dvector![0.0], 1e-9).unwrap_err();
-        assert_eq!(error, SolveError::Shape { rows: 2, length: 1 });
+        assert!(matches!(error, MathError::RightSide { rows: 2, length: 1 }));
         let error = solve_truncated(&j, &dvector![0.0, 0.0], 1.5).unwrap_err();
         assert!(error.to_string().contains("1.5; choose one in [0, 1)"));
     }

@@ -1,29 +1,133 @@
-//! The one place that asks faer for a singular value decomposition.
+//! Singular value decomposition of tall and wide matrices.
 
+use super::cholesky::dot;
+use super::widest::{Kernel, widest};
 use nalgebra::{DMatrix, DVector};
 
+/// Sweeps over all pairs of columns; six to ten are usual.
+const SWEEPS: usize = 60;
+
 /// `A = U diag(σ) Vᵀ`, thin: with k = min(rows, columns), `left` is rows × k, `right` is columns × k, and
-/// `values` descend.
+/// `values` descend. A singular value of zero may have a vector of zeros on the longer side.
 pub(super) struct Svd {
     pub left: DMatrix<f64>,
     pub values: DVector<f64>,
     pub right: DMatrix<f64>,
 }
 
-/// Decomposes `matrix`; `None` where the iteration does not converge, as on entries that are not finite.
+/// Decomposes `matrix`; `None` where an entry is not finite or the iteration does not converge.
 ///
-/// faer rather than nalgebra: eight times as fast at 128 × 128, equal at 128 × 6, and nalgebra's iteration never
-/// ends on NaN.
+/// A tall matrix is brought to A = QR; then the columns of R are rotated in pairs until they are orthogonal (one-sided
+/// Jacobi). nalgebra's own decomposition leaves errors of 1e-11 in one of some thousand 3 × 3 matrices.
 pub(super) fn thin_svd(matrix: &DMatrix<f64>) -> Option<Svd> {
     let (rows, columns) = matrix.shape();
-    let view = faer::MatRef::from_column_major_slice(matrix.as_slice(), rows, columns);
-    let svd = view.thin_svd().ok()?;
-    let (u, s, v) = (svd.U(), svd.S().column_vector(), svd.V());
+    if matrix.iter().any(|v| !v.is_finite()) {
+        return None;
+    }
+    if rows < columns {
+        let turned = thin_svd(&matrix.transpose())?;
+        return Some(Svd {
+            left: turned.right,
+            values: turned.values,
+            right: turned.left,
+        });
+    }
+    if columns == 0 {
+        return Some(Svd {
+            left: DMatrix::zeros(rows, 0),
+            values: DVector::zeros(0),
+            right: DMatrix::zeros(0, 0),
+        });
+    }
+    // Squares of what is near one neither overflow nor vanish.
+    let size = match matrix.amax() {
+        0.0 => 1.0,
+        largest => largest,
+    };
+    let qr = (matrix / size).qr();
+    let mut rotated = qr.r();
+    let mut right = DMatrix::identity(columns, columns);
+    let rotate = Rotations {
+        columns,
+        rotated: rotated.as_mut_slice(),
+        right: right.as_mut_slice(),
+    };
+    if !widest(rotate) {
+        return None;
+    }
+    let norms: Vec<f64> = rotated.column_iter().map(|c| c.norm()).collect();
+    let mut order: Vec<usize> = (0..columns).collect();
+    order.sort_by(|&a, &b| norms[b].total_cmp(&norms[a]));
+    let mut left = rotated.select_columns(&order);
+    let values = DVector::from_iterator(columns, order.iter().map(|&j| norms[j]));
+    for (mut column, &value) in left.column_iter_mut().zip(values.iter()) {
+        if value > 0.0 {
+            column /= value;
+        }
+    }
     Some(Svd {
-        left: DMatrix::from_fn(u.nrows(), u.ncols(), |i, j| u[(i, j)]),
-        values: DVector::from_fn(s.nrows(), |i, _| s[i]),
-        right: DMatrix::from_fn(v.nrows(), v.ncols(), |i, j| v[(i, j)]),
+        left: qr.q() * left,
+        values: values * size,
+        right: right.select_columns(&order),
     })
+}
+
+/// Makes the columns of a square matrix orthogonal, with the same rotations of `right`; returns `false` where that does
+/// not converge.
+struct Rotations<'a> {
+    columns: usize,
+    rotated: &'a mut [f64],
+    right: &'a mut [f64],
+}
+
+impl Kernel for Rotations<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run(self) -> bool {
+        let n = self.columns;
+        let rounding = n as f64 * f64::EPSILON;
+        for _ in 0..SWEEPS {
+            let mut squares: Vec<f64> = self.rotated.chunks_exact(n).map(|c| dot(c, c)).collect();
+            let mut converged = true;
+            for q in 1..n {
+                for p in 0..q {
+                    let [a, b] = pair(self.rotated, n, p, q);
+                    let product = dot(a, b);
+                    if product.abs() <= rounding * (squares[p] * squares[q]).sqrt() {
+                        continue;
+                    }
+                    converged = false;
+                    let zeta = (squares[q] - squares[p]) / (2.0 * product);
+                    let tangent = zeta.signum() / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
+                    let cosine = (1.0 + tangent * tangent).sqrt().recip();
+                    turn([a, b], cosine, cosine * tangent);
+                    turn(pair(self.right, n, p, q), cosine, cosine * tangent);
+                    // Rounding must not make a square negative.
+                    squares[p] = (squares[p] - tangent * product).max(0.0);
+                    squares[q] += tangent * product;
+                }
+            }
+            if converged {
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// Columns p < q of n rows.
+#[inline(always)]
+fn pair(matrix: &mut [f64], n: usize, p: usize, q: usize) -> [&mut [f64]; 2] {
+    let (before, after) = matrix.split_at_mut(q * n);
+    [&mut before[p * n..][..n], &mut after[..n]]
+}
+
+#[inline(always)]
+fn turn([a, b]: [&mut [f64]; 2], cosine: f64, sine: f64) {
+    for (a, b) in a.iter_mut().zip(b) {
+        (*a, *b) = (cosine * *a - sine * *b, sine * *a + cosine * *b);
+    }
 }
 
 #[cfg(test)]
@@ -49,5 +153,20 @@ mod tests {
         let mut matrix = DMatrix::identity(4, 4);
         matrix[(1, 2)] = f64::NAN;
         assert!(thin_svd(&matrix).is_none());
+    }
+
+    #[test]
+    fn zeros_and_repeated_columns_converge() {
+        let repeated = DMatrix::from_fn(9, 4, |i, j| (i + j / 2) as f64);
+        for matrix in [
+            DMatrix::zeros(5, 3),
+            repeated,
+            DMatrix::from_element(3, 3, 1e-300),
+        ] {
+            let svd = thin_svd(&matrix).unwrap();
+            let back = &svd.left * DMatrix::from_diagonal(&svd.values) * svd.right.transpose();
+            assert!((back - &matrix).amax() <= 1e-14 * matrix.amax());
+            assert!(svd.values.as_slice().is_sorted_by(|a, b| a >= b));
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Adam over the tensors of dfdx modules, its state in plain vectors.
 
 use super::NetworkError;
+use crate::math::widest;
 use dfdx::nn::tensor_collection::{
     RecursiveWalker, TensorCollection, TensorOptions, TensorVisitor, ViewTensorMut,
 };
@@ -115,7 +116,7 @@ impl TensorVisitor<f32, Cpu> for Step<'_> {
             .iter_mut()
             .zip(&weights)
             .zip(moments.first.iter_mut().zip(&mut moments.second));
-        pulp::Arch::new().dispatch(|| {
+        widest(|| {
             for ((g, w), (m, v)) in each {
                 let slope = *g + decay * w;
                 *m = BETA1 * *m + (1.0 - BETA1) * slope;

@@ -13,6 +13,7 @@
 //! that it does not change their bits.
 
 use super::activation::Activation;
+use crate::math::widest;
 
 /// Added to the variance, as in dfdx and PyTorch.
 const EPSILON: f32 = 1e-5;
@@ -63,7 +64,7 @@ pub(super) fn forward<A: Activation>(
         inverse_std: vec![0.0; normed / outputs],
         slope: vec![0.0; z.len()],
     };
-    pulp::Arch::new().dispatch(|| {
+    widest(|| {
         for (row, z) in z.chunks_exact_mut(outputs).enumerate() {
             let span = row * outputs..(row + 1) * outputs;
             for (z, b) in z.iter_mut().zip(bias) {
@@ -99,7 +100,7 @@ pub(super) fn backward(
         gamma: vec![0.0; normed],
         beta: vec![0.0; normed],
     };
-    pulp::Arch::new().dispatch(|| {
+    widest(|| {
         for (row, d) in d.chunks_exact_mut(outputs).enumerate() {
             let span = row * outputs..(row + 1) * outputs;
             for (d, slope) in d.iter_mut().zip(&saved.slope[span.clone()]) {

@@ -1,14 +1,9 @@
 //! Names and units of channels.
 
+use serde::Serialize;
+
 /// A named physical quantity with its unit.
-///
-/// ```
-/// use truetwin::record::Quantity;
-///
-/// let level = Quantity::new("h", "m");
-/// assert_eq!((level.name.as_str(), level.unit.as_str()), ("h", "m"));
-/// ```
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Quantity {
     /// Name.
     pub name: String,
@@ -27,15 +22,6 @@ impl Quantity {
 }
 
 /// The channels of a twin.
-///
-/// ```
-/// use truetwin::record::Signals;
-/// use truetwin::twin::DigitalTwin;
-/// use truetwin::twins::VanDerPol;
-///
-/// assert!(VanDerPol.signals().inputs.is_empty());
-/// assert_eq!(Signals::default().outputs[0].name, "y"); // of a black box that says nothing else
-/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Signals {
     /// Inputs, in the order of a drive's columns.

@@ -30,15 +30,6 @@ pub fn read_drive(path: &Path) -> Result<Drive, RecordError> {
 }
 
 /// Parses the text of a record that stands in the program itself; `path` is for messages.
-///
-/// ```
-/// use std::path::Path;
-/// use truetwin::record::parse_record;
-///
-/// let record = parse_record("t,u,y\n0,1,0\n0.5,1,0.2\n1,0,0.3\n", Path::new("embedded.csv"))?;
-/// assert_eq!((record.samples(), record.drive().dt()), (3, 0.5));
-/// # Ok::<(), truetwin::record::RecordError>(())
-/// ```
 pub fn parse_record(text: &str, path: &Path) -> Result<Record, RecordError> {
     Table::parse(text.as_bytes(), path)?.record(path)
 }

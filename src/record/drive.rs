@@ -6,7 +6,7 @@ use ndarray::Array2;
 /// Samples by channels: row k belongs to time k·Δt. A system without inputs has zero columns and N rows.
 pub type Signal = Array2<f64>;
 
-/// What drives a twin: step, length and inputs, each input held over a step.
+/// Step, length and inputs of one experiment, each input held over a step.
 ///
 /// ```
 /// use truetwin::record::Drive;
@@ -21,7 +21,7 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// Step Δt in seconds, and inputs (N × channels).
+    /// A drive of step Δt = `dt` seconds with `inputs` (N × channels).
     pub fn new(dt: f64, inputs: Signal) -> Result<Self, RecordError> {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(RecordError::Step(dt));
@@ -33,7 +33,7 @@ impl Drive {
             inputs.indexed_iter().find(|(_, v)| !v.is_finite())
         {
             return Err(RecordError::NotFinite {
-                what: "input",
+                kind: "input",
                 channel: channel + 1,
                 sample,
                 value,
@@ -48,7 +48,7 @@ impl Drive {
         Ok(Self { dt, inputs })
     }
 
-    /// Without inputs, N = `samples`.
+    /// A drive without inputs, N = `samples`.
     pub fn autonomous(dt: f64, samples: usize) -> Result<Self, RecordError> {
         Self::new(dt, Signal::zeros((samples, 0)))
     }

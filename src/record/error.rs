@@ -3,7 +3,7 @@
 use crate::storage::files::with_remedy;
 use std::path::{Path, PathBuf};
 
-/// Why a drive, a record or its file cannot be used.
+/// A fault in a drive, a record or its file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordError {
@@ -25,10 +25,10 @@ pub enum RecordError {
     #[error("the record has no output; give at least one column y")]
     NoOutput,
     /// An input or output that is NaN or infinite.
-    #[error("{what} {channel}, sample {sample} is {value}; {what}s must be finite")]
+    #[error("{kind} {channel}, sample {sample} is {value}; {kind}s must be finite")]
     NotFinite {
         /// "input" or "output".
-        what: &'static str,
+        kind: &'static str,
         /// Channel, from 1.
         channel: usize,
         /// Sample, from 0.
@@ -38,11 +38,11 @@ pub enum RecordError {
     },
     /// Channels other than the twin's.
     #[error(
-        "the record has {given} {what}, the twin has {expected} ({names}); name its columns so"
+        "the record has {given} {kind}, the twin has {expected} ({names}); name its columns so"
     )]
     Channels {
         /// "inputs" or "outputs".
-        what: &'static str,
+        kind: &'static str,
         /// In the record.
         given: usize,
         /// In the twin.

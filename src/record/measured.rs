@@ -34,7 +34,7 @@ impl Record {
             outputs.indexed_iter().find(|(_, v)| !v.is_finite())
         {
             return Err(RecordError::NotFinite {
-                what: "output",
+                kind: "output",
                 channel: channel + 1,
                 sample,
                 value,
@@ -60,7 +60,7 @@ impl Record {
 
     /// Checks that a twin with these channels can be compared with the record.
     pub fn check_channels(&self, signals: &Signals) -> Result<(), RecordError> {
-        for (what, letter, given, expected) in [
+        for (kind, letter, given, expected) in [
             (
                 "inputs",
                 "u",
@@ -71,7 +71,7 @@ impl Record {
         ] {
             if given != expected {
                 return Err(RecordError::Channels {
-                    what,
+                    kind,
                     given,
                     expected,
                     names: column_names(letter, expected).join(","),

@@ -63,7 +63,7 @@ impl Table {
         let (inputs, outputs) =
             channels(&header).map_err(|problem| RecordError::file(path, problem))?;
         let columns = 1 + inputs + outputs;
-        // Where column j of the file goes in a row ordered t, u1, u2, …, y1, y2, ….
+        // Index of column j of the file in a row ordered t, u1, u2, …, y1, y2, ….
         let places: Vec<usize> = header.iter().map(|name| place(name, inputs)).collect();
         // Numbers alone are kept, and each once: a record may fill half of the memory.
         let (mut t, mut u, mut y) = (Vec::new(), Vec::new(), Vec::new());
@@ -215,7 +215,7 @@ fn channels(header: &csv::StringRecord) -> Result<(usize, usize), String> {
     Ok((inputs, outputs))
 }
 
-/// Where a column goes: t first, then inputs, then outputs.
+/// Index of a column in a row: t first, then inputs, then outputs.
 fn place(name: &str, inputs: usize) -> usize {
     let number = name[1..].parse::<usize>().unwrap_or(1);
     match name.as_bytes()[0] {

@@ -32,17 +32,6 @@ fn csv_text(drive: &Drive, outputs: &Signal) -> String {
 }
 
 /// Writes a record to a new file, which appears whole or not at all.
-///
-/// ```
-/// use truetwin::record::{Drive, Record, Signal, write_record};
-///
-/// let record = Record::new(Drive::new(0.5, Signal::ones((3, 1)))?, Signal::zeros((3, 1)))?;
-/// let folder = tempfile::tempdir()?;
-/// let path = folder.path().join("R.csv");
-/// write_record(&path, &record)?;
-/// assert!(write_record(&path, &record).is_err()); // nothing is overwritten
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 pub fn write_record(path: &Path, record: &Record) -> Result<(), RecordError> {
     write_new(path, record_csv_text(record).as_bytes())
         .map_err(|error| RecordError::io(path, error))

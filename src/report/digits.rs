@@ -8,7 +8,7 @@ const OF_NUMBER: i32 = 3;
 /// Most significant digits of a value, however small its error.
 const MOST: i32 = 7;
 
-/// How a number is written: all numbers of one quantity alike, so that they can be compared.
+/// Notation of the numbers of one quantity, the same for all of them so that they can be compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Digits {
     /// Digits after the point.
@@ -18,8 +18,7 @@ pub(super) enum Digits {
 }
 
 impl Digits {
-    /// What `std_error` supports for numbers the size of `value`: two digits of the error, at most seven of
-    /// the value.
+    /// Digits that `std_error` supports for numbers of the size of `value`: two of the error, at most seven of the value.
     pub(super) fn supported(value: f64, std_error: f64) -> Self {
         if !(std_error > 0.0 && std_error.is_finite()) {
             return Self::significant(value, OF_NUMBER + 1);

@@ -103,7 +103,7 @@ pub(super) fn preformatted(text: &str) -> String {
     format!("<pre>{}</pre>\n", lines.join("\n"))
 }
 
-/// What is secondary: folded on the screen, unfolded in print.
+/// A secondary part: folded on the screen, unfolded in print.
 pub(super) fn folded(summary: &str, body: &str) -> String {
     format!(
         "<details>\n<summary>{}</summary>\n{body}</details>\n",
@@ -128,7 +128,7 @@ pub(super) fn figure(svg: &str, caption: &str) -> String {
     )
 }
 
-/// What stands in a column.
+/// Kind of a column.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Column {
     Text,
@@ -169,9 +169,9 @@ pub(super) fn table(caption: &str, head: &[(&str, Column)], rows: &[Vec<String>]
 
 /// A cell of a matrix.
 pub(super) struct Shade {
-    /// What stands in it.
+    /// Text.
     pub(super) text: String,
-    /// From 0 to 1: how dark it is.
+    /// Darkness, 0 to 1.
     pub(super) weight: f64,
     /// Framed and bold.
     pub(super) right: bool,

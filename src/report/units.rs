@@ -33,19 +33,19 @@ impl Units {
             .map(|e| e.as_ref())
     }
 
-    /// Of a state, an input or an output.
+    /// Returns the unit of a state, an input or an output.
     pub(super) fn variable(&self, name: &str) -> &str {
         let signals = self.inputs.iter().chain(&self.outputs);
         let known = (self.states.iter().chain(signals)).find(|q| q.name == name);
         known.map_or("", |q| &q.unit)
     }
 
-    /// Whether this is a state: its equation gives a rate.
+    /// Tells whether the name is a state's: its equation gives a rate.
     fn is_state(&self, name: &str) -> bool {
         self.states.iter().any(|q| q.name == name)
     }
 
-    /// Of what the equation of a state or an output gives.
+    /// Returns the unit of the equation of a state or an output.
     pub(super) fn equation_unit(&self, name: &str) -> String {
         let unit = self.variable(name);
         match (self.is_state(name), unit) {

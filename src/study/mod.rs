@@ -193,13 +193,7 @@ impl Study {
         let space = twin.parameters();
         for (name, &value) in &file.fixed {
             let parameter = &space[space.position(name).map_err(StudyError::Fixed)?];
-            if !parameter.bounds.contains(value) {
-                return Err(StudyError::Fixed(TwinError::OutOfBounds {
-                    name: name.clone(),
-                    value,
-                    bounds: parameter.bounds,
-                }));
-            }
+            parameter.check_value(value).map_err(StudyError::Fixed)?;
         }
         let mut held = file.fixed.clone();
         held.extend(given_magnitudes(&file.effect));

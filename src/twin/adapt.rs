@@ -1,25 +1,16 @@
 //! A twin in another setting: prior, bounds, limits, noise and start changed from outside.
 
-use crate::record::{Drive, Signal, Signals};
+use super::fix::{Held, HeldBlackBox};
+use crate::record::Quantity;
 use crate::twin::{
-    DigitalTwin, Interval, Modified, Modify, Noise, Now, Outline, Parameter, ParameterSpace, Role,
-    SimulationError, StateSpace, Twin, TwinError,
+    DigitalTwin, Interval, Modified, Modify, Now, Outline, Parameter, ParameterSpace, Role,
+    StateSpace, Twin, TwinError,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// A number that is either known or to be estimated; files write `0.1` or `"estimate"`.
-///
-/// ```
-/// use truetwin::study::StudyFile;
-/// use truetwin::twin::Level;
-///
-/// let file = StudyFile::parse("twin = 'tanks'\n[noise]\nh1 = 0.1\ny = 'estimate'", "S.toml".as_ref())?;
-/// assert_eq!(file.noise["h1"], Level::Known(0.1));
-/// assert_eq!(file.noise["y"], Level::Estimate);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(from = "LevelText", into = "LevelText")]
 #[non_exhaustive]
@@ -61,28 +52,12 @@ impl From<Level> for LevelText {
     }
 }
 
-/// What is changed in a twin; each map goes by the names of parameters, states and outputs.
+/// A new setting of a twin; each map goes by the names of parameters, states and outputs.
 ///
 /// An unknown start or noise level lengthens θ by a parameter `start.<state>` or `noise.<state or output>`. Its
 /// prior is `prior["start.h1"]`, or else the state's limits; for noise, a tenth to three times the twin's own level.
-///
-/// ```
-/// use std::sync::Arc;
-/// use truetwin::twin::{Adaptation, Level, TwinError, adapt};
-/// use truetwin::twins::CascadedTanks;
-///
-/// let mut adaptation = Adaptation::default();
-/// adaptation.start.insert("h1".into(), Level::Estimate);
-/// let twin = adapt(Arc::new(CascadedTanks), &adaptation, 4.0)?;
-/// assert_eq!(twin.parameters().names(), ["k1", "k2", "k3", "k4", "start.h1"]);
-///
-/// adaptation.start.insert("h3".into(), Level::Known(0.0));
-/// let refused = adapt(Arc::new(CascadedTanks), &adaptation, 4.0).err().ok_or("h3 is no state")?;
-/// assert!(matches!(refused, TwinError::UnknownIn { .. }));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Adaptation {
+pub(crate) struct Adaptation {
     /// Prior box by parameter.
     pub prior: BTreeMap<String, Interval>,
     /// Physical bounds by parameter.
@@ -95,112 +70,16 @@ pub struct Adaptation {
     pub start: BTreeMap<String, Level>,
 }
 
-/// The twin in another setting; θ is the twin's, then unknown noise levels, then unknown starts. `step` is the Δt, in
+/// Puts a twin into another setting; θ is the twin's, then unknown noise levels, then unknown starts. `step` is the Δt, in
 /// seconds, at which the twin's own noise levels are taken.
-///
-/// ```
-/// use std::sync::Arc;
-/// use truetwin::twin::{Adaptation, DigitalTwin, Interval, adapt};
-/// use truetwin::twins::VanDerPol;
-///
-/// let mut adaptation = Adaptation::default();
-/// adaptation.prior.insert("nu".into(), Interval::new(1.0, 2.0)?);
-/// let twin = adapt(Arc::new(VanDerPol), &adaptation, 0.05)?;
-/// assert_eq!(twin.parameters().centre(), [1.5]);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub fn adapt(base: impl Into<Twin>, adaptation: &Adaptation, step: f64) -> Result<Twin, TwinError> {
-    let base = base.into();
+pub(crate) fn adapt(base: Twin, adaptation: &Adaptation, step: f64) -> Result<Twin, TwinError> {
     if *adaptation == Adaptation::default() {
         return Ok(base);
     }
-    let equations = match base {
-        Twin::Equations(equations) => equations,
-        Twin::BlackBox(base) => return adapt_black_box(base, adaptation),
-    };
-    let mut outline = equations.outline();
-    let n = outline.parameters.len();
-    let position = |table, name: &str, known: &[String]| {
-        (known.iter().position(|k| k == name)).ok_or_else(|| TwinError::UnknownIn {
-            table,
-            name: name.into(),
-            known: known.join(", "),
-        })
-    };
-    let states: Vec<String> = outline.states.iter().map(|s| s.name.clone()).collect();
-    let outputs = outline.outputs.iter().map(|y| y.name.clone());
-    let noisy: Vec<String> = states.iter().cloned().chain(outputs).collect();
-    let mut limits = equations.limits();
-    for (name, &limit) in &adaptation.limits {
-        limits[position("limits", name, &states)?] = limit;
+    match base {
+        Twin::Equations(base) => adapt_equations(base, adaptation, step),
+        Twin::BlackBox(base) => adapt_black_box(base, adaptation),
     }
-    let declared = declared_noise(equations.as_ref(), &outline, step);
-    let mut added: Vec<Parameter> = Vec::new();
-    let mut noise = Vec::new();
-    for (name, &level) in &adaptation.noise {
-        let index = position("noise", name, &noisy)?;
-        let what = match level {
-            Level::Known(value) if value >= 0.0 && value.is_finite() => Setting::Known(value),
-            Level::Known(value) => {
-                return Err(TwinError::Value {
-                    table: "noise",
-                    name: name.clone(),
-                    value,
-                    remedy: "a standard deviation is 0 or more",
-                });
-            }
-            Level::Estimate => {
-                let twin = declared[index];
-                let guess = (twin > 0.0).then(|| Interval::unchecked(0.1 * twin, 3.0 * twin));
-                added.push(unknown(
-                    adaptation,
-                    &format!("noise.{name}"),
-                    guess,
-                    Role::Noise,
-                )?);
-                Setting::Parameter(n + added.len() - 1)
-            }
-        };
-        noise.push((index, what));
-    }
-    let mut start = Vec::new();
-    for (name, &level) in &adaptation.start {
-        let index = position("start", name, &states)?;
-        let what = match level {
-            Level::Known(value) if limits[index].contains(value) && value.is_finite() => {
-                Setting::Known(value)
-            }
-            Level::Known(value) => {
-                return Err(TwinError::Value {
-                    table: "start",
-                    name: name.clone(),
-                    value,
-                    remedy: "a start lies within the state's limits",
-                });
-            }
-            Level::Estimate => {
-                let guess = Some(limits[index]).filter(|limit| limit.is_finite());
-                added.push(unknown(
-                    adaptation,
-                    &format!("start.{name}"),
-                    guess,
-                    Role::Start,
-                )?);
-                Setting::Parameter(n + added.len() - 1)
-            }
-        };
-        start.push((index, what));
-    }
-    outline.parameters = ParameterSpace::new(outline.parameters.iter().cloned().chain(added));
-    rebox(&mut outline.parameters, adaptation)?;
-    Ok(Twin::Equations(Arc::new(Modified(Adapted {
-        outline,
-        limits,
-        noise,
-        start,
-        own: n,
-        base: equations,
-    }))))
 }
 
 fn adapt_black_box(base: Arc<dyn DigitalTwin>, adaptation: &Adaptation) -> Result<Twin, TwinError> {
@@ -215,15 +94,112 @@ fn adapt_black_box(base: Arc<dyn DigitalTwin>, adaptation: &Adaptation) -> Resul
     }
     let mut parameters = base.parameters();
     rebox(&mut parameters, adaptation)?;
-    Ok(Twin::BlackBox(Arc::new(AdaptedBlackBox {
+    let held = Held::none(parameters.len());
+    Ok(Twin::BlackBox(Arc::new(HeldBlackBox {
         base,
         parameters,
+        held,
     })))
+}
+
+fn adapt_equations(
+    base: Arc<dyn StateSpace>,
+    adaptation: &Adaptation,
+    step: f64,
+) -> Result<Twin, TwinError> {
+    let mut outline = base.outline();
+    let own = outline.parameters.len();
+    let names = |all: &[Quantity]| -> Vec<String> { all.iter().map(|q| q.name.clone()).collect() };
+    let states = names(&outline.states);
+    let noisy = [&states[..], &names(&outline.outputs)].concat();
+    let mut limits = base.limits();
+    for (index, _, limit) in indexed("limits", &adaptation.limits, &states)? {
+        limits[index] = limit;
+    }
+    let noise = indexed("noise", &adaptation.noise, &noisy)?;
+    let levels = declared_noise(base.as_ref(), &outline, step);
+    for &(index, name, level) in &noise {
+        match level {
+            Level::Known(value) if !(value >= 0.0 && value.is_finite()) => {
+                return Err(TwinError::Value {
+                    table: "noise",
+                    name: name.into(),
+                    value,
+                    remedy: "a standard deviation is 0 or more",
+                });
+            }
+            Level::Known(_) => {}
+            Level::Estimate => {
+                let level = levels[index];
+                let guess = (level > 0.0).then(|| Interval::unchecked(0.1 * level, 3.0 * level));
+                let parameter = unknown(adaptation, Role::Noise, name, guess)?;
+                outline.parameters.push(parameter);
+            }
+        }
+    }
+    let start = indexed("start", &adaptation.start, &states)?;
+    for &(index, name, level) in &start {
+        let limit = limits[index];
+        match level {
+            Level::Known(value) if !(limit.contains(value) && value.is_finite()) => {
+                return Err(TwinError::Value {
+                    table: "start",
+                    name: name.into(),
+                    value,
+                    remedy: "a start lies within the state's limits",
+                });
+            }
+            Level::Known(_) => {}
+            Level::Estimate => {
+                let guess = Some(limit).filter(|limit| limit.is_finite());
+                let parameter = unknown(adaptation, Role::Start, name, guess)?;
+                outline.parameters.push(parameter);
+            }
+        }
+    }
+    rebox(&mut outline.parameters, adaptation)?;
+    let settings = |role: Role, all: &[(usize, &str, Level)]| -> Result<Vec<_>, TwinError> {
+        let setting = |name, level| match level {
+            Level::Known(value) => Ok(Setting::Known(value)),
+            Level::Estimate => {
+                (outline.parameters.position(&role.name(name))).map(Setting::Parameter)
+            }
+        };
+        (all.iter())
+            .map(|&(index, name, level)| Ok((index, setting(name, level)?)))
+            .collect()
+    };
+    Ok(Twin::Equations(Arc::new(Modified(Adapted {
+        limits,
+        noise: settings(Role::Noise, &noise)?,
+        start: settings(Role::Start, &start)?,
+        own,
+        outline,
+        base,
+    }))))
+}
+
+/// Entries of a table, each with the index of its name among those that the twin knows.
+fn indexed<'a, T: Copy>(
+    table: &'static str,
+    entries: &'a BTreeMap<String, T>,
+    known: &[String],
+) -> Result<Vec<(usize, &'a str, T)>, TwinError> {
+    let index = |name: &str| {
+        (known.iter().position(|k| k == name)).ok_or_else(|| TwinError::UnknownIn {
+            table,
+            name: name.into(),
+            known: known.join(", "),
+        })
+    };
+    (entries.iter())
+        .map(|(name, &value)| Ok((index(name)?, name.as_str(), value)))
+        .collect()
 }
 
 /// Noise levels of states, then outputs, at the prior's centre.
 fn declared_noise(twin: &dyn StateSpace, outline: &Outline, step: f64) -> Vec<f64> {
-    let (mut q, mut r) = (
+    let (mut process, mut measurement) = (
         vec![0.0; outline.states.len()],
         vec![0.0; outline.outputs.len()],
     );
@@ -234,23 +210,22 @@ fn declared_noise(twin: &dyn StateSpace, outline: &Outline, step: f64) -> Vec<f6
         u: &vec![0.0; outline.inputs.len()],
         theta: &centre,
     };
-    twin.noise(&now, &mut q, &mut r);
-    q.extend(r);
-    q
+    twin.noise(&now, &mut process, &mut measurement);
+    process.extend(measurement);
+    process
 }
 
-/// A parameter for an unknown start or noise level.
+/// A parameter for an unknown start or noise level of `target`.
 fn unknown(
     adaptation: &Adaptation,
-    name: &str,
-    guess: Option<Interval>,
     role: Role,
+    target: &str,
+    guess: Option<Interval>,
 ) -> Result<Parameter, TwinError> {
-    let given = adaptation.prior.get(name).copied();
-    let prior = given
-        .or(guess)
-        .ok_or_else(|| TwinError::NoPrior(name.into()))?;
-    let mut parameter = Parameter::new(name, "", prior.low(), prior.high()).with_role(role);
+    let name = role.name(target);
+    let prior = (adaptation.prior.get(&name).copied().or(guess))
+        .ok_or_else(|| TwinError::NoPrior(name.clone()))?;
+    let mut parameter = Parameter::new(&name, "", prior.low(), prior.high()).with_role(role);
     if let Some(guess) = guess {
         let (low, high) = (guess.low().min(prior.low()), guess.high().max(prior.high()));
         parameter = parameter.within(low, high);
@@ -260,27 +235,17 @@ fn unknown(
 
 /// Sets prior boxes and bounds.
 fn rebox(parameters: &mut ParameterSpace, adaptation: &Adaptation) -> Result<(), TwinError> {
-    for (table, boxes) in [("prior", &adaptation.prior), ("bounds", &adaptation.bounds)] {
-        for (name, &interval) in boxes {
-            let known = parameters.names().join(", ");
-            let parameter = parameters
-                .iter_mut()
-                .find(|p| p.name == *name)
-                .ok_or_else(|| TwinError::UnknownIn {
-                    table,
-                    name: name.clone(),
-                    known,
-                })?;
-            match table {
-                "prior" => parameter.prior = interval,
-                _ => parameter.bounds = interval,
-            }
-        }
+    let names: Vec<String> = parameters.iter().map(|p| p.name.clone()).collect();
+    for (index, _, prior) in indexed("prior", &adaptation.prior, &names)? {
+        parameters[index].prior = prior;
+    }
+    for (index, _, bounds) in indexed("bounds", &adaptation.bounds, &names)? {
+        parameters[index].bounds = bounds;
     }
     parameters.check()
 }
 
-/// Where a start or noise level comes from.
+/// A start or noise level.
 #[derive(Debug, Clone, Copy)]
 enum Setting {
     Known(f64),
@@ -337,28 +302,5 @@ impl Modify for Adapted {
             };
             *level = setting.value(now.theta);
         }
-    }
-}
-
-/// A black box with another prior or other bounds.
-struct AdaptedBlackBox {
-    base: Arc<dyn DigitalTwin>,
-    parameters: ParameterSpace,
-}
-
-impl DigitalTwin for AdaptedBlackBox {
-    fn parameters(&self) -> ParameterSpace {
-        self.parameters.clone()
-    }
-    fn signals(&self) -> Signals {
-        self.base.signals()
-    }
-    fn simulate(
-        &self,
-        theta: &[f64],
-        drive: &Drive,
-        noise: Noise,
-    ) -> Result<Signal, SimulationError> {
-        self.base.simulate(theta, drive, noise)
     }
 }

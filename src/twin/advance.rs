@@ -1,54 +1,8 @@
 //! One step of any equations: of one state, or of all points of a filter at once.
 
-use super::state_space::simulate_equations;
+use super::simulation::simulate_equations;
 use crate::record::{Drive, Signal};
-use crate::twin::{Interval, Noise, Now, SimulationError, StateSpace, Workspace};
-
-/// What every twin with equations can do, and none in its own way: the step.
-///
-/// It is implemented for all of them at once and can be for no single one, so a step that twins made of others would
-/// not know cannot exist. As a supertrait of [`StateSpace`] it is compiled once for each twin, the equations inline:
-/// a filter that holds a `dyn StateSpace` then pays one call for all its points.
-pub trait Advance {
-    /// One step without noise and limits: memories, then motion.
-    fn advance(&self, now: &Now<'_>, x: &mut [f64], work: &mut Workspace);
-
-    /// Simulates the equations.
-    #[doc(hidden)]
-    fn run_equations(
-        &self,
-        theta: &[f64],
-        drive: &Drive,
-        noise: Noise,
-    ) -> Result<Signal, SimulationError>;
-
-    /// Carries points over a step; see [`Points`]. Returns whether a constraint acted on any that matters to the noise.
-    #[doc(hidden)]
-    fn advance_each(&self, now: &Now<'_>, points: Points<'_>, work: &mut Workspace) -> bool;
-
-    /// Outputs, `p` each, of points, `n` each.
-    #[doc(hidden)]
-    fn observe_each(&self, now: &Now<'_>, sizes: (usize, usize), points: &[f64], y: &mut [f64]);
-
-    /// Puts outputs, `p` each, through the readout; returns whether it changed any.
-    #[doc(hidden)]
-    fn readout_each(&self, now: &Now<'_>, p: usize, y: &mut [f64]) -> bool;
-}
-
-/// Points that a filter carries over a step; n states each, one point after the other.
-#[doc(hidden)]
-#[derive(Debug)]
-pub struct Points<'w> {
-    /// Put into the limits, advanced, constrained; the first is the centre.
-    pub moving: &'w mut [f64],
-    /// Limits by state.
-    pub limits: &'w [Interval],
-    /// Two for each state: the centre after its motion, with that state shifted up and down; constrained. Those of a
-    /// state without shift are left alone.
-    pub shifted: &'w mut [f64],
-    /// Shift of each state.
-    pub shifts: &'w [f64],
-}
+use crate::twin::{Advance, Noise, Now, Points, SimulationError, StateSpace, Workspace};
 
 impl<T: StateSpace> Advance for T {
     #[inline]
@@ -141,7 +95,7 @@ fn advance_each<T: StateSpace>(
     bent | changes(centre, |x| twin.constrain(now, x))
 }
 
-/// Whether `with` changes `values`. Nothing is left of this for a `with` that does nothing.
+/// Runs `with` and tells whether it changed `values`. Nothing is left of this for a `with` that does nothing.
 #[inline(always)]
 fn changes(values: &mut [f64], with: impl FnOnce(&mut [f64])) -> bool {
     let (mut few, many);

@@ -1,4 +1,4 @@
-//! What is wrong with a new twin, found before any training: [`check`] in a test, `truetwin check` in a shell.
+//! Checks of a new twin before any training: [`check`] in a test, `truetwin check` in a shell.
 //!
 //! ```
 //! use truetwin::record::Drive;
@@ -12,13 +12,17 @@
 //! ```
 
 use crate::record::{Drive, Signal};
-use crate::twin::{DigitalTwin, Noise, PRIOR_DEVIATION, SimulationError, combination};
+use crate::twin::{
+    DigitalTwin, Noise, PRIOR_DEVIATION, Parameter, ParameterSpace, SimulationError, combination,
+};
 use nalgebra::DMatrix;
+use serde::Serialize;
 
-/// How bad a finding is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+/// Severity of a finding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Severity {
-    /// As it should be.
+    /// The check passed.
     Pass,
     /// Worth knowing; the twin can be used.
     Warning,
@@ -27,18 +31,30 @@ pub enum Severity {
 }
 
 /// The outcome of one check.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Finding {
     /// Short name of the check.
     pub check: &'static str,
-    /// How bad it is.
+    /// Severity.
     pub severity: Severity,
-    /// What was found, and the remedy.
+    /// The result, and the remedy where there is one.
     pub message: String,
 }
 
 impl Finding {
+    fn pass(check: &'static str, message: impl Into<String>) -> Self {
+        Self::new(check, Severity::Pass, message)
+    }
+
+    fn failure(check: &'static str, message: impl Into<String>) -> Self {
+        Self::new(check, Severity::Failure, message)
+    }
+
+    fn warning(check: &'static str, message: impl Into<String>) -> Self {
+        Self::new(check, Severity::Warning, message)
+    }
+
     fn new(check: &'static str, severity: Severity, message: impl Into<String>) -> Self {
         Self {
             check,
@@ -63,135 +79,216 @@ const PAIRED: f64 = 1e-2;
 /// 6. *paired*: noise draws do not depend on θ (common random numbers);
 /// 7. *identifiable*: no direction in θ leaves the free run unchanged, or moves it less than the noise does over the whole
 ///    prior (first order, centre of the prior, noise taken as white).
-///
-///
-/// ```
-/// use truetwin::record::Drive;
-/// use truetwin::twin::conformance::{Finding, Severity, check};
-/// use truetwin::twins::VanDerPol;
-///
-/// let findings: Vec<Finding> = check(&VanDerPol, &Drive::autonomous(0.05, 100)?, 1);
-/// assert!(findings.iter().all(|finding| finding.severity < Severity::Failure));
-/// assert_eq!(findings[0].check, "parameters");
-/// # Ok::<(), truetwin::record::RecordError>(())
-/// ```
 pub fn check(twin: &dyn DigitalTwin, drive: &Drive, seed: u64) -> Vec<Finding> {
     let space = twin.parameters();
-    let mut findings = Vec::new();
     if let Err(error) = space.check() {
-        return vec![Finding::new(
-            "parameters",
-            Severity::Failure,
-            error.to_string(),
-        )];
+        return vec![Finding::failure("parameters", error.to_string())];
     }
-    findings.push(Finding::new(
+    let names = space.names().join(", ");
+    let mut findings = vec![Finding::pass(
         "parameters",
-        Severity::Pass,
-        format!("{} to estimate: {}", space.len(), space.names().join(", ")),
-    ));
-    let centre = space.centre();
-    let noise = Noise::new(seed, "check", 0);
-    let first = match twin.simulate(&centre, drive, noise) {
+        format!("{} to estimate: {names}", space.len()),
+    )];
+    let setting = Setting {
+        twin,
+        drive,
+        noise: Noise::new(seed, "check", 0),
+        centre: space.centre(),
+        space,
+    };
+    let first = match setting.run(&setting.centre) {
         Ok(outputs) => outputs,
         Err(error) => {
-            let message = format!("at the prior's centre {centre:?}: {error}");
-            findings.push(Finding::new("finite", Severity::Failure, message));
+            let message = format!("at the prior's centre {:?}: {error}", setting.centre);
+            findings.push(Finding::failure("finite", message));
             return findings;
         }
     };
     let expected = (drive.samples(), twin.signals().outputs.len());
     if first.dim() != expected {
-        findings.push(Finding::new(
-            "channels",
-            Severity::Failure,
-            format!("outputs are {:?}, {expected:?} (samples, channels) were declared; return one row a sample and one column an output", first.dim()),
-        ));
+        let message = format!(
+            "outputs are {:?}, {expected:?} (samples, channels) were declared; return one row a sample and one column an output",
+            first.dim()
+        );
+        findings.push(Finding::failure("channels", message));
         return findings;
     }
-    findings.push(Finding::new(
-        "channels",
-        Severity::Pass,
-        format!("{} samples, {} outputs", expected.0, expected.1),
-    ));
-    findings.push(finite(twin, drive, noise));
-    findings.push(repeatable(twin, drive, noise, &first));
-    let (finding, spread) = noisy(twin, drive, seed, &first);
-    findings.push(finding);
-    findings.push(paired(twin, drive, noise, &first, spread));
-    findings.push(identifiable(twin, drive, spread));
+    let message = format!("{} samples, {} outputs", expected.0, expected.1);
+    findings.push(Finding::pass("channels", message));
+    findings.push(setting.finite());
+    findings.push(setting.repeatable(&first));
+    let other = twin.simulate(&setting.centre, drive, Noise::new(seed, "check", 1));
+    let spread = other.map_or(0.0, |other| rms(&first, &other));
+    findings.push(noisy(spread));
+    findings.push(setting.paired(&first, spread));
+    findings.push(setting.identifiable(spread));
     findings
 }
 
-/// Corners of the prior box: all of them up to six parameters, 64 spread ones beyond.
-fn corners(twin: &dyn DigitalTwin) -> Vec<Vec<f64>> {
-    let space = twin.parameters();
-    let count = 1usize << space.len().min(6);
-    (0..count)
-        .map(|c| {
-            (space.iter().enumerate())
-                // Beyond six parameters, Walsh codes keep the corners apart.
-                .map(|(j, p)| {
-                    let bit = if j < 6 {
-                        c >> j & 1
-                    } else {
-                        (c & (j + 1)).count_ones() as usize & 1
-                    };
-                    if bit == 1 {
-                        p.prior.high()
-                    } else {
-                        p.prior.low()
-                    }
-                })
-                .collect()
-        })
-        .collect()
+/// A twin and the run that it is checked by.
+struct Setting<'a> {
+    twin: &'a dyn DigitalTwin,
+    drive: &'a Drive,
+    noise: Noise,
+    space: ParameterSpace,
+    centre: Vec<f64>,
 }
 
-fn finite(twin: &dyn DigitalTwin, drive: &Drive, noise: Noise) -> Finding {
-    let corners = corners(twin);
-    let mut bad = corners.iter().filter_map(|theta| {
-        let problem = match twin.simulate(theta, drive, noise) {
-            Ok(outputs) if outputs.iter().all(|v| v.is_finite()) => return None,
-            Ok(_) => "outputs are not finite".to_owned(),
-            Err(error) => error.to_string(),
-        };
-        Some((theta, problem))
-    });
-    let Some((theta, problem)) = bad.next() else {
-        let message = format!("finite at the {} corners of the prior", corners.len());
-        return Finding::new("finite", Severity::Pass, message);
-    };
-    let others = bad.count();
-    Finding::new(
-        "finite",
-        if others + 1 == corners.len() {
-            Severity::Failure
-        } else {
-            Severity::Warning
-        },
-        format!(
-            "{problem} at the prior's corner {theta:?} ({} of {} corners); such draws are redrawn: shrink the prior or the step",
-            others + 1,
-            corners.len()
-        ),
-    )
-}
-
-fn repeatable(twin: &dyn DigitalTwin, drive: &Drive, noise: Noise, first: &Signal) -> Finding {
-    let again = twin.simulate(&twin.parameters().centre(), drive, noise);
-    match again {
-        Ok(again) if again == *first => Finding::new(
-            "repeatable",
-            Severity::Pass,
-            "the same arguments give the same bits",
-        ),
-        _ => Finding::new(
-            "repeatable",
-            Severity::Failure,
-            "two runs with the same arguments differ; take all randomness from `noise` and keep no state between runs",
-        ),
+impl Setting<'_> {
+    fn run(&self, theta: &[f64]) -> Result<Signal, SimulationError> {
+        self.twin.simulate(theta, self.drive, self.noise)
     }
+
+    /// Corners of the prior box: all of them up to six parameters, 64 spread ones beyond.
+    fn corners(&self) -> Vec<Vec<f64>> {
+        let corner = |c: usize| {
+            let end = |(j, p): (usize, &Parameter)| {
+                // Beyond six parameters, Walsh codes keep the corners apart.
+                let bit = if j < 6 {
+                    c >> j & 1
+                } else {
+                    (c & (j + 1)).count_ones() as usize & 1
+                };
+                if bit == 1 {
+                    p.prior.high()
+                } else {
+                    p.prior.low()
+                }
+            };
+            self.space.iter().enumerate().map(end).collect()
+        };
+        (0..1usize << self.space.len().min(6)).map(corner).collect()
+    }
+
+    fn finite(&self) -> Finding {
+        let corners = self.corners();
+        let mut bad = corners.iter().filter_map(|theta| {
+            let problem = match self.run(theta) {
+                Ok(outputs) if outputs.iter().all(|v| v.is_finite()) => return None,
+                Ok(_) => "outputs are not finite".to_owned(),
+                Err(error) => error.to_string(),
+            };
+            Some((theta, problem))
+        });
+        let Some((theta, problem)) = bad.next() else {
+            let message = format!("finite at the {} corners of the prior", corners.len());
+            return Finding::pass("finite", message);
+        };
+        let (failed, all) = (bad.count() + 1, corners.len());
+        let message = format!(
+            "{problem} at the prior's corner {theta:?} ({failed} of {all} corners); such draws are redrawn: shrink the prior or the step"
+        );
+        if failed == all {
+            Finding::failure("finite", message)
+        } else {
+            Finding::warning("finite", message)
+        }
+    }
+
+    fn repeatable(&self, first: &Signal) -> Finding {
+        match self.run(&self.centre) {
+            Ok(again) if again == *first => {
+                Finding::pass("repeatable", "the same arguments give the same bits")
+            }
+            _ => Finding::failure(
+                "repeatable",
+                "two runs with the same arguments differ; take all randomness from `noise` and keep no state between runs",
+            ),
+        }
+    }
+
+    fn paired(&self, first: &Signal, spread: f64) -> Finding {
+        let mut moved = self.centre.clone();
+        for (value, width) in moved.iter_mut().zip(self.space.widths()) {
+            *value += 1e-9 * width;
+        }
+        match self.run(&moved).map(|y| rms(first, &y)) {
+            Ok(change) if change <= PAIRED * spread || spread == 0.0 => {
+                Finding::pass("paired", "noise draws do not depend on θ")
+            }
+            Ok(change) => Finding::failure(
+                "paired",
+                format!(
+                    "1e-9 of the prior's width moves the outputs by {change:.1e} rms (noise: {spread:.1e}): draws depend on θ; open each source of noise by its own name and draw the same number of times"
+                ),
+            ),
+            Err(error) => Finding::failure("paired", error.to_string()),
+        }
+    }
+
+    /// Singular directions of the free run's Jacobian at the prior's centre, θ in units of the prior's width, against the
+    /// noise: two noisy runs differ by `spread` rms.
+    fn identifiable(&self, spread: f64) -> Finding {
+        const CHECK: &str = "identifiable";
+        let jacobian = match self.free_run_jacobian() {
+            Ok(jacobian) => jacobian,
+            Err(error) => return Finding::warning(CHECK, format!("not known: {error}")),
+        };
+        let svd = jacobian.svd(false, true);
+        let largest = svd.singular_values.max();
+        // Standard deviation of the direction if the noise were white, in prior widths.
+        let deviation = |s: f64| spread / 2f64.sqrt() / s;
+        let named = |weak: &dyn Fn(f64) -> bool| -> Vec<String> {
+            let chosen = (svd.singular_values.iter().enumerate()).filter(|(_, s)| weak(**s));
+            let words = chosen.filter_map(|(i, _)| {
+                let row = svd.v_t.as_ref()?.row(i).transpose();
+                Some(combination(&self.space.names(), row.as_slice()))
+            });
+            words.collect()
+        };
+        let flat = named(&|s| s <= FLAT * largest);
+        let drowned = named(&|s| s > FLAT * largest && deviation(s) > PRIOR_DEVIATION);
+        if !flat.is_empty() {
+            let message = format!(
+                "the free run does not change along {} (θ over the prior's width): only noise can tell; fix one parameter there, or report combinations",
+                flat.join("; ")
+            );
+            return Finding::warning(CHECK, message);
+        }
+        if !drowned.is_empty() {
+            let message = format!(
+                "a record of this length tells less than the prior about {} (θ over the prior's width): expect wide intervals there; take longer records or another input",
+                drowned.join("; ")
+            );
+            return Finding::warning(CHECK, message);
+        }
+        let weakest = deviation(svd.singular_values.min());
+        let message = format!(
+            "every direction moves the free run (the weakest is known to about {weakest:.1e} prior widths)"
+        );
+        Finding::pass(CHECK, message)
+    }
+
+    /// ∂(free run)/∂(θ over the prior's width) at the prior's centre, by central differences; N·channels × d.
+    fn free_run_jacobian(&self) -> Result<DMatrix<f64>, SimulationError> {
+        let widths = self.space.widths();
+        let column = |j: usize| -> Result<Vec<f64>, SimulationError> {
+            let side = |sign: f64| {
+                let mut theta = self.centre.clone();
+                theta[j] += sign * 1e-4 * widths[j];
+                self.twin.free_run(&theta, self.drive)
+            };
+            let difference = side(1.0)? - side(-1.0)?;
+            Ok(difference.iter().map(|d| d / 2e-4).collect())
+        };
+        let columns: Vec<Vec<f64>> = (0..self.space.len())
+            .map(column)
+            .collect::<Result<_, _>>()?;
+        Ok(DMatrix::from_fn(columns[0].len(), columns.len(), |i, j| {
+            columns[j][i]
+        }))
+    }
+}
+
+fn noisy(spread: f64) -> Finding {
+    if spread > 0.0 {
+        let message = format!("two noise samples differ by {spread:.3e} rms");
+        return Finding::pass("noise", message);
+    }
+    Finding::warning(
+        "noise",
+        "the twin has no noise: statistics of features cannot be simulated; give it noise levels",
+    )
 }
 
 /// Root mean square of a difference.
@@ -199,127 +296,10 @@ fn rms(a: &Signal, b: &Signal) -> f64 {
     ((a - b).mapv(|d| d * d).mean().unwrap_or(0.0)).sqrt()
 }
 
-fn noisy(twin: &dyn DigitalTwin, drive: &Drive, seed: u64, first: &Signal) -> (Finding, f64) {
-    let other = twin.simulate(
-        &twin.parameters().centre(),
-        drive,
-        Noise::new(seed, "check", 1),
-    );
-    let spread = other.map_or(0.0, |other| rms(first, &other));
-    let finding = if spread > 0.0 {
-        let message = format!("two noise samples differ by {spread:.3e} rms");
-        Finding::new("noise", Severity::Pass, message)
-    } else {
-        Finding::new(
-            "noise",
-            Severity::Warning,
-            "the twin has no noise: statistics of features cannot be simulated; give it noise levels",
-        )
-    };
-    (finding, spread)
-}
-
-fn paired(
-    twin: &dyn DigitalTwin,
-    drive: &Drive,
-    noise: Noise,
-    first: &Signal,
-    spread: f64,
-) -> Finding {
-    let space = twin.parameters();
-    let mut moved = space.centre();
-    for (value, width) in moved.iter_mut().zip(space.widths()) {
-        *value += 1e-9 * width;
-    }
-    let change = twin.simulate(&moved, drive, noise).map(|y| rms(first, &y));
-    match change {
-        Ok(change) if change <= PAIRED * spread || spread == 0.0 => {
-            Finding::new("paired", Severity::Pass, "noise draws do not depend on θ")
-        }
-        Ok(change) => Finding::new(
-            "paired",
-            Severity::Failure,
-            format!(
-                "1e-9 of the prior's width moves the outputs by {change:.1e} rms (noise: {spread:.1e}): draws depend on θ; open each source of noise by its own name and draw the same number of times"
-            ),
-        ),
-        Err(error) => Finding::new("paired", Severity::Failure, error.to_string()),
-    }
-}
-
-/// Singular directions of the free run's Jacobian at the prior's centre, θ in units of the prior's width, against the
-/// noise: two noisy runs differ by `spread` rms.
-fn identifiable(twin: &dyn DigitalTwin, drive: &Drive, spread: f64) -> Finding {
-    let space = twin.parameters();
-    let jacobian = match free_run_jacobian(twin, drive) {
-        Ok(jacobian) => jacobian,
-        Err(error) => {
-            let message = format!("not known: {error}");
-            return Finding::new("identifiable", Severity::Warning, message);
-        }
-    };
-    let svd = jacobian.svd(false, true);
-    let largest = svd.singular_values.max();
-    // Standard deviation of the direction if the noise were white, in prior widths.
-    let deviation = |s: f64| spread / 2f64.sqrt() / s;
-    let named = |weak: &dyn Fn(f64) -> bool| -> Vec<String> {
-        let chosen = (svd.singular_values.iter().enumerate()).filter(|(_, s)| weak(**s));
-        let words = chosen.filter_map(|(i, _)| {
-            let row = svd.v_t.as_ref()?.row(i).transpose();
-            Some(combination(&space.names(), row.as_slice()))
-        });
-        words.collect()
-    };
-    let flat = named(&|s| s <= FLAT * largest);
-    let drowned = named(&|s| s > FLAT * largest && deviation(s) > PRIOR_DEVIATION);
-    if !flat.is_empty() {
-        let message = format!(
-            "the free run does not change along {} (θ over the prior's width): only noise can tell; fix one parameter there, or report combinations",
-            flat.join("; ")
-        );
-        return Finding::new("identifiable", Severity::Warning, message);
-    }
-    if !drowned.is_empty() {
-        let message = format!(
-            "a record of this length tells less than the prior about {} (θ over the prior's width): expect wide intervals there; take longer records or another input",
-            drowned.join("; ")
-        );
-        return Finding::new("identifiable", Severity::Warning, message);
-    }
-    let weakest = deviation(svd.singular_values.min());
-    let message = format!(
-        "every direction moves the free run (the weakest is known to about {weakest:.1e} prior widths)"
-    );
-    Finding::new("identifiable", Severity::Pass, message)
-}
-
-/// ∂(free run)/∂(θ over the prior's width) at the prior's centre, by central differences; N·channels × d.
-fn free_run_jacobian(
-    twin: &dyn DigitalTwin,
-    drive: &Drive,
-) -> Result<DMatrix<f64>, SimulationError> {
-    let space = twin.parameters();
-    let (centre, widths) = (space.centre(), space.widths());
-    let column = |j: usize| -> Result<Vec<f64>, SimulationError> {
-        let side = |sign: f64| {
-            let mut theta = centre.clone();
-            theta[j] += sign * 1e-4 * widths[j];
-            twin.free_run(&theta, drive)
-        };
-        let difference = side(1.0)? - side(-1.0)?;
-        Ok(difference.iter().map(|d| d / 2e-4).collect())
-    };
-    let columns: Vec<Vec<f64>> = (0..space.len()).map(column).collect::<Result<_, _>>()?;
-    Ok(DMatrix::from_fn(columns[0].len(), columns.len(), |i, j| {
-        columns[j][i]
-    }))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::record::{Quantity, Signals};
-    use crate::twin::{Parameter, ParameterSpace};
     use std::sync::atomic::{AtomicU64, Ordering};
 
     /// y = a·b·k/10 + noise, with a flaw.

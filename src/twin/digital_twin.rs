@@ -1,8 +1,7 @@
 //! The one trait that every simulator has.
 
 use crate::record::{Drive, Signal, Signals};
-use crate::twin::{Noise, ParameterSpace, StateSpace};
-use std::error::Error;
+use crate::twin::{Noise, ParameterSpace, SimulationError, StateSpace};
 use std::sync::Arc;
 
 /// A simulator of a physical system: parameters and inputs in, outputs out.
@@ -90,52 +89,4 @@ pub trait DigitalTwin: Send + Sync {
 }
 
 /// Runs that a black box's free run is the mean of.
-pub(crate) const FREE_RUNS: u64 = 32;
-
-/// Why a simulation gave no outputs.
-///
-/// ```
-/// use truetwin::record::Drive;
-/// use truetwin::twin::{DigitalTwin, Noise, SimulationError};
-/// use truetwin::twins::VanDerPol;
-///
-/// let drive = Drive::autonomous(1.0, 50)?; // far too large a step
-/// let error = VanDerPol.simulate(&[5.0], &drive, Noise::OFF).unwrap_err();
-/// assert!(matches!(error, SimulationError::Diverged { .. }) && error.costs_one_run());
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SimulationError {
-    /// The trajectory left the finite numbers: these parameters are not for this input.
-    #[error("the simulation diverged at t = {at} s")]
-    Diverged {
-        /// Time of the first non-finite value, in seconds.
-        at: f64,
-    },
-    /// This run failed for another reason, such as a solver that gave up; others may work.
-    #[error("this simulation failed: {0}")]
-    Failed(Box<dyn Error + Send + Sync>),
-    /// The simulator does not work at all; no other parameters will help.
-    #[error("the simulator failed: {0}")]
-    Fatal(Box<dyn Error + Send + Sync>),
-}
-
-impl SimulationError {
-    /// A fatal error from a message.
-    pub fn fatal(message: impl Into<String>) -> Self {
-        Self::Fatal(message.into().into())
-    }
-
-    /// Whether only this run is lost: a search goes on elsewhere, a draw is drawn again.
-    ///
-    /// ```
-    /// use truetwin::twin::SimulationError;
-    /// assert!(SimulationError::Diverged { at: 0.5 }.costs_one_run());
-    /// assert!(SimulationError::Failed("the solver found no root".into()).costs_one_run());
-    /// assert!(!SimulationError::fatal("no licence").costs_one_run());
-    /// ```
-    pub fn costs_one_run(&self) -> bool {
-        matches!(self, Self::Diverged { .. } | Self::Failed(_))
-    }
-}
+pub(super) const FREE_RUNS: u64 = 32;

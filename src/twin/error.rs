@@ -1,9 +1,8 @@
-//! Errors of parameters, intervals, names and settings of a twin.
+//! Errors of a twin's parameters, names and settings, and of its simulations.
 
 use crate::setting::did_you_mean;
-use crate::twin::Interval;
 
-/// Why a twin, its parameters, a point or a new setting cannot be used.
+/// A fault in a twin, its parameters, a point or a new setting.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TwinError {
@@ -33,18 +32,18 @@ pub enum TwinError {
         kind: &'static str,
         /// The name.
         name: String,
-        /// What is wrong, and the remedy.
+        /// Problem and remedy.
         problem: &'static str,
     },
     /// A prior or bounds with ends exchanged, or not finite.
-    #[error("{what} of {name} is {interval}; write finite [low, high] with low < high")]
+    #[error("{kind} of {name} is {interval}; write finite [low, high] with low < high")]
     Box {
         /// Parameter.
         name: String,
         /// "prior" or "bounds".
-        what: &'static str,
-        /// What was given.
-        interval: Interval,
+        kind: &'static str,
+        /// The ends given.
+        interval: String,
     },
     /// A prior that leaves the physical bounds.
     #[error(
@@ -54,9 +53,9 @@ pub enum TwinError {
         /// Parameter.
         name: String,
         /// The prior box.
-        prior: Interval,
+        prior: String,
         /// The physical bounds.
-        bounds: Interval,
+        bounds: String,
     },
     /// A point with too many or too few numbers.
     #[error("{given} values for {expected} parameters ({names}); give one value for each")]
@@ -76,7 +75,7 @@ pub enum TwinError {
         /// The value.
         value: f64,
         /// Its bounds.
-        bounds: Interval,
+        bounds: String,
     },
     /// A name that no parameter has.
     #[error("no parameter is called {name}{}; there are {names}", did_you_mean(name, names.split(", ")))]
@@ -110,10 +109,40 @@ pub enum TwinError {
         name: String,
         /// Value.
         value: f64,
-        /// What to write.
+        /// Remedy.
         remedy: &'static str,
     },
     /// An unknown start or noise level without a prior.
     #[error("no prior for the unknown {0}; add [prior] \"{0}\" = [low, high]")]
     NoPrior(String),
+}
+
+/// A simulation without outputs.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimulationError {
+    /// A trajectory that left the finite numbers: these parameters are not for this input.
+    #[error("the simulation diverged at t = {at} s")]
+    Diverged {
+        /// Time of the first non-finite value, in seconds.
+        at: f64,
+    },
+    /// A run that failed for another reason, such as a solver that gave up; others may work.
+    #[error("this simulation failed: {0}")]
+    Failed(Box<dyn std::error::Error + Send + Sync>),
+    /// A simulator that does not work at all; no other parameters will help.
+    #[error("the simulator failed: {0}")]
+    Fatal(Box<dyn std::error::Error + Send + Sync>),
+}
+
+impl SimulationError {
+    /// A fatal error from a message.
+    pub fn fatal(message: impl Into<String>) -> Self {
+        Self::Fatal(message.into().into())
+    }
+
+    /// Tells whether only this run is lost: a search goes on elsewhere, a draw is drawn again.
+    pub fn costs_one_run(&self) -> bool {
+        matches!(self, Self::Diverged { .. } | Self::Failed(_))
+    }
 }

@@ -1,6 +1,6 @@
 //! A twin with some parameters held at known values.
 
-use super::state_space::check_length;
+use super::simulation::check_length;
 use crate::record::{Drive, Signal, Signals};
 use crate::twin::{
     DigitalTwin, Modified, Modify, Noise, Outline, ParameterSpace, SimulationError, StateSpace,
@@ -10,25 +10,13 @@ use smallvec::SmallVec;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// The twin with the named parameters held; θ is shorter by them.
+/// Holds the named parameters of a twin; θ is shorter by them.
 ///
-/// # Errors
-///
-/// [`TwinError`] for an unknown name, or when nothing is left to estimate. Whether values make sense is the
-/// caller's to check: a magnitude may be held at infinity.
-///
-/// ```
-/// use std::collections::BTreeMap;
-/// use std::sync::Arc;
-/// use truetwin::twin::{DigitalTwin, fix};
-/// use truetwin::twins::CascadedTanks;
-///
-/// let held = BTreeMap::from([("k4".to_owned(), 1.0)]);
-/// let twin = fix(Arc::new(CascadedTanks), &held)?;
-/// assert_eq!(twin.parameters().names(), ["k1", "k2", "k3"]);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub fn fix(base: impl Into<Twin>, values: &BTreeMap<String, f64>) -> Result<Twin, TwinError> {
+/// Refuses unknown names, and to leave nothing to estimate. Values are not checked: a magnitude may be held at infinity.
+pub(crate) fn fix(
+    base: impl Into<Twin>,
+    values: &BTreeMap<String, f64>,
+) -> Result<Twin, TwinError> {
     let base = base.into();
     if values.is_empty() {
         return Ok(base);
@@ -55,14 +43,23 @@ pub fn fix(base: impl Into<Twin>, values: &BTreeMap<String, f64>) -> Result<Twin
                 held,
             })))
         }
-        Twin::BlackBox(base) => Twin::BlackBox(Arc::new(FixedBlackBox { base, free, held })),
+        Twin::BlackBox(base) => Twin::BlackBox(Arc::new(HeldBlackBox {
+            base,
+            parameters: free,
+            held,
+        })),
     })
 }
 
 /// Values of all parameters; none for those that are free.
-struct Held(Vec<Option<f64>>);
+pub(super) struct Held(Vec<Option<f64>>);
 
 impl Held {
+    /// Leaves all of `parameters` free.
+    pub fn none(parameters: usize) -> Self {
+        Self(vec![None; parameters])
+    }
+
     fn complete(&self, free: &[f64]) -> SmallVec<[f64; 16]> {
         let mut free = free.iter();
         (self.0.iter())
@@ -100,16 +97,16 @@ impl Modify for Fixed {
     }
 }
 
-/// A black box with held parameters.
-struct FixedBlackBox {
-    base: Arc<dyn DigitalTwin>,
-    free: ParameterSpace,
-    held: Held,
+/// A black box with held parameters, and the free ones in another setting.
+pub(super) struct HeldBlackBox {
+    pub base: Arc<dyn DigitalTwin>,
+    pub parameters: ParameterSpace,
+    pub held: Held,
 }
 
-impl DigitalTwin for FixedBlackBox {
+impl DigitalTwin for HeldBlackBox {
     fn parameters(&self) -> ParameterSpace {
-        self.free.clone()
+        self.parameters.clone()
     }
     fn signals(&self) -> Signals {
         self.base.signals()
@@ -120,8 +117,12 @@ impl DigitalTwin for FixedBlackBox {
         drive: &Drive,
         noise: Noise,
     ) -> Result<Signal, SimulationError> {
-        check_length(self.free.len(), theta)?;
-        self.base.simulate(&self.held.complete(theta), drive, noise)
+        check_length(self.parameters.len(), theta)?;
+        (self.base).simulate(&self.held.complete(theta), drive, noise)
+    }
+    fn free_run(&self, theta: &[f64], drive: &Drive) -> Result<Signal, SimulationError> {
+        check_length(self.parameters.len(), theta)?;
+        self.base.free_run(&self.held.complete(theta), drive)
     }
 }
 
@@ -159,7 +160,7 @@ mod tests {
     #[test]
     fn held_parameters_leave_theta() {
         let values = |pairs: &[(&str, f64)]| pairs.iter().map(|&(n, v)| (n.into(), v)).collect();
-        let twin = fix(Arc::new(Sum), &values(&[("a", 3.0)])).unwrap();
+        let twin = fix(Twin::new(Sum), &values(&[("a", 3.0)])).unwrap();
         assert_eq!(twin.parameters().names(), ["b"]);
         let drive = Drive::autonomous(1.0, 1).unwrap();
         assert_eq!(
@@ -167,7 +168,7 @@ mod tests {
             23.0
         );
         for bad in [&[("c", 1.0)][..], &[("a", 1.0), ("b", 1.0)]] {
-            assert!(fix(Arc::new(Sum), &values(bad)).is_err());
+            assert!(fix(Twin::new(Sum), &values(bad)).is_err());
         }
     }
 }

@@ -1,8 +1,10 @@
 //! The handle by which every stage holds a twin.
 
+use super::digital_twin::FREE_RUNS;
 use crate::record::{Drive, Signal, Signals};
-use crate::twin::modified::{Modified, Modify};
-use crate::twin::{DigitalTwin, Noise, Outline, ParameterSpace, SimulationError, StateSpace};
+use crate::twin::{
+    DigitalTwin, Modified, Modify, Noise, Outline, ParameterSpace, SimulationError, StateSpace,
+};
 use std::sync::Arc;
 
 /// A twin of either kind, cheap to clone. A stage that needs equations matches once, at its entrance.
@@ -79,6 +81,14 @@ impl Twin {
     /// Names and units of the equations; `None` for a black box.
     pub fn outline(&self) -> Option<Outline> {
         self.equations().map(StateSpace::outline)
+    }
+
+    /// Number of simulations that a free run takes.
+    pub(crate) fn runs_of_a_free_run(&self) -> usize {
+        match self {
+            Self::Equations(_) => 1,
+            Self::BlackBox(_) => FREE_RUNS as usize,
+        }
     }
 
     /// The twin with `hook` called before each of its runs; an error of the hook stops the run.
@@ -175,5 +185,99 @@ impl<H: Hook> DigitalTwin for Watched<dyn DigitalTwin, H> {
     ) -> Result<Signal, SimulationError> {
         (self.hook)()?;
         self.base.simulate(theta, drive, noise)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::twin::{Adaptation, Interval, Level, Now, Parameter, TwinError, adapt, fix};
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    /// ẋ = −k·x, y = x with a noisy sensor.
+    struct Decay;
+    impl StateSpace for Decay {
+        fn outline(&self) -> Outline {
+            Outline::new()
+                .parameter(Parameter::new("k", "1/s", 0.5, 2.0))
+                .state("x", "-")
+                .output("y", "-")
+        }
+        fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+            dx[0] = -now.theta[0] * x[0];
+        }
+        fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+            y[0] = x[0];
+        }
+        fn start(&self, _: &Now<'_>, x: &mut [f64]) {
+            x[0] = 1.0;
+        }
+        fn noise(&self, _: &Now<'_>, _: &mut [f64], measurement: &mut [f64]) {
+            measurement[0] = 0.1;
+        }
+    }
+
+    /// The same without its equations.
+    struct Boxed;
+    impl DigitalTwin for Boxed {
+        fn parameters(&self) -> ParameterSpace {
+            DigitalTwin::parameters(&Decay)
+        }
+        fn signals(&self) -> Signals {
+            DigitalTwin::signals(&Decay)
+        }
+        fn simulate(
+            &self,
+            theta: &[f64],
+            drive: &Drive,
+            noise: Noise,
+        ) -> Result<Signal, SimulationError> {
+            DigitalTwin::simulate(&Decay, theta, drive, noise)
+        }
+    }
+
+    #[test]
+    fn a_watched_twin_runs_as_before_and_each_run_is_seen() {
+        let drive = Drive::autonomous(0.1, 20).unwrap();
+        for (twin, runs) in [(Twin::new(Decay), 1), (Twin::new(Boxed), 32)] {
+            let seen = Arc::new(AtomicUsize::new(0));
+            let counter = seen.clone();
+            let watched = twin.watched(move || {
+                counter.fetch_add(1, Ordering::Relaxed);
+                Ok(())
+            });
+            let noise = Noise::new(1, "watched", 0);
+            let run = |twin: &Twin| twin.simulate(&[1.0], &drive, noise).unwrap();
+            assert_eq!(run(&watched), run(&twin));
+            let free = |twin: &Twin| twin.free_run(&[1.0], &drive).unwrap();
+            assert_eq!(free(&watched), free(&twin));
+            assert_eq!(seen.load(Ordering::Relaxed), 1 + runs);
+            assert_eq!(twin.runs_of_a_free_run(), runs);
+        }
+        let stopped = Twin::new(Decay).watched(|| Err(SimulationError::fatal("stop")));
+        assert!(stopped.simulate(&[1.0], &drive, Noise::OFF).is_err());
+    }
+
+    #[test]
+    fn unknown_starts_and_noise_levels_are_found_by_name() {
+        let adaptation = Adaptation {
+            prior: [("start.x".to_owned(), Interval::unchecked(0.0, 5.0))].into(),
+            noise: [("y".to_owned(), Level::Estimate)].into(),
+            start: [("x".to_owned(), Level::Estimate)].into(),
+            ..Adaptation::default()
+        };
+        let twin = adapt(Twin::new(Decay), &adaptation, 0.1).unwrap();
+        assert_eq!(twin.parameters().names(), ["k", "noise.y", "start.x"]);
+        let drive = Drive::autonomous(0.1, 20).unwrap();
+        let noise = Noise::new(1, "adapted", 0);
+        let own = Twin::new(Decay).simulate(&[1.0], &drive, noise).unwrap();
+        let run = |twin: &Twin, theta: &[f64]| twin.simulate(theta, &drive, noise).unwrap();
+        assert_eq!(run(&twin, &[1.0, 0.1, 1.0]), own);
+        let silent = run(&twin, &[1.0, 0.0, 3.0]);
+        assert_eq!((silent[[0, 0]], silent[[1, 0]]), (3.0, 2.7));
+        let held = fix(twin, &[("noise.y".to_owned(), 0.1)].into()).unwrap();
+        assert_eq!(run(&held, &[1.0, 1.0]), own);
+        let refused = adapt(Twin::new(Boxed), &adaptation, 0.1).err();
+        assert_eq!(refused, Some(TwinError::BlackBox("noise")));
     }
 }

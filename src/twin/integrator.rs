@@ -1,14 +1,25 @@
 //! Fixed-step integrators that carry the equations from one sample to the next.
 
-use crate::twin::Now;
 use serde::{Deserialize, Serialize};
 
-/// How the state is carried over one step Δt, the input held.
+/// Time, step, inputs and parameters at which equations are evaluated.
+#[derive(Debug, Clone, Copy)]
+pub struct Now<'a> {
+    /// Time in seconds from the first sample.
+    pub t: f64,
+    /// Step Δt in seconds.
+    pub dt: f64,
+    /// Inputs, held over the step.
+    pub u: &'a [f64],
+    /// Parameters θ.
+    pub theta: &'a [f64],
+}
+
+/// The rule that carries the state over one step Δt, the input held.
 ///
 /// ```
-/// use truetwin::effect::*;
-/// use truetwin::record::*;
-/// use truetwin::twin::*;
+/// use truetwin::prelude::*;
+/// use truetwin::twin::Integrator;
 ///
 /// /// ẋ = −k·x, exactly x(0)·exp(−k·t).
 /// struct Decay(Integrator);
@@ -42,7 +53,7 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Integrator {
-    /// x ← x + Δt·f(t, x): first order, what the paper's twins use.
+    /// x ← x + Δt·f(t, x), first order; the rule of the paper's twins.
     #[default]
     Euler,
     /// The classical fourth-order Runge–Kutta step.
@@ -50,16 +61,6 @@ pub enum Integrator {
 }
 
 /// Buffers that outlive a step, so that the loop allocates nothing.
-///
-/// ```
-/// use truetwin::twin::{Integrator, Now, Workspace};
-///
-/// let mut work = Workspace::new(1);
-/// let now = Now { t: 0.0, dt: 0.1, u: &[], theta: &[] };
-/// let mut x = [1.0];
-/// Integrator::RungeKutta4.step(&now, &mut x, &mut work, |_, x, dx| dx[0] = -x[0]);
-/// assert!((x[0] - (-0.1f64).exp()).abs() < 1e-6);
-/// ```
 #[derive(Debug, Clone, Default)]
 pub struct Workspace {
     slopes: [Vec<f64>; 4],

@@ -4,14 +4,6 @@ use crate::twin::TwinError;
 use serde::{Deserialize, Serialize};
 
 /// `[low, high]`, in the unit of what it bounds; an end may be infinite. Files write it as `[low, high]`.
-///
-/// ```
-/// use truetwin::twin::Interval;
-/// let prior = Interval::new(0.4, 0.8)?;
-/// assert_eq!(prior.centre(), 0.6000000000000001);
-/// assert!(Interval::new(0.8, 0.4).is_err());
-/// # Ok::<(), truetwin::twin::TwinError>(())
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "[f64; 2]", into = "[f64; 2]")]
 pub struct Interval {
@@ -20,7 +12,7 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// Without bounds.
+    /// The interval without bounds.
     pub const EVERYTHING: Self = Self {
         low: f64::NEG_INFINITY,
         high: f64::INFINITY,
@@ -35,12 +27,12 @@ impl Interval {
         }
     }
 
-    /// As written by an author in code; checked with the rest of the twin, not here.
+    /// An interval written in code; it is checked with the rest of the twin.
     pub(crate) const fn unchecked(low: f64, high: f64) -> Self {
         Self { low, high }
     }
 
-    /// Whether the ends are in order and not NaN.
+    /// Checks that the ends are in order and not NaN.
     pub(crate) fn check(self) -> Result<Self, TwinError> {
         Self::new(self.low, self.high)
     }
@@ -65,12 +57,12 @@ impl Interval {
         self.low + 0.5 * self.width()
     }
 
-    /// Whether both ends are finite.
+    /// Tells whether both ends are finite.
     pub fn is_finite(self) -> bool {
         self.low.is_finite() && self.high.is_finite()
     }
 
-    /// Whether `value` lies inside, ends included.
+    /// Tells whether `value` lies inside, ends included.
     pub fn contains(self, value: f64) -> bool {
         self.low <= value && value <= self.high
     }
@@ -111,7 +103,7 @@ mod tests {
     fn nan_and_reversed_ends_are_refused() {
         assert!(Interval::new(f64::NAN, 1.0).is_err());
         let error = Interval::new(2.0, 1.0).unwrap_err().to_string();
-        assert!(error.contains("[2, 1]") && error.contains("low < high"));
+        assert!(error.contains("[2, 1]") && error.contains("low must be below high"));
     }
 
     #[test]

@@ -1,13 +1,12 @@
-//! What a user implements, and the data that flows through every layer.
+//! Simulators: the traits that a user implements, parameters, noise, and the handle that stages hold.
 //!
 //! | to … | look at |
 //! |---|---|
 //! | plug in a simulator whose equations are at hand | [`StateSpace`] |
 //! | plug in a black box | [`DigitalTwin`] |
 //! | hold a twin of either kind | [`Twin`] |
-//! | say what is estimated, from where to where | [`ParameterSpace`], [`Parameter`], [`Interval`] |
+//! | name what is estimated, with prior and bounds | [`ParameterSpace`], [`Parameter`], [`Interval`] |
 //! | draw noise that pairs across runs | [`Noise`] |
-//! | change limits, noise, start or prior of a twin | [`Adaptation`], [`adapt`], [`fix`] |
 //! | find out what is wrong with a new twin | [`conformance`] |
 
 mod adapt;
@@ -25,17 +24,17 @@ mod names;
 mod noise;
 mod outline;
 mod parameter;
+mod simulation;
 mod state_space;
 
-pub use adapt::{Adaptation, Level, adapt};
-pub(crate) use advance::{Advance, Points};
-pub(crate) use digital_twin::FREE_RUNS;
-pub use digital_twin::{DigitalTwin, SimulationError};
+pub use adapt::Level;
+pub(crate) use adapt::{Adaptation, adapt};
+pub use digital_twin::DigitalTwin;
 pub(crate) use direction::{combination, oriented};
-pub use error::TwinError;
-pub use fix::fix;
+pub use error::{SimulationError, TwinError};
+pub(crate) use fix::fix;
 pub use handle::Twin;
-pub use integrator::{Integrator, Workspace};
+pub use integrator::{Integrator, Now, Workspace};
 pub use interval::Interval;
 pub(crate) use modified::{Modified, Modify};
 pub(crate) use names::check_twin;
@@ -43,4 +42,5 @@ pub use noise::{Noise, Source};
 pub use outline::Outline;
 pub(crate) use parameter::PRIOR_DEVIATION;
 pub use parameter::{Parameter, ParameterSpace, Role};
-pub use state_space::{Now, Outliers, StateSpace};
+pub(crate) use state_space::{Advance, Points};
+pub use state_space::{Outliers, StateSpace};

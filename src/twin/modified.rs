@@ -1,9 +1,8 @@
 //! Equations made of other equations.
 
 use crate::record::{Drive, Signal};
-use crate::twin::advance::Advance;
 use crate::twin::{
-    Integrator, Interval, Noise, Now, Outliers, Outline, SimulationError, StateSpace,
+    Advance, Integrator, Interval, Noise, Now, Outliers, Outline, SimulationError, StateSpace,
 };
 
 /// A change of a base twin's equations. Every hook forwards to the base unless it is overridden.

@@ -67,7 +67,7 @@ fn check_composed(parameter: &Parameter) -> Result<(), TwinError> {
     Err(named("parameter", name, problem))
 }
 
-/// Whether effects may call a channel so: `sensor`, `actuator2`.
+/// Tells whether effects call a channel by this name: `sensor`, `actuator2`.
 fn is_channel(name: &str) -> bool {
     let number = name
         .strip_prefix("sensor")

@@ -28,7 +28,7 @@ impl Noise {
     /// No noise: every normal draw is zero.
     pub const OFF: Self = Self { key: None };
 
-    /// Sample number `sample` of what `purpose` names (`"bank"`, `"gate"`, …) under a user's `seed`.
+    /// Sample number `sample` of a `purpose` (`"bank"`, `"gate"`, …) under a user's `seed`.
     pub fn new(seed: u64, purpose: &str, sample: u64) -> Self {
         Self {
             key: Some((mix(seed ^ hash(purpose)), sample)),
@@ -69,23 +69,13 @@ impl Noise {
         self.key.map(|(key, sample)| mix(key ^ mix(sample)))
     }
 
-    /// Whether this is [`Noise::OFF`].
+    /// Tells whether this is [`Noise::OFF`].
     pub fn is_off(self) -> bool {
         self.key.is_none()
     }
 }
 
 /// Draws of one source of noise.
-///
-/// ```
-/// use truetwin::twin::Noise;
-///
-/// let mut source = Noise::new(1, "measured", 0).source("sensor");
-/// let mean = (0..10_000).map(|_| source.normal()).sum::<f64>() / 1e4;
-/// assert!(mean.abs() < 0.05);
-/// assert!((0.0..1.0).contains(&source.uniform()));
-/// assert!(source.happens(1.0));
-/// ```
 #[derive(Debug, Clone)]
 pub struct Source(Option<ChaCha8Rng>);
 

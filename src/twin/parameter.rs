@@ -1,25 +1,18 @@
-//! What is estimated: names, units, prior box and physical bounds.
+//! Parameters to estimate: names, units, prior box and physical bounds.
 
 use crate::twin::{Interval, Noise, TwinError};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
-/// The standard deviation of a uniform prior over its width, 1/√12: what is known worse than this is known from the prior
-/// alone.
+/// The standard deviation of a uniform prior over its width, 1/√12; an estimate that is no better rests on the prior alone.
 pub const PRIOR_DEVIATION: f64 = 0.288_675_134_594_812_9;
 
-/// What a parameter stands for.
-///
-/// ```
-/// use truetwin::twin::{Parameter, Role};
-///
-/// assert_eq!(Parameter::new("k", "1/s", 0.1, 1.0).role, Role::Physical);
-/// ```
+/// The kind of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Role {
-    /// A parameter of the twin's own equations; what the user wants to know.
+    /// A parameter of the twin's own equations.
     #[default]
     Physical,
     /// An unknown start of a state.
@@ -28,6 +21,17 @@ pub enum Role {
     Noise,
     /// The magnitude of an effect that the twin lacked.
     Effect,
+}
+
+impl Role {
+    /// The name of a parameter of this role: `start.h1`, `noise.y`; of other roles, `target` itself.
+    pub(crate) fn name(self, target: &str) -> String {
+        match self {
+            Self::Start => format!("start.{target}"),
+            Self::Noise => format!("noise.{target}"),
+            Self::Physical | Self::Effect => target.into(),
+        }
+    }
 }
 
 /// One parameter.
@@ -45,11 +49,11 @@ pub struct Parameter {
     pub name: String,
     /// Unit, for people.
     pub unit: String,
-    /// Where simulations for training are drawn from, uniformly.
+    /// Interval that simulations for training are drawn from, uniformly.
     pub prior: Interval,
-    /// What is physically possible; estimates never leave it. Encloses the prior.
+    /// Physically possible values; estimates never leave them. They enclose the prior.
     pub bounds: Interval,
-    /// What the parameter stands for.
+    /// Kind.
     pub role: Role,
 }
 
@@ -66,14 +70,26 @@ impl Parameter {
         }
     }
 
-    /// With physical bounds `[low, high]`.
+    /// Sets the physical bounds to `[low, high]`.
     #[must_use]
     pub fn within(mut self, low: f64, high: f64) -> Self {
         self.bounds = Interval::unchecked(low, high);
         self
     }
 
-    /// With another role.
+    /// Checks that a value lies within the bounds.
+    pub(crate) fn check_value(&self, value: f64) -> Result<(), TwinError> {
+        if self.bounds.contains(value) {
+            return Ok(());
+        }
+        Err(TwinError::OutOfBounds {
+            name: self.name.clone(),
+            value,
+            bounds: self.bounds.to_string(),
+        })
+    }
+
+    /// Sets the role.
     #[must_use]
     pub fn with_role(mut self, role: Role) -> Self {
         self.role = role;
@@ -82,25 +98,16 @@ impl Parameter {
 }
 
 /// The parameters of a twin, in the order of θ.
-///
-/// ```
-/// use truetwin::twin::{Parameter, ParameterSpace};
-/// let space = ParameterSpace::new([Parameter::new("k", "1/s", 0.1, 1.0).within(0.0, 2.0)]);
-/// space.check()?;
-/// assert_eq!(space.centre(), [0.55]);
-/// assert!(space.check_point(&[3.0]).unwrap_err().to_string().contains("k = 3"));
-/// # Ok::<(), truetwin::twin::TwinError>(())
-/// ```
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ParameterSpace(Vec<Parameter>);
 
 impl ParameterSpace {
-    /// From its parameters, in the order of θ. [`check`](Self::check) tells whether they make sense.
+    /// A space of these parameters, in the order of θ; [`check`](Self::check) finds faults.
     pub fn new(parameters: impl IntoIterator<Item = Parameter>) -> Self {
         Self(parameters.into_iter().collect())
     }
 
-    /// Whether names are unique, boxes in order, and priors inside bounds.
+    /// Checks that names are unique, boxes in order, and priors inside bounds.
     pub fn check(&self) -> Result<(), TwinError> {
         if self.0.is_empty() {
             return Err(TwinError::NoParameter);
@@ -113,12 +120,12 @@ impl ParameterSpace {
                     name: parameter.name.clone(),
                 });
             }
-            for (what, interval) in [("prior", parameter.prior), ("bounds", parameter.bounds)] {
+            for (kind, interval) in [("prior", parameter.prior), ("bounds", parameter.bounds)] {
                 if interval.check().is_err() || !interval.is_finite() {
                     return Err(TwinError::Box {
                         name: parameter.name.clone(),
-                        what,
-                        interval,
+                        kind,
+                        interval: interval.to_string(),
                     });
                 }
             }
@@ -126,15 +133,15 @@ impl ParameterSpace {
             if !bounds.contains(prior.low()) || !bounds.contains(prior.high()) {
                 return Err(TwinError::PriorOutside {
                     name: parameter.name.clone(),
-                    prior,
-                    bounds,
+                    prior: prior.to_string(),
+                    bounds: bounds.to_string(),
                 });
             }
         }
         Ok(())
     }
 
-    /// Whether `theta` has the right length and lies in the bounds.
+    /// Checks that `theta` has the right length and lies in the bounds.
     pub fn check_point(&self, theta: &[f64]) -> Result<(), TwinError> {
         if theta.len() != self.len() {
             return Err(TwinError::Length {
@@ -144,13 +151,7 @@ impl ParameterSpace {
             });
         }
         for (parameter, &value) in self.0.iter().zip(theta) {
-            if !parameter.bounds.contains(value) {
-                return Err(TwinError::OutOfBounds {
-                    name: parameter.name.clone(),
-                    value,
-                    bounds: parameter.bounds,
-                });
-            }
+            parameter.check_value(value)?;
         }
         Ok(())
     }
@@ -165,19 +166,14 @@ impl ParameterSpace {
         self.0.len()
     }
 
-    /// Whether there is none.
+    /// Tells whether there is no parameter.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// One after the other.
+    /// Parameters in the order of θ.
     pub fn iter(&self) -> std::slice::Iter<'_, Parameter> {
         self.0.iter()
-    }
-
-    /// To change them, for instance by a study file.
-    pub fn iter_mut(&mut self) -> std::slice::IterMut<'_, Parameter> {
-        self.0.iter_mut()
     }
 
     /// Names in the order of θ.
@@ -243,6 +239,12 @@ impl std::ops::Index<usize> for ParameterSpace {
     type Output = Parameter;
     fn index(&self, index: usize) -> &Parameter {
         &self.0[index]
+    }
+}
+
+impl std::ops::IndexMut<usize> for ParameterSpace {
+    fn index_mut(&mut self, index: usize) -> &mut Parameter {
+        &mut self.0[index]
     }
 }
 

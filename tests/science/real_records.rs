@@ -1,5 +1,6 @@
 //! Measured records, where they are at hand: `../shared/data`, or the folder that `TRUETWIN_DATA` names.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use truetwin::diagnose::{Decision, DiagnoseSettings, Diagnosis, FreeRuns, Verdict, diagnose};
 use truetwin::estimator::{EstimateOptions, PretrainOptions, pretrain};
@@ -9,17 +10,17 @@ use truetwin::record::{Record, Signal, read_record};
 use truetwin::report::gap_pictures;
 use truetwin::study::{Study, StudyFile};
 
+/// The path of a file of measured data; says in the output of the tests, past libtest's capture, whether it is at hand.
 fn data(name: &str) -> Option<PathBuf> {
     let folder = std::env::var_os("TRUETWIN_DATA").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
         PathBuf::from,
     );
     let path = folder.join(name);
-    if !path.exists() {
-        println!("skipped: no {}", path.display());
-        return None;
-    }
-    Some(path)
+    let found = path.exists();
+    let what = if found { "ran with" } else { "skipped, no" };
+    writeln!(std::io::stderr(), "real records: {what} {}", path.display()).unwrap();
+    found.then_some(path)
 }
 
 /// The study of the real tanks.

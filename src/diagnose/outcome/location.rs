@@ -1,26 +1,28 @@
 //! Location of a gap: in the equations, in time, in the states, by lag and by frequency.
 
 use crate::diagnose::thresholds::Thresholds;
+use serde::{Serialize, Serializer};
 
 /// Location of a gap.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Location {
+    /// Difference between the record and simulations of the refitted twin.
+    #[serde(flatten)]
+    pub maps: Maps,
+    /// Onset of the gap.
+    pub onset: Option<Onset>,
     /// The most probable place of a structural gap.
     pub target: Option<String>,
     /// All places, most probable first.
     pub targets: Vec<TargetShare>,
     /// Equations and what each would have to gain or lose to follow the record, most probable first.
     pub equations: Vec<Equation>,
-    /// Onset of the gap.
-    pub onset: Option<Onset>,
-    /// Difference between the record and simulations of the refitted twin.
-    pub maps: Maps,
-    /// The same with the accepted effects, or else the best explanation, added.
+    /// The maps with the accepted effects, or else the best explanation, added.
     pub after: Option<Maps>,
 }
 
 /// A target, and how much speaks for it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TargetShare {
     /// State, `sensor`, `actuator` or parameter.
     pub target: String,
@@ -31,23 +33,28 @@ pub struct TargetShare {
 }
 
 /// Difference between innovations and those of simulations, cut in several ways. All p-values are corrected for all cells of all cuts
-/// together; shares add up to at most one in each list.
-#[derive(Debug, Clone, PartialEq, Default)]
+/// together; shares add up to at most one in each list. Serialised are the cells that stand out.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Maps {
     /// Windows of time, clearest first.
+    #[serde(serialize_with = "notable")]
     pub windows: Vec<Window>,
     /// Ranges of states, inputs and predicted outputs, clearest first.
+    #[serde(serialize_with = "notable")]
     pub regions: Vec<Region>,
     /// Outputs, clearest first.
+    #[serde(serialize_with = "notable")]
     pub channels: Vec<Channel>,
     /// Past signals that innovations still depend on, clearest first.
+    #[serde(serialize_with = "notable")]
     pub lags: Vec<Lag>,
     /// Frequency bands, clearest first.
+    #[serde(serialize_with = "notable")]
     pub bands: Vec<Band>,
 }
 
 /// The start of the first block of time that the twin, fitted to all before it, does not foresee.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Onset {
     /// Index of the record, from 0.
     pub record: usize,
@@ -60,10 +67,8 @@ pub struct Onset {
 }
 
 /// A stretch of time.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Window {
-    /// Index of the record, from 0.
-    pub record: usize,
     /// First instant, in seconds.
     pub start: f64,
     /// Last instant, in seconds.
@@ -74,10 +79,12 @@ pub struct Window {
     pub p_value: f64,
     /// Share in what the best explanation gains.
     pub share: f64,
+    /// Index of the record, from 0.
+    pub record: usize,
 }
 
 /// A range of a variable.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Region {
     /// State, input, or output as predicted.
     pub variable: String,
@@ -92,7 +99,7 @@ pub struct Region {
 }
 
 /// One output over the whole of all records.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Channel {
     /// Output.
     pub channel: String,
@@ -103,7 +110,7 @@ pub struct Channel {
 }
 
 /// Dependence of an innovation on the past.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Lag {
     /// Output.
     pub channel: String,
@@ -120,7 +127,7 @@ pub struct Lag {
 }
 
 /// A band of frequencies.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Band {
     /// Output.
     pub channel: String,
@@ -135,7 +142,7 @@ pub struct Band {
 }
 
 /// Missing term of an equation, as the smoothed disturbance there.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Equation {
     /// The state whose rate, or the output whose value, the equation gives.
     pub equation: String,
@@ -148,7 +155,7 @@ pub struct Equation {
 }
 
 /// The missing term where a variable is in a range.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TermRange {
     /// State or input.
     pub variable: String,
@@ -202,4 +209,12 @@ impl Maps {
             bands: kept(&self.bands),
         }
     }
+}
+
+/// Writes the cells that stand out.
+fn notable<C: Cell + Serialize, S: Serializer>(
+    cells: &[C],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(cells.iter().filter(|cell| cell.is_notable()))
 }

@@ -9,6 +9,7 @@ pub use location::{
 
 use crate::record::{Drive, Signal};
 use crate::twin::Interval;
+use serde::ser::{SerializeStruct, Serializer};
 use serde::{Deserialize, Serialize};
 
 /// Kind of gap.
@@ -64,7 +65,7 @@ impl Decision {
 }
 
 /// Structural test: can the refitted twin have made the record?
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Detection {
     /// p-value of the structural test; with a validation record, of rank and e-value together.
     pub p_value: f64,
@@ -79,7 +80,7 @@ pub struct Detection {
 }
 
 /// One parameter of the twin.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FittedParameter {
     /// Name.
     pub name: String,
@@ -98,7 +99,7 @@ pub struct FittedParameter {
 }
 
 /// An unknown start, noise level or magnitude that the study itself estimates.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FittedNuisance {
     /// State, output or magnitude.
     pub name: String,
@@ -111,7 +112,7 @@ pub struct FittedNuisance {
 }
 
 /// One listed effect, fitted.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EffectFit {
     /// Id of the effect.
     pub id: String,
@@ -120,6 +121,7 @@ pub struct EffectFit {
     /// Among listed effects and catch-alls.
     pub probability: f64,
     /// Names and values, those held at an infinite off value included.
+    #[serde(serialize_with = "as_map")]
     pub magnitudes: Vec<(String, f64)>,
     /// Nats over the twin, on the record and, if there is one, the validation record.
     pub log_score_gain: f64,
@@ -135,7 +137,7 @@ impl EffectFit {
 }
 
 /// Cause of the gap: the effect that the twin lacks.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Cause {
     /// The decision.
     pub decision: Decision,
@@ -147,48 +149,57 @@ pub struct Cause {
     pub class: Vec<String>,
     /// p-value of the structural test with the accepted, or else the best, effect added.
     pub unexplained_p_value: Option<f64>,
-    /// The catch-all that beats every listed effect.
-    pub catch_all: Option<String>,
     /// A record that would split the class; none where there is no class, or no input splits it.
     pub next_input: Option<NextInput>,
+    /// The catch-all that beats every listed effect.
+    pub catch_all: Option<String>,
 }
 
 /// A record to measure next, so that rivals are told apart.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "file", rename = "next-input.csv")]
 pub struct NextInput {
-    /// Inputs and length of it.
-    pub drive: Drive,
     /// Kind of input.
     pub kind: String,
     /// The rivals, as `id@target`.
     pub rivals: Vec<String>,
+    /// Inputs and length of it.
+    #[serde(flatten, serialize_with = "size")]
+    pub drive: Drive,
     /// Simulated pairs of the present record and such a next one: those whose true rival stood out, and all.
+    #[serde(serialize_with = "share_of")]
     pub split: [u64; 2],
     /// The same with the present inputs measured once more.
+    #[serde(serialize_with = "share_of")]
     pub again: [u64; 2],
 }
 
 /// Regression of the missing term: exploratory, not a test.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Discovery {
     /// The equation that lacks the term: a state or an output.
+    #[serde(flatten, serialize_with = "exploratory")]
     pub equation: String,
     /// Terms by how often resampled records include them.
     pub terms: Vec<Term>,
     /// Share of the variance of the smoothed missing term that the terms explain.
     pub explained: f64,
     /// Instants of the first record, in seconds.
+    #[serde(skip)]
     pub times: Vec<f64>,
     /// The smoothed missing term there.
+    #[serde(skip)]
     pub missing: Vec<f64>,
     /// Its standard deviation.
+    #[serde(skip)]
     pub std_error: Vec<f64>,
     /// The regression there.
+    #[serde(skip)]
     pub fitted: Vec<f64>,
 }
 
 /// One term of a regression.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Term {
     /// Such as `h1²` or `u`.
     pub name: String,
@@ -201,7 +212,7 @@ pub struct Term {
 }
 
 /// The smallest magnitude of a listed effect that records like these reveal in 80 of 100 cases.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Visible {
     /// Id of the effect.
     pub id: String,
@@ -227,7 +238,8 @@ pub struct FreeRuns {
 }
 
 /// Result of a diagnosis.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
+#[serde(tag = "schema", rename = "truetwin.gap/1")]
 pub struct Diagnosis {
     /// Name of the twin.
     pub twin: String,
@@ -240,8 +252,10 @@ pub struct Diagnosis {
     /// All other estimates.
     pub nuisance: Vec<FittedNuisance>,
     /// Location of the gap.
+    #[serde(rename = "where")]
     pub location: Location,
     /// Cause of the gap.
+    #[serde(rename = "which")]
     pub cause: Cause,
     /// Extent on held-out data, if there are any.
     pub shrinkage: Option<Shrinkage>,
@@ -249,16 +263,18 @@ pub struct Diagnosis {
     pub discovery: Option<Discovery>,
     /// Smallest visible magnitude of each listed effect.
     pub power: Vec<Visible>,
-    /// Free runs beside the first record.
-    pub free_runs: FreeRuns,
-    /// Free runs beside the validation record.
-    pub validation_runs: Option<FreeRuns>,
-    /// Effects of this twin that were not tested, as `id@target`.
-    pub not_tested: Vec<String>,
     /// Number of explanations tested: listed effects and disturbances.
     pub candidates: usize,
+    /// Effects of this twin that were not tested, as `id@target`.
+    pub not_tested: Vec<String>,
     /// Wall-clock seconds.
     pub seconds: f64,
+    /// Free runs beside the first record.
+    #[serde(skip)]
+    pub free_runs: FreeRuns,
+    /// Free runs beside the validation record.
+    #[serde(skip)]
+    pub validation_runs: Option<FreeRuns>,
 }
 
 /// Free-run errors before and after, on held-out data.
@@ -289,4 +305,59 @@ impl Shrinkage {
     pub const FREE_RUN: &str = "free-run NRMSE";
     /// Mean log density of a sample, for effects that move no free run.
     pub const LOG_SCORE: &str = "held-out log score";
+}
+
+impl Serialize for Shrinkage {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Controls {
+            unfitted: Option<f64>,
+            theta_only: f64,
+            placebo: Option<f64>,
+        }
+        let mut object = serializer.serialize_struct("Shrinkage", 8)?;
+        object.serialize_field("metric", self.metric)?;
+        object.serialize_field("before", &self.before)?;
+        object.serialize_field("after", &self.after)?;
+        object.serialize_field("floor", &self.floor)?;
+        object.serialize_field("closed", &self.closed)?;
+        object.serialize_field("interval", &self.interval)?;
+        object.serialize_field("held_out", self.held_out)?;
+        let controls = Controls {
+            unfitted: self.unfitted,
+            theta_only: self.before,
+            placebo: self.placebo,
+        };
+        object.serialize_field("controls", &controls)?;
+        object.end()
+    }
+}
+
+/// Writes names and values as one object.
+fn as_map<S: Serializer>(pairs: &[(String, f64)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(pairs.iter().map(|(name, value)| (name, value)))
+}
+
+/// Writes the length of a record.
+fn size<S: Serializer>(drive: &Drive, serializer: S) -> Result<S::Ok, S::Error> {
+    let mut object = serializer.serialize_struct("Size", 2)?;
+    object.serialize_field("samples", &drive.samples())?;
+    object.serialize_field("step", &drive.dt())?;
+    object.end()
+}
+
+/// Writes a count and the number of cases.
+fn share_of<S: Serializer>([count, of]: &[u64; 2], serializer: S) -> Result<S::Ok, S::Error> {
+    let mut object = serializer.serialize_struct("Count", 2)?;
+    object.serialize_field("count", count)?;
+    object.serialize_field("of", of)?;
+    object.end()
+}
+
+/// Marks a regression as exploratory.
+fn exploratory<S: Serializer>(equation: &str, serializer: S) -> Result<S::Ok, S::Error> {
+    let mut object = serializer.serialize_struct("Exploratory", 2)?;
+    object.serialize_field("exploratory", &true)?;
+    object.serialize_field("equation", equation)?;
+    object.end()
 }

@@ -16,7 +16,7 @@ use crate::diagnose::outcome::NextInput;
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::thresholds::Thresholds;
 use crate::likelihood::kalman::recoverable;
-use crate::record::{Drive, Record, RecordError, Signal};
+use crate::record::{Drive, Record, Signal};
 use crate::twin::Noise;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -121,7 +121,7 @@ fn proposals(record: &Record, times: usize, noise: Noise) -> Result<Vec<Proposal
     let given = drive.inputs();
     let inputs = given.ncols();
     if inputs == 0 {
-        let drive = Drive::autonomous(dt, samples).map_err(RecordError::from)?;
+        let drive = Drive::autonomous(dt, samples)?;
         return Ok(match times {
             1 => vec![],
             _ => vec![Proposal {
@@ -174,7 +174,7 @@ fn proposals(record: &Record, times: usize, noise: Noise) -> Result<Vec<Proposal
                 let (low, high) = ranges[j];
                 low + shares[[k, j]].clamp(0.0, 1.0) * (high - low)
             });
-            let drive = Drive::new(dt, values).map_err(RecordError::from)?;
+            let drive = Drive::new(dt, values)?;
             let kind = format!("{kind}{long}");
             Ok(Proposal { kind, drive })
         })

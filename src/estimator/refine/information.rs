@@ -2,6 +2,7 @@
 
 use crate::twin::{PRIOR_DEVIATION, ParameterSpace, Role, combination, oriented};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use serde::Serialize;
 
 /// Fisher information of the features, regularised: G = JᵀJ/(1 + 1/K) + λ·diag(1/width²).
 ///
@@ -23,17 +24,17 @@ pub struct Information {
 }
 
 /// A combination of parameters and how well it is known.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Direction {
     /// Unit vector in (θ over the prior's width), physical parameters only.
     pub direction: Vec<f64>,
     /// Standard deviation along it, in prior widths.
     pub std_error: f64,
-    /// Whether the prior knows it better than the record does: worse than 1/√12 of its width.
-    pub weak: bool,
     /// In words: `0.58·k1 − 0.58·k2 + 0.57·k4`.
     pub combination: String,
+    /// Whether the prior knows it better than the record does: worse than 1/√12 of its width.
+    pub weak: bool,
 }
 
 /// Why there is no information matrix.

@@ -47,14 +47,13 @@
 mod information;
 mod problem;
 mod settings;
-
-pub use crate::fit::OptimiseError;
+use crate::math::MathError;
 pub use information::{Direction, Information, InformationError};
 pub use settings::RefineSettings;
 
 use crate::estimator::bank::{BankError, FeatureSimulator};
 use crate::estimator::gate::{GateError, GateSettings};
-use crate::fit::{Bounds, EvaluationError, GaussNewton, ResidualProblem, space_filling};
+use crate::fit::{Bounds, GaussNewton, ResidualProblem, space_filling};
 use crate::math::Whitening;
 use crate::progress::{Cancelled, Progress};
 use crate::record::Drive;
@@ -128,7 +127,7 @@ pub enum RefineError {
     },
     /// The search itself failed.
     #[error(transparent)]
-    Optimise(#[from] OptimiseError),
+    Optimise(#[from] MathError),
     /// The information matrix is unusable.
     #[error(transparent)]
     Information(#[from] InformationError),
@@ -143,7 +142,7 @@ impl RefineError {
         let bank = |error: &BankError| !matches!(error, BankError::Hopeless { .. });
         match self {
             Self::Bank(error) | Self::Gate(GateError::Bank(error)) => bank(error),
-            Self::Optimise(OptimiseError::Fatal(_)) | Self::Cancelled(_) => true,
+            Self::Optimise(MathError::Fatal(_)) | Self::Cancelled(_) => true,
             _ => false,
         }
     }
@@ -408,15 +407,16 @@ impl Refinement<'_> {
 }
 
 /// An evaluation that failed outside of a search.
-fn not_evaluated(error: EvaluationError) -> OptimiseError {
+fn not_evaluated(error: MathError) -> MathError {
     match error {
-        EvaluationError::Fatal(error) => OptimiseError::Fatal(error),
-        rejected => OptimiseError::Start(rejected.into()),
+        MathError::Fatal(error) => MathError::Fatal(error),
+        MathError::Rejected(_) => MathError::Start(error.into()),
+        other => MathError::fatal(other),
     }
 }
 
 /// The bounds of a space, as the minimiser wants them.
-fn bounds(space: &ParameterSpace) -> Result<Bounds, OptimiseError> {
+fn bounds(space: &ParameterSpace) -> Result<Bounds, MathError> {
     let side = |of: fn(crate::twin::Interval) -> f64| {
         DVector::from_iterator(space.len(), space.bounds().into_iter().map(of))
     };
@@ -424,7 +424,7 @@ fn bounds(space: &ParameterSpace) -> Result<Bounds, OptimiseError> {
         side(crate::twin::Interval::low),
         side(crate::twin::Interval::high),
     )
-    .map_err(|error| OptimiseError::Fatal(error.into()))
+    .map_err(|error| MathError::Fatal(error.into()))
 }
 
 /// θ_init, then space-filling points in the bounds.

@@ -1,8 +1,8 @@
 //! The residual that Gauss–Newton makes small, and its Jacobian by paired differences.
 
 use crate::estimator::bank::{BankError, DrawError, FeatureSimulator};
-use crate::fit::{EvaluationError, ResidualProblem};
-use crate::math::{DifferenceError, Stencil, Whitening};
+use crate::fit::ResidualProblem;
+use crate::math::{MathError, Stencil, Whitening};
 use crate::progress::Progress;
 use crate::record::Drive;
 use crate::twin::Noise;
@@ -28,7 +28,7 @@ pub(super) struct FeatureResidual<'a> {
     pub upper: Vec<f64>,
 }
 
-impl From<DrawError> for EvaluationError {
+impl From<DrawError> for MathError {
     fn from(error: DrawError) -> Self {
         match error {
             DrawError::Rejected(reason) => Self::rejected(reason),
@@ -37,16 +37,10 @@ impl From<DrawError> for EvaluationError {
     }
 }
 
-impl From<DifferenceError> for EvaluationError {
-    fn from(error: DifferenceError) -> Self {
-        Self::fatal(error)
-    }
-}
-
 impl FeatureResidual<'_> {
     /// f̄(θ).
-    pub fn mean_features(&self, theta: &DVector<f64>) -> Result<DVector<f64>, EvaluationError> {
-        self.progress.checkpoint().map_err(EvaluationError::fatal)?;
+    pub fn mean_features(&self, theta: &DVector<f64>) -> Result<DVector<f64>, MathError> {
+        self.progress.checkpoint().map_err(MathError::fatal)?;
         let noise = |i| self.noise.sample(i);
         let mean =
             (self.simulator).mean_features(theta.as_slice(), self.drive, noise, self.seeds)?;
@@ -54,21 +48,21 @@ impl FeatureResidual<'_> {
     }
 
     /// ∂f/∂θ of each seed by itself.
-    pub fn jacobians(&self, theta: &DVector<f64>) -> Result<Vec<DMatrix<f64>>, EvaluationError> {
+    pub fn jacobians(&self, theta: &DVector<f64>) -> Result<Vec<DMatrix<f64>>, MathError> {
         let stencil = Stencil::new(theta.as_slice(), &self.steps, &self.lower, &self.upper)?;
         let one = |seed: u64| {
-            self.progress.checkpoint().map_err(EvaluationError::fatal)?;
+            self.progress.checkpoint().map_err(MathError::fatal)?;
             stencil.jacobian(|point| {
                 let noise = self.noise.sample(seed);
                 let features = self.simulator.features(point, self.drive, noise)?;
-                Ok::<_, EvaluationError>(DVector::from_vec(features))
+                Ok::<_, MathError>(DVector::from_vec(features))
             })
         };
         (0..self.seeds as u64).into_par_iter().map(one).collect()
     }
 
     /// ∂f̄/∂θ: the same seeds on both sides of θ.
-    pub fn feature_jacobian(&self, theta: &DVector<f64>) -> Result<DMatrix<f64>, EvaluationError> {
+    pub fn feature_jacobian(&self, theta: &DVector<f64>) -> Result<DMatrix<f64>, MathError> {
         let stencil = Stencil::new(theta.as_slice(), &self.steps, &self.lower, &self.upper)?;
         let values: Vec<DVector<f64>> = (stencil.points().par_iter())
             .map(|point| self.mean_features(&DVector::from_column_slice(point)))
@@ -76,9 +70,8 @@ impl FeatureResidual<'_> {
         Ok(stencil.assemble(&values)?)
     }
 
-    fn whitening(&self) -> Result<&Whitening, EvaluationError> {
-        (self.whitening.as_ref())
-            .ok_or_else(|| EvaluationError::fatal("no covariance was simulated"))
+    fn whitening(&self) -> Result<&Whitening, MathError> {
+        (self.whitening.as_ref()).ok_or_else(|| MathError::fatal("no covariance was simulated"))
     }
 }
 
@@ -87,7 +80,7 @@ impl ResidualProblem for FeatureResidual<'_> {
         self.initial.len()
     }
 
-    fn residual(&self, theta: &DVector<f64>) -> Result<DVector<f64>, EvaluationError> {
+    fn residual(&self, theta: &DVector<f64>) -> Result<DVector<f64>, MathError> {
         let misfit = self
             .whitening()?
             .apply(&(self.mean_features(theta)? - self.observed));
@@ -96,7 +89,7 @@ impl ResidualProblem for FeatureResidual<'_> {
         Ok(DVector::from_iterator(misfit.len() + prior.len(), rows))
     }
 
-    fn jacobian(&self, theta: &DVector<f64>) -> Result<DMatrix<f64>, EvaluationError> {
+    fn jacobian(&self, theta: &DVector<f64>) -> Result<DMatrix<f64>, MathError> {
         let whitened = self
             .whitening()?
             .apply_columns(&self.feature_jacobian(theta)?);
@@ -110,7 +103,7 @@ impl ResidualProblem for FeatureResidual<'_> {
 }
 
 /// The error of a bank, where a single simulation is meant.
-impl From<BankError> for EvaluationError {
+impl From<BankError> for MathError {
     fn from(error: BankError) -> Self {
         Self::fatal(error)
     }

@@ -1,7 +1,8 @@
 //! Fitting the noise-free output.
 
 use crate::evaluate::EvaluateError;
-use crate::fit::{Bounds, EvaluationError, GaussNewton, ResidualProblem};
+use crate::fit::{Bounds, GaussNewton, ResidualProblem};
+use crate::math::MathError;
 use crate::math::Stencil;
 use crate::record::Record;
 use crate::setting::SettingError;
@@ -218,7 +219,7 @@ impl OutputError<'_> {
     }
 }
 
-impl From<EvaluateError> for EvaluationError {
+impl From<EvaluateError> for MathError {
     fn from(error: EvaluateError) -> Self {
         match &error {
             EvaluateError::Simulation(cause) if cause.costs_one_run() => Self::rejected(error),
@@ -231,10 +232,10 @@ impl ResidualProblem for OutputError<'_> {
     fn dimension(&self) -> usize {
         self.steps.len()
     }
-    fn residual(&self, theta: &DVector<f64>) -> Result<DVector<f64>, EvaluationError> {
+    fn residual(&self, theta: &DVector<f64>) -> Result<DVector<f64>, MathError> {
         Ok(self.at(theta.as_slice())?)
     }
-    fn jacobian(&self, theta: &DVector<f64>) -> Result<DMatrix<f64>, EvaluationError> {
+    fn jacobian(&self, theta: &DVector<f64>) -> Result<DMatrix<f64>, MathError> {
         Ok(self.slopes(theta.as_slice())?)
     }
 }

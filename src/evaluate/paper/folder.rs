@@ -12,21 +12,6 @@ use std::path::Path;
 const LAYOUT: u32 = 3;
 
 /// Source of a study's estimator.
-///
-/// ```
-/// use truetwin::evaluate::paper::{Benchmark, MonteCarlo, Origin, Scenario, reference_projects};
-/// use truetwin::estimator::PretrainOptions;
-///
-/// let project = &reference_projects()?[0];
-/// let study = project.study();
-/// let plan = MonteCarlo { benchmark: Benchmark::of(study), scenario: Scenario::First, runs: 100, seed: 1 };
-/// let place = tempfile::tempdir()?;
-/// let training = PretrainOptions::default();
-/// let origin = Origin::Trained(project.recipe(training.preset), &training);
-/// let folder = plan.folder(&place.path().join("runs"), study, origin)?;
-/// assert!(folder.file("manifest.json").exists()); // another call is refused there
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Debug, Clone, Copy)]
 pub enum Origin<'a> {
     /// Trained for it, and kept in the folder.
@@ -42,7 +27,7 @@ impl MonteCarlo {
     /// # Errors
     ///
     /// [`StorageError`]: a path that is taken, a folder of another call, an estimator or input file that cannot be read.
-    pub fn folder(
+    pub(crate) fn folder(
         &self,
         path: &Path,
         study: &Study,

@@ -5,7 +5,7 @@
 //! | run the estimator and the baselines on many simulated records | [`MonteCarlo::run`], [`Run`] |
 //! | turn the runs into errors and coverage | [`score`], [`Scores`] |
 //! | choose where true parameters come from | [`Scenario`] |
-//! | keep runs in a folder and go on later | [`MonteCarlo::folder`] |
+//! | keep runs in a folder and go on later | [`MonteCarlo::run`] |
 //! | draw what the answers predict | [`FreeRuns`], [`MeanRuns`] |
 //! | have a twin's test points, invariants, published figures | [`Benchmark`] |
 //!
@@ -40,7 +40,7 @@ mod run;
 mod scenario;
 mod score;
 
-pub use folder::Origin;
+pub(crate) use folder::Origin;
 pub use free_runs::{FreeRuns, MeanRuns};
 use invariant::{Invariant, Symmetry};
 pub use method::Method;
@@ -49,5 +49,5 @@ pub use paper::{reference_projects, reference_studies};
 pub use run::Run;
 pub use scenario::{Benchmark, Scenario};
 use scenario::{Published, TestPoint};
-pub(crate) use score::{COVERAGE_LEVEL, MethodScore};
+pub(crate) use score::COVERAGE_LEVEL;
 pub use score::{Scores, score};

@@ -157,7 +157,7 @@ const EVALUATION_LEVELS: [f64; 14] = [
     0.483433, 2.016987, 0.857486, 2.415572,
 ];
 
-/// What (k₁, k₂, k₄) → (k₁√c, k₂/√c, c·k₄) leaves as it is: the output sees h₁ only up to its scale.
+/// Invariants of (k₁, k₂, k₄) → (k₁√c, k₂/√c, c·k₄): the output sees h₁ only up to its scale.
 const TANKS_INVARIANTS: [Invariant; 3] = [
     Invariant {
         name: "k1·k2",

@@ -5,6 +5,7 @@ use crate::evaluate::EvaluateError;
 use crate::record::{Drive, RecordError, Signal};
 use crate::study::{DriveSource, RecordTable, Study};
 use crate::twin::Noise;
+use serde::Serialize;
 
 /// Source of true parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,11 +65,12 @@ pub struct TestPoint {
 }
 
 /// A published figure.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Published {
     /// Mean squared error.
     pub mse: f64,
     /// Milliseconds a record, on the authors' machine.
+    #[serde(rename = "ms")]
     pub milliseconds: f64,
 }
 

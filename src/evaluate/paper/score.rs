@@ -3,12 +3,14 @@
 use super::{Method, MonteCarlo, Published, Run, Scenario};
 use crate::math::{clopper_pearson, median};
 use crate::study::Study;
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
 
 /// Level of the intervals of a coverage.
 pub const COVERAGE_LEVEL: f64 = 0.95;
 
 /// Errors and coverage of the runs of a study.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Scores {
     /// In the order of [`Method::all`].
@@ -20,10 +22,11 @@ pub struct Scores {
 }
 
 /// Error of one method.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct MethodScore {
     /// Method.
+    #[serde(flatten, serialize_with = "named")]
     pub method: Method,
     /// Mean over runs and parameters of the squared error; NaN where the method cannot be used or failed on a run.
     pub mse: f64,
@@ -32,31 +35,49 @@ pub struct MethodScore {
     /// Median over runs of the squared error averaged over parameters; a run that failed counts as infinitely wrong.
     pub median: f64,
     /// Mean wall-clock time of an answer, milliseconds; NaN without any.
+    #[serde(rename = "ms")]
     pub milliseconds: f64,
     /// Runs without an answer.
     pub failed: usize,
     /// Mean squared error of what a record determines, by name; as `mse` otherwise.
+    #[serde(serialize_with = "as_map")]
     pub invariants: Vec<(&'static str, f64)>,
     /// As `mse`, without the part along what a record does not determine; `None` where there is no such part.
     pub mse_without_scale: Option<f64>,
     /// Published figures for this twin, scenario and method.
+    #[serde(rename = "paper")]
     pub published: Option<Published>,
 }
 
 /// Coverage of the true value by an interval.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Coverage {
     /// Parameter.
     pub name: String,
     /// Runs whose interval held it.
+    #[serde(rename = "count")]
     pub covered: u64,
     /// Runs with an estimate.
     pub of: u64,
+    /// `covered` over `of`; NaN without estimates.
+    pub share: f64,
     /// Ends of the exact (Clopper–Pearson) interval of the probability, at 95 %.
-    pub low: f64,
-    /// Upper end.
-    pub high: f64,
+    pub interval: [f64; 2],
+}
+
+/// Writes a method's name and its start.
+fn named<S: Serializer>(method: &Method, serializer: S) -> Result<S::Ok, S::Error> {
+    let mut object = serializer.serialize_struct("Method", 2)?;
+    object.serialize_field("method", &method.to_string())?;
+    let start = method.initialisation().map(|start| start.to_string());
+    object.serialize_field("initialisation", &start)?;
+    object.end()
+}
+
+/// Writes names and values as one object.
+fn as_map<S: Serializer>(pairs: &[(&str, f64)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(pairs.iter().copied())
 }
 
 /// Scores the runs of `plan`.
@@ -134,8 +155,8 @@ fn covered(name: &str, j: usize, runs: &[Run]) -> Coverage {
         name: name.into(),
         covered,
         of,
-        low,
-        high,
+        share: covered as f64 / of as f64,
+        interval: [low, high],
     }
 }
 
@@ -211,7 +232,10 @@ mod tests {
             [1, 1, 1, 2],
             "1.2, 1.2, 0.9, 1.0 in [0.8, 1.1], [0.95, 2.0]"
         );
-        assert_eq!((scores.coverage[3].of, scores.coverage[3].high), (2, 1.0));
+        assert_eq!(
+            (scores.coverage[3].of, scores.coverage[3].interval[1]),
+            (2, 1.0)
+        );
     }
 
     /// e = (k1/2, −k2/2, 0, k4)/100 at the truth.

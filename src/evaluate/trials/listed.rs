@@ -5,7 +5,7 @@ use crate::record::Drive;
 use crate::twin::{Noise, Source};
 use std::f64::consts::{PI, TAU};
 
-/// What magnitudes are measured by: one record of the unbent world.
+/// Scale of magnitudes: one record of the unperturbed world.
 #[derive(Debug, Clone)]
 pub(super) struct Scene {
     /// In seconds.
@@ -17,7 +17,7 @@ pub(super) struct Scene {
 }
 
 impl Scene {
-    /// Of a world at θ; `None` where it runs away.
+    /// Simulates a world at θ; `None` where it runs away.
     pub fn of(world: &World, theta: &[f64], drive: &Drive) -> Option<Self> {
         let states = world.states(theta, drive, &[], 1, Noise::OFF)?;
         let range = |values: &mut dyn Iterator<Item = f64>| {
@@ -37,7 +37,7 @@ impl Scene {
     }
 }
 
-/// How a law is written.
+/// Form in which a law is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Form {
     /// As in the library's table.

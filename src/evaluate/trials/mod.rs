@@ -47,4 +47,4 @@ pub use kind::Kind;
 pub use row::Row;
 pub use run::{Sealed, Settings, Withheld};
 pub use score::Scorecard;
-pub(crate) use score::{Count, LEVEL, Range};
+pub(crate) use score::{Count, Range};

@@ -4,6 +4,8 @@ use super::Kind;
 use super::answer::{Answer, Outcome};
 use super::opened::Opened;
 use super::truth::Truth;
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
 
 /// Nats from which on an effect is clear: it cannot be overlooked by chance.
 const CLEAR: f64 = 12.0;
@@ -42,6 +44,34 @@ pub struct Row {
     pub failure: Option<String>,
     /// Wall-clock seconds of the diagnosis.
     pub seconds: f64,
+}
+
+impl Serialize for Row {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let outcome = self.outcome.as_ref();
+        let top = outcome.and_then(Outcome::top);
+        let mut object = serializer.serialize_struct("Row", 19)?;
+        object.serialize_field("trial", &self.trial)?;
+        object.serialize_field("kind", &self.kind)?;
+        object.serialize_field("truth", &self.truth)?;
+        object.serialize_field("answer", &self.answer())?;
+        object.serialize_field("right", &self.is_right())?;
+        object.serialize_field("strength", &self.strength)?;
+        object.serialize_field("added", &self.added)?;
+        object.serialize_field("shortfall", &self.shortfall)?;
+        object.serialize_field("gain", &self.gain)?;
+        object.serialize_field("p_value", &outcome.map(|o| o.p_value))?;
+        object.serialize_field("where", &outcome.and_then(|o| o.target.as_ref()))?;
+        object.serialize_field("top", &top.map(|top| &top.key))?;
+        object.serialize_field("probability", &top.map(|top| top.probability))?;
+        object.serialize_field("class", &outcome.map(|o| &o.class))?;
+        object.serialize_field("closed", &outcome.and_then(|o| o.closed))?;
+        object.serialize_field("interval", &outcome.and_then(|o| o.interval))?;
+        object.serialize_field("true_share", &self.share)?;
+        object.serialize_field("failure", &self.failure)?;
+        object.serialize_field("seconds", &self.seconds)?;
+        object.end()
+    }
 }
 
 impl Row {

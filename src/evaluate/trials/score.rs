@@ -2,10 +2,12 @@
 
 use super::{Kind, Row};
 use crate::math::clopper_pearson;
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 
 /// Level of the Clopper–Pearson intervals.
-pub const LEVEL: f64 = 0.95;
+const LEVEL: f64 = 0.95;
 /// Ends of the bins of strength.
 const STRENGTHS: [f64; 6] = [0.0, 0.2, 0.4, 0.6, 0.8, 1.0];
 /// Ends of the bins of gain, in nats.
@@ -31,8 +33,18 @@ pub struct Count {
     pub of: u64,
 }
 
+impl Serialize for Count {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut object = serializer.serialize_struct("Count", 3)?;
+        object.serialize_field("count", &self.count)?;
+        object.serialize_field("of", &self.of)?;
+        object.serialize_field("interval", &self.interval())?;
+        object.end()
+    }
+}
+
 impl Count {
-    /// How many of the rows in `of` are in `count`, too.
+    /// Counts the rows in `of` that are in `count`, too.
     fn over<'r>(
         rows: impl IntoIterator<Item = &'r Row>,
         of: impl Fn(&Row) -> bool,
@@ -59,7 +71,7 @@ impl Count {
 }
 
 /// Detection within a range of a magnitude.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Range {
     /// From.
     pub low: f64,
@@ -70,7 +82,7 @@ pub struct Range {
 }
 
 /// The trials of one kind.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct KindScore {
     /// Kind.
     pub kind: Kind,
@@ -81,7 +93,7 @@ pub struct KindScore {
 }
 
 /// Answers of about the same stated probability.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StatedBin {
     /// Mean of what was stated.
     pub stated: f64,
@@ -89,17 +101,33 @@ pub struct StatedBin {
     pub right: Count,
 }
 
+/// A truth and an answer.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Confusion {
+    /// As in [`Row::truth`].
+    pub truth: String,
+    /// As in [`Row::answer`].
+    pub answer: String,
+    /// Number of trials.
+    pub count: u64,
+}
+
 /// All scores; docs/withheld.md defines each.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "schema", rename = "truetwin.scorecard/1")]
 pub struct Scorecard {
     /// Name of the twin.
     pub twin: String,
-    /// Seed of everything random.
+    /// Number of trials.
+    pub trials: usize,
+    /// Random seed.
     pub seed: u64,
     /// Level of the structural test.
     pub alpha: f64,
     /// SHA-256 of the key file.
     pub seal: String,
+    /// Level of the Clopper–Pearson intervals.
+    pub interval_level: f64,
     /// Called structural, of kinds `none` and `outside`.
     pub false_alarms: Count,
     /// Called structural, of kind `absorbed`.
@@ -121,19 +149,22 @@ pub struct Scorecard {
     /// The same, of the clear ones.
     pub clear_class_size: Option<f64>,
     /// The place is right, of detected `listed` and `parametrised`.
+    #[serde(rename = "where")]
     pub place: Count,
     /// The same, of the clear ones.
+    #[serde(rename = "clear_where")]
     pub clear_place: Count,
     /// The place is right, of detected gaps that no effect of the library describes.
+    #[serde(rename = "unlisted_where")]
     pub unlisted_place: Count,
     /// None of the listed effects, of detected ones that have none: recall.
     pub abstained: Count,
     /// The same, of those that no listed effect imitates within 6 held-out nats.
     pub clear_abstained: Count,
-    /// None of the listed effects, of detected ones that have one.
-    pub wrongly_abstained: Count,
     /// Nothing listed was there, of all that were answered so: precision.
     pub abstained_rightly: Count,
+    /// None of the listed effects, of detected ones that have one.
+    pub wrongly_abstained: Count,
     /// Both effects accepted, of detected pairs.
     pub pairs_accepted: Count,
     /// The same, of pairs whose weaker effect adds over 12 nats to the other one.
@@ -153,8 +184,9 @@ pub struct Scorecard {
     /// Detection by what the true effects gain, in nats.
     pub by_gain: Vec<Range>,
     /// Counts of each truth and answer.
-    pub confusion: Vec<(String, String, u64)>,
+    pub confusion: Vec<Confusion>,
     /// Every trial.
+    #[serde(rename = "list")]
     pub rows: Vec<Row>,
 }
 
@@ -179,9 +211,11 @@ impl Scorecard {
         let seconds: Vec<f64> = rows.iter().map(|row| row.seconds).collect();
         Self {
             twin: twin.into(),
+            trials: rows.len(),
             seed,
             alpha,
             seal: seal.into(),
+            interval_level: LEVEL,
             false_alarms: over(
                 &|row| matches!(row.kind, Kind::None | Kind::Outside),
                 &Row::called,
@@ -293,13 +327,17 @@ fn reliability(rows: &[Row]) -> Vec<StatedBin> {
         .collect()
 }
 
-fn confusion(rows: &[Row]) -> Vec<(String, String, u64)> {
+fn confusion(rows: &[Row]) -> Vec<Confusion> {
     let mut counts = BTreeMap::new();
     for row in rows {
         *counts.entry((row.truth.clone(), row.answer())).or_insert(0) += 1;
     }
     (counts.into_iter())
-        .map(|((truth, answer), count)| (truth, answer, count))
+        .map(|((truth, answer), count)| Confusion {
+            truth,
+            answer,
+            count,
+        })
         .collect()
 }
 

@@ -1,4 +1,4 @@
-//! What nobody listed: departures that no effect of the library describes, one a row.
+//! Unlisted departures: no effect of the library describes them. One a row.
 
 use super::listed::Scene;
 use super::world::{ForceLaw, ParameterLaw, Perturbation, SignalLaw, World};
@@ -18,7 +18,7 @@ struct Departure {
     make: fn(&Frame<'_>) -> (Perturbation, String),
 }
 
-/// What the numbers of a departure are measured by.
+/// Scale of a departure's numbers.
 struct Frame<'a> {
     world: &'a World,
     scene: &'a Scene,

@@ -1,7 +1,7 @@
 //! The estimate of an ARMAX model of one output.
 
 use crate::feature::regression::regress;
-use crate::math::{Lagged, LaggedSignals, LeastSquares, LeastSquaresError, Regressors};
+use crate::math::{Lagged, LaggedSignals, LeastSquares, MathError, Regressors};
 use nalgebra::DMatrix;
 
 /// Refinements after the two regressions: where noise prevails these start far off, and three are too few.
@@ -66,11 +66,7 @@ pub(super) struct Model {
 }
 
 /// Estimates the model of `y` with `inputs`, of [`Orders::needed`] samples at least.
-pub(super) fn estimate(
-    y: &[f64],
-    inputs: &[Vec<f64>],
-    orders: Orders,
-) -> Result<Model, LeastSquaresError> {
+pub(super) fn estimate(y: &[f64], inputs: &[Vec<f64>], orders: Orders) -> Result<Model, MathError> {
     let series = Series::new(y, inputs, orders);
     let mut theta = series.by_regressions()?;
     let mut residuals = series.residuals(&theta);
@@ -118,7 +114,7 @@ impl<'a> Series<'a> {
     }
 
     /// A long ARX model; then its residuals stand for the innovations in the regression of the ARMAX model.
-    fn by_regressions(&self) -> Result<Vec<f64>, LeastSquaresError> {
+    fn by_regressions(&self) -> Result<Vec<f64>, MathError> {
         let Orders { p, q, r, .. } = self.orders;
         let long = self.orders.long(self.y.len());
         let fit = regress(lagged(self.y, long, self.inputs, long), long)?;
@@ -151,7 +147,7 @@ impl<'a> Series<'a> {
     }
 
     /// Regression of the residuals on their gradient: regressors filtered by 1/C.
-    fn newton_step(&self, theta: &[f64], residuals: &[f64]) -> Result<Vec<f64>, LeastSquaresError> {
+    fn newton_step(&self, theta: &[f64], residuals: &[f64]) -> Result<Vec<f64>, MathError> {
         let Orders { p, q, r, .. } = self.orders;
         let (c, n) = (&theta[theta.len() - r..], theta.len());
         let start = self.orders.start();

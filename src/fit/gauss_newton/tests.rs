@@ -1,3 +1,4 @@
+use crate::math::MathError;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use argmin::core::State;
@@ -6,23 +7,22 @@ use argmin::solver::linesearch::{BacktrackingLineSearch, condition::ArmijoCondit
 use nalgebra::{DMatrix, dmatrix, dvector};
 
 use super::*;
-use crate::fit::EvaluationError;
 
 /// Residuals and Jacobian as closures.
 struct Closures<R, J>(usize, R, J);
 
 impl<R, J> ResidualProblem for Closures<R, J>
 where
-    R: Fn(&DVector<f64>) -> Result<DVector<f64>, EvaluationError>,
-    J: Fn(&DVector<f64>) -> Result<DMatrix<f64>, EvaluationError>,
+    R: Fn(&DVector<f64>) -> Result<DVector<f64>, MathError>,
+    J: Fn(&DVector<f64>) -> Result<DMatrix<f64>, MathError>,
 {
     fn dimension(&self) -> usize {
         self.0
     }
-    fn residual(&self, theta: &DVector<f64>) -> Result<DVector<f64>, EvaluationError> {
+    fn residual(&self, theta: &DVector<f64>) -> Result<DVector<f64>, MathError> {
         self.1(theta)
     }
-    fn jacobian(&self, theta: &DVector<f64>) -> Result<DMatrix<f64>, EvaluationError> {
+    fn jacobian(&self, theta: &DVector<f64>) -> Result<DMatrix<f64>, MathError> {
         self.2(theta)
     }
 }
@@ -118,7 +118,7 @@ fn rejected_points_shorten_the_step() {
         |x: &DVector<f64>| {
             if x[0] < 0.0 {
                 rejected.fetch_add(1, Ordering::Relaxed);
-                return Err(EvaluationError::rejected("diverged"));
+                return Err(MathError::rejected("diverged"));
             }
             Ok(dvector![x[0].sqrt() - 2.0])
         },
@@ -133,7 +133,7 @@ fn rejected_points_shorten_the_step() {
     let error = GaussNewton::default()
         .minimise(&root, &dvector![-1.0], &Bounds::unbounded(1), &unit(1))
         .unwrap_err();
-    assert!(matches!(error, OptimiseError::Start(_)));
+    assert!(matches!(error, MathError::Start(_)));
     assert!(error.to_string().contains("diverged; start elsewhere"));
 }
 
@@ -157,7 +157,7 @@ fn a_search_that_cannot_go_on_keeps_what_it_has() {
     let flat = Closures(
         1,
         |x: &DVector<f64>| Ok(x.clone()),
-        |_: &DVector<f64>| Err(EvaluationError::rejected("diverged beside θ")),
+        |_: &DVector<f64>| Err(MathError::rejected("diverged beside θ")),
     );
     let minimum = GaussNewton::default()
         .minimise(&flat, &dvector![3.0], &Bounds::unbounded(1), &unit(1))
@@ -175,14 +175,14 @@ fn a_fatal_evaluation_ends_the_search() {
         1,
         |x: &DVector<f64>| match x[0] {
             1.0 => Ok(x.clone()),
-            _ => Err(EvaluationError::fatal("cancelled")),
+            _ => Err(MathError::fatal("cancelled")),
         },
         |_: &DVector<f64>| Ok(dmatrix![1.0]),
     );
     let error = GaussNewton::default()
         .minimise(&fatal, &dvector![1.0], &Bounds::unbounded(1), &unit(1))
         .unwrap_err();
-    assert!(matches!(error, OptimiseError::Fatal(_)));
+    assert!(matches!(error, MathError::Fatal(_)));
     assert_eq!(error.to_string(), "cancelled");
 }
 

@@ -78,7 +78,7 @@ fn levels(twin: &dyn DigitalTwin, record: &Record) -> Vec<Parameter> {
         .map(|(j, output)| {
             let size = size(&record.outputs().column(j).to_vec());
             Parameter {
-                name: format!("noise.{}", output.name),
+                name: Role::Noise.name(&output.name),
                 unit: output.unit.clone(),
                 prior: Interval::unchecked(LEAST * size, size),
                 bounds: Interval::unchecked(LEAST * size, 10.0 * size),

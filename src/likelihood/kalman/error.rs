@@ -1,7 +1,5 @@
 //! Why a record could not be filtered.
-
-use crate::fit::EvaluationError;
-use crate::math::DifferenceError;
+use crate::math::MathError;
 use crate::record::RecordError;
 use crate::setting::SettingError;
 use crate::twin::{SimulationError, TwinError};
@@ -68,7 +66,7 @@ pub enum FilterError {
     },
     /// No differences could be taken around θ.
     #[error(transparent)]
-    Difference(#[from] DifferenceError),
+    Difference(#[from] MathError),
 }
 
 impl FilterError {
@@ -91,7 +89,7 @@ pub(crate) fn recoverable<T>(result: Result<T, FilterError>) -> Result<Option<T>
     }
 }
 
-impl From<FilterError> for EvaluationError {
+impl From<FilterError> for MathError {
     fn from(error: FilterError) -> Self {
         if error.is_recoverable() {
             Self::rejected(error)

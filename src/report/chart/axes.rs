@@ -139,7 +139,7 @@ impl<'a> Axes<'a> {
     }
 }
 
-/// Everything with a name, the lines first.
+/// Returns all named layers, lines first.
 fn legend(panel: &Panel) -> impl Iterator<Item = (&str, Swatch)> {
     let lines = (panel.series.iter()).map(|s| (s.label.as_str(), Swatch::Line(s.style)));
     let areas = (panel.areas.iter()).map(|a| (a.label.as_str(), Swatch::Area));

@@ -18,9 +18,9 @@ const NAMES: f64 = 0.46 * ROOM;
 pub struct BarChart {
     /// Heading, also for screen readers.
     pub title: String,
-    /// What the picture shows, for those who cannot see it.
+    /// Description for screen readers.
     pub description: String,
-    /// From top to bottom.
+    /// Ordered from top to bottom.
     pub groups: Vec<BarGroup>,
 }
 
@@ -31,7 +31,7 @@ pub struct BarGroup {
     pub label: String,
     /// The value that takes all the room; if none, the largest of all groups without.
     pub full: Option<f64>,
-    /// From top to bottom.
+    /// Ordered from top to bottom.
     pub bars: Vec<Bar>,
 }
 
@@ -78,7 +78,7 @@ impl Bar {
         Self { clear, ..self }
     }
 
-    /// With an interval.
+    /// Sets the interval.
     pub fn interval(self, interval: Option<[f64; 2]>) -> Self {
         Self { interval, ..self }
     }
@@ -128,7 +128,7 @@ impl BarChart {
     }
 }
 
-/// From values to places.
+/// Scale from values to positions.
 struct Scale {
     left: f64,
     right: f64,

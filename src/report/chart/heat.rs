@@ -22,11 +22,11 @@ const NAMES: f64 = 0.34 * ROOM;
 pub struct HeatMap {
     /// Heading, also for screen readers.
     pub title: String,
-    /// What the picture shows, for those who cannot see it.
+    /// Description for screen readers.
     pub description: String,
     /// Quantity and unit of the x axis.
     pub x: String,
-    /// From top to bottom.
+    /// Ordered from top to bottom.
     pub groups: Vec<HeatGroup>,
 }
 
@@ -35,7 +35,7 @@ pub struct HeatMap {
 pub struct HeatGroup {
     /// Heading; empty for none.
     pub label: String,
-    /// From top to bottom.
+    /// Ordered from top to bottom.
     pub rows: Vec<HeatRow>,
 }
 
@@ -44,7 +44,7 @@ pub struct HeatGroup {
 pub struct HeatRow {
     /// Name.
     pub label: String,
-    /// From left to right.
+    /// Ordered from left to right.
     pub cells: Vec<Span>,
     /// A place on the x axis.
     pub mark: Option<Mark>,

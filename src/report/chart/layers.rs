@@ -1,4 +1,4 @@
-//! What lies below and over the lines of a panel: bands, points with intervals, marks.
+//! Layers of a panel below and above its lines: bands, points with intervals, marks.
 
 use super::frame::Frame;
 use super::frame::TEXT;
@@ -12,7 +12,7 @@ const CAP: f64 = 4.0;
 /// A band between two lines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Area {
-    /// In the legend; empty for none.
+    /// Name in the legend; empty for none.
     pub label: String,
     /// (x, low, high), sorted by x.
     pub points: Vec<(f64, f64, f64)>,
@@ -41,9 +41,9 @@ impl Area {
 /// Points with their intervals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dots {
-    /// In the legend; empty for none.
+    /// Name in the legend; empty for none.
     pub label: String,
-    /// From left to right.
+    /// Ordered from left to right.
     pub points: Vec<Dot>,
 }
 
@@ -78,14 +78,14 @@ impl Dots {
 /// A place on the x axis: a dashed line over the whole height, with its name beside it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mark {
-    /// Where.
+    /// Position.
     pub x: f64,
     /// Its name.
     pub label: String,
 }
 
 impl Mark {
-    /// Between these heights; the name stands at the upper end, on the side that has room.
+    /// Draws the mark between two heights; its name stands at the upper end, on the side with room.
     pub(super) fn draw(&self, out: &mut String, frame: &Frame, (top, bottom): (f64, f64)) {
         let x = frame.x(self.x);
         let _ = writeln!(
@@ -102,7 +102,7 @@ impl Mark {
     }
 }
 
-/// What stands before a name in the legend.
+/// Symbol before a name in the legend.
 pub(super) enum Swatch {
     Line(Style),
     Area,
@@ -110,7 +110,7 @@ pub(super) enum Swatch {
 }
 
 impl Swatch {
-    /// Draws it so long, from (x, y) on.
+    /// Draws the symbol from (x, y) on.
     pub(super) fn draw(&self, out: &mut String, (x, y): (f64, f64), long: f64) {
         let end = x + long;
         let _ = match self {

@@ -12,11 +12,11 @@ use super::ticks::{Ticks, padded};
 pub struct Chart {
     /// Heading, also for screen readers.
     pub title: String,
-    /// What the picture shows, for those who cannot see it.
+    /// Description for screen readers.
     pub description: String,
     /// Quantity and unit of the x axis.
     pub x: String,
-    /// From top to bottom.
+    /// Ordered from top to bottom.
     pub panels: Vec<Panel>,
 }
 

@@ -20,9 +20,9 @@ const GAP: f64 = 18.0;
 pub struct Multiples {
     /// Heading, also for screen readers.
     pub title: String,
-    /// What the picture shows, for those who cannot see it.
+    /// Description for screen readers.
     pub description: String,
-    /// From top to bottom.
+    /// Ordered from top to bottom.
     pub rows: Vec<FacetRow>,
 }
 
@@ -33,7 +33,7 @@ pub struct FacetRow {
     pub label: String,
     /// Heading in bold.
     pub clear: bool,
-    /// From left to right; three stand beside each other.
+    /// Ordered from left to right, three in a row.
     pub facets: Vec<Facet>,
 }
 
@@ -42,16 +42,16 @@ pub struct FacetRow {
 pub struct Facet {
     /// Variable and unit.
     pub x: String,
-    /// From left to right.
+    /// Ordered from left to right.
     pub steps: Vec<Step>,
 }
 
 /// A mean over a range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
-    /// From.
+    /// Lower end.
     pub low: f64,
-    /// To.
+    /// Upper end.
     pub high: f64,
     /// Mean of the quantity there.
     pub mean: f64,
@@ -113,7 +113,7 @@ impl FacetRow {
     }
 }
 
-/// Where a value stands in axes below `top`.
+/// Returns the position of a value in axes below `top`.
 fn height((low, high): (f64, f64), top: f64, value: f64) -> f64 {
     top + HEIGHT * (high - value) / (high - low)
 }

@@ -42,29 +42,29 @@ impl Panel {
         }
     }
 
-    /// With marked stretches of the x axis.
+    /// Sets marked stretches of the x axis.
     pub fn spans(self, spans: Vec<Span>) -> Self {
         Self { spans, ..self }
     }
 
-    /// With a band below the lines.
+    /// Adds a band below the lines.
     pub fn area(mut self, area: Area) -> Self {
         self.areas.push(area);
         self
     }
 
-    /// With points and their intervals.
+    /// Adds points and their intervals.
     pub fn dots(mut self, dots: Dots) -> Self {
         self.dots.push(dots);
         self
     }
 
-    /// With marked places on the x axis.
+    /// Sets marks on the x axis.
     pub fn marks(self, marks: Vec<Mark>) -> Self {
         Self { marks, ..self }
     }
 
-    /// With these ends of the y axis.
+    /// Sets the ends of the y axis.
     pub fn range(self, low: f64, high: f64) -> Self {
         Self {
             range: Some((low, high)),
@@ -82,7 +82,7 @@ impl Panel {
         lines.chain(areas).chain(dots)
     }
 
-    /// With another height in user units.
+    /// Sets the height in user units.
     pub fn height(self, height: f64) -> Self {
         Self { height, ..self }
     }
@@ -91,7 +91,7 @@ impl Panel {
 /// One line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// In the legend; empty for none.
+    /// Name in the legend; empty for none.
     pub label: String,
     /// Colour, width, dashes.
     pub style: Style,
@@ -100,7 +100,7 @@ pub struct Series {
 }
 
 impl Series {
-    /// From its points, sorted by x.
+    /// Creates a line from points sorted by x.
     pub fn new(label: &str, style: Style, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
         Self {
             label: label.into(),

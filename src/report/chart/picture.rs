@@ -11,7 +11,7 @@ pub(super) struct Picture<'a> {
 }
 
 impl<'a> Picture<'a> {
-    /// With its title on top.
+    /// Creates a picture with its title.
     pub(super) fn new(title: &'a str, description: &'a str) -> Self {
         let mut body = String::new();
         let shown = clipped(title, TITLE * BOLD, ROOM);
@@ -30,12 +30,12 @@ impl<'a> Picture<'a> {
         }
     }
 
-    /// Where the room below the title begins.
+    /// Returns the upper end of the room below the title.
     pub(super) fn top(&self) -> f64 {
         EDGE + TITLE + 4.0
     }
 
-    /// What has been drawn, to draw more.
+    /// Returns the drawing, to add to it.
     pub(super) fn body(&mut self) -> &mut String {
         &mut self.body
     }

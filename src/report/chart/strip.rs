@@ -11,7 +11,7 @@ const GAP: f64 = 5.0;
 /// Opacity of a stretch of full weight: text on it must stay legible.
 const DENSEST: f64 = 0.55;
 
-/// How a stretch is framed, so that it is told apart without colour.
+/// Frame of a stretch; it carries the same information as the colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Edge {
     /// An unbroken frame, and bold text.
@@ -25,15 +25,15 @@ pub enum Edge {
 /// A stretch of the x axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Span {
-    /// Where it begins.
+    /// Start.
     pub from: f64,
-    /// Where it ends.
+    /// End.
     pub to: f64,
-    /// Written inside where there is room.
+    /// Label inside, if there is room.
     pub label: String,
-    /// From 0 to 1: how dark it is.
+    /// Darkness, 0 to 1.
     pub weight: f64,
-    /// Its frame.
+    /// Frame.
     pub edge: Edge,
 }
 

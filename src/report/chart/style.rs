@@ -1,6 +1,6 @@
 //! Colour, width and dashes of lines.
 
-/// How a line is drawn.
+/// Style of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Style {
     /// A colour of SVG.
@@ -14,9 +14,9 @@ pub struct Style {
 impl Style {
     /// A measured record: broad and pale, so that what is laid over it can be seen.
     pub const RECORD: Self = Self::new("#a6a6a6", 3.0, "");
-    /// What was there before.
+    /// The old state.
     pub const BEFORE: Self = Self::new("#d55e00", 1.5, "6 4");
-    /// What is there now.
+    /// The new state.
     pub const AFTER: Self = Self::new("#0072b2", 1.5, "");
     /// For anything else, in this order.
     pub const OTHERS: [Self; 5] = [

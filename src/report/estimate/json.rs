@@ -1,6 +1,5 @@
 //! An estimate as JSON, `truetwin.estimate/1`.
 
-use crate::estimator::refine::Direction;
 use crate::estimator::{Estimate, INTERVAL_LEVEL};
 use crate::study::Study;
 use serde_json::{Value, json};
@@ -31,30 +30,20 @@ pub fn estimate_json(study: &Study, estimate: &Estimate) -> Value {
             "statistic": estimate.after.map(|test| test.statistic),
         })
     });
-    let nuisance: Vec<Value> = (estimate.nuisance().iter())
-        .map(|n| json!({ "name": n.name, "role": n.role, "value": n.value, "std_error": n.std_error }))
-        .collect();
-    let directions = (estimate.information.as_ref())
-        .map(|known| known.directions.iter().map(direction).collect::<Vec<_>>());
-    let weak: Vec<Value> = (estimate.information.iter())
-        .flat_map(|known| known.weak().map(direction))
+    let directions = estimate.information.as_ref().map(|known| &known.directions);
+    let weak: Vec<_> = (estimate.information.iter())
+        .flat_map(|known| known.weak())
         .collect();
     let space = study.twin().parameters();
     let described: Vec<_> = space.iter().collect();
     let parameters: Vec<Value> = (estimate.physical(&described).iter())
         .map(|p| json!({ "name": p.name, "unit": p.unit, "prior": p.prior, "bounds": p.bounds }))
         .collect();
-    let seconds = &estimate.seconds;
     json!({
         "schema": "truetwin.estimate/1",
         "twin": study.name(),
         "names": estimate.physical(&estimate.names),
-        "gate": {
-            "p_value": estimate.gate.p_value,
-            "alpha": estimate.gate.alpha,
-            "out_of_distribution": estimate.gate.out_of_distribution,
-            "statistic": estimate.gate.statistic,
-        },
+        "gate": estimate.gate,
         "theta": {
             "initial": own(&estimate.initial),
             "gauss_newton": stage(&estimate.gauss_newton),
@@ -62,7 +51,7 @@ pub fn estimate_json(study: &Study, estimate: &Estimate) -> Value {
             "final": own(&estimate.theta),
         },
         "std_error": own(&estimate.std_error),
-        "nuisance": nuisance,
+        "nuisance": estimate.nuisance(),
         "interval": {
             "level": INTERVAL_LEVEL,
             "low": own(&estimate.low),
@@ -76,27 +65,11 @@ pub fn estimate_json(study: &Study, estimate: &Estimate) -> Value {
             "initial_rmse": estimate.tracking_initial.as_ref().map(|run| run.rmse),
         },
         "simulations": estimate.simulations,
-        "seconds": {
-            "predict": seconds.predict,
-            "gate": seconds.gate,
-            "gauss_newton": seconds.gauss_newton,
-            "cloud": seconds.cloud,
-            "tune": seconds.tune,
-            "total": seconds.total,
-        },
+        "seconds": estimate.seconds,
         "parameters": parameters,
         "directions": directions,
         "refitted": estimate.refitted,
         "redrawn": estimate.redrawn(),
-    })
-}
-
-fn direction(known: &Direction) -> Value {
-    json!({
-        "direction": known.direction,
-        "std_error": known.std_error,
-        "combination": known.combination,
-        "weak": known.weak,
     })
 }
 

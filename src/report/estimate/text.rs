@@ -1,22 +1,20 @@
-//! An estimate as a person reads it on the terminal.
+//! An estimate as text for the terminal.
 
 use crate::estimator::{Estimate, INTERVAL_LEVEL};
 use crate::report::digits::{self, Digits, probability, short, unit_suffix};
 use crate::study::Study;
 use crate::twin::{Parameter, Role};
 
-/// Columns and lines that an estimate takes at most.
+/// Limits of columns and lines.
 const COLUMNS: usize = 100;
 const LINES: usize = 20;
-/// Weak combinations that are written out.
+/// Number of weak combinations shown.
 const COMBINATIONS: usize = 2;
 
-/// The estimate in at most 20 lines of 100 columns, without colour codes: what the gate said, the parameters with
-/// their errors, what the record tells little about, whether the calibrated twin explains the record, how well it
-/// follows it.
+/// Returns the estimate in at most 20 lines of 100 columns: gate, parameters with errors, weak combinations, test after the
+/// refit, free-run errors.
 ///
-/// Values have the digits that their standard errors support. Where there are more parameters than lines, the last
-/// line of the table says so.
+/// Values have the digits that their standard errors support.
 pub fn estimate_text(study: &Study, estimate: &Estimate) -> String {
     let mut above = paragraph(&gate(study, estimate));
     above.push(String::new());
@@ -32,24 +30,24 @@ pub fn estimate_text(study: &Study, estimate: &Estimate) -> String {
     lines.join("\n") + "\n"
 }
 
-/// What the gate said, and what followed from it.
+/// Returns the answer of the gate and its consequence.
 fn gate(study: &Study, estimate: &Estimate) -> String {
     let (name, test) = (study.name(), estimate.gate);
     let p = format!("{}, level {}", probability(test.p_value), test.alpha);
     match (test.out_of_distribution, estimate.refitted) {
         (true, _) => format!(
-            "{name}: at the network's first estimate the twin does not make such a record ({p}); the estimate was refined on it."
+            "{name}: the record is inconsistent with the network's estimate ({p}); parameters refitted."
         ),
         (false, false) => format!(
-            "{name}: the record is what the twin makes at the network's estimate ({p}); it was kept."
+            "{name}: the record is consistent with the network's estimate ({p}); estimate kept."
         ),
         (false, true) => format!(
-            "{name}: the record is what the twin makes at the network's first estimate ({p}); it was refined all the same, as asked."
+            "{name}: the record is consistent with the network's estimate ({p}); parameters refitted as requested."
         ),
     }
 }
 
-/// Names, units and numbers of all of θ in aligned columns, in at most `lines` lines.
+/// Returns names, units and numbers of θ in aligned columns, in at most `lines` lines.
 fn table(study: &Study, estimate: &Estimate, lines: usize) -> Vec<String> {
     let level = format!("{:.0} % interval", 100.0 * INTERVAL_LEVEL);
     let head = [
@@ -102,7 +100,7 @@ fn table(study: &Study, estimate: &Estimate, lines: usize) -> Vec<String> {
     written
 }
 
-/// One line of the table.
+/// Returns one line of the table.
 fn row(estimate: &Estimate, j: usize, parameter: &Parameter) -> [String; 6] {
     let name = match parameter.role {
         Role::Physical | Role::Effect => parameter.name.clone(),
@@ -125,12 +123,12 @@ fn row(estimate: &Estimate, j: usize, parameter: &Parameter) -> [String; 6] {
     ]
 }
 
-/// The weak combinations in words, after an empty line; nothing where all is well.
+/// Returns the weak combinations after an empty line; nothing if there are none.
 fn weak(estimate: &Estimate) -> Vec<String> {
     let Some(information) = &estimate.information else {
         return [
             vec![String::new()],
-            paragraph("The features do not tell which parameters the record determines."),
+            paragraph("The features do not determine which parameters the record identifies."),
         ]
         .concat();
     };
@@ -140,7 +138,7 @@ fn weak(estimate: &Estimate) -> Vec<String> {
     }
     let mut lines = vec![String::new()];
     lines.extend(paragraph(&format!(
-        "The record tells less than the prior about {} of {} combinations (± in prior widths):",
+        "The record does not identify {} of {} parameter combinations (± in prior widths):",
         weak.len(),
         information.directions.len(),
     )));
@@ -155,20 +153,21 @@ fn weak(estimate: &Estimate) -> Vec<String> {
         lines.push(format!("  … and {} more", weak.len() - COMBINATIONS));
     }
     lines.extend(paragraph(
-        "Moving along such a combination hardly changes the record: fix a parameter in it, or excite the system in another way.",
+        "Moves along such a combination hardly change the record: fix one of its parameters, or use another input.",
     ));
     lines
 }
 
-/// Whether the calibrated twin explains the record; `None` where nothing was refitted.
+/// Returns the test of the calibrated twin; `None` without a refit.
 fn after(estimate: &Estimate) -> Option<String> {
     if !estimate.refitted {
         return None;
     }
     Some(match estimate.after {
-        None => "Whether the calibrated twin explains the record cannot be tested: the features have no more numbers than θ.".into(),
+        None => "The calibrated twin cannot be tested: there are no more features than parameters."
+            .into(),
         Some(test) if test.out_of_distribution => format!(
-            "The calibrated twin does not explain the record ({}; a complete twin fails this test in {} % of records): it seems to lack something that no parameter makes up for. The standard errors hold only if nothing is missing.",
+            "The calibrated twin does not explain the record ({}, false-alarm rate {} %): no parameters compensate for what it lacks. Standard errors hold only for a complete twin. Next: truetwin diagnose.",
             probability(test.p_value),
             100.0 * test.alpha,
         ),
@@ -179,7 +178,7 @@ fn after(estimate: &Estimate) -> Option<String> {
     })
 }
 
-/// Free-run errors before and after, and on the validation record.
+/// Returns free-run errors before and after, and on the validation record.
 fn tracking(study: &Study, estimate: &Estimate) -> String {
     let outputs = study.twin().signals().outputs;
     // A common unit, or none: channels of several units share one number.
@@ -190,7 +189,7 @@ fn tracking(study: &Study, estimate: &Estimate) -> String {
         _ => String::new(),
     };
     let Some(after) = &estimate.tracking else {
-        return "The free run at the estimate diverges: the twin cannot be run without noise there.".into();
+        return "The free run at the estimate diverges.".into();
     };
     let after = short(after.rmse);
     let mut text = match &estimate.tracking_initial {
@@ -208,11 +207,11 @@ fn tracking(study: &Study, estimate: &Estimate) -> String {
     text + "."
 }
 
-/// Simulations and seconds.
+/// Returns simulations and seconds.
 fn effort(estimate: &Estimate) -> String {
     let redrawn = match estimate.redrawn() {
         0 => String::new(),
-        n => format!(" ({n} of the cloud drawn anew)"),
+        n => format!(" ({n} draws of the cloud repeated)"),
     };
     format!(
         "{} simulations{redrawn}, {} s.",
@@ -221,7 +220,7 @@ fn effort(estimate: &Estimate) -> String {
     )
 }
 
-/// Text in lines of at most [`COLUMNS`] columns.
+/// Breaks text into lines of at most [`COLUMNS`] columns.
 fn paragraph(text: &str) -> Vec<String> {
     let mut lines: Vec<String> = vec![];
     for word in text.split(' ') {
@@ -240,7 +239,7 @@ fn length(text: &str) -> usize {
     text.chars().count()
 }
 
-/// Text of at most `width` columns, its end replaced by an ellipsis.
+/// Cuts text to `width` columns, with an ellipsis.
 fn clipped(text: &str, width: usize) -> String {
     if length(text) <= width {
         return text.into();

@@ -6,14 +6,14 @@ use crate::diagnose::{
 };
 use crate::report::digits::{chance, error, percent, probability, short, unit_suffix};
 
-/// Most lines of the text.
+/// Limit of lines.
 const LINES: usize = 15;
-/// Explanations that are shown.
+/// Number of explanations shown.
 const SHOWN: usize = 4;
-/// Terms of a missing law that are shown.
+/// Number of terms shown of a missing law.
 const TERMS: usize = 3;
 
-/// The diagnosis in at most fifteen lines: the verdict, what it rests on, where, which, how far.
+/// Returns the diagnosis in at most fifteen lines: verdict, test, parameters, location, explanations, extent, next record.
 pub fn gap_text(diagnosis: &Diagnosis) -> String {
     let mut lines = vec![verdict_sentence(diagnosis)];
     let d = &diagnosis.detection;
@@ -81,7 +81,7 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     }
     if let Some(p) = diagnosis.cause.unexplained_p_value {
         lines.push(format!(
-            "What the best explanation leaves: {}.",
+            "Residual test with the best explanation added: {}.",
             probability(p)
         ));
     }
@@ -100,17 +100,19 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     lines.join("\n") + "\n"
 }
 
-/// The answer in one sentence.
+/// Returns the answer in one sentence.
 pub fn verdict_sentence(diagnosis: &Diagnosis) -> String {
     let listed = |keys: &[String]| keys.join(" and ");
     match (diagnosis.verdict, diagnosis.cause.decision) {
-        (Verdict::NoGap, _) => "No gap: the twin explains the record within its prior.".into(),
+        (Verdict::NoGap, _) => {
+            "No gap: the twin explains the record with parameters inside the prior.".into()
+        }
         (Verdict::ParameterGap, Decision::Absorbed) => format!(
             "Parameter gap: parameters outside the prior explain the record; so would {} with parameters inside.",
             diagnosis.cause.class.first().cloned().unwrap_or_default()
         ),
         (Verdict::ParameterGap, _) => {
-            "Parameter gap: the twin explains the record with parameters outside its prior.".into()
+            "Parameter gap: the twin explains the record with parameters outside the prior.".into()
         }
         (_, Decision::Named) => {
             format!(
@@ -119,20 +121,20 @@ pub fn verdict_sentence(diagnosis: &Diagnosis) -> String {
             )
         }
         (_, Decision::Class) => format!(
-            "Structural gap: the twin lacks {}, or a rival that these data cannot tell apart ({}).",
+            "Structural gap: the twin lacks {}, or a rival that this record cannot separate from it ({}).",
             listed(&diagnosis.cause.accepted),
             diagnosis.cause.class[1..].join(", ")
         ),
         _ => match &diagnosis.location.target {
             Some(target) => format!(
-                "Structural gap that no listed effect explains; what is missing acts on {target}."
+                "Structural gap outside the library: no listed effect explains it; the missing law acts on {target}."
             ),
-            None => "Structural gap that no listed effect explains.".into(),
+            None => "Structural gap outside the library: no listed effect explains it.".into(),
         },
     }
 }
 
-/// Errors on held-out data before and after, and the share of the gap that closed.
+/// Returns errors on held-out data before and after, and the share of the gap closed.
 pub(super) fn closed_sentence(s: &Shrinkage) -> String {
     let mut text = format!("{} on the {}: {}", s.metric, s.held_out, short(s.before));
     if let Some(after) = s.after {
@@ -148,17 +150,17 @@ pub(super) fn closed_sentence(s: &Shrinkage) -> String {
     text + "."
 }
 
-/// Why there are no errors on held-out data.
+/// Returns the reason for missing errors on held-out data.
 pub(super) fn no_share(diagnosis: &Diagnosis) -> String {
     if diagnosis.validation_runs.is_none() && diagnosis.free_runs.times.len() < SHORTEST_SPLIT {
         return format!(
-            "Too short to hold anything back: no share. Give --validation, or a record of at least {SHORTEST_SPLIT} samples."
+            "No share of the gap closed: the record is too short to hold data back. Give --validation, or a record of at least {SHORTEST_SPLIT} samples."
         );
     }
-    "The twin does not run through the held-out data: no share.".into()
+    "No share of the gap closed: the free run on the held-out data diverges.".into()
 }
 
-/// The first terms of the missing law.
+/// Returns the first terms of the missing law.
 fn explored(discovery: &Discovery) -> String {
     let terms: Vec<String> = (discovery.terms.iter().take(TERMS))
         .map(|t| {
@@ -176,17 +178,17 @@ fn explored(discovery: &Discovery) -> String {
         terms.join(", ")
     };
     format!(
-        "Exploratory, what {} lacks: {terms}; {} of its variance.",
+        "Exploratory, missing term of {}: {terms}; {} of its variance explained.",
         discovery.equation,
         percent(discovery.explained)
     )
 }
 
-/// What to measure, and what it splits.
+/// Returns the proposed record and its power to separate the rivals.
 fn measure_next(next: &NextInput) -> String {
     let ([split, of], [again, of_again]) = (next.split, next.again);
     format!(
-        "Measure next: {} ({NEXT_INPUT}); {split} of {of} simulated pairs told apart, the same inputs again {again} of {of_again}.",
+        "Measure next: {} ({NEXT_INPUT}); it separates the rivals in {split} of {of} simulations, the present inputs in {again} of {of_again}.",
         next.kind
     )
 }
@@ -226,15 +228,15 @@ mod tests {
             class.contains("Where: h1; from 612 s on; clearest"),
             "{class}"
         );
-        let next = "18 of 20 simulated pairs told apart, the same inputs again 6 of 20";
+        let next = "separates the rivals in 18 of 20 simulations, the present inputs in 6 of 20";
         assert!(
             class.contains(next) && class.contains(NEXT_INPUT),
             "{class}"
         );
         let none = gap_text(&made::oscillator_none());
-        let terms = "Exploratory, what x2 lacks: −0.620 · |x1|·x2 (98 %), ";
+        let terms = "Exploratory, missing term of x2: −0.620 · |x1|·x2 (98 %), ";
         assert!(
-            none.contains(terms) && none.contains("83 % of its variance"),
+            none.contains(terms) && none.contains("83 % of its variance explained"),
             "{none}"
         );
         let mut all = made::oscillator_none();

@@ -2,9 +2,9 @@
 
 use crate::estimator::INTERVAL_LEVEL;
 use crate::estimator::PresetName;
-use crate::evaluate::paper::{COVERAGE_LEVEL, MethodScore, MonteCarlo, Scenario, Scores};
+use crate::evaluate::paper::{COVERAGE_LEVEL, MonteCarlo, Scenario, Scores};
 use crate::study::Study;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 /// The scores as one JSON object, `truetwin.reproduce/1`.
 ///
@@ -24,15 +24,6 @@ pub fn reproduce_json(
     preset: PresetName,
     scores: &Scores,
 ) -> Value {
-    let coverage: Vec<Value> = (scores.coverage.iter())
-        .map(|c| {
-            let share = c.covered as f64 / c.of as f64;
-            json!({
-                "name": c.name, "count": c.covered, "of": c.of, "share": share,
-                "interval": [c.low, c.high],
-            })
-        })
-        .collect();
     json!({
         "schema": "truetwin.reproduce/1",
         "twin": study.name(),
@@ -46,27 +37,9 @@ pub fn reproduce_json(
         "seed": plan.seed,
         "preset": preset,
         "failed": scores.failed,
-        "methods": scores.methods.iter().map(row).collect::<Vec<_>>(),
+        "methods": scores.methods,
         "coverage": {
-            "level": INTERVAL_LEVEL, "interval_level": COVERAGE_LEVEL, "parameters": coverage,
+            "level": INTERVAL_LEVEL, "interval_level": COVERAGE_LEVEL, "parameters": scores.coverage,
         },
-    })
-}
-
-fn row(score: &MethodScore) -> Value {
-    let invariants: Map<String, Value> = (score.invariants.iter())
-        .map(|(name, mse)| ((*name).to_owned(), json!(mse)))
-        .collect();
-    json!({
-        "method": score.method.to_string(),
-        "initialisation": score.method.initialisation().map(|start| start.to_string()),
-        "mse": score.mse,
-        "mse_std_error": score.mse_std_error,
-        "median": score.median,
-        "ms": score.milliseconds,
-        "failed": score.failed,
-        "invariants": invariants,
-        "mse_without_scale": score.mse_without_scale,
-        "paper": score.published.map(|p| json!({ "mse": p.mse, "ms": p.milliseconds })),
     })
 }

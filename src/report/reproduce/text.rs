@@ -82,7 +82,7 @@ fn invariants(scores: &Scores) -> String {
     format!("MSE of what the output determines\n\n{}", table(&rows))
 }
 
-/// How often the intervals held the truth.
+/// Returns the coverage of the intervals.
 fn coverage(scores: &Scores) -> String {
     let rows: Vec<Vec<String>> = (scores.coverage.iter())
         .filter(|c| c.of > 0)
@@ -90,8 +90,12 @@ fn coverage(scores: &Scores) -> String {
             vec![
                 c.name.clone(),
                 format!("{} of {}", c.covered, c.of),
-                format!("{:.0} %", 100.0 * c.covered as f64 / c.of as f64),
-                format!("[{:.0}, {:.0}] %", 100.0 * c.low, 100.0 * c.high),
+                format!("{:.0} %", 100.0 * c.share),
+                format!(
+                    "[{:.0}, {:.0}] %",
+                    100.0 * c.interval[0],
+                    100.0 * c.interval[1]
+                ),
             ]
         })
         .collect();
@@ -107,7 +111,7 @@ fn coverage(scores: &Scores) -> String {
     }
 }
 
-/// Who did not answer.
+/// Returns the methods without an answer.
 fn failures(plan: &MonteCarlo, scores: &Scores) -> String {
     (scores.methods.iter().filter(|s| s.failed > 0))
         .map(|s| {

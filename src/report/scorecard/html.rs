@@ -27,7 +27,7 @@ pub fn scorecard_html(card: &Scorecard) -> String {
     )
 }
 
-/// What was found, and how.
+/// Returns the head of the page.
 fn lead(card: &Scorecard) -> String {
     let called = |count: Count| match count.of {
         0 => "none was tried".into(),

@@ -82,7 +82,7 @@ fn cells(names: &[&str]) -> Vec<String> {
     names.iter().map(|name| (*name).into()).collect()
 }
 
-/// What counts as right for a kind.
+/// Returns the rule of a right answer.
 pub(super) fn rule(kind: Kind) -> &'static str {
     match kind {
         Kind::None => "no structural gap",

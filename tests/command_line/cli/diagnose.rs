@@ -187,7 +187,7 @@ fn a_record_too_short_to_hold_anything_back_is_diagnosed_without_a_share() {
     let record = oscillation("short.csv", 120, 0.05);
     let out = place().join("short").display().to_string();
     let text = done(&["diagnose", &record, "--twin", "van-der-pol", "--out", &out]);
-    let says = "Too short to hold anything back: no share";
+    let says = "No share of the gap closed: the record is too short";
     assert!(text.contains(says), "{text}");
     let read = |name: &str| fs::read_to_string(Path::new(&out).join(name)).unwrap();
     let report: serde_json::Value = serde_json::from_str(&read("report.json")).unwrap();

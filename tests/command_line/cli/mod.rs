@@ -102,7 +102,7 @@ fn twins_effects_and_check_tell_what_there_is() {
         json(&["check", "--twin", "tanks", "--json"])["passed"],
         true
     );
-    assert!(done(&["--help"]).contains("Calibrate a digital twin"));
+    assert!(done(&["--help"]).contains("Calibrate simulators"));
     assert!(done(&["estimate", "--help"]).contains("--validation"));
 }
 

@@ -214,12 +214,7 @@ fn uniform_scenarios_need_no_test_points() {
 #[test]
 fn the_help_teaches_and_wrong_scenarios_are_refused() {
     let help = done(&["reproduce", "--help"]);
-    for expected in [
-        "uniform",
-        "reproduce.json",
-        "goes on where it stopped",
-        "TS-fine",
-    ] {
+    for expected in ["uniform", "reproduce.json", "resumes it", "TS-fine"] {
         assert!(help.contains(expected), "{expected} is not in:\n{help}");
     }
     refused(&small(&["--scenario", "4"]), &["--scenario", "uniform"]);

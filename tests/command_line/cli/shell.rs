@@ -124,7 +124,7 @@ fn the_manual_has_every_verb_and_every_option() {
 #[test]
 fn every_help_has_a_purpose_an_example_and_exit_codes() {
     let whole = done(&["--help"]);
-    assert!(whole.contains("Exit: 0 done, 2 ") && whole.contains("truetwin demo"));
+    assert!(whole.contains("Exit codes: 0 done; 2 ") && whole.contains("truetwin demo"));
     for verb in verbs() {
         let help = done(&[&verb, "--help"]);
         let purpose = help.lines().next().unwrap();
@@ -138,7 +138,7 @@ fn every_help_has_a_purpose_an_example_and_exit_codes() {
             help.matches(&call).count() >= 2,
             "{verb} shows no call to copy"
         );
-        assert!(help.contains("Exit: "), "{verb} tells no exit codes");
+        assert!(help.contains("Exit codes: "), "{verb} tells no exit codes");
     }
 }
 

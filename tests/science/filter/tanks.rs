@@ -2,7 +2,6 @@
 
 use super::{maximum_likelihood, mean, particle, record};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use truetwin::effect::*;
 use truetwin::effect::{ActuatorLag, SensorLag, SensorOutliers, StateCeiling};
@@ -10,6 +9,7 @@ use truetwin::likelihood::kalman::{
     FilterSettings, Kalman, Method, Score, filter, log_likelihood, smooth,
 };
 use truetwin::record::*;
+use truetwin::study::{RecordPlan, Study, StudyFile};
 use truetwin::twin::*;
 use truetwin::twins::CascadedTanks;
 
@@ -28,6 +28,14 @@ fn levels(run: u64) -> Drive {
 
 fn simulated(theta: &[f64], run: u64) -> Record {
     record(&CascadedTanks, theta, levels(run), run)
+}
+
+/// The tanks in the setting of a study file.
+fn adapted(tables: &str) -> Twin {
+    let plan = RecordPlan::levels(0.5, 400, 0.0, 3.0, 30);
+    let study = Study::new("tanks", CascadedTanks, plan).unwrap();
+    let file = StudyFile::parse(&format!("twin = 'tanks'\n{tables}"), "S.toml".as_ref()).unwrap();
+    study.configure(&file).unwrap().twin().clone()
 }
 
 /// Over 60 records: squares of standardised innovations have mean 1, and innovations do not predict each other.
@@ -96,11 +104,7 @@ fn limits_are_felt_as_a_particle_filter_feels_them() {
 /// Starts are parameters: their errors are what the information says.
 #[test]
 fn an_unknown_start_is_found() {
-    let adaptation = Adaptation {
-        start: BTreeMap::from(["h1", "h2"].map(|h| (h.into(), Level::Estimate))),
-        ..Adaptation::default()
-    };
-    let twin = adapt(Arc::new(CascadedTanks), &adaptation, 0.5).unwrap();
+    let twin = adapted("[start]\nh1 = 'estimate'\nh2 = 'estimate'");
     let equations = twin.equations().unwrap();
     let truth = [0.6, 0.5, 0.55, 1.0, 3.0, 6.0];
     let errors: Vec<[f64; 2]> = (0..12)
@@ -124,11 +128,7 @@ fn an_unknown_start_is_found() {
 /// Noise levels are parameters too: the score at the truth is zero on average, and negative in a level that is too high.
 #[test]
 fn noise_levels_are_parameters() {
-    let adaptation = Adaptation {
-        noise: BTreeMap::from(["h1", "h2", "y"].map(|h| (h.into(), Level::Estimate))),
-        ..Adaptation::default()
-    };
-    let twin = adapt(Arc::new(CascadedTanks), &adaptation, 0.5).unwrap();
+    let twin = adapted("[noise]\nh1 = 'estimate'\nh2 = 'estimate'\ny = 'estimate'");
     let equations = twin.equations().unwrap();
     let mut truth = CENTRE.to_vec();
     for name in &twin.parameters().names()[4..] {

@@ -70,7 +70,7 @@ fn keys_stay_sealed_until_every_share_has_answered() {
     let [first, second] = ["1/2", "2/2"].map(|share| share.parse().unwrap());
     assert_eq!(sealed.answer(first, &silent).unwrap().len(), 1);
     let error = sealed.open_keys(first, &silent).unwrap_err().to_string();
-    assert!(error.contains("1 of 2 answers"), "{error}");
+    assert!(error.contains("1 of 2 trials answered"), "{error}");
     assert_eq!(sealed.answer(second, &silent).unwrap().len(), 2);
     assert_eq!(sealed.open_keys(first, &silent).unwrap(), 1);
     assert_eq!(sealed.score(&silent).unwrap().rows.len(), 2);

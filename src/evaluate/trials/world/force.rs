@@ -1,4 +1,4 @@
-//! What a world adds to the rate of a state.
+//! Forces that a world adds to the rate of a state.
 
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;

@@ -231,7 +231,7 @@ impl World {
         all
     }
 
-    /// What is read: the sensor's laws, noise, what is made of the reading.
+    /// Returns the reading: the sensor's laws, noise, what is made of the reading.
     fn measured(
         &self,
         truth: Vec<f64>,
@@ -306,7 +306,7 @@ mod tests {
 
     /// Without noise and perturbations, integrated as the twin is, a world is its twin to rounding.
     #[test]
-    fn unbent_worlds_are_their_twins() {
+    fn unperturbed_worlds_are_their_twins() {
         for study in reference_studies().unwrap() {
             let world = World::of(study.name()).unwrap();
             let drives = study.drives().unwrap();

@@ -1,4 +1,4 @@
-//! How a world changes a parameter over time.
+//! Changes of a parameter over time.
 
 use crate::twin::Noise;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! How a world perturbations a signal on its way from a sensor or to an actuator: whole series at once, in formulas of its own.
+//! Distortions of a signal on its way from a sensor or to an actuator: whole series at once, in formulas of its own.
 
 use crate::twin::Noise;
 use serde::{Deserialize, Serialize};

@@ -18,19 +18,19 @@ fn joined(text: &str) -> String {
 }
 
 #[test]
-fn both_ways_through_the_gate_are_told() {
+fn both_answers_of_the_gate_are_reported() {
     let found = estimates();
     let kept = estimate_text(&found.study, &found.kept);
     fits(&kept);
     let kept = joined(&kept);
     assert!(
-        kept.contains("it was kept") && !kept.contains("consistent"),
+        kept.contains("estimate kept") && !kept.contains("inconsistent"),
         "{kept}"
     );
     let refined = estimate_text(&found.study, &found.refined);
     fits(&refined);
     for expected in [
-        "refined",
+        "refitted",
         "start of x1",
         "90 % interval",
         " → ",
@@ -41,7 +41,7 @@ fn both_ways_through_the_gate_are_told() {
 }
 
 #[test]
-fn a_twin_that_lacks_something_is_called_so() {
+fn an_incomplete_twin_is_reported() {
     let found = estimates();
     let mut estimate = found.refined.clone();
     let test = |p_value| GateOutcome {
@@ -51,7 +51,7 @@ fn a_twin_that_lacks_something_is_called_so() {
         out_of_distribution: p_value <= 0.1,
     };
     for (after, expected) in [
-        (Some(test(0.005)), "seems to lack something"),
+        (Some(test(0.005)), "no parameters compensate"),
         (Some(test(0.5)), "is consistent with the record (p = 0.500)"),
         (None, "cannot be tested"),
     ] {

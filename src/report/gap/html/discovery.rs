@@ -1,4 +1,4 @@
-//! What the missing term may be: exploratory, no test.
+//! Section on the missing term: exploratory, no test.
 
 use crate::diagnose::Diagnosis;
 use crate::report::digits::percent;
@@ -12,27 +12,27 @@ pub(super) fn section_of(study: &Study, diagnosis: &Diagnosis) -> Option<Section
     let d = diagnosis.discovery.as_ref()?;
     let equation = Units::of(study).equation_name(&d.equation);
     let mut body = paragraph(&format!(
-        "Exploratory, not a test: no listed effect is accepted, so what the {equation} lacks is smoothed from the record and \
-         regressed on states and inputs. The terms below explain {} of its variance. They say where to look, not what is true.",
+        "Exploratory, not a test: no listed effect is accepted, so the missing term of the {equation} is smoothed from the record \
+         and regressed on states and inputs. The terms below explain {} of its variance. They are hints, not findings.",
         percent(d.explained)
     ));
     match pictures::terms(study, diagnosis) {
         Some(svg) => body.push_str(&figure(
             &svg,
-            "In how many resampled records the regression includes a term, and its factor there. A term that is nearly always in, \
-             with an interval away from zero, is worth writing down as an effect of your own.",
+            "Share of resampled records whose regression includes a term, and its factor. A term that is nearly always included, with \
+             an interval away from zero, is worth trying as your own effect.",
         )),
         None => body.push_str(&paragraph("No term is included.")),
     }
     if let Some(svg) = pictures::missing(study, diagnosis) {
         body.push_str(&figure(
             &svg,
-            "Where the regression leaves the band, the terms do not say enough.",
+            "Where the regression leaves the band, the terms do not suffice.",
         ));
     }
     Some(Section::new(
         "discovery",
-        "What the missing law may be",
+        "Candidates for the missing law",
         body,
     ))
 }

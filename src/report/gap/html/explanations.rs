@@ -1,6 +1,6 @@
-//! Which effect: explanations by probability, with magnitudes.
+//! Section on causes: explanations by probability, with magnitudes.
 
-use crate::diagnose::{Decision, Diagnosis, EffectFit, Verdict};
+use crate::diagnose::{Decision, Diagnosis, EffectFit, RIVALS, Verdict};
 use crate::report::digits::bare;
 use crate::report::digits::{chance, probability, short};
 use crate::report::gap::pictures;
@@ -40,44 +40,45 @@ fn body(units: &Units, diagnosis: &Diagnosis) -> String {
             ("p", Number),
         ];
         body.push_str(&table(
-            "Best first. p is that of the effect's own scan, corrected for all candidates.",
+            "Best first. p: the effect's own scan, corrected for all candidates.",
             &head,
             &rows,
         ));
     }
     if let Some(p) = which.unexplained_p_value {
         body.push_str(&paragraph(&format!(
-            "The structural test of the twin with the best explanation added: {}.",
+            "Residual test with the best explanation added: {}.",
             probability(p)
         )));
     }
     body
 }
 
-/// What was decided, in a sentence.
+/// Returns the decision in a sentence.
 fn decision(diagnosis: &Diagnosis) -> String {
     let which = &diagnosis.cause;
     match which.decision {
-        Decision::Named if which.accepted.len() > 1 => {
-            "A pair of effects is accepted. Probabilities are of each alone; the gain of the second is what it adds to the first."
-                .into()
-        }
-        Decision::Named => "One effect is accepted, and no other comes near it.".into(),
+        Decision::Named if which.accepted.len() > 1 => format!(
+            "{} effects are accepted together. Each probability compares an effect with all that were tried in its place; each \
+             gain is what the effect adds to those above it.",
+            which.accepted.len()
+        ),
+        Decision::Named => "One effect is accepted; no other one comes near it.".into(),
         Decision::Class => format!(
-            "The best guess is accepted; {} effects are within six nats of it, and these data cannot tell them apart.",
+            "The best explanation is accepted; this record cannot separate {} effects within {RIVALS} nats of it.",
             which.class.len()
         ),
         Decision::NoneOfThese => match &which.catch_all {
-            Some(place) => format!("No listed effect is accepted: a disturbance of {place} explains more."),
-            None => "No listed effect is accepted: each leaves something visible.".into(),
+            Some(place) => format!("No listed effect is accepted: a disturbance of {place} explains the record better."),
+            None => "No listed effect is accepted: with each of them, the residual test still fails.".into(),
         },
         Decision::Absorbed => {
-            "Parameters outside the prior explain the record; so do these effects with parameters inside it.".into()
+            "Parameters outside the prior explain the record; so do these effects with parameters inside the prior.".into()
         }
         Decision::NotNeeded if diagnosis.verdict == Verdict::ParameterGap => {
-            "None is needed: other parameters explain the record.".into()
+            "No effect is needed: other parameters explain the record.".into()
         }
-        Decision::NotNeeded => "None is needed.".into(),
+        Decision::NotNeeded => "No effect is needed.".into(),
     }
 }
 

@@ -1,4 +1,4 @@
-//! How far the gap closes, on data that no fit has seen.
+//! Section on the share of the gap that closes on held-out data.
 
 use crate::diagnose::{Diagnosis, Shrinkage};
 use crate::report::digits::short;
@@ -17,16 +17,18 @@ fn body(diagnosis: &Diagnosis) -> String {
     let mut body = paragraph(&closed_sentence(s));
     if s.metric == Shrinkage::LOG_SCORE {
         body.push_str(&paragraph(
-            "The score is the mean log density of a held-out sample in nats: more is better. The accepted effects are noise and \
-             move no free run.",
+            "The score is the mean log density of a held-out sample in nats; higher is better. The accepted effects change the noise \
+             only, so free runs do not change.",
         ));
     }
     if let Some(svg) = pictures::extent(diagnosis) {
         let wrong = match s.placebo {
-            Some(_) => " A wrong effect, fitted alike, shows what any extra number gains.",
+            Some(_) => {
+                " The wrong effect, fitted in the same way, shows the gain of any extra parameter."
+            }
             None => "",
         };
-        let caption = "Errors of free runs over the standard deviation of the output. The floor is what noise alone leaves.";
+        let caption = "Errors of free runs over the standard deviation of the output. Floor: the error that noise alone causes.";
         body.push_str(&figure(&svg, &format!("{caption}{wrong}")));
     }
     if s.closed.is_none()
@@ -34,7 +36,7 @@ fn body(diagnosis: &Diagnosis) -> String {
         && s.metric == Shrinkage::FREE_RUN
     {
         body.push_str(&paragraph(&format!(
-            "No share is given: before ({}) and the floor ({}) are too close together for these data; after is {}.",
+            "No share is given: the error before ({}) and the floor ({}) are too close; the error after is {}.",
             short(s.before),
             short(floor),
             short(after)

@@ -1,4 +1,4 @@
-//! How sure the answer is, and what it does not cover.
+//! Section on evidence and limits of the answer.
 
 use crate::diagnose::{Diagnosis, Visible};
 use crate::report::digits::{percent, probability, short, unit_suffix};
@@ -16,60 +16,59 @@ pub(super) fn section_of(units: &Units, diagnosis: &Diagnosis) -> Section {
     Section::new("limits", "How sure, and what was not tested", body)
 }
 
-/// What the numbers rest on.
+/// Returns the evidence.
 fn sure(diagnosis: &Diagnosis) -> Vec<String> {
     let d = &diagnosis.detection;
     let mut items = vec![format!(
-        "The test simulates records of the refitted twin, treats each as it treats the measured one, and ranks the measured one \
-         among them ({}). It calls a right twin wrong in about {} of records.",
+        "The test simulates records of the refitted twin, analyses them like the measured record, and ranks the measured record \
+         among them ({}). False-alarm rate about {}.",
         probability(d.rank_p_value),
         percent(d.alpha)
     )];
     items.push(match d.log_e {
         Some(log_e) => format!(
-            "The validation record, fitted by nobody, speaks for itself: log E {}; above {} it would be enough alone.",
+            "Evidence from the validation record alone: log E {}; above {} it suffices without the rank.",
             short(log_e),
             short((2.0 / d.alpha).ln())
         ),
-        None => "No validation record was given: an explanation that fits this record by luck is not caught.".into(),
+        None => "No validation record was given: an explanation that fits this record by chance is not detected.".into(),
     });
     if !diagnosis.cause.effects.is_empty() {
         items.push(
-            "Probabilities of effects compare what was looked at, 5 % kept for a law that is not listed and that one of these \
-             imitates; sealed trials say how often they are right (docs/diagnosing-a-gap.md). p-values of effects are corrected for \
-             all candidates."
+            "Probabilities compare the effects that were tested; 5 % are reserved for unlisted laws that a listed effect imitates. \
+             Sealed trials measure how often they are right (docs/diagnosing-a-gap.md). p-values of effects are corrected for all \
+             candidates."
                 .into(),
         );
     }
     items
 }
 
-/// What was left out.
+/// Returns the effects that were not tested.
 fn untested(diagnosis: &Diagnosis) -> Vec<String> {
     let mut items = vec![format!(
-        "{} explanations were looked at, and up to three effects together, each beside the best; no law outside the list but \
-         disturbances.",
+        "{} explanations were tested, and combinations of up to three effects; laws outside the list only as disturbances.",
         diagnosis.candidates
     )];
     if !diagnosis.not_tested.is_empty() {
         items.push(format!(
-            "Not tested, left out by the call, by the study, or because no filter models them: {}.",
+            "Not tested (excluded by the call or the study, or without a filter model): {}.",
             diagnosis.not_tested.join(", ")
         ));
     }
     items
 }
 
-/// What would have been seen.
+/// Returns the smallest detectable magnitudes.
 fn power(units: &Units, diagnosis: &Diagnosis) -> String {
     if diagnosis.power.is_empty() {
         return String::new();
     }
     let hidden = diagnosis.power.iter().filter(|v| v.value.is_none()).count();
     let lead = match hidden {
-        0 => "Every listed effect would have been seen, had it been large enough.".into(),
+        0 => "Every listed effect is detectable in this record if it is large enough.".into(),
         n => format!(
-            "{n} of {} listed effects could not have been seen in such a record, however large within reach.",
+            "{n} of {} listed effects are not detectable in this record at any plausible size.",
             diagnosis.power.len()
         ),
     };
@@ -77,18 +76,14 @@ fn power(units: &Units, diagnosis: &Diagnosis) -> String {
     let head = [
         ("effect", Text),
         ("magnitude", Text),
-        ("smallest seen", Number),
+        ("smallest detectable", Number),
     ];
     let numbers = table(
-        "The smallest magnitude that 80 of 100 such records reveal. Smaller ones may be there and go unseen.",
+        "The smallest magnitude that the test detects in 80 of 100 such records; smaller ones may be present.",
         &head,
         &rows,
     );
-    [
-        paragraph(&lead),
-        folded("What this record could have revealed", &numbers),
-    ]
-    .concat()
+    [paragraph(&lead), folded("Detectable magnitudes", &numbers)].concat()
 }
 
 fn row(units: &Units, visible: &Visible) -> Vec<String> {
@@ -99,7 +94,7 @@ fn row(units: &Units, visible: &Visible) -> Vec<String> {
         visible.magnitude.clone(),
         match visible.value {
             Some(value) => format!("{}{}", short(value), unit_suffix(&unit)),
-            None => "none in reach".into(),
+            None => "not detectable".into(),
         },
     ]
 }

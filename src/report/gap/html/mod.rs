@@ -1,4 +1,4 @@
-//! A diagnosis as one page that needs nothing else.
+//! The page of a diagnosis.
 
 mod discovery;
 mod explanations;
@@ -16,11 +16,10 @@ use crate::report::page::{Section, escaped, figure, page, paragraph};
 use crate::report::units::Units;
 use crate::study::Study;
 
-/// The diagnosis as a self-contained page, readable on a phone and in print: the verdict, measured and twin before and after,
-/// where, which, how far, what to do next, how sure and what was not tested, parameters.
+/// Returns the diagnosis as a self-contained page for screen, phone and print.
 ///
-/// Pictures are SVG inside the page, with words for those who cannot see them; nothing is told by colour alone. There are no
-/// scripts, and nothing is loaded from elsewhere.
+/// Pictures are SVG inside the page with descriptions for screen readers; colour never carries information alone. The page
+/// has no scripts and loads nothing.
 pub fn gap_html(study: &Study, diagnosis: &Diagnosis) -> String {
     let units = Units::of(study);
     let verdict = escaped(&verdict_sentence(diagnosis));
@@ -36,7 +35,7 @@ pub fn gap_html(study: &Study, diagnosis: &Diagnosis) -> String {
         steps::section_of(study, &units, diagnosis),
         limits::section_of(&units, diagnosis),
     ]);
-    // Where nothing else is to be said, the parameters are the answer.
+    // Without a structural gap, the parameters are the answer.
     let parameters = match diagnosis.verdict {
         Verdict::StructuralGap => sections.len(),
         _ => 1,
@@ -72,13 +71,13 @@ fn runs(study: &Study, diagnosis: &Diagnosis) -> Section {
         String::new()
     } else {
         format!(
-            " The strip below the axis marks windows in which the twin does not follow, with their shares of the gap: unbroken \
-         frame and bold text p < {}, dashed frame p ≤ 0.1.",
+            " The strip below the axis marks windows where the twin deviates, with their shares of the gap: unbroken \
+             frame and bold text p < {}, dashed frame p ≤ 0.1.",
             diagnosis.detection.alpha
         )
     };
     let caption = format!(
-        "The twin sees the inputs of the record alone and runs without noise. Its parameters are fitted to this record.{marked}"
+        "The twin runs from the inputs alone, without noise. Its parameters are fitted to this record.{marked}"
     );
     let mut body = String::new();
     if let Some(svg) = pictures::runs(study, diagnosis, false) {
@@ -87,7 +86,7 @@ fn runs(study: &Study, diagnosis: &Diagnosis) -> Section {
     if let Some(svg) = pictures::runs(study, diagnosis, true) {
         body.push_str(&figure(
             &svg,
-            "The same on the validation record; no parameter is fitted to it.",
+            "The validation record; no parameter is fitted to it.",
         ));
     }
     Section::new("runs", "Measured against twin", body)

@@ -1,4 +1,4 @@
-//! Parameters, and everything else that was estimated.
+//! Section on parameters, starts and noise levels.
 
 use crate::diagnose::Diagnosis;
 use crate::report::digits::{Digits, error, short, unit_suffix};
@@ -10,7 +10,7 @@ pub(super) fn section_of(units: &Units, diagnosis: &Diagnosis) -> Section {
     let beside = if diagnosis.cause.accepted.is_empty() {
         "refitted"
     } else {
-        "refitted beside the accepted effects"
+        "refitted together with the accepted effects"
     };
     let rows: Vec<Vec<String>> = (diagnosis.parameters.iter())
         .map(|p| {
@@ -41,7 +41,7 @@ pub(super) fn section_of(units: &Units, diagnosis: &Diagnosis) -> Section {
         ("", Text),
     ];
     let caption = format!(
-        "The twin's own parameters, {beside}. Not identified: the record knows no more than the prior."
+        "The twin's own parameters, {beside}. Not identified: the record adds nothing to the prior."
     );
     let mut body = table(&caption, &head, &rows);
     if !diagnosis.nuisance.is_empty() {
@@ -65,7 +65,7 @@ pub(super) fn section_of(units: &Units, diagnosis: &Diagnosis) -> Section {
             ("std. error", Number),
             ("unit", Text),
         ];
-        body.push_str(&table("What was estimated beside them.", &head, &rows));
+        body.push_str(&table("Other estimated quantities.", &head, &rows));
     }
     if diagnosis.parameters.is_empty() {
         body = paragraph("The twin has no parameters of its own.");

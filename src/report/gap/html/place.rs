@@ -1,4 +1,4 @@
-//! Where: in time, in the equations, in the twin, at which values, lags and frequencies.
+//! Section on the location of a gap: in the twin, in time, in the equations, at values, lags and frequencies.
 
 use crate::diagnose::{Diagnosis, Location, Maps, Verdict, Window};
 use crate::report::digits::{bare, error, percent, probability, short, unit_suffix};
@@ -18,7 +18,7 @@ pub(super) fn section_of(study: &Study, diagnosis: &Diagnosis) -> Section {
 
 fn body(study: &Study, diagnosis: &Diagnosis) -> String {
     let mut body = match &diagnosis.location.target {
-        Some(target) => paragraph(&format!("What is missing acts on {target}.")),
+        Some(target) => paragraph(&format!("The missing law acts on {target}.")),
         None => String::new(),
     };
     let filled = format!(
@@ -30,8 +30,8 @@ fn body(study: &Study, diagnosis: &Diagnosis) -> String {
     body.push_str(&equations(study, diagnosis));
     if let Some(svg) = pictures::regions(study, diagnosis) {
         let caption = format!(
-            "Shares of what the best explanation gains, by the filtered state or the input a step before, and by the predicted \
-             output; all ranges of all variables add up to 100 %. Only ranges that stand out (p ≤ 0.1). {filled}"
+            "Shares of the best explanation's gain, by the filtered state or the input one step before, and by the predicted output; \
+             all ranges of all variables add up to 100 %. Only significant ranges (p ≤ 0.1). {filled}"
         );
         body.push_str(&figure(&svg, &caption));
         body.push_str(&ranges(study, diagnosis));
@@ -39,16 +39,16 @@ fn body(study: &Study, diagnosis: &Diagnosis) -> String {
     let further: String = [
         (
             pictures::channels(study, diagnosis),
-            "Share of each output in what stands out.",
+            "Share of each output in the significant misfit.",
         ),
         (
             pictures::lags(diagnosis),
-            "Shares of the squared correlations beyond what chance makes. An output on its own past: memory that the twin lacks, or \
-             noise that is not white; on the past of an input: a path or a delay that it lacks.",
+            "Shares of the squared correlations beyond chance. An output on its own past: missing memory, or noise that is not \
+             white; on the past of an input: a missing path or delay.",
         ),
         (
             pictures::bands(diagnosis),
-            "Shares of the innovations’ power beyond what chance makes.",
+            "Shares of the innovations’ power beyond chance.",
         ),
     ]
     .into_iter()
@@ -68,17 +68,17 @@ fn targets(diagnosis: &Diagnosis, filled: &str) -> String {
     let place = &diagnosis.location;
     let alone = match (place.targets.first(), &place.target) {
         (Some(first), Some(target)) if first.target != *target => {
-            format!(" Shares are of single explanations; what is accepted acts on {target}.")
+            format!(" Shares compare single explanations; the accepted effects act on {target}.")
         }
         _ => String::new(),
     };
     let caption =
-        format!("How probable it is that what explains the gap stands there.{alone} {filled}");
+        format!("Probability that the cause of the gap is at this place.{alone} {filled}");
     let rows: Vec<Vec<String>> = (place.targets.iter())
         .map(|t| vec![t.target.clone(), percent(t.share), bare(t.p_value)])
         .collect();
     let head = [("place", Text), ("share", Number), ("p", Number)];
-    let numbers = table("Every place that was looked at.", &head, &rows);
+    let numbers = table("All tested places.", &head, &rows);
     figure(&svg, &caption) + &folded("Places in numbers", &numbers)
 }
 
@@ -102,7 +102,7 @@ fn ranges(study: &Study, diagnosis: &Diagnosis) -> String {
         ("share", Number),
         ("p", Number),
     ];
-    let numbers = table("Ranges that stand out, clearest first.", &head, &rows);
+    let numbers = table("Significant ranges, clearest first.", &head, &rows);
     folded("Ranges in numbers", &numbers)
 }
 
@@ -115,17 +115,17 @@ fn time(diagnosis: &Diagnosis) -> String {
     let alpha = diagnosis.detection.alpha;
     let mut lead = match &place.onset {
         Some(o) if o.time <= 0.0 => format!(
-            "The twin does not foresee {} from the start on ({}).",
+            "The twin fails to predict {} from the start on ({}).",
             channel(&o.channel, o.record),
             probability(o.p_value)
         ),
         Some(o) => format!(
-            "Fitted to all before it, the twin foresees each stretch until {} s; there {} departs ({}).",
+            "Fitted to all earlier samples, the twin predicts each stretch until {} s; from there on {} deviates ({}).",
             short(o.time),
             channel(&o.channel, o.record),
             probability(o.p_value)
         ),
-        None => "No moment stands out as the beginning.".into(),
+        None => "No onset is significant.".into(),
     };
     lead.push_str(&format!(" {}.", standing(&place.maps)));
     if let Some(after) = &place.after {
@@ -139,8 +139,8 @@ fn time(diagnosis: &Diagnosis) -> String {
         ));
     }
     let caption = format!(
-        "Shares of the gap by window and output. Unbroken frame and bold text: p < {alpha}; dashed frame: p ≤ 0.1; no frame: \
-         such as simulations of the twin show, too. p is corrected for all cells of all maps."
+        "Shares of the gap by window and output. Unbroken frame and bold text: p < {alpha}; dashed frame: p ≤ 0.1; no frame: as in \
+         simulations of the twin. p is corrected for all cells of all maps."
     );
     let numbers = table("Windows in order of time.", &head(place), &rows(place));
     [
@@ -152,11 +152,11 @@ fn time(diagnosis: &Diagnosis) -> String {
     .concat()
 }
 
-/// How many windows stand out.
+/// Returns the number of significant windows.
 fn standing(maps: &Maps) -> String {
     match (maps.notable().windows.len(), maps.windows.len()) {
-        (0, _) => "No window stands out".into(),
-        (some, all) => format!("{some} of {all} windows stand out"),
+        (0, _) => "No window is significant".into(),
+        (some, all) => format!("{some} of {all} windows are significant"),
     }
 }
 
@@ -211,7 +211,7 @@ fn rows(place: &Location) -> Vec<Vec<String>> {
     windows.into_iter().map(row).collect()
 }
 
-/// What each equation would have to gain.
+/// Returns the terms that the equations lack.
 fn equations(study: &Study, diagnosis: &Diagnosis) -> String {
     let Some(svg) = pictures::equations(study, diagnosis) else {
         return String::new();
@@ -220,7 +220,7 @@ fn equations(study: &Study, diagnosis: &Diagnosis) -> String {
     let equations = &diagnosis.location.equations;
     let lead = match equations.first() {
         Some(first) => format!(
-            "A disturbance in the {} follows the record best ({} among all equations, {}).",
+            "A disturbance in the {} explains the record best ({} among all equations, {}).",
             units.equation_name(&first.equation),
             percent(first.share),
             probability(first.p_value)
@@ -246,20 +246,20 @@ fn equations(study: &Study, diagnosis: &Diagnosis) -> String {
         .collect();
     let head = [
         ("equation", Text),
-        ("where", Text),
-        ("is", Number),
+        ("variable", Text),
+        ("range", Number),
         ("mean missing term", Number),
         ("std. error", Number),
         ("unit", Text),
     ];
-    let numbers = table("Equations that stand out, by ranges.", &head, &rows);
+    let numbers = table("Significant equations, by ranges.", &head, &rows);
     [
         subheading("In the equations"),
         paragraph(&lead),
         figure(
             &svg,
-            "What each equation would have to gain (above zero) or lose (below) for the twin to follow: means by ranges of each \
-             variable. Boxes: ± one standard error; thick lines: more than two from zero. Bold heading: the equation stands out.",
+            "Term that each equation lacks: means by ranges of each variable. Boxes: ± one standard error; thick lines: more than two \
+             from zero. Bold heading: the equation is significant.",
         ),
         folded("Equations in numbers", &numbers),
     ]

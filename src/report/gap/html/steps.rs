@@ -1,4 +1,4 @@
-//! What to do next.
+//! Section on next steps.
 
 use crate::diagnose::{Decision, Diagnosis, EffectFit, NextInput, Verdict};
 use crate::effect::Law;
@@ -19,7 +19,7 @@ pub(super) fn section_of(study: &Study, units: &Units, diagnosis: &Diagnosis) ->
             .filter_map(|e| study_table(units, e))
             .collect();
         body.push_str(&paragraph(
-            "For the study file; without magnitudes, they are estimated:",
+            "For the study file (magnitudes that are removed are estimated):",
         ));
         body.push_str(&preformatted(&tables.join("\n")));
     }
@@ -29,12 +29,12 @@ pub(super) fn section_of(study: &Study, units: &Units, diagnosis: &Diagnosis) ->
     Section::new("next", "What to do next", body)
 }
 
-/// The record that tells rivals apart.
+/// Returns the proposal of a record that separates the rivals.
 fn measure(study: &Study, diagnosis: &Diagnosis, next: &NextInput) -> String {
     let drive = &next.drive;
     let mut body = subheading("Measure this next");
     body.push_str(&paragraph(&format!(
-        "{NEXT_INPUT}, beside this page, holds {}: {} samples every {} s, {} s in all. It is to tell apart {}.",
+        "{NEXT_INPUT}, beside this page, holds {}: {} samples every {} s, {} s in all. It separates {}.",
         next.kind,
         drive.samples(),
         short(drive.dt()),
@@ -43,15 +43,15 @@ fn measure(study: &Study, diagnosis: &Diagnosis, next: &NextInput) -> String {
     )));
     let ([split, of], [again, of_again]) = (next.split, next.again);
     body.push_str(&paragraph(&format!(
-        "{split} of {of} simulated pairs of the present record and such a one were told apart; with the same inputs measured again, \
-         {again} of {of_again}."
+        "In simulations, present record and proposed record together separate the rivals in {split} of {of} cases; the present \
+         inputs measured again do so in {again} of {of_again}."
     )));
     match pictures::next_input(study, diagnosis) {
         Some(svg) => {
             body.push_str(&figure(&svg, "The input, held over each step."));
         }
         None => body.push_str(&paragraph(
-            "The twin has no input: the file holds the instants alone.",
+            "The twin has no input: the file holds only the time column.",
         )),
     }
     let call = format!(
@@ -69,22 +69,22 @@ fn steps(diagnosis: &Diagnosis) -> Vec<String> {
     match (diagnosis.verdict, which.decision) {
         (Verdict::NoGap, _) => steps.push("Use the twin with the refitted parameters.".into()),
         (Verdict::ParameterGap, Decision::Absorbed) => steps.push(format!(
-            "Take the refitted parameters, or give a record with another input: it may tell them from {}.",
+            "Take the refitted parameters, or measure with another input to separate them from {}.",
             which.class.join(", ")
         )),
         (Verdict::ParameterGap, _) => steps.push(
-            "Take the refitted parameters, if they make sense; widen the prior in the study then, and pretrain again.".into(),
+            "Check the refitted parameters. If they make sense, widen the prior in the study and pretrain again.".into(),
         ),
         (_, Decision::Named) => {
             steps.push(format!("Add {} to the twin.", which.accepted.join(" and ")));
         }
         (_, Decision::Class) if which.next_input.is_some() => steps.push(format!(
-            "Tell the rivals apart ({}): measure the record below.",
+            "Separate the rivals ({}): measure the record below.",
             which.class.join(", ")
         )),
         (_, Decision::Class) => steps.push(format!(
-            "Tell the rivals apart ({}): give a validation record, or a record whose input reaches further or changes faster; \
-             docs/choosing-effects.md says what separates neighbours.",
+            "Separate the rivals ({}): give a validation record, or a record with a wider or faster input; docs/choosing-effects.md \
+             explains how to separate neighbours.",
             which.class.join(", ")
         )),
         _ => steps.extend(none_of_these(diagnosis)),
@@ -93,7 +93,7 @@ fn steps(diagnosis: &Diagnosis) -> Vec<String> {
         .unexplained_p_value
         .is_some_and(|p| p < diagnosis.detection.alpha);
     if left && which.decision == Decision::Named {
-        steps.push("Something is left beside what was accepted: diagnose again with it added to the study.".into());
+        steps.push("The residual test still fails: add the accepted effects to the study and diagnose again.".into());
     }
     let vague: Vec<&str> = (diagnosis.parameters.iter())
         .filter(|p| !p.identified)
@@ -101,7 +101,7 @@ fn steps(diagnosis: &Diagnosis) -> Vec<String> {
         .collect();
     if !vague.is_empty() {
         steps.push(format!(
-            "This record knows no more of {} than the prior: fix what is known otherwise, or measure with a livelier input.",
+            "This record does not identify {}: fix the parameters that are known otherwise, or measure with a richer input.",
             vague.join(", ")
         ));
     }
@@ -112,7 +112,7 @@ fn steps(diagnosis: &Diagnosis) -> Vec<String> {
     steps
 }
 
-/// Where to look for a law that is not listed.
+/// Returns hints for an unlisted law.
 fn none_of_these(diagnosis: &Diagnosis) -> Vec<String> {
     let (place, maps) = (&diagnosis.location, diagnosis.location.maps.notable());
     let mut look = match &place.target {
@@ -121,7 +121,7 @@ fn none_of_these(diagnosis: &Diagnosis) -> Vec<String> {
     };
     if let Some(r) = maps.regions.first() {
         look.push_str(&format!(
-            ", above all where {} is {} … {}",
+            ", especially where {} is {} … {}",
             r.variable,
             short(r.low),
             short(r.high)
@@ -143,7 +143,8 @@ fn none_of_these(diagnosis: &Diagnosis) -> Vec<String> {
     }
     vec![
         look + ".",
-        "Write the law that you suspect as an effect of your own (examples/own_effect.rs) and diagnose again.".into(),
+        "Write the suspected law as your own effect (examples/own_effect.rs) and diagnose again."
+            .into(),
     ]
 }
 

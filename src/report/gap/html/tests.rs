@@ -116,7 +116,7 @@ fn every_section_is_there_under_every_verdict() {
     }
 }
 
-/// What the JSON says in numbers, the page says too.
+/// The page has the numbers of the JSON.
 #[test]
 fn the_numbers_of_the_json_are_on_the_page() {
     use crate::report::digits::{bare, chance, error, percent, probability, short};
@@ -180,9 +180,9 @@ fn each_answer_says_what_to_do_with_it() {
         "Use the twin with the refitted parameters",
         "Add cubic-stiffness@x2 to the twin",
         "Take the refitted parameters",
-        "Tell the rivals apart (cubic-stiffness@x2, power-law@x2)",
+        "Separate the rivals (cubic-stiffness@x2, power-law@x2)",
         "examples/own_effect.rs",
-        "Too short to hold anything back: no share",
+        "No share of the gap closed: the record is too short",
     ]) {
         let page = gap_html(&oscillator(), diagnosis);
         assert!(page.contains(expected), "{expected}");
@@ -197,28 +197,28 @@ fn each_answer_says_what_to_do_with_it() {
 fn every_part_of_the_answer_has_its_place() {
     let class = gap_html(&tanks(), &made::tanks_class());
     for text in [
-        "Fitted to all before it, the twin foresees each stretch until 612 s; there y departs (p = 0.012).",
-        "With state-ceiling@h1 added: no window stands out.",
+        "Fitted to all earlier samples, the twin predicts each stretch until 612 s; from there on y deviates (p = 0.012).",
+        "With state-ceiling@h1 added: no window is significant.",
         "<title>Windows of time</title>",
         ">onset 612 s<",
-        "A disturbance in the rate of h1 follows the record best (93 %",
+        "A disturbance in the rate of h1 explains the record best (93 %",
         ">93 %, p = 0.002: rate of h1 in V/s<",
         ">h2 in V<",
         ">y on the past of u<",
         ">40.0 … 77.5 s<",
         ">0.00625 … 0.0125 Hz<",
-        "One class: not told apart by these data",
+        "One class: not separated by this record",
         "rival, same class",
         "next-input.csv, beside this page, holds steps over the whole range",
-        "18 of 20 simulated pairs",
-        "again, 6 of 20",
+        "in 18 of 20 cases",
+        "again do so in 6 of 20",
         "<title>The input to measure with next</title>",
         "measure the record below",
-        "log E 31.2; above 3.69 it would be enough alone",
-        "Not tested, left out by the call, by the study, or because no filter models them: outliers@sensor",
+        "log E 31.2; above 3.69 it suffices without the rank",
+        "Not tested (excluded by the call or the study, or without a filter model): outliers@sensor",
         "<td class=\"n\">5.20 V</td>",
-        "<td class=\"n\">none in reach</td>",
-        "1 of 4 listed effects could not have been seen",
+        "<td class=\"n\">not detectable</td>",
+        "1 of 4 listed effects are not detectable",
     ] {
         assert!(class.contains(text), "{text}");
     }
@@ -226,7 +226,7 @@ fn every_part_of_the_answer_has_its_place() {
     let none = gap_html(&oscillator(), &made::oscillator_none());
     for text in [
         "Exploratory, not a test",
-        "what the rate of x2 lacks",
+        "missing term of the rate of x2",
         "explain 83 % of its variance",
         ">98 %, −0.620 (−0.744 to −0.496)<",
         "± 1 standard deviation",
@@ -235,7 +235,7 @@ fn every_part_of_the_answer_has_its_place() {
         assert!(none.contains(text), "{text}");
     }
     let no_gap = gap_html(&oscillator(), &made::oscillator_no_gap());
-    assert!(no_gap.contains("What this record could have revealed"));
+    assert!(no_gap.contains("Detectable magnitudes"));
     let (parameters, place) = (
         no_gap.find("<section id=\"parameters"),
         no_gap.find("<section id=\"where"),
@@ -251,7 +251,7 @@ fn a_twin_without_inputs_is_told_to_measure_instants() {
     let mut diagnosis = made::oscillator_none();
     diagnosis.cause.next_input = made::tanks_class().cause.next_input;
     let page = gap_html(&oscillator(), &diagnosis);
-    assert!(page.contains("the file holds the instants alone"));
+    assert!(page.contains("the file holds only the time column"));
     assert!(!page.contains("The input to measure with next"));
 }
 

@@ -1,4 +1,4 @@
-//! What the missing term depends on: exploratory.
+//! The missing term and its candidates: exploratory.
 
 use crate::diagnose::Diagnosis;
 use crate::report::chart::{Area, Bar, BarChart, BarGroup, Chart, Panel, Series, Style};
@@ -30,7 +30,7 @@ pub fn missing(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
     let chart = Chart {
         title: "The missing term over time".into(),
         description: format!(
-            "What {quantity} would have to gain, smoothed, with its standard deviation; the regression explains {} of its variance.",
+            "Missing term of the {quantity}, smoothed, with its standard deviation; the regression explains {} of its variance.",
             percent(d.explained)
         ),
         x: "t in s".into(),
@@ -56,9 +56,9 @@ pub fn terms(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
         .collect();
     let unit = unit_suffix(&Units::of(study).equation_unit(&d.equation));
     let label = if unit.is_empty() {
-        "included in so many; factor (90 % interval)".to_owned()
+        "share of records that include it; factor (90 % interval)".to_owned()
     } else {
-        format!("included in so many; factor in{unit} (90 % interval)")
+        format!("share of records that include it; factor in{unit} (90 % interval)")
     };
     let chart = BarChart {
         title: "Terms that may be missing".into(),

@@ -1,4 +1,4 @@
-//! Where in the equations: what each would have to gain or lose, by ranges of states and inputs.
+//! Missing terms of the equations by ranges of states and inputs.
 
 use crate::diagnose::{Diagnosis, Equation};
 use crate::report::chart::{Facet, FacetRow, Multiples, Step};
@@ -27,7 +27,7 @@ pub fn equations(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
         })
         .collect();
     let picture = Multiples {
-        title: "What the equations lack".into(),
+        title: "Missing terms of the equations".into(),
         description: format!(
             "Mean missing term by ranges of states and inputs; most probable in {} with {}.",
             units.equation(&first.equation),

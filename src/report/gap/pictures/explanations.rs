@@ -21,17 +21,21 @@ pub fn explanations(diagnosis: &Diagnosis) -> Option<String> {
         |e: &&EffectFit| which.decision == Decision::Class && which.class.contains(&e.key());
     let rivals: Vec<Bar> = shown().filter(is_rival).map(bar).collect();
     let mut others: Vec<Bar> = shown().filter(|e| !is_rival(e)).map(bar).collect();
-    // What absorbs a parameter gap is compared with no others.
+    // Effects that absorb a parameter gap are compared with no others.
     if which.decision != Decision::Absorbed {
         let listed: f64 = shown().map(|e| e.probability).sum();
         let rest = (1.0 - listed).max(0.0);
-        others.push(Bar::new("all others, unlisted too", rest, &chance(rest)));
+        others.push(Bar::new(
+            "all others, including unlisted",
+            rest,
+            &chance(rest),
+        ));
     }
     let groups = if rivals.is_empty() {
         vec![BarGroup::new("", Some(1.0), others)]
     } else {
         vec![
-            BarGroup::new("One class: not told apart by these data", Some(1.0), rivals),
+            BarGroup::new("One class: not separated by this record", Some(1.0), rivals),
             BarGroup::new("Outside the class", Some(1.0), others),
         ]
     };

@@ -127,7 +127,7 @@ pub fn lags(diagnosis: &Diagnosis) -> Option<String> {
         })
         .collect();
     let chart = BarChart {
-        title: "What innovations still owe to the past".into(),
+        title: "Dependence of innovations on the past".into(),
         description: format!(
             "Bars of {} lags; the clearest is {} at {}.",
             lags.len(),

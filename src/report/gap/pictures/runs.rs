@@ -10,7 +10,7 @@ use crate::study::Study;
 /// Measured outputs with the twin running free over them, before and after accepted effects; below the first record the
 /// windows of time that stand out. `None` for the validation record where there is none.
 ///
-/// What leaves the picture far above or below the measured values is broken off.
+/// Runs that leave the range of the measured values are cut off.
 pub fn runs(study: &Study, diagnosis: &Diagnosis, validation: bool) -> Option<String> {
     let runs = if validation {
         diagnosis.validation_runs.as_ref()?

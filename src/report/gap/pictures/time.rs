@@ -1,4 +1,4 @@
-//! Where in time: windows of all outputs, before and after the accepted effects.
+//! Windows of time of all outputs, before and after the accepted effects.
 
 use super::windows::{largest, onset, spans};
 use crate::diagnose::{Diagnosis, Maps, Onset};
@@ -32,12 +32,15 @@ pub fn time(diagnosis: &Diagnosis) -> Option<String> {
     }
     let windows = |maps: &Maps| maps.notable().windows.len();
     let after = after.map_or(String::new(), |after| {
-        format!("; with the effect added {} stand out", windows(after))
+        format!(
+            "; with the effect added, {} are significant",
+            windows(after)
+        )
     });
     let map = HeatMap {
         title: "Windows of time".into(),
         description: format!(
-            "{} of {} windows stand out, the clearest of {} from {} to {} s with {} of the gap{after}.",
+            "{} of {} windows are significant, the clearest in {} from {} to {} s with {} of the gap{after}.",
             windows(maps),
             maps.windows.len(),
             clearest.channel,
@@ -51,7 +54,7 @@ pub fn time(diagnosis: &Diagnosis) -> Option<String> {
     Some(map.svg())
 }
 
-/// What the second map is of.
+/// Returns the label of the second map.
 fn with_effects(diagnosis: &Diagnosis) -> String {
     match diagnosis.cause.accepted.as_slice() {
         [] => "with the best explanation added".into(),

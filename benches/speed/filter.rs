@@ -1,13 +1,13 @@
-//! One pass of a filter over a record: 400 rows of tanks, 300 of van der Pol. `cargo bench --bench filter`.
+//! One pass of a filter over a record: 400 rows of tanks, 300 of van der Pol.
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use crate::Clock;
 use std::hint::black_box;
 use truetwin::likelihood::kalman::{Coordinates, FilterSettings, Kalman, Method, Score};
 use truetwin::record::{Drive, Record, Signal};
 use truetwin::twin::{DigitalTwin, Noise, StateSpace};
 use truetwin::twins::{CascadedTanks, VanDerPol};
 
-fn passes(c: &mut Criterion) {
+pub fn run(clock: &Clock) {
     let levels = Signal::from_shape_fn((400, 1), |(k, _)| ((k / 30) * 7 % 5) as f64 * 0.6);
     let forced = Drive::new(0.5, levels).expect("the step is positive");
     let free = Drive::autonomous(0.05, 300).expect("the step is positive");
@@ -22,17 +22,16 @@ fn passes(c: &mut Criterion) {
         for method in [Method::Points, Method::Extended] {
             let settings = FilterSettings::default().with_method(method);
             let kalman = Kalman::new(twin, &record, &settings).expect("the channels agree");
-            c.bench_function(&format!("{name}, {method:?}, log-likelihood"), |b| {
-                b.iter(|| kalman.log_likelihood(black_box(theta)))
+            let name = |part: &str| format!("filter: {name}, {method:?}, {part}");
+            clock.time(&name("log-likelihood"), 1, || {
+                kalman.log_likelihood(black_box(theta))
             });
             if method == Method::Points {
                 let coordinates = Coordinates::new(kalman.parameters());
-                c.bench_function(&format!("{name}, {method:?}, one-sided score"), |b| {
-                    b.iter(|| Score::forward(&kalman, black_box(theta), &coordinates))
+                clock.time(&name("one-sided score"), 1, || {
+                    Score::forward(&kalman, black_box(theta), &coordinates)
                 });
-                c.bench_function(&format!("{name}, {method:?}, score"), |b| {
-                    b.iter(|| Score::at(&kalman, black_box(theta)))
-                });
+                clock.time(&name("score"), 1, || Score::at(&kalman, black_box(theta)));
             }
         }
     }
@@ -49,6 +48,3 @@ fn twin_outputs(
         _ => VanDerPol.simulate(theta, drive, noise)?,
     })
 }
-
-criterion_group!(benches, passes);
-criterion_main!(benches);

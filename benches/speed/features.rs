@@ -1,13 +1,12 @@
-//! Each kind of features of one record: 400 rows of tanks, 300 of van der Pol. `cargo bench --bench features`.
+//! Each kind of features of one record: 400 rows of tanks, 300 of van der Pol.
 
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use crate::Clock;
 use std::hint::black_box;
-use std::time::Duration;
 use truetwin::evaluate::paper::reference_studies;
 use truetwin::feature::{Ar, Armax, Arx, Deviation, FeatureRecipe, Score};
 use truetwin::twin::Noise;
 
-fn features(c: &mut Criterion) {
+pub fn run(clock: &Clock) {
     let arx = |lags| Arx {
         outputs: lags,
         inputs: lags,
@@ -38,21 +37,13 @@ fn features(c: &mut Criterion) {
         let drive = drives.draw(noise).expect("levels are finite");
         let centre = twin.parameters().centre();
         let outputs = twin.simulate(&centre, &drive, noise).expect("it is stable");
-        let mut group = c.benchmark_group(study.name());
-        group
-            .throughput(Throughput::Elements(1))
-            .sample_size(20)
-            .warm_up_time(Duration::from_millis(300))
-            .measurement_time(Duration::from_secs(2));
         for recipe in recipes {
             let map = recipe.bind(&twin).expect("fits the twin");
-            group.bench_function(format!("{recipe:?}"), |b| {
-                b.iter(|| map.extract(&drive, black_box(&outputs)))
-            });
+            clock.time(
+                &format!("features: {}, {recipe:?}", study.name()),
+                1,
+                || map.extract(&drive, black_box(&outputs)),
+            );
         }
-        group.finish();
     }
 }
-
-criterion_group!(benches, features);
-criterion_main!(benches);

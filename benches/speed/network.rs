@@ -1,9 +1,9 @@
 //! One training epoch of the `deep` architecture, with fused layers and with plain dfdx layers, and one prediction.
 //!
-//! 10 000 samples of 128 features, four heads, batches of 64, orthogonality 5e-4. Run on one thread, since plain dfdx
-//! spreads its products over rayon's: `RAYON_NUM_THREADS=1 cargo bench --bench network`.
+//! 10 000 samples of 128 features, four heads, batches of 64, orthogonality 5e-4. Plain dfdx spreads its products over the
+//! threads of rayon: compare them on one thread.
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use crate::Clock;
 use ndarray::Array2;
 use std::hint::black_box;
 use truetwin::network::{Deep, Training, architecture, layers::*};
@@ -43,36 +43,37 @@ fn settings() -> Training {
     }
 }
 
-fn training(c: &mut Criterion) {
+fn training(clock: &Clock) {
     let (features, targets) = samples(10_000);
-    let mut group = c.benchmark_group("one epoch");
-    group.sample_size(10);
     for (name, deep) in [
         ("fused", architecture::<Deep>()),
         ("plain", architecture::<PlainDeep>()),
     ] {
         let silent = Progress::silent();
-        group.bench_function(name, |b| {
-            b.iter(|| deep.train(&features, &targets, &settings(), 1, &silent))
+        clock.time(&format!("network: one epoch, {name}"), 1, || {
+            deep.train(&features, &targets, &settings(), 1, &silent)
         });
     }
-    group.finish();
 }
 
-fn tuning(c: &mut Criterion) {
+fn tuning(clock: &Clock) {
     let (features, targets) = samples(1000);
     let silent = Progress::silent();
     let (network, _) = architecture::<Deep>()
         .train(&features, &targets, &settings(), 1, &silent)
         .expect("the samples are finite");
-    c.bench_function("one epoch of heads, 1000 samples", |b| {
-        b.iter(|| network.tune_heads(&features, &targets, &settings(), 1, &silent))
+    clock.time("network: one epoch of heads, 1000 samples", 1, || {
+        network.tune_heads(&features, &targets, &settings(), 1, &silent)
     });
     let row = features.slice(ndarray::s![..1, ..]).to_owned();
-    c.bench_function("predict one row", |b| {
-        b.iter(|| network.predict(black_box(&row)))
+    clock.time("network: predict one row", 1, || {
+        network.predict(black_box(&row))
     });
 }
 
-criterion_group!(benches, training, tuning);
-criterion_main!(benches);
+pub fn run(clock: &Clock) {
+    if clock.wants("network") {
+        training(clock);
+        tuning(clock);
+    }
+}

@@ -1,7 +1,7 @@
-//! One record of each reference twin, outside the prior, in the default preset: gate, Gauss–Newton, and the whole
-//! estimate with tuned heads. The estimator is trained on a small bank, outside the timing. `cargo bench --bench estimate`.
+//! One record of each reference twin, outside the prior, in the default preset: gate, Gauss–Newton, and the whole estimate with
+//! tuned heads. The estimator is trained on a small bank, outside the timing.
 
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use crate::Clock;
 use std::time::Duration;
 use truetwin::estimator::bank::FeatureSimulator;
 use truetwin::estimator::gate::GateTest;
@@ -10,7 +10,10 @@ use truetwin::evaluate::paper::{Benchmark, MonteCarlo, Scenario, reference_studi
 use truetwin::progress::Progress;
 use truetwin::twin::Noise;
 
-fn estimates(c: &mut Criterion) {
+pub fn run(clock: &Clock) {
+    if !clock.wants("estimate") {
+        return;
+    }
     let silent = Progress::silent();
     for study in reference_studies().expect("the reference studies are sound") {
         let small = PretrainOptions {
@@ -31,12 +34,7 @@ fn estimates(c: &mut Criterion) {
         let preset = project.recipe(PresetName::Default);
         let simulator = FeatureSimulator::new(twin.clone(), preset.features.as_ref())
             .expect("the features fit the twin");
-        let mut group = c.benchmark_group(study.name());
-        group
-            .throughput(Throughput::Elements(1))
-            .sample_size(10)
-            .warm_up_time(Duration::from_millis(500))
-            .measurement_time(Duration::from_secs(4));
+        let name = |part: &str| format!("estimate: {}, {part}", study.name());
         let gate = GateTest {
             simulator: &simulator,
             drive: record.drive(),
@@ -44,22 +42,16 @@ fn estimates(c: &mut Criterion) {
             noise: Noise::new(1, "bench", 0),
             progress: &silent,
         };
-        group.bench_function("gate", |b| b.iter(|| gate.at(&theta)));
+        clock.time(&name("gate"), 1, || gate.at(&theta));
         let options = EstimateOptions {
             always_refine: true,
             ..EstimateOptions::default()
         };
         let refined = || (estimator.estimate(&record, &options, &silent)).expect("it is estimated");
-        group.bench_function("Gauss–Newton", |b| {
-            b.iter_custom(|times| {
-                let seconds = (0..times).filter_map(|_| refined().seconds.gauss_newton);
-                Duration::from_secs_f64(seconds.sum())
-            })
+        clock.print(&name("Gauss–Newton"), 1, |calls| {
+            let seconds = (0..calls).filter_map(|_| refined().seconds.gauss_newton);
+            Duration::from_secs_f64(seconds.sum())
         });
-        group.bench_function("estimate, refined and tuned", |b| b.iter(refined));
-        group.finish();
+        clock.time(&name("refined and tuned"), 1, refined);
     }
 }
-
-criterion_group!(benches, estimates);
-criterion_main!(benches);

@@ -1,10 +1,9 @@
-//! Simulations with features a second, on one core, and the price of writing a twin as equations: the tanks beside a loop
-//! by hand, one at a time and in batches on more and more threads. `RAYON_NUM_THREADS=1 cargo bench --bench bank`.
+//! Simulations with features a second, and the price of writing a twin as equations: the tanks beside a loop by hand, one at a
+//! time and in batches on more and more threads.
 
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use crate::Clock;
 use rayon::prelude::*;
 use std::hint::black_box;
-use std::time::Duration;
 use truetwin::estimator::shards::Prior;
 use truetwin::feature::{Ar, Arx, FeatureRecipe};
 use truetwin::progress::Progress;
@@ -18,7 +17,7 @@ const BANK: usize = 200;
 const THETA: [f64; 4] = [0.6, 0.5, 0.55, 1.0];
 
 /// Draws from the prior, each with its own input, as pretraining does.
-fn bank(c: &mut Criterion) {
+fn bank(clock: &Clock) {
     let free = RecordPlan::autonomous(0.05, 300);
     let staircase = RecordPlan::levels(0.5, 400, 0.0, 3.0, 30);
     let arx = |lags| Arx {
@@ -32,20 +31,13 @@ fn bank(c: &mut Criterion) {
         ("tanks, ARX(8, 8)", &tanks, &arx(8)),
         ("tanks, ARX(64, 64)", &tanks, &arx(64)),
     ];
-    let mut group = c.benchmark_group("bank");
-    group
-        .throughput(Throughput::Elements(BANK as u64))
-        .sample_size(20)
-        .warm_up_time(Duration::from_millis(500))
-        .measurement_time(Duration::from_secs(3));
     for (name, study, features) in cases {
         let prior = Prior::new(study, features).expect("fits the twin");
         let stage = Progress::silent().stage("bank", BANK);
-        group.bench_function(name, |b| {
-            b.iter(|| prior.rows(0..BANK as u64, 1, "bench", &stage))
+        clock.time(&format!("bank: {name}"), BANK as u64, || {
+            prior.rows(0..BANK as u64, 1, "bench", &stage)
         });
     }
-    group.finish();
 }
 
 /// The tanks as `StateSpace` runs them, noise and limits included.
@@ -67,15 +59,10 @@ fn by_hand(theta: &[f64; 4], drive: &Drive, noise: Noise) -> Vec<f64> {
         .collect()
 }
 
-fn simulators(c: &mut Criterion) {
+fn simulators(clock: &Clock) {
     let plan = RecordPlan::levels(0.5, 400, 0.0, 3.0, 30);
     let source = plan.prepare(&CascadedTanks.signals());
     let drive = (source.expect("a plan of the tanks").draw(Noise::OFF)).expect("levels are finite");
-    let mut group = c.benchmark_group("one tanks record");
-    group
-        .throughput(Throughput::Elements(drive.samples() as u64))
-        .warm_up_time(Duration::from_millis(500))
-        .measurement_time(Duration::from_secs(2));
     for (noises, noise) in [
         ("noise", Noise::new(1, "bench", 0)),
         ("no noise", Noise::OFF),
@@ -84,30 +71,24 @@ fn simulators(c: &mut Criterion) {
         let hand = by_hand(&THETA, &drive, noise);
         let equal = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-9;
         assert!(generic.iter().zip(&hand).all(equal), "the same equations");
-        group.bench_function(format!("equations, {noises}"), |b| {
-            b.iter(|| CascadedTanks.simulate(black_box(&THETA), &drive, noise))
+        let name = |how: &str| format!("simulator, tanks, {how}, {noises}");
+        clock.time(&name("equations"), 1, || {
+            CascadedTanks.simulate(black_box(&THETA), &drive, noise)
         });
-        group.bench_function(format!("by hand, {noises}"), |b| {
-            b.iter(|| by_hand(black_box(&THETA), &drive, noise))
+        clock.time(&name("by hand"), 1, || {
+            by_hand(black_box(&THETA), &drive, noise)
         });
     }
-    group.finish();
 }
 
 /// Records at once, on so many threads.
 const BATCH: u64 = 512;
 
 /// Batches of tanks records on pools of threads, by the generic simulator and by hand.
-fn threads(c: &mut Criterion) {
+fn threads(clock: &Clock) {
     let plan = RecordPlan::levels(0.5, 400, 0.0, 3.0, 30);
     let source = plan.prepare(&CascadedTanks.signals());
     let drive = (source.expect("a plan of the tanks").draw(Noise::OFF)).expect("levels are finite");
-    let mut group = c.benchmark_group("batches of tanks records");
-    group
-        .throughput(Throughput::Elements(BATCH))
-        .sample_size(20)
-        .warm_up_time(Duration::from_millis(500))
-        .measurement_time(Duration::from_secs(2));
     let most = std::thread::available_parallelism().map_or(1, usize::from);
     for threads in (0..).map(|i| 1 << i).take_while(|n| *n <= most) {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
@@ -119,15 +100,18 @@ fn threads(c: &mut Criterion) {
             Err(_) => f64::NAN,
         };
         let hand = |i| by_hand(&THETA, &drive, noise(i))[drive.samples() - 1];
-        group.bench_function(format!("equations, {threads} threads"), |b| {
-            b.iter(|| pool.install(|| (0..BATCH).into_par_iter().map(generic).sum::<f64>()))
+        let name = |how: &str| format!("batch of tanks records, {how}, {threads} threads");
+        clock.time(&name("equations"), BATCH, || {
+            pool.install(|| (0..BATCH).into_par_iter().map(generic).sum::<f64>())
         });
-        group.bench_function(format!("by hand, {threads} threads"), |b| {
-            b.iter(|| pool.install(|| (0..BATCH).into_par_iter().map(hand).sum::<f64>()))
+        clock.time(&name("by hand"), BATCH, || {
+            pool.install(|| (0..BATCH).into_par_iter().map(hand).sum::<f64>())
         });
     }
-    group.finish();
 }
 
-criterion_group!(benches, bank, simulators, threads);
-criterion_main!(benches);
+pub fn run(clock: &Clock) {
+    bank(clock);
+    simulators(clock);
+    threads(clock);
+}

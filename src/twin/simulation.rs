@@ -1,0 +1,203 @@
+//! The loop that simulates equations.
+
+use crate::record::{Drive, Signal, Signals};
+use crate::twin::{
+    DigitalTwin, Interval, Noise, Now, Outline, ParameterSpace, SimulationError, StateSpace,
+    Workspace,
+};
+use std::sync::Arc;
+
+impl<T: StateSpace + 'static> DigitalTwin for T {
+    fn parameters(&self) -> ParameterSpace {
+        self.outline().parameters
+    }
+
+    fn signals(&self) -> Signals {
+        self.outline().signals()
+    }
+
+    fn simulate(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Signal, SimulationError> {
+        self.run(theta, drive, noise)
+    }
+
+    fn free_run(&self, theta: &[f64], drive: &Drive) -> Result<Signal, SimulationError> {
+        self.run(theta, drive, Noise::OFF)
+    }
+
+    fn equations(self: Arc<Self>) -> Option<Arc<dyn StateSpace>> {
+        Some(self)
+    }
+}
+
+/// Checks that θ has the twin's length.
+pub(super) fn check_length(parameters: usize, theta: &[f64]) -> Result<(), SimulationError> {
+    if theta.len() == parameters {
+        return Ok(());
+    }
+    Err(SimulationError::fatal(format!(
+        "{} parameter values given, the twin has {parameters}",
+        theta.len()
+    )))
+}
+
+/// Checks lengths once, before the loop relies on them.
+fn check_lengths(outline: &Outline, theta: &[f64], drive: &Drive) -> Result<(), SimulationError> {
+    check_length(outline.parameters.len(), theta)?;
+    let (given, inputs) = (drive.inputs().ncols(), outline.inputs.len());
+    if given != inputs {
+        return Err(SimulationError::fatal(format!(
+            "the drive has {given} inputs, the twin has {inputs}"
+        )));
+    }
+    Ok(())
+}
+
+/// The simulation loop. Allocates its buffers once; nothing inside the loop.
+pub(super) fn simulate_equations(
+    twin: &(impl StateSpace + ?Sized),
+    theta: &[f64],
+    drive: &Drive,
+    noise: Noise,
+) -> Result<Signal, SimulationError> {
+    let outline = twin.outline();
+    check_lengths(&outline, theta, drive)?;
+    twin.check_parameters(theta, drive.dt())?;
+    let (n, p) = (outline.states.len(), outline.outputs.len());
+    let limits: Vec<(usize, Interval)> = twin
+        .limits()
+        .into_iter()
+        .enumerate()
+        .filter(|(_, limit)| *limit != Interval::EVERYTHING)
+        .collect();
+    let mut process: Vec<_> = (outline.states.iter())
+        .map(|s| noise.source(&format!("process/{}", s.name)))
+        .collect();
+    let mut measurement: Vec<_> = (outline.outputs.iter())
+        .map(|y| noise.source(&format!("measurement/{}", y.name)))
+        .collect();
+    let (mut q, mut r) = (vec![0.0; n], vec![0.0; p]);
+    let mut x = vec![0.0; n];
+    let mut work = Workspace::new(n);
+    let mut outputs = vec![0.0; drive.samples() * p];
+    let mut now = Now {
+        t: 0.0,
+        dt: drive.dt(),
+        u: drive.input(0),
+        theta,
+    };
+    twin.start(&now, &mut x);
+    for k in 0..drive.samples() {
+        (now.t, now.u) = (drive.time(k), drive.input(k));
+        let y = &mut outputs[k * p..(k + 1) * p];
+        twin.observe(&now, &x, y);
+        if !noise.is_off() {
+            q.fill(0.0);
+            r.fill(0.0);
+            twin.noise(&now, &mut q, &mut r);
+            for ((y, r), v) in y.iter_mut().zip(&r).zip(&mut measurement) {
+                if *r != 0.0 {
+                    *y += r * v.normal();
+                }
+            }
+        }
+        twin.readout(&now, y);
+        if !y.iter().all(|v| v.is_finite()) {
+            return Err(SimulationError::Diverged { at: now.t });
+        }
+        twin.advance(&now, &mut x, &mut work);
+        if !noise.is_off() {
+            for ((x, q), w) in x.iter_mut().zip(&q).zip(&mut process) {
+                if *q != 0.0 {
+                    *x += q * w.normal();
+                }
+            }
+        }
+        twin.constrain(&now, &mut x);
+        for &(i, limit) in &limits {
+            x[i] = limit.clamp(x[i]);
+        }
+        if !x.iter().all(|v| v.is_finite()) {
+            return Err(SimulationError::Diverged { at: now.t + now.dt });
+        }
+    }
+    let mut outputs = Signal::from_shape_vec((drive.samples(), p), outputs)
+        .map_err(|error| SimulationError::Fatal(error.into()))?;
+    twin.corrupt_outputs(theta, noise, &mut outputs);
+    Ok(outputs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::twin::Parameter;
+
+    /// x ← a·x + w, observed with noise; two outputs.
+    struct Walk;
+    impl StateSpace for Walk {
+        fn outline(&self) -> Outline {
+            Outline::new()
+                .parameter(Parameter::new("rate", "1/s", -2.0, 30.0))
+                .state("x", "m")
+                .output("y1", "m")
+                .output("y2", "m")
+        }
+        fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+            dx[0] = now.theta[0] * x[0];
+        }
+        fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+            y.copy_from_slice(&[x[0], -x[0]]);
+        }
+        fn start(&self, _: &Now<'_>, x: &mut [f64]) {
+            x[0] = 1.0;
+        }
+        fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+            process[0] = 0.3;
+            measurement[1] = 0.2;
+        }
+    }
+
+    fn drive(samples: usize) -> Drive {
+        Drive::autonomous(0.1, samples).unwrap()
+    }
+
+    #[test]
+    fn noise_levels_are_standard_deviations() {
+        let drive = drive(2);
+        let n = 4000u32;
+        let [mut increments, mut errors] = [0.0, 0.0];
+        for i in 0..n {
+            let y = (Walk.simulate(&[0.0], &drive, Noise::new(3, "t", i.into()))).unwrap();
+            increments += (y[[1, 0]] - 1.0).powi(2) / f64::from(n);
+            errors += (y[[0, 1]] + 1.0).powi(2) / f64::from(n);
+        }
+        // Relative sd of a variance from n draws: √(2/n) = 0.022; five of them.
+        assert!((increments / 0.09 - 1.0).abs() < 0.11, "{increments}");
+        assert!((errors / 0.04 - 1.0).abs() < 0.11, "{errors}");
+    }
+
+    #[test]
+    fn divergence_tells_the_time_and_wrong_lengths_are_fatal() {
+        let blown = Walk.simulate(&[1e300], &drive(10), Noise::OFF);
+        assert!(matches!(blown, Err(SimulationError::Diverged { at }) if at > 0.0));
+        assert!(matches!(
+            Walk.simulate(&[], &drive(10), Noise::OFF),
+            Err(SimulationError::Fatal(_))
+        ));
+        let driven = Drive::new(0.1, Signal::zeros((3, 1))).unwrap();
+        let error = Walk.simulate(&[0.0], &driven, Noise::OFF).unwrap_err();
+        assert!(error.to_string().contains("1 inputs, the twin has 0"));
+    }
+
+    #[test]
+    fn common_noise_pairs_runs_at_different_parameters() {
+        let noise = Noise::new(5, "t", 0);
+        let a = Walk.simulate(&[-1.0], &drive(50), noise).unwrap();
+        let b = Walk.simulate(&[-1.0 + 1e-9], &drive(50), noise).unwrap();
+        assert!((&a - &b).iter().all(|d| d.abs() < 1e-7));
+    }
+}
