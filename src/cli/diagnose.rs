@@ -3,6 +3,7 @@
 use super::args::Subject;
 use super::{Context, Failure, Verb, output, records};
 use crate::diagnose::{DiagnoseSettings, GivenRecord, diagnose};
+use crate::effect::EffectPattern;
 use crate::estimator::Estimator;
 use crate::record::{Record, drive_csv_text};
 use crate::report::{NEXT_INPUT, gap_html, gap_json, gap_text};
@@ -34,7 +35,7 @@ pub(super) struct Diagnose {
     validation: Option<PathBuf>,
     /// Effects to exclude.
     #[arg(long, value_name = "ID[@TARGET],..", value_delimiter = ',')]
-    without: Vec<String>,
+    without: Vec<EffectPattern>,
     /// New folder for report.json, report.html and next-input.csv.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,

@@ -2,7 +2,6 @@
 
 use super::args::Subject;
 use super::{Context, Failure, Verb, output};
-use crate::effect::{described, library};
 use clap::Args;
 use serde_json::{Value, json};
 use std::process::ExitCode;
@@ -25,32 +24,26 @@ impl Verb for Effects {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         let study = context.study(&self.subject)?;
         let possible = study.candidates();
-        let mut known = library();
-        for effect in &possible {
-            if known.iter().all(|d| d.id != effect.typetag_name()) {
-                known.push(described(effect.as_ref()));
-            }
-        }
-        let described: Vec<_> = (known.into_iter())
-            .filter_map(|description| {
+        let described: Vec<_> = (study.catalogue().kinds().iter())
+            .filter_map(|kind| {
                 let places: Vec<String> = (possible.iter())
-                    .filter(|e| e.typetag_name() == description.id)
+                    .filter(|e| e.id() == kind.id())
                     .map(|e| match e.other() {
                         Some(other) => format!(
                             "{} ({} {other})",
                             e.target(),
-                            description.other.unwrap_or("with")
+                            kind.other_state().map_or("with", |other| other.key())
                         ),
                         None => e.target().to_owned(),
                     })
                     .collect();
-                (!places.is_empty()).then_some((description, places))
+                (!places.is_empty()).then_some((kind, places))
             })
             .collect();
         if context.json {
             let effects: Vec<Value> = (described.iter())
                 .map(|(d, places)| {
-                    let magnitudes: Vec<Value> = (d.magnitudes.iter())
+                    let magnitudes: Vec<Value> = (d.magnitudes().iter())
                         .map(|m| {
                             json!({
                                 "name": m.name, "unit": m.unit, "shape": m.off.is_none(),
@@ -60,7 +53,7 @@ impl Verb for Effects {
                             })
                         })
                         .collect();
-                    json!({ "id": d.id, "targets": places, "law": d.formula, "magnitudes": magnitudes })
+                    json!({ "id": d.id(), "targets": places, "law": d.formula(), "magnitudes": magnitudes })
                 })
                 .collect();
             output::print_json(&json!({
@@ -69,7 +62,7 @@ impl Verb for Effects {
         } else {
             let lines: Vec<String> = (described.iter())
                 .map(|(d, places)| {
-                    let magnitudes: Vec<String> = (d.magnitudes.iter())
+                    let magnitudes: Vec<String> = (d.magnitudes().iter())
                         .map(|m| match m.unit {
                             "" => m.name.to_owned(),
                             unit => format!("{} [{unit}]", m.name),
@@ -77,8 +70,8 @@ impl Verb for Effects {
                         .collect();
                     format!(
                         "{:<22} {}\n{:<22} on {}; magnitudes {}",
-                        d.id,
-                        d.formula,
+                        d.id(),
+                        d.formula(),
                         "",
                         places.join(", "),
                         magnitudes.join(", ")

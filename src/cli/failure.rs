@@ -3,7 +3,6 @@
 use super::output;
 use crate::diagnose::DiagnoseError;
 use crate::effect::EffectError;
-use crate::effect::EffectFileError;
 use crate::estimator::bank::BankError;
 use crate::estimator::bank::file::BankFileError;
 use crate::estimator::gate::GateError;
@@ -147,7 +146,6 @@ macro_rules! users {
 users!(
     BankFileError,
     EffectError,
-    EffectFileError,
     EstimatorFileError,
     RecordError,
     SimulationError,

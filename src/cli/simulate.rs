@@ -2,7 +2,6 @@
 
 use super::args::Subject;
 use super::{Context, Failure, Verb, output};
-use crate::effect::read_effects;
 use crate::effect::{augment, given_magnitudes};
 use crate::record::{Drive, Record, read_drive, record_csv_text, write_record};
 use crate::setting::did_you_mean;
@@ -53,7 +52,7 @@ impl Verb for Simulate {
         let mut twin = study.twin().clone();
         let mut magnitudes = BTreeMap::new();
         if let Some(path) = &self.effect {
-            let effects = read_effects(path)?;
+            let effects = study.catalogue().read(path)?;
             magnitudes = given_magnitudes(&effects);
             twin = augment(twin, effects).map_err(|error| Failure::from(error).within(path))?;
         }

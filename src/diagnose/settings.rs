@@ -1,5 +1,7 @@
 //! Settings of a diagnosis.
 
+use crate::effect::EffectPattern;
+
 /// Settings of a diagnosis.
 ///
 /// | setting | default | range | meaning |
@@ -22,7 +24,7 @@ pub struct DiagnoseSettings {
     /// Seed of everything random.
     pub seed: u64,
     /// Effects that are not to be named: `id` or `id@target`.
-    pub without: Vec<String>,
+    pub without: Vec<EffectPattern>,
     /// θ from an estimator.
     pub initial: Option<Vec<f64>>,
     /// Stop after the verdict.

@@ -1,6 +1,15 @@
 //! Marks that signal effects leave on measured outputs.
 
-use crate::effect::Mark;
+/// The mark of an effect on measured outputs, whatever the twin: values that pile up at its ends or steps.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Mark {
+    /// The effect leaves none.
+    Unmarked,
+    /// It would leave one, and there is none.
+    Absent,
+    /// There is one, of these magnitudes.
+    Present(Vec<f64>),
+}
 
 /// Equal values at an end that noise does not bring about, and how many times more often than a usual value they come.
 const TIES: usize = 4;
@@ -33,7 +42,7 @@ fn distinct(outputs: &[f64]) -> Vec<(f64, usize)> {
     values
 }
 
-/// Of a limited range, as (low, high): many samples exactly at the least or the greatest value.
+/// Mark of a limited range, as (low, high): many samples exactly at the least or the greatest value.
 pub(super) fn clipped(outputs: &[f64]) -> Mark {
     let values = distinct(outputs);
     if values.len() < 3 {
@@ -45,13 +54,14 @@ pub(super) fn clipped(outputs: &[f64]) -> Mark {
     let at = |(value, count): (f64, usize), off: f64| if count >= least { value } else { off };
     let low = at(values[0], f64::NEG_INFINITY);
     let high = at(values[values.len() - 1], f64::INFINITY);
-    match low.is_finite() || high.is_finite() {
-        true => Mark::Present(vec![low, high]),
-        false => Mark::Absent,
+    if low.is_finite() || high.is_finite() {
+        Mark::Present(vec![low, high])
+    } else {
+        Mark::Absent
     }
 }
 
-/// Of rounding, as its step: all distances are multiples of the least one, and there are few values or the step is none of
+/// Mark of rounding, as its step: all distances are multiples of the least one, and there are few values or the step is none of
 /// digits.
 pub(super) fn rounded(outputs: &[f64]) -> Mark {
     let values = distinct(outputs);
@@ -74,13 +84,14 @@ pub(super) fn rounded(outputs: &[f64]) -> Mark {
         let level = (v - low) / step;
         (level - level.round()).abs()
     };
-    match values.iter().all(|(v, _)| off(*v) <= TOLERANCE) {
-        true => Mark::Present(vec![step]),
-        false => Mark::Absent,
+    if values.iter().all(|(v, _)| off(*v) <= TOLERANCE) {
+        Mark::Present(vec![step])
+    } else {
+        Mark::Absent
     }
 }
 
-/// Whether the step is one that numbers have in files and machines: a power of ten or of two, or ten over two, four, five.
+/// Returns whether the step is one that numbers have in files and machines: a power of ten or of two, or ten over two, four, five.
 fn is_of_digits(step: f64) -> bool {
     let whole = |v: f64| (v - v.round()).abs() < 1e-4;
     [1.0, 2.0, 2.5, 5.0]

@@ -2,7 +2,7 @@
 
 use super::digits::{short, unit_suffix};
 use crate::diagnose::EffectFit;
-use crate::effect::{Effects, Law, UnmodelledEffect};
+use crate::effect::{Effect, TargetKind};
 use crate::record::Quantity;
 use crate::study::Study;
 
@@ -11,7 +11,7 @@ pub(super) struct Units {
     pub(super) inputs: Vec<Quantity>,
     pub(super) outputs: Vec<Quantity>,
     states: Vec<Quantity>,
-    effects: Effects,
+    effects: Vec<Effect>,
 }
 
 impl Units {
@@ -27,10 +27,8 @@ impl Units {
     }
 
     /// The effect of this id and target.
-    pub(super) fn effect(&self, id: &str, target: &str) -> Option<&dyn UnmodelledEffect> {
-        (self.effects.iter())
-            .find(|e| e.typetag_name() == id && e.target() == target)
-            .map(|e| e.as_ref())
+    pub(super) fn effect(&self, id: &str, target: &str) -> Option<&Effect> {
+        (self.effects.iter()).find(|e| e.id() == id && e.target() == target)
     }
 
     /// Returns the unit of a state, an input or an output.
@@ -77,7 +75,7 @@ impl Units {
     /// The unit of one magnitude of a listed effect; none where the effect is not known.
     pub(super) fn of_magnitude(&self, id: &str, target: &str, name: &str) -> Option<String> {
         let effect = self.effect(id, target)?;
-        let known = effect.magnitudes().into_iter().find(|m| m.name == name)?;
+        let known = effect.magnitudes().iter().find(|m| m.name == name)?;
         Some(self.magnitude(effect, known.unit))
     }
 
@@ -97,14 +95,12 @@ impl Units {
 
     /// A unit of the library in those of the twin: its words `signal`, `state` and `from` stand for the unit of what is
     /// bent, and of the other state.
-    fn magnitude(&self, effect: &dyn UnmodelledEffect, unit: &str) -> String {
-        let bent = match effect.law() {
-            Law::Sensor | Law::MeasurementNoise | Law::Outliers => {
-                channel(&self.outputs, effect.target())
-            }
-            Law::Actuator => channel(&self.inputs, effect.target()),
-            Law::Force | Law::Limit | Law::ProcessNoise => self.variable(effect.target()),
-            Law::Parameter => "",
+    fn magnitude(&self, effect: &Effect, unit: &str) -> String {
+        let bent = match effect.law().target() {
+            TargetKind::Sensor => channel(&self.outputs, effect.target()),
+            TargetKind::Actuator => channel(&self.inputs, effect.target()),
+            TargetKind::State => self.variable(effect.target()),
+            TargetKind::Parameter => "",
         };
         let other = effect.other().map_or("", |name| self.variable(name));
         let inside = |word: &str, own: &str| match own {

@@ -1,6 +1,6 @@
 //! The study file: a twin in the user's own setting.
 
-use crate::effect::Effects;
+use crate::effect::{EffectEntry, EffectPattern};
 use crate::feature::FeatureRecipe;
 use crate::record::{RecordError, read_drive};
 use crate::storage::files::{folder, with_remedy};
@@ -95,7 +95,7 @@ pub struct StudyFile {
     pub features: Option<Arc<dyn FeatureRecipe>>,
     /// Effects added to the twin.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub effect: Effects,
+    pub effect: Vec<EffectEntry>,
     /// Which effects a diagnosis may name.
     #[serde(skip_serializing_if = "Library::is_empty")]
     pub library: Library,
@@ -144,10 +144,10 @@ impl RecordTable {
 pub struct Library {
     /// These alone (all if empty): ids, or `id@target`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub only: Vec<String>,
+    pub only: Vec<EffectPattern>,
     /// Not these.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub without: Vec<String>,
+    pub without: Vec<EffectPattern>,
 }
 
 impl Library {

@@ -7,7 +7,9 @@ mod plan;
 pub use file::{Library, RecordTable, StudyFile, StudyFileError};
 pub use plan::{DriveSource, InputPlan, Levels, PlanError, RecordPlan};
 
-use crate::effect::{EffectError, Effects, UnmodelledEffect, augment, given_magnitudes};
+use crate::effect::{
+    Catalogue, Effect, EffectError, EffectKey, EffectKind, EffectPattern, augment, given_magnitudes,
+};
 use crate::record::{Record, RecordError};
 use crate::setting::did_you_mean;
 use crate::twin::{Adaptation, DigitalTwin, Twin, TwinError, adapt, check_twin, fix};
@@ -33,8 +35,8 @@ pub struct Study {
     plan: RecordPlan,
     file: StudyFile,
     demo: Option<Arc<Record>>,
-    /// Beside those of the library.
-    own_effects: Effects,
+    /// The library's effects and the study's own.
+    catalogue: Catalogue,
 }
 
 impl std::fmt::Debug for Study {
@@ -128,17 +130,15 @@ impl Study {
                 ..StudyFile::default()
             },
             demo: None,
-            own_effects: Effects::new(),
+            catalogue: Catalogue::default(),
         })
     }
 
-    /// With effects that the twin may lack and the library does not have, one for each target.
+    /// Adds effects that the twin may lack and the library does not have. Each is offered at every place that it can stand at,
+    /// and files know its id.
     #[must_use]
-    pub fn with_effects(
-        mut self,
-        effects: impl IntoIterator<Item = Arc<dyn UnmodelledEffect>>,
-    ) -> Self {
-        self.own_effects.extend(effects);
+    pub fn with_effects(mut self, kinds: impl IntoIterator<Item = EffectKind>) -> Self {
+        self.catalogue = kinds.into_iter().fold(self.catalogue, Catalogue::with);
         self
     }
 
@@ -159,7 +159,7 @@ impl Study {
             });
         }
         // Boxes of magnitudes apply once the effects are there; all others before.
-        let of_effects = |name: &str| name.contains('@');
+        let of_effects = |name: &str| name.parse::<EffectKey>().is_ok();
         let part = |boxes: &BTreeMap<String, _>, effects: bool| {
             (boxes.iter())
                 .filter(|(name, _)| of_effects(name) == effects)
@@ -186,7 +186,10 @@ impl Study {
             ..Adaptation::default()
         };
         let mut twin = adapt(self.base.clone(), &first, step)?;
-        twin = augment(twin, file.effect.clone())?;
+        let effects = (file.effect.iter())
+            .map(|entry| self.catalogue.resolve(entry))
+            .collect::<Result<Vec<_>, _>>()?;
+        twin = augment(twin, effects.clone())?;
         if second != Adaptation::default() {
             twin = adapt(twin, &second, step)?;
         }
@@ -196,7 +199,7 @@ impl Study {
             parameter.check_value(value).map_err(StudyError::Fixed)?;
         }
         let mut held = file.fixed.clone();
-        held.extend(given_magnitudes(&file.effect));
+        held.extend(given_magnitudes(&effects));
         twin = fix(twin, &held).map_err(StudyError::Fixed)?;
         let RecordTable {
             step,
@@ -215,17 +218,9 @@ impl Study {
         })
     }
 
-    /// Whether a name is that of an effect: an `id` of the library or of the study's own, or an `id@target` of this twin.
-    pub fn knows_effect(&self, name: &str) -> bool {
-        match name.split_once('@') {
-            Some((id, target)) => {
-                (self.effects().iter()).any(|e| e.typetag_name() == id && e.target() == target)
-            }
-            None => {
-                crate::effect::library().iter().any(|d| d.id == name)
-                    || self.own_effects.iter().any(|e| e.typetag_name() == name)
-            }
-        }
+    /// Returns whether a pattern names an effect of the library or of the study's own.
+    pub fn knows_effect(&self, pattern: &EffectPattern) -> bool {
+        self.catalogue.knows(pattern, &self.twin)
     }
 
     fn check_library(&self, library: &Library) -> Result<(), StudyError> {
@@ -237,29 +232,31 @@ impl Study {
     }
 
     /// Adds to the name of an unknown effect the known one that is nearest.
-    pub(crate) fn with_nearest_effect(&self, name: &str) -> String {
+    pub(crate) fn with_nearest_effect(&self, pattern: &EffectPattern) -> String {
         let effects = self.effects();
-        let known = effects.iter().map(|e| match name.contains('@') {
-            true => format!("{}@{}", e.typetag_name(), e.target()),
-            false => e.typetag_name().to_owned(),
+        let known = effects.iter().map(|e| match pattern.target {
+            Some(_) => e.key().to_string(),
+            None => e.id().to_owned(),
         });
-        format!("{name}{}", did_you_mean(name, known))
+        let name = pattern.to_string();
+        format!("{name}{}", did_you_mean(&name, known))
     }
 
-    /// The library's effects and the study's own, each once for each target of this twin, all magnitudes free.
-    pub fn effects(&self) -> Effects {
-        let library = crate::effect::applicable(&self.twin);
-        (library.into_iter())
-            .chain(self.own_effects.iter().cloned())
-            .collect()
+    /// Returns all effects that this program knows.
+    pub fn catalogue(&self) -> &Catalogue {
+        &self.catalogue
     }
 
-    /// What the twin may lack: those of [`Study::effects`] that `[library]` lets through.
-    pub fn candidates(&self) -> Effects {
+    /// Returns the library's effects and the study's own, each once for each target of this twin, all magnitudes free.
+    pub fn effects(&self) -> Vec<Effect> {
+        self.catalogue.applicable(&self.twin)
+    }
+
+    /// Returns what the twin may lack: those of [`Study::effects`] that `[library]` lets through.
+    pub fn candidates(&self) -> Vec<Effect> {
         let Library { only, without } = &self.file.library;
-        let named = |list: &[String], effect: &Arc<dyn UnmodelledEffect>| {
-            let id = effect.typetag_name();
-            (list.iter()).any(|n| n == id || *n == format!("{id}@{}", effect.target()))
+        let named = |list: &[EffectPattern], effect: &Effect| {
+            list.iter().any(|pattern| pattern.matches(effect.key()))
         };
         (self.effects().into_iter())
             .filter(|effect| only.is_empty() || named(only, effect))

@@ -122,8 +122,9 @@ fn what_the_cascaded_tanks_lack_is_explored() {
     let study = tanks();
     let every = study.effects();
     let settings = DiagnoseSettings {
-        without: (every.iter().map(|e| e.typetag_name().to_owned()))
-            .filter(|id| id != "sensor-rectification")
+        without: (every.iter().map(|e| e.id()))
+            .filter(|id| *id != "sensor-rectification")
+            .map(Into::into)
             .collect(),
         ..DiagnoseSettings::default()
     };

@@ -7,7 +7,6 @@ use crate::diagnose::hypotheses::candidate::{Addition, Candidate};
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::free_run::{Runner, closed};
 use crate::diagnose::thresholds::Thresholds;
-use crate::effect::Law;
 use crate::twin::Noise;
 
 /// One accepted effect.
@@ -30,10 +29,7 @@ impl Accepted {
 
     /// Returns true where only the noise changes, so that no free run moves.
     pub fn is_noise(&self) -> bool {
-        matches!(
-            self.addition.effect.law(),
-            Law::MeasurementNoise | Law::ProcessNoise | Law::Outliers
-        )
+        self.addition.effect.law().is_noise()
     }
 }
 

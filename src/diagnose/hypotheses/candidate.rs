@@ -4,17 +4,16 @@ use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::disturbed_equations::disturbed;
 use crate::diagnose::hypotheses::entry::Entry;
 use crate::diagnose::thresholds::Thresholds;
-use crate::effect::{Law, Magnitude, UnmodelledEffect, augment_short};
+use crate::effect::{Effect, EffectKey, EffectPattern, Magnitude, augment_short};
 use crate::record::Signals;
 use crate::study::Study;
 use crate::twin::{Outline, Role, Twin, fix};
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 /// A listed effect, or a catch-all.
 #[derive(Debug, Clone)]
 pub(in crate::diagnose) enum Kind {
-    Listed(Arc<dyn UnmodelledEffect>),
+    Listed(Effect),
     CatchAll(Entry, f64),
 }
 
@@ -41,12 +40,7 @@ impl Candidate {
     /// Returns true where only the noise changes, so that no free run moves.
     pub fn is_noise(&self) -> bool {
         match &self.kind {
-            Kind::Listed(effect) => {
-                matches!(
-                    effect.law(),
-                    Law::MeasurementNoise | Law::ProcessNoise | Law::Outliers
-                )
-            }
+            Kind::Listed(effect) => effect.law().is_noise(),
             Kind::CatchAll(..) => true,
         }
     }
@@ -54,7 +48,7 @@ impl Candidate {
     /// The numbers of the law; of a catch-all, its strength.
     pub fn magnitudes(&self) -> Vec<Magnitude> {
         match &self.kind {
-            Kind::Listed(effect) => effect.magnitudes(),
+            Kind::Listed(effect) => effect.magnitudes().to_vec(),
             Kind::CatchAll(..) => vec![Magnitude::positive("std", "", &[0.05])],
         }
     }
@@ -63,7 +57,7 @@ impl Candidate {
 /// An effect with those of its magnitudes that are held at their off value.
 #[derive(Debug, Clone)]
 pub(in crate::diagnose) struct Addition {
-    pub effect: Arc<dyn UnmodelledEffect>,
+    pub effect: Effect,
     pub held: BTreeMap<String, f64>,
     /// Memory values that filters keep of a delay.
     pub kept: Option<usize>,
@@ -74,15 +68,15 @@ pub(in crate::diagnose) fn with(
     base: &Twin,
     additions: &[Addition],
 ) -> Result<Twin, DiagnoseError> {
-    let mut effects = vec![];
+    let (mut effects, mut memories) = (vec![], vec![]);
     let mut held = BTreeMap::new();
     for addition in additions {
         let effect = &addition.effect;
-        let (id, target) = (effect.typetag_name(), effect.target());
-        effects.push((effect.clone(), addition.kept.unwrap_or(effect.memory())));
-        held.extend((addition.held.iter()).map(|(name, v)| (format!("{id}@{target}.{name}"), *v)));
+        effects.push(effect.clone());
+        memories.push(addition.kept.unwrap_or(effect.kind().memories().1));
+        held.extend((addition.held.iter()).map(|(name, v)| (effect.key().magnitude(name), *v)));
     }
-    Ok(fix(augment_short(base.clone(), effects)?, &held)?)
+    Ok(fix(augment_short(base.clone(), effects, memories)?, &held)?)
 }
 
 /// The twin with a catch-all on top.
@@ -90,36 +84,24 @@ pub(in crate::diagnose) fn with_disturbance(base: &Twin, entry: Entry, memory: f
     disturbed(base.clone(), entry, memory)
 }
 
-/// Magnitudes that a fit may start from.
-fn first_starts(effect: &dyn UnmodelledEffect) -> Vec<f64> {
-    (effect.magnitudes().iter())
-        .map(|m| m.starts.first().copied().unwrap_or(0.0))
-        .collect()
-}
-
 /// Every listed effect that the study lets a diagnosis name and a filter knows; then a catch-all for each state, sensor and
 /// own parameter.
 pub(in crate::diagnose) fn candidates(
     study: &Study,
-    without: &[String],
+    without: &[EffectPattern],
 ) -> Result<Vec<Candidate>, DiagnoseError> {
     if let Some(name) = without.iter().find(|name| !study.knows_effect(name)) {
         return Err(DiagnoseError::Without(study.with_nearest_effect(name)));
     }
     let twin = study.twin();
-    let named = |id: &str, target: &str| {
-        let full = format!("{id}@{target}");
-        without.iter().any(|name| name == id || *name == full)
-    };
     let already = already(study);
     let mut all: Vec<Candidate> = (study.candidates().into_iter())
-        .filter(|e| e.law() != Law::Outliers || e.outliers(&first_starts(e.as_ref())).is_some())
+        .filter(|effect| !without.iter().any(|pattern| pattern.matches(effect.key())))
         .map(|effect| Candidate {
-            id: effect.typetag_name().into(),
+            id: effect.id().into(),
             target: effect.target().into(),
             kind: Kind::Listed(effect),
         })
-        .filter(|c| !named(&c.id, &c.target))
         .filter(|c| !already.contains(&c.key()))
         .collect();
     all.extend(match twin.outline() {
@@ -137,7 +119,7 @@ pub(in crate::diagnose) fn not_tested(study: &Study, candidates: &[Candidate]) -
         .chain(already(study))
         .collect();
     let mut keys: Vec<String> = (study.effects().iter())
-        .map(|e| format!("{}@{}", e.typetag_name(), e.target()))
+        .map(|e| e.key().to_string())
         .filter(|key| !known.contains(key))
         .collect();
     keys.dedup();
@@ -147,7 +129,7 @@ pub(in crate::diagnose) fn not_tested(study: &Study, candidates: &[Candidate]) -
 /// Effects that the study has added to its twin.
 fn already(study: &Study) -> Vec<String> {
     (study.file().effect.iter())
-        .map(|e| format!("{}@{}", e.typetag_name(), e.target()))
+        .map(|e| EffectKey::new(&e.id, &e.target).to_string())
         .collect()
 }
 

@@ -2,7 +2,7 @@
 
 use crate::diagnose::fitting::axis::Axis;
 use crate::diagnose::thresholds::Thresholds;
-use crate::effect::{Mark, UnmodelledEffect};
+use crate::effect::{Effect, Mark};
 use crate::twin::Interval;
 
 /// A choice of an effect's magnitudes to use.
@@ -44,12 +44,9 @@ pub(in crate::diagnose) fn unset_log_axis(centre: f64) -> Axis {
 /// The ways to use an effect: as its mark says; one threshold, or all of them; delays by length.
 ///
 /// Only filters pay for a long register.
-pub(in crate::diagnose) fn choices(
-    effect: &dyn UnmodelledEffect,
-    mark: &Mark,
-    filtered: bool,
-) -> Vec<Choice> {
+pub(in crate::diagnose) fn choices(effect: &Effect, mark: &Mark, filtered: bool) -> Vec<Choice> {
     let magnitudes = effect.magnitudes();
+    let (least, most) = effect.kind().memories();
     let thresholds: Vec<usize> = (0..magnitudes.len())
         .filter(|&i| magnitudes[i].is_threshold())
         .collect();
@@ -59,8 +56,7 @@ pub(in crate::diagnose) fn choices(
         return vec![choice(off, None)];
     }
     match thresholds.len() {
-        0 | 1 if filtered && effect.least_memory() < effect.memory() => (0..Thresholds::REGISTERS
-            .len())
+        0 | 1 if filtered && least < most => (0..Thresholds::REGISTERS.len())
             .map(|i| choice(vec![], Some(i)))
             .collect(),
         0 | 1 => vec![choice(vec![], None)],

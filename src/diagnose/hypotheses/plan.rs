@@ -9,13 +9,12 @@ use crate::diagnose::hypotheses::entry::Entry;
 use crate::diagnose::hypotheses::scales::Scales;
 use crate::diagnose::hypotheses::variant::Variant;
 use crate::diagnose::thresholds::Thresholds;
-use crate::effect::{Law, Magnitude, Mark, UnmodelledEffect};
+use crate::effect::{Effect, Law, Magnitude, Mark, TargetKind};
 use crate::math::quantile;
 use crate::math::{deviation, ends, largest};
 use crate::twin::{Interval, Twin};
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, TAU};
-use std::sync::Arc;
 
 /// A variant before its points are tried.
 pub(in crate::diagnose) struct Plan {
@@ -60,14 +59,14 @@ impl Planner<'_> {
                 Ok(vec![self.disturbance(index, free, *entry, *memory)])
             }
             Kind::Listed(effect) => {
-                let values = self.values(effect.as_ref());
+                let values = self.values(effect);
                 let mark = match effect.law() {
-                    Law::Sensor => effect.mark(&values),
+                    Law::Sensor(_) => effect.kind().marks(&values),
                     _ => Mark::Unmarked,
                 };
                 let plan = |choice: &Choice| self.listed(index, effect, &values, &mark, choice);
                 let filtered = !self.problem.is_simulated();
-                (choices(effect.as_ref(), &mark, filtered).iter())
+                (choices(effect, &mark, filtered).iter())
                     .filter_map(|choice| plan(choice).transpose())
                     .collect()
             }
@@ -77,9 +76,11 @@ impl Planner<'_> {
     fn disturbance(&self, index: usize, free: Vec<Magnitude>, entry: Entry, memory: f64) -> Plan {
         let scales = self.scales;
         let guess = match entry {
-            Entry::State(i) => 0.05 * deviation(&scales.columns(Law::Force, i)) / scales.dt(),
-            Entry::Sensor(j) => 0.05 * deviation(&scales.columns(Law::Sensor, j)),
-            Entry::Actuator(j) => 0.05 * deviation(&scales.columns(Law::Actuator, j)),
+            Entry::State(i) => {
+                0.05 * deviation(&scales.columns(TargetKind::State, i)) / scales.dt()
+            }
+            Entry::Sensor(j) => 0.05 * deviation(&scales.columns(TargetKind::Sensor, j)),
+            Entry::Actuator(j) => 0.05 * deviation(&scales.columns(TargetKind::Actuator, j)),
             Entry::Parameter(_) => 0.05,
         };
         let visible = Lead::Visible {
@@ -108,18 +109,18 @@ impl Planner<'_> {
     }
 
     /// Values of the signal or state that an effect sits at.
-    fn values(&self, effect: &dyn UnmodelledEffect) -> Vec<f64> {
+    fn values(&self, effect: &Effect) -> Vec<f64> {
         let outline = self.study.outline();
-        let law = effect.law();
-        let known = crate::effect::targets(law, outline.as_ref(), &self.study.signals());
+        let kind = effect.law().target();
+        let known = crate::effect::targets(kind, outline.as_ref(), &self.study.signals());
         let target = known.iter().position(|k| k == effect.target()).unwrap_or(0);
-        self.scales.columns(law, target)
+        self.scales.columns(kind, target)
     }
 
     fn listed(
         &self,
         index: usize,
-        effect: &Arc<dyn UnmodelledEffect>,
+        effect: &Effect,
         values: &[f64],
         mark: &Mark,
         choice: &Choice,
@@ -129,17 +130,19 @@ impl Planner<'_> {
             .filter(|(i, _)| choice.off.contains(i))
             .map(|(_, m)| (m.name.to_owned(), m.off.unwrap_or(0.0)))
             .collect();
-        let free: Vec<Magnitude> = (magnitudes.into_iter())
+        let free: Vec<Magnitude> = (magnitudes.iter())
             .filter(|m| !held.contains_key(m.name))
+            .cloned()
             .collect();
         let Some(first) = free.first() else {
             return Ok(None);
         };
         let (mut leads, axis, range) = self.first(first, effect.law(), values, choice.register);
         let mut axes = vec![axis];
-        if choice.register.is_none() && effect.least_memory() < effect.memory() {
+        let (least, most) = effect.kind().memories();
+        if choice.register.is_none() && least < most {
             // No later than the whole register reaches.
-            let reach = (effect.memory() - 1) as f64 * self.scales.dt();
+            let reach = (most - 1) as f64 * self.scales.dt();
             let bounds = axes[0].bounds;
             axes[0].bounds = Interval::unchecked(bounds.low(), bounds.high().min(reach));
         }
@@ -193,7 +196,7 @@ impl Planner<'_> {
     }
 
     /// Plans the first magnitude of an effect at a signal or state with these values.
-    fn first(&self, m: &Magnitude, law: Law, values: &[f64], register: Option<usize>) -> First {
+    fn first(&self, m: &Magnitude, law: &Law, values: &[f64], register: Option<usize>) -> First {
         let (dt, duration) = (self.scales.dt(), self.scales.duration());
         let size = deviation(values).max(1e-9 * largest(values)).max(1e-12);
         let positive = m.limits.low() >= 0.0;
@@ -221,10 +224,10 @@ impl Planner<'_> {
             let leads = starts.map(|v| Lead::Shrink(in_unit(v))).collect();
             let axis = log_axis(0.05 * dt, 0.5 * duration, 2.0 * dt);
             (leads, axis, (0.0, 3.0))
-        } else if law == Law::Outliers {
+        } else if matches!(law, Law::Outliers(_)) {
             let leads = starts.map(Lead::At).collect();
             (leads, log_axis(1e-4, 0.5, 0.02), (0.0, 2.0))
-        } else if matches!(law, Law::MeasurementNoise | Law::ProcessNoise) {
+        } else if law.is_noise() {
             let visible = Lead::Visible {
                 guess: greatest,
                 linear: true,

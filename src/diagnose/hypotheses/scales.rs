@@ -1,6 +1,6 @@
 //! Scales of a record: sizes of its signals and states.
 
-use crate::effect::Law;
+use crate::effect::TargetKind;
 use crate::record::{Record, Signal};
 
 /// Records and states that the units of a dictionary are taken from.
@@ -12,7 +12,7 @@ pub(in crate::diagnose) struct Scales<'a> {
 
 impl Scales<'_> {
     /// Values of a sensor, actuator or state, of all records.
-    pub fn columns(&self, law: Law, target: usize) -> Vec<f64> {
+    pub fn columns(&self, kind: TargetKind, target: usize) -> Vec<f64> {
         let column = |signal: &Signal| -> Vec<f64> {
             if target < signal.ncols() {
                 signal.column(target).to_vec()
@@ -20,11 +20,9 @@ impl Scales<'_> {
                 vec![]
             }
         };
-        let all: Vec<Vec<f64>> = match law {
-            Law::Sensor | Law::MeasurementNoise | Law::Outliers => {
-                self.records.iter().map(|r| column(r.outputs())).collect()
-            }
-            Law::Actuator => (self.records.iter())
+        let all: Vec<Vec<f64>> = match kind {
+            TargetKind::Sensor => self.records.iter().map(|r| column(r.outputs())).collect(),
+            TargetKind::Actuator => (self.records.iter())
                 .map(|r| column(r.drive().inputs()))
                 .collect(),
             _ => self.states.iter().map(column).collect(),

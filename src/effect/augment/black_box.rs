@@ -2,7 +2,7 @@
 
 use super::outliers::strike;
 use super::{Slot, Slots};
-use crate::effect::{Instant, Law};
+use crate::effect::law::{Instant, Law, SignalLaw};
 use crate::record::{Drive, Signal, Signals};
 use crate::twin::{DigitalTwin, Noise, ParameterSpace, SimulationError};
 use std::sync::Arc;
@@ -20,17 +20,14 @@ impl AugmentedBlackBox {
 }
 
 /// Passes one channel of a whole signal through an effect.
-fn pass(slot: &Slot, theta: &[f64], dt: f64, signal: &mut Signal) {
-    let m = slot.m(theta);
-    let mut memory = vec![0.0; slot.effect.memory()];
-    let mut channel = signal.column_mut(slot.target);
-    slot.effect.begin(m, &mut memory, channel[0]);
+fn pass(law: &SignalLaw, slot: &Slot, theta: &[f64], dt: f64, signal: &mut Signal) {
+    let m = slot.place.m(theta);
+    let mut channel = signal.column_mut(slot.place.target);
+    // No filter pays for the states of a long register here.
+    let mut memory = vec![channel[0]; slot.effect.kind().memories().1];
     for (k, value) in channel.iter_mut().enumerate() {
-        let instant = Instant {
-            t: k as f64 * dt,
-            dt,
-        };
-        *value = slot.effect.signal(m, instant, &mut memory, *value);
+        let t = k as f64 * dt;
+        *value = law(m, Instant { t, dt }, &mut memory, *value);
     }
 }
 
@@ -52,8 +49,10 @@ impl DigitalTwin for AugmentedBlackBox {
         let dt = drive.dt();
         self.slots.check(theta, dt)?;
         let mut inputs = drive.inputs().clone();
-        for slot in self.slots.with(Law::Actuator) {
-            pass(slot, theta, dt, &mut inputs);
+        for slot in &self.slots.all {
+            if let Law::Actuator(law) = slot.effect.law() {
+                pass(law.as_ref(), slot, theta, dt, &mut inputs);
+            }
         }
         let drive = Drive::new(dt, inputs).map_err(|error| SimulationError::Fatal(error.into()))?;
         let mut outputs = self
@@ -62,15 +61,16 @@ impl DigitalTwin for AugmentedBlackBox {
         // `all` is sorted along the signal: sensors, noise, saturation, outliers.
         for slot in &self.slots.all {
             match slot.effect.law() {
-                Law::Sensor => pass(slot, theta, dt, &mut outputs),
-                Law::MeasurementNoise => {
-                    let level = slot.effect.noise_level(slot.m(theta));
-                    let mut source = noise.source(&format!("sensor-noise/{}", slot.target));
-                    for value in outputs.column_mut(slot.target) {
+                Law::Sensor(law) => pass(law.as_ref(), slot, theta, dt, &mut outputs),
+                Law::MeasurementNoise(law) => {
+                    let level = law(slot.place.m(theta));
+                    let channel = slot.place.target;
+                    let mut source = noise.source(&format!("sensor-noise/{channel}"));
+                    for value in outputs.column_mut(channel) {
                         *value += level * source.normal();
                     }
                 }
-                Law::Outliers => strike(slot, theta, noise, &mut outputs),
+                Law::Outliers(_) => strike(slot, theta, noise, &mut outputs),
                 _ => {}
             }
         }

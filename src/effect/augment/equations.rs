@@ -1,9 +1,11 @@
 //! A state-space twin with effects.
 
 use super::outliers::strike;
-use super::{Slot, Slots};
-use crate::effect::{Instant, Law, NOISE_ENTERS};
-use crate::record::{Quantity, Signal as Record};
+use super::{Place, Placed, Slots};
+use crate::effect::law::{
+    ForceLaw, ForcePoint, Instant, Law, LimitLaw, NOISE_ENTERS, NoiseLaw, ParameterLaw, SignalLaw,
+};
+use crate::record::{Quantity, Signal};
 use crate::twin::{
     Integrator, Interval, Noise, Now, Outliers, Outline, SimulationError, StateSpace,
 };
@@ -23,20 +25,22 @@ pub(super) struct AugmentedEquations {
     states: usize,
     /// Held inputs in the state; empty without actuator effects.
     held: Range<usize>,
-    sensors: Vec<Signal>,
-    actuators: Vec<Signal>,
-    forces: Vec<Slot>,
-    ceilings: Vec<Slot>,
-    parameters: Vec<Slot>,
-    process: Vec<Slot>,
-    measurement: Vec<Slot>,
+    sensors: Vec<OnSignal>,
+    actuators: Vec<OnSignal>,
+    forces: Vec<Placed<ForceLaw>>,
+    ceilings: Vec<Placed<LimitLaw>>,
+    parameters: Vec<Placed<ParameterLaw>>,
+    process: Vec<Placed<NoiseLaw>>,
+    measurement: Vec<Placed<NoiseLaw>>,
     outline: Outline,
 }
 
 /// A signal effect and its memory in the state.
-struct Signal {
-    slot: Slot,
+struct OnSignal {
+    law: Arc<SignalLaw>,
+    at: Place,
     memory: Range<usize>,
+    after_noise: bool,
 }
 
 impl AugmentedEquations {
@@ -45,39 +49,66 @@ impl AugmentedEquations {
         let mut outline = base.outline();
         let (states, inputs) = (outline.states.len(), outline.inputs.len());
         outline.parameters = slots.space(&outline.parameters);
-        let any_actuator = slots.with(Law::Actuator).next().is_some();
+        let any_actuator = (slots.all.iter()).any(|s| matches!(s.effect.law(), Law::Actuator(_)));
         let held = states..states + if any_actuator { inputs } else { 0 };
         let hidden = |name: String| Quantity::new(&name, "");
         for j in 1..=held.len() {
             outline.states.push(hidden(format!("held/{j}")));
         }
-        let mut signals = |law| {
+        let mut signals = |pick: fn(&Law) -> Option<&Arc<SignalLaw>>| {
             let mut placed = Vec::new();
-            for slot in slots.with(law).cloned() {
+            for slot in &slots.all {
+                let Some(law) = pick(slot.effect.law()) else {
+                    continue;
+                };
                 let from = outline.states.len();
-                for k in 0..slot.memory {
-                    let (id, target) = (slot.effect.typetag_name(), slot.effect.target());
-                    outline.states.push(hidden(format!("{id}@{target}/{k}")));
+                for k in 0..slot.place.memory {
+                    outline
+                        .states
+                        .push(hidden(format!("{}/{k}", slot.effect.key())));
                 }
-                placed.push(Signal {
-                    slot,
+                placed.push(OnSignal {
+                    law: law.clone(),
+                    at: slot.place.clone(),
                     memory: from..outline.states.len(),
+                    after_noise: slot.effect.kind().position() > NOISE_ENTERS,
                 });
             }
             placed
         };
-        let (sensors, actuators) = (signals(Law::Sensor), signals(Law::Actuator));
-        let of = |law| slots.with(law).cloned().collect();
+        let sensors = signals(|law| match law {
+            Law::Sensor(law) => Some(law),
+            _ => None,
+        });
+        let actuators = signals(|law| match law {
+            Law::Actuator(law) => Some(law),
+            _ => None,
+        });
         Self {
             states,
             held,
             sensors,
             actuators,
-            forces: of(Law::Force),
-            ceilings: of(Law::Limit),
-            parameters: of(Law::Parameter),
-            process: of(Law::ProcessNoise),
-            measurement: of(Law::MeasurementNoise),
+            forces: slots.of_law(|law| match law {
+                Law::Force(law) => Some(law),
+                _ => None,
+            }),
+            ceilings: slots.of_law(|law| match law {
+                Law::Limit(law) => Some(law),
+                _ => None,
+            }),
+            parameters: slots.of_law(|law| match law {
+                Law::Parameter(law) => Some(law),
+                _ => None,
+            }),
+            process: slots.of_law(|law| match law {
+                Law::ProcessNoise(law) => Some(law),
+                _ => None,
+            }),
+            measurement: slots.of_law(|law| match law {
+                Law::MeasurementNoise(law) => Some(law),
+                _ => None,
+            }),
             outline,
             base,
             slots,
@@ -105,9 +136,9 @@ impl AugmentedEquations {
             );
         }
         let mut theta = Short::from_slice(own);
-        for slot in &self.parameters {
-            let value = &mut theta[slot.target];
-            *value = slot.effect.parameter(slot.m(now.theta), now.t, *value);
+        for Placed { law, at } in &self.parameters {
+            let value = &mut theta[at.target];
+            *value = law(at.m(now.theta), now.t, *value);
         }
         let now = Now {
             u,
@@ -119,35 +150,42 @@ impl AugmentedEquations {
 
     /// The inputs of this sample behind the actuator effects; advances their memories in `x`.
     fn actuate(&self, now: &Now<'_>, x: &mut [f64]) -> Short {
-        let instant = Instant {
-            t: now.t,
-            dt: now.dt,
-        };
         let mut u = Short::from_slice(now.u);
-        for Signal { slot, memory } in &self.actuators {
-            let (m, value) = (slot.m(now.theta), &mut u[slot.target]);
-            *value = slot
-                .effect
-                .signal(m, instant, &mut x[memory.clone()], *value);
+        for actuator in &self.actuators {
+            actuator.pass(now, &mut x[actuator.memory.clone()], &mut u);
         }
         u
     }
 
-    /// Passes `y` through the sensor effects before (or after) the noise. Memories are read from `x`, and
-    /// advanced in it when it is `keep`.
-    fn sense(&self, now: &Now<'_>, memory: &mut [f64], y: &mut [f64], after_noise: bool) {
-        for Signal { slot, memory: at } in &self.sensors {
-            if (slot.effect.order() > NOISE_ENTERS) == after_noise {
-                let (m, value) = (slot.m(now.theta), &mut y[slot.target]);
-                let instant = Instant {
-                    t: now.t,
-                    dt: now.dt,
-                };
-                // After the noise nobody remembers, and `memory` is empty.
-                let memory = memory.get_mut(at.clone()).unwrap_or_default();
-                *value = slot.effect.signal(m, instant, memory, *value);
+    /// Passes `y` through the sensor effects before (or after) the noise; advances their memories in `x`.
+    fn sense(&self, now: &Now<'_>, x: &mut [f64], y: &mut [f64], after_noise: bool) {
+        for sensor in &self.sensors {
+            if sensor.after_noise == after_noise {
+                // After the noise nobody remembers, and `x` is empty.
+                let memory = x.get_mut(sensor.memory.clone()).unwrap_or_default();
+                sensor.pass(now, memory, y);
             }
         }
+    }
+}
+
+impl OnSignal {
+    /// Passes its channel of a sample through the effect.
+    #[inline]
+    fn pass(&self, now: &Now<'_>, memory: &mut [f64], channels: &mut [f64]) {
+        let instant = Instant {
+            t: now.t,
+            dt: now.dt,
+        };
+        let value = &mut channels[self.at.target];
+        *value = (self.law)(self.at.m(now.theta), instant, memory, *value);
+    }
+
+    /// Fills the memory with the first value of the channel, and passes that through the effect.
+    fn begin(&self, now: &Now<'_>, x: &mut [f64], channels: &mut [f64]) {
+        let memory = &mut x[self.memory.clone()];
+        memory.fill(channels[self.at.target]);
+        self.pass(now, &mut Short::from_slice(memory), channels);
     }
 }
 
@@ -165,13 +203,21 @@ impl StateSpace for AugmentedEquations {
         } else {
             &x[self.held.clone()]
         };
-        self.inner(now, u, |twin, now| twin.drift(now, &x[..self.states], base));
-        for slot in &self.forces {
-            let other = slot.other.map_or(0.0, |j| x[j]);
-            base[slot.target] += slot
-                .effect
-                .force(slot.m(now.theta), now.t, x[slot.target], other);
-        }
+        let states = &x[..self.states];
+        self.inner(now, u, |twin, own| {
+            twin.drift(own, states, base);
+            for Placed { law, at } in &self.forces {
+                let point = ForcePoint {
+                    x: x[at.target],
+                    other: at.other.map_or(0.0, |j| x[j]),
+                    t: own.t,
+                    states,
+                    u: own.u,
+                    theta: own.theta,
+                };
+                base[at.target] += law(at.m(now.theta), &point);
+            }
+        });
     }
 
     fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
@@ -193,16 +239,9 @@ impl StateSpace for AugmentedEquations {
 
     fn start(&self, now: &Now<'_>, x: &mut [f64]) {
         x.fill(0.0);
-        let instant = Instant {
-            t: now.t,
-            dt: now.dt,
-        };
         let mut u = Short::from_slice(now.u);
-        for Signal { slot, memory } in &self.actuators {
-            let (m, value) = (slot.m(now.theta), &mut u[slot.target]);
-            slot.effect.begin(m, &mut x[memory.clone()], *value);
-            let mut scratch = Short::from_slice(&x[memory.clone()]);
-            *value = slot.effect.signal(m, instant, &mut scratch, *value);
+        for actuator in &self.actuators {
+            actuator.begin(now, x, &mut u);
         }
         if !self.held.is_empty() {
             x[self.held.clone()].copy_from_slice(&u);
@@ -213,11 +252,8 @@ impl StateSpace for AugmentedEquations {
             twin.start(now, x);
             twin.observe(now, x, &mut y);
         });
-        for Signal { slot, memory } in &self.sensors {
-            let (m, value) = (slot.m(now.theta), &mut y[slot.target]);
-            slot.effect.begin(m, &mut x[memory.clone()], *value);
-            let mut scratch = Short::from_slice(&x[memory.clone()]);
-            *value = slot.effect.signal(m, instant, &mut scratch, *value);
+        for sensor in &self.sensors {
+            sensor.begin(now, x, &mut y);
         }
     }
 
@@ -245,10 +281,10 @@ impl StateSpace for AugmentedEquations {
         self.inner(now, now.u, |twin, now| {
             twin.noise(now, &mut process[..self.states], measurement);
         });
-        for (slots, levels) in [(&self.process, process), (&self.measurement, measurement)] {
-            for slot in slots {
-                let level = &mut levels[slot.target];
-                let added = slot.effect.noise_level(slot.m(now.theta));
+        for (added, levels) in [(&self.process, process), (&self.measurement, measurement)] {
+            for Placed { law, at } in added {
+                let level = &mut levels[at.target];
+                let added = law(at.m(now.theta));
                 // hypot is not exact for a zero side; off must be.
                 if added != 0.0 {
                     *level = level.hypot(added);
@@ -264,11 +300,10 @@ impl StateSpace for AugmentedEquations {
     }
 
     fn constrain(&self, now: &Now<'_>, x: &mut [f64]) {
-        for slot in &self.ceilings {
-            let m = slot.m(now.theta);
-            let (i, j) = (slot.target, slot.other.filter(|j| *j != slot.target));
+        for Placed { law, at } in &self.ceilings {
+            let (i, j) = (at.target, at.other.filter(|j| *j != at.target));
             let mut value = x[i];
-            slot.effect.limit(m, &mut value, j.map(|j| &mut x[j]));
+            law(at.m(now.theta), &mut value, j.map(|j| &mut x[j]));
             x[i] = value;
         }
         self.inner(now, now.u, |twin, now| {
@@ -289,24 +324,25 @@ impl StateSpace for AugmentedEquations {
 
     fn outliers(&self, theta: &[f64]) -> Vec<Outliers> {
         let mut all = self.base.as_ref().outliers(&theta[..self.slots.base]);
-        for slot in self.slots.with(Law::Outliers) {
-            let Some(own) = slot.effect.outliers(slot.m(theta)) else {
+        for slot in &self.slots.all {
+            let Law::Outliers(law) = slot.effect.law() else {
                 continue;
             };
+            let own = law(slot.place.m(theta));
             all.resize(self.outline.outputs.len(), Outliers::default());
-            let there = &mut all[slot.target];
+            let both = &mut all[slot.place.target];
             // Both are rare: their probabilities add up, and the larger ones are seen.
-            there.probability += own.probability;
-            there.scale = there.scale.max(own.scale);
+            both.probability += own.probability;
+            both.scale = both.scale.max(own.scale);
         }
         all
     }
 
-    fn corrupt_outputs(&self, theta: &[f64], noise: Noise, outputs: &mut Record) {
+    fn corrupt_outputs(&self, theta: &[f64], noise: Noise, outputs: &mut Signal) {
         self.base
             .as_ref()
             .corrupt_outputs(&theta[..self.slots.base], noise, outputs);
-        for slot in self.slots.with(Law::Outliers) {
+        for slot in &self.slots.all {
             strike(slot, theta, noise, outputs);
         }
     }

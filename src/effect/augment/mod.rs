@@ -1,23 +1,27 @@
-//! Twins with effects: the one door, with a type for equations and one for black boxes behind it.
+//! Twins with effects: one entry, with a type for equations and one for black boxes behind it.
 
 mod black_box;
 mod equations;
 mod outliers;
 
-use crate::effect::{EffectError, Effects, Law, UnmodelledEffect, check_effects};
+use super::check::{check_effects, targets};
+use super::error::EffectError;
+use super::law::Law;
+use super::placed::Effect;
 use crate::twin::{Interval, Parameter, ParameterSpace, Role, SimulationError, Twin};
 use black_box::AugmentedBlackBox;
 use equations::AugmentedEquations;
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
-/// The twin with `effects` added: a twin, its θ longer by their magnitudes, named `id@target.magnitude`.
+/// Adds `effects` to a twin. The result is a twin, its θ longer by their magnitudes, named `id@target.magnitude`.
 ///
 /// With every magnitude at its off value, trajectories agree with the twin's to the bit. Sensor and actuator
 /// effects serve every twin, the others need equations.
 ///
-/// Order along a signal is [`UnmodelledEffect::order`]; in a step come equations and forces, then noise, then
-/// ceilings, then the twin's own limits. A black box's outputs already contain its noise.
+/// In a step come equations and forces, then noise, then ceilings, then the twin's own limits. A black box's outputs already
+/// contain its noise.
 ///
 /// # Errors
 ///
@@ -25,14 +29,13 @@ use std::sync::Arc;
 ///
 /// ```
 /// use std::sync::Arc;
-/// use truetwin::effect::SensorBias;
-/// use truetwin::effect::{Given, augment};
+/// use truetwin::effect::{Catalogue, augment};
 /// use truetwin::record::Drive;
 /// use truetwin::twin::{DigitalTwin, Noise};
 /// use truetwin::twins::VanDerPol;
 ///
-/// let bias = SensorBias { target: "sensor".into(), magnitudes: Given::default() };
-/// let twin = augment(Arc::new(VanDerPol), vec![Arc::new(bias)])?;
+/// let bias = Catalogue::default().effect("sensor-bias", "sensor")?;
+/// let twin = augment(Arc::new(VanDerPol), vec![bias])?;
 /// assert_eq!(twin.parameters().names(), ["nu", "sensor-bias@sensor.offset"]);
 ///
 /// let drive = Drive::autonomous(0.05, 10)?;
@@ -41,63 +44,47 @@ use std::sync::Arc;
 /// assert_eq!(biased, plain + 0.5);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn augment(base: impl Into<Twin>, effects: Effects) -> Result<Twin, EffectError> {
-    let whole = effects.iter().map(|e| (e.clone(), e.memory())).collect();
-    augment_short(base.into(), whole)
+pub fn augment(base: impl Into<Twin>, effects: Vec<Effect>) -> Result<Twin, EffectError> {
+    let memories = effects.iter().map(|e| e.kind().memories().1).collect();
+    augment_short(base.into(), effects, memories)
 }
 
-/// [`augment`], with so many memory values for each effect; no fewer than [`UnmodelledEffect::least_memory`], no more than it has.
+/// Adds effects as [`augment`] does, with so many memory values for each of them, within what its law allows.
 ///
 /// A filter's cost grows with the square of the states, and a delay's register is longer than most delays.
 pub(crate) fn augment_short(
     base: Twin,
-    effects: Vec<(Arc<dyn UnmodelledEffect>, usize)>,
+    effects: Vec<Effect>,
+    memories: Vec<usize>,
 ) -> Result<Twin, EffectError> {
     if effects.is_empty() {
         return Ok(base);
     }
     let outline = base.outline();
-    let (all, memories): (Effects, Vec<usize>) = effects.into_iter().unzip();
-    check_effects(&all, outline.as_ref(), &base.signals())?;
-    let slots = Slots::of(&base, all, &memories);
+    check_effects(&effects, outline.as_ref(), &base.signals())?;
+    let slots = Slots::of(&base, &effects, &memories);
     Ok(match base {
         Twin::Equations(base) => Twin::Equations(Arc::new(AugmentedEquations::new(base, slots))),
         Twin::BlackBox(base) => Twin::BlackBox(Arc::new(AugmentedBlackBox::new(base, slots))),
     })
 }
 
-/// Magnitudes that effects' files give, by the names that [`augment`] gives their parameters.
-///
-/// ```
-/// use std::sync::Arc;
-/// use truetwin::effect::SensorBias;
-/// use truetwin::effect::{Effects, Given, given_magnitudes};
-///
-/// let bias = SensorBias { target: "sensor".into(), magnitudes: Given::new([("offset", 0.5)]) };
-/// let effects: Effects = vec![Arc::new(bias)];
-/// assert_eq!(given_magnitudes(&effects)["sensor-bias@sensor.offset"], 0.5);
-/// ```
-pub fn given_magnitudes(effects: &[Arc<dyn UnmodelledEffect>]) -> BTreeMap<String, f64> {
+/// Returns the given magnitudes of effects, by the names of the parameters that [`augment`] adds.
+pub fn given_magnitudes(effects: &[Effect]) -> BTreeMap<String, f64> {
     let named = effects.iter().flat_map(|effect| {
-        effect.magnitudes().into_iter().filter_map(move |m| {
+        effect.magnitudes().iter().filter_map(move |m| {
             let value = effect.given().get(m.name)?;
-            Some((parameter_name(effect.as_ref(), m.name), value))
+            Some((effect.key().magnitude(m.name), value))
         })
     });
     named.collect()
 }
 
-/// `id@target.magnitude`.
-fn parameter_name(effect: &dyn UnmodelledEffect, magnitude: &str) -> String {
-    format!("{}@{}.{magnitude}", effect.typetag_name(), effect.target())
-}
-
-/// One effect and where its numbers stand.
+/// Where the numbers of an effect stand.
 #[derive(Debug, Clone)]
-struct Slot {
-    effect: Arc<dyn UnmodelledEffect>,
+struct Place {
     /// Magnitudes in θ.
-    magnitudes: std::ops::Range<usize>,
+    magnitudes: Range<usize>,
     /// Index of the target among channels, states or parameters.
     target: usize,
     /// Index of the other state.
@@ -106,10 +93,23 @@ struct Slot {
     memory: usize,
 }
 
-impl Slot {
+impl Place {
     fn m<'a>(&self, theta: &'a [f64]) -> &'a [f64] {
         &theta[self.magnitudes.clone()]
     }
+}
+
+/// An effect and its place.
+#[derive(Debug, Clone)]
+struct Slot {
+    effect: Effect,
+    place: Place,
+}
+
+/// The function of a law, and its place.
+struct Placed<L: ?Sized> {
+    law: Arc<L>,
+    at: Place,
 }
 
 /// The effects of a twin, sorted along the signal.
@@ -123,26 +123,28 @@ struct Slots {
 
 impl Slots {
     /// Targets must have been checked.
-    fn of(base: &Twin, effects: Effects, memories: &[usize]) -> Self {
+    fn of(base: &Twin, effects: &[Effect], memories: &[usize]) -> Self {
         let outline = base.outline();
         let signals = base.signals();
         let base = base.parameters().len();
         let mut parameters = Vec::new();
         let mut all: Vec<Slot> = Vec::new();
-        for (effect, &memory) in effects.into_iter().zip(memories) {
-            let known = super::targets(effect.law(), outline.as_ref(), &signals);
+        for (effect, &memory) in effects.iter().zip(memories) {
+            let known = targets(effect.law().target(), outline.as_ref(), &signals);
             let index = |name: &str| known.iter().position(|k| k == name);
             let from = base + parameters.len();
-            parameters.extend(magnitude_parameters(effect.as_ref()));
-            all.push(Slot {
+            parameters.extend(magnitude_parameters(effect));
+            let (least, most) = effect.kind().memories();
+            let place = Place {
                 magnitudes: from..base + parameters.len(),
                 target: index(effect.target()).unwrap_or(0),
                 other: effect.other().and_then(index),
-                memory: memory.clamp(effect.least_memory().min(effect.memory()), effect.memory()),
-                effect,
-            });
+                memory: memory.clamp(least.min(most), most),
+            };
+            let effect = effect.clone();
+            all.push(Slot { effect, place });
         }
-        all.sort_by_key(|slot| slot.effect.order());
+        all.sort_by_key(|slot| slot.effect.kind().position());
         Self {
             base,
             all,
@@ -155,15 +157,22 @@ impl Slots {
         ParameterSpace::new(base.iter().chain(&self.parameters).cloned())
     }
 
-    /// Slots of one law, with their place in `all`.
-    fn with(&self, law: Law) -> impl Iterator<Item = &Slot> {
-        self.all.iter().filter(move |s| s.effect.law() == law)
+    /// The functions of one kind of law.
+    fn of_law<L: ?Sized>(&self, pick: impl Fn(&Law) -> Option<&Arc<L>>) -> Vec<Placed<L>> {
+        (self.all.iter())
+            .filter_map(|slot| {
+                Some(Placed {
+                    law: pick(slot.effect.law())?.clone(),
+                    at: slot.place.clone(),
+                })
+            })
+            .collect()
     }
 
     fn check(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {
-        for slot in &self.all {
-            (slot.effect.check(slot.m(theta), dt)).map_err(|problem| {
-                SimulationError::fatal(format!("effect {}: {problem}", slot.effect.typetag_name()))
+        for Slot { effect, place } in &self.all {
+            (effect.kind().check_values(place.m(theta), dt)).map_err(|problem| {
+                SimulationError::fatal(format!("effect {}: {problem}", effect.id()))
             })?;
         }
         Ok(())
@@ -171,8 +180,8 @@ impl Slots {
 }
 
 /// Magnitudes as parameters: bounds from their limits, made finite by the largest start.
-fn magnitude_parameters(effect: &dyn UnmodelledEffect) -> Vec<Parameter> {
-    (effect.magnitudes().into_iter())
+fn magnitude_parameters(effect: &Effect) -> Vec<Parameter> {
+    (effect.magnitudes().iter())
         .map(|m| {
             let reach = m.starts.iter().fold(1e-6, |a: f64, s| a.max(s.abs()));
             let off = m.off.filter(|v| v.is_finite()).unwrap_or(0.0);
@@ -192,7 +201,7 @@ fn magnitude_parameters(effect: &dyn UnmodelledEffect) -> Vec<Parameter> {
                 _ => Interval::unchecked(near(-2.0 * reach), near(2.0 * reach)),
             };
             Parameter {
-                name: parameter_name(effect, m.name),
+                name: effect.key().magnitude(m.name),
                 unit: m.unit.into(),
                 prior: if prior.check().is_ok() { prior } else { bounds },
                 bounds,
@@ -200,4 +209,33 @@ fn magnitude_parameters(effect: &dyn UnmodelledEffect) -> Vec<Parameter> {
             }
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::Catalogue;
+    use crate::record::{Drive, Signal};
+    use crate::twin::Noise;
+    use crate::twins::CascadedTanks;
+
+    #[test]
+    fn delays_that_fit_a_short_register_are_exact() {
+        let delay = Catalogue::default()
+            .effect("sensor-delay", "sensor")
+            .unwrap();
+        let base = Twin::new(CascadedTanks);
+        let long = augment(base.clone(), vec![delay.clone()]).unwrap();
+        let short = augment_short(base, vec![delay], vec![5]).unwrap();
+        let states = |twin: &Twin| twin.outline().unwrap().states.len();
+        assert_eq!((states(&long), states(&short)), (2 + 64, 2 + 5));
+        let u = Signal::from_shape_fn((80, 1), |(k, _)| (k % 17) as f64 / 6.0);
+        let drive = Drive::new(0.5, u).unwrap();
+        for delay in [0.0, 0.7, 2.0] {
+            let theta = [0.6, 0.5, 0.55, 1.0, delay];
+            let noise = Noise::new(1, "t", 0);
+            let run = |twin: &Twin| twin.simulate(&theta, &drive, noise).unwrap();
+            assert_eq!(run(&long), run(&short));
+        }
+    }
 }

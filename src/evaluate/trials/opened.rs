@@ -75,7 +75,7 @@ impl Opened {
             }
         }
         let abstains = truth.kind.is_structural()
-            && (truth.right.iter()).all(|key| settings.without.contains(key));
+            && (truth.right.iter()).all(|key| settings.without.contains(&key.as_str().into()));
         let shortfall = if abstains && !settings.detection_only {
             shortfall(
                 sampler,

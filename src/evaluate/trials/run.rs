@@ -301,7 +301,7 @@ impl Sealed<'_> {
         );
         DiagnoseSettings {
             seed: noise.seed().unwrap_or_default(),
-            without,
+            without: without.into_iter().map(Into::into).collect(),
             detection_only: self.trials.settings.detection_only,
             ..DiagnoseSettings::default()
         }

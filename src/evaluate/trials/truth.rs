@@ -95,7 +95,7 @@ impl<'a> TruthSampler<'a> {
             return Err(no_reference(format!("this {}", study.name())));
         }
         let library = (study.candidates().iter())
-            .map(|e| format!("{}@{}", e.typetag_name(), e.target()))
+            .map(|e| e.key().to_string())
             .collect();
         Ok(Self {
             world,

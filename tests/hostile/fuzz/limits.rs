@@ -72,7 +72,9 @@ fn devices_and_pipes_without_end() {
     assert!(refused(8 * MIB, || read_record(zero)).contains("1 MiB"));
     assert!(refused(8 * MIB, || StudyFile::read(zero)).contains("longer than 1 MiB"));
     assert!(
-        refused(8 * MIB, || truetwin::effect::read_effects(zero)).contains("longer than 1 MiB")
+        refused(8 * MIB, || truetwin::effect::Catalogue::default()
+            .read(zero))
+        .contains("longer than 1 MiB")
     );
     let place = place();
     let pipe = place.path().join("pipe.csv");

@@ -9,8 +9,7 @@ use std::fs;
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
-use truetwin::effect::augment;
-use truetwin::effect::read_effects;
+use truetwin::effect::{Catalogue, augment};
 use truetwin::estimator::Estimator;
 use truetwin::estimator::Project;
 use truetwin::estimator::bank::{Bank, Draws, file as bank_file};
@@ -93,7 +92,9 @@ pub fn study(data: &[u8]) -> Result<(), String> {
 
 /// An effect file, up to the twin that has the effects.
 pub fn effect(data: &[u8]) -> Result<(), String> {
-    let found = read_effects(&file("effect.toml", data)).map_err(text)?;
+    let found = Catalogue::default()
+        .read(&file("effect.toml", data))
+        .map_err(text)?;
     let Some(study) = projects()
         .iter()
         .map(Project::study)

@@ -50,30 +50,3 @@ fn code_is_compiled() {
     }
     assert!(checked > 5);
 }
-
-/// The list of effects is that of the library, which a test of the library holds to the code.
-#[test]
-fn effects_are_those_of_the_library() {
-    let rows = |path: &str, prefix: &str| -> Vec<String> {
-        (read(&root().join(path)).lines())
-            .filter_map(|line| line.strip_prefix(prefix))
-            .filter(|row| row.starts_with("| `"))
-            .map(str::to_owned)
-            .collect()
-    };
-    let library = rows("src/effect/mod.rs", "//! ");
-    assert!(library.len() >= 30);
-    let page = read(&root().join("docs/choosing-effects.md"));
-    let list = page
-        .split("## The list")
-        .nth(1)
-        .unwrap()
-        .split("\n## ")
-        .next()
-        .unwrap();
-    let listed: Vec<&str> = list
-        .lines()
-        .filter(|line| line.starts_with("| `"))
-        .collect();
-    assert_eq!(listed, library);
-}

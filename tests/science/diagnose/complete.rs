@@ -89,7 +89,7 @@ fn the_missing_term_is_regressed() {
     let record = record(study.twin(), text, &[1.4], drive, noise);
     let every = study.effects();
     let settings = DiagnoseSettings {
-        without: every.iter().map(|e| e.typetag_name().into()).collect(),
+        without: every.iter().map(|e| e.id().into()).collect(),
         ..DiagnoseSettings::default()
     };
     let found = with_settings(&study, record, &settings);

@@ -1,8 +1,7 @@
 //! Records with known gaps, and what a diagnosis makes of many of them.
 
 use truetwin::diagnose::{DiagnoseSettings, Diagnosis, diagnose};
-use truetwin::effect::parse_effects;
-use truetwin::effect::{augment, given_magnitudes};
+use truetwin::effect::{Catalogue, augment, given_magnitudes};
 use truetwin::evaluate::paper::reference_studies;
 use truetwin::progress::Progress;
 use truetwin::record::{Drive, Record, Signal, Signals};
@@ -64,7 +63,7 @@ pub fn drive(study: &Study, noise: Noise) -> Drive {
 
 /// A record of `twin` with the effects of a text.
 pub fn record(twin: &Twin, effects: &str, theta: &[f64], drive: Drive, noise: Noise) -> Record {
-    let effects = parse_effects(effects).unwrap();
+    let effects = Catalogue::default().parse(effects).unwrap();
     let given = given_magnitudes(&effects);
     let twin = augment(twin.clone(), effects).unwrap();
     let space = twin.parameters();

@@ -5,7 +5,8 @@ use super::*;
 #[test]
 fn a_black_box_takes_signal_effects_only() {
     for (name, base, ..) in twins() {
-        let on_signals = applicable(&base)
+        let on_signals = Catalogue::default()
+            .applicable(&base)
             .iter()
             .all(|e| e.target() == "sensor" || e.target() == "actuator");
         assert_eq!(on_signals, name.starts_with("boxed"));
@@ -37,7 +38,7 @@ fn the_sensor_chain_keeps_its_order() {
         .iter()
         .chain(&chain[2..])
         .cloned()
-        .collect::<Effects>();
+        .collect::<Vec<Effect>>();
     for (name, base, theta, drive) in twins() {
         let noise = Noise::new(7, "chain", 0);
         let clipped = run(base.clone(), &theta, rest.clone(), &drive, noise);
@@ -57,7 +58,7 @@ fn the_sensor_chain_keeps_its_order() {
 #[test]
 fn black_box_and_equations_agree_without_noise() {
     let (_, base, theta, drive) = twins().remove(0);
-    for effect in applicable(&Twin::new(BlackBox(CascadedTanks))) {
+    for effect in Catalogue::default().applicable(&Twin::new(BlackBox(CascadedTanks))) {
         let starts = effect
             .magnitudes()
             .into_iter()
@@ -90,13 +91,13 @@ fn effects_nest() {
     let late = || one("sensor-delay", "sensor", "magnitudes = { delay = 40.0 }");
     for (_, base, theta, drive) in twins().into_iter().filter(|t| t.2.len() == 4) {
         let noise = Noise::new(8, "nest", 0);
-        let both = |first: Effects, then: Effects| {
+        let both = |first: Vec<Effect>, then: Vec<Effect>| {
             let theta = held(&held(&theta, &first), &then);
             let twin = augment(augment(base.clone(), first).unwrap(), then).unwrap();
             twin.simulate(&theta, &drive, noise)
         };
         let flat =
-            |effects: Vec<Effects>| run(base.clone(), &theta, effects.concat(), &drive, noise);
+            |effects: Vec<Vec<Effect>>| run(base.clone(), &theta, effects.concat(), &drive, noise);
         // The outer effect acts on the input first.
         assert_eq!(both(lag(), gain()).unwrap(), flat(vec![gain(), lag()]));
         let bias = one("sensor-bias", "sensor", "magnitudes = { offset = 0.0 }");
@@ -107,7 +108,7 @@ fn effects_nest() {
         );
         let inner = augment(base.clone(), [lag(), late()].concat()).unwrap();
         let targets = |twin: &Twin| {
-            let all = applicable(twin);
+            let all = Catalogue::default().applicable(twin);
             all.iter().map(|e| format!("{e:?}")).collect::<Vec<_>>()
         };
         assert_eq!(targets(&inner), targets(&base), "memories are no targets");

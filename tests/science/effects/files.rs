@@ -30,7 +30,7 @@ fn bad_files_are_refused_in_one_line() {
         (format!("{bias}magnitudes = \n"), vec!["line 4"]),
     ] {
         std::fs::write(&path, &text).unwrap();
-        let error = read_effects(&path).unwrap_err().to_string();
+        let error = Catalogue::default().read(&path).unwrap_err().to_string();
         assert!(
             error.contains("bad.toml") && !error.contains('\n') && !error.contains(", ,"),
             "{error}"
@@ -39,7 +39,9 @@ fn bad_files_are_refused_in_one_line() {
             assert!(error.contains(word), "{word}: {error}");
         }
     }
-    let missing = read_effects(&folder.path().join("none.toml")).unwrap_err();
+    let missing = Catalogue::default()
+        .read(&folder.path().join("none.toml"))
+        .unwrap_err();
     assert!(missing.to_string().contains("none.toml"), "{missing}");
 }
 
@@ -68,6 +70,14 @@ fn effects_that_do_not_fit_a_twin_are_refused_in_one_line() {
                 "to = \"h2\"\nmagnitudes = { spill = 1.5 }",
             ),
             ["spill = 1.5", "[0, 1]"],
+        ),
+        (
+            one("state-ceiling", "h1", "to = \"h1\""),
+            ["h1 to itself", "name another state"],
+        ),
+        (
+            one("cross-coupling", "h1", "from = \"h1\""),
+            ["h1 to itself", "name another state"],
         ),
         (
             one("sensor-bias", "sensor", "magnitudes = { offset = nan }"),
@@ -108,7 +118,7 @@ fn files_hold_off_values_and_survive_a_round_trip() {
     assert_eq!(effects[1].given().get("spill"), None);
     assert!(augment(Twin::new(CascadedTanks), effects.clone()).is_ok());
     let file: BTreeMap<_, Vec<_>> =
-        [("effect", effects.iter().map(AsRef::as_ref).collect())].into();
+        [("effect", effects.iter().map(Effect::entry).collect())].into();
     let text = toml::to_string(&file).unwrap();
     assert_eq!(format!("{:?}", from(&text)), format!("{effects:?}"));
 }

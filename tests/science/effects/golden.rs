@@ -24,7 +24,9 @@ fn golden_records() {
         };
         let effects = match id {
             "none" => vec![],
-            _ => read_effects(&path.with_extension("toml")).unwrap(),
+            _ => Catalogue::default()
+                .read(&path.with_extension("toml"))
+                .unwrap(),
         };
         seen.insert(id.to_owned());
         let record = read_record(&path).unwrap();
@@ -41,11 +43,11 @@ fn golden_records() {
     }
     assert!(bad.is_empty(), "{}", bad.join("\n"));
     let random = ["sensor-noise", "sensor-outliers", "process-noise"];
-    for member in library() {
+    for member in Catalogue::default().kinds() {
         assert!(
-            seen.contains(member.id) != random.contains(&member.id),
+            seen.contains(member.id()) != random.contains(&member.id()),
             "{}",
-            member.id
+            member.id()
         );
     }
 }

@@ -5,31 +5,32 @@ use super::*;
 /// Each member once; limits hold the off value and the starts; θ of a twin with it makes sense.
 #[test]
 fn the_library_makes_sense() {
-    let library = library();
-    let ids: BTreeSet<_> = library.iter().map(|member| member.id).collect();
+    let catalogue = Catalogue::default();
+    let library = catalogue.kinds();
+    let ids: BTreeSet<_> = library.iter().map(|member| member.id()).collect();
     assert_eq!((library.len(), ids.len()), (30, 30));
-    for member in &library {
+    for member in library {
         assert!(
-            member.magnitudes.iter().any(|m| m.off.is_some()),
+            member.magnitudes().iter().any(|m| m.off.is_some()),
             "{}",
-            member.id
+            member.id()
         );
-        for m in &member.magnitudes {
+        for m in member.magnitudes() {
             assert!(
                 m.off.is_none_or(|off| m.limits.contains(off)),
                 "{}",
-                member.id
+                member.id()
             );
             assert!(
                 m.starts.iter().all(|s| m.limits.contains(*s)),
                 "{}",
-                member.id
+                member.id()
             );
-            assert!(!m.starts.is_empty(), "{}", member.id);
+            assert!(!m.starts.is_empty(), "{}", member.id());
         }
     }
     for (name, base, ..) in twins() {
-        for effect in applicable(&base) {
+        for effect in Catalogue::default().applicable(&base) {
             let twin = augment(base.clone(), vec![effect]).unwrap();
             twin.parameters()
                 .check()
@@ -41,13 +42,16 @@ fn the_library_makes_sense() {
 /// Counts by hand from the table; the cubic spring only on the oscillator's rate.
 #[test]
 fn what_may_be_lacking() {
-    let counts: Vec<_> = twins().iter().map(|t| applicable(&t.1).len()).collect();
+    let counts: Vec<_> = twins()
+        .iter()
+        .map(|t| Catalogue::default().applicable(&t.1).len())
+        .collect();
     // Tanks: 10 sensor, 8 actuator, 2 × (6 forces + 1 coupling + 1 ceiling + 1 noise), 4 × 2 parameters.
     // Oscillator: no actuator, one parameter, one cubic spring.
     assert_eq!(counts, [10 + 8 + 18 + 8, 10 + 18 + 2 + 1, 18, 10]);
     let springs: Vec<_> = (twins().iter())
-        .flat_map(|t| applicable(&t.1))
-        .filter(|e| e.typetag_name() == "cubic-stiffness")
+        .flat_map(|t| Catalogue::default().applicable(&t.1))
+        .filter(|e| e.id() == "cubic-stiffness")
         .map(|e| (e.target().to_owned(), e.other().unwrap().to_owned()))
         .collect();
     assert_eq!(springs, [("x2".to_owned(), "x1".to_owned())]);

@@ -10,7 +10,6 @@ mod off;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use truetwin::effect::*;
-use truetwin::effect::{applicable, library, parse_effects, read_effects};
 use truetwin::record::*;
 use truetwin::twin::*;
 use truetwin::twins::{CascadedTanks, VanDerPol};
@@ -73,28 +72,28 @@ fn twins() -> Vec<Case> {
 }
 
 /// θ of a twin with these effects at what their files hold; nothing may be left free.
-fn held(theta: &[f64], effects: &Effects) -> Vec<f64> {
+fn held(theta: &[f64], effects: &[Effect]) -> Vec<f64> {
     let magnitudes = effects.iter().flat_map(|effect| {
         let given = effect.given().clone();
-        (effect.magnitudes().into_iter()).map(move |m| given.get(m.name).unwrap())
+        (effect.magnitudes().iter()).map(move |m| given.get(m.name).unwrap())
     });
     theta.iter().copied().chain(magnitudes).collect()
 }
 
 /// Effects from the text of a file.
-fn from(text: &str) -> Effects {
-    parse_effects(text).unwrap()
+fn from(text: &str) -> Vec<Effect> {
+    Catalogue::default().parse(text).unwrap()
 }
 
 /// One effect in a file; `rest` holds further keys.
-fn one(id: &str, target: &str, rest: &str) -> Effects {
+fn one(id: &str, target: &str, rest: &str) -> Vec<Effect> {
     from(&format!(
         "[[effect]]\nid = \"{id}\"\ntarget = \"{target}\"\n{rest}"
     ))
 }
 
 /// One run of a twin with these effects.
-fn run(base: Twin, theta: &[f64], e: Effects, drive: &Drive, noise: Noise) -> Signal {
+fn run(base: Twin, theta: &[f64], e: Vec<Effect>, drive: &Drive, noise: Noise) -> Signal {
     let theta = held(theta, &e);
     (augment(base, e).unwrap().simulate(&theta, drive, noise)).unwrap()
 }

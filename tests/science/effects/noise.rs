@@ -7,8 +7,8 @@ use super::*;
 fn effects_move_no_draws() {
     let (_, base, theta, drive) = twins().remove(0);
     let noise = Noise::new(4, "draws", 0);
-    let part = |effects: &Effects| {
-        let at = |n| run(base.clone(), &theta, effects.clone(), &drive, n);
+    let part = |effects: &[Effect]| {
+        let at = |n| run(base.clone(), &theta, effects.to_vec(), &drive, n);
         at(noise) - at(Noise::OFF)
     };
     let plain = part(&vec![]);
@@ -28,13 +28,13 @@ fn effects_move_no_draws() {
 }
 
 /// Variance of one sample over many runs.
-fn variance(base: Twin, theta: &[f64], effects: &Effects, row: usize) -> f64 {
+fn variance(base: Twin, theta: &[f64], effects: &[Effect], row: usize) -> f64 {
     let inputs = base.signals().inputs.len();
     let drive = Drive::new(0.5, Signal::ones((row + 1, inputs))).unwrap();
-    let free = run(base.clone(), theta, effects.clone(), &drive, Noise::OFF)[[row, 0]];
+    let free = run(base.clone(), theta, effects.to_vec(), &drive, Noise::OFF)[[row, 0]];
     let n = 8000;
     let theta = held(theta, effects);
-    let twin = augment(base, effects.clone()).unwrap();
+    let twin = augment(base, effects.to_vec()).unwrap();
     let square = |i| {
         let y = twin
             .simulate(&theta, &drive, Noise::new(5, "variance", i))

@@ -7,9 +7,9 @@ fn off_changes_no_bit() {
     for (name, base, theta, drive) in twins() {
         let noise = Noise::new(1, "off", 0);
         let plain = bits(&base.simulate(&theta, &drive, noise).unwrap());
-        for effect in applicable(&base) {
+        for effect in Catalogue::default().applicable(&base) {
             let what = format!("{name}: {effect:?}");
-            let magnitudes = effect.magnitudes();
+            let magnitudes = effect.magnitudes().to_vec();
             let twin = augment(base.clone(), vec![effect]).unwrap();
             // Shapes at any value: there are at most four starts.
             for i in 0..4 {
@@ -33,7 +33,7 @@ fn all_off_together_change_no_bit() {
     for (name, base, mut theta, drive) in twins() {
         let noise = Noise::new(2, "off", 0);
         let plain = bits(&base.simulate(&theta, &drive, noise).unwrap());
-        let effects = applicable(&base);
+        let effects = Catalogue::default().applicable(&base);
         for m in effects.iter().flat_map(|e| e.magnitudes()) {
             theta.push(m.off.unwrap_or(m.starts[0]));
         }
@@ -51,9 +51,9 @@ fn on_changes_the_record() {
     for (name, base, theta, drive) in twins() {
         let noise = Noise::new(3, "on", 0);
         let plain = base.simulate(&theta, &drive, noise).unwrap();
-        for effect in applicable(&base) {
+        for effect in Catalogue::default().applicable(&base) {
             let what = format!("{name}: {effect:?}");
-            let magnitudes = effect.magnitudes();
+            let magnitudes = effect.magnitudes().to_vec();
             let twin = augment(base.clone(), vec![effect]).unwrap();
             let moves = (0..4).any(|i| {
                 let starts = magnitudes.iter().map(|m| m.starts[i % m.starts.len()]);
@@ -61,8 +61,8 @@ fn on_changes_the_record() {
                 twin.simulate(&at, &drive, noise).is_ok_and(|y| y != plain)
             });
             // A level above 0 has no sign to lose, and no start of a jump lies within 7.5 s.
-            let idle = name == "tanks" && what.contains("Rectification")
-                || name == "van-der-pol" && what.contains("ParameterStep");
+            let idle = name == "tanks" && what.contains("sensor-rectification")
+                || name == "van-der-pol" && what.contains("parameter-step");
             assert!(moves || idle, "{what}");
         }
     }

@@ -4,7 +4,6 @@ use super::{maximum_likelihood, mean, particle, record};
 use rayon::prelude::*;
 use std::sync::Arc;
 use truetwin::effect::*;
-use truetwin::effect::{ActuatorLag, SensorLag, SensorOutliers, StateCeiling};
 use truetwin::likelihood::kalman::{
     FilterSettings, Kalman, Method, Score, filter, log_likelihood, smooth,
 };
@@ -157,15 +156,11 @@ fn effects_that_are_off_leave_the_likelihood() {
     let record = simulated(&CENTRE, 3);
     let settings = FilterSettings::default();
     let base = log_likelihood(&CascadedTanks, &CENTRE, &record, &settings).unwrap();
-    let effects: Effects = vec![
-        Arc::new(SensorLag {
-            target: "sensor".into(),
-            magnitudes: Given::default(),
-        }),
-        Arc::new(ActuatorLag {
-            target: "actuator".into(),
-            magnitudes: Given::default(),
-        }),
+    let library = Catalogue::default();
+    let listed = |id, target| library.effect(id, target).unwrap();
+    let effects = vec![
+        listed("sensor-lag", "sensor"),
+        listed("actuator-lag", "actuator"),
     ];
     let twin = augment(Arc::new(CascadedTanks), effects).unwrap();
     let mut theta = CENTRE.to_vec();
@@ -178,11 +173,7 @@ fn effects_that_are_off_leave_the_likelihood() {
     assert!(on < base - 5.0, "{on} {base}");
 
     // A ceiling is a constraint: points go through it.
-    let ceiling: Effects = vec![Arc::new(StateCeiling {
-        target: "h1".into(),
-        to: "h2".into(),
-        magnitudes: Given::default(),
-    })];
+    let ceiling = vec![listed("state-ceiling", "h1").with_other("h2")];
     let twin = augment(Arc::new(CascadedTanks), ceiling).unwrap();
     let equations = twin.equations().unwrap();
     let mut theta = CENTRE.to_vec();
@@ -199,10 +190,8 @@ fn effects_that_are_off_leave_the_likelihood() {
 /// Outliers make rows a mixture: the score at the truth has mean zero, and off they change no bit.
 #[test]
 fn outliers_are_a_mixture() {
-    let effects: Effects = vec![Arc::new(SensorOutliers {
-        target: "sensor".into(),
-        magnitudes: Given::default(),
-    })];
+    let outliers = Catalogue::default().effect("sensor-outliers", "sensor");
+    let effects = vec![outliers.unwrap()];
     let twin = augment(Arc::new(CascadedTanks), effects).unwrap();
     let equations = twin.equations().unwrap();
     let settings = FilterSettings::default();

@@ -1,7 +1,6 @@
 //! Section on next steps.
 
 use crate::diagnose::{Decision, Diagnosis, EffectFit, NextInput, Verdict};
-use crate::effect::Law;
 use crate::math::six_digits;
 use crate::report::digits::short;
 use crate::report::gap::json::NEXT_INPUT;
@@ -151,13 +150,11 @@ fn none_of_these(diagnosis: &Diagnosis) -> Vec<String> {
 /// `[[effect]]` with its keys.
 fn study_table(units: &Units, fit: &EffectFit) -> Option<String> {
     let effect = units.effect(&fit.id, &fit.target)?;
-    let other = effect.other().map_or(String::new(), |name| {
-        let key = match effect.law() {
-            Law::Limit => "to",
-            _ => "from",
-        };
-        format!("{key} = \"{name}\"\n")
-    });
+    let entry = effect.entry();
+    let other = |key: &str, state: Option<String>| {
+        state.map_or(String::new(), |state| format!("{key} = \"{state}\"\n"))
+    };
+    let other = other("from", entry.from) + &other("to", entry.to);
     let finite = fit.magnitudes.iter().filter(|(_, value)| value.is_finite());
     let values: Vec<String> = finite
         .map(|(name, value)| format!("{name} = {:?}", six_digits(*value)))

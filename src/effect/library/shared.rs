@@ -1,6 +1,6 @@
-//! Laws, and the magnitudes that go with them, that sensors and actuators share.
+//! Laws and magnitudes that sensors and actuators share.
 
-use crate::effect::Magnitude;
+use super::super::magnitude::Magnitude;
 
 /// Samples that a delay keeps: the present one and 63 before it. Each is a state for whoever simulates or filters
 /// the twin, so there are no more of them than delays in practice need.
@@ -35,6 +35,19 @@ pub(super) fn lag(tau: f64, dt: f64, z: &mut f64, value: f64) -> f64 {
     *z
 }
 
+/// v ← v + clamp(u − v, ±reach).
+pub(super) fn limit_rate(reach: f64, v: &mut f64, u: f64) -> f64 {
+    // v + (u − v) is not u to the bit; within reach, u it is.
+    *v = if u - *v > reach {
+        *v + reach
+    } else if *v - u > reach {
+        *v - reach
+    } else {
+        u
+    };
+    *v
+}
+
 /// Takes `value` into the shift register `past`, newest first, and reads it `delay` seconds ago, linear between
 /// samples. [`check_delay`] has refused what the register does not reach.
 pub(super) fn delay(delay: f64, dt: f64, past: &mut [f64], value: f64) -> f64 {
@@ -49,7 +62,7 @@ pub(super) fn delay(delay: f64, dt: f64, past: &mut [f64], value: f64) -> f64 {
     }
 }
 
-/// Whether the register reaches `delay` seconds back at step `dt`.
+/// Refuses a delay that the register does not reach at step `dt`.
 pub(super) fn check_delay(delay: f64, dt: f64) -> Result<(), String> {
     let longest = (DELAY_SAMPLES - 1) as f64 * dt;
     if delay <= longest {

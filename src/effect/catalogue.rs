@@ -1,0 +1,157 @@
+//! All effects that a program knows, and where in a twin each can stand.
+
+use super::check::targets;
+use super::error::EffectError;
+use super::key::EffectPattern;
+use super::kind::{EffectKind, OtherState};
+use super::library;
+use super::placed::{Effect, EffectEntry};
+use crate::twin::{Noise, Now, Outline, ParameterSpace, Role, StateSpace, Twin};
+use std::sync::{Arc, LazyLock};
+
+static LIBRARY: LazyLock<Vec<Arc<EffectKind>>> =
+    LazyLock::new(|| library::rows().into_iter().map(Arc::new).collect());
+
+/// The kinds of effects that a program knows: the library's, then its own.
+///
+/// ```
+/// use truetwin::effect::Catalogue;
+/// use truetwin::twin::Twin;
+/// use truetwin::twins::VanDerPol;
+///
+/// let possible = Catalogue::default().applicable(&Twin::new(VanDerPol));
+/// assert!(possible.iter().any(|effect| effect.target() == "x2"));
+/// assert!(possible.iter().all(|effect| effect.target() != "actuator")); // the oscillator has no input
+/// ```
+#[derive(Debug, Clone)]
+pub struct Catalogue(Vec<Arc<EffectKind>>);
+
+impl Default for Catalogue {
+    /// The library alone.
+    fn default() -> Self {
+        Self(LIBRARY.clone())
+    }
+}
+
+impl Catalogue {
+    /// Adds a kind; one of the same id is replaced.
+    #[must_use]
+    pub fn with(mut self, kind: EffectKind) -> Self {
+        self.0.retain(|known| known.id() != kind.id());
+        self.0.push(Arc::new(kind));
+        self
+    }
+
+    /// Returns all kinds, in the order of the list of `docs/choosing-effects.md`.
+    pub fn kinds(&self) -> &[Arc<EffectKind>] {
+        &self.0
+    }
+
+    fn kind(&self, id: &str) -> Result<&Arc<EffectKind>, EffectError> {
+        let known = self.0.iter().find(|kind| kind.id() == id);
+        known.ok_or_else(|| EffectError::Unknown {
+            id: id.into(),
+            known: (self.0.iter().map(|kind| kind.id()))
+                .collect::<Vec<_>>()
+                .join(", "),
+        })
+    }
+
+    /// Returns the effect `id` at `target`, all magnitudes free. A law between two states needs
+    /// [`Effect::with_other`], too. Whether the target exists is checked when the effect is added to a twin.
+    pub fn effect(&self, id: &str, target: &str) -> Result<Effect, EffectError> {
+        Ok(Effect::new(self.kind(id)?.clone(), target, None))
+    }
+
+    /// Returns the effect of an `[[effect]]` table.
+    pub fn resolve(&self, entry: &EffectEntry) -> Result<Effect, EffectError> {
+        Effect::from_entry(self.kind(&entry.id)?.clone(), entry)
+    }
+
+    /// Returns every effect that this twin may lack, once for each target and other state, all magnitudes free.
+    ///
+    /// Targets are the twin's own states and parameters, not the memories and magnitudes of effects already added.
+    /// An effect of [`OtherState::RateOf`] is offered where a state is the rate of another; the drift is probed for that.
+    pub fn applicable(&self, twin: &Twin) -> Vec<Effect> {
+        let (equations, signals) = (twin.equations(), twin.signals());
+        let outline = twin.outline().map(own);
+        let rates = equations.map_or_else(Vec::new, rates);
+        let mut effects = Vec::new();
+        for kind in &self.0 {
+            let known = targets(kind.law().target(), outline.as_ref(), &signals);
+            for target in known.iter().filter(|target| kind.may_stand_on(target)) {
+                let rest = || known.iter().filter(|name| *name != target);
+                let others: Vec<Option<&String>> = match kind.other_state() {
+                    None => vec![None],
+                    Some(OtherState::RateOf) => (rates.iter())
+                        .filter(|(rate, _)| rate == target)
+                        .map(|(_, of)| Some(of))
+                        .collect(),
+                    // The excess of a single vessel is lost.
+                    Some(OtherState::To) if known.len() == 1 => vec![Some(target)],
+                    Some(OtherState::From | OtherState::To) => rest().map(Some).collect(),
+                };
+                effects.extend(
+                    (others.into_iter())
+                        .map(|other| Effect::new(kind.clone(), target, other.map(String::as_str))),
+                );
+            }
+        }
+        effects
+    }
+
+    /// Returns whether a pattern names a kind, or a kind at one of the targets of this twin.
+    pub(crate) fn knows(&self, pattern: &EffectPattern, twin: &Twin) -> bool {
+        if pattern.target.is_none() {
+            return self.kind(&pattern.id).is_ok();
+        }
+        (self.applicable(twin).iter()).any(|effect| pattern.matches(effect.key()))
+    }
+}
+
+/// Returns the outline without the additions of effects and unknown levels. Names of added states hold a slash.
+fn own(mut outline: Outline) -> Outline {
+    outline.states.retain(|state| !state.name.contains('/'));
+    outline.parameters = ParameterSpace::new(
+        (outline.parameters.iter())
+            .filter(|p| p.role == Role::Physical)
+            .cloned(),
+    );
+    outline
+}
+
+/// Finds pairs (rate, of): the drift of the second state is the first state, at every one of a few random points.
+fn rates(twin: &dyn StateSpace) -> Vec<(String, String)> {
+    const POINTS: u64 = 5;
+    let (outline, limits) = (twin.outline(), twin.limits());
+    let states = &outline.states;
+    let mut pairs: Vec<(usize, usize)> = (0..states.len())
+        .flat_map(|i| (0..states.len()).map(move |j| (i, j)))
+        .filter(|(i, j)| i != j)
+        .collect();
+    for point in 0..POINTS {
+        let mut source = Noise::new(0, "rates", point).source("point");
+        let x: Vec<f64> = (limits.iter())
+            .map(|limit| {
+                if limit.is_finite() {
+                    limit.low() + source.uniform() * limit.width()
+                } else {
+                    limit.clamp(source.normal())
+                }
+            })
+            .collect();
+        let u: Vec<f64> = outline.inputs.iter().map(|_| source.uniform()).collect();
+        let theta = outline.parameters.draw_prior(Noise::new(0, "rates", point));
+        let now = Now {
+            t: 0.0,
+            dt: 1.0,
+            u: &u,
+            theta: &theta,
+        };
+        let mut dx = vec![0.0; x.len()];
+        twin.drift(&now, &x, &mut dx);
+        pairs.retain(|&(i, j)| dx[j] == x[i]);
+    }
+    let name = |i: usize| states[i].name.clone();
+    pairs.into_iter().map(|(i, j)| (name(i), name(j))).collect()
+}

@@ -1,0 +1,86 @@
+//! Effects of actuators, in the order in which they act along the signal u.
+
+use super::super::kind::EffectKind;
+use super::super::magnitude::Magnitude;
+use super::shared::{
+    DELAY, DELAY_SAMPLES, HIGH, LOW, TAU, check_delay, clamp, delay, lag, limit_rate,
+};
+
+pub(super) fn rows() -> Vec<EffectKind> {
+    vec![
+        // A relative error of the scale; −1 is a dead actuator.
+        EffectKind::actuator("actuator-gain", "u·(1 + error)", |m, _, _, u| {
+            u * (1.0 + m[0])
+        })
+        .magnitude(
+            Magnitude::signed("error", "1", &[-0.2, -0.05, 0.05, 0.2]).within(-1.0, f64::INFINITY),
+        )
+        .order(10),
+        // A constant error of the zero.
+        EffectKind::actuator("actuator-bias", "u + offset", |m, _, _, u| u + m[0])
+            .magnitude(Magnitude::signed(
+                "offset",
+                "signal",
+                &[-0.3, -0.1, 0.1, 0.3],
+            ))
+            .order(20),
+        // Commands inside ±width/2 do nothing, larger ones lose that much.
+        EffectKind::actuator(
+            "actuator-dead-zone",
+            "u − clamp(u, ±width/2)",
+            |m, _, _, u| u - clamp(u, -0.5 * m[0], 0.5 * m[0]),
+        )
+        .magnitude(Magnitude::positive("width", "signal", &[0.1, 0.4, 1.0]))
+        .order(30),
+        // Play: after a reversal nothing moves until it is used up; v starts at the first u.
+        EffectKind::actuator(
+            "actuator-backlash",
+            "v ← clamp(v, u ± width/2)",
+            |m, _, memory, u| {
+                memory[0] = clamp(memory[0], u - 0.5 * m[0], u + 0.5 * m[0]);
+                memory[0]
+            },
+        )
+        .magnitude(Magnitude::positive("width", "signal", &[0.1, 0.4, 1.0]))
+        .memory(1)
+        .order(40),
+        // A limited range. Where low exceeds high, high wins.
+        EffectKind::actuator(
+            "actuator-saturation",
+            "clamp(u, low, high)",
+            |m, _, _, u| clamp(u, m[0], m[1]),
+        )
+        .magnitude(LOW)
+        .magnitude(HIGH)
+        .order(50),
+        // A limited speed; v starts at the first u.
+        EffectKind::actuator(
+            "actuator-rate-limit",
+            "v ← v + clamp(u − v, ±rate·Δt)",
+            |m, now, memory, u| limit_rate(m[0] * now.dt, &mut memory[0], u),
+        )
+        .magnitude(Magnitude::positive("rate", "signal/s", &[0.1, 0.5, 2.0]).off(f64::INFINITY))
+        .memory(1)
+        .order(60),
+        // A first-order lag; v starts at the first u.
+        EffectKind::actuator(
+            "actuator-lag",
+            "v ← a·v + (1 − a)·u, a = exp(−Δt/τ)",
+            |m, now, memory, u| lag(m[0], now.dt, &mut memory[0], u),
+        )
+        .magnitude(TAU)
+        .memory(1)
+        .order(70),
+        // A dead time of at most 63 steps; the first value before the start.
+        EffectKind::actuator(
+            "actuator-delay",
+            "u(t − delay), linear between samples",
+            |m, now, memory, u| delay(m[0], now.dt, memory, u),
+        )
+        .magnitude(DELAY)
+        .memory(DELAY_SAMPLES)
+        .least_memory(2)
+        .check(|m, dt| check_delay(m[0], dt))
+        .order(80),
+    ]
+}

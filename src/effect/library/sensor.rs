@@ -1,0 +1,107 @@
+//! Effects of sensors, in the order in which they act along the signal s.
+
+use super::super::kind::EffectKind;
+use super::super::magnitude::Magnitude;
+use super::super::marks::{clipped, rounded};
+use super::shared::{DELAY, DELAY_SAMPLES, HIGH, LOW, TAU, check_delay, clamp, delay, lag};
+use crate::twin::Outliers;
+
+pub(super) fn rows() -> Vec<EffectKind> {
+    vec![
+        // A constant error of the zero.
+        EffectKind::sensor("sensor-bias", "s + offset", |m, _, _, s| s + m[0])
+            .magnitude(Magnitude::signed(
+                "offset",
+                "signal",
+                &[-0.3, -0.1, 0.1, 0.3],
+            ))
+            .order(10),
+        // A relative error of the scale; −1 is a dead sensor.
+        EffectKind::sensor("sensor-gain", "s·(1 + error)", |m, _, _, s| {
+            s * (1.0 + m[0])
+        })
+        .magnitude(
+            Magnitude::signed("error", "1", &[-0.2, -0.05, 0.05, 0.2]).within(-1.0, f64::INFINITY),
+        )
+        .order(20),
+        // A zero that moves steadily from the first sample on.
+        EffectKind::sensor("sensor-drift", "s + rate·t", |m, now, _, s| {
+            s + m[0] * now.t
+        })
+        .magnitude(Magnitude::signed(
+            "rate",
+            "signal/s",
+            &[-0.01, -0.001, 0.001, 0.01],
+        ))
+        .order(30),
+        // A first-order lag; the reading is z, which starts at the first s.
+        EffectKind::sensor(
+            "sensor-lag",
+            "z ← a·z + (1 − a)·s, a = exp(−Δt/τ)",
+            |m, now, memory, s| lag(m[0], now.dt, &mut memory[0], s),
+        )
+        .magnitude(TAU)
+        .memory(1)
+        .order(40),
+        // A dead time of at most 63 steps; the first value before the start.
+        EffectKind::sensor(
+            "sensor-delay",
+            "s(t − delay), linear between samples",
+            |m, now, memory, s| delay(m[0], now.dt, memory, s),
+        )
+        .magnitude(DELAY)
+        .memory(DELAY_SAMPLES)
+        .least_memory(2)
+        .check(|m, dt| check_delay(m[0], dt))
+        .order(50),
+        // A part f of the signal is rectified.
+        EffectKind::sensor(
+            "sensor-rectification",
+            "(1 − f)·s + f·abs(s)",
+            |m, _, _, s| (1.0 - m[0]) * s + m[0] * s.abs(),
+        )
+        .magnitude(Magnitude::positive("fraction", "1", &[0.1, 0.5, 0.9]).within(0.0, 1.0))
+        .order(60),
+        // White noise. A black box's own is already in its outputs; independent draws are added there.
+        EffectKind::measurement_noise(
+            "sensor-noise",
+            "r² + std² for the variance r² of the twin's own noise",
+            |m| m[0],
+        )
+        .magnitude(Magnitude::positive("std", "signal", &[0.01, 0.05, 0.2])),
+        // A limited range, after the noise. Where low exceeds high, high wins.
+        EffectKind::sensor("sensor-saturation", "clamp(s, low, high)", |m, _, _, s| {
+            clamp(s, m[0], m[1])
+        })
+        .magnitude(LOW)
+        .magnitude(HIGH)
+        .mark(clipped)
+        .order(80),
+        // Rounding to a multiple of the step, halves upwards.
+        EffectKind::sensor(
+            "sensor-quantization",
+            "step·⌊s/step + ½⌋",
+            |m, _, _, s| {
+                if m[0] > 0.0 {
+                    m[0] * (s / m[0] + 0.5).floor()
+                } else {
+                    s
+                }
+            },
+        )
+        .magnitude(Magnitude::positive("step", "signal", &[0.02, 0.1, 0.5]))
+        .mark(rounded)
+        .order(90),
+        // Rare large errors, after everything else.
+        EffectKind::outliers(
+            "sensor-outliers",
+            "s + N(0, scale²) with that probability",
+            |m| Outliers {
+                probability: m[0],
+                scale: m[1],
+            },
+        )
+        .magnitude(Magnitude::positive("probability", "1", &[0.01, 0.05]).within(0.0, 1.0))
+        .magnitude(Magnitude::positive("scale", "signal", &[0.5, 2.0]).shape()),
+    ]
+}

@@ -1,0 +1,118 @@
+//! Effects on states: forces on the rate of x, a ceiling, noise.
+
+use super::super::kind::{EffectKind, OtherState};
+use super::super::magnitude::Magnitude;
+use super::shared::sign;
+use std::f64::consts::TAU;
+
+pub(super) fn rows() -> Vec<EffectKind> {
+    let mut rows = forces();
+    rows.extend([
+        // After each step, the excess over the level is cut. A twin of one state names itself: the excess is lost.
+        EffectKind::limit(
+            "state-ceiling",
+            "the excess over level is cut; spill × excess is added to `to`",
+            |m, x, to| {
+                if *x > m[0] {
+                    if let Some(to) = to {
+                        *to += m[1] * (*x - m[0]);
+                    }
+                    *x = m[0];
+                }
+            },
+        )
+        .magnitude(Magnitude::signed("level", "state", &[0.5, 1.0, 2.0, 4.0]).off(f64::INFINITY))
+        .magnitude(
+            Magnitude::positive("spill", "1", &[0.0, 0.5, 1.0])
+                .within(0.0, 1.0)
+                .shape(),
+        )
+        .other(OtherState::To),
+        // White noise: an increment N(0, std²) a step.
+        EffectKind::process_noise(
+            "process-noise",
+            "q² + std² for the variance q² of the twin's own increment a step",
+            |m| m[0],
+        )
+        .magnitude(Magnitude::positive("std", "state", &[0.01, 0.05, 0.2])),
+    ]);
+    rows
+}
+
+fn forces() -> Vec<EffectKind> {
+    vec![
+        // A constant push or leak.
+        EffectKind::force("constant-forcing", "ẋ + force", |m, _| m[0]).magnitude(
+            Magnitude::signed("force", "state/s", &[-0.3, -0.1, 0.1, 0.3]),
+        ),
+        // A loss of constant size against the sign of the state, with sign 0 = 0.
+        EffectKind::force("coulomb-friction", "ẋ − force·sign x", |m, at| {
+            -m[0] * sign(at.x)
+        })
+        .magnitude(Magnitude::positive("force", "state/s", &[0.03, 0.1, 0.3])),
+        // Leakage, cooling, viscous friction.
+        EffectKind::force("linear-loss", "ẋ − rate·x", |m, at| -m[0] * at.x)
+            .magnitude(Magnitude::positive("rate", "1/s", &[0.03, 0.1, 0.3])),
+        // Another state acts on this one.
+        EffectKind::force("cross-coupling", "ẋ + rate·x_from", |m, at| {
+            m[0] * at.other
+        })
+        .magnitude(Magnitude::signed(
+            "rate",
+            "state/(from·s)",
+            &[-0.3, -0.1, 0.1, 0.3],
+        ))
+        .other(OtherState::From),
+        // Turbulent drag.
+        EffectKind::force("quadratic-drag", "ẋ − c·abs(x)·x", |m, at| {
+            -m[0] * at.x.abs() * at.x
+        })
+        .magnitude(Magnitude::positive(
+            "coefficient",
+            "1/(state·s)",
+            &[0.03, 0.1, 0.3],
+        )),
+        // A Duffing spring; below 0 it softens.
+        EffectKind::force("cubic-stiffness", "ẋ − c·x_from³", |m, at| {
+            -m[0] * at.other.powi(3)
+        })
+        .magnitude(Magnitude::signed(
+            "coefficient",
+            "state/(from³·s)",
+            &[-0.1, 0.1, 0.3],
+        ))
+        .other(OtherState::RateOf),
+        // An outflow or friction law, with sign 0 = 0; below 0 it corrects a law that takes too much.
+        EffectKind::force("power-law", "ẋ − c·abs(x)^e·sign x", |m, at| {
+            -m[0] * at.x.abs().powf(m[1]) * sign(at.x)
+        })
+        .magnitude(Magnitude::signed(
+            "coefficient",
+            "state^(1−e)/s",
+            &[-0.1, 0.03, 0.1, 0.3],
+        ))
+        .magnitude(
+            Magnitude::positive("exponent", "1", &[0.5, 1.5, 2.5])
+                .within(0.0, 4.0)
+                .shape(),
+        ),
+        // Vibration, mains hum, tides.
+        EffectKind::force(
+            "periodic-disturbance",
+            "ẋ + amplitude·sin(2π·f·t + phase)",
+            |m, at| m[0] * (TAU * m[1] * at.t + m[2]).sin(),
+        )
+        .magnitude(Magnitude::positive("amplitude", "state/s", &[0.1, 0.3]))
+        .magnitude(
+            // A period of eleven days stands for "above 0".
+            Magnitude::positive("frequency", "Hz", &[0.003, 0.01, 0.03, 0.1])
+                .within(1e-6, f64::INFINITY)
+                .shape(),
+        )
+        .magnitude(
+            Magnitude::signed("phase", "rad", &[0.0, 2.0, 4.0])
+                .within(-TAU, TAU)
+                .shape(),
+        ),
+    ]
+}

@@ -1,0 +1,169 @@
+//! An effect at one target of a twin.
+
+use super::error::EffectError;
+use super::key::EffectKey;
+use super::kind::EffectKind;
+use super::law::Law;
+use super::magnitude::{Given, Magnitude};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::sync::Arc;
+
+/// A kind of effect at one target, with the magnitudes that are given; the others are free, a part of θ.
+///
+/// ```
+/// use truetwin::effect::Catalogue;
+///
+/// let lag = Catalogue::default().effect("sensor-lag", "sensor")?.hold("tau", 2.5);
+/// assert_eq!(lag.key().to_string(), "sensor-lag@sensor");
+/// assert_eq!(lag.given().get("tau"), Some(2.5));
+/// # Ok::<(), truetwin::effect::EffectError>(())
+/// ```
+#[derive(Clone)]
+pub struct Effect {
+    key: EffectKey,
+    other: Option<String>,
+    given: Given,
+    kind: Arc<EffectKind>,
+}
+
+impl Effect {
+    pub(super) fn new(kind: Arc<EffectKind>, target: &str, other: Option<&str>) -> Self {
+        Self {
+            key: EffectKey::new(kind.id(), target),
+            other: other.map(Into::into),
+            given: Given::default(),
+            kind,
+        }
+    }
+
+    /// Creates the effect of a file's table.
+    pub(super) fn from_entry(
+        kind: Arc<EffectKind>,
+        entry: &EffectEntry,
+    ) -> Result<Self, EffectError> {
+        let id = || kind.id().to_owned();
+        let key = kind.other_state().map(super::kind::OtherState::key);
+        for (other, state) in [("from", &entry.from), ("to", &entry.to)] {
+            match state {
+                Some(state) if key != Some(other) => {
+                    return Err(EffectError::Other {
+                        id: id(),
+                        key: other,
+                        state: state.clone(),
+                    });
+                }
+                None if key == Some(other) => {
+                    return Err(EffectError::NoOther {
+                        id: id(),
+                        key: other,
+                    });
+                }
+                _ => {}
+            }
+        }
+        let other = entry.from.as_deref().or(entry.to.as_deref());
+        Ok(Self {
+            given: entry.magnitudes.clone(),
+            ..Self::new(kind.clone(), &entry.target, other)
+        })
+    }
+
+    /// Holds a magnitude at a value.
+    #[must_use]
+    pub fn hold(mut self, magnitude: &str, value: f64) -> Self {
+        self.given.insert(magnitude, value);
+        self
+    }
+
+    /// Sets the other state of a law between two: `from` which it acts, or `to` which it spills.
+    #[must_use]
+    pub fn with_other(mut self, state: &str) -> Self {
+        self.other = Some(state.into());
+        self
+    }
+
+    /// Returns the identity: id and target.
+    pub fn key(&self) -> &EffectKey {
+        &self.key
+    }
+
+    /// Returns the id.
+    pub fn id(&self) -> &str {
+        &self.key.id
+    }
+
+    /// Returns the target: `sensor`, `actuator` (numbered where there are several), a state or a parameter.
+    pub fn target(&self) -> &str {
+        &self.key.target
+    }
+
+    /// Returns the other state of a law between two.
+    pub fn other(&self) -> Option<&str> {
+        self.other.as_deref()
+    }
+
+    /// Returns the magnitudes that are given.
+    pub fn given(&self) -> &Given {
+        &self.given
+    }
+
+    /// Returns the kind.
+    pub fn kind(&self) -> &Arc<EffectKind> {
+        &self.kind
+    }
+
+    /// Returns the law.
+    pub fn law(&self) -> &Law {
+        self.kind.law()
+    }
+
+    /// Returns the magnitudes of the law, in the order of θ.
+    pub fn magnitudes(&self) -> &[Magnitude] {
+        self.kind.magnitudes()
+    }
+
+    /// Returns the table that a file holds of it.
+    pub fn entry(&self) -> EffectEntry {
+        let other = |key| {
+            let own = self.kind.other_state().map(super::kind::OtherState::key);
+            self.other.clone().filter(|_| own == Some(key))
+        };
+        EffectEntry {
+            id: self.key.id.clone(),
+            target: self.key.target.clone(),
+            from: other("from"),
+            to: other("to"),
+            magnitudes: self.given.clone(),
+        }
+    }
+}
+
+impl fmt::Debug for Effect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Effect")
+            .field("key", &self.key)
+            .field("other", &self.other)
+            .field("given", &self.given)
+            .finish_non_exhaustive()
+    }
+}
+
+/// An `[[effect]]` table of a file, not yet looked up among the known kinds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EffectEntry {
+    /// Id of the kind.
+    pub id: String,
+    /// The target.
+    pub target: String,
+    /// The state that acts on the target.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub from: Option<String>,
+    /// The state that takes what the target loses.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub to: Option<String>,
+    /// Magnitudes held at a value; the others are free.
+    #[serde(default)]
+    pub magnitudes: Given,
+}
