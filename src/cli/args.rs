@@ -1,53 +1,9 @@
-//! Options of all verbs, and options that several verbs share.
+//! Options that several verbs share.
 
-use super::Command as Verbs;
 use crate::estimator::PresetName;
-use clap::{Args, Command, CommandFactory, Parser, ValueEnum};
+use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 use std::time::Duration;
-
-/// Calibrate simulators against measured data and diagnose what they are missing.
-#[derive(Debug, Parser)]
-#[command(
-    name = "truetwin",
-    version,
-    after_help = "A first look:   truetwin demo\n\
-        The main job:   truetwin pretrain --twin tanks --out tanks.est\n                \
-        truetwin estimate record.csv --estimator tanks.est --out result\n\
-        Your simulator: truetwin check --program 'python3 model.py'   (docs/external-programs.md)\n\n\
-        Records are CSV: t (seconds, uniform), inputs u or u1,u2,…, outputs y or y1,y2,…"
-)]
-pub(super) struct Arguments {
-    #[command(subcommand)]
-    pub command: Verbs,
-    /// Print one JSON object.
-    #[arg(long, global = true)]
-    pub json: bool,
-    /// Random seed; the same seed gives the same bits on any number of threads.
-    #[arg(long, global = true, default_value_t = 1)]
-    pub seed: u64,
-    /// Number of threads [default: all cores].
-    #[arg(long, global = true)]
-    pub threads: Option<usize>,
-    #[command(flatten)]
-    pub external: External,
-}
-
-/// Exit codes, at the end of every `--help`.
-const EXIT: &str = "Exit codes: 0 done; 2 wrong call or file (one line names the problem, the place and the remedy); 130 stopped by Ctrl-C; \
-     1 internal error.";
-
-/// The whole command line.
-pub(super) fn command() -> Command {
-    let with_exit = |command: Command| {
-        let text = match command.get_after_help() {
-            Some(text) => format!("{text}\n\n{EXIT}"),
-            None => EXIT.into(),
-        };
-        command.after_help(text)
-    };
-    with_exit(Arguments::command()).mut_subcommands(with_exit)
-}
 
 /// An external twin, for this call alone.
 #[derive(Debug, Args)]

@@ -1,7 +1,7 @@
 //! The external twin of a call: `--program` or `--fmu`.
 
-use super::Failure;
 use super::args::External;
+use super::failure::Failure;
 use crate::estimator::Project;
 use crate::external::program::{ProgramCommand, ProgramError, ProgramSettings, ProgramTwin};
 use crate::study::Study;

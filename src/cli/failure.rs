@@ -1,21 +1,16 @@
 //! Turns errors into one line and an exit code.
 
-use super::output;
+use super::say::say;
 use crate::diagnose::DiagnoseError;
 use crate::effect::EffectError;
-use crate::estimator::bank::BankError;
-use crate::estimator::bank::file::BankFileError;
-use crate::estimator::gate::GateError;
-use crate::estimator::refine::RefineError;
-use crate::estimator::shards::{PriorError, ShardsError};
-use crate::estimator::{EstimateError, EstimatorFileError, PretrainError};
+use crate::estimator::EstimatorError;
 use crate::evaluate::EvaluateError;
 use crate::feature::FeatureError;
 use crate::network::NetworkError;
 use crate::record::RecordError;
 use crate::storage::StorageError;
 use crate::storage::work::Ranks;
-use crate::study::{PlanError, StudyError};
+use crate::study::StudyError;
 use crate::twin::{SimulationError, TwinError};
 use std::fmt::Display;
 use std::path::Path;
@@ -128,7 +123,7 @@ impl Failure {
             .split_whitespace()
             .collect::<Vec<_>>()
             .join(" ");
-        output::say(&format!("error: {line}"));
+        say(&format!("error: {line}"));
         ExitCode::from(self.code)
     }
 }
@@ -144,9 +139,7 @@ macro_rules! users {
     };
 }
 users!(
-    BankFileError,
     EffectError,
-    EstimatorFileError,
     RecordError,
     SimulationError,
     StorageError,
@@ -163,7 +156,7 @@ macro_rules! studies {
         })*
     };
 }
-studies!(FeatureError, PlanError, StudyError);
+studies!(FeatureError, StudyError);
 
 impl From<EvaluateError> for Failure {
     fn from(error: EvaluateError) -> Self {
@@ -191,80 +184,18 @@ impl From<NetworkError> for Failure {
     }
 }
 
-impl From<BankError> for Failure {
-    fn from(error: BankError) -> Self {
+impl From<EstimatorError> for Failure {
+    fn from(error: EstimatorError) -> Self {
+        use EstimatorError as E;
         match error {
-            BankError::Cancelled(_) => Self::internal(error),
-            _ => Self {
+            E::Study(error) => error.into(),
+            E::Feature(error) => error.into(),
+            E::Network(error) => error.into(),
+            E::Cancelled(_) | E::Search(_) | E::Cloud(_) => Self::internal(error),
+            E::Simulation(_) | E::Rejected(_) | E::Hopeless { .. } | E::Inputs(_) => Self {
                 about_study: true,
                 ..Self::user(error)
             },
-        }
-    }
-}
-
-impl From<GateError> for Failure {
-    fn from(error: GateError) -> Self {
-        match error {
-            GateError::Bank(error) => error.into(),
-            GateError::Whitening(_) => Self::user(error),
-        }
-    }
-}
-
-impl From<RefineError> for Failure {
-    fn from(error: RefineError) -> Self {
-        match error {
-            RefineError::Bank(error) => error.into(),
-            RefineError::Gate(error) => error.into(),
-            RefineError::NoStart { .. } | RefineError::Information(_) => Self::user(error),
-            RefineError::Optimise(_) | RefineError::Cancelled(_) => Self::internal(error),
-        }
-    }
-}
-
-impl From<PretrainError> for Failure {
-    fn from(error: PretrainError) -> Self {
-        match error {
-            PretrainError::Bank(error) => error.into(),
-            PretrainError::Network(error) => error.into(),
-            PretrainError::Settings(_) => Self::user(error),
-            PretrainError::Plan(error) => error.into(),
-            PretrainError::Feature(error) => error.into(),
-            PretrainError::Shards(error) => error.into(),
-            PretrainError::File(_)
-            | PretrainError::Memory(_)
-            | PretrainError::Width { .. }
-            | PretrainError::Work(_)
-            | PretrainError::Taken(_)
-            | PretrainError::Save(_) => Self::user(error),
-            PretrainError::TooManyFeatures { .. } | PretrainError::Standardise(_) => Self {
-                about_study: true,
-                ..Self::user(error)
-            },
-        }
-    }
-}
-
-impl From<ShardsError> for Failure {
-    fn from(error: ShardsError) -> Self {
-        match error {
-            ShardsError::Bank(error) => error.into(),
-            ShardsError::Prior(PriorError::Feature(error)) => error.into(),
-            ShardsError::Prior(PriorError::Plan(error)) => error.into(),
-            _ => Self::user(error),
-        }
-    }
-}
-
-impl From<EstimateError> for Failure {
-    fn from(error: EstimateError) -> Self {
-        match error {
-            EstimateError::Bank(error) => error.into(),
-            EstimateError::Gate(error) => error.into(),
-            EstimateError::Refine(error) => error.into(),
-            EstimateError::Network(error) => error.into(),
-            EstimateError::Cancelled(_) | EstimateError::Ellipsoid(_) => Self::internal(error),
             _ => Self::user(error),
         }
     }

@@ -15,34 +15,24 @@
 //! one line that has the remedy; 1 anything else.
 
 mod args;
-mod bank;
-mod check;
-mod demo;
-mod diagnose;
-mod effects;
-mod estimate;
+mod arguments;
+mod context;
 mod external;
 mod failure;
-mod features;
-mod merge;
 mod output;
-mod pretrain;
 mod progress;
 mod records;
-mod reproduce;
-mod shell;
-mod simulate;
+mod say;
 mod stop;
-mod twins;
-mod withheld;
+mod verbs;
 
 use crate::estimator::Project;
-use crate::progress::Progress;
 use crate::storage::StorageError;
-use crate::storage::work::{Ranks, Share};
-use crate::study::{Study, StudyError, StudyFile};
-use args::{Arguments, Subject};
-use clap::{FromArgMatches, Subcommand};
+use crate::storage::work::Ranks;
+use crate::study::StudyError;
+use arguments::Arguments;
+use clap::FromArgMatches;
+use context::Context;
 use failure::Failure;
 use std::error::Error;
 use std::ffi::OsString;
@@ -79,7 +69,7 @@ pub fn run_from<P: Into<Project>, E: Into<StudyError>>(
         Err(error) => return Failure::from(error).report(),
     };
     let words: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
-    let matches = args::command().try_get_matches_from(&words);
+    let matches = arguments::command().try_get_matches_from(&words);
     let parsed = match matches.and_then(|matches| Arguments::from_arg_matches(&matches)) {
         Ok(parsed) => parsed,
         Err(error) if !error.use_stderr() => {
@@ -175,133 +165,9 @@ fn dispatch(
         seed: arguments.seed,
         progress: &progress,
         ranks,
+        command: arguments::command,
     };
     let verb = arguments.command.verb();
     let study = verb.subject().and_then(|subject| subject.study.as_deref());
     (verb.run(&context)).map_err(|failure| failure.of_study(study))
-}
-
-/// The verbs, in the order of `--help`. A new verb needs a file, a `mod`, a variant and an arm.
-#[derive(Debug, Subcommand)]
-enum Command {
-    Twins(twins::Twins),
-    Effects(effects::Effects),
-    Check(check::Check),
-    Simulate(simulate::Simulate),
-    Bank(bank::Bank),
-    Features(features::Features),
-    Merge(merge::Merge),
-    Pretrain(pretrain::Pretrain),
-    Estimate(estimate::Estimate),
-    Diagnose(diagnose::Diagnose),
-    Reproduce(reproduce::Reproduce),
-    Withheld(withheld::Withheld),
-    Demo(demo::Demo),
-    Completions(shell::Completions),
-    Man(shell::Man),
-}
-
-impl Command {
-    fn verb(&self) -> &dyn Verb {
-        match self {
-            Self::Twins(verb) => verb,
-            Self::Effects(verb) => verb,
-            Self::Check(verb) => verb,
-            Self::Simulate(verb) => verb,
-            Self::Bank(verb) => verb,
-            Self::Features(verb) => verb,
-            Self::Merge(verb) => verb,
-            Self::Pretrain(verb) => verb,
-            Self::Estimate(verb) => verb,
-            Self::Diagnose(verb) => verb,
-            Self::Reproduce(verb) => verb,
-            Self::Withheld(verb) => verb,
-            Self::Demo(verb) => verb,
-            Self::Completions(verb) => verb,
-            Self::Man(verb) => verb,
-        }
-    }
-}
-
-/// A verb: its options and its work.
-trait Verb {
-    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure>;
-
-    /// The twin of the call, for verbs that need one.
-    fn subject(&self) -> Option<&Subject> {
-        None
-    }
-
-    /// Tells whether rerunning the same command resumes the work.
-    fn is_resumed(&self) -> bool {
-        false
-    }
-
-    /// Tells whether the ranks of a cluster share the work.
-    fn is_shared_out(&self) -> bool {
-        false
-    }
-}
-
-/// Data that every verb gets.
-struct Context<'a> {
-    /// All studies, including the external one.
-    projects: &'a [Project],
-    /// The external study of this call.
-    external: Option<&'a Project>,
-    /// Name of the program.
-    program: &'a str,
-    json: bool,
-    seed: u64,
-    progress: &'a Progress,
-    ranks: &'a Ranks,
-}
-
-impl Context<'_> {
-    /// Returns the study of `--twin` or `--study`, or else the external one.
-    fn study(&self, subject: &Subject) -> Result<Study, Failure> {
-        Ok(self.project(subject)?.study().clone())
-    }
-
-    /// As [`study`](Self::study), with the recipes.
-    fn project(&self, subject: &Subject) -> Result<Project, Failure> {
-        match (&subject.twin, &subject.study) {
-            (Some(name), _) => Ok(self.named(name)?.clone()),
-            (None, Some(path)) => {
-                let file = StudyFile::read(path).map_err(StudyError::from)?;
-                let at = |failure: Failure| failure.within(path);
-                let project = self.named(&file.twin).map_err(at)?;
-                project.configure(&file).map_err(|error| at(error.into()))
-            }
-            (None, None) => (self.external.cloned()).ok_or_else(|| {
-                Failure::user(
-                    "no twin given; add --twin NAME (`truetwin twins` lists them), --study S.toml, --program 'COMMAND', or --fmu M.fmu",
-                )
-            }),
-        }
-    }
-
-    /// Returns the share of this process in numbered work: that of `--shard`, or of its rank.
-    fn share(&self, asked: Option<Share>) -> Result<Share, Failure> {
-        match asked {
-            None => Ok(self.ranks.share()),
-            Some(share) if self.ranks.is_alone() => Ok(share),
-            Some(_) => Err(Failure::user(
-                "--shard cannot be used under mpirun, where ranks share the work; remove it",
-            )),
-        }
-    }
-
-    fn named(&self, name: &str) -> Result<&Project, Failure> {
-        let project = (self.projects.iter()).find(|project| project.study().name() == name);
-        Ok(project.ok_or_else(|| StudyError::Twin {
-            given: name.into(),
-            known: self
-                .projects
-                .iter()
-                .map(|project| project.study().name())
-                .collect::<Vec<_>>()
-                .join(", "),
-        })?)
-    }
 }

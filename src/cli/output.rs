@@ -1,6 +1,8 @@
 //! Output: standard output, and folders that appear complete.
 
-use super::{Context, Failure};
+use super::context::Context;
+use super::failure::Failure;
+pub(super) use super::say::say;
 use crate::storage::files::{folder, with_remedy};
 use crate::storage::untrusted::{hidden, printable};
 use crate::storage::{self, StorageError, sweep_beside};
@@ -23,11 +25,6 @@ pub(super) fn print(text: &str) -> Result<(), Failure> {
         ))),
         _ => Ok(()),
     }
-}
-
-/// Prints a message to standard error; a closed pipe is ignored.
-pub(super) fn say(text: &str) {
-    let _ = writeln!(io::stderr().lock(), "{}", printable(text));
 }
 
 /// Prints one JSON object.

@@ -1,6 +1,7 @@
 //! Records of a call, with warnings about those that are likely mistakes.
 
-use super::{Failure, output};
+use super::failure::Failure;
+use super::output;
 use crate::record::{Record, read_record};
 use std::path::{Path, PathBuf};
 
@@ -65,7 +66,7 @@ fn warn_of_outlier(path: &Path, record: &Record) {
                 String::new()
             };
             warn(&format!(
-                "{}, row {}, column {letter}{number}: {} is an outlier, 95 % of the column lie within ±{usual}; correct it if it is a mistake",
+                "{}, row {}, column {letter}{number}: {:?} is an outlier, 95 % of the column lie within ±{usual:?}; correct it if it is a mistake",
                 path.display(),
                 sample.unwrap_or_default() + 2,
                 sample.map_or(largest, |k| channel[k]),

@@ -1,6 +1,7 @@
 //! Ctrl-C stops the work at its next step and prints how to resume; a second one ends the process at once.
 
-use super::{Failure, Verb};
+use super::context::Verb;
+use super::failure::Failure;
 use std::ffi::OsString;
 use std::sync::atomic::{AtomicBool, Ordering};
 

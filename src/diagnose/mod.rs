@@ -37,8 +37,9 @@ mod thresholds;
 
 pub use error::{DiagnoseError, GivenRecord};
 pub(crate) use gain::{gain_of, held_out_score};
+pub(crate) use outcome::Cell;
 pub use outcome::{
-    Band, Cause, Cell, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit, Equation,
+    Band, Cause, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit, Equation,
     FittedNuisance, FittedParameter, FreeRuns, Lag, Location, Maps, NextInput, Onset, Region,
     Shrinkage, TargetShare, Term, TermRange, Verdict, Visible, Window,
 };

@@ -5,7 +5,7 @@ use crate::diagnose::detect::{Detected, detect, explained};
 use crate::diagnose::error::{DiagnoseError, GivenRecord};
 use crate::diagnose::explain::attribute::Explanation;
 use crate::diagnose::explain::decide::{Conclusion, decide};
-use crate::diagnose::explain::extended::{Accepted, ExtendedTwin};
+use crate::diagnose::explain::extended::{Accepted, ExtendedTwin, additions};
 use crate::diagnose::explain::verdict::absorbing;
 use crate::diagnose::hypotheses::candidate::Addition;
 use crate::diagnose::locate::location::{locate, maps};
@@ -68,9 +68,10 @@ pub fn diagnose(
     check(study, records, validation, settings)?;
     let noise = Noise::new(settings.seed, "diagnose", 0);
     let twin = measured(study.twin(), records)?;
-    let dithered = match twin.1 {
-        true => Some(dithered(records, noise)?),
-        false => None,
+    let dithered = if twin.1 {
+        Some(dithered(records, noise)?)
+    } else {
+        None
     };
     let records = dithered.as_deref().unwrap_or(records);
     let validation: Option<Vec<Record>> = validation.map(|v| vec![v.clone()]);
@@ -84,9 +85,10 @@ pub fn diagnose(
         after,
         effects,
         explanations,
-    } = match settings.detection_only {
-        true => Attributed::nothing(),
-        false => attribute(&context, &mut detected, settings, noise, progress)?,
+    } = if settings.detection_only {
+        Attributed::nothing()
+    } else {
+        attribute(&context, &mut detected, settings, noise, progress)?
     };
     let Detected { model, null, .. } = &detected;
     let structural = detected.verdict == Verdict::StructuralGap;
@@ -224,9 +226,7 @@ fn attribute<'a>(
             stage.finish();
             if !list.is_empty() {
                 all.conclusion.decision = Decision::Absorbed;
-                all.conclusion.class = (list.iter())
-                    .map(|e| model.dictionary.candidates[e.candidate].key())
-                    .collect();
+                all.conclusion.class = (list.iter()).map(|e| model.candidate(e).key()).collect();
             }
             all.effects = reported(model, &list, test, &all.conclusion);
         }
@@ -244,17 +244,14 @@ fn beside(
     record: &Record,
 ) -> Result<FreeRuns, DiagnoseError> {
     let runner = |model: &FittedTwin<'_>, additions: &[Addition]| {
-        let theta = model.problem.of_record(0, &model.fitted.theta);
+        let theta = model.theta();
         Runner::new(context.twin, additions, theta)
     };
-    let additions: Vec<Addition> = conclusion
-        .accepted
-        .iter()
-        .map(|a| a.addition.clone())
-        .collect();
-    let grown = match additions.is_empty() {
-        true => None,
-        false => Some(runner(last, &additions)?),
+    let additions = additions(&conclusion.accepted);
+    let grown = if additions.is_empty() {
+        None
+    } else {
+        Some(runner(last, &additions)?)
     };
     Ok(free_runs(record, &runner(model, &[])?, grown.as_ref()))
 }

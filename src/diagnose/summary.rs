@@ -19,9 +19,9 @@ pub(in crate::diagnose) fn reported(
 ) -> Vec<EffectFit> {
     let chances = probabilities(explanations);
     let mut all: Vec<EffectFit> = (explanations.iter().zip(chances))
-        .filter(|(e, _)| model.dictionary.candidates[e.candidate].is_listed())
+        .filter(|(e, _)| model.candidate(e).is_listed())
         .map(|(e, probability)| {
-            let candidate = &model.dictionary.candidates[e.candidate];
+            let candidate = model.candidate(e);
             EffectFit {
                 id: candidate.id.clone(),
                 target: candidate.target.clone(),
@@ -62,7 +62,7 @@ pub(in crate::diagnose) fn fitted_parameters(
     let theta = &model.fitted.theta;
     let (mut own, mut nuisance) = (vec![], vec![]);
     for (j, p) in space.iter().enumerate() {
-        if p.role == Role::Physical {
+        if p.role == Role::Parameter {
             own.push(FittedParameter {
                 name: p.name.clone(),
                 unit: p.unit.clone(),
@@ -78,9 +78,8 @@ pub(in crate::diagnose) fn fitted_parameters(
                 Role::Noise => "noise",
                 _ => "effect",
             };
-            let name = p.name.split_once('.').filter(|_| role != "effect");
             nuisance.push(FittedNuisance {
-                name: name.map_or(p.name.as_str(), |(_, name)| name).to_owned(),
+                name: p.target().to_owned(),
                 role,
                 value: theta[j],
                 std_error: errors[j],
@@ -92,7 +91,7 @@ pub(in crate::diagnose) fn fitted_parameters(
     let d = model.problem.twin.parameters().len();
     for (i, j) in (d..theta.len()).enumerate() {
         let (record, which) = (i / starts.len().max(1) + 2, i % starts.len().max(1));
-        let name = starts[which].name.trim_start_matches("start.");
+        let name = starts[which].target();
         nuisance.push(FittedNuisance {
             name: format!("{name} (record {record})"),
             role: "start",

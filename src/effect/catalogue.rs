@@ -6,7 +6,7 @@ use super::key::EffectPattern;
 use super::kind::{EffectKind, OtherState};
 use super::library;
 use super::placed::{Effect, EffectEntry};
-use crate::twin::{Noise, Now, Outline, ParameterSpace, Role, StateSpace, Twin};
+use crate::twin::{Noise, Now, Outline, ParameterSpace, Role, StateSpace, Twin, is_memory};
 use std::sync::{Arc, LazyLock};
 
 static LIBRARY: LazyLock<Vec<Arc<EffectKind>>> =
@@ -111,10 +111,10 @@ impl Catalogue {
 
 /// Returns the outline without the additions of effects and unknown levels. Names of added states hold a slash.
 fn own(mut outline: Outline) -> Outline {
-    outline.states.retain(|state| !state.name.contains('/'));
+    outline.states.retain(|state| !is_memory(&state.name));
     outline.parameters = ParameterSpace::new(
         (outline.parameters.iter())
-            .filter(|p| p.role == Role::Physical)
+            .filter(|p| p.role == Role::Parameter)
             .cloned(),
     );
     outline

@@ -4,7 +4,7 @@ use super::error::EffectError;
 use super::law::{Law, NOISE_ENTERS, TargetKind};
 use super::placed::Effect;
 use crate::record::Signals;
-use crate::twin::Outline;
+use crate::twin::{Outline, is_memory};
 
 /// Returns the names of all targets of a kind, in a twin with these equations (none: a black box) and signals.
 pub(crate) fn targets(
@@ -84,7 +84,7 @@ fn check_place(
         }
     }
     // A twin of a single state has no other one: there, what a limit takes is lost.
-    let alone = known.iter().filter(|name| !name.contains('/')).count() == 1;
+    let alone = known.iter().filter(|name| !is_memory(name)).count() == 1;
     let lost = matches!(law, Law::Limit(_)) && alone;
     if effect.other() == Some(effect.target()) && !lost {
         let target = effect.target().to_owned();

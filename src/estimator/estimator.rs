@@ -1,9 +1,10 @@
 //! The pretrained estimator.
 
-use super::calibration::Calibration;
-use super::readout::Readout;
-use super::{PresetName, Project, Settings};
 use crate::estimator::bank::FeatureSimulator;
+use crate::estimator::project::Project;
+use crate::estimator::readout::{Calibration, Readout};
+use crate::estimator::recipe::PresetName;
+use crate::estimator::settings::Settings;
 use crate::feature::{FeatureError, FeatureRecipe};
 use crate::network::{Architecture, Network, NetworkError};
 use crate::record::Record;

@@ -39,8 +39,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use crate::estimator::bank::{BankError, FeatureSimulator};
-use crate::math::{MathError, Whitening, median, rank_p_value};
+use crate::estimator::bank::FeatureSimulator;
+use crate::estimator::error::EstimatorError;
+use crate::math::{Whitening, median, rank_p_value};
 use crate::progress::Progress;
 use crate::record::Drive;
 use crate::setting::SettingError;
@@ -161,11 +162,12 @@ impl GateSettings {
     }
 
     /// μ and S^{-1/2} from simulated features, in the form of the test.
-    pub fn whiten(&self, features: &Array2<f64>) -> Result<Whitening, MathError> {
+    pub fn whiten(&self, features: &Array2<f64>) -> Result<Whitening, EstimatorError> {
         match self.form {
             GateForm::Calibrated => Whitening::calibrated(features),
             GateForm::Paper => Whitening::regularised(features, self.epsilon),
         }
+        .map_err(EstimatorError::Whitening)
     }
 }
 
@@ -181,28 +183,6 @@ pub struct GateOutcome {
     pub out_of_distribution: bool,
     /// s of the record.
     pub statistic: f64,
-}
-
-/// Why the test could not be made.
-///
-/// ```
-/// use truetwin::estimator::bank::BankError;
-/// use truetwin::estimator::gate::GateError;
-///
-/// let bank = BankError::Hopeless { failed: 95, tried: 100, reason: "diverged".into() };
-/// assert!(matches!(GateError::from(bank), GateError::Bank(_)));
-/// ```
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum GateError {
-    /// The simulations failed.
-    #[error(transparent)]
-    Bank(#[from] BankError),
-    /// The simulated features have no covariance.
-    #[error(
-        "the features simulated at the estimate cannot be whitened: {0}; a twin without noise has no statistics: give it noise levels ([noise] in a study)"
-    )]
-    Whitening(#[from] MathError),
 }
 
 /// What the test simulates with.
@@ -224,7 +204,7 @@ debug_by_name!(GateTest<'_>);
 
 impl GateTest<'_> {
     /// Simulates the null at `theta`.
-    pub fn at(&self, theta: &[f64]) -> Result<Gate, GateError> {
+    pub fn at(&self, theta: &[f64]) -> Result<Gate, EstimatorError> {
         let simulated = self.simulate(theta)?;
         let whitening = self.settings.whiten(&simulated.whitening)?;
         Ok(Gate {
@@ -249,15 +229,14 @@ impl GateTest<'_> {
     /// # Errors
     ///
     /// As [`at`](Self::at), and those of `estimate`.
-    pub fn at_estimate<E: From<GateError>>(
+    pub fn at_estimate(
         &self,
         theta: &[f64],
         jacobians: &[DMatrix<f64>],
-        estimate: impl FnOnce(&Array2<f64>) -> Result<Array2<f64>, E>,
-    ) -> Result<Gate, E> {
+        estimate: impl FnOnce(&Array2<f64>) -> Result<Array2<f64>, EstimatorError>,
+    ) -> Result<Gate, EstimatorError> {
         let simulated = self.simulate(theta)?;
-        let whitening =
-            (self.settings.whiten(&simulated.whitening)).map_err(|error| E::from(error.into()))?;
+        let whitening = self.settings.whiten(&simulated.whitening)?;
         let ranked = simulated.ranked();
         let null = match self.settings.form {
             GateForm::Paper => whitening.squared_distances(ranked),
@@ -291,7 +270,7 @@ impl GateTest<'_> {
         theta: &[f64],
         jacobian: &DMatrix<f64>,
         features: &DVector<f64>,
-    ) -> Result<Option<GateOutcome>, GateError> {
+    ) -> Result<Option<GateOutcome>, EstimatorError> {
         // Calibrated whatever the form of the first test was: it is a check, not a part of the paper's method.
         let settings = GateSettings {
             form: GateForm::Calibrated,
@@ -323,7 +302,7 @@ impl GateTest<'_> {
         Ok(Some(gate.decide(statistic)))
     }
 
-    fn simulate(&self, theta: &[f64]) -> Result<NullFeatures, GateError> {
+    fn simulate(&self, theta: &[f64]) -> Result<NullFeatures, EstimatorError> {
         let size = self.settings.whitening_simulations(self.simulator.dim());
         let fresh = match self.settings.form {
             GateForm::Calibrated => self.settings.null,

@@ -42,41 +42,31 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod error;
+mod estimate;
+#[allow(clippy::module_inception)]
+mod estimator;
+mod file;
+mod pretrain;
+mod project;
+mod readout;
+mod recipe;
+mod settings;
+
 pub mod bank;
 pub mod gate;
 pub mod refine;
 pub(crate) mod sample;
 pub mod shards;
 
-mod calibration;
-mod cloud;
-mod estimate;
-mod estimator;
-mod file;
-mod pretrain;
-mod pretraining;
-mod project;
-mod quadratic;
-mod readout;
-mod recipe;
-mod scaler;
-mod settings;
-mod standardiser;
-mod tracking;
-mod tune;
-
-pub use crate::estimator::sample::{CloudSampler, EllipsoidError};
-pub(crate) use estimate::INTERVAL_LEVEL;
-pub use estimate::{Estimate, EstimateError, EstimateOptions, Nuisance, Seconds};
+pub use error::EstimatorError;
+pub(crate) use estimate::track;
+pub use estimate::{Estimate, EstimateOptions, Nuisance, Seconds, Tracking};
 pub use estimator::Estimator;
-pub use file::EstimatorFileError;
-pub use pretrain::{PretrainError, PretrainOptions, pretrain, pretrain_on};
-pub use pretraining::{CHECKPOINT, GivenBank, Pretraining};
+pub use pretrain::{CHECKPOINT, GivenBank, PretrainOptions, Pretraining, pretrain, pretrain_on};
 pub use project::Project;
-pub use readout::Readout;
+pub(crate) use readout::INTERVAL_LEVEL;
+pub use readout::{Readout, Scaler, Standardiser};
 pub use recipe::{PresetName, Recipe};
-pub use scaler::Scaler;
+pub use sample::CloudSampler;
 pub use settings::{CloudSettings, Inputs, Settings};
-pub use standardiser::Standardiser;
-pub use tracking::Tracking;
-pub(crate) use tracking::track;

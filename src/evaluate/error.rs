@@ -7,7 +7,7 @@ use crate::progress::Cancelled;
 use crate::record::RecordError;
 use crate::setting::SettingError;
 use crate::storage::StorageError;
-use crate::study::PlanError;
+use crate::study::StudyError;
 use crate::twin::{Interval, SimulationError, TwinError};
 use std::path::PathBuf;
 
@@ -82,7 +82,7 @@ pub enum EvaluateError {
     Work(#[from] StorageError),
     /// The study's inputs cannot be drawn.
     #[error(transparent)]
-    Plan(#[from] PlanError),
+    Plan(#[from] StudyError),
     /// The record cannot be read, or does not fit the twin.
     #[error(transparent)]
     Record(#[from] RecordError),

@@ -23,8 +23,9 @@ pub(crate) fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
 
 /// Creates a temporary file beside `path` with these bytes on the disk.
 fn filled(path: &Path, bytes: &[u8]) -> io::Result<tempfile::NamedTempFile> {
-    let mut file = file_beside(path)?;
-    file.write_all(bytes)?;
+    let file = file_beside(path)?;
+    // The error of the temporary file's own `write_all` would name that file.
+    file.as_file().write_all(bytes)?;
     file.as_file().sync_all()?;
     Ok(file)
 }

@@ -2,14 +2,15 @@
 
 use crate::effect::{EffectEntry, EffectPattern};
 use crate::feature::FeatureRecipe;
-use crate::record::{RecordError, read_drive};
-use crate::storage::files::{folder, with_remedy};
+use crate::record::read_drive;
+use crate::storage::files::folder;
 use crate::storage::untrusted::{MESSAGE, check_names, one_line, read_text};
+use crate::study::error::StudyError;
 use crate::study::plan::InputPlan;
 use crate::twin::{Interval, Level};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 /// Longest study file, in bytes: a hundred times one that names every parameter and effect.
@@ -108,7 +109,7 @@ pub struct StudyFile {
 ///
 /// let file = StudyFile::parse("twin = 'tanks'\n[record]\nstep = 4.0", "S.toml".as_ref())?;
 /// assert_eq!((file.record.step, file.record.samples), (Some(4.0), None)); // the twin's own length
-/// # Ok::<(), truetwin::study::StudyFileError>(())
+/// # Ok::<(), truetwin::study::StudyError>(())
 /// ```
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -137,7 +138,7 @@ impl RecordTable {
 ///
 /// let file = StudyFile::parse("twin = 'tanks'\n[library]\nwithout = ['sensor-bias', 'state-ceiling@h1']", "S.toml".as_ref())?;
 /// assert_eq!(file.library.without.len(), 2);
-/// # Ok::<(), truetwin::study::StudyFileError>(())
+/// # Ok::<(), truetwin::study::StudyError>(())
 /// ```
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -156,60 +157,10 @@ impl Library {
     }
 }
 
-/// Why a study file cannot be used.
-///
-/// ```
-/// use truetwin::study::{StudyFile, StudyFileError};
-///
-/// let error: StudyFileError = StudyFile::parse("twin = 'tanks'\nspeed = 3", "S.toml".as_ref()).unwrap_err();
-/// assert!(error.to_string().contains("speed"), "{error}");
-/// ```
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum StudyFileError {
-    /// It cannot be read.
-    #[error("{}: {}", path.display(), with_remedy(error))]
-    Io {
-        /// File.
-        path: PathBuf,
-        /// What the system said.
-        error: std::io::Error,
-    },
-    /// It is no study.
-    #[error("{}, line {line}: {message}; correct that line", path.display())]
-    Syntax {
-        /// File.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// What the parser said, in one line.
-        message: String,
-    },
-    /// The input file cannot be read.
-    #[error(transparent)]
-    Input(#[from] RecordError),
-    /// Step or samples contradict the input file.
-    #[error(
-        "{}: [record] contradicts {}, which has {samples} samples, step {step} s; leave step and samples out",
-        path.display(),
-        input.display()
-    )]
-    Grid {
-        /// File.
-        path: PathBuf,
-        /// Input file.
-        input: PathBuf,
-        /// Step of the input file, in seconds.
-        step: f64,
-        /// Samples of the input file.
-        samples: usize,
-    },
-}
-
 impl StudyFile {
     /// Reads a study file. A relative input file is looked for beside it; its step and length become the study's.
-    pub fn read(path: &Path) -> Result<Self, StudyFileError> {
-        let text = read_text(path, MOST).map_err(|error| StudyFileError::Io {
+    pub fn read(path: &Path) -> Result<Self, StudyError> {
+        let text = read_text(path, MOST).map_err(|error| StudyError::Io {
             path: path.into(),
             error,
         })?;
@@ -222,12 +173,11 @@ impl StudyFile {
             let other = record.step.is_some_and(|s| (s - step).abs() > 1e-3 * step)
                 || record.samples.is_some_and(|n| n != samples);
             if other {
-                return Err(StudyFileError::Grid {
-                    path: path.into(),
-                    input: input.clone(),
-                    step,
-                    samples,
-                });
+                return Err(StudyError::Plan(format!(
+                    "{}: [record] contradicts {}, which has {samples} samples, step {step} s; leave step and samples out",
+                    path.display(),
+                    input.display()
+                )));
             }
             (record.step, record.samples) = (Some(step), Some(samples));
         }
@@ -235,8 +185,8 @@ impl StudyFile {
     }
 
     /// Parses the text of a study file; `path` is for messages.
-    pub fn parse(text: &str, path: &Path) -> Result<Self, StudyFileError> {
-        let wrong = |line, message: &str| StudyFileError::Syntax {
+    pub fn parse(text: &str, path: &Path) -> Result<Self, StudyError> {
+        let wrong = |line, message: &str| StudyError::Syntax {
             path: path.into(),
             line,
             message: one_line(message, MESSAGE),

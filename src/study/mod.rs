@@ -1,18 +1,20 @@
 //! A twin together with everything that estimating its parameters needs, checked.
 
+mod error;
 mod file;
 mod manifest;
 mod plan;
 
-pub use file::{Library, RecordTable, StudyFile, StudyFileError};
-pub use plan::{DriveSource, InputPlan, Levels, PlanError, RecordPlan};
+pub use error::StudyError;
+pub use file::{Library, RecordTable, StudyFile};
+pub use plan::{DriveSource, InputPlan, Levels, RecordPlan};
 
 use crate::effect::{
-    Catalogue, Effect, EffectError, EffectKey, EffectKind, EffectPattern, augment, given_magnitudes,
+    Catalogue, Effect, EffectKey, EffectKind, EffectPattern, augment, given_magnitudes,
 };
-use crate::record::{Record, RecordError};
+use crate::record::Record;
 use crate::setting::did_you_mean;
-use crate::twin::{Adaptation, DigitalTwin, Twin, TwinError, adapt, check_twin, fix};
+use crate::twin::{Adaptation, DigitalTwin, Role, Twin, TwinError, adapt, check_twin, fix};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -49,65 +51,6 @@ impl std::fmt::Debug for Study {
     }
 }
 
-/// Why there is no such study, or why a record does not belong to it.
-///
-/// ```
-/// use truetwin::study::{RecordPlan, Study, StudyError, StudyFile};
-/// use truetwin::twins::VanDerPol;
-///
-/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 300))?;
-/// let file = StudyFile::parse("twin = 'oscillator'\n[fixed]\nmu = 1.0", "S.toml".as_ref())?;
-/// let error: StudyError = study.configure(&file).unwrap_err();
-/// assert!(error.to_string().contains("mu"), "{error}");
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum StudyError {
-    /// Of the file.
-    #[error(transparent)]
-    File(#[from] StudyFileError),
-    /// The file is about another twin.
-    #[error("no twin is called \"{given}\"{}; there are {known}", did_you_mean(given, known.split(", ")))]
-    Twin {
-        /// In the file.
-        given: String,
-        /// Known twins.
-        known: String,
-    },
-    /// Of prior, bounds, limits, noise, start.
-    #[error(transparent)]
-    Adaptation(#[from] TwinError),
-    /// Of effects.
-    #[error(transparent)]
-    Effect(#[from] EffectError),
-    /// A parameter is fixed, and has a prior or bounds.
-    #[error("{0} stands in [fixed] and in [prior] or [bounds]; remove one of them")]
-    Contradiction(String),
-    /// `[library]` names an effect that there is not.
-    #[error(
-        "[library] names {0}, which is no effect of this twin; `truetwin effects --twin T` lists them"
-    )]
-    Library(String),
-    /// Of fixed parameters.
-    #[error("[fixed]: {0}")]
-    Fixed(TwinError),
-    /// Of the twin's own parameters.
-    #[error("twin \"{name}\": {error}")]
-    Parameters {
-        /// Twin.
-        name: String,
-        /// What is wrong.
-        error: TwinError,
-    },
-    /// Of step, length, input.
-    #[error(transparent)]
-    Plan(#[from] PlanError),
-    /// Of a record's channels, or of the file of the demo record.
-    #[error(transparent)]
-    Record(#[from] RecordError),
-}
-
 impl Study {
     /// Creates a study of `twin` under `name`.
     pub fn new(
@@ -116,10 +59,8 @@ impl Study {
         plan: RecordPlan,
     ) -> Result<Self, StudyError> {
         let base = Twin::new(twin);
-        check_twin(&base).map_err(|error| StudyError::Parameters {
-            name: name.into(),
-            error,
-        })?;
+        check_twin(&base)
+            .map_err(|error| StudyError::Table(format!("twin \"{name}\": {error}")))?;
         Ok(Self {
             name: name.into(),
             twin: base.clone(),
@@ -158,7 +99,7 @@ impl Study {
                 known: self.name.clone(),
             });
         }
-        // Boxes of magnitudes apply once the effects are there; all others before.
+        // Boxes of magnitudes apply once the effects are added; all others before.
         let of_effects = |name: &str| name.parse::<EffectKey>().is_ok();
         let part = |boxes: &BTreeMap<String, _>, effects: bool| {
             (boxes.iter())
@@ -167,9 +108,11 @@ impl Study {
                 .collect()
         };
         let step = file.record.step.unwrap_or(self.plan.step);
-        for table in [&file.prior, &file.bounds] {
-            if let Some(name) = table.keys().find(|name| file.fixed.contains_key(*name)) {
-                return Err(StudyError::Contradiction(name.clone()));
+        for (table, boxes) in [("prior", &file.prior), ("bounds", &file.bounds)] {
+            if let Some(name) = boxes.keys().find(|name| file.fixed.contains_key(*name)) {
+                return Err(StudyError::Table(format!(
+                    "{name} appears in both [fixed] and [{table}]; remove one"
+                )));
             }
         }
         self.check_library(&file.library)?;
@@ -185,22 +128,24 @@ impl Study {
             bounds: part(&file.bounds, true),
             ..Adaptation::default()
         };
-        let mut twin = adapt(self.base.clone(), &first, step)?;
         let effects = (file.effect.iter())
             .map(|entry| self.catalogue.resolve(entry))
             .collect::<Result<Vec<_>, _>>()?;
+        let mut twin = adapt(self.base.clone(), &first, step)
+            .map_err(|error| self.naming_magnitudes(error, &effects))?;
         twin = augment(twin, effects.clone())?;
         if second != Adaptation::default() {
             twin = adapt(twin, &second, step)?;
         }
+        let fixed = |error: TwinError| StudyError::Table(format!("[fixed]: {error}"));
         let space = twin.parameters();
         for (name, &value) in &file.fixed {
-            let parameter = &space[space.position(name).map_err(StudyError::Fixed)?];
-            parameter.check_value(value).map_err(StudyError::Fixed)?;
+            let parameter = &space[space.position(name).map_err(fixed)?];
+            parameter.check_value(value).map_err(fixed)?;
         }
         let mut held = file.fixed.clone();
         held.extend(given_magnitudes(&effects));
-        twin = fix(twin, &held).map_err(StudyError::Fixed)?;
+        twin = fix(twin, &held).map_err(fixed)?;
         let RecordTable {
             step,
             samples,
@@ -218,6 +163,21 @@ impl Study {
         })
     }
 
+    /// Adds the magnitudes of the file's effects to the names that an unknown name in `[prior]` or `[bounds]` is told.
+    fn naming_magnitudes(&self, error: TwinError, effects: &[Effect]) -> TwinError {
+        match (error, augment(self.base.clone(), effects.to_vec())) {
+            (TwinError::UnknownIn { table, name, known }, Ok(twin))
+                if matches!(table, "prior" | "bounds") =>
+            {
+                let space = twin.parameters();
+                let magnitudes = space.iter().filter(|p| p.role == Role::Magnitude);
+                let known = magnitudes.fold(known, |known, p| format!("{known}, {}", p.name));
+                TwinError::UnknownIn { table, name, known }
+            }
+            (error, _) => error,
+        }
+    }
+
     /// Returns whether a pattern names an effect of the library or of the study's own.
     pub fn knows_effect(&self, pattern: &EffectPattern) -> bool {
         self.catalogue.knows(pattern, &self.twin)
@@ -227,7 +187,10 @@ impl Study {
         let mut named = library.only.iter().chain(&library.without);
         let unknown = named.find(|name| !self.knows_effect(name));
         unknown.map_or(Ok(()), |name| {
-            Err(StudyError::Library(self.with_nearest_effect(name)))
+            Err(StudyError::Table(format!(
+                "[library] names {}, which is no effect of this twin; `truetwin effects --twin T` lists them",
+                self.with_nearest_effect(name)
+            )))
         })
     }
 
@@ -290,7 +253,7 @@ impl Study {
     }
 
     /// What drives are drawn from.
-    pub fn drives(&self) -> Result<DriveSource, PlanError> {
+    pub fn drives(&self) -> Result<DriveSource, StudyError> {
         self.plan.prepare(&self.twin.signals())
     }
 
@@ -298,5 +261,37 @@ impl Study {
     pub fn check_record(&self, record: &Record) -> Result<(), StudyError> {
         record.check_channels(&self.twin.signals())?;
         Ok(self.plan.check_step(record)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::twins::CascadedTanks;
+
+    fn refused(tables: &str) -> String {
+        let text = format!("twin = 'tanks'\n{tables}");
+        let file = StudyFile::parse(&text, "s.toml".as_ref()).unwrap();
+        let plan = RecordPlan::levels(0.5, 60, 0.0, 3.0, 30);
+        let study = Study::new("tanks", CascadedTanks, plan).unwrap();
+        study.configure(&file).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn an_unknown_name_lists_parameters_and_magnitudes() {
+        let effect = "[[effect]]\nid = 'sensor-lag'\ntarget = 'sensor'\n";
+        let message = refused(&format!("[prior]\nk9 = [0.0, 1.0]\n{effect}"));
+        for name in ["k9", "k1, k2, k3, k4", "sensor-lag@sensor.tau"] {
+            assert!(message.contains(name), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_parameter_in_two_tables_is_refused() {
+        let message = refused("[fixed]\nk1 = 0.5\n[bounds]\nk1 = [0.1, 1.0]");
+        assert_eq!(
+            message,
+            "k1 appears in both [fixed] and [bounds]; remove one"
+        );
     }
 }

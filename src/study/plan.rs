@@ -2,6 +2,7 @@
 
 use crate::record::{Drive, Record, RecordError, Signal, Signals, read_drive};
 use crate::storage::untrusted::MOST_NUMBERS;
+use crate::study::error::StudyError;
 use crate::twin::{Interval, Noise};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -70,70 +71,6 @@ pub struct RecordPlan {
     pub input: Option<InputPlan>,
 }
 
-/// Why no input can be made, or why a record does not fit.
-///
-/// ```
-/// use truetwin::study::{PlanError, RecordPlan};
-/// use truetwin::record::Signals;
-///
-/// // The twin has one input, and nothing says what it looks like.
-/// let error = RecordPlan::autonomous(0.1, 300).prepare(&Signals::default()).err();
-/// assert!(matches!(error, Some(PlanError::NoInput(1))));
-/// ```
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum PlanError {
-    /// Step or samples that make no record, or an input file that cannot be read.
-    #[error(transparent)]
-    Record(#[from] RecordError),
-    /// A hold of zero samples.
-    #[error("[record] hold = 0; a level is held for at least 1 sample")]
-    Hold,
-    /// The twin has no input, and the study gives one.
-    #[error("[record] input is given, but the twin has no input; remove it")]
-    Surplus,
-    /// More samples than any record has.
-    #[error(
-        "[record] samples = {0}; at most {MOST_SAMPLES} can be simulated: take a larger step or a shorter record"
-    )]
-    Samples(usize),
-    /// More numbers than any record has.
-    #[error(
-        "[record] samples = {samples} for {channels} inputs and outputs; at most {MOST_NUMBERS} numbers can be simulated: take a shorter record"
-    )]
-    Numbers {
-        /// Samples asked for.
-        samples: usize,
-        /// Inputs and outputs.
-        channels: usize,
-    },
-    /// The twin has inputs, and nothing says which.
-    #[error(
-        "the twin has {0} inputs; say what they look like: [record] input = {{ levels = [low, high], hold = n }}, or a file"
-    )]
-    NoInput(usize),
-    /// An input file with another number of inputs.
-    #[error("{}: {given} inputs, the twin has {expected}; give each its column", path.display())]
-    Channels {
-        /// File.
-        path: PathBuf,
-        /// In the file.
-        given: usize,
-        /// In the twin.
-        expected: usize,
-    },
-    /// A record with another step than the study's.
-    #[error(
-        "the record's step is {given} s, the study's {expected} s; resample the record, or set [record] step = {given} in a study file and pretrain again"
-    )]
-    Step {
-        /// In the record.
-        given: f64,
-        /// In the study.
-        expected: f64,
-    },
-}
-
 impl RecordPlan {
     /// A record without inputs.
     pub fn autonomous(step: f64, samples: usize) -> Self {
@@ -155,24 +92,37 @@ impl RecordPlan {
     }
 
     /// Makes ready what drives are drawn from; reads the input file, if one is named.
-    pub fn prepare(&self, signals: &Signals) -> Result<DriveSource, PlanError> {
+    pub fn prepare(&self, signals: &Signals) -> Result<DriveSource, StudyError> {
         let channels = signals.inputs.len();
         let all = channels + signals.outputs.len();
         let fixed = match &self.input {
-            Some(_) if channels == 0 => return Err(PlanError::Surplus),
-            _ if self.samples > MOST_SAMPLES => return Err(PlanError::Samples(self.samples)),
+            Some(_) if channels == 0 => {
+                let problem = "[record] input is given, but the twin has no input; remove it";
+                return Err(StudyError::Plan(problem.into()));
+            }
+            _ if self.samples > MOST_SAMPLES => {
+                return Err(StudyError::Plan(format!(
+                    "[record] samples = {}; at most {MOST_SAMPLES} can be simulated: take a larger step or a shorter record",
+                    self.samples
+                )));
+            }
             _ if self.samples.saturating_mul(all) > MOST_NUMBERS => {
-                return Err(PlanError::Numbers {
-                    samples: self.samples,
-                    channels: all,
-                });
+                return Err(StudyError::Plan(format!(
+                    "[record] samples = {} for {all} inputs and outputs; at most {MOST_NUMBERS} numbers can be simulated: take a shorter record",
+                    self.samples
+                )));
             }
             None if channels == 0 => Some(Drive::autonomous(self.step, self.samples)?),
-            None => return Err(PlanError::NoInput(channels)),
+            None => {
+                return Err(StudyError::Plan(format!(
+                    "the twin has {channels} inputs; give [record] input = {{ levels = [low, high], hold = n }}, or a file"
+                )));
+            }
             Some(InputPlan::File(path)) => Some(self.read(path, channels)?),
             Some(InputPlan::Levels(Levels { levels, hold })) => {
                 if *hold == 0 {
-                    return Err(PlanError::Hold);
+                    let problem = "[record] hold = 0; a level is held for at least 1 sample";
+                    return Err(StudyError::Plan(problem.into()));
                 }
                 // Step and ends are checked here, once, so that drawing cannot fail; one sample shows it.
                 let samples = self.samples.min(1);
@@ -187,24 +137,25 @@ impl RecordPlan {
         })
     }
 
-    fn read(&self, path: &Path, channels: usize) -> Result<Drive, PlanError> {
+    fn read(&self, path: &Path, channels: usize) -> Result<Drive, StudyError> {
         let drive = read_drive(path)?;
         let given = drive.inputs().ncols();
         if given != channels {
-            return Err(PlanError::Channels {
-                path: path.into(),
-                given,
-                expected: channels,
-            });
+            return Err(StudyError::Plan(format!(
+                "{}: {given} inputs, the twin has {channels}; give each its column",
+                path.display()
+            )));
         }
         Ok(drive)
     }
 
     /// Whether a record has the study's step, to 1e-3 of it.
-    pub fn check_step(&self, record: &Record) -> Result<(), PlanError> {
+    pub fn check_step(&self, record: &Record) -> Result<(), StudyError> {
         let (given, expected) = (record.drive().dt(), self.step);
         if (given - expected).abs() > 1e-3 * expected {
-            return Err(PlanError::Step { given, expected });
+            return Err(StudyError::Plan(format!(
+                "the record's step is {given} s, the study's {expected} s; resample the record, or set [record] step = {given} in a study file and pretrain again"
+            )));
         }
         Ok(())
     }
@@ -278,7 +229,7 @@ mod tests {
         let plan = RecordPlan::levels(0.5, 9, 0.0, 1.0, 0);
         assert!(matches!(
             plan.prepare(&Signals::default()),
-            Err(PlanError::Hold)
+            Err(StudyError::Plan(_))
         ));
     }
 }

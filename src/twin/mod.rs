@@ -37,7 +37,7 @@ pub use handle::Twin;
 pub use integrator::{Integrator, Now, Workspace};
 pub use interval::Interval;
 pub(crate) use modified::{Modified, Modify};
-pub(crate) use names::check_twin;
+pub(crate) use names::{check_twin, is_memory};
 pub use noise::{Noise, Source};
 pub use outline::Outline;
 pub(crate) use parameter::PRIOR_DEVIATION;

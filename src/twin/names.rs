@@ -89,6 +89,11 @@ fn unique<'a>(
     }
 }
 
+/// Tells whether a state is the memory of an effect or a disturbance, not the twin's own: no state of a twin holds a slash.
+pub(crate) fn is_memory(state: &str) -> bool {
+    state.contains('/')
+}
+
 fn names(quantities: &[Quantity]) -> impl Iterator<Item = &str> {
     quantities.iter().map(|quantity| quantity.name.as_str())
 }

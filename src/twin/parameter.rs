@@ -14,22 +14,34 @@ pub const PRIOR_DEVIATION: f64 = 0.288_675_134_594_812_9;
 pub enum Role {
     /// A parameter of the twin's own equations.
     #[default]
-    Physical,
+    #[serde(rename = "physical")]
+    Parameter,
     /// An unknown start of a state.
     Start,
     /// An unknown noise level.
     Noise,
     /// The magnitude of an effect that the twin lacked.
-    Effect,
+    #[serde(rename = "effect")]
+    Magnitude,
 }
 
 impl Role {
     /// The name of a parameter of this role: `start.h1`, `noise.y`; of other roles, `target` itself.
     pub(crate) fn name(self, target: &str) -> String {
+        format!("{}{target}", self.prefix())
+    }
+
+    /// Returns the state of a start called `name`, the state or output of a noise level, and `name` itself in other roles.
+    pub(crate) fn target(self, name: &str) -> &str {
+        name.strip_prefix(self.prefix()).unwrap_or(name)
+    }
+
+    /// The beginning of the names of parameters of this role.
+    fn prefix(self) -> &'static str {
         match self {
-            Self::Start => format!("start.{target}"),
-            Self::Noise => format!("noise.{target}"),
-            Self::Physical | Self::Effect => target.into(),
+            Self::Start => "start.",
+            Self::Noise => "noise.",
+            Self::Parameter | Self::Magnitude => "",
         }
     }
 }
@@ -66,7 +78,7 @@ impl Parameter {
             unit: unit.into(),
             prior,
             bounds: prior,
-            role: Role::Physical,
+            role: Role::Parameter,
         }
     }
 
@@ -87,6 +99,19 @@ impl Parameter {
             value,
             bounds: self.bounds.to_string(),
         })
+    }
+
+    /// Returns the state of a start, the state or output of a noise level, and the whole name of any other parameter.
+    pub(crate) fn target(&self) -> &str {
+        self.role.target(&self.name)
+    }
+
+    /// Returns the range that fits start in: the bounds, or the prior of a magnitude, whose bounds are wide in any unit.
+    pub(crate) fn start_range(&self) -> Interval {
+        match self.role {
+            Role::Magnitude => self.prior,
+            _ => self.bounds,
+        }
     }
 
     /// Sets the role.
@@ -225,12 +250,15 @@ impl ParameterSpace {
             .collect()
     }
 
-    /// Uniform in the physical bounds, from the noise source `theta`.
+    /// Uniform in the physical bounds, magnitudes of effects in their prior; from the noise source `theta`.
     pub fn draw_bounds(&self, noise: Noise) -> Vec<f64> {
         let mut source = noise.source("theta");
         self.0
             .iter()
-            .map(|p| p.bounds.low() + source.uniform() * p.bounds.width())
+            .map(|p| {
+                let range = p.start_range();
+                range.low() + source.uniform() * range.width()
+            })
             .collect()
     }
 }

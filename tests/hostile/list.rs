@@ -162,6 +162,12 @@ fn limits_of_the_system_are_named() {
     one_line(call, &output, &["bank", "ulimit -f"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(files(place.path()).is_empty());
+    let call = "simulate --twin van-der-pol --theta nu=1 --out s.csv";
+    one_line(
+        call,
+        &limited("-f 0", call),
+        &["error: s.csv: File too large (os error 27); raise"],
+    );
     let call = "twins --threads 1024";
     let output = limited("-v 400000", call);
     one_line(call, &output, &["threads", "--threads", "ulimit -v"]);

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
-use truetwin::estimator::{EstimateOptions, Estimator, PretrainError, PretrainOptions, pretrain};
+use truetwin::estimator::{EstimateOptions, Estimator, EstimatorError, PretrainOptions, pretrain};
 use truetwin::evaluate::paper::reference_studies;
 use truetwin::progress::{Listener, Progress};
 use truetwin::record::Signals;
@@ -318,7 +318,7 @@ impl DigitalTwin for Broken {
 fn a_diverging_twin_stops_with_the_remedy() {
     let study = Study::new("broken", Broken, RecordPlan::autonomous(0.1, 100)).unwrap();
     let error = pretrain(&study, &PretrainOptions::default(), &Progress::silent()).unwrap_err();
-    assert!(matches!(error, PretrainError::Bank(_)));
+    assert!(matches!(error, EstimatorError::Hopeless { .. }));
     let text = error.to_string();
     assert!(
         text.contains("diverged at t = 0.5 s") && text.contains("shrink the prior"),

@@ -5,7 +5,7 @@ use crate::diagnose::explain::frequency::peaks;
 use crate::diagnose::fitting::climb::{Fitted, climb, fit};
 use crate::diagnose::fitting::problem::Problem;
 use crate::diagnose::fitting::reference::{Gain, Reference};
-use crate::diagnose::hypotheses::candidate::Addition;
+use crate::diagnose::hypotheses::candidate::{Addition, Candidate, Kind};
 use crate::diagnose::hypotheses::dictionary::{Dictionary, Point};
 use crate::diagnose::hypotheses::variant::Variant;
 use crate::diagnose::test::fitted_twin::FittedTwin;
@@ -173,9 +173,10 @@ fn best_points(
             let mut m = point.m.clone();
             if point.linear && gain.alpha != 0.0 {
                 // A noise's square is what adds up.
-                m[0] *= match axis.bounds.low() > 0.0 {
-                    true => gain.alpha.clamp(0.01, 100.0).sqrt(),
-                    false => gain.alpha,
+                m[0] *= if axis.bounds.low() > 0.0 {
+                    gain.alpha.clamp(0.01, 100.0).sqrt()
+                } else {
+                    gain.alpha
                 };
             }
             (point.variant, m)
@@ -235,7 +236,7 @@ pub(super) fn base_validation(
     let Some(records) = validation else {
         return Ok(None);
     };
-    let theta = model.problem.of_record(0, &model.fitted.theta);
+    let theta = model.theta();
     elsewhere(&model.problem.on(records), &theta)
 }
 
@@ -321,16 +322,21 @@ pub(in crate::diagnose) fn probabilities(explanations: &[Explanation]) -> Vec<f6
 }
 
 impl FittedTwin<'_> {
+    /// The candidate of an explanation.
+    pub fn candidate(&self, explanation: &Explanation) -> &Candidate {
+        &self.dictionary.candidates[explanation.candidate]
+    }
+
     /// The effect of an explanation as an addition to the twin.
     pub fn addition(&self, explanation: &Explanation) -> Option<Addition> {
         let candidate = &self.dictionary.candidates[explanation.candidate];
         match &candidate.kind {
-            crate::diagnose::hypotheses::candidate::Kind::Listed(effect) => Some(Addition {
+            Kind::Listed(effect) => Some(Addition {
                 effect: effect.clone(),
                 held: self.dictionary.variants[explanation.variant].held.clone(),
                 kept: self.dictionary.variants[explanation.variant].kept,
             }),
-            crate::diagnose::hypotheses::candidate::Kind::CatchAll(..) => None,
+            Kind::CatchAll(..) => None,
         }
     }
 

@@ -24,13 +24,18 @@ pub(in crate::diagnose) struct Accepted {
 
 impl Accepted {
     pub fn key(&self) -> String {
-        format!("{}@{}", self.id, self.target)
+        crate::effect::EffectKey::new(&self.id, &self.target).to_string()
     }
 
     /// Returns true where only the noise changes, so that no free run moves.
     pub fn is_noise(&self) -> bool {
         self.addition.effect.law().is_noise()
     }
+}
+
+/// Effects that are added to the twin.
+pub(in crate::diagnose) fn additions(accepted: &[Accepted]) -> Vec<Addition> {
+    accepted.iter().map(|a| a.addition.clone()).collect()
 }
 
 /// A twin with accepted effects, fitted.
@@ -53,7 +58,7 @@ pub(in crate::diagnose) fn extend<'a>(
         return Ok(None);
     };
     let variant = &model.dictionary.variants[explanation.variant];
-    let candidate = &model.dictionary.candidates[explanation.candidate];
+    let candidate = model.candidate(explanation);
     let mut all = accepted.to_vec();
     all.push(Accepted {
         addition,
@@ -63,7 +68,7 @@ pub(in crate::diagnose) fn extend<'a>(
         gain: explanation.gain + explanation.validation.unwrap_or(0.0),
         probability,
     });
-    let additions: Vec<Addition> = all.iter().map(|a| a.addition.clone()).collect();
+    let additions = additions(&all);
     let left: Vec<Candidate> = (model.dictionary.candidates.iter())
         .filter(|c| !c.is_listed() || !all.iter().any(|a| a.key() == c.key()))
         .cloned()
@@ -91,7 +96,7 @@ pub(in crate::diagnose) fn magnitudes(
     model: &FittedTwin<'_>,
     explanation: &Explanation,
 ) -> Vec<(String, f64)> {
-    let candidate = &model.dictionary.candidates[explanation.candidate];
+    let candidate = model.candidate(explanation);
     let variant = &model.dictionary.variants[explanation.variant];
     let problem = variant.problem(&model.problem);
     let theta = problem.of_record(0, &explanation.fitted.theta);
@@ -118,8 +123,8 @@ pub(in crate::diagnose) fn improves(
         return Ok(false);
     };
     let errors = |model: &FittedTwin<'_>, accepted: &[Accepted]| -> Result<_, DiagnoseError> {
-        let additions: Vec<Addition> = accepted.iter().map(|a| a.addition.clone()).collect();
-        let theta = model.problem.of_record(0, &model.fitted.theta);
+        let additions = additions(accepted);
+        let theta = model.theta();
         Ok(Runner::new(context.twin, &additions, theta)?.errors(&records[0], 0))
     };
     let (before, after) = (

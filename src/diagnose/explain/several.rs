@@ -89,7 +89,7 @@ fn best_pair<'a>(
     (first, statistics): (&ExtendedTwin<'a>, &Statistics),
     stage: &Stage,
 ) -> Result<Option<ExtendedTwin<'a>>, DiagnoseError> {
-    let key = |e: &Explanation| model.dictionary.candidates[e.candidate].key();
+    let key = |e: &Explanation| model.candidate(e).key();
     let chances = probabilities(&listed.iter().map(|e| (*e).clone()).collect::<Vec<_>>());
     let mut tried = vec![first.accepted[0].key()];
     let mut best = beside(context, first, statistics, stage)?.best;
@@ -225,7 +225,7 @@ fn without<'a>(
         .map(|(_, accepted)| accepted)
         .collect();
     let [kept] = kept[..] else { return Ok(None) };
-    let theta = pair.model.problem.of_record(0, &pair.model.fitted.theta);
+    let theta = pair.model.theta();
     let own = &theta[..model.problem.twin.parameters().len()];
     let explanation = refitted(model, kept, own, context.validation)?;
     match explanation {

@@ -29,7 +29,7 @@ pub(in crate::diagnose) fn inside<'a>(problem: &Problem<'a>) -> Problem<'a> {
     let space = problem.twin.parameters();
     let axes = (space.iter().zip(&problem.axes))
         .map(|(p, axis)| match p.role {
-            Role::Physical => axis.clone().inside(p.prior),
+            Role::Parameter => axis.clone().inside(p.prior),
             _ => axis.clone(),
         })
         .collect::<Vec<Axis>>();
@@ -45,7 +45,7 @@ pub(in crate::diagnose) fn left_the_prior(
 ) -> Result<(bool, Option<Fitted>), DiagnoseError> {
     let space = problem.twin.parameters();
     let theta = problem.of_record(0, &fitted.theta);
-    let own = || (space.iter().zip(&theta)).filter(|(p, _)| p.role == Role::Physical);
+    let own = || (space.iter().zip(&theta)).filter(|(p, _)| p.role == Role::Parameter);
     let beyond = own().filter(|(p, v)| !p.prior.contains(**v)).count();
     if beyond == 0 {
         return Ok((false, None));

@@ -36,7 +36,7 @@ impl Axis {
         if bounds.low() > 0.0 {
             let span = (prior.high() / prior.low()).ln() / 12f64.sqrt();
             let within = match p.role {
-                Role::Physical => Interval::unchecked(
+                Role::Parameter => Interval::unchecked(
                     bounds.low().max((centre / FACTOR).min(prior.low())),
                     bounds.high().min((FACTOR * centre).max(prior.high())),
                 ),

@@ -155,9 +155,10 @@ impl Reference {
         let square = direction.norm_squared();
         let with_theta = self.directions.tr_mul(direction);
         let own = square - with_theta.dot(&self.factor.solve(&with_theta));
-        match own > COLLINEAR * square && own.is_finite() {
-            true => own,
-            false => 0.0,
+        if own > COLLINEAR * square && own.is_finite() {
+            own
+        } else {
+            0.0
         }
     }
 

@@ -7,7 +7,7 @@ use crate::diagnose::thresholds::Thresholds;
 use crate::effect::{Effect, EffectKey, EffectPattern, Magnitude, augment_short};
 use crate::record::Signals;
 use crate::study::Study;
-use crate::twin::{Outline, Role, Twin, fix};
+use crate::twin::{Outline, Role, Twin, fix, is_memory};
 use std::collections::BTreeMap;
 
 /// A listed effect, or a catch-all.
@@ -30,7 +30,7 @@ pub(in crate::diagnose) struct Candidate {
 impl Candidate {
     /// `id@target`.
     pub fn key(&self) -> String {
-        format!("{}@{}", self.id, self.target)
+        EffectKey::new(&self.id, &self.target).to_string()
     }
 
     pub fn is_listed(&self) -> bool {
@@ -135,11 +135,11 @@ fn already(study: &Study) -> Vec<String> {
 
 fn catch_alls(outline: &Outline) -> Vec<Candidate> {
     let states = (outline.states.iter().enumerate())
-        .filter(|(_, s)| !s.name.contains('/'))
+        .filter(|(_, s)| !is_memory(&s.name))
         .map(|(i, s)| (Entry::State(i), s.name.clone()));
     let sensors = numbered("sensor", outline.outputs.len(), Entry::Sensor);
     let parameters = (outline.parameters.iter().enumerate())
-        .filter(|(_, p)| p.role == Role::Physical)
+        .filter(|(_, p)| p.role == Role::Parameter)
         .map(|(i, p)| (Entry::Parameter(i), p.name.clone()));
     disturbances(states.chain(sensors).chain(parameters))
 }

@@ -23,7 +23,7 @@ pub(in crate::diagnose) fn disturbed(base: Twin, entry: Entry, memory: f64) -> T
     };
     let mut outline = base.outline();
     outline.states.push(Quantity::new("disturbance/0", ""));
-    let sigma = Parameter::new("disturbance", "", 0.01, 1.0).with_role(Role::Effect);
+    let sigma = Parameter::new("disturbance", "", 0.01, 1.0).with_role(Role::Magnitude);
     outline.parameters = ParameterSpace::new(outline.parameters.iter().cloned().chain([sigma]));
     Twin::Equations(Arc::new(Modified(Disturbed {
         base,

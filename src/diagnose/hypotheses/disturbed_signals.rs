@@ -42,7 +42,7 @@ impl Disturbed {
 
 impl DigitalTwin for Disturbed {
     fn parameters(&self) -> ParameterSpace {
-        let sigma = Parameter::new("disturbance", "", 0.01, 1.0).with_role(Role::Effect);
+        let sigma = Parameter::new("disturbance", "", 0.01, 1.0).with_role(Role::Magnitude);
         ParameterSpace::new(self.base.parameters().iter().cloned().chain([sigma]))
     }
     fn signals(&self) -> Signals {

@@ -53,7 +53,7 @@ pub(in crate::diagnose) fn locate(
         // No disturbance was among the candidates: the best one says where.
         location.target = disturbances(model, explanations)
             .first()
-            .map(|(e, _)| model.dictionary.candidates[e.candidate].target.clone());
+            .map(|(e, _)| model.candidate(e).target.clone());
     }
     let discovery = match conclusion.decision {
         Decision::NoneOfThese => regressed(
@@ -80,7 +80,7 @@ fn regressed(
     noise: Noise,
 ) -> Result<Option<Discovery>, DiagnoseError> {
     let all = disturbances(model, explanations);
-    let name = |e: &Explanation| &model.dictionary.candidates[e.candidate].target;
+    let name = |e: &Explanation| &model.candidate(e).target;
     let named = all.iter().find(|(e, _)| Some(name(e).as_str()) == target);
     let Some((explanation, _)) = named.or(all.first()) else {
         return Ok(None);

@@ -42,7 +42,7 @@ pub(in crate::diagnose) fn disturbances<'e>(
     let mut which: Vec<&Explanation> = vec![];
     for e in explanations {
         // Best first.
-        let Kind::CatchAll(entry, _) = &model.dictionary.candidates[e.candidate].kind else {
+        let Kind::CatchAll(entry, _) = &model.candidate(e).kind else {
             continue;
         };
         if matches!(entry, Entry::Parameter(_)) || entries.contains(entry) {
@@ -75,7 +75,7 @@ pub(in crate::diagnose) fn missing_term(
         records.push(smoothed);
     }
     let inputs = problem.records[0].drive().inputs().ncols();
-    let candidate = &model.dictionary.candidates[explanation.candidate];
+    let candidate = model.candidate(explanation);
     let equation = match &candidate.kind {
         Kind::CatchAll(Entry::Sensor(j), _) => twin.signals().outputs[*j].name.clone(),
         _ => candidate.target.clone(),

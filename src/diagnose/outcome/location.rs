@@ -170,7 +170,7 @@ pub struct TermRange {
 }
 
 /// One cell of a map.
-pub trait Cell {
+pub(crate) trait Cell {
     /// Family-wise p-value.
     fn p_value(&self) -> f64;
     /// Share of what the list divides.

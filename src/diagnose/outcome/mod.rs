@@ -2,9 +2,9 @@
 
 mod location;
 
+pub(crate) use location::Cell;
 pub use location::{
-    Band, Cell, Channel, Equation, Lag, Location, Maps, Onset, Region, TargetShare, TermRange,
-    Window,
+    Band, Channel, Equation, Lag, Location, Maps, Onset, Region, TargetShare, TermRange, Window,
 };
 
 use crate::record::{Drive, Signal};
@@ -132,7 +132,7 @@ pub struct EffectFit {
 impl EffectFit {
     /// `id@target`.
     pub fn key(&self) -> String {
-        format!("{}@{}", self.id, self.target)
+        crate::effect::EffectKey::new(&self.id, &self.target).to_string()
     }
 }
 

@@ -4,12 +4,11 @@ use crate::diagnose::context::Context;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::explain::attribute::Explanation;
 use crate::diagnose::explain::decide::Conclusion;
-use crate::diagnose::explain::extended::{Accepted, ExtendedTwin};
+use crate::diagnose::explain::extended::{Accepted, ExtendedTwin, additions};
 use crate::diagnose::fitting::climb::{Fitted, fit};
 use crate::diagnose::fitting::first_part::first_part;
 use crate::diagnose::fitting::posterior::posterior;
 use crate::diagnose::fitting::problem::Problem;
-use crate::diagnose::hypotheses::candidate::Addition;
 use crate::diagnose::outcome::Shrinkage;
 use crate::diagnose::settings::DiagnoseSettings;
 use crate::diagnose::test::fitted_twin::FittedTwin;
@@ -38,18 +37,14 @@ pub(in crate::diagnose) fn shrinkage(
     noise: Noise,
 ) -> Result<Option<Shrinkage>, DiagnoseError> {
     let twin = context.twin;
-    let additions: Vec<Addition> = conclusion
-        .accepted
-        .iter()
-        .map(|a| a.addition.clone())
-        .collect();
+    let additions = additions(&conclusion.accepted);
     let whole = &model.problem.records[0];
     // The held-out record, its first sample that counts, and θ fitted without it.
     let short: Vec<Record>;
     let (record, from, base, grown, held_out) = match context.validation {
         Some(records) => {
-            let base = model.problem.of_record(0, &model.fitted.theta);
-            let grown = extended.map(|s| s.model.problem.of_record(0, &s.model.fitted.theta));
+            let base = model.theta();
+            let grown = extended.map(|s| s.model.theta());
             (&records[0], 0, Some(base), grown, "validation record")
         }
         None if whole.samples() >= SHORTEST_SPLIT => {
@@ -59,13 +54,10 @@ pub(in crate::diagnose) fn shrinkage(
                 let problem = problem.on(&short);
                 Ok(fit(&problem, &[problem.full(theta)], 10)?.map(|f| f.theta))
             };
-            let base = model.problem.of_record(0, &model.fitted.theta);
+            let base = model.theta();
             let base = refit(&model.problem, &base)?;
             let grown = match extended {
-                Some(s) => refit(
-                    &s.model.problem,
-                    &s.model.problem.of_record(0, &s.model.fitted.theta),
-                )?,
+                Some(s) => refit(&s.model.problem, &s.model.theta())?,
                 None => None,
             };
             (whole, split, base, grown, "last third of the record")

@@ -1,7 +1,7 @@
 //! The record to measure next, so that rivals are told apart.
 //!
 //! Inputs of several kinds, within the range of those that were applied, are tried on the fitted rivals: simulate one, filter
-//! with all; what the innovations of two differ by, beyond what θ can answer, is what an input is worth (`scan.rs`). The best is
+//! with all; what the innovations of two differ by, beyond what θ can answer, is what an input is worth (`reference.rs`). The best is
 //! tried in earnest: each rival is fitted anew to the present records and a simulated next one together, and a record counts
 //! as telling when the rival that made it leads all others by more than a class is wide.
 //!

@@ -140,9 +140,10 @@ fn least(
                 distance: share.abs(),
             }));
         }
-        match root < need {
-            true => low = share,
-            false => high = Some(share),
+        if root < need {
+            low = share;
+        } else {
+            high = Some(share);
         }
         // As if the root were proportional, within what is known.
         let guess = share * (need / root.max(1e-3 * need)).clamp(0.05, 8.0);

@@ -62,7 +62,7 @@ impl Bins {
     pub fn new(outline: &Outline, states: &[(Filtered, Signal)], records: &[Record]) -> Self {
         let own: Vec<String> = (outline.states.iter())
             .map(|s| s.name.clone())
-            .take_while(|name| !name.contains('/'))
+            .take_while(|name| !crate::twin::is_memory(name))
             .collect();
         let n = own.len();
         let (inputs, outputs) = (&outline.inputs, &outline.outputs);

@@ -40,9 +40,10 @@ pub(in crate::diagnose) fn shares(
                 .filter(|(f, _)| *f == own)
                 .map(|(_, g)| g.max(0.0))
                 .sum();
-            let share = match total > 0.0 {
-                true => gain.max(0.0) / total,
-                false => 0.0,
+            let share = if total > 0.0 {
+                gain.max(0.0) / total
+            } else {
+                0.0
             };
             // Every variable sorts the same samples: all of them together are the whole.
             match own.0 {

@@ -21,6 +21,11 @@ pub(in crate::diagnose) struct FittedTwin<'a> {
 }
 
 impl<'a> FittedTwin<'a> {
+    /// θ of the first record.
+    pub fn theta(&self) -> Vec<f64> {
+        self.problem.of_record(0, &self.fitted.theta)
+    }
+
     /// Builds the dictionary of effects around a fit; `None` where the twin cannot be filtered there.
     pub fn new(
         twin: &Twin,

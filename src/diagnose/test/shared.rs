@@ -128,9 +128,13 @@ fn moved(
     }
     let (samples, p) = moved.innovations.dim();
     for k in 0..samples {
-        let s = DMatrix::from_fn(p, p, |i, j| match i == j {
-            true => moved.covariances[[k, i, i]].max(KEPT * here.covariances[[k, i, i]]),
-            false => moved.covariances[[k, i, j]],
+        let s = DMatrix::from_fn(p, p, |i, j| {
+            let moved = moved.covariances[[k, i, j]];
+            if i == j {
+                moved.max(KEPT * here.covariances[[k, i, i]])
+            } else {
+                moved
+            }
         });
         let e = DVector::from_fn(p, |j, _| moved.innovations[[k, j]]);
         let (v, _) = standardised(&s, &e);

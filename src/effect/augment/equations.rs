@@ -6,9 +6,7 @@ use crate::effect::law::{
     ForceLaw, ForcePoint, Instant, Law, LimitLaw, NOISE_ENTERS, NoiseLaw, ParameterLaw, SignalLaw,
 };
 use crate::record::{Quantity, Signal};
-use crate::twin::{
-    Integrator, Interval, Noise, Now, Outliers, Outline, SimulationError, StateSpace,
-};
+use crate::twin::{Modify, Noise, Now, Outliers, Outline, SimulationError, StateSpace};
 use smallvec::SmallVec;
 use std::ops::Range;
 use std::sync::Arc;
@@ -44,7 +42,6 @@ struct OnSignal {
 }
 
 impl AugmentedEquations {
-    /// `base` must show its equations.
     pub(super) fn new(base: Arc<dyn StateSpace>, slots: Slots) -> Self {
         let mut outline = base.outline();
         let (states, inputs) = (outline.states.len(), outline.inputs.len());
@@ -189,7 +186,19 @@ impl OnSignal {
     }
 }
 
-impl StateSpace for AugmentedEquations {
+impl Modify for AugmentedEquations {
+    fn base(&self) -> &dyn StateSpace {
+        self.base.as_ref()
+    }
+
+    fn added(&self) -> usize {
+        self.outline.states.len() - self.states
+    }
+
+    fn theta<R>(&self, theta: &[f64], then: impl FnOnce(&[f64]) -> R) -> R {
+        then(&theta[..self.slots.base])
+    }
+
     fn outline(&self) -> Outline {
         self.outline.clone()
     }
@@ -293,12 +302,6 @@ impl StateSpace for AugmentedEquations {
         }
     }
 
-    fn limits(&self) -> Vec<Interval> {
-        let mut limits = self.base.as_ref().limits();
-        limits.resize(self.outline.states.len(), Interval::EVERYTHING);
-        limits
-    }
-
     fn constrain(&self, now: &Now<'_>, x: &mut [f64]) {
         for Placed { law, at } in &self.ceilings {
             let (i, j) = (at.target, at.other.filter(|j| *j != at.target));
@@ -311,19 +314,13 @@ impl StateSpace for AugmentedEquations {
         });
     }
 
-    fn integrator(&self) -> Integrator {
-        self.base.as_ref().integrator()
-    }
-
     fn check_parameters(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {
-        self.base
-            .as_ref()
-            .check_parameters(&theta[..self.slots.base], dt)?;
+        self.theta(theta, |theta| self.base.check_parameters(theta, dt))?;
         self.slots.check(theta, dt)
     }
 
     fn outliers(&self, theta: &[f64]) -> Vec<Outliers> {
-        let mut all = self.base.as_ref().outliers(&theta[..self.slots.base]);
+        let mut all = self.theta(theta, |theta| self.base.outliers(theta));
         for slot in &self.slots.all {
             let Law::Outliers(law) = slot.effect.law() else {
                 continue;
@@ -339,9 +336,9 @@ impl StateSpace for AugmentedEquations {
     }
 
     fn corrupt_outputs(&self, theta: &[f64], noise: Noise, outputs: &mut Signal) {
-        self.base
-            .as_ref()
-            .corrupt_outputs(&theta[..self.slots.base], noise, outputs);
+        self.theta(theta, |theta| {
+            self.base.corrupt_outputs(theta, noise, outputs);
+        });
         for slot in &self.slots.all {
             strike(slot, theta, noise, outputs);
         }

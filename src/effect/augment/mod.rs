@@ -8,7 +8,7 @@ use super::check::{check_effects, targets};
 use super::error::EffectError;
 use super::law::Law;
 use super::placed::Effect;
-use crate::twin::{Interval, Parameter, ParameterSpace, Role, SimulationError, Twin};
+use crate::twin::{Interval, Modified, Parameter, ParameterSpace, Role, SimulationError, Twin};
 use black_box::AugmentedBlackBox;
 use equations::AugmentedEquations;
 use std::collections::BTreeMap;
@@ -64,7 +64,9 @@ pub(crate) fn augment_short(
     check_effects(&effects, outline.as_ref(), &base.signals())?;
     let slots = Slots::of(&base, &effects, &memories);
     Ok(match base {
-        Twin::Equations(base) => Twin::Equations(Arc::new(AugmentedEquations::new(base, slots))),
+        Twin::Equations(base) => {
+            Twin::Equations(Arc::new(Modified(AugmentedEquations::new(base, slots))))
+        }
         Twin::BlackBox(base) => Twin::BlackBox(Arc::new(AugmentedBlackBox::new(base, slots))),
     })
 }
@@ -179,16 +181,19 @@ impl Slots {
     }
 }
 
-/// Magnitudes as parameters: bounds from their limits, made finite by the largest start.
+/// Bounds of a magnitude whose limits are open, in multiples of its largest start. Starts are for a signal of size 1; a
+/// sensor may read pascals or nanometres, so that the bounds must be wide. They are finite for the sake of differences near
+/// them; fits start within the prior ([`Parameter::start_range`]).
+const WIDE: f64 = 1e6;
+
+/// Returns the magnitudes as parameters.
 fn magnitude_parameters(effect: &Effect) -> Vec<Parameter> {
     (effect.magnitudes().iter())
         .map(|m| {
             let reach = m.starts.iter().fold(1e-6, |a: f64, s| a.max(s.abs()));
-            let off = m.off.filter(|v| v.is_finite()).unwrap_or(0.0);
-            let finite =
-                |limit: f64, fallback: f64| if limit.is_finite() { limit } else { fallback };
-            let low = finite(m.limits.low(), off.min(0.0) - 10.0 * reach);
-            let high = finite(m.limits.high(), off.max(0.0) + 10.0 * reach);
+            let finite = |limit: f64, open: f64| if limit.is_finite() { limit } else { open };
+            let low = finite(m.limits.low(), -WIDE * reach);
+            let high = finite(m.limits.high(), WIDE * reach);
             // What a file holds is within bounds, however far from the starts.
             let given = effect.given().get(m.name).filter(|v| v.is_finite());
             let bounds = Interval::unchecked(
@@ -205,7 +210,7 @@ fn magnitude_parameters(effect: &Effect) -> Vec<Parameter> {
                 unit: m.unit.into(),
                 prior: if prior.check().is_ok() { prior } else { bounds },
                 bounds,
-                role: Role::Effect,
+                role: Role::Magnitude,
             }
         })
         .collect()

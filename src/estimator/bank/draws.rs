@@ -1,6 +1,7 @@
 //! Many simulations, row by row.
 
-use super::{BankError, DrawError, FeatureSimulator};
+use super::simulator::FeatureSimulator;
+use crate::estimator::error::EstimatorError;
 use crate::progress::Stage;
 use crate::record::Drive;
 use crate::twin::Noise;
@@ -15,17 +16,6 @@ const ATTEMPTS: usize = 200;
 const HOPELESS: f64 = 0.9;
 
 /// Where to simulate.
-///
-/// ```
-/// use std::borrow::Cow;
-/// use truetwin::estimator::bank::Draw;
-/// use truetwin::record::Drive;
-///
-/// let drive = Drive::autonomous(0.05, 200)?;
-/// let draw = Draw { theta: vec![1.5], drive: Cow::Borrowed(&drive) }; // see `Draws` for its use
-/// assert_eq!(draw.drive.samples(), 200);
-/// # Ok::<(), truetwin::record::RecordError>(())
-/// ```
 #[derive(Debug, Clone)]
 pub struct Draw<'a> {
     /// Parameters.
@@ -130,9 +120,9 @@ impl FeatureSimulator {
         &self,
         rows: Range<u64>,
         noise: impl Fn(u64) -> Noise + Sync,
-        draw: impl Fn(u64, usize, Noise) -> Result<Option<Draw<'a>>, BankError> + Sync,
+        draw: impl Fn(u64, usize, Noise) -> Result<Option<Draw<'a>>, EstimatorError> + Sync,
         stage: &Stage,
-    ) -> Result<Draws, BankError> {
+    ) -> Result<Draws, EstimatorError> {
         let rows: Vec<Row> = rows
             .into_par_iter()
             .map(|i| {
@@ -140,12 +130,12 @@ impl FeatureSimulator {
                 stage.tick()?;
                 Ok(row)
             })
-            .collect::<Result<_, BankError>>()?;
+            .collect::<Result<_, EstimatorError>>()?;
         let size = rows.len();
         let failed: usize = rows.iter().map(|row| row.failed).sum();
         if failed as f64 > HOPELESS * (size + failed) as f64 {
             let reason = rows.iter().rev().find_map(|row| row.reason.clone());
-            return Err(BankError::Hopeless {
+            return Err(EstimatorError::Hopeless {
                 failed,
                 tried: size + failed,
                 reason: reason.unwrap_or_default(),
@@ -170,8 +160,8 @@ impl FeatureSimulator {
         &self,
         i: u64,
         noise: Noise,
-        draw: &impl Fn(u64, usize, Noise) -> Result<Option<Draw<'a>>, BankError>,
-    ) -> Result<Row, BankError> {
+        draw: &impl Fn(u64, usize, Noise) -> Result<Option<Draw<'a>>, EstimatorError>,
+    ) -> Result<Row, EstimatorError> {
         let (mut rejected, mut failed, mut reason) = (0, 0, None);
         while failed < ATTEMPTS && rejected < ATTEMPTS {
             let attempt = rejected + failed;
@@ -193,14 +183,14 @@ impl FeatureSimulator {
                         reason,
                     });
                 }
-                Err(DrawError::Rejected(text)) => {
+                Err(EstimatorError::Rejected(text)) => {
                     failed += 1;
                     reason = Some(text);
                 }
-                Err(DrawError::Fatal(error)) => return Err(error),
+                Err(error) => return Err(error),
             }
         }
-        Err(BankError::Hopeless {
+        Err(EstimatorError::Hopeless {
             failed: rejected + failed,
             tried: rejected + failed,
             reason: reason.unwrap_or_else(|| "out of bounds".into()),
@@ -215,7 +205,7 @@ impl FeatureSimulator {
         size: usize,
         noise: impl Fn(u64) -> Noise + Sync,
         stage: &Stage,
-    ) -> Result<Array2<f64>, BankError> {
+    ) -> Result<Array2<f64>, EstimatorError> {
         let draw = |_, _, _| {
             Ok(Some(Draw {
                 theta: theta.to_vec(),
@@ -240,7 +230,7 @@ mod tests {
         FeatureSimulator::new(Arc::new(twin), &Ar { order: 2 }).unwrap()
     }
 
-    fn bank(simulator: &FeatureSimulator, size: usize) -> Result<Draws, BankError> {
+    fn bank(simulator: &FeatureSimulator, size: usize) -> Result<Draws, EstimatorError> {
         let drive = Drive::autonomous(0.05, 60).unwrap();
         let space = simulator.twin().parameters();
         simulator.draws(
@@ -311,6 +301,6 @@ mod tests {
     #[test]
     fn a_twin_that_nearly_always_diverges_stops_the_work() {
         let error = bank(&simulator(Fragile(0.97)), 50).unwrap_err();
-        assert!(matches!(error, BankError::Hopeless { .. }), "{error}");
+        assert!(matches!(error, EstimatorError::Hopeless { .. }), "{error}");
     }
 }

@@ -20,58 +20,16 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use super::Draws;
+use super::draws::Draws;
 use super::npy;
 use super::npz::{Npz, archive};
-use crate::storage::files::{with_remedy, write_new};
-use crate::storage::untrusted::{MESSAGE, MOST_NUMBERS, Rows, excerpt, one_line};
+use crate::estimator::error::EstimatorError;
+use crate::storage::files::write_new;
+use crate::storage::untrusted::{MOST_NUMBERS, Rows, excerpt};
 use ndarray::Array2;
 use std::fs::File;
 use std::io::{self, Read, Seek};
-use std::path::{Path, PathBuf};
-
-/// Why a file of rows cannot be used.
-///
-/// ```
-/// use std::path::Path;
-/// use truetwin::estimator::bank::file::{BankFileError, read};
-///
-/// assert!(matches!(read(Path::new("no-such-bank.npz"), &["k"]), Err(BankFileError::Io { .. })));
-/// ```
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum BankFileError {
-    /// Something cannot be read or written.
-    #[error("{}: {}", path.display(), with_remedy(error))]
-    Io {
-        /// File.
-        path: PathBuf,
-        /// What the system said.
-        error: io::Error,
-    },
-    /// The file holds something else.
-    #[error("{}: no bank ({reason}); {remedy}", path.display())]
-    Content {
-        /// File.
-        path: PathBuf,
-        /// What does not fit.
-        reason: String,
-        /// What can be done.
-        remedy: &'static str,
-    },
-    /// The name does not say which form.
-    #[error("{}: banks are written and read as .npz or .csv, features also as .npy; choose such a name", .0.display())]
-    Form(PathBuf),
-}
-
-impl BankFileError {
-    pub(crate) fn io(path: &Path, error: io::Error) -> Self {
-        Self::Io {
-            path: path.into(),
-            error,
-        }
-    }
-}
+use std::path::Path;
 
 /// What to do about a file from elsewhere.
 const GIVE: &str = "give theta (rows × parameters) and features (rows × features), one simulation a row, all finite";
@@ -81,11 +39,17 @@ enum Form {
     Csv,
 }
 
-fn form(path: &Path) -> Result<Form, BankFileError> {
+fn other_form(path: &Path) -> EstimatorError {
+    let problem =
+        "banks are written and read as .npz or .csv, features also as .npy; choose such a name";
+    EstimatorError::file(path, problem)
+}
+
+fn form(path: &Path) -> Result<Form, EstimatorError> {
     match path.extension().and_then(|e| e.to_str()) {
         Some("npz") => Ok(Form::Npz),
         Some("csv") => Ok(Form::Csv),
-        _ => Err(BankFileError::Form(path.into())),
+        _ => Err(other_form(path)),
     }
 }
 
@@ -94,7 +58,7 @@ fn form(path: &Path) -> Result<Form, BankFileError> {
 /// # Errors
 ///
 /// As [`write()`].
-pub(crate) fn write_features(path: &Path, features: &Array2<f64>) -> Result<(), BankFileError> {
+pub(crate) fn write_features(path: &Path, features: &Array2<f64>) -> Result<(), EstimatorError> {
     let bytes = match path.extension().and_then(|e| e.to_str()) {
         Some("npy") => {
             let mut bytes = Vec::new();
@@ -102,11 +66,11 @@ pub(crate) fn write_features(path: &Path, features: &Array2<f64>) -> Result<(), 
         }
         Some("npz") => archive(&[("features", features)]),
         Some("csv") => csv_text(&features_alone(features), &[]),
-        _ => return Err(BankFileError::Form(path.into())),
+        _ => return Err(other_form(path)),
     };
     bytes
         .and_then(|bytes| write_new(path, &bytes))
-        .map_err(|error| BankFileError::io(path, error))
+        .map_err(|error| EstimatorError::io(path, error))
 }
 
 /// The CSV text of [`write_features`].
@@ -137,14 +101,14 @@ pub(crate) fn is_named(path: &Path) -> bool {
 /// # Errors
 ///
 /// A place that is taken or cannot be written, a name of no form.
-pub fn write(path: &Path, draws: &Draws, names: &[&str]) -> Result<(), BankFileError> {
+pub fn write(path: &Path, draws: &Draws, names: &[&str]) -> Result<(), EstimatorError> {
     let bytes = match form(path)? {
         Form::Npz => npz(draws),
         Form::Csv => csv_text(draws, names),
     };
     bytes
         .and_then(|bytes| write_new(path, &bytes))
-        .map_err(|error| BankFileError::io(path, error))
+        .map_err(|error| EstimatorError::io(path, error))
 }
 
 /// Reads a file in the form that its name ends with, of a twin with these parameters.
@@ -152,14 +116,10 @@ pub fn write(path: &Path, draws: &Draws, names: &[&str]) -> Result<(), BankFileE
 /// # Errors
 ///
 /// A file that cannot be read, holds something else, other parameters, or numbers that are not finite.
-pub fn read(path: &Path, names: &[&str]) -> Result<Draws, BankFileError> {
+pub fn read(path: &Path, names: &[&str]) -> Result<Draws, EstimatorError> {
     let form = form(path)?;
-    let file = File::open(path).map_err(|error| BankFileError::io(path, error))?;
-    let wrong = |reason: String| BankFileError::Content {
-        path: path.into(),
-        reason: one_line(&reason, MESSAGE),
-        remedy: GIVE,
-    };
+    let file = File::open(path).map_err(|error| EstimatorError::io(path, error))?;
+    let wrong = |reason: String| EstimatorError::no_bank(path, &reason, GIVE);
     let draws = match form {
         Form::Npz => from_npz(io::BufReader::new(file)).map_err(wrong)?,
         Form::Csv => from_csv(file, names).map_err(wrong)?,

@@ -8,7 +8,6 @@
 //! | exchange rows with NumPy and spreadsheets | [`mod@file`] |
 
 mod draws;
-mod error;
 pub mod file;
 mod npy;
 mod npz;
@@ -16,6 +15,5 @@ mod parts;
 mod simulator;
 
 pub use draws::{Draw, Draws};
-pub use error::{BankError, DrawError};
 pub use parts::Bank;
 pub use simulator::FeatureSimulator;

@@ -1,7 +1,7 @@
 //! Banks in parts.
 
-use super::Draws;
-use super::file::BankFileError;
+use super::draws::Draws;
+use crate::estimator::error::EstimatorError;
 use std::borrow::Cow;
 
 /// Simulations that need not fit into memory at once: rows of parameters and features, in parts.
@@ -16,7 +16,7 @@ use std::borrow::Cow;
 /// let rows = Draws { theta: array![[1.0], [2.0]], features: array![[0.1], [0.2]], redrawn: 0 };
 /// assert_eq!((rows.parts(), rows.rows()), (vec![2], 2));
 /// assert_eq!(*rows.part(0)?, rows);
-/// # Ok::<(), truetwin::estimator::bank::file::BankFileError>(())
+/// # Ok::<(), truetwin::estimator::EstimatorError>(())
 /// ```
 pub trait Bank: Sync {
     /// Rows of each part, in order.
@@ -27,7 +27,7 @@ pub trait Bank: Sync {
     /// # Errors
     ///
     /// A part that cannot be read, or is not what it was.
-    fn part(&self, index: usize) -> Result<Cow<'_, Draws>, BankFileError>;
+    fn part(&self, index: usize) -> Result<Cow<'_, Draws>, EstimatorError>;
 
     /// All rows.
     fn rows(&self) -> usize {
@@ -41,7 +41,7 @@ impl Bank for Draws {
         vec![self.theta.nrows()]
     }
 
-    fn part(&self, _: usize) -> Result<Cow<'_, Draws>, BankFileError> {
+    fn part(&self, _: usize) -> Result<Cow<'_, Draws>, EstimatorError> {
         Ok(Cow::Borrowed(self))
     }
 }

@@ -1,6 +1,6 @@
 //! A twin seen through its features.
 
-use super::{BankError, DrawError};
+use crate::estimator::error::EstimatorError;
 use crate::feature::{Centred, FeatureError, FeatureMap, FeatureRecipe};
 use crate::record::{Drive, Record};
 use crate::twin::{Noise, Twin};
@@ -105,15 +105,15 @@ impl FeatureSimulator {
         theta: &[f64],
         drive: &Drive,
         noise: Noise,
-    ) -> Result<Vec<f64>, DrawError> {
+    ) -> Result<Vec<f64>, EstimatorError> {
         let outputs = match self.twin.simulate(theta, drive, noise) {
             Ok(outputs) => outputs,
             Err(error) if error.costs_one_run() => {
-                return Err(DrawError::Rejected(error.to_string()));
+                return Err(EstimatorError::Rejected(error.to_string()));
             }
-            Err(error) => return Err(BankError::Simulation(error).into()),
+            Err(error) => return Err(EstimatorError::Simulation(error)),
         };
-        let rejected = |text: String| Err(DrawError::Rejected(text));
+        let rejected = |text: String| Err(EstimatorError::Rejected(text));
         match self.map.extract(drive, &outputs) {
             Ok(features) if features.iter().all(|v| v.is_finite()) => Ok(features),
             Ok(_) => rejected("features are not finite".into()),
@@ -128,7 +128,7 @@ impl FeatureSimulator {
             Err(FeatureError::Filter(error)) if error.is_recoverable() => {
                 rejected(error.to_string())
             }
-            Err(error) => Err(BankError::Feature(error).into()),
+            Err(error) => Err(EstimatorError::Feature(error)),
         }
     }
 
@@ -140,7 +140,7 @@ impl FeatureSimulator {
         drive: &Drive,
         noise: impl Fn(u64) -> Noise + Sync,
         seeds: usize,
-    ) -> Result<DVector<f64>, DrawError> {
+    ) -> Result<DVector<f64>, EstimatorError> {
         let runs: Vec<Vec<f64>> = (0..seeds as u64)
             .into_par_iter()
             .map(|sample| self.features(theta, drive, noise(sample)))

@@ -1,5 +1,6 @@
 //! What a record tells about θ: information, standard errors, and directions in words.
 
+use crate::estimator::error::EstimatorError;
 use crate::twin::{PRIOR_DEVIATION, ParameterSpace, Role, combination, oriented};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde::Serialize;
@@ -37,25 +38,6 @@ pub struct Direction {
     pub weak: bool,
 }
 
-/// Why there is no information matrix.
-///
-/// ```
-/// use nalgebra::dmatrix;
-/// use truetwin::estimator::refine::{Information, InformationError};
-/// use truetwin::twin::{Parameter, ParameterSpace};
-///
-/// // The only feature does not move with b.
-/// let space = ParameterSpace::new([Parameter::new("a", "-", 0.0, 1.0), Parameter::new("b", "-", 0.0, 1.0)]);
-/// let refused: Result<Information, InformationError> = Information::new(&dmatrix![1.0, 0.0], &space, 0.0, 64);
-/// assert!(refused.is_err());
-/// assert!(Information::new(&dmatrix![1.0, 0.0], &space, 1e-3, 64).is_ok()); // the prior's share
-/// ```
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error(
-    "the features hold no information on {0} at the estimate; fix this parameter, or choose other features"
-)]
-pub struct InformationError(String);
-
 impl Information {
     /// From the whitened Jacobian (rank × d, inverse parameter units), λ and K.
     pub fn new(
@@ -63,7 +45,7 @@ impl Information {
         space: &ParameterSpace,
         ridge: f64,
         seeds: usize,
-    ) -> Result<Self, InformationError> {
+    ) -> Result<Self, EstimatorError> {
         let widths = DVector::from_vec(space.widths());
         let d = space.len();
         // In units of the prior's width, so that parameters of any scale are inverted alike.
@@ -78,7 +60,9 @@ impl Information {
             let weakest = flat.eigenvalues.imin();
             let direction = flat.eigenvectors.column(weakest);
             let words = combination(&space.names(), direction.as_slice());
-            return Err(InformationError(words));
+            return Err(EstimatorError::Undetermined(format!(
+                "the features hold no information on {words} at the estimate; fix this parameter, or choose other features"
+            )));
         };
         let directions = directions(&covariance, space);
         let unscale = |matrix: DMatrix<f64>, power: i32| {
@@ -104,7 +88,7 @@ impl Information {
 /// Eigen-directions of the covariance (prior widths) of the physical parameters; nuisances are marginalised out.
 fn directions(covariance: &DMatrix<f64>, space: &ParameterSpace) -> Vec<Direction> {
     let physical: Vec<usize> = (0..space.len())
-        .filter(|&j| space[j].role == Role::Physical)
+        .filter(|&j| space[j].role == Role::Parameter)
         .collect();
     if physical.is_empty() {
         return Vec::new();

@@ -47,15 +47,16 @@
 mod information;
 mod problem;
 mod settings;
-use crate::math::MathError;
-pub use information::{Direction, Information, InformationError};
+
+pub use information::{Direction, Information};
 pub use settings::RefineSettings;
 
-use crate::estimator::bank::{BankError, FeatureSimulator};
-use crate::estimator::gate::{GateError, GateSettings};
+use crate::estimator::bank::FeatureSimulator;
+use crate::estimator::error::EstimatorError;
+use crate::estimator::gate::GateSettings;
 use crate::fit::{Bounds, GaussNewton, ResidualProblem, space_filling};
-use crate::math::Whitening;
-use crate::progress::{Cancelled, Progress};
+use crate::math::{MathError, Whitening};
+use crate::progress::Progress;
 use crate::record::Drive;
 use crate::twin::{Noise, ParameterSpace};
 use nalgebra::{DMatrix, DVector};
@@ -98,53 +99,12 @@ impl Refined {
     }
 }
 
-/// Why the refinement failed.
-///
-/// ```
-/// use truetwin::progress::Cancelled;
-/// use truetwin::estimator::refine::RefineError;
-///
-/// assert_eq!(RefineError::from(Cancelled).to_string(), "cancelled");
-/// ```
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum RefineError {
-    /// The simulations failed.
-    #[error(transparent)]
-    Bank(#[from] BankError),
-    /// The covariance of the features could not be simulated.
-    #[error(transparent)]
-    Gate(#[from] GateError),
-    /// Every start failed.
-    #[error(
-        "Gauss–Newton found no estimate from {starts} starts: {last}; widen the bounds or check the twin"
-    )]
-    NoStart {
-        /// Number of starts.
-        starts: usize,
-        /// What the last one said.
-        last: String,
-    },
-    /// The search itself failed.
-    #[error(transparent)]
-    Optimise(#[from] MathError),
-    /// The information matrix is unusable.
-    #[error(transparent)]
-    Information(#[from] InformationError),
-    /// Stopped from outside.
-    #[error(transparent)]
-    Cancelled(#[from] Cancelled),
-}
-
-impl RefineError {
-    /// Whether no other start will help.
-    fn is_fatal(&self) -> bool {
-        let bank = |error: &BankError| !matches!(error, BankError::Hopeless { .. });
-        match self {
-            Self::Bank(error) | Self::Gate(GateError::Bank(error)) => bank(error),
-            Self::Optimise(MathError::Fatal(_)) | Self::Cancelled(_) => true,
-            _ => false,
-        }
+/// Whether an error ends the search for a better start.
+fn is_fatal(error: &EstimatorError) -> bool {
+    use EstimatorError::{Hopeless, Search, Undetermined, Whitening};
+    match error {
+        Search(error) => matches!(error, MathError::Fatal(_)),
+        error => !matches!(error, Hopeless { .. } | Undetermined(_) | Whitening(_)),
     }
 }
 
@@ -184,7 +144,7 @@ struct Local {
 
 impl Refinement<'_> {
     /// Runs it from `initial`.
-    pub fn run(&self, initial: &[f64]) -> Result<Refined, RefineError> {
+    pub fn run(&self, initial: &[f64]) -> Result<Refined, EstimatorError> {
         let space = self.simulator.twin().parameters();
         let settings = self.settings;
         let stage = self
@@ -207,7 +167,7 @@ impl Refinement<'_> {
         space: &ParameterSpace,
         initial: &DVector<f64>,
         stage: &crate::progress::Stage,
-    ) -> Result<(DVector<f64>, Local, usize), RefineError> {
+    ) -> Result<(DVector<f64>, Local, usize), EstimatorError> {
         let (mut best, mut failed, mut last): (Option<Candidate>, _, _) = (None, 0, String::new());
         for start in starts(space, initial, self.settings.starts)? {
             let survey = self.problem(space, initial, self.settings.survey_seeds);
@@ -221,7 +181,7 @@ impl Refinement<'_> {
                         best = Some(candidate);
                     }
                 }
-                Err(error) if error.is_fatal() => return Err(error),
+                Err(error) if is_fatal(&error) => return Err(error),
                 Err(error) => {
                     failed += 1;
                     last = error.to_string();
@@ -230,7 +190,11 @@ impl Refinement<'_> {
             stage.tick()?;
         }
         let starts = self.settings.starts;
-        let Candidate { theta, local, .. } = best.ok_or(RefineError::NoStart { starts, last })?;
+        let Candidate { theta, local, .. } = best.ok_or_else(|| {
+            EstimatorError::Undetermined(format!(
+                "Gauss–Newton found no estimate from {starts} starts: {last}; widen the bounds or check the twin"
+            ))
+        })?;
         Ok((theta, local, failed))
     }
 
@@ -239,7 +203,7 @@ impl Refinement<'_> {
         &self,
         refined: &Refined,
         theta: &[f64],
-    ) -> Result<DVector<f64>, RefineError> {
+    ) -> Result<DVector<f64>, EstimatorError> {
         let space = self.simulator.twin().parameters();
         let problem = self.problem(&space, &refined.theta, self.settings.seeds);
         let mean = problem
@@ -278,7 +242,7 @@ impl Refinement<'_> {
     }
 
     /// ∂f/∂θ at `theta`, n × d, of a few seeds, each by itself.
-    pub fn jacobians_at(&self, theta: &[f64]) -> Result<Vec<DMatrix<f64>>, RefineError> {
+    pub fn jacobians_at(&self, theta: &[f64]) -> Result<Vec<DMatrix<f64>>, EstimatorError> {
         let space = self.simulator.twin().parameters();
         let theta = DVector::from_vec(space.clamp(theta));
         let problem = self.problem(&space, &theta, self.settings.centred_seeds);
@@ -286,7 +250,7 @@ impl Refinement<'_> {
     }
 
     /// What is known around `theta` without a search.
-    pub fn describe_at(&self, theta: &[f64]) -> Result<Refined, RefineError> {
+    pub fn describe_at(&self, theta: &[f64]) -> Result<Refined, EstimatorError> {
         let space = self.simulator.twin().parameters();
         let theta = DVector::from_vec(space.clamp(theta));
         let local = self.whiten(&theta)?;
@@ -294,7 +258,7 @@ impl Refinement<'_> {
     }
 
     /// S at `theta`, from the same noise everywhere.
-    fn whiten(&self, theta: &DVector<f64>) -> Result<Local, RefineError> {
+    fn whiten(&self, theta: &DVector<f64>) -> Result<Local, EstimatorError> {
         let size = self.gate.whitening_simulations(self.simulator.dim());
         let noise = self.noise.child("whitening");
         let features = self.simulator.repeat(
@@ -304,7 +268,7 @@ impl Refinement<'_> {
             |i| noise.sample(i),
             &self.progress.unseen(),
         )?;
-        let whitening = self.gate.whiten(&features).map_err(GateError::from)?;
+        let whitening = self.gate.whiten(&features)?;
         let spread = (whitening.squared_distances(&features).iter())
             .map(|s| s.sqrt())
             .collect();
@@ -329,7 +293,7 @@ impl Refinement<'_> {
         mut problem: FeatureResidual<'_>,
         start: &DVector<f64>,
         space: &ParameterSpace,
-    ) -> Result<Candidate, RefineError> {
+    ) -> Result<Candidate, EstimatorError> {
         problem.whitening = Some(self.whiten(start)?.whitening);
         let minimum =
             self.minimiser()
@@ -352,7 +316,7 @@ impl Refinement<'_> {
         mut theta: DVector<f64>,
         mut local: Local,
         stage: &crate::progress::Stage,
-    ) -> Result<(DVector<f64>, Local), RefineError> {
+    ) -> Result<(DVector<f64>, Local), EstimatorError> {
         let mut problem = self.problem(space, initial, self.settings.seeds);
         for _ in 0..self.settings.rounds {
             problem.whitening = Some(local.whitening.clone());
@@ -383,7 +347,7 @@ impl Refinement<'_> {
         theta: DVector<f64>,
         Local { whitening, spread }: Local,
         failed_starts: usize,
-    ) -> Result<Refined, RefineError> {
+    ) -> Result<Refined, EstimatorError> {
         let problem = self.problem(space, initial, self.settings.seeds);
         let jacobian = problem.feature_jacobian(&theta).map_err(not_evaluated)?;
         let mean = problem.mean_features(&theta).map_err(not_evaluated)?;
@@ -432,7 +396,7 @@ fn starts(
     space: &ParameterSpace,
     initial: &DVector<f64>,
     count: usize,
-) -> Result<Vec<DVector<f64>>, RefineError> {
+) -> Result<Vec<DVector<f64>>, EstimatorError> {
     let mut all = vec![initial.clone()];
     all.extend(space_filling(&bounds(space)?, count - 1, 0)?);
     Ok(all)

@@ -1,6 +1,7 @@
 //! The residual that Gauss–Newton makes small, and its Jacobian by paired differences.
 
-use crate::estimator::bank::{BankError, DrawError, FeatureSimulator};
+use crate::estimator::bank::FeatureSimulator;
+use crate::estimator::error::EstimatorError;
 use crate::fit::ResidualProblem;
 use crate::math::{MathError, Stencil, Whitening};
 use crate::progress::Progress;
@@ -28,11 +29,11 @@ pub(super) struct FeatureResidual<'a> {
     pub upper: Vec<f64>,
 }
 
-impl From<DrawError> for MathError {
-    fn from(error: DrawError) -> Self {
+impl From<EstimatorError> for MathError {
+    fn from(error: EstimatorError) -> Self {
         match error {
-            DrawError::Rejected(reason) => Self::rejected(reason),
-            DrawError::Fatal(error) => Self::fatal(error),
+            EstimatorError::Rejected(reason) => Self::rejected(reason),
+            error => Self::fatal(error),
         }
     }
 }
@@ -99,12 +100,5 @@ impl ResidualProblem for FeatureResidual<'_> {
             all[(n + j, j)] = self.pull / self.widths[j];
         }
         Ok(all)
-    }
-}
-
-/// The error of a bank, where a single simulation is meant.
-impl From<BankError> for MathError {
-    fn from(error: BankError) -> Self {
-        Self::fatal(error)
     }
 }

@@ -1,6 +1,6 @@
 //! Uniform draws in the box spanned by principal axes.
 
-use super::Sampler;
+use super::sampler::Sampler;
 use crate::twin::Noise;
 use nalgebra::{DMatrix, DVector};
 

@@ -1,6 +1,8 @@
 //! The paper's mixture of two samplers.
 
-use super::{Ellipsoid, Sampler, Sensitivity};
+use super::ellipsoid::Ellipsoid;
+use super::sampler::Sampler;
+use super::sensitivity::Sensitivity;
 use crate::twin::Noise;
 use nalgebra::DVector;
 

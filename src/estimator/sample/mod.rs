@@ -5,35 +5,23 @@
 mod eigenbox;
 mod ellipsoid;
 mod hybrid;
+mod sampler;
 mod sensitivity;
 
 pub use eigenbox::EigenBox;
-pub use ellipsoid::{Ellipsoid, EllipsoidError};
-pub use hybrid::Hybrid;
-pub use sensitivity::Sensitivity;
+pub use sampler::Sampler;
 
+use crate::estimator::error::EstimatorError;
 use crate::estimator::refine::Refined;
 use crate::math::median;
-use crate::twin::{Noise, ParameterSpace};
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use crate::twin::ParameterSpace;
+use ellipsoid::Ellipsoid;
+use hybrid::Hybrid;
+use nalgebra::{DMatrix, SymmetricEigen};
+use sensitivity::Sensitivity;
 use serde::{Deserialize, Serialize};
 
-/// Draws parameters around an estimate.
-///
-/// Bounds are not a sampler's business: whoever simulates the cloud rejects what is outside, draws again with
-/// other noise, and counts.
-pub trait Sampler: Send + Sync {
-    /// Draw number `index`, which depends on it and on `noise` alone.
-    fn draw(&self, index: u64, noise: Noise) -> DVector<f64>;
-}
-
-/// Which sampler draws the cloud.
-///
-/// ```
-/// use truetwin::estimator::{CloudSampler, CloudSettings};
-///
-/// assert_eq!(CloudSettings::default().sampler, CloudSampler::Ellipsoid);
-/// ```
+/// Sampler of the cloud.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -56,7 +44,7 @@ impl CloudSampler {
         refined: &Refined,
         space: &ParameterSpace,
         spread: f64,
-    ) -> Result<Box<dyn Sampler>, EllipsoidError> {
+    ) -> Result<Box<dyn Sampler>, EstimatorError> {
         let centre = refined.theta.clone();
         let ellipsoid = || {
             let information = &refined.information.matrix / spread.powi(2);
@@ -66,7 +54,9 @@ impl CloudSampler {
             let jacobian = refined.whitened_jacobian();
             let sensitivities: Vec<f64> = jacobian.column_iter().map(|c| c.norm()).collect();
             let typical = median(&refined.spread).unwrap_or(1.0);
-            let reach: Vec<f64> = space.bounds().iter().map(|b| 0.5 * b.width()).collect();
+            let reach: Vec<f64> = (space.iter())
+                .map(|p| 0.5 * p.start_range().width())
+                .collect();
             let length = typical * refined.residual.norm();
             Sensitivity::new(centre.clone(), &sensitivities, length, &reach)
         };

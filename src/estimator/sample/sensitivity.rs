@@ -1,6 +1,6 @@
 //! Draws along single parameters, wide where the features hardly react.
 
-use super::Sampler;
+use super::sampler::Sampler;
 use crate::twin::Noise;
 use nalgebra::DVector;
 

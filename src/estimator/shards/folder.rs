@@ -1,12 +1,10 @@
 //! The folder of shards.
 
-use super::ShardsError;
-use super::plan::{MOST, VERB, rows_of_a_shard};
-use crate::estimator::bank::file::{self, BankFileError};
-use crate::estimator::bank::{Bank, Draws};
+use crate::estimator::bank::{Bank, Draws, file};
+use crate::estimator::error::EstimatorError;
 use crate::storage::StorageError;
 use crate::storage::files::{sha256, write_new};
-use crate::storage::untrusted::{MESSAGE, MOST_NUMBERS, one_line, read_kept};
+use crate::storage::untrusted::{MOST_NUMBERS, read_kept};
 use crate::storage::work::{Manifest, WorkFolder};
 use serde_json::{Value, json};
 use std::borrow::Cow;
@@ -15,7 +13,15 @@ use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Where shards lie.
+/// Verb whose folders hold banks.
+pub(super) const VERB: &str = "bank";
+/// Most simulations of a bank.
+pub(super) const MOST: usize = 1_000_000_000_000;
+/// About so many shards make a bank, unless they would be smaller or larger than this.
+const SHARES: usize = 64;
+const FEWEST_ROWS: usize = 16;
+const MOST_ROWS: usize = 16_384;
+/// Folder of the shards.
 pub(super) const SHARDS: &str = "shards";
 /// What to do about a shard that is not what it was.
 const AGAIN: &str = "run the same `truetwin bank` call again, and it is made again";
@@ -36,6 +42,11 @@ pub(super) struct Shards {
     pub there: BTreeMap<usize, String>,
 }
 
+/// Returns the rows of each shard but the last: a function of the bank's size alone.
+pub(super) fn rows_of_a_shard(size: usize) -> usize {
+    size.div_ceil(SHARES).clamp(FEWEST_ROWS, MOST_ROWS)
+}
+
 /// The name of a shard.
 fn name(number: usize, checksum: &str) -> String {
     format!("{number:06}-{checksum}.npz")
@@ -50,7 +61,7 @@ fn parse(name: &str) -> Option<(usize, &str)> {
 
 impl Shards {
     /// Of a folder with this manifest.
-    pub fn list(folder: WorkFolder, manifest: Manifest) -> Result<Self, ShardsError> {
+    pub fn list(folder: WorkFolder, manifest: Manifest) -> Result<Self, EstimatorError> {
         let number = |key: &str| {
             (manifest.get(key).and_then(Value::as_u64))
                 .filter(|n| *n > 0)
@@ -72,7 +83,7 @@ impl Shards {
         let of = size.div_ceil(rows);
         let place = folder.part(SHARDS)?;
         let mut there = BTreeMap::new();
-        let failed = |error| ShardsError::from(StorageError::io(&place, error));
+        let failed = |error| EstimatorError::from(StorageError::io(&place, error));
         for entry in std::fs::read_dir(&place).map_err(failed)? {
             let found = entry.map_err(failed)?.file_name();
             let Some((number, checksum)) = found.to_str().and_then(parse) else {
@@ -82,10 +93,8 @@ impl Shards {
                 continue;
             }
             if let Some(other) = there.insert(number, checksum.to_owned()) {
-                return Err(ShardsError::Conflict {
-                    one: place.join(name(number, checksum)),
-                    other: place.join(name(number, &other)),
-                });
+                let [one, other] = [checksum, &other].map(|c| place.join(name(number, c)));
+                return Err(conflict(&one, &other));
             }
         }
         Ok(Self {
@@ -100,7 +109,7 @@ impl Shards {
     }
 
     /// The same folder as it is now.
-    pub fn again(self) -> Result<Self, ShardsError> {
+    pub fn again(self) -> Result<Self, EstimatorError> {
         Self::list(self.folder, self.manifest)
     }
 
@@ -122,73 +131,76 @@ impl Shards {
     }
 
     /// The bytes of a shard, if they are what they were.
-    pub fn bytes(&self, number: usize) -> Result<Vec<u8>, ShardsError> {
-        let incomplete = || ShardsError::Incomplete {
-            path: self.folder.path().into(),
-            there: self.there.len(),
-            of: self.of,
-        };
-        let path = self.file(number).ok_or_else(incomplete)?;
+    pub fn bytes(&self, number: usize) -> Result<Vec<u8>, EstimatorError> {
+        let path = self.file(number).ok_or_else(|| self.incomplete())?;
         let bytes = read_kept(&path, 8 * MOST_NUMBERS as u64)
-            .map_err(|error| BankFileError::io(&path, error))?;
-        match self.there.get(&number) == Some(&sha256(&bytes)) {
-            true => Ok(bytes),
-            false => Err(damaged(path, "its SHA-256 is not that of its name").into()),
+            .map_err(|error| EstimatorError::io(&path, error))?;
+        if self.there.get(&number) == Some(&sha256(&bytes)) {
+            Ok(bytes)
+        } else {
+            Err(damaged(&path, "its SHA-256 is not that of its name"))
         }
     }
 
     /// The rows of a shard, checked.
-    pub fn draws(&self, number: usize) -> Result<Draws, ShardsError> {
+    pub fn draws(&self, number: usize) -> Result<Draws, EstimatorError> {
         let bytes = self.bytes(number)?;
         let draws = file::from_npz(io::Cursor::new(bytes));
         let checked = draws.and_then(|draws| {
             file::check(&draws, self.names.len())?;
-            match draws.theta.nrows() == self.rows(number).count() {
-                true => Ok(draws),
-                false => Err("another number of rows".into()),
+            if draws.theta.nrows() == self.rows(number).count() {
+                Ok(draws)
+            } else {
+                Err("another number of rows".into())
             }
         });
-        checked.map_err(|reason| damaged(self.place(number), &reason).into())
+        checked.map_err(|reason| damaged(&self.place(number), &reason))
+    }
+
+    fn incomplete(&self) -> EstimatorError {
+        let (there, of) = (self.there.len(), self.of);
+        let problem = format!(
+            "{there} of {of} shards are there; run the same `truetwin bank` call again to make the others"
+        );
+        EstimatorError::file(self.folder.path(), problem)
     }
 
     /// Of a shard whose rows are wider or narrower than those of the first.
-    pub fn odd(&self, number: usize) -> BankFileError {
-        damaged(self.place(number), "another number of features")
+    pub fn odd(&self, number: usize) -> EstimatorError {
+        damaged(&self.place(number), "another number of features")
     }
 
     /// Whether a shard is there and is what it was.
-    pub fn is_sound(&self, number: usize) -> Result<bool, ShardsError> {
+    pub fn is_sound(&self, number: usize) -> Result<bool, EstimatorError> {
         match self.bytes(number) {
             Ok(_) => Ok(true),
-            Err(
-                ShardsError::Incomplete { .. } | ShardsError::File(BankFileError::Content { .. }),
-            ) => Ok(false),
+            Err(EstimatorError::File { .. }) => Ok(false),
             // A file that cannot be read now may be sound.
             Err(error) => Err(error),
         }
     }
 
     /// Adds a shard; where another process has made it in the meantime, that one stays.
-    pub fn add(&self, number: usize, bytes: &[u8]) -> Result<(), ShardsError> {
+    pub fn add(&self, number: usize, bytes: &[u8]) -> Result<(), EstimatorError> {
         let path = (self.folder.part(SHARDS)?).join(name(number, &sha256(bytes)));
         match write_new(&path, bytes) {
-            Err(error) if !path.exists() => Err(BankFileError::io(&path, error).into()),
+            Err(error) if !path.exists() => Err(EstimatorError::io(&path, error)),
             _ => Ok(()),
         }
     }
 
     /// Removes a shard that is not what it was.
-    pub fn remove(&self, number: usize) -> Result<(), ShardsError> {
+    pub fn remove(&self, number: usize) -> Result<(), EstimatorError> {
         match self.file(number) {
             Some(path) => {
-                std::fs::remove_file(&path).map_err(|error| BankFileError::io(&path, error).into())
+                std::fs::remove_file(&path).map_err(|error| EstimatorError::io(&path, error))
             }
             None => Ok(()),
         }
     }
 
     /// Puts the checksums into the manifest, if every shard is there; sweeps out what processes that died have left.
-    pub fn finish(&self) -> Result<(), ShardsError> {
+    pub fn finish(&self) -> Result<(), EstimatorError> {
         if self.there.len() == self.of {
             let checksums: Vec<&String> = self.there.values().collect();
             self.folder.finish(&self.manifest, json!(checksums))?;
@@ -213,12 +225,17 @@ fn foreign(path: &Path) -> StorageError {
     }
 }
 
-fn damaged(path: PathBuf, reason: &str) -> BankFileError {
-    BankFileError::Content {
-        path,
-        reason: one_line(reason, MESSAGE),
-        remedy: AGAIN,
-    }
+fn damaged(path: &Path, reason: &str) -> EstimatorError {
+    EstimatorError::no_bank(path, reason, AGAIN)
+}
+
+/// Two folders hold different rows under the same numbers.
+pub(super) fn conflict(one: &Path, other: &Path) -> EstimatorError {
+    EstimatorError::Bank(format!(
+        "{} and {} differ, and should hold the same rows; make both with the same build on machines of one kind",
+        one.display(),
+        other.display()
+    ))
 }
 
 /// A whole bank on disk: each shard is a part, read when it is asked for.
@@ -233,8 +250,8 @@ impl ShardedBank {
     ///
     /// # Errors
     ///
-    /// [`ShardsError`]: no folder of a bank, shards that are missing or are not those of the manifest.
-    pub fn open(path: &Path) -> Result<Self, ShardsError> {
+    /// [`EstimatorError`]: no folder of a bank, shards that are missing or are not those of the manifest.
+    pub fn open(path: &Path) -> Result<Self, EstimatorError> {
         let (folder, manifest) = WorkFolder::find(path, VERB)?;
         let seed = manifest.get("seed").and_then(Value::as_u64);
         let seed = seed.ok_or_else(|| foreign(path))?;
@@ -242,15 +259,11 @@ impl ShardedBank {
         let shards = Shards::list(folder, manifest)?;
         let there = json!(shards.there.values().collect::<Vec<_>>());
         if shards.there.len() < shards.of || finished.is_none() {
-            return Err(ShardsError::Incomplete {
-                path: path.into(),
-                there: shards.there.len(),
-                of: shards.of,
-            });
+            return Err(shards.incomplete());
         }
         if finished != Some(there) {
             let file = shards.folder.file(SHARDS);
-            return Err(damaged(file, "its shards are not those of manifest.json").into());
+            return Err(damaged(&file, "its shards are not those of manifest.json"));
         }
         Ok(Self { shards, seed })
     }
@@ -280,8 +293,8 @@ impl ShardedBank {
     ///
     /// # Errors
     ///
-    /// [`BankFileError`]: a shard that cannot be read, or is not what it was.
-    pub fn read(&self) -> Result<Draws, BankFileError> {
+    /// [`EstimatorError`]: a shard that cannot be read, or is not what it was.
+    pub fn read(&self) -> Result<Draws, EstimatorError> {
         let parts = (0..self.shards.of).map(|index| self.part(index));
         Draws::stacked(self.size(), parts, |index| self.shards.odd(index))
     }
@@ -307,11 +320,7 @@ impl Bank for ShardedBank {
         (0..self.shards.of).map(rows).collect()
     }
 
-    fn part(&self, index: usize) -> Result<Cow<'_, Draws>, BankFileError> {
-        match self.shards.draws(index) {
-            Ok(draws) => Ok(Cow::Owned(draws)),
-            Err(ShardsError::File(error)) => Err(error),
-            Err(error) => Err(damaged(self.shards.place(index), &error.to_string())),
-        }
+    fn part(&self, index: usize) -> Result<Cow<'_, Draws>, EstimatorError> {
+        self.shards.draws(index).map(Cow::Owned)
     }
 }

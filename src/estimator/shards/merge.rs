@@ -1,9 +1,8 @@
 //! The folders of a job array, put together.
 
-use super::ShardsError;
-use super::folder::{SHARDS, Shards};
-use super::plan::VERB;
-use crate::estimator::bank::{BankError, Draws, file};
+use super::folder::{SHARDS, Shards, VERB, conflict};
+use crate::estimator::bank::{Draws, file};
+use crate::estimator::error::EstimatorError;
 use crate::progress::Progress;
 use crate::storage::work::WorkFolder;
 use std::borrow::Cow;
@@ -19,21 +18,21 @@ const NAMED: usize = 10;
 ///
 /// # Errors
 ///
-/// [`ShardsError`]: folders of different calls, shards that are missing, differ between folders, or are not what they were.
-pub fn merge(from: &[PathBuf], out: &Path, progress: &Progress) -> Result<usize, ShardsError> {
+/// [`EstimatorError`]: folders of different calls, shards that are missing, differ between folders, or are not what they were.
+pub fn merge(from: &[PathBuf], out: &Path, progress: &Progress) -> Result<usize, EstimatorError> {
     let all = listed(from)?;
     let Some(first) = all.first() else {
         return Ok(0);
     };
     let holders = holders(&all, first.of)?;
-    let folder = WorkFolder::open::<ShardsError>(out, first.manifest(), &[SHARDS], |_| Ok(()))?;
+    let folder = WorkFolder::open::<EstimatorError>(out, first.manifest(), &[SHARDS], |_| Ok(()))?;
     let merged = Shards::list(folder, first.manifest().clone())?;
     let stage = progress.stage("merge", holders.len());
     for (number, holder) in holders.into_iter().enumerate() {
         if !merged.there.contains_key(&number) {
             merged.add(number, &holder.bytes(number)?)?;
         }
-        stage.tick().map_err(BankError::from)?;
+        stage.tick()?;
     }
     let merged = merged.again()?;
     merged.finish()?;
@@ -51,7 +50,7 @@ pub fn merge_into_file(
     from: &[PathBuf],
     out: &Path,
     progress: &Progress,
-) -> Result<usize, ShardsError> {
+) -> Result<usize, EstimatorError> {
     let all = listed(from)?;
     let Some(first) = all.first() else {
         return Ok(0);
@@ -60,39 +59,37 @@ pub fn merge_into_file(
     let stage = progress.stage("merge", holders.len());
     let parts = holders.iter().enumerate().map(|(number, holder)| {
         let draws = holder.draws(number)?;
-        stage.tick().map_err(BankError::from)?;
-        Ok::<_, ShardsError>(Cow::Owned(draws))
+        stage.tick()?;
+        Ok::<_, EstimatorError>(Cow::Owned(draws))
     });
-    let draws = Draws::stacked(first.size, parts, |number| {
-        holders[number].odd(number).into()
-    })?;
+    let draws = Draws::stacked(first.size, parts, |number| holders[number].odd(number))?;
     let names: Vec<&str> = first.names.iter().map(String::as_str).collect();
     file::write(out, &draws, &names)?;
     Ok(draws.theta.nrows())
 }
 
 /// What lies in each folder; all must be of one call.
-fn listed(from: &[PathBuf]) -> Result<Vec<Shards>, ShardsError> {
+fn listed(from: &[PathBuf]) -> Result<Vec<Shards>, EstimatorError> {
     let all = (from.iter())
         .map(|path| {
             let (folder, manifest) = WorkFolder::find(path, VERB)?;
             Shards::list(folder, manifest.unfinished())
         })
-        .collect::<Result<Vec<Shards>, ShardsError>>()?;
+        .collect::<Result<Vec<Shards>, EstimatorError>>()?;
     for (other, path) in all.iter().zip(from).skip(1) {
         if let Some(difference) = all[0].manifest().differs(other.manifest()) {
-            return Err(ShardsError::Strangers {
-                one: from[0].clone(),
-                other: path.clone(),
-                difference,
-            });
+            return Err(EstimatorError::Bank(format!(
+                "{} and {} are of different banks: {difference}; merge folders of one call",
+                from[0].display(),
+                path.display()
+            )));
         }
     }
     Ok(all)
 }
 
 /// Who has shards 0 … `of` − 1; all must be there, and agree.
-fn holders(all: &[Shards], of: usize) -> Result<Vec<&Shards>, ShardsError> {
+fn holders(all: &[Shards], of: usize) -> Result<Vec<&Shards>, EstimatorError> {
     // What is there is counted before anything is made for every shard: a manifest may speak of far more.
     let there: BTreeSet<usize> = (all.iter().flat_map(|s| s.there.keys().copied())).collect();
     if there.len() < of {
@@ -100,11 +97,11 @@ fn holders(all: &[Shards], of: usize) -> Result<Vec<&Shards>, ShardsError> {
         let mut missing: Vec<String> = absent.take(NAMED + 1).map(|n| n.to_string()).collect();
         let more = if missing.len() > NAMED { ", …" } else { "" };
         missing.truncate(NAMED);
-        return Err(ShardsError::Missing {
-            there: there.len(),
-            of,
-            missing: format!("{}{more}", missing.join(", ")),
-        });
+        return Err(EstimatorError::Bank(format!(
+            "{} of {of} shards are there; missing: {}{more}; make these shares first",
+            there.len(),
+            missing.join(", ")
+        )));
     }
     let mut found = Vec::with_capacity(of);
     for number in there {
@@ -115,7 +112,7 @@ fn holders(all: &[Shards], of: usize) -> Result<Vec<&Shards>, ShardsError> {
         if let Some(other) = holders.find(|s| s.there.get(&number) != holder.there.get(&number))
             && let (Some(one), Some(other)) = (holder.file(number), other.file(number))
         {
-            return Err(ShardsError::Conflict { one, other });
+            return Err(conflict(&one, &other));
         }
         found.push(holder);
     }

@@ -42,14 +42,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod error;
 mod folder;
 mod merge;
 mod plan;
 mod prior;
 
-pub use error::ShardsError;
 pub use folder::ShardedBank;
 pub use merge::{merge, merge_into_file};
 pub use plan::{BankPlan, Filled};
-pub use prior::{Prior, PriorError};
+pub use prior::Prior;

@@ -1,10 +1,11 @@
 //! What a bank on disk holds, and who fills it.
 
-use super::folder::{SHARDS, ShardedBank, Shards};
-use super::{Prior, ShardsError};
-use crate::estimator::bank::BankError;
-use crate::estimator::bank::file::{BankFileError, npz};
-use crate::estimator::{PresetName, Project};
+use super::folder::{MOST, SHARDS, ShardedBank, Shards, VERB, rows_of_a_shard};
+use super::prior::Prior;
+use crate::estimator::bank::file::npz;
+use crate::estimator::error::EstimatorError;
+use crate::estimator::project::Project;
+use crate::estimator::recipe::PresetName;
 use crate::progress::Progress;
 use crate::storage::work::{Manifest, Share, WorkFolder};
 use serde_json::json;
@@ -12,13 +13,6 @@ use std::path::Path;
 
 /// Layout of the folder; raised when it changes.
 const LAYOUT: u32 = 2;
-pub(super) const VERB: &str = "bank";
-/// Most simulations of a bank.
-pub(super) const MOST: usize = 1_000_000_000_000;
-/// About so many shards make a bank, unless they would be smaller or larger than this.
-const SHARES: usize = 64;
-const FEWEST_ROWS: usize = 16;
-const MOST_ROWS: usize = 16_384;
 
 /// A bank to be filled: simulations from a study's prior, as features of a preset.
 ///
@@ -64,11 +58,6 @@ pub struct Filled {
     pub rows: usize,
 }
 
-/// Rows of each shard of a bank, the last one excepted: a function of its size alone.
-pub(super) fn rows_of_a_shard(size: usize) -> usize {
-    size.div_ceil(SHARES).clamp(FEWEST_ROWS, MOST_ROWS)
-}
-
 impl BankPlan {
     /// Simulates the shards of a share that are not in the folder yet; makes the folder where there is none.
     ///
@@ -77,22 +66,25 @@ impl BankPlan {
     ///
     /// # Errors
     ///
-    /// [`ShardsError`]: a folder of another call, a place that cannot be written, a twin that fails, a stop.
+    /// [`EstimatorError`]: a folder of another call, a place that cannot be written, a twin that fails, a stop.
     pub fn fill(
         &self,
         path: &Path,
         share: Share,
         progress: &Progress,
-    ) -> Result<Filled, ShardsError> {
+    ) -> Result<Filled, EstimatorError> {
         if !(1..=MOST).contains(&self.size) {
-            return Err(ShardsError::Size(self.size));
+            return Err(EstimatorError::Bank(format!(
+                "a bank of {} simulations; choose between 1 and {MOST}",
+                self.size
+            )));
         }
         let prior = Prior::new(
             self.project.study(),
             self.project.recipe(self.preset).features.as_ref(),
         )?;
         let manifest = self.manifest()?;
-        let folder = WorkFolder::open::<ShardsError>(path, &manifest, &[SHARDS], |_| Ok(()))?;
+        let folder = WorkFolder::open::<EstimatorError>(path, &manifest, &[SHARDS], |_| Ok(()))?;
         let shards = Shards::list(folder, manifest.clone())?;
         let mine = || (0..shards.of).filter(|number| share.takes(*number));
         let stage = progress.stage("kept shards", mine().count());
@@ -102,13 +94,13 @@ impl BankPlan {
                 shards.remove(number)?;
                 missing.push(number);
             }
-            stage.tick().map_err(BankError::from)?;
+            stage.tick()?;
         }
         let rows: usize = missing.iter().map(|n| shards.rows(*n).count()).sum();
         let stage = progress.stage("bank", rows);
         for number in missing {
             let draws = prior.rows(shards.rows(number), self.seed, "bank", &stage)?;
-            let bytes = npz(&draws).map_err(|error| BankFileError::io(path, error))?;
+            let bytes = npz(&draws).map_err(|error| EstimatorError::io(path, error))?;
             shards.add(number, &bytes)?;
         }
         finish(path, manifest)
@@ -118,13 +110,13 @@ impl BankPlan {
     ///
     /// # Errors
     ///
-    /// [`ShardsError`]: no folder of this call.
-    pub fn finish(&self, path: &Path) -> Result<Filled, ShardsError> {
+    /// [`EstimatorError`]: no folder of this call.
+    pub fn finish(&self, path: &Path) -> Result<Filled, EstimatorError> {
         finish(path, self.manifest()?)
     }
 
     /// Everything that the rows depend on.
-    pub(super) fn manifest(&self) -> Result<Manifest, ShardsError> {
+    pub(super) fn manifest(&self) -> Result<Manifest, EstimatorError> {
         let features = &self.project.recipe(self.preset).features;
         Ok((self.project.study())
             .manifest(VERB, LAYOUT)?
@@ -138,20 +130,21 @@ impl BankPlan {
     ///
     /// # Errors
     ///
-    /// [`ShardsError::Other`] names what is different.
-    pub fn check(&self, bank: &ShardedBank) -> Result<(), ShardsError> {
+    /// [`EstimatorError::File`] names what is different.
+    pub fn check(&self, bank: &ShardedBank) -> Result<(), EstimatorError> {
         match self.manifest()?.differs(bank.manifest()) {
             None => Ok(()),
-            Some(difference) => Err(ShardsError::Other {
-                path: bank.path().into(),
-                difference,
-            }),
+            Some(difference) => {
+                let problem =
+                    format!("a bank of another setting: {difference}; make a bank with this one");
+                Err(EstimatorError::file(bank.path(), problem))
+            }
         }
     }
 }
 
 /// How far a folder of this manifest has come, which takes a simulation to make.
-fn finish(path: &Path, manifest: Manifest) -> Result<Filled, ShardsError> {
+fn finish(path: &Path, manifest: Manifest) -> Result<Filled, EstimatorError> {
     let shards = Shards::list(WorkFolder::resume(path, &manifest)?, manifest)?;
     shards.finish()?;
     Ok(Filled {

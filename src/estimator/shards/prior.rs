@@ -1,9 +1,10 @@
 //! Simulations from the prior of a study.
 
-use crate::estimator::bank::{BankError, Draw, Draws, FeatureSimulator};
-use crate::feature::{FeatureError, FeatureRecipe};
+use crate::estimator::bank::{Draw, Draws, FeatureSimulator};
+use crate::estimator::error::EstimatorError;
+use crate::feature::FeatureRecipe;
 use crate::progress::Stage;
-use crate::study::{DriveSource, PlanError, Study};
+use crate::study::{DriveSource, Study};
 use crate::twin::{Noise, ParameterSpace};
 use std::borrow::Cow;
 use std::ops::Range;
@@ -40,7 +41,7 @@ impl Prior {
     /// # Errors
     ///
     /// Features that the twin cannot have.
-    pub fn new(study: &Study, features: &dyn FeatureRecipe) -> Result<Self, PriorError> {
+    pub fn new(study: &Study, features: &dyn FeatureRecipe) -> Result<Self, EstimatorError> {
         Ok(Self {
             simulator: FeatureSimulator::new(study.twin().clone(), features)?,
             space: study.twin().parameters(),
@@ -64,13 +65,14 @@ impl Prior {
         seed: u64,
         purpose: &str,
         stage: &Stage,
-    ) -> Result<Draws, BankError> {
+    ) -> Result<Draws, EstimatorError> {
         self.simulator.draws(
             rows,
             |i| Noise::new(seed, purpose, i),
             |_, _, noise| {
-                let drive = (self.drives.draw(noise))
-                    .map_err(|error| BankError::Input(error.to_string()))?;
+                let drive = (self.drives.draw(noise)).map_err(|error| {
+                    EstimatorError::Bank(format!("the input cannot be made: {error}"))
+                })?;
                 Ok(Some(Draw {
                     theta: self.space.draw_prior(noise),
                     drive: Cow::Owned(drive),
@@ -79,27 +81,4 @@ impl Prior {
             stage,
         )
     }
-}
-
-/// Why a study's prior cannot be simulated.
-///
-/// ```
-/// use truetwin::feature::Ar;
-/// use truetwin::estimator::shards::{Prior, PriorError};
-/// use truetwin::study::{RecordPlan, Study};
-/// use truetwin::twins::VanDerPol;
-///
-/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 100))?;
-/// assert!(matches!(Prior::new(&study, &Ar { order: 0 }), Err(PriorError::Feature(_))));
-/// # Ok::<(), truetwin::study::StudyError>(())
-/// ```
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum PriorError {
-    /// Of the features.
-    #[error(transparent)]
-    Feature(#[from] FeatureError),
-    /// Of step, length, input.
-    #[error(transparent)]
-    Plan(#[from] PlanError),
 }

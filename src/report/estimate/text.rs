@@ -61,7 +61,7 @@ fn table(study: &Study, estimate: &Estimate, lines: usize) -> Vec<String> {
     let space = study.twin().parameters();
     // The twin's own parameters first.
     let (own, others): (Vec<_>, Vec<_>) =
-        (space.iter().enumerate()).partition(|(_, p)| p.role == Role::Physical);
+        (space.iter().enumerate()).partition(|(_, p)| p.role == Role::Parameter);
     let all: Vec<_> = (own.into_iter().chain(others))
         .map(|(j, parameter)| row(estimate, j, parameter))
         .collect();
@@ -103,9 +103,9 @@ fn table(study: &Study, estimate: &Estimate, lines: usize) -> Vec<String> {
 /// Returns one line of the table.
 fn row(estimate: &Estimate, j: usize, parameter: &Parameter) -> [String; 6] {
     let name = match parameter.role {
-        Role::Physical | Role::Effect => parameter.name.clone(),
-        Role::Start => parameter.name.replacen("start.", "start of ", 1),
-        Role::Noise => parameter.name.replacen("noise.", "noise of ", 1),
+        Role::Parameter | Role::Magnitude => parameter.name.clone(),
+        Role::Start => format!("start of {}", parameter.target()),
+        Role::Noise => format!("noise of {}", parameter.target()),
     };
     let (value, error) = (estimate.theta[j], estimate.std_error[j]);
     let digits = Digits::supported(value, error);

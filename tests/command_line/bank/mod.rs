@@ -6,9 +6,10 @@ mod training;
 use crate::files::files;
 use std::fs;
 use std::path::{Path, PathBuf};
+use truetwin::estimator::EstimatorError;
 use truetwin::estimator::PresetName;
 use truetwin::estimator::bank::Bank;
-use truetwin::estimator::shards::{BankPlan, ShardedBank, ShardsError, merge, merge_into_file};
+use truetwin::estimator::shards::{BankPlan, ShardedBank, merge, merge_into_file};
 use truetwin::progress::{Listener, Progress};
 use truetwin::storage::work::Share;
 use truetwin::study::{RecordPlan, Study};
@@ -27,7 +28,7 @@ fn plan(study: &Study, size: usize) -> BankPlan {
     }
 }
 
-fn fill(plan: &BankPlan, path: &Path, share: &str) -> Result<(usize, usize), ShardsError> {
+fn fill(plan: &BankPlan, path: &Path, share: &str) -> Result<(usize, usize), EstimatorError> {
     let filled = plan.fill(path, share.parse().unwrap(), &Progress::silent())?;
     Ok((filled.there, filled.of))
 }
@@ -131,7 +132,7 @@ fn damaged_shards_are_named_and_made_again() {
     for (what, harm) in damage {
         harm(&shard);
         let read = ShardedBank::open(&path).and_then(|bank| {
-            bank.part(1).map_err(ShardsError::from)?;
+            bank.part(1)?;
             Ok(())
         });
         let error = read.unwrap_err().to_string();
@@ -148,7 +149,7 @@ fn what_does_not_belong_together_is_refused() {
     let silent = Progress::silent();
     fill(&plan(&study, 40), &at("half"), "1/2").unwrap();
     fill(&plan(&study, 41), &at("other"), "1/1").unwrap();
-    let refused = |result: Result<usize, ShardsError>| result.unwrap_err().to_string();
+    let refused = |result: Result<usize, EstimatorError>| result.unwrap_err().to_string();
     let error = refused(merge(&[at("half")], &at("out"), &silent));
     assert!(
         error.contains("1 of 3 shards") && error.contains("missing: 0, 2"),

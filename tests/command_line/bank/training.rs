@@ -6,9 +6,8 @@ use std::borrow::Cow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use truetwin::estimator::bank::Bank;
 use truetwin::estimator::bank::Draws;
-use truetwin::estimator::bank::file::BankFileError;
 use truetwin::estimator::shards::ShardedBank;
-use truetwin::estimator::{PresetName, PretrainOptions, pretrain, pretrain_on};
+use truetwin::estimator::{EstimatorError, PresetName, PretrainOptions, pretrain, pretrain_on};
 use truetwin::progress::Progress;
 
 fn options(size: usize) -> PretrainOptions {
@@ -48,7 +47,7 @@ impl Bank for Made {
     fn parts(&self) -> Vec<usize> {
         vec![self.rows; self.parts]
     }
-    fn part(&self, index: usize) -> Result<Cow<'_, Draws>, BankFileError> {
+    fn part(&self, index: usize) -> Result<Cow<'_, Draws>, EstimatorError> {
         self.read.fetch_add(1, Ordering::Relaxed);
         let number = |i: usize| ((index * self.rows + i) as f64 * 0.618_034) % 1.0;
         Ok(Cow::Owned(Draws {

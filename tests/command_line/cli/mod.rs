@@ -444,7 +444,7 @@ fn wrong_studies_are_refused_with_file_and_line() {
     );
     check(
         "twin = 'tanks'\n[prior]\nk4 = [0.9, 1]\n[fixed]\nk4 = 1\n",
-        &["k4 stands in [fixed] and in [prior]"],
+        &["k4 appears in both [fixed] and [prior]"],
     );
     check(
         "twin = 'tanks'\n[library]\nonly = ['magic']\n",

@@ -1,7 +1,7 @@
 //! What a diagnosis says beside the name: since when, what is left, what else could have been seen, what to measure next.
 
 use super::trials::*;
-use truetwin::diagnose::{Cell, Decision, DiagnoseSettings, Diagnosis, Verdict, diagnose};
+use truetwin::diagnose::{Decision, DiagnoseSettings, Diagnosis, Verdict, diagnose};
 use truetwin::math::binomial_bounds;
 use truetwin::progress::Progress;
 use truetwin::record::Record;
@@ -28,11 +28,11 @@ fn a_gap_begins_where_it_begins() {
     assert!((85.0..140.0).contains(&onset.time), "{onset:?}");
     assert!(onset.p_value <= 0.05 && onset.channel == "y");
     let sums = [
-        maps.windows.iter().map(Cell::share).sum::<f64>(),
-        maps.regions.iter().map(Cell::share).sum(),
-        maps.channels.iter().map(Cell::share).sum(),
-        maps.lags.iter().map(Cell::share).sum(),
-        maps.bands.iter().map(Cell::share).sum(),
+        maps.windows.iter().map(|cell| cell.share).sum::<f64>(),
+        maps.regions.iter().map(|cell| cell.share).sum(),
+        maps.channels.iter().map(|cell| cell.share).sum(),
+        maps.lags.iter().map(|cell| cell.share).sum(),
+        maps.bands.iter().map(|cell| cell.share).sum(),
     ];
     assert!(sums.iter().all(|sum| *sum <= 1.0 + 1e-9), "{sums:?}");
     assert!(!maps.notable().windows.is_empty() || !maps.notable().bands.is_empty());

@@ -75,7 +75,7 @@ pub(super) struct MissingEffect {
 impl MissingEffect {
     /// `id@target`.
     pub fn key(&self) -> String {
-        format!("{}@{}", self.id, self.target)
+        crate::effect::EffectKey::new(self.id, self.target).to_string()
     }
 }
 

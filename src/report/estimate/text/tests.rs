@@ -65,7 +65,8 @@ fn an_incomplete_twin_is_reported() {
 struct Many;
 impl DigitalTwin for Many {
     fn parameters(&self) -> ParameterSpace {
-        let name = |j| format!("a-very-long-name-of-a-parameter-{j}@some-long-target.magnitude");
+        let name =
+            |j| format!("a-very-long-name-of-a-parameter-{j}-on-some-long-target-and-magnitude");
         ParameterSpace::new((0..40).map(|j| Parameter::new(&name(j), "m^3/(kg s^2)", -1e-9, 1e9)))
     }
     fn simulate(&self, _: &[f64], _: &Drive, _: Noise) -> Result<Signal, SimulationError> {
@@ -79,7 +80,7 @@ fn any_number_of_parameters_fits_the_terminal() {
     let mut estimate = estimates().refined.clone();
     let space = study.twin().parameters();
     estimate.names = space.names().into_iter().map(str::to_owned).collect();
-    estimate.roles = vec![Role::Physical; 40];
+    estimate.roles = vec![Role::Parameter; 40];
     for all in [
         &mut estimate.initial,
         &mut estimate.theta,

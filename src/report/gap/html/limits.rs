@@ -90,7 +90,7 @@ fn row(units: &Units, visible: &Visible) -> Vec<String> {
     let unit =
         (units.of_magnitude(&visible.id, &visible.target, &visible.magnitude)).unwrap_or_default();
     vec![
-        format!("{}@{}", visible.id, visible.target),
+        crate::effect::EffectKey::new(&visible.id, &visible.target).to_string(),
         visible.magnitude.clone(),
         match visible.value {
             Some(value) => format!("{}{}", short(value), unit_suffix(&unit)),

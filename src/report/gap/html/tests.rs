@@ -179,7 +179,7 @@ fn each_answer_says_what_to_do_with_it() {
     for (diagnosis, expected) in cases().iter().zip([
         "Use the twin with the refitted parameters",
         "Add cubic-stiffness@x2 to the twin",
-        "Take the refitted parameters",
+        "Check the refitted parameters",
         "Separate the rivals (cubic-stiffness@x2, power-law@x2)",
         "examples/own_effect.rs",
         "No share of the gap closed: the record is too short",

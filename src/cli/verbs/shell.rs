@@ -1,7 +1,8 @@
 //! `completions` and `man`: shell completion and manual pages, generated from the options.
 
-use super::args;
-use super::{Context, Failure, Verb, output};
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
 use crate::setting::did_you_mean;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Command};
@@ -19,7 +20,7 @@ use std::process::ExitCode;
         fish        truetwin completions fish > ~/.config/fish/completions/truetwin.fish\n  \
         PowerShell  truetwin completions powershell >> $PROFILE\n\
         Then open a new shell.")]
-pub(super) struct Completions {
+pub(in crate::cli) struct Completions {
     /// Shell.
     #[arg(value_enum)]
     shell: Shell,
@@ -47,7 +48,7 @@ impl Verb for Completions {
 #[command(after_help = "Read one page, or install all of them:\n  \
         truetwin man estimate | man -l -\n  \
         truetwin man --out man1 && sudo mv man1/* /usr/local/share/man/man1/")]
-pub(super) struct Man {
+pub(in crate::cli) struct Man {
     /// Verb of the page to print [default: the program's page].
     #[arg(value_name = "VERB", conflicts_with = "out")]
     verb: Option<String>,
@@ -111,7 +112,7 @@ fn command(context: &Context<'_>) -> Command {
     let names: Vec<String> = (context.projects.iter())
         .map(|project| project.study().name().to_owned())
         .collect();
-    (args::command().name(context.program.to_owned())).mut_subcommands(|verb| {
+    ((context.command)().name(context.program.to_owned())).mut_subcommands(|verb| {
         let takes_twin = verb.get_arguments().any(|option| option.get_id() == "twin");
         if takes_twin {
             verb.mut_arg("twin", |option| {

@@ -1,7 +1,9 @@
 //! `effects`: lists the effects that a twin may lack.
 
-use super::args::Subject;
-use super::{Context, Failure, Verb, output};
+use crate::cli::args::Subject;
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
 use clap::Args;
 use serde_json::{Value, json};
 use std::process::ExitCode;
@@ -11,7 +13,7 @@ use std::process::ExitCode;
 #[command(after_help = "Example:\n  \
         truetwin effects --twin tanks\n\
         Next: simulate with --effect E.toml (docs/choosing-effects.md), or find effects with truetwin diagnose")]
-pub(super) struct Effects {
+pub(in crate::cli) struct Effects {
     #[command(flatten)]
     subject: Subject,
 }

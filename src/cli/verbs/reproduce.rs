@@ -1,8 +1,12 @@
 //! `reproduce`: the paper's table and figures, on any twin.
 
-use super::args::{PresetArgument, Subject, at_least_one};
-use super::{Context, Failure, Verb, output};
-use crate::estimator::{Estimator, PretrainError, PretrainOptions, Pretraining, Project, pretrain};
+use crate::cli::args::{PresetArgument, Subject, at_least_one};
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
+use crate::estimator::{
+    Estimator, EstimatorError, PretrainOptions, Pretraining, Project, pretrain,
+};
 use crate::evaluate::paper::{
     Benchmark, FreeRuns, MeanRuns, MonteCarlo, Origin, Run, Scenario, score,
 };
@@ -65,7 +69,7 @@ impl From<ScenarioArgument> for Scenario {
         DIR holds reproduce.json (as --json), table.txt, trajectories.svg (as in the paper: the truth and the mean\n\
         predictions; scenarios 1 and 2), first-record.svg, and the state of the work: manifest.json, estimator.est,\n\
         runs/NNNN.json. Interrupted, the same command resumes it; a different command is refused.")]
-pub(super) struct Reproduce {
+pub(in crate::cli) struct Reproduce {
     #[command(flatten)]
     subject: Subject,
     /// Source of the true parameters.
@@ -205,7 +209,7 @@ fn kept(
     while context.ranks.is_root() && !path.exists() {
         match Pretraining::new(project, *training).write(&path, context.progress) {
             // Another job is training it.
-            Err(PretrainError::Work(StorageError::Busy { .. })) => {
+            Err(EstimatorError::Work(StorageError::Busy { .. })) => {
                 context.progress.checkpoint().map_err(Failure::internal)?;
                 std::thread::sleep(LOOK);
             }

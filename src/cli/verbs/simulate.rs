@@ -1,7 +1,9 @@
 //! `simulate`: simulates a record.
 
-use super::args::Subject;
-use super::{Context, Failure, Verb, output};
+use crate::cli::args::Subject;
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
 use crate::effect::{augment, given_magnitudes};
 use crate::record::{Drive, Record, read_drive, record_csv_text, write_record};
 use crate::setting::did_you_mean;
@@ -18,7 +20,7 @@ use std::process::ExitCode;
         truetwin simulate --twin van-der-pol --theta nu=3 --out R.csv\n  \
         truetwin simulate --twin tanks --theta k1=0.6,k2=0.5,k3=0.55,k4=1 --effect E.toml --seed 4 --out R.csv\n\
         Next: truetwin estimate R.csv --estimator EST, or truetwin diagnose R.csv --twin NAME --out gap")]
-pub(super) struct Simulate {
+pub(in crate::cli) struct Simulate {
     #[command(flatten)]
     subject: Subject,
     /// Parameters as name=value, separated by commas; estimated starts and noise levels may be omitted.

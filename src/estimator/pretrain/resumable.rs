@@ -1,8 +1,10 @@
 //! A pretraining that can be interrupted.
 
-use super::pretrain::{fits_into_memory, pretrain_from, prior, settings};
-use super::{Estimator, PretrainError, PretrainOptions, Project};
+use super::train::{PretrainOptions, fits_into_memory, pretrain_from, prior, settings};
 use crate::estimator::bank::{Bank, Draws};
+use crate::estimator::error::EstimatorError;
+use crate::estimator::estimator::Estimator;
+use crate::estimator::project::Project;
 use crate::estimator::shards::{BankPlan, ShardedBank};
 use crate::network::{Checkpoints, History, NetworkError};
 use crate::progress::Progress;
@@ -111,19 +113,20 @@ impl<'a> Pretraining<'a> {
     ///
     /// # Errors
     ///
-    /// [`PretrainError`]; among them a path that is taken, another process at work, and a folder of another pretraining.
+    /// [`EstimatorError`]; among them a path that is taken, another process at work, and a folder of another pretraining.
     pub fn write(
         &self,
         path: &Path,
         progress: &Progress,
-    ) -> Result<(Estimator, History), PretrainError> {
+    ) -> Result<(Estimator, History), EstimatorError> {
         let manifest = self.manifest()?;
         let place = beside(path);
         sweep_beside(path);
         if path.symlink_metadata().is_ok() && WorkFolder::resume(&place, &manifest).is_err() {
-            return Err(PretrainError::Taken(path.into()));
+            let problem = "exists already; choose another --out, or remove it";
+            return Err(EstimatorError::file(path, problem));
         }
-        let folder = WorkFolder::open::<PretrainError>(&place, &manifest, &[], |_| Ok(()))?;
+        let folder = WorkFolder::open::<EstimatorError>(&place, &manifest, &[], |_| Ok(()))?;
         let lock = folder.lock()?;
         let made = self.made(&folder, progress).and_then(|made| {
             made.0.save_again(path)?;
@@ -144,7 +147,7 @@ impl<'a> Pretraining<'a> {
         &self,
         folder: &WorkFolder,
         progress: &Progress,
-    ) -> Result<(Estimator, History), PretrainError> {
+    ) -> Result<(Estimator, History), EstimatorError> {
         let checkpoints = Checkpoints::new(folder.file(TRAINING), self.every);
         let simulated;
         let bank = match &self.bank {
@@ -159,7 +162,7 @@ impl<'a> Pretraining<'a> {
 
     /// The bank in the folder, made as far as it is missing, as one part: rows in the order in which they would be without a
     /// folder.
-    fn simulated(&self, path: &Path, progress: &Progress) -> Result<Draws, PretrainError> {
+    fn simulated(&self, path: &Path, progress: &Progress) -> Result<Draws, EstimatorError> {
         let size = settings(&self.project, &self.options)?.bank_size;
         fits_into_memory(size)?;
         // What the network cannot take is said before anything is simulated.
@@ -175,7 +178,7 @@ impl<'a> Pretraining<'a> {
     }
 
     /// Everything that the estimator depends on.
-    fn manifest(&self) -> Result<Manifest, PretrainError> {
+    fn manifest(&self) -> Result<Manifest, EstimatorError> {
         let preset = self.project.recipe(self.options.preset);
         let mut settings = settings(&self.project, &self.options)?;
         let bank = match &self.bank {
@@ -198,16 +201,15 @@ impl<'a> Pretraining<'a> {
 }
 
 /// Whether the same call would end with the same error again.
-fn ends_for_good(error: &PretrainError) -> bool {
+fn ends_for_good(error: &EstimatorError) -> bool {
     matches!(
         error,
-        PretrainError::Settings(_)
-            | PretrainError::Plan(_)
-            | PretrainError::Feature(_)
-            | PretrainError::Width { .. }
-            | PretrainError::TooManyFeatures { .. }
-            | PretrainError::Standardise(_)
-            | PretrainError::Network(NetworkError::Diverged { .. })
+        EstimatorError::Setting(_)
+            | EstimatorError::Study(_)
+            | EstimatorError::Feature(_)
+            | EstimatorError::Inputs(_)
+            | EstimatorError::Undetermined(_)
+            | EstimatorError::Network(NetworkError::Diverged { .. })
     )
 }
 

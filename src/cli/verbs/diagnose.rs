@@ -1,7 +1,9 @@
 //! `diagnose`: tests whether the twin explains the record, and finds what it lacks.
 
-use super::args::Subject;
-use super::{Context, Failure, Verb, output, records};
+use crate::cli::args::Subject;
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::{output, records};
 use crate::diagnose::{DiagnoseSettings, GivenRecord, diagnose};
 use crate::effect::EffectPattern;
 use crate::estimator::Estimator;
@@ -21,7 +23,7 @@ use std::process::ExitCode;
         truetwin diagnose R.csv --twin tanks --validation V.csv --out gap\n  \
         truetwin diagnose R1.csv R2.csv --study S.toml --without sensor-bias,state-ceiling@h1 --out gap\n\
         Next: open gap/report.html; docs/diagnosing-a-gap.md says how to read it")]
-pub(super) struct Diagnose {
+pub(in crate::cli) struct Diagnose {
     /// Measured records of one system; they share all parameters except unknown starts.
     #[arg(value_name = "R.csv", required = true)]
     records: Vec<PathBuf>,

@@ -1,9 +1,10 @@
 //! The cloud of fresh simulations around θ_GN.
 
-use super::{EstimateError, Settings};
 use crate::estimator::bank::{Draw, Draws, FeatureSimulator};
+use crate::estimator::error::EstimatorError;
 use crate::estimator::refine::Refined;
 use crate::estimator::sample::{EigenBox, Sampler};
+use crate::estimator::settings::Settings;
 use crate::feature::Centred;
 use crate::progress::Progress;
 use crate::record::Drive;
@@ -38,7 +39,7 @@ pub fn cloud(
     around: &Around<'_>,
     noise: Noise,
     progress: &Progress,
-) -> Result<Draws, EstimateError> {
+) -> Result<Draws, EstimatorError> {
     let Around {
         simulator,
         drive,

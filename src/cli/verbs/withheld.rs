@@ -1,7 +1,9 @@
 //! `withheld`: scores `diagnose` on trials with sealed truth.
 
-use super::args::{Subject, at_least_one};
-use super::{Context, Failure, Verb, output};
+use crate::cli::args::{Subject, at_least_one};
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
 use crate::evaluate::trials::{self, Kind, Settings};
 use crate::report::{scorecard_html, scorecard_json, scorecard_text};
 use crate::setting::did_you_mean;
@@ -19,7 +21,7 @@ use std::process::ExitCode;
         truetwin withheld --twin tanks --trials 100 --out trials\n\n\
         DIR holds scorecard.json (as --json), scorecard.html, and the state of the work: manifest.json, seal.txt,\n\
         keys.json, records, answers. Interrupted, the same command resumes it; a different command is refused.")]
-pub(super) struct Withheld {
+pub(in crate::cli) struct Withheld {
     #[command(flatten)]
     subject: Subject,
     /// Number of trials, one record each.

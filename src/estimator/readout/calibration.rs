@@ -4,6 +4,8 @@ use crate::math::quantile;
 use ndarray::Array2;
 use statrs::distribution::{ContinuousCDF, Normal};
 
+/// Level of the intervals given with an estimate.
+pub const INTERVAL_LEVEL: f64 = 0.9;
 /// Neighbours of a prediction whose errors are taken as its own.
 const NEIGHBOURS: usize = 100;
 

@@ -1,7 +1,9 @@
 //! `features`: compresses records to features.
 
-use super::args::{PresetArgument, Subject};
-use super::{Context, Failure, Verb, output};
+use crate::cli::args::{PresetArgument, Subject};
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
 use crate::estimator::bank::file;
 use crate::record::read_record;
 use clap::Args;
@@ -14,7 +16,7 @@ use std::process::ExitCode;
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
         truetwin features R1.csv R2.csv --twin tanks --out X.npy")]
-pub(super) struct Features {
+pub(in crate::cli) struct Features {
     /// Records, measured or simulated.
     #[arg(value_name = "R.csv", required = true)]
     records: Vec<PathBuf>,

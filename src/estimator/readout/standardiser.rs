@@ -1,6 +1,6 @@
 //! What stands between features and a network: an affine map to unit variance.
 
-use super::Scaler;
+use super::scaler::Scaler;
 use crate::math::{MathError, Whitening};
 use ndarray::{Array1, Array2};
 

@@ -1,7 +1,9 @@
 //! `check`: tests a twin before training.
 
-use super::args::Subject;
-use super::{Context, Failure, Verb, output};
+use crate::cli::args::Subject;
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
 use crate::estimator::PresetName;
 use crate::twin::conformance::{Severity, check};
 use crate::twin::{Noise, SimulationError, Twin};
@@ -16,7 +18,7 @@ use std::sync::Arc;
         truetwin check --twin tanks\n  \
         truetwin check --program 'python3 model.py'\n\
         Failures end with exit code 1. Next: truetwin pretrain with the same twin")]
-pub(super) struct Check {
+pub(in crate::cli) struct Check {
     #[command(flatten)]
     subject: Subject,
 }

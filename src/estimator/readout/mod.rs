@@ -1,9 +1,17 @@
 //! From features to parameters: the network, and what stands around it.
 
-use super::quadratic::Quadratic;
-use super::{Scaler, Standardiser};
+mod calibration;
+mod quadratic;
+mod scaler;
+mod standardiser;
+
+pub use calibration::{Calibration, INTERVAL_LEVEL, Spread};
+pub use scaler::Scaler;
+pub use standardiser::Standardiser;
+
 use crate::network::{Network, NetworkError};
 use ndarray::Array2;
+use quadratic::Quadratic;
 use std::sync::Arc;
 
 /// Weight of a row of zeros in the ridge regression of the quadratic layer.
@@ -21,13 +29,13 @@ pub struct Readout {
     pub inputs: Standardiser,
     /// Targets ↔ θ.
     pub targets: Scaler,
-    pub(super) layer: Option<Layer>,
-    pub(super) network: Arc<dyn Network>,
+    pub(in crate::estimator) layer: Option<Layer>,
+    pub(in crate::estimator) network: Arc<dyn Network>,
 }
 
 /// The quadratic layer. The network learns its residuals: where q is nearly right, the network need not learn it anew.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Layer {
+pub struct Layer {
     pub quadratic: Quadratic,
     /// r, for each target.
     pub residual: Vec<f64>,

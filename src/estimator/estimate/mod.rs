@@ -1,198 +1,31 @@
 //! From a measured record to a calibrated twin.
 
-use super::calibration::Spread;
-use super::cloud::{Around, cloud};
-use super::tracking::track;
-use super::tune::tune;
-use super::{Estimator, PresetName, Settings, Tracking};
-use crate::estimator::bank::{BankError, Draws, FeatureSimulator};
-use crate::estimator::gate::{GateError, GateForm, GateOutcome, GateTest};
-use crate::estimator::refine::{Information, RefineError, RefineSettings, Refined, Refinement};
-use crate::estimator::sample::EllipsoidError;
-use crate::feature::FeatureError;
-use crate::network::NetworkError;
-use crate::progress::{Cancelled, Progress};
+mod cloud;
+mod outcome;
+mod tracking;
+mod tune;
+
+pub use outcome::{Estimate, EstimateOptions, Nuisance, Seconds};
+pub use tracking::{Tracking, track};
+
+use crate::estimator::bank::{Draws, FeatureSimulator};
+use crate::estimator::error::EstimatorError;
+use crate::estimator::estimator::Estimator;
+use crate::estimator::gate::{GateForm, GateOutcome, GateTest};
+use crate::estimator::readout::{INTERVAL_LEVEL, Spread};
+use crate::estimator::refine::{Information, RefineSettings, Refined, Refinement};
+use crate::estimator::settings::Settings;
+use crate::progress::Progress;
 use crate::record::Record;
-use crate::setting::SettingError;
-use crate::study::StudyError;
-use crate::twin::{Noise, Role};
+use crate::twin::Noise;
+use cloud::{Around, cloud};
 use nalgebra::DVector;
-use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::time::Instant;
+use tune::tune;
 
-/// Level of the intervals given with an estimate.
-pub const INTERVAL_LEVEL: f64 = 0.9;
 /// The tuned estimate is kept while its whitened misfit is within this quantile of χ²_d.
 const KEEP_TUNED: f64 = 0.999;
-
-/// What may be chosen for an estimate.
-#[derive(Debug, Clone, Default)]
-pub struct EstimateOptions {
-    /// Seed of all simulations.
-    pub seed: u64,
-    /// Numbers of another preset than the estimator's own; features and network stay.
-    pub preset: Option<PresetName>,
-    /// Refine and tune whatever the gate says.
-    pub always_refine: bool,
-    /// A second record to score the calibrated twin on.
-    pub validation: Option<Record>,
-}
-
-/// What an estimate is made of. Skipped stages are `None`.
-#[derive(Debug, Clone)]
-#[non_exhaustive]
-pub struct Estimate {
-    /// Names of θ: the twin's parameters, then unknown noise levels, starts and magnitudes.
-    pub names: Vec<String>,
-    /// What each parameter stands for.
-    pub roles: Vec<Role>,
-    /// The network's estimate.
-    pub initial: Vec<f64>,
-    /// The test of the network's estimate.
-    pub gate: GateOutcome,
-    /// Gauss–Newton's estimate.
-    pub gauss_newton: Option<Vec<f64>>,
-    /// The tuned heads' estimate.
-    pub fine: Option<Vec<f64>>,
-    /// The estimate: the network's where the gate kept it, else the tuned one unless its misfit is too large, else
-    /// Gauss–Newton's.
-    pub theta: Vec<f64>,
-    /// Standard errors of `theta`.
-    pub std_error: Vec<f64>,
-    /// Ends of the 90 % interval, within the bounds.
-    pub low: Vec<f64>,
-    /// Upper ends.
-    pub high: Vec<f64>,
-    /// Information and directions at Gauss–Newton's estimate, or at the network's where the gate kept it.
-    pub information: Option<Information>,
-    /// The test after the refit; `None` where no degree of freedom is left.
-    pub after: Option<GateOutcome>,
-    /// Whether a refit was made at all.
-    pub refitted: bool,
-    /// The free run at `theta`, unknown starts refitted; `None` where it diverges.
-    pub tracking: Option<Tracking>,
-    /// The free run at the network's estimate, for comparison; `None` without a refit, or where it diverges.
-    pub tracking_initial: Option<Tracking>,
-    /// The free run on the validation record; `None` without one, or where it diverges.
-    pub validation: Option<Tracking>,
-    /// Simulator calls.
-    pub simulations: usize,
-    /// The cloud that the heads were tuned on, and measured on: its last rows they never saw.
-    pub cloud: Option<Draws>,
-    /// Wall-clock times.
-    pub seconds: Seconds,
-}
-
-/// Wall-clock seconds of each stage; `None` for skipped ones.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-#[non_exhaustive]
-pub struct Seconds {
-    /// Features and network.
-    pub predict: f64,
-    /// The test.
-    pub gate: f64,
-    /// Gauss–Newton.
-    pub gauss_newton: Option<f64>,
-    /// The cloud.
-    pub cloud: Option<f64>,
-    /// The heads.
-    pub tune: Option<f64>,
-    /// Everything, free runs included.
-    pub total: f64,
-}
-
-/// A parameter that is estimated without being asked for.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[non_exhaustive]
-pub struct Nuisance {
-    /// State, output, or `id@target.magnitude`.
-    pub name: String,
-    /// "start", "noise" or "effect".
-    pub role: &'static str,
-    /// Estimate.
-    pub value: f64,
-    /// Standard error.
-    pub std_error: f64,
-}
-
-/// Why there is no estimate.
-///
-/// ```
-/// use truetwin::progress::Cancelled;
-/// use truetwin::estimator::EstimateError;
-///
-/// assert_eq!(EstimateError::from(Cancelled).to_string(), "cancelled");
-/// ```
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum EstimateError {
-    /// The record is not one of this study.
-    #[error(transparent)]
-    Study(#[from] StudyError),
-    /// The record has no features.
-    #[error(transparent)]
-    Feature(#[from] FeatureError),
-    /// A setting is out of range.
-    #[error(transparent)]
-    Settings(#[from] SettingError),
-    /// Simulations failed.
-    #[error(transparent)]
-    Bank(#[from] BankError),
-    /// The test failed.
-    #[error(transparent)]
-    Gate(#[from] GateError),
-    /// Gauss–Newton failed.
-    #[error(transparent)]
-    Refine(#[from] RefineError),
-    /// The cloud has no ellipsoid.
-    #[error(transparent)]
-    Ellipsoid(#[from] EllipsoidError),
-    /// The network failed.
-    #[error(transparent)]
-    Network(#[from] NetworkError),
-    /// Stopped from outside.
-    #[error(transparent)]
-    Cancelled(#[from] Cancelled),
-}
-
-impl Estimate {
-    /// Start states, noise levels and magnitudes among θ.
-    pub fn nuisance(&self) -> Vec<Nuisance> {
-        (0..self.names.len())
-            .filter_map(|j| {
-                let role = match self.roles[j] {
-                    Role::Physical => return None,
-                    Role::Start => "start",
-                    Role::Noise => "noise",
-                    Role::Effect => "effect",
-                };
-                let name = self.names[j].strip_prefix(&format!("{role}."));
-                Some(Nuisance {
-                    name: name.unwrap_or(&self.names[j]).into(),
-                    role,
-                    value: self.theta[j],
-                    std_error: self.std_error[j],
-                })
-            })
-            .collect()
-    }
-
-    /// The twin's own parameters out of a vector over all of θ.
-    pub fn physical<T: Clone>(&self, all: &[T]) -> Vec<T> {
-        (all.iter().zip(&self.roles))
-            .filter(|(_, role)| **role == Role::Physical)
-            .map(|(value, _)| value.clone())
-            .collect()
-    }
-}
-
-impl Estimate {
-    /// Draws of the cloud that were drawn again: out of bounds, diverged, or without features.
-    pub fn redrawn(&self) -> usize {
-        self.cloud.as_ref().map_or(0, |draws| draws.redrawn)
-    }
-}
 
 impl Estimator {
     /// Estimates θ from a record: features, network, gate; and where the gate rejects: Gauss–Newton, cloud, tuned
@@ -200,13 +33,13 @@ impl Estimator {
     ///
     /// # Errors
     ///
-    /// A record that does not fit, simulations that fail, a listener that cancels: [`EstimateError`].
+    /// A record that does not fit, simulations that fail, a listener that cancels: [`EstimatorError`].
     pub fn estimate(
         &self,
         record: &Record,
         options: &EstimateOptions,
         progress: &Progress,
-    ) -> Result<Estimate, EstimateError> {
+    ) -> Result<Estimate, EstimatorError> {
         let clock = Instant::now();
         self.study().check_record(record)?;
         if let Some(validation) = &options.validation {
@@ -336,7 +169,7 @@ impl Run<'_> {
         &self,
         simulator: &FeatureSimulator,
         initial: &[f64],
-    ) -> Result<GateOutcome, EstimateError> {
+    ) -> Result<GateOutcome, EstimatorError> {
         let test = self.gate_test(simulator, "gate");
         let gate = match self.settings.gate.form {
             GateForm::Paper => test.at(initial)?,
@@ -349,7 +182,7 @@ impl Run<'_> {
                 let refinement = self.refinement(simulator, self.observed, &self.settings.refine);
                 let jacobians = refinement.jacobians_at(&initial)?;
                 test.at_estimate(&initial, &jacobians, |features| {
-                    Ok::<_, EstimateError>(self.estimator.predict(features)?)
+                    Ok(self.estimator.predict(features)?)
                 })?
             }
         };
@@ -378,7 +211,7 @@ impl Run<'_> {
         &self,
         simulator: &FeatureSimulator,
         initial: &[f64],
-    ) -> Result<Outcome, EstimateError> {
+    ) -> Result<Outcome, EstimatorError> {
         let space = self.estimator.study().twin().parameters();
         let spread = (self.estimator.calibration).spread(initial, &space.widths(), INTERVAL_LEVEL);
         let unknown = || Spread::normal(vec![f64::NAN; initial.len()], INTERVAL_LEVEL);
@@ -388,7 +221,7 @@ impl Run<'_> {
             .describe_at(initial)
         {
             Ok(refined) => Some(refined.information),
-            Err(RefineError::Cancelled(stop)) => return Err(stop.into()),
+            Err(error @ EstimatorError::Cancelled(_)) => return Err(error),
             Err(_) => None,
         };
         Ok(Outcome {
@@ -408,7 +241,7 @@ impl Run<'_> {
         simulator: &FeatureSimulator,
         initial: &[f64],
         seconds: &mut Seconds,
-    ) -> Result<Outcome, EstimateError> {
+    ) -> Result<Outcome, EstimatorError> {
         let (settings, progress) = (self.settings, self.progress);
         let lap = Instant::now();
         // Features that can find the record's neighbourhood by themselves do, and are taken about it from here on.
@@ -465,8 +298,8 @@ impl Run<'_> {
         let after = match after {
             Ok(after) => after,
             // Simulations at the answer cannot be tested (they diverge, say); the answer stands.
-            Err(GateError::Bank(BankError::Hopeless { .. }) | GateError::Whitening(_)) => None,
-            Err(error) => return Err(error.into()),
+            Err(EstimatorError::Hopeless { .. } | EstimatorError::Whitening(_)) => None,
+            Err(error) => return Err(error),
         };
         Ok(Outcome {
             answer,
@@ -486,5 +319,53 @@ impl Run<'_> {
         let misfit = (refinement.whitened_residual(refined, theta))
             .map(|residual| refined.explainable_misfit(&residual));
         matches!((misfit, threshold), (Ok(misfit), Ok(threshold)) if misfit <= threshold)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimator::estimate::EstimateOptions;
+    use crate::estimator::pretrain::{PretrainOptions, pretrain};
+    use crate::study::{RecordPlan, Study, StudyFile};
+    use crate::twins::CascadedTanks;
+
+    /// The tanks, all physical parameters fixed.
+    fn fixed(tables: &str) -> Study {
+        let text =
+            format!("twin = 'tanks'\n[fixed]\nk1 = 0.6\nk2 = 0.6\nk3 = 0.6\nk4 = 0.6\n{tables}");
+        let file = StudyFile::parse(&text, "s.toml".as_ref()).unwrap();
+        let plan = RecordPlan::levels(0.5, 60, 0.0, 3.0, 30);
+        let study = Study::new("tanks", CascadedTanks, plan).unwrap();
+        study.configure(&file).unwrap()
+    }
+
+    const SMALL: PretrainOptions = PretrainOptions {
+        preset: crate::estimator::recipe::PresetName::Default,
+        bank_size: Some(100),
+        epochs: Some(1),
+        seed: 1,
+    };
+
+    #[test]
+    fn a_start_alone_is_estimated() {
+        let study = fixed("[start]\nh1 = 'estimate'");
+        let (estimator, _) = pretrain(&study, &SMALL, &Progress::silent()).unwrap();
+        let noise = Noise::new(1, "record", 0);
+        let drive = study.drives().unwrap().draw(noise).unwrap();
+        let theta = study.twin().parameters().centre();
+        let outputs = study.twin().simulate(&theta, &drive, noise).unwrap();
+        let record = Record::new(drive, outputs).unwrap();
+        for always_refine in [false, true] {
+            let options = EstimateOptions {
+                always_refine,
+                ..EstimateOptions::default()
+            };
+            let estimate = estimator
+                .estimate(&record, &options, &Progress::silent())
+                .unwrap();
+            assert_eq!(estimate.names, ["start.h1"]);
+            assert!(estimate.std_error[0].is_finite());
+        }
     }
 }

@@ -1,7 +1,9 @@
 //! `pretrain`: simulates a bank and trains the network.
 
-use super::args::{PresetArgument, Subject, seconds};
-use super::{Context, Failure, Verb, output};
+use crate::cli::args::{PresetArgument, Subject, seconds};
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
 use crate::estimator::bank::{Bank, file};
 use crate::estimator::shards::{BankPlan, ShardedBank};
 use crate::estimator::{GivenBank, PretrainOptions, Pretraining, Project};
@@ -19,7 +21,7 @@ use std::time::{Duration, Instant};
         truetwin pretrain --study S.toml --bank bank --out mine.est\n\
         After a stop, rerun the same command to resume: EST.part keeps bank and training until EST is complete.\n\
         Next: truetwin estimate R.csv --estimator tanks.est")]
-pub(super) struct Pretrain {
+pub(in crate::cli) struct Pretrain {
     #[command(flatten)]
     subject: Subject,
     /// Output file of the estimator.

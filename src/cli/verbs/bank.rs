@@ -1,7 +1,9 @@
 //! `bank`: simulates a bank to disk.
 
-use super::args::{PresetArgument, Subject, at_least_one};
-use super::{Context, Failure, Verb, output};
+use crate::cli::args::{PresetArgument, Subject, at_least_one};
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
 use crate::estimator::shards::BankPlan;
 use crate::storage::work::Share;
 use clap::Args;
@@ -20,7 +22,7 @@ use std::time::Instant;
         truetwin merge bank-1 bank-2 bank-3 bank-4 --out bank\n  \
         truetwin pretrain --twin tanks --bank bank --out tanks.est\n\
         On a shared file system, give all jobs one DIR; no merge is needed. See docs/scaling.md.")]
-pub(super) struct Bank {
+pub(in crate::cli) struct Bank {
     #[command(flatten)]
     subject: Subject,
     /// Number of simulations.

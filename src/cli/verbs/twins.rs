@@ -1,6 +1,8 @@
 //! `twins`: lists the twins.
 
-use super::{Context, Failure, Verb, output};
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
 use crate::record::Quantity;
 use crate::study::Study;
 use clap::Args;
@@ -12,7 +14,7 @@ use std::process::ExitCode;
 #[command(after_help = "Example:\n  \
         truetwin twins\n\
         Next: truetwin check --twin NAME, then truetwin pretrain --twin NAME --out NAME.est")]
-pub(super) struct Twins {}
+pub(in crate::cli) struct Twins {}
 
 impl Verb for Twins {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {

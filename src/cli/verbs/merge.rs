@@ -1,6 +1,8 @@
 //! `merge`: merges the banks of a job array.
 
-use super::{Context, Failure, Verb, output};
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
 use crate::estimator::bank::file;
 use crate::estimator::shards::{merge, merge_into_file};
 use clap::Args;
@@ -14,7 +16,7 @@ use std::process::ExitCode;
         truetwin merge bank-1 bank-2 --out bank\n  \
         truetwin merge bank --out bank.npz\n\
         Next: truetwin pretrain with --bank bank")]
-pub(super) struct Merge {
+pub(in crate::cli) struct Merge {
     /// Folders filled by one `truetwin bank` command.
     #[arg(value_name = "DIR", required = true)]
     from: Vec<PathBuf>,

@@ -1,7 +1,9 @@
 //! `estimate`: estimates the parameters behind a record.
 
-use super::args::PresetArgument;
-use super::{Context, Failure, Verb, output, records};
+use crate::cli::args::PresetArgument;
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::{output, records};
 use crate::estimator::bank::file;
 use crate::estimator::{self, EstimateOptions, Estimator};
 use crate::record::Record;
@@ -16,7 +18,7 @@ use std::process::ExitCode;
 #[command(after_help = "Example:\n  \
         truetwin estimate R.csv --estimator tanks.est --validation V.csv --out result\n\
         If the calibrated twin does not explain the record, next: truetwin diagnose R.csv")]
-pub(super) struct Estimate {
+pub(in crate::cli) struct Estimate {
     /// Measured record.
     #[arg(value_name = "R.csv")]
     record: PathBuf,

@@ -1,7 +1,9 @@
 //! `demo`: estimates the parameters behind an embedded record.
 
 use super::estimate::{show, write_results};
-use super::{Context, Failure, Verb, output};
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
 use crate::estimator::{EstimateOptions, PresetName, PretrainOptions, pretrain};
 use crate::record::{Record, write_record};
 use crate::study::Study;
@@ -19,7 +21,7 @@ const EPOCHS: usize = 40;
 #[command(after_help = "Example:\n  \
         truetwin demo --out demo\n\
         Next: look at demo/overlay.svg, then truetwin twins")]
-pub(super) struct Demo {
+pub(in crate::cli) struct Demo {
     /// Name of the twin [default: the first one that has a demo record].
     #[arg(long)]
     twin: Option<String>,

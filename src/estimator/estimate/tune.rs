@@ -1,12 +1,13 @@
 //! Heads tuned on the cloud.
 
-use super::calibration::{Calibration, Spread};
-use super::estimate::INTERVAL_LEVEL;
-use super::estimator::one_row;
-use super::readout::{Layer, Readout};
-use super::{EstimateError, Estimator, Scaler, Settings, Standardiser};
 use crate::estimator::bank::Draws;
+use crate::estimator::error::EstimatorError;
+use crate::estimator::estimator::{Estimator, one_row};
+use crate::estimator::readout::{
+    Calibration, INTERVAL_LEVEL, Layer, Readout, Scaler, Spread, Standardiser,
+};
 use crate::estimator::refine::Refined;
+use crate::estimator::settings::Settings;
 use crate::network::Training;
 use crate::progress::Progress;
 use nalgebra::DVector;
@@ -37,7 +38,7 @@ pub fn tune(
     settings: &Settings,
     seed: u64,
     progress: &Progress,
-) -> Result<Tuned, EstimateError> {
+) -> Result<Tuned, EstimatorError> {
     let size = (settings.cloud.draws(draws.theta.ncols())).min(draws.theta.nrows());
     let rows = |all: &Array2<f64>, from: usize, to: usize| all.slice(s![from..to, ..]).to_owned();
     let (features, theta) = (rows(&draws.features, 0, size), rows(&draws.theta, 0, size));

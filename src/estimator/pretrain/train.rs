@@ -1,24 +1,18 @@
 //! Bank and training.
 
-use super::calibration::Calibration;
-use super::readout::Readout;
-use super::{
-    Estimator, EstimatorFileError, Inputs, PresetName, Project, Scaler, Settings, Standardiser,
-};
-use crate::estimator::bank::file::BankFileError;
-use crate::estimator::bank::{Bank, BankError, Draws};
-use crate::estimator::shards::{Prior, PriorError, ShardsError};
-use crate::feature::FeatureError;
-use crate::math::MathError;
-use crate::network::{Checkpoints, History, NetworkError, Part, Samples};
+use crate::estimator::bank::{Bank, Draws};
+use crate::estimator::error::EstimatorError;
+use crate::estimator::estimator::Estimator;
+use crate::estimator::project::Project;
+use crate::estimator::readout::{Calibration, Readout, Scaler, Standardiser};
+use crate::estimator::recipe::PresetName;
+use crate::estimator::settings::{Inputs, Settings};
+use crate::estimator::shards::Prior;
+use crate::network::{Checkpoints, History, Part, Samples};
 use crate::progress::Progress;
-use crate::setting::SettingError;
-use crate::storage::StorageError;
-use crate::study::PlanError;
 use ndarray::Array2;
 use std::borrow::Cow;
 use std::error::Error;
-use std::path::PathBuf;
 
 /// Simulations apart from the bank, on which the error of the network is measured.
 const CALIBRATION: usize = 1000;
@@ -42,87 +36,6 @@ pub struct PretrainOptions {
     pub seed: u64,
 }
 
-/// Why there is no estimator.
-///
-/// ```
-/// use truetwin::progress::Progress;
-/// use truetwin::study::{RecordPlan, Study};
-/// use truetwin::twins::VanDerPol;
-/// use truetwin::estimator::{PretrainError, PretrainOptions, pretrain};
-///
-/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 200))?;
-/// let too_few = PretrainOptions { bank_size: Some(3), ..PretrainOptions::default() };
-/// let error = pretrain(&study, &too_few, &Progress::silent()).unwrap_err();
-/// assert!(matches!(error, PretrainError::Settings(_)));
-/// # Ok::<(), truetwin::study::StudyError>(())
-/// ```
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum PretrainError {
-    /// Of the recipe.
-    #[error(transparent)]
-    Settings(#[from] SettingError),
-    /// Of step, length, input.
-    #[error(transparent)]
-    Plan(#[from] PlanError),
-    /// Of the features.
-    #[error(transparent)]
-    Feature(#[from] FeatureError),
-    /// Of the simulations.
-    #[error(transparent)]
-    Bank(#[from] BankError),
-    /// Of a bank on disk.
-    #[error(transparent)]
-    File(#[from] BankFileError),
-    /// More simulations than fit into memory.
-    #[error(
-        "bank size = {0}; at most {MOST_IN_MEMORY} fit into memory: make a bank on disk with `truetwin bank`, then pretrain --bank"
-    )]
-    Memory(usize),
-    /// A bank of another width.
-    #[error(
-        "the bank has {given} {what}, twin and preset have {expected}; make a bank with this study and preset"
-    )]
-    Width {
-        /// Parameters or features.
-        what: &'static str,
-        /// In the bank.
-        given: usize,
-        /// Of the study.
-        expected: usize,
-    },
-    /// Of the folder in which a pretraining is kept.
-    #[error(transparent)]
-    Work(#[from] StorageError),
-    /// Of the bank in that folder.
-    #[error(transparent)]
-    Shards(#[from] ShardsError),
-    /// There is something in the estimator's place.
-    #[error("{} exists already; choose another --out, or remove it", .0.display())]
-    Taken(PathBuf),
-    /// The estimator cannot be written.
-    #[error(transparent)]
-    Save(#[from] EstimatorFileError),
-    /// Of the training.
-    #[error(transparent)]
-    Network(#[from] NetworkError),
-    /// The features of the bank do not vary, or are not finite.
-    #[error("the features of the bank cannot be standardised: {0}")]
-    Standardise(#[from] MathError),
-    /// More features than the network takes.
-    #[error(
-        "the features are {features} numbers, network \"{network}\" takes at most {most}; lower their order or choose a wider network"
-    )]
-    TooManyFeatures {
-        /// Features.
-        features: usize,
-        /// Network.
-        network: &'static str,
-        /// Its limit.
-        most: usize,
-    },
-}
-
 /// Simulates a bank from the prior, in memory, and trains the network on it.
 ///
 /// θ is uniform in the prior, each simulation has its own noise and, where the study draws inputs, its own input.
@@ -130,14 +43,14 @@ pub enum PretrainError {
 ///
 /// # Errors
 ///
-/// [`PretrainError`].
+/// [`EstimatorError`].
 ///
 /// Source: Lakshminarayanan, Guerrero & Rojas, section III.
 pub fn pretrain(
     project: impl Into<Project>,
     options: &PretrainOptions,
     progress: &Progress,
-) -> Result<(Estimator, History), PretrainError> {
+) -> Result<(Estimator, History), EstimatorError> {
     let project = &project.into();
     let settings = settings(project, options)?;
     let size = settings.bank_size;
@@ -158,7 +71,7 @@ pub fn pretrain(
 ///
 /// # Errors
 ///
-/// [`PretrainError`]; also for rows of another width.
+/// [`EstimatorError`]; also for rows of another width.
 ///
 /// ```
 /// use truetwin::progress::Progress;
@@ -183,7 +96,7 @@ pub fn pretrain_on(
     bank: &dyn Bank,
     options: &PretrainOptions,
     progress: &Progress,
-) -> Result<(Estimator, History), PretrainError> {
+) -> Result<(Estimator, History), EstimatorError> {
     let project = project.into();
     pretrain_from(&project, bank, options, &Checkpoints::none(), progress)
 }
@@ -195,7 +108,7 @@ pub(super) fn pretrain_from(
     options: &PretrainOptions,
     checkpoints: &Checkpoints,
     progress: &Progress,
-) -> Result<(Estimator, History), PretrainError> {
+) -> Result<(Estimator, History), EstimatorError> {
     let options = PretrainOptions {
         bank_size: Some(bank.rows()),
         ..*options
@@ -214,18 +127,20 @@ pub(super) fn pretrain_from(
 }
 
 /// Refuses a bank that is too large.
-pub(super) fn fits_into_memory(size: usize) -> Result<(), PretrainError> {
-    match size <= MOST_IN_MEMORY {
-        true => Ok(()),
-        false => Err(PretrainError::Memory(size)),
+pub(super) fn fits_into_memory(size: usize) -> Result<(), EstimatorError> {
+    if size <= MOST_IN_MEMORY {
+        return Ok(());
     }
+    Err(EstimatorError::Bank(format!(
+        "bank size = {size}; at most {MOST_IN_MEMORY} fit into memory: make a bank on disk with `truetwin bank`, then pretrain --bank"
+    )))
 }
 
 /// The preset's numbers with what the options say otherwise, checked.
 pub(super) fn settings(
     project: &Project,
     options: &PretrainOptions,
-) -> Result<Settings, PretrainError> {
+) -> Result<Settings, EstimatorError> {
     let mut settings = project.recipe(options.preset).settings.clone();
     settings.bank_size = options.bank_size.unwrap_or(settings.bank_size);
     settings.training.epochs = options.epochs.unwrap_or(settings.training.epochs);
@@ -234,16 +149,16 @@ pub(super) fn settings(
 }
 
 /// The prior through the preset's features, which the network must take.
-pub(super) fn prior(project: &Project, options: &PretrainOptions) -> Result<Prior, PretrainError> {
+pub(super) fn prior(project: &Project, options: &PretrainOptions) -> Result<Prior, EstimatorError> {
     let preset = project.recipe(options.preset);
     let prior = Prior::new(project.study(), preset.features.as_ref())?;
     let most = preset.architecture.max_features();
     if prior.dim() > most {
-        return Err(PretrainError::TooManyFeatures {
-            features: prior.dim(),
-            network: preset.architecture.id(),
-            most,
-        });
+        return Err(EstimatorError::Inputs(format!(
+            "the features are {} numbers, network \"{}\" takes at most {most}; lower their order or choose a wider network",
+            prior.dim(),
+            preset.architecture.id()
+        )));
     }
     Ok(prior)
 }
@@ -256,7 +171,7 @@ fn train(
     bank: &dyn Bank,
     checkpoints: &Checkpoints,
     progress: &Progress,
-) -> Result<(Estimator, History), PretrainError> {
+) -> Result<(Estimator, History), EstimatorError> {
     let preset = project.recipe(options.preset);
     let seed = options.seed;
     let first = first_rows(bank)?;
@@ -269,16 +184,18 @@ fn train(
         ("features", first.features.ncols(), prior.dim()),
     ] {
         if given != expected {
-            return Err(PretrainError::Width {
-                what,
-                given,
-                expected,
-            });
+            return Err(EstimatorError::Bank(format!(
+                "the bank has {given} {what}, twin and preset have {expected}; make a bank with this study and preset"
+            )));
         }
     }
     let inputs = match settings.inputs {
         Inputs::Each => Standardiser::each(&first.features),
-        Inputs::Principal => Standardiser::principal(&first.features, LIMIT)?,
+        Inputs::Principal => Standardiser::principal(&first.features, LIMIT).map_err(|error| {
+            EstimatorError::Inputs(format!(
+                "the features of the bank cannot be standardised: {error}"
+            ))
+        })?,
     };
     let targets = Scaler::fit(&first.theta);
     let samples = Standardised {
@@ -318,14 +235,14 @@ fn train(
 }
 
 /// The first [`STANDARD`] rows of a bank, or all: rows are alike, and so many tell means and deviations well enough.
-fn first_rows(bank: &dyn Bank) -> Result<Draws, BankFileError> {
+fn first_rows(bank: &dyn Bank) -> Result<Draws, EstimatorError> {
     let sizes = bank.parts();
     let rows = sizes.iter().sum::<usize>().min(STANDARD);
     let parts = (0..sizes.len()).map(|index| bank.part(index));
-    Draws::stacked(rows, parts, |index| BankFileError::Content {
-        path: format!("part {index} of the bank").into(),
-        reason: "another number of features".into(),
-        remedy: "make the bank again",
+    Draws::stacked(rows, parts, |index| {
+        EstimatorError::Bank(format!(
+            "part {index} of the bank: another number of features; make the bank again"
+        ))
     })
 }
 
@@ -354,14 +271,5 @@ impl Samples for Standardised<'_> {
         let features = self.inputs.apply(&draws.features);
         let targets = self.targets.apply(&draws.theta);
         Ok((Cow::Owned(features), Cow::Owned(targets)))
-    }
-}
-
-impl From<PriorError> for PretrainError {
-    fn from(error: PriorError) -> Self {
-        match error {
-            PriorError::Feature(error) => Self::Feature(error),
-            PriorError::Plan(error) => Self::Plan(error),
-        }
     }
 }

@@ -1,0 +1,48 @@
+//! The whole command line.
+
+use super::args::External;
+use super::verbs::Command as Verbs;
+use clap::{Command, CommandFactory, Parser};
+
+/// Calibrate simulators against measured data and diagnose what they are missing.
+#[derive(Debug, Parser)]
+#[command(
+    name = "truetwin",
+    version,
+    after_help = "A first look:   truetwin demo\n\
+        The main job:   truetwin pretrain --twin tanks --out tanks.est\n                \
+        truetwin estimate record.csv --estimator tanks.est --out result\n\
+        Your simulator: truetwin check --program 'python3 model.py'   (docs/external-programs.md)\n\n\
+        Records are CSV: t (seconds, uniform), inputs u or u1,u2,…, outputs y or y1,y2,…"
+)]
+pub(super) struct Arguments {
+    #[command(subcommand)]
+    pub command: Verbs,
+    /// Print one JSON object.
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Random seed; the same seed gives the same bits on any number of threads.
+    #[arg(long, global = true, default_value_t = 1)]
+    pub seed: u64,
+    /// Number of threads [default: all cores].
+    #[arg(long, global = true)]
+    pub threads: Option<usize>,
+    #[command(flatten)]
+    pub external: External,
+}
+
+/// Exit codes, at the end of every `--help`.
+const EXIT: &str = "Exit codes: 0 done; 2 wrong call or file (one line names the problem, the place and the remedy); 130 stopped by Ctrl-C; \
+     1 internal error.";
+
+/// The whole command line.
+pub(super) fn command() -> Command {
+    let with_exit = |command: Command| {
+        let text = match command.get_after_help() {
+            Some(text) => format!("{text}\n\n{EXIT}"),
+            None => EXIT.into(),
+        };
+        command.after_help(text)
+    };
+    with_exit(Arguments::command()).mut_subcommands(with_exit)
+}

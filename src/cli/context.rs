@@ -1,0 +1,95 @@
+//! The interface between the command line and its verbs.
+
+use super::args::Subject;
+use super::failure::Failure;
+use crate::estimator::Project;
+use crate::progress::Progress;
+use crate::storage::work::{Ranks, Share};
+use crate::study::{Study, StudyError, StudyFile};
+use clap::Command;
+use std::process::ExitCode;
+
+/// A verb: its options and its work.
+pub(super) trait Verb {
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure>;
+
+    /// The twin of the call, for verbs that need one.
+    fn subject(&self) -> Option<&Subject> {
+        None
+    }
+
+    /// Tells whether rerunning the same command resumes the work.
+    fn is_resumed(&self) -> bool {
+        false
+    }
+
+    /// Tells whether the ranks of a cluster share the work.
+    fn is_shared_out(&self) -> bool {
+        false
+    }
+}
+
+/// Data that every verb gets.
+pub(super) struct Context<'a> {
+    /// All studies, including the external one.
+    pub projects: &'a [Project],
+    /// The external study of this call.
+    pub external: Option<&'a Project>,
+    /// Name of the program.
+    pub program: &'a str,
+    pub json: bool,
+    pub seed: u64,
+    pub progress: &'a Progress,
+    pub ranks: &'a Ranks,
+    /// Creates the whole command line.
+    pub command: fn() -> Command,
+}
+
+impl Context<'_> {
+    /// Returns the study of `--twin` or `--study`, or else the external one.
+    pub fn study(&self, subject: &Subject) -> Result<Study, Failure> {
+        Ok(self.project(subject)?.study().clone())
+    }
+
+    /// As [`study`](Self::study), with the recipes.
+    pub fn project(&self, subject: &Subject) -> Result<Project, Failure> {
+        match (&subject.twin, &subject.study) {
+            (Some(name), _) => Ok(self.named(name)?.clone()),
+            (None, Some(path)) => {
+                let file = StudyFile::read(path)?;
+                let at = |failure: Failure| failure.within(path);
+                let project = self.named(&file.twin).map_err(at)?;
+                project.configure(&file).map_err(|error| at(error.into()))
+            }
+            (None, None) => (self.external.cloned()).ok_or_else(|| {
+                Failure::user(
+                    "no twin given; add --twin NAME (`truetwin twins` lists them), --study S.toml, --program 'COMMAND', or --fmu M.fmu",
+                )
+            }),
+        }
+    }
+
+    /// Returns the share of this process in numbered work: that of `--shard`, or of its rank.
+    pub fn share(&self, asked: Option<Share>) -> Result<Share, Failure> {
+        match asked {
+            None => Ok(self.ranks.share()),
+            Some(share) if self.ranks.is_alone() => Ok(share),
+            Some(_) => Err(Failure::user(
+                "--shard cannot be used under mpirun, where ranks share the work; remove it",
+            )),
+        }
+    }
+
+    pub fn named(&self, name: &str) -> Result<&Project, Failure> {
+        let project = (self.projects.iter()).find(|project| project.study().name() == name);
+        Ok(project.ok_or_else(|| StudyError::Twin {
+            given: name.into(),
+            known: self
+                .projects
+                .iter()
+                .map(|project| project.study().name())
+                .collect::<Vec<_>>()
+                .join(", "),
+        })?)
+    }
+}

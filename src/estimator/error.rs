@@ -1,0 +1,117 @@
+//! The error of the estimator's room.
+
+use crate::feature::FeatureError;
+use crate::math::MathError;
+use crate::network::NetworkError;
+use crate::progress::Cancelled;
+use crate::setting::SettingError;
+use crate::storage::StorageError;
+use crate::storage::files::with_remedy;
+use crate::storage::untrusted::{MESSAGE, one_line};
+use crate::study::StudyError;
+use crate::twin::SimulationError;
+use std::path::{Path, PathBuf};
+
+/// Error of a bank, a pretraining, an estimate, or an estimator file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum EstimatorError {
+    /// A setting is out of range.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// The record or the record plan does not fit the study.
+    #[error(transparent)]
+    Study(#[from] StudyError),
+    /// The features cannot be taken from this twin or record.
+    #[error(transparent)]
+    Feature(#[from] FeatureError),
+    /// The network failed.
+    #[error(transparent)]
+    Network(#[from] NetworkError),
+    /// The work folder cannot be used.
+    #[error(transparent)]
+    Work(#[from] StorageError),
+    /// The work was cancelled.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// The simulator failed in a way that other parameters cannot mend.
+    #[error(transparent)]
+    Simulation(SimulationError),
+    /// One simulation gave no features; other parameters may.
+    #[error("{0}")]
+    Rejected(String),
+    /// Nearly all simulations failed.
+    #[error(
+        "{failed} of {tried} draws failed ({reason}); shrink the prior, the bounds or the step, or mend the twin"
+    )]
+    Hopeless {
+        /// Failed draws.
+        failed: usize,
+        /// All draws.
+        tried: usize,
+        /// Message of the last failure.
+        reason: String,
+    },
+    /// The bank cannot be made, merged, or used for this study.
+    #[error("{0}")]
+    Bank(String),
+    /// The network cannot take these features.
+    #[error("{0}")]
+    Inputs(String),
+    /// A file cannot be read or written.
+    #[error("{}: {}", path.display(), with_remedy(error))]
+    Io {
+        /// File.
+        path: PathBuf,
+        /// The system's error.
+        error: std::io::Error,
+    },
+    /// A file or folder holds something else, is damaged, or was made for another twin or by another version.
+    #[error("{}: {problem}", path.display())]
+    File {
+        /// File or folder.
+        path: PathBuf,
+        /// Problem and remedy.
+        problem: String,
+    },
+    /// The features simulated at an estimate have no covariance.
+    #[error(
+        "the features simulated at the estimate cannot be whitened: {0}; a twin without noise has no statistics: give it noise levels ([noise] in a study)"
+    )]
+    Whitening(MathError),
+    /// The record does not determine the parameters.
+    #[error("{0}")]
+    Undetermined(String),
+    /// A numerical search failed.
+    #[error(transparent)]
+    Search(#[from] MathError),
+    /// The cloud cannot be drawn.
+    #[error("{0}")]
+    Cloud(String),
+}
+
+impl EstimatorError {
+    pub(crate) fn io(path: &Path, error: std::io::Error) -> Self {
+        Self::Io {
+            path: path.into(),
+            error,
+        }
+    }
+
+    /// A file with this problem, which may quote the file's content.
+    pub(crate) fn file(path: &Path, problem: impl ToString) -> Self {
+        Self::File {
+            path: path.into(),
+            problem: one_line(&problem.to_string(), MESSAGE),
+        }
+    }
+
+    /// A file that holds no bank, or a damaged one.
+    pub(crate) fn no_bank(path: &Path, reason: &str, remedy: &str) -> Self {
+        let reason = one_line(reason, MESSAGE);
+        Self::File {
+            path: path.into(),
+            problem: format!("no bank ({reason}); {remedy}"),
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! The error of a study.
+
+use crate::effect::EffectError;
+use crate::record::RecordError;
+use crate::setting::did_you_mean;
+use crate::storage::files::with_remedy;
+use crate::twin::TwinError;
+use std::path::PathBuf;
+
+/// Error of a study, its file, or its records.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum StudyError {
+    /// The study file cannot be read.
+    #[error("{}: {}", path.display(), with_remedy(error))]
+    Io {
+        /// File.
+        path: PathBuf,
+        /// The system's error.
+        error: std::io::Error,
+    },
+    /// The text of the study file is wrong.
+    #[error("{}, line {line}: {message}; correct that line", path.display())]
+    Syntax {
+        /// File.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// Message of the parser, in one line.
+        message: String,
+    },
+    /// The study is about an unknown twin.
+    #[error("no twin is called \"{given}\"{}; there are {known}", did_you_mean(given, known.split(", ")))]
+    Twin {
+        /// Name in the file.
+        given: String,
+        /// Known twins.
+        known: String,
+    },
+    /// Prior, bounds, limits, noise or starts do not fit the twin.
+    #[error(transparent)]
+    Adaptation(#[from] TwinError),
+    /// An effect does not fit the twin.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+    /// The twin's own parameters, `[fixed]` or `[library]` are wrong.
+    #[error("{0}")]
+    Table(String),
+    /// Step, length or input are wrong, or a record has another step.
+    #[error("{0}")]
+    Plan(String),
+    /// A record, its file, or its channels are wrong.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+}
