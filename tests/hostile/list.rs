@@ -215,9 +215,12 @@ fn a_second_run_on_one_output_is_refused() {
 fn a_damaged_bank_is_named_with_its_remedy() {
     let place = tempfile::tempdir().unwrap();
     assert!(
-        run(place.path(), "bank --twin van-der-pol --size 64 --out bank")
-            .status
-            .success()
+        run(
+            place.path(),
+            "bank --twin van-der-pol --size 128 --out bank"
+        )
+        .status
+        .success()
     );
     let train = "pretrain --twin van-der-pol --bank bank --epochs 1 --out v.est";
     let shards = place.path().join("bank/shards");
