@@ -4,7 +4,7 @@ use super::args::Subject;
 use super::failure::Failure;
 use crate::estimator::Project;
 use crate::progress::Progress;
-use crate::storage::work::{Share, Team};
+use crate::storage::work::{Ranks, Share};
 use crate::study::{Study, StudyError, StudyFile};
 use clap::Command;
 use std::process::ExitCode;
@@ -40,7 +40,7 @@ pub(super) struct Context<'a> {
     pub json: bool,
     pub seed: u64,
     pub progress: &'a Progress,
-    pub team: &'a Team,
+    pub ranks: &'a Ranks,
     /// Creates the whole command line.
     pub command: fn() -> Command,
 }
@@ -72,8 +72,8 @@ impl Context<'_> {
     /// Returns the share of this process in numbered work: that of `--shard`, or of its rank.
     pub fn share(&self, asked: Option<Share>) -> Result<Share, Failure> {
         match asked {
-            None => Ok(self.team.share()),
-            Some(share) if self.team.is_alone() => Ok(share),
+            None => Ok(self.ranks.share()),
+            Some(share) if self.ranks.is_alone() => Ok(share),
             Some(_) => Err(Failure::user(
                 "--shard cannot be used under mpirun, where ranks share the work; remove it",
             )),

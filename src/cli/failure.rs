@@ -8,7 +8,8 @@ use crate::evaluate::EvaluateError;
 use crate::feature::FeatureError;
 use crate::network::NetworkError;
 use crate::record::RecordError;
-use crate::storage::work::{Team, TeamError, WorkError};
+use crate::storage::StorageError;
+use crate::storage::work::Ranks;
 use crate::study::StudyError;
 use crate::twin::{SimulationError, TwinError};
 use std::fmt::Display;
@@ -107,8 +108,8 @@ impl Failure {
     }
 
     /// Reports a failure that all ranks share; the root rank prints it.
-    pub fn report_of(self, team: &Team) -> ExitCode {
-        if team.leads() {
+    pub fn report_of(self, ranks: &Ranks) -> ExitCode {
+        if ranks.is_root() {
             self.report()
         } else {
             ExitCode::from(self.code)
@@ -141,9 +142,8 @@ users!(
     EffectError,
     RecordError,
     SimulationError,
-    TeamError,
+    StorageError,
     TwinError,
-    WorkError,
 );
 
 /// Errors that the setting of the study can cause.
@@ -162,7 +162,7 @@ impl From<EvaluateError> for Failure {
     fn from(error: EvaluateError) -> Self {
         match error {
             EvaluateError::Diagnose(error) => error.into(),
-            EvaluateError::Threads(_) | EvaluateError::Cancelled(_) => Self::internal(error),
+            EvaluateError::Cancelled(_) => Self::internal(error),
             EvaluateError::Changed(_)
             | EvaluateError::NoEffect(_)
             | EvaluateError::Runaway(_)

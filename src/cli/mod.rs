@@ -21,17 +21,20 @@ mod external;
 mod failure;
 mod output;
 mod progress;
+mod records;
 mod say;
 mod stop;
 mod verbs;
 
 use crate::estimator::Project;
-use crate::storage::work::Team;
+use crate::storage::StorageError;
+use crate::storage::work::Ranks;
 use crate::study::StudyError;
 use arguments::Arguments;
 use clap::FromArgMatches;
 use context::Context;
 use failure::Failure;
+use std::error::Error;
 use std::ffi::OsString;
 use std::path::Path;
 use std::process::ExitCode;
@@ -61,8 +64,8 @@ pub fn run_from<P: Into<Project>, E: Into<StudyError>>(
     projects: impl IntoIterator<Item = Result<P, E>>,
     arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>,
 ) -> ExitCode {
-    let team = match Team::join() {
-        Ok(team) => team,
+    let ranks = match Ranks::join() {
+        Ok(ranks) => ranks,
         Err(error) => return Failure::from(error).report(),
     };
     let words: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
@@ -71,24 +74,25 @@ pub fn run_from<P: Into<Project>, E: Into<StudyError>>(
         Ok(parsed) => parsed,
         Err(error) if !error.use_stderr() => {
             // Help and version are results.
-            let shown = if team.leads() {
+            let shown = if ranks.is_root() {
                 output::print(&error.to_string())
             } else {
                 Ok(())
             };
             return shown.map_or_else(Failure::report, |()| ExitCode::SUCCESS);
         }
-        Err(error) => return Failure::usage(&error).report_of(&team),
+        Err(error) => return Failure::usage(&error).report_of(&ranks),
     };
     let verb = parsed.command.verb();
-    if !team.is_alone() && !verb.is_shared_out() {
+    if !ranks.is_alone() && !verb.is_shared_out() {
         let failure = Failure::user("this verb runs in one process; start it without mpirun");
-        return failure.report_of(&team);
+        return failure.report_of(&ranks);
     }
     let program = (words.first())
         .and_then(|word| Some(Path::new(word).file_stem()?.to_str()?.to_owned()))
         .unwrap_or_else(|| "truetwin".into());
     stop::listen();
+    stop::report_file_size_limit();
     let projects: Result<Vec<Project>, E> = (projects.into_iter())
         .map(|project| project.map(Into::into))
         .collect();
@@ -96,39 +100,46 @@ pub fn run_from<P: Into<Project>, E: Into<StudyError>>(
         .map_err(|error| Failure::from(error.into()))
         .and_then(|projects| {
             in_pool(parsed.threads, || {
-                dispatch(&parsed, &program, &projects, &team)
+                dispatch(&parsed, &program, &projects, &ranks)
             })
         });
     match result {
         Ok(code) => code,
         Err(_) if stop::asked() => {
-            let exit = stop::failure(verb, &words).report_of(&team);
-            team.abandon(stop::CODE);
+            let exit = stop::failure(verb, &words).report_of(&ranks);
+            ranks.abandon(stop::CODE);
             exit
         }
         Err(failure) => {
             let code = failure.code();
             let exit = failure.report();
-            team.abandon(code);
+            ranks.abandon(code);
             exit
         }
     }
 }
 
-/// Runs `work` in its own pool if a number of threads is given; the global pool stays untouched.
+/// Runs `work` in its own pool if a number of threads is given, else in the global one.
 fn in_pool<R: Send>(
     threads: Option<usize>,
     work: impl FnOnce() -> Result<R, Failure> + Send,
 ) -> Result<R, Failure> {
+    let builder = rayon::ThreadPoolBuilder::new();
+    let failed = |threads, error| Failure::from(StorageError::threads(threads, error));
     match threads {
-        None => work(),
+        None => match builder.build_global() {
+            // An error without a cause says that the application has made the pool already.
+            Err(error) if error.source().is_some() => {
+                let cores = std::thread::available_parallelism().map_or(1, usize::from);
+                Err(failed(cores, error))
+            }
+            _ => work(),
+        },
         Some(threads) if !(1..=MOST_THREADS).contains(&threads) => Err(Failure::user(format!(
             "--threads {threads}: choose between 1 and {MOST_THREADS}"
         ))),
-        Some(threads) => rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .map_err(Failure::internal)?
+        Some(threads) => (builder.num_threads(threads).build())
+            .map_err(|error| failed(threads, error))?
             .install(work),
     }
 }
@@ -137,9 +148,9 @@ fn dispatch(
     arguments: &Arguments,
     program: &str,
     registered: &[Project],
-    team: &Team,
+    ranks: &Ranks,
 ) -> Result<ExitCode, Failure> {
-    let progress = if team.leads() {
+    let progress = if ranks.is_root() {
         progress::bars()
     } else {
         progress::bars().unshown()
@@ -153,7 +164,7 @@ fn dispatch(
         json: arguments.json,
         seed: arguments.seed,
         progress: &progress,
-        team,
+        ranks,
         command: arguments::command,
     };
     let verb = arguments.command.verb();

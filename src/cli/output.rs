@@ -3,8 +3,9 @@
 use super::context::Context;
 use super::failure::Failure;
 pub(super) use super::say::say;
-use crate::storage::files::{self, folder, with_remedy};
+use crate::storage::files::{folder, with_remedy};
 use crate::storage::untrusted::{hidden, printable};
+use crate::storage::{self, StorageError, sweep_beside};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::fs;
@@ -70,7 +71,7 @@ pub(super) fn print_share(
     Ok(ExitCode::SUCCESS)
 }
 
-/// Refuses an existing path or a missing parent folder, before the work starts.
+/// Refuses an existing path or a missing parent folder, before the work starts; removes leftovers of killed processes there.
 pub(super) fn check_new(path: &Path) -> Result<(), Failure> {
     let name = path.display();
     if fs::symlink_metadata(path).is_ok() {
@@ -78,34 +79,32 @@ pub(super) fn check_new(path: &Path) -> Result<(), Failure> {
             "{name} exists already; choose another --out or remove it"
         )));
     }
-    check_folder(path)
+    check_folder(path)?;
+    sweep_beside(path);
+    Ok(())
 }
 
 /// Refuses a missing parent folder, before the work starts.
 pub(super) fn check_folder(path: &Path) -> Result<(), Failure> {
-    let folder = folder(path);
-    if folder.is_dir() {
+    if folder(path).is_dir() {
         Ok(())
     } else {
-        Err(Failure::user(format!(
-            "{}: the folder {} does not exist; make it first",
-            path.display(),
-            folder.display()
-        )))
+        Err(StorageError::NoParent { path: path.into() }.into())
     }
 }
 
 /// An output folder that appears complete: it is filled beside its place and then moved.
 pub(super) struct NewFolder {
     place: PathBuf,
-    filling: files::NewFolder,
+    filling: storage::NewFolder,
 }
 
 impl NewFolder {
+    /// Creates the folder before the work starts, so that another run with the same `--out` is refused.
     pub fn new(place: &Path) -> Result<Self, Failure> {
-        let filling = files::NewFolder::new(place);
+        check_new(place)?;
         Ok(Self {
-            filling: filling.map_err(|error| failed(place, &error))?,
+            filling: storage::NewFolder::claim(place)?,
             place: place.into(),
         })
     }
@@ -116,17 +115,14 @@ impl NewFolder {
     }
 
     pub fn write(&self, name: &str, text: &str) -> Result<(), Failure> {
-        fs::write(self.file(name), text).map_err(|error| failed(&self.place.join(name), &error))
+        fs::write(self.file(name), text)
+            .map_err(|error| StorageError::io(&self.place.join(name), error).into())
     }
 
     /// Moves the folder to its place.
     pub fn finish(self) -> Result<(), Failure> {
-        (self.filling.finish()).map_err(|error| failed(&self.place, &error))
+        (self.filling.finish()).map_err(|error| StorageError::io(&self.place, error).into())
     }
-}
-
-fn failed(path: &Path, error: &io::Error) -> Failure {
-    Failure::user(format!("{}: {}", path.display(), with_remedy(error)))
 }
 
 #[cfg(test)]

@@ -21,6 +21,19 @@ pub(super) fn listen() {
     let _ = ctrlc::set_handler(asked);
 }
 
+/// Makes a write beyond the limit of file sizes (`ulimit -f`) an error instead of the end of the process.
+#[cfg(unix)]
+pub(super) fn report_file_size_limit() {
+    extern "C" fn nothing(_: libc::c_int) {}
+    let handler = nothing as extern "C" fn(libc::c_int) as libc::sighandler_t;
+    // SAFETY: the handler does nothing, which is allowed at any point of the program. Unlike an ignored signal, a handled one
+    // is not inherited by the programs that this process starts.
+    unsafe { libc::signal(libc::SIGXFSZ, handler) };
+}
+
+#[cfg(not(unix))]
+pub(super) fn report_file_size_limit() {}
+
 /// Tells whether the work is to stop.
 pub(super) fn asked() -> bool {
     ASKED.load(Ordering::Relaxed)

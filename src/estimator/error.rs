@@ -5,9 +5,9 @@ use crate::math::MathError;
 use crate::network::NetworkError;
 use crate::progress::Cancelled;
 use crate::setting::SettingError;
+use crate::storage::StorageError;
 use crate::storage::files::with_remedy;
 use crate::storage::untrusted::{MESSAGE, one_line};
-use crate::storage::work::WorkError;
 use crate::study::StudyError;
 use crate::twin::SimulationError;
 use std::path::{Path, PathBuf};
@@ -30,7 +30,7 @@ pub enum EstimatorError {
     Network(#[from] NetworkError),
     /// The work folder cannot be used.
     #[error(transparent)]
-    Work(#[from] WorkError),
+    Work(#[from] StorageError),
     /// The work was cancelled.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),

@@ -6,7 +6,7 @@ use crate::math::MathError;
 use crate::progress::Cancelled;
 use crate::record::RecordError;
 use crate::setting::SettingError;
-use crate::storage::work::WorkError;
+use crate::storage::StorageError;
 use crate::study::StudyError;
 use crate::twin::{Interval, SimulationError, TwinError};
 use std::path::PathBuf;
@@ -79,7 +79,7 @@ pub enum EvaluateError {
     },
     /// The work folder cannot be used.
     #[error(transparent)]
-    Work(#[from] WorkError),
+    Work(#[from] StorageError),
     /// The study's inputs cannot be drawn.
     #[error(transparent)]
     Plan(#[from] StudyError),
@@ -104,9 +104,6 @@ pub enum EvaluateError {
     /// The diagnosis failed.
     #[error(transparent)]
     Diagnose(#[from] DiagnoseError),
-    /// No threads.
-    #[error("no threads could be started: {0}")]
-    Threads(#[from] rayon::ThreadPoolBuildError),
     /// The caller stopped the work.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),

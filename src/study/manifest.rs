@@ -1,8 +1,9 @@
 //! What work over a study depends on, as far as the study decides it.
 
 use super::{InputPlan, Study};
+use crate::storage::StorageError;
 use crate::storage::files::sha256;
-use crate::storage::work::{Manifest, WorkError, checksum};
+use crate::storage::work::{Manifest, checksum};
 use crate::twin::Noise;
 use serde_json::{Value, json};
 
@@ -13,7 +14,7 @@ impl Study {
     /// # Errors
     ///
     /// An input file that cannot be read.
-    pub fn manifest(&self, verb: &'static str, layout: u32) -> Result<Manifest, WorkError> {
+    pub fn manifest(&self, verb: &'static str, layout: u32) -> Result<Manifest, StorageError> {
         let space = self.twin().parameters();
         let parameters: Vec<Value> = (space.iter())
             .map(|p| json!({ "name": p.name, "prior": p.prior, "bounds": p.bounds }))

@@ -6,6 +6,7 @@ mod faults;
 #[path = "../common/files.rs"]
 mod files;
 mod fuzz;
+mod list;
 mod memory;
 mod security;
 #[cfg(unix)]

@@ -224,7 +224,7 @@ fn two_processes_do_not_pretrain_one_estimator() {
     first.wait().unwrap();
     let said = String::from_utf8(second.stderr).unwrap();
     assert_eq!(second.status.code(), Some(2), "{said}");
-    assert!(said.contains("another process is at work"), "{said}");
+    assert!(said.contains("another run is writing to"), "{said}");
 }
 
 #[test]

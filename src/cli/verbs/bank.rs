@@ -62,16 +62,16 @@ impl Verb for Bank {
         };
         let share = context.share(self.shard)?;
         // Rows of all ranks are counted, by one rank.
-        let before = if context.team.leads() {
+        let before = if context.ranks.is_root() {
             plan.finish(&self.out).map_or(0, |filled| filled.rows)
         } else {
             0
         };
-        context.team.wait();
+        context.ranks.wait();
         let clock = Instant::now();
         plan.fill(&self.out, share, context.progress)?;
-        context.team.wait();
-        if !context.team.leads() {
+        context.ranks.wait();
+        if !context.ranks.is_root() {
             return Ok(ExitCode::SUCCESS);
         }
         let seconds = clock.elapsed().as_secs_f64();

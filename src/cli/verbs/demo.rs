@@ -32,9 +32,8 @@ pub(in crate::cli) struct Demo {
 
 impl Verb for Demo {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        if let Some(out) = &self.out {
-            output::check_new(out)?;
-        }
+        let folder = self.out.as_deref().map(output::NewFolder::new);
+        let folder = folder.transpose()?;
         let project = match &self.twin {
             Some(name) => context.named(name)?,
             None => (context.projects.iter().find(|p| p.study().demo().is_some()))
@@ -67,8 +66,7 @@ impl Verb for Demo {
             ..EstimateOptions::default()
         };
         let estimate = estimator.estimate(&record, &settings, context.progress)?;
-        if let Some(out) = &self.out {
-            let folder = output::NewFolder::new(out)?;
+        if let (Some(folder), Some(out)) = (folder, &self.out) {
             write_record(&folder.file("record.csv"), &record)?;
             write_results(&folder, study, &record, &estimate)?;
             folder.finish()?;

@@ -3,11 +3,11 @@
 use crate::cli::args::Subject;
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
-use crate::cli::output;
+use crate::cli::{output, records};
 use crate::diagnose::{DiagnoseSettings, GivenRecord, diagnose};
 use crate::effect::EffectPattern;
 use crate::estimator::Estimator;
-use crate::record::{Record, drive_csv_text, read_record};
+use crate::record::{Record, drive_csv_text};
 use crate::report::{NEXT_INPUT, gap_html, gap_json, gap_text};
 use crate::study::Study;
 use clap::Args;
@@ -49,14 +49,10 @@ impl Verb for Diagnose {
     }
 
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        if let Some(out) = &self.out {
-            output::check_new(out)?;
-        }
+        let folder = self.out.as_deref().map(output::NewFolder::new);
+        let folder = folder.transpose()?;
         let study = context.study(&self.subject)?;
-        let records: Vec<Record> = (self.records.iter())
-            .map(|path| read_record(path))
-            .collect::<Result<_, _>>()?;
-        let validation = self.validation.as_deref().map(read_record).transpose()?;
+        let (records, validation) = records::read(&self.records, self.validation.as_deref())?;
         let initial = match &self.estimator {
             Some(path) => Some(first_estimate(context, &study, path, &records[0])?),
             None => None,
@@ -87,8 +83,7 @@ impl Verb for Diagnose {
             }
         })?;
         let json = gap_json(&found);
-        if let Some(out) = &self.out {
-            let folder = output::NewFolder::new(out)?;
+        if let Some(folder) = folder {
             let text = serde_json::to_string_pretty(&json).map_err(Failure::internal)?;
             folder.write("report.json", &text)?;
             folder.write("report.html", &gap_html(&study, &found))?;

@@ -3,10 +3,10 @@
 use crate::cli::args::PresetArgument;
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
-use crate::cli::output;
+use crate::cli::{output, records};
 use crate::estimator::bank::file;
 use crate::estimator::{self, EstimateOptions, Estimator};
-use crate::record::{Record, read_record};
+use crate::record::Record;
 use crate::report::{estimate_json, estimate_text, overlay_svg, trajectories_csv};
 use crate::study::Study;
 use clap::Args;
@@ -41,16 +41,17 @@ pub(in crate::cli) struct Estimate {
 
 impl Verb for Estimate {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        if let Some(out) = &self.out {
-            output::check_new(out)?;
-        }
+        let folder = self.out.as_deref().map(output::NewFolder::new);
+        let folder = folder.transpose()?;
         let estimator = Estimator::load(&self.estimator, context.projects)?;
-        let record = read_record(&self.record)?;
+        let paths = std::slice::from_ref(&self.record);
+        let (mut records, validation) = records::read(paths, self.validation.as_deref())?;
+        let record = records.remove(0);
         let settings = EstimateOptions {
             seed: context.seed,
             preset: self.preset.map(Into::into),
             always_refine: self.always_refine,
-            validation: self.validation.as_deref().map(read_record).transpose()?,
+            validation,
         };
         if let Some((validation, path)) = settings.validation.as_ref().zip(self.validation.as_ref())
         {
@@ -59,8 +60,7 @@ impl Verb for Estimate {
         }
         let estimate = (estimator.estimate(&record, &settings, context.progress))
             .map_err(|error| Failure::from(error).within(&self.record))?;
-        if let Some(out) = &self.out {
-            let folder = output::NewFolder::new(out)?;
+        if let Some(folder) = folder {
             write_results(&folder, estimator.study(), &record, &estimate)?;
             folder.finish()?;
         }

@@ -11,7 +11,8 @@ use crate::evaluate::paper::{
     Benchmark, FreeRuns, MeanRuns, MonteCarlo, Origin, Run, Scenario, score,
 };
 use crate::report::{first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
-use crate::storage::work::{Share, WorkError, WorkFolder};
+use crate::storage::StorageError;
+use crate::storage::work::{Share, WorkFolder};
 use crate::study::Study;
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
@@ -132,7 +133,7 @@ impl Verb for Reproduce {
             epochs: self.epochs,
             seed: context.seed,
         };
-        if self.out.is_none() && !context.team.is_alone() {
+        if self.out.is_none() && !context.ranks.is_alone() {
             return Err(Failure::user("--out is required under mpirun"));
         }
         let share = context.share(self.shard)?;
@@ -158,8 +159,8 @@ impl Verb for Reproduce {
             if self.shard.is_some() && there < self.runs {
                 return output::print_share(context, out, "records", there, self.runs);
             }
-            context.team.wait();
-            if !context.team.leads() {
+            context.ranks.wait();
+            if !context.ranks.is_root() {
                 return Ok(ExitCode::SUCCESS);
             }
         }
@@ -205,10 +206,10 @@ fn kept(
     folder: &WorkFolder,
 ) -> Result<Estimator, Failure> {
     let path = folder.file("estimator.est");
-    while context.team.leads() && !path.exists() {
+    while context.ranks.is_root() && !path.exists() {
         match Pretraining::new(project, *training).write(&path, context.progress) {
             // Another job is training it.
-            Err(EstimatorError::Work(WorkError::Busy { .. })) => {
+            Err(EstimatorError::Work(StorageError::Busy { .. })) => {
                 context.progress.checkpoint().map_err(Failure::internal)?;
                 std::thread::sleep(LOOK);
             }
@@ -217,7 +218,7 @@ fn kept(
             trained => drop(trained?),
         }
     }
-    context.team.wait();
+    context.ranks.wait();
     Ok(Estimator::load(&path, context.projects)?)
 }
 

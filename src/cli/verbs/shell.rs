@@ -61,7 +61,6 @@ impl Verb for Man {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         let pages = pages(context)?;
         if let Some(out) = &self.out {
-            output::check_new(out)?;
             let folder = output::NewFolder::new(out)?;
             for (name, text) in &pages {
                 folder.write(&format!("{name}.1"), text)?;

@@ -71,7 +71,7 @@ impl Verb for Withheld {
             detection_only: self.detection_only,
         };
         let sealed = trials::Withheld::new(&study, settings)?.seal(&self.out, context.progress)?;
-        if context.team.leads() {
+        if context.ranks.is_root() {
             // Printed before the first diagnosis.
             output::say(&format!("keys sealed: sha256 {}", sealed.seal()));
         }
@@ -80,10 +80,10 @@ impl Verb for Withheld {
         if self.shard.is_some() && answers < self.trials {
             return output::print_share(context, &self.out, "trials", answers, self.trials);
         }
-        context.team.wait();
+        context.ranks.wait();
         sealed.open_keys(share, context.progress)?;
-        context.team.wait();
-        if !context.team.leads() {
+        context.ranks.wait();
+        if !context.ranks.is_root() {
             return Ok(ExitCode::SUCCESS);
         }
         let card = sealed.score(context.progress)?;

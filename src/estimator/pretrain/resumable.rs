@@ -8,6 +8,7 @@ use crate::estimator::project::Project;
 use crate::estimator::shards::{BankPlan, ShardedBank};
 use crate::network::{Checkpoints, History, NetworkError};
 use crate::progress::Progress;
+use crate::storage::sweep_beside;
 use crate::storage::work::{Manifest, Share, WorkFolder};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -120,7 +121,7 @@ impl<'a> Pretraining<'a> {
     ) -> Result<(Estimator, History), EstimatorError> {
         let manifest = self.manifest()?;
         let place = beside(path);
-        WorkFolder::sweep_removed(&place)?;
+        sweep_beside(path);
         if path.symlink_metadata().is_ok() && WorkFolder::resume(&place, &manifest).is_err() {
             let problem = "exists already; choose another --out, or remove it";
             return Err(EstimatorError::file(path, problem));

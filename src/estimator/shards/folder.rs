@@ -2,9 +2,10 @@
 
 use crate::estimator::bank::{Bank, Draws, file};
 use crate::estimator::error::EstimatorError;
-use crate::storage::files::{sha256, sweep, write_new};
+use crate::storage::StorageError;
+use crate::storage::files::{sha256, write_new};
 use crate::storage::untrusted::{MOST_NUMBERS, read_kept};
-use crate::storage::work::{Manifest, WorkError, WorkFolder};
+use crate::storage::work::{Manifest, WorkFolder};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -82,7 +83,7 @@ impl Shards {
         let of = size.div_ceil(rows);
         let place = folder.part(SHARDS)?;
         let mut there = BTreeMap::new();
-        let failed = |error| EstimatorError::from(WorkError::io(&place, error));
+        let failed = |error| EstimatorError::from(StorageError::io(&place, error));
         for entry in std::fs::read_dir(&place).map_err(failed)? {
             let found = entry.map_err(failed)?.file_name();
             let Some((number, checksum)) = found.to_str().and_then(parse) else {
@@ -203,8 +204,7 @@ impl Shards {
         if self.there.len() == self.of {
             let checksums: Vec<&String> = self.there.values().collect();
             self.folder.finish(&self.manifest, json!(checksums))?;
-            let place = self.folder.part(SHARDS)?;
-            sweep(&place).map_err(|error| WorkError::io(&place, error))?;
+            self.folder.sweep();
         }
         Ok(())
     }
@@ -216,9 +216,13 @@ impl Shards {
 }
 
 /// Of a folder whose manifest says too little.
-fn foreign(path: &Path) -> WorkError {
+fn foreign(path: &Path) -> StorageError {
     let path = path.into();
-    WorkError::Foreign { path, verb: VERB }
+    StorageError::Foreign {
+        path,
+        verb: VERB,
+        reason: "its manifest.json is damaged".into(),
+    }
 }
 
 fn damaged(path: &Path, reason: &str) -> EstimatorError {

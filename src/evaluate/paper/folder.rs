@@ -2,7 +2,8 @@
 
 use super::monte_carlo::{MonteCarlo, RUNS};
 use crate::estimator::{PretrainOptions, Recipe};
-use crate::storage::work::{Manifest, WorkError, WorkFolder, checksum};
+use crate::storage::StorageError;
+use crate::storage::work::{Manifest, WorkFolder, checksum};
 use crate::study::Study;
 use serde_json::json;
 use std::path::Path;
@@ -25,19 +26,19 @@ impl MonteCarlo {
     ///
     /// # Errors
     ///
-    /// [`WorkError`]: a path that is taken, a folder of another call, an estimator or input file that cannot be read.
+    /// [`StorageError`]: a path that is taken, a folder of another call, an estimator or input file that cannot be read.
     pub(crate) fn folder(
         &self,
         path: &Path,
         study: &Study,
         origin: Origin<'_>,
-    ) -> Result<WorkFolder, WorkError> {
+    ) -> Result<WorkFolder, StorageError> {
         let manifest = self.manifest(study, origin)?;
         WorkFolder::open(path, &manifest, &[RUNS], |_| Ok(()))
     }
 
     /// Everything that the runs depend on; files by their checksums.
-    fn manifest(&self, study: &Study, origin: Origin<'_>) -> Result<Manifest, WorkError> {
+    fn manifest(&self, study: &Study, origin: Origin<'_>) -> Result<Manifest, StorageError> {
         let manifest = study
             .manifest("reproduce", LAYOUT)?
             .with("scenario", self.scenario.number())

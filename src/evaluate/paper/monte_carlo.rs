@@ -7,8 +7,12 @@ use crate::estimator::Estimator;
 use crate::evaluate::EvaluateError;
 use crate::progress::Progress;
 use crate::record::Record;
+use crate::setting::SettingError;
 use crate::storage::work::{Piece, Pieces, Share, WorkFolder};
 use crate::study::Study;
+
+/// Most runs of a study; they are in memory.
+const MOST: usize = 1_000_000;
 
 /// Folder of kept runs.
 pub(super) const RUNS: &str = "runs";
@@ -29,6 +33,8 @@ pub struct MonteCarlo {
 impl MonteCarlo {
     /// Checks that the study has this scenario; worth asking before an estimator is trained.
     pub fn check(&self, study: &Study) -> Result<(), EvaluateError> {
+        let limit = format!("choose at most {MOST}");
+        SettingError::unless(self.runs <= MOST, "runs", self.runs, limit)?;
         self.draws(study).map(|_| ())
     }
 
@@ -110,7 +116,7 @@ mod tests {
     use crate::evaluate::paper::{Origin, reference_projects, score};
     use crate::progress::Listener;
     use crate::record::{Drive, Signal};
-    use crate::storage::work::WorkError;
+    use crate::storage::StorageError;
     use crate::study::RecordPlan;
     use crate::twin::{DigitalTwin, Noise, Parameter, ParameterSpace, SimulationError};
     use std::fs;
@@ -141,7 +147,7 @@ mod tests {
         }
     }
 
-    fn open(path: &Path, plan: &MonteCarlo) -> Result<WorkFolder, WorkError> {
+    fn open(path: &Path, plan: &MonteCarlo) -> Result<WorkFolder, StorageError> {
         let project = &reference_projects().unwrap()[0];
         let origin = Origin::Trained(project.recipe(TRAINING.preset), &TRAINING);
         plan.folder(path, oscillator().study(), origin)

@@ -3,9 +3,10 @@
 use super::truth::Truth;
 use crate::evaluate::EvaluateError;
 use crate::record::{Record, read_record, record_csv_text};
+use crate::storage::StorageError;
 use crate::storage::files::sha256;
 use crate::storage::untrusted::check_file;
-use crate::storage::work::{Manifest, NewWork, WorkError, WorkFolder};
+use crate::storage::work::{Manifest, NewWork, WorkFolder};
 use serde::Serialize;
 use std::io;
 use std::path::Path;
@@ -48,26 +49,31 @@ pub(super) struct Filling<'a>(&'a NewWork<'a>);
 
 impl Filling<'_> {
     /// Adds a record.
-    pub fn record(&self, trial: usize, validation: bool, record: &Record) -> Result<(), WorkError> {
+    pub fn record(
+        &self,
+        trial: usize,
+        validation: bool,
+        record: &Record,
+    ) -> Result<(), StorageError> {
         let name = record_name(trial, validation);
         self.0.write(&name, record_csv_text(record).as_bytes())
     }
 
     /// Says which effects each trial's library does without: the diagnoser may know that much.
-    pub fn left_out(&self, effects: &[&Vec<String>]) -> Result<(), WorkError> {
+    pub fn left_out(&self, effects: &[&Vec<String>]) -> Result<(), StorageError> {
         self.json(LEFT_OUT, effects).map(|_| ())
     }
 
     /// Writes keys and seal.
-    pub fn keys(&self, keys: &[Truth]) -> Result<(), WorkError> {
+    pub fn keys(&self, keys: &[Truth]) -> Result<(), StorageError> {
         let keys = self.json(KEYS, keys)?;
         let seal = sha256(keys.as_bytes());
         self.0.write(SEAL, format!("{seal}\n").as_bytes())
     }
 
-    fn json<T: Serialize + ?Sized>(&self, name: &str, value: &T) -> Result<String, WorkError> {
+    fn json<T: Serialize + ?Sized>(&self, name: &str, value: &T) -> Result<String, StorageError> {
         let text = serde_json::to_string_pretty(value)
-            .map_err(|error| WorkError::io(Path::new(name), io::Error::from(error)))?;
+            .map_err(|error| StorageError::io(Path::new(name), io::Error::from(error)))?;
         let text = format!("{text}\n");
         self.0.write(name, text.as_bytes())?;
         Ok(text)
@@ -91,7 +97,7 @@ impl Folder {
     pub fn record(&self, trial: usize, validation: bool) -> Result<Record, EvaluateError> {
         self.work.part(RECORDS)?;
         let path = self.work.file(&record_name(trial, validation));
-        check_file(&path).map_err(|error| WorkError::io(&path, error))?;
+        check_file(&path).map_err(|error| StorageError::io(&path, error))?;
         Ok(read_record(&path)?)
     }
 

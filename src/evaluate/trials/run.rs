@@ -10,7 +10,9 @@ use crate::diagnose::DiagnoseSettings;
 use crate::evaluate::EvaluateError;
 use crate::progress::Progress;
 use crate::record::Record;
-use crate::storage::work::{Manifest, Piece, Pieces, Share, WorkError};
+use crate::setting::SettingError;
+use crate::storage::StorageError;
+use crate::storage::work::{Manifest, Piece, Pieces, Share};
 use crate::study::Study;
 use crate::twin::Noise;
 use serde_json::json;
@@ -18,6 +20,8 @@ use std::path::Path;
 
 /// Layout of the folder; raised when it changes.
 const LAYOUT: u32 = 4;
+/// Most trials of a folder; their keys are in memory.
+const MOST: usize = 1_000_000;
 
 /// Settings of sealed trials.
 ///
@@ -92,6 +96,8 @@ impl<'a> Withheld<'a> {
         if settings.trials == 0 {
             return Err(EvaluateError::Nothing("trials"));
         }
+        let limit = format!("choose at most {MOST}");
+        SettingError::unless(settings.trials <= MOST, "trials", settings.trials, limit)?;
         if settings.kinds.is_empty() {
             return Err(EvaluateError::Nothing("kinds"));
         }
@@ -139,7 +145,7 @@ impl<'a> Withheld<'a> {
     }
 
     /// Everything that the trials depend on.
-    fn manifest(&self) -> Result<Manifest, WorkError> {
+    fn manifest(&self) -> Result<Manifest, StorageError> {
         let study = self.sampler.study();
         let settings = &self.settings;
         let kinds: Vec<&str> = settings.kinds.iter().map(|kind| kind.id()).collect();

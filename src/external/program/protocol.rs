@@ -115,7 +115,16 @@ pub(super) fn answer(
     }
     match (told.outputs, told.diverged, told.error) {
         (Some(outputs), None, None) => stack(outputs, signals, drive),
-        (None, Some(at), None) => Ok(Answer::Diverged(at)),
+        (None, Some(at), None) => {
+            let end = drive.time(drive.samples());
+            if (0.0..=end).contains(&at) {
+                Ok(Answer::Diverged(at))
+            } else {
+                Err(format!(
+                    "diverged = {at}; give a time between 0 and {end} s, the end of the record"
+                ))
+            }
+        }
         (None, None, Some(text)) => Ok(Answer::Error(excerpt(&text))),
         _ => Err("exactly one of outputs, diverged (a time in seconds) and error is needed".into()),
     }
@@ -224,9 +233,13 @@ mod tests {
         let expected = Signal::from_shape_vec((3, 1), vec![1.0, 0.25, -3e-7]).unwrap();
         assert_eq!(outputs, Answer::Outputs(expected));
         assert_eq!(
-            read(r#"{"id": 7, "diverged": 3.2}"#),
-            Ok(Answer::Diverged(3.2))
+            read(r#"{"id": 7, "diverged": 1.2}"#),
+            Ok(Answer::Diverged(1.2))
         );
+        for odd in ["-1", "1.6", "1e300"] {
+            let error = read(&format!(r#"{{"id": 7, "diverged": {odd}}}"#)).unwrap_err();
+            assert!(error.contains("between 0 and 1.5 s"), "{error}");
+        }
         let error = read(r#"{"id": 7, "error": "no\nlicence"}"#);
         assert_eq!(error, Ok(Answer::Error("no licence".into())));
     }

@@ -1,11 +1,12 @@
-//! What only the verbs reach otherwise, for the fuzz tests. No part of the library's interface.
+//! Readers of work folders for the fuzz tests. Not part of the library's interface.
 
-use super::{WorkError, WorkFolder};
+use super::WorkFolder;
+use crate::storage::StorageError;
 use serde::de::DeserializeOwned;
 use std::path::Path;
 
 /// Reads the manifest of a folder that `verb` is said to have made.
-pub fn manifest(folder: &Path, verb: &'static str) -> Result<(), WorkError> {
+pub fn manifest(folder: &Path, verb: &'static str) -> Result<(), StorageError> {
     WorkFolder::find(folder, verb).map(|_| ())
 }
 
@@ -14,7 +15,7 @@ pub fn piece<T: DeserializeOwned>(
     folder: &Path,
     verb: &'static str,
     part: &str,
-) -> Result<(), WorkError> {
+) -> Result<(), StorageError> {
     let (folder, _) = WorkFolder::find(folder, verb)?;
     folder.kept::<T>(part, 0, |_| Ok(())).map(|_| ())
 }

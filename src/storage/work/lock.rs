@@ -1,15 +1,14 @@
-//! One process at a time.
+//! Exclusive use of a work folder.
 
-use super::{WorkError, WorkFolder};
+use super::WorkFolder;
+use crate::storage::StorageError;
 use crate::storage::untrusted::check_file;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io;
 
 const FILE: &str = "lock";
 
-/// A folder of work that no other process may work on, until this is dropped or its process ends.
-///
-/// For work whose steps follow one another; numbered pieces need none.
+/// Lock of a work folder, until this is dropped or its process ends. Numbered pieces need none.
 #[derive(Debug)]
 pub(crate) struct Lock {
     /// The system gives the lock back when the file is closed, however the process ends.
@@ -17,27 +16,25 @@ pub(crate) struct Lock {
 }
 
 impl WorkFolder {
-    /// Keeps other processes out.
-    ///
-    /// A file system without locks keeps nobody out; two processes then do the same work, to the same bits.
+    /// Keeps other processes out. On a file system without locks two processes may do the same work, to the same bits.
     ///
     /// # Errors
     ///
-    /// [`WorkError::Busy`] where another process is at work, [`WorkError::Io`].
-    pub(crate) fn lock(&self) -> Result<Lock, WorkError> {
+    /// [`StorageError::Busy`] if another process works on the folder, [`StorageError::Io`].
+    pub(crate) fn lock(&self) -> Result<Lock, StorageError> {
         let path = self.file(FILE);
         if path.symlink_metadata().is_ok() {
-            check_file(&path).map_err(|error| WorkError::io(&path, error))?;
+            check_file(&path).map_err(|error| StorageError::io(&path, error))?;
         }
         let mut options = OpenOptions::new();
         let file = (options.create(true).append(true).open(&path))
-            .map_err(|error| WorkError::io(&path, error))?;
+            .map_err(|error| StorageError::io(&path, error))?;
         match file.try_lock() {
-            Err(TryLockError::WouldBlock) => Err(WorkError::Busy {
+            Err(TryLockError::WouldBlock) => Err(StorageError::Busy {
                 path: self.path().into(),
             }),
             Err(TryLockError::Error(error)) if error.kind() != io::ErrorKind::Unsupported => {
-                Err(WorkError::io(&path, error))
+                Err(StorageError::io(&path, error))
             }
             _ => Ok(Lock { _file: file }),
         }
@@ -46,7 +43,8 @@ impl WorkFolder {
 
 #[cfg(test)]
 mod tests {
-    use crate::storage::work::{Manifest, WorkError, WorkFolder};
+    use crate::storage::StorageError;
+    use crate::storage::work::{Manifest, WorkFolder};
 
     #[test]
     fn the_second_is_kept_out_until_the_first_has_gone() {
@@ -54,11 +52,11 @@ mod tests {
         let manifest = Manifest::new("pretrain", 1);
         let open = || {
             let path = place.path().join("work");
-            WorkFolder::open::<WorkError>(&path, &manifest, &[], |_| Ok(())).unwrap()
+            WorkFolder::open::<StorageError>(&path, &manifest, &[], |_| Ok(())).unwrap()
         };
         let first = open().lock().unwrap();
         let refused = open().lock().unwrap_err();
-        assert!(matches!(refused, WorkError::Busy { .. }), "{refused}");
+        assert!(matches!(refused, StorageError::Busy { .. }), "{refused}");
         drop(first);
         open().lock().unwrap();
     }
@@ -69,7 +67,7 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let manifest = Manifest::new("pretrain", 1);
         let path = place.path().join("work");
-        let folder = WorkFolder::open::<WorkError>(&path, &manifest, &[], |_| Ok(())).unwrap();
+        let folder = WorkFolder::open::<StorageError>(&path, &manifest, &[], |_| Ok(())).unwrap();
         let elsewhere = place.path().join("elsewhere");
         std::os::unix::fs::symlink(&elsewhere, folder.file("lock")).unwrap();
         assert!(folder.lock().is_err());

@@ -1,14 +1,14 @@
-//! What a folder of work is about: what another call must say to go on with it.
+//! Manifest of a work folder: everything that a call must repeat to resume it.
 
-use super::WorkError;
+use crate::storage::StorageError;
 use crate::storage::files::{sha256, sha256_of};
 use crate::storage::untrusted::excerpt;
 use serde_json::{Map, Value};
 use std::path::Path;
 
-/// The entry that a finished folder has beside what its pieces depend on.
+/// Entry that a finished folder has in addition.
 const CHECKSUMS: &str = "checksums";
-/// Longest value that is worth showing in a message.
+/// Longest value that a message shows, in characters.
 const SHORT: usize = 40;
 
 /// Everything that the pieces in a folder depend on, in `manifest.json`.
@@ -19,7 +19,7 @@ pub struct Manifest {
 }
 
 impl Manifest {
-    /// Of a folder that `verb` makes; `layout` is raised when the folder's layout changes.
+    /// Creates the manifest of a folder of `verb`; `layout` is raised when the folder's layout changes.
     pub fn new(verb: &'static str, layout: u32) -> Self {
         let empty = Self {
             verb,
@@ -30,71 +30,91 @@ impl Manifest {
             .with("version", env!("CARGO_PKG_VERSION"))
     }
 
-    /// With one thing more that the pieces depend on.
+    /// Adds an entry.
     pub fn with(mut self, key: &str, value: impl Into<Value>) -> Self {
         self.entries.insert(key.into(), value.into());
         self
     }
 
-    /// One of the things that the pieces depend on.
+    /// Returns an entry.
     pub fn get(&self, key: &str) -> Option<&Value> {
         self.entries.get(key)
     }
 
-    /// Checksums of the pieces, once all are there.
+    /// Returns the checksums of the pieces of a finished folder.
     pub fn checksums(&self) -> Option<&Value> {
         self.entries.get(CHECKSUMS)
     }
 
-    /// Without checksums.
+    /// Removes the checksums.
     pub fn unfinished(mut self) -> Self {
         self.entries.shift_remove(CHECKSUMS);
         self
     }
 
-    /// With the checksums of all pieces.
+    /// Adds the checksums of all pieces.
     pub(super) fn finished(self, checksums: Value) -> Self {
         self.with(CHECKSUMS, checksums)
     }
 
-    /// What makes such folders.
+    /// Verb that makes the folder.
     pub fn verb(&self) -> &'static str {
         self.verb
     }
 
-    /// SHA-256 of all of it, in hexadecimal digits.
+    /// Returns the SHA-256 of the text, in hexadecimal digits.
     pub(crate) fn checksum(&self) -> String {
         sha256(self.text().as_bytes())
     }
 
-    /// As it stands in the folder.
+    /// Returns the text of the file.
     pub(super) fn text(&self) -> String {
         format!("{:#}\n", Value::Object(self.entries.clone()))
     }
 
-    /// From the folder's text; `None` where it is none of this verb, whatever the layout.
-    pub(super) fn parse(verb: &'static str, text: &str) -> Option<Self> {
-        let Ok(Value::Object(entries)) = serde_json::from_str(text) else {
-            return None;
-        };
-        let schema = entries.get("schema").and_then(Value::as_str)?;
-        let ours = schema.starts_with(&format!("truetwin.{verb}-folder/"));
-        ours.then_some(Self { verb, entries })
+    /// Parses the folder's text.
+    ///
+    /// # Errors
+    ///
+    /// A text that is no manifest of this verb, in words.
+    pub(super) fn parse(verb: &'static str, text: &str) -> Result<Self, String> {
+        let entries: Map<String, Value> = serde_json::from_str(text).map_err(|error| {
+            format!(
+                "its manifest.json is damaged: {}",
+                excerpt(&error.to_string())
+            )
+        })?;
+        let schema = entries
+            .get("schema")
+            .and_then(Value::as_str)
+            .unwrap_or_default();
+        if schema.starts_with(&format!("truetwin.{verb}-folder/")) {
+            return Ok(Self { verb, entries });
+        }
+        Err(
+            match schema
+                .strip_prefix("truetwin.")
+                .and_then(|s| s.split_once("-folder/"))
+            {
+                Some((other, _)) => format!("it is one of `truetwin {}`", excerpt(other)),
+                None => "its manifest.json has another schema".into(),
+            },
+        )
     }
 
-    /// The first thing that `found` says otherwise, in words; `None` where both say the same, finished or not.
-    pub fn differs(&self, found: &Self) -> Option<String> {
-        let keys = self.entries.keys().chain(found.entries.keys());
-        keys.filter(|key| *key != CHECKSUMS)
-            .map(|key| (key, found.get(key), self.get(key)))
-            .find(|(_, there, here)| there != here)
-            .map(|(key, there, here)| {
-                let (there, here) = (shown(there), shown(here));
-                match there.chars().count().max(here.chars().count()) <= SHORT {
-                    true => excerpt(&format!("{key} was {there}, now it is {here}")),
-                    false => excerpt(&format!("{key} was another")),
-                }
-            })
+    /// Returns the first difference from the `kept` manifest in words, finished or not; `None` if there is none.
+    pub fn differs(&self, kept: &Self) -> Option<String> {
+        let keys = self.entries.keys().chain(kept.entries.keys());
+        let differs = |key: &&String| *key != CHECKSUMS && kept.get(key) != self.get(key);
+        let key = { keys }.find(differs)?;
+        let (old, new) = (shown(kept.get(key)), shown(self.get(key)));
+        let both = format!("{key} was {old}, now it is {new}");
+        let short = old.chars().count().max(new.chars().count()) <= SHORT;
+        Some(excerpt(&if short {
+            both
+        } else {
+            format!("{key} differs")
+        }))
     }
 }
 
@@ -106,13 +126,9 @@ fn shown(value: Option<&Value>) -> String {
     }
 }
 
-/// SHA-256 of a file that pieces depend on, in hexadecimal digits.
-///
-/// # Errors
-///
-/// A file that cannot be read.
-pub fn checksum(path: &Path) -> Result<String, WorkError> {
-    sha256_of(path).map_err(|error| WorkError::io(path, error))
+/// Returns the SHA-256 of a file that pieces depend on, in hexadecimal digits.
+pub fn checksum(path: &Path) -> Result<String, StorageError> {
+    sha256_of(path).map_err(|error| StorageError::io(path, error))
 }
 
 #[cfg(test)]
@@ -134,16 +150,17 @@ mod tests {
         );
         assert_eq!(differs(manifest()), "network was deep, now it is not given");
         let long = there.clone().with("network", "x".repeat(50));
-        assert_eq!(differs(long), "network was another");
+        assert_eq!(differs(long), "network differs");
     }
 
     #[test]
-    fn there_and_back_and_other_files_are_none_of_ours() {
+    fn a_manifest_survives_its_file_and_other_files_are_refused() {
         let text = manifest().text();
-        assert_eq!(Manifest::parse("reproduce", &text), Some(manifest()));
-        assert_eq!(Manifest::parse("withheld", &text), None);
+        assert_eq!(Manifest::parse("reproduce", &text), Ok(manifest()));
+        let other = Manifest::parse("withheld", &text).unwrap_err();
+        assert!(other.contains("`truetwin reproduce`"), "{other}");
         for text in ["", "[]", "{}", r#"{"schema": "truetwin.gap/1"}"#] {
-            assert_eq!(Manifest::parse("reproduce", text), None, "{text}");
+            assert!(Manifest::parse("reproduce", text).is_err(), "{text}");
         }
     }
 }

@@ -1,28 +1,27 @@
-//! Long work: shared out to threads and processes, kept piece by piece, gone on with after an interruption.
+//! Long work: divided among threads and processes, kept piece by piece, resumed after an interruption.
 //!
-//! Work is *numbered*: piece k depends on its number and the call alone, so that who does it, when, and how often it was
-//! interrupted changes nothing.
+//! Work is *numbered*: piece k depends only on its number and the call, so that neither the process that makes it, nor the
+//! time, nor interruptions change it.
 //!
 //! | to … | look at |
 //! |---|---|
-//! | keep finished pieces in a folder, and go on with it | [`WorkFolder`] |
-//! | do a part of the pieces: of a job array, of the ranks of a cluster | [`Share`] |
-//! | wait for the other ranks | [`Team`] |
+//! | keep finished pieces in a folder, and resume it | [`WorkFolder`] |
+//! | do a share of the pieces: of a job array, of the ranks of a cluster | [`Share`] |
 
-mod crew;
 mod folder;
 #[doc(hidden)]
 pub mod fuzzing;
 mod lock;
 mod manifest;
+mod new_work;
 mod pieces;
+mod ranks;
 mod share;
-mod team;
+mod thread_groups;
 
-use crew::share_out;
-pub(crate) use folder::NewWork;
-pub use folder::{WorkError, WorkFolder};
+pub use folder::WorkFolder;
 pub(crate) use manifest::{Manifest, checksum};
+pub(crate) use new_work::NewWork;
 pub(crate) use pieces::{Piece, Pieces};
-pub use share::{Share, ShareError};
-pub use team::{Team, TeamError};
+pub(crate) use ranks::Ranks;
+pub use share::Share;

@@ -1,12 +1,13 @@
-//! Numbered pieces: kept, or made and kept.
+//! Numbered pieces of work, kept in a folder.
 
-use super::{Share, WorkError, WorkFolder, share_out};
+use super::thread_groups::thread_groups;
+use super::{Share, WorkFolder};
 use crate::progress::{Cancelled, Stage};
-use rayon::ThreadPoolBuildError;
+use crate::storage::StorageError;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// What a piece of work gives.
+/// Result of a piece of work.
 pub(crate) trait Piece: Serialize + DeserializeOwned + Send {
     /// Its number, from 0.
     fn number(&self) -> usize;
@@ -14,38 +15,38 @@ pub(crate) trait Piece: Serialize + DeserializeOwned + Send {
 
 /// Pieces 0 … `count` − 1 of a part.
 pub(crate) struct Pieces<'a> {
-    /// Where they are kept, if anywhere.
+    /// Folder that keeps them.
     pub folder: Option<&'a WorkFolder>,
-    /// The part of the folder.
+    /// Part of the folder.
     pub part: &'static str,
-    /// How many there are.
+    /// Number of pieces.
     pub count: usize,
-    /// Which of them are made here.
+    /// Pieces to be made by this process.
     pub share: Share,
 }
 
 impl Pieces<'_> {
-    /// Those that are kept, in order.
+    /// Returns the kept pieces, in order.
     pub fn kept<T: Piece>(
         &self,
         fits: impl Fn(&T) -> Result<(), &'static str>,
-    ) -> Result<Vec<T>, WorkError> {
+    ) -> Result<Vec<T>, StorageError> {
         let Some(folder) = self.folder else {
             return Ok(vec![]);
         };
         (0..self.count)
             .filter_map(|number| {
-                let fits = |piece: &T| match piece.number() == number {
-                    true => fits(piece),
-                    false => Err("its number is another"),
+                let fits = |piece: &T| match piece.number() {
+                    same if same == number => fits(piece),
+                    _ => Err("it holds another number"),
                 };
                 folder.kept(self.part, number, fits).transpose()
             })
             .collect()
     }
 
-    /// Makes and keeps those of the share that are not kept, in parallel, each on its share of the current threads; returns
-    /// all that are there then, in order. A tick for each.
+    /// Makes and keeps the missing pieces of the share, in parallel, each on its part of the current threads; returns all kept
+    /// pieces, in order. One tick for each.
     pub fn all<T: Piece, E>(
         &self,
         stage: &Stage,
@@ -53,7 +54,7 @@ impl Pieces<'_> {
         make: impl Fn(usize) -> Result<T, E> + Sync,
     ) -> Result<Vec<T>, E>
     where
-        E: From<WorkError> + From<Cancelled> + From<ThreadPoolBuildError> + Send,
+        E: From<StorageError> + From<Cancelled> + Send,
     {
         let mut all = self.kept(fits)?;
         for _ in &all {
@@ -63,7 +64,7 @@ impl Pieces<'_> {
         let missing: Vec<usize> = (0..self.count)
             .filter(|number| self.share.takes(*number) && !known.contains(number))
             .collect();
-        all.extend(share_out(&missing, |number| {
+        all.extend(thread_groups(&missing, |number| {
             let made = make(number)?;
             if let Some(folder) = self.folder {
                 folder.keep(self.part, number, &made)?;
@@ -75,7 +76,7 @@ impl Pieces<'_> {
         if let Some(folder) = self.folder
             && all.len() == self.count
         {
-            folder.sweep(self.part)?;
+            folder.sweep();
         }
         Ok(all)
     }

@@ -1,18 +1,19 @@
-//! Which pieces of numbered work are done here.
+//! Shares of numbered work.
 
+use crate::storage::StorageError;
 use std::fmt;
 use std::str::FromStr;
 
-/// Part `index` of `of`: piece k belongs to it where k ≡ index (mod of).
+/// Share `index` of `of`: it has piece k if k ≡ index (mod of).
 ///
-/// Written `i/n`. Whether an array of jobs counts from 0 to n − 1 or from 1 to n, its shares are the same n: 0/n is n/n.
+/// Written `i/n`. Job arrays may count from 0 or from 1: 0/n is n/n.
 ///
 /// ```
 /// use truetwin::storage::work::Share;
 /// let share: Share = "1/3".parse()?;
 /// assert_eq!((0..7).filter(|k| share.takes(*k)).collect::<Vec<_>>(), [1, 4]);
 /// assert_eq!("0/3".parse::<Share>()?, "3/3".parse()?);
-/// # Ok::<(), truetwin::storage::work::ShareError>(())
+/// # Ok::<(), truetwin::storage::StorageError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Share {
@@ -20,53 +21,37 @@ pub struct Share {
     of: usize,
 }
 
-/// What is no share.
-///
-/// ```
-/// use truetwin::storage::work::{Share, ShareError};
-///
-/// let error: ShareError = Share::new(5, 4).unwrap_err();
-/// assert!(error.to_string().contains('4'), "{error}");
-/// ```
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("\"{0}\" is no share; write i/n: part i of n, such as 1/4")]
-pub struct ShareError(String);
-
 impl Share {
     /// Everything.
     pub const WHOLE: Self = Self { index: 0, of: 1 };
 
-    /// Part `index` (from 0, or from 1) of `of`.
-    ///
-    /// # Errors
-    ///
-    /// No parts, or an index beyond them.
-    pub fn new(index: usize, of: usize) -> Result<Self, ShareError> {
-        match index <= of && of > 0 {
-            true => Ok(Self {
-                index: index % of,
-                of,
-            }),
-            false => Err(ShareError(format!("{index}/{of}"))),
+    /// Creates share `index` (from 0, or from 1) of `of`.
+    pub fn new(index: usize, of: usize) -> Result<Self, StorageError> {
+        if of == 0 || index > of {
+            return Err(StorageError::Share(format!("{index}/{of}")));
         }
+        Ok(Self {
+            index: index % of,
+            of,
+        })
     }
 
-    /// Whether piece `number` is done here.
+    /// Tells whether the share has piece `number`.
     pub fn takes(self, number: usize) -> bool {
         number % self.of == self.index
     }
 
-    /// Whether this is everything.
+    /// Tells whether the share is everything.
     pub fn is_whole(self) -> bool {
         self.of == 1
     }
 }
 
 impl FromStr for Share {
-    type Err = ShareError;
+    type Err = StorageError;
 
-    fn from_str(text: &str) -> Result<Self, ShareError> {
-        let wrong = || ShareError(text.into());
+    fn from_str(text: &str) -> Result<Self, StorageError> {
+        let wrong = || StorageError::Share(text.into());
         let (index, of) = text.split_once('/').ok_or_else(wrong)?;
         let number = |digits: &str| digits.parse().map_err(|_| wrong());
         Self::new(number(index)?, number(of)?)
@@ -98,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_share_is_said() {
+    fn other_texts_are_refused() {
         for text in [
             "", "3", "5/4", "1/0", "0/0", "-1/4", "a/b", "1/2/3", "1.0/2",
         ] {

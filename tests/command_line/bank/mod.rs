@@ -158,7 +158,7 @@ fn what_does_not_belong_together_is_refused() {
     let error = refused(merge(&[at("half"), at("other")], &at("out"), &silent));
     assert!(error.contains("size was 41, now it is 40"), "{error}");
     let error = refused(merge(&[at("nowhere")], &at("out"), &silent));
-    assert!(error.contains("no folder of `bank`"), "{error}");
+    assert!(error.contains("no folder of `truetwin bank`"), "{error}");
     let error = ShardedBank::open(&at("half")).unwrap_err().to_string();
     assert!(error.contains("1 of 3 shards"), "{error}");
     let error = fill(&plan(&study, 42), &at("other"), "1/1")

@@ -146,7 +146,7 @@ fn a_folder_goes_on_where_it_stopped() {
         ),
         (
             ["--scenario", "2"],
-            ["scenario was 1, now it is 2", "repeat that call"],
+            ["scenario was 1, now it is 2", "rerun that call"],
         ),
     ] {
         refused(

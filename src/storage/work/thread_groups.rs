@@ -1,23 +1,25 @@
-//! Pieces of work on all cores, each with cores of its own.
+//! Threads divided among pieces of work.
 
-use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
+use crate::storage::StorageError;
+use rayon::ThreadPoolBuilder;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Does `work` on every item, in parallel; the results are in no order.
 ///
-/// The current pool's threads are shared out to workers, each a pool of its own: work that is itself parallel neither
-/// waits for nor takes up another item, so that its wall-clock time is its own. The first error stops the others at
+/// The current pool's threads are divided into groups, each a pool of its own. Work that is itself parallel therefore neither
+/// waits for another item nor runs one, so that its wall-clock time is its own. The first error stops the other groups at
 /// their next item.
-pub(crate) fn share_out<T: Send, E: Send + From<ThreadPoolBuildError>>(
+pub(super) fn thread_groups<T: Send, E: Send + From<StorageError>>(
     items: &[usize],
     work: impl Fn(usize) -> Result<T, E> + Sync,
 ) -> Result<Vec<T>, E> {
     let threads = rayon::current_num_threads();
-    let workers = threads.min(items.len());
+    let groups = threads.min(items.len());
     let next = AtomicUsize::new(0);
-    let worker = |number: usize| {
-        let share = threads / workers + usize::from(number < threads % workers);
-        let pool = ThreadPoolBuilder::new().num_threads(share).build()?;
+    let group = |number: usize| {
+        let size = threads / groups + usize::from(number < threads % groups);
+        let pool = (ThreadPoolBuilder::new().num_threads(size).build())
+            .map_err(|error| StorageError::threads(threads, error))?;
         pool.install(|| {
             let mut done = Vec::new();
             while let Some(&item) = items.get(next.fetch_add(1, Ordering::Relaxed)) {
@@ -32,14 +34,19 @@ pub(crate) fn share_out<T: Send, E: Send + From<ThreadPoolBuildError>>(
             Ok(done)
         })
     };
-    let worker = &worker;
+    let group = &group;
     std::thread::scope(|scope| {
-        let crew: Vec<_> = (0..workers)
-            .map(|number| scope.spawn(move || worker(number)))
-            .collect();
+        let running = (0..groups).map(|number| {
+            let thread = std::thread::Builder::new().spawn_scoped(scope, move || group(number));
+            thread.map_err(|error| {
+                next.store(items.len(), Ordering::Relaxed);
+                StorageError::threads(threads, error)
+            })
+        });
+        let running: Vec<_> = running.collect::<Result<_, _>>()?;
         let mut all = Vec::with_capacity(items.len());
-        for member in crew {
-            match member.join() {
+        for thread in running {
+            match thread.join() {
                 Ok(done) => all.extend(done?),
                 Err(panic) => std::panic::resume_unwind(panic),
             }
@@ -56,7 +63,7 @@ mod tests {
     #[derive(Debug, thiserror::Error)]
     enum Stop {
         #[error(transparent)]
-        Threads(#[from] ThreadPoolBuildError),
+        Storage(#[from] StorageError),
         #[error(transparent)]
         Cancelled(#[from] Cancelled),
     }
@@ -66,7 +73,7 @@ mod tests {
         for threads in [1, 3, 16] {
             let pool = ThreadPoolBuilder::new().num_threads(threads).build();
             let mut done = pool.unwrap().install(|| {
-                share_out(&[4, 5, 6, 7, 8], |i| {
+                thread_groups(&[4, 5, 6, 7, 8], |i| {
                     Ok::<_, Stop>((i, rayon::current_num_threads()))
                 })
                 .unwrap()
@@ -77,14 +84,14 @@ mod tests {
             let most = threads.div_ceil(threads.min(5));
             assert!(done.iter().all(|d| (1..=most).contains(&d.1)), "{done:?}");
         }
-        assert!(share_out(&[], Ok::<_, Stop>).unwrap().is_empty());
+        assert!(thread_groups(&[], Ok::<_, Stop>).unwrap().is_empty());
     }
 
     #[test]
     fn an_error_ends_the_work() {
         let begun = AtomicUsize::new(0);
         let items: Vec<usize> = (0..1000).collect();
-        let result = share_out(&items, |_| -> Result<(), Stop> {
+        let result = thread_groups(&items, |_| -> Result<(), Stop> {
             begun.fetch_add(1, Ordering::Relaxed);
             Err(Cancelled.into())
         });

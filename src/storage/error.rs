@@ -1,0 +1,123 @@
+//! The error of files and work folders.
+
+use super::files::{folder, with_remedy};
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Error of a file, a work folder, or of sharing work among threads and processes.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum StorageError {
+    /// A file or folder that cannot be read or written.
+    #[error("{}: {}", path.display(), with_remedy(error))]
+    Io {
+        /// File or folder.
+        path: PathBuf,
+        /// The system's error.
+        error: io::Error,
+    },
+    /// An output in a folder that does not exist.
+    #[error("{}: the folder {} does not exist; make it first", path.display(), folder(path).display())]
+    NoParent {
+        /// Output.
+        path: PathBuf,
+    },
+    /// An output path that holds something else.
+    #[error(
+        "{} exists already and is no folder of `truetwin {verb}` ({reason}); choose another --out or remove it",
+        path.display()
+    )]
+    Taken {
+        /// Output.
+        path: PathBuf,
+        /// Verb that was to resume it.
+        verb: &'static str,
+        /// Problem of its manifest.
+        reason: String,
+    },
+    /// An input folder that the verb did not make, or whose manifest is damaged.
+    #[error(
+        "{}: no folder of `truetwin {verb}` ({reason}); name a folder that it made, or make this one again",
+        path.display()
+    )]
+    Foreign {
+        /// Input.
+        path: PathBuf,
+        /// Verb that makes such folders.
+        verb: &'static str,
+        /// Problem of its manifest.
+        reason: String,
+    },
+    /// A folder of another call.
+    #[error(
+        "{} holds the work of another call: {difference}; rerun that call to resume it, choose another --out, or remove it",
+        path.display()
+    )]
+    OtherCall {
+        /// Folder.
+        path: PathBuf,
+        /// First difference between the calls.
+        difference: String,
+    },
+    /// An output that another process is writing.
+    #[error(
+        "another run is writing to {}; wait until it is done or stop it, or choose another --out",
+        path.display()
+    )]
+    Busy {
+        /// Output.
+        path: PathBuf,
+    },
+    /// A damaged piece of a work folder.
+    #[error("{}: cannot be used ({reason}); remove it, and the next run makes it again", path.display())]
+    Piece {
+        /// File.
+        path: PathBuf,
+        /// Problem of its content.
+        reason: String,
+    },
+    /// A text that is no share.
+    #[error("\"{0}\" is no share; write i/n: share i of n, such as 1/4")]
+    Share(String),
+    /// Threads that the system refuses to start.
+    #[error(
+        "cannot start {threads} threads ({error}); choose fewer with --threads, or raise the limits of memory and processes (ulimit -v, ulimit -u)"
+    )]
+    Threads {
+        /// Number of threads asked for.
+        threads: usize,
+        /// The system's error.
+        error: String,
+    },
+    /// Several ranks of a build without MPI: each would do all of the work.
+    #[error(
+        "started as {ranks} ranks, but this build has no MPI; install it with `--features mpi`, or use --shard i/n in a job array"
+    )]
+    NoMpi {
+        /// Number of ranks.
+        ranks: usize,
+    },
+    /// An MPI library that does not start.
+    #[error(
+        "MPI does not start; check the launcher and the library that this build is linked with"
+    )]
+    MpiStart,
+}
+
+impl StorageError {
+    /// Creates an error of the system about a path.
+    pub fn io(path: &Path, error: io::Error) -> Self {
+        Self::Io {
+            path: path.into(),
+            error,
+        }
+    }
+
+    /// Creates an error for threads that do not start.
+    pub(crate) fn threads(threads: usize, error: impl std::fmt::Display) -> Self {
+        Self::Threads {
+            threads,
+            error: error.to_string(),
+        }
+    }
+}

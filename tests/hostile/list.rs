@@ -1,0 +1,250 @@
+//! Hostile calls that once failed: each ends in one line that names the problem, the place and the remedy.
+
+use crate::files::files;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+const TRUETWIN: &str = env!("CARGO_BIN_EXE_truetwin");
+
+fn run(folder: &Path, words: &str) -> Output {
+    let mut command = Command::new(TRUETWIN);
+    command.args(words.split_whitespace()).current_dir(folder);
+    command.output().unwrap()
+}
+
+/// Runs a call that fails with code 2 and one line with all of these parts.
+fn refused(folder: &Path, words: &str, parts: &[&str]) {
+    let output = run(folder, words);
+    one_line(words, &output, parts);
+    assert_eq!(output.status.code(), Some(2), "{words}");
+}
+
+fn one_line(words: &str, output: &Output, parts: &[&str]) {
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(text.trim().lines().count(), 1, "{words}: {text}");
+    for part in parts {
+        assert!(text.contains(part), "{words}: {part} in {text}");
+    }
+}
+
+/// A folder with a record of the oscillator.
+fn with_record() -> TempDir {
+    let place = tempfile::tempdir().unwrap();
+    let made = run(
+        place.path(),
+        "simulate --twin van-der-pol --theta nu=1 --out r.csv",
+    );
+    assert!(made.status.success());
+    place
+}
+
+/// Names in a folder that begin as unfinished files do.
+fn leftovers(folder: &Path) -> Vec<String> {
+    let names = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name());
+    let names = names.map(|name| name.into_string().unwrap());
+    names
+        .filter(|name| name.starts_with(".truetwin-"))
+        .collect()
+}
+
+#[test]
+fn odd_record_files_are_named_as_such() {
+    let place = tempfile::tempdir().unwrap();
+    let utf16 = "t,y\n0,1\n".encode_utf16().flat_map(u16::to_le_bytes);
+    let utf16: Vec<u8> = [0xff, 0xfe].into_iter().chain(utf16).collect();
+    let cases: [(&[u8], &[&str]); 14] = [
+        (b"t;u;y\n0;1;2\n", &["semicolons", "by commas"]),
+        (b"t\tu\ty\n0\t1\t2\n", &["tabs", "by commas"]),
+        (b"t,y\n0,1,5\n", &["row 2 has 3 cells", "decimal points"]),
+        (b"t,y\n0,\"1,5\"\n", &["row 2, column y", "decimal comma"]),
+        (&utf16, &["UTF-16", "UTF-8"]),
+        (b"t\0,\0y\0", &["UTF-16", "UTF-8"]),
+        (b"t,u,y,y\n0,1,2,3\n", &["\"y\" appears twice", "t,u,y1,y2"]),
+        (b"t,t,y\n0,0,2\n", &["t appears twice"]),
+        (b"t,y,y2\n0,0,2\n", &["\"y\" is out of order", "t,y1,y2"]),
+        (b"y\n0\n", &["column t is missing"]),
+        ("t,\u{200b}y\n0,1\n".as_bytes(), &["\\u{200b}y"]),
+        ("t,y\n0,1\u{a0}000\n".as_bytes(), &["1\\u{a0}000"]),
+        (
+            b"t,y\n0,1\n0,2\n",
+            &["row 3, column t: 0 s follows 0 s", "must increase"],
+        ),
+        (
+            b"t,y\n0,1\n1,1e300\n",
+            &["row 3, column y", "largest value"],
+        ),
+    ];
+    for (bytes, parts) in cases {
+        fs::write(place.path().join("a.csv"), bytes).unwrap();
+        let parts: Vec<&str> = ["a.csv"].iter().chain(parts).copied().collect();
+        refused(place.path(), "diagnose a.csv --twin van-der-pol", &parts);
+    }
+}
+
+#[test]
+fn an_input_file_has_no_outputs() {
+    let place = with_record();
+    let call = "simulate --twin van-der-pol --theta nu=1 --input r.csv";
+    refused(place.path(), call, &["r.csv", "remove the output columns"]);
+}
+
+/// Repeated and outlying data are no error; the lines before the answer name them.
+#[test]
+fn likely_mistakes_in_records_are_warned_of() {
+    let place = with_record();
+    let at = |name: &str| place.path().join(name);
+    fs::copy(at("r.csv"), at("same.csv")).unwrap();
+    let text = fs::read_to_string(at("r.csv")).unwrap();
+    let mut rows: Vec<&str> = text.lines().take(60).collect();
+    fs::write(at("short.csv"), rows.join("\n")).unwrap();
+    let time = rows[30].split(',').next().unwrap();
+    let outlier = format!("{time},1e30");
+    rows[30] = &outlier;
+    fs::write(at("far.csv"), rows.join("\n")).unwrap();
+    // The odd last record ends each call at once.
+    fs::write(at("odd.csv"), "t,u,y\n0,1,1\n0.05,1,1\n").unwrap();
+    for (records, parts) in [
+        (
+            "r.csv same.csv odd.csv",
+            ["r.csv and same.csv", "counts twice"],
+        ),
+        (
+            "r.csv odd.csv --validation same.csv",
+            ["same.csv and r.csv", "second measurement"],
+        ),
+        (
+            "far.csv odd.csv",
+            ["far.csv, row 31, column y: 1", "outlier"],
+        ),
+    ] {
+        let output = run(
+            place.path(),
+            &format!("diagnose {records} --twin van-der-pol"),
+        );
+        let text = String::from_utf8(output.stderr).unwrap();
+        let warning = text.lines().find(|line| line.starts_with("warning: "));
+        let warning = warning.unwrap_or_else(|| panic!("no warning in {text}"));
+        assert!(parts.iter().all(|part| warning.contains(part)), "{text}");
+        assert_eq!(text.lines().count(), 2, "{text}");
+    }
+}
+
+#[test]
+fn numbers_beyond_memory_are_refused() {
+    let place = tempfile::tempdir().unwrap();
+    for call in [
+        "withheld --twin tanks --trials 1000000000000 --out a",
+        "reproduce --twin tanks --runs 1000000000000 --out a",
+    ] {
+        refused(place.path(), call, &["1000000000000", "at most 1000000"]);
+    }
+    assert!(files(place.path()).is_empty());
+}
+
+#[cfg(unix)]
+#[test]
+fn limits_of_the_system_are_named() {
+    let place = tempfile::tempdir().unwrap();
+    let limited = |limit: &str, words: &str| {
+        let script = format!("ulimit {limit}; exec \"$0\" {words}");
+        let mut command = Command::new("sh");
+        command
+            .args(["-c", &script, TRUETWIN])
+            .current_dir(place.path());
+        command.output().unwrap()
+    };
+    let call = "bank --twin van-der-pol --size 64 --out bank";
+    let output = limited("-f 0", call);
+    one_line(call, &output, &["bank", "ulimit -f"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(files(place.path()).is_empty());
+    let call = "simulate --twin van-der-pol --theta nu=1 --out s.csv";
+    one_line(
+        call,
+        &limited("-f 0", call),
+        &["error: s.csv: File too large (os error 27); raise"],
+    );
+    let call = "twins --threads 1024";
+    let output = limited("-v 400000", call);
+    one_line(call, &output, &["threads", "--threads", "ulimit -v"]);
+    assert_eq!(output.status.code(), Some(2));
+}
+
+#[cfg(unix)]
+#[test]
+fn leftovers_of_killed_runs_are_removed_by_the_next() {
+    let place = with_record();
+    let bank = "bank --twin van-der-pol --size 64 --out bank";
+    assert!(run(place.path(), bank).status.success());
+    for part in [".", "bank", "bank/shards"] {
+        fs::write(place.path().join(part).join(".truetwin-a1b2c3"), "half").unwrap();
+    }
+    fs::create_dir(place.path().join(".truetwin-gap")).unwrap();
+    assert!(run(place.path(), bank).status.success());
+    for part in [".", "bank", "bank/shards"] {
+        assert!(leftovers(&place.path().join(part)).is_empty(), "{part}");
+    }
+    fs::write(place.path().join(".truetwin-a1b2c3"), "half").unwrap();
+    let call = "simulate --twin van-der-pol --theta nu=1 --out s.csv";
+    assert!(run(place.path(), call).status.success());
+    assert!(leftovers(place.path()).is_empty());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_second_run_on_one_output_is_refused() {
+    let place = with_record();
+    let claimed = place.path().join(".truetwin-gap");
+    fs::create_dir(&claimed).unwrap();
+    let lock = fs::File::open(&claimed).unwrap();
+    lock.lock().unwrap();
+    let call = "diagnose r.csv --twin van-der-pol --out gap";
+    refused(
+        place.path(),
+        call,
+        &["another run is writing to gap", "--out"],
+    );
+    assert!(claimed.exists());
+}
+
+#[test]
+fn a_damaged_bank_is_named_with_its_remedy() {
+    let place = tempfile::tempdir().unwrap();
+    assert!(
+        run(
+            place.path(),
+            "bank --twin van-der-pol --size 128 --out bank"
+        )
+        .status
+        .success()
+    );
+    let train = "pretrain --twin van-der-pol --bank bank --epochs 1 --out v.est";
+    let shards = place.path().join("bank/shards");
+    let shard = fs::read_dir(&shards)
+        .unwrap()
+        .next()
+        .unwrap()
+        .unwrap()
+        .path();
+    let bytes = fs::read(&shard).unwrap();
+    fs::write(&shard, &bytes[..bytes.len() / 2]).unwrap();
+    let name = shard.file_name().unwrap().to_str().unwrap();
+    refused(place.path(), train, &["bank/shards", name, "truetwin bank"]);
+    fs::remove_file(&shard).unwrap();
+    refused(place.path(), train, &["bank: ", "truetwin bank"]);
+    fs::write(place.path().join("bank/manifest.json"), "{").unwrap();
+    refused(
+        place.path(),
+        train,
+        &["bank: ", "manifest.json is damaged", "make this one again"],
+    );
+    refused(
+        place.path(),
+        "pretrain --twin van-der-pol --bank none --epochs 1 --out v.est",
+        &["none: ", "does not exist"],
+    );
+}
