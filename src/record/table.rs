@@ -125,10 +125,12 @@ fn number(cell: &str) -> Result<f64, String> {
             excerpt(cell)
         )),
         Ok(value) if value.is_finite() => Ok(value),
-        _ if cell.replacen(',', ".", 1).parse::<f64>().is_ok() => Err(format!(
-            "\"{}\" has a decimal comma; write decimal points",
-            quoted(cell)
-        )),
+        _ if cell.contains(',') && cell.replacen(',', ".", 1).parse::<f64>().is_ok() => {
+            Err(format!(
+                "\"{}\" has a decimal comma; write decimal points",
+                quoted(cell)
+            ))
+        }
         _ => Err(format!(
             "\"{}\" is no finite number; correct or remove the row",
             quoted(cell)

@@ -108,7 +108,7 @@ fn wrong_calls_are_refused_in_one_line_that_names_what_and_where() {
     refuses(&[&tanks], &["of-tanks.csv", "record 1", "inputs"]);
     refuses(
         &[&record, "--without", "cubic"],
-        &["error: --without names cubic", "truetwin effects"],
+        &["unknown effect cubic in --without", "truetwin effects"],
     );
     refuses(
         &[&record, "--without", "cubic-stiffness@h7"],
