@@ -56,7 +56,7 @@ impl Regressors for DMatrix<f64> {
 /// ([`with_ridge`](Self::with_ridge)) resolves a smaller μ and lets the rounding in unseen directions grow: their product
 /// stays at about 1e-15.
 ///
-/// For 336 × 128, the factor costs 26 µs; the Gram matrix and one solve 110 µs and 60 µs with a written Φ, 7 µs and 27 µs
+/// For 336 × 128, the factor cost 26 µs with faer, before it was written out here; the Gram matrix and one solve 110 µs and 60 µs with a written Φ, 7 µs and 27 µs
 /// with [`LaggedSignals`](super::LaggedSignals).
 ///
 /// # Reference
