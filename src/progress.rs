@@ -119,16 +119,6 @@ impl Listener for Unshown {
 }
 
 /// One part of long work; shared by threads.
-///
-/// ```
-/// use truetwin::progress::{Progress, Stage};
-///
-/// let stage: Stage = Progress::silent().stage("records", 3);
-/// for _ in 0..3 {
-///     stage.tick()?; // fails where the listener asks to stop
-/// }
-/// # Ok::<(), truetwin::progress::Cancelled>(())
-/// ```
 #[derive(Debug)]
 pub struct Stage {
     progress: Progress,

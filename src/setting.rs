@@ -26,13 +26,6 @@ pub struct SettingError {
 
 impl SettingError {
     /// Of the setting `name`, which is `value`, and must be what `remedy` says.
-    ///
-    /// ```
-    /// use truetwin::setting::SettingError;
-    ///
-    /// let error = SettingError::new("step", -0.1, "must be positive");
-    /// assert_eq!(error.to_string(), "step = -0.1; must be positive");
-    /// ```
     pub fn new(name: impl Into<String>, value: impl Display, remedy: impl Into<String>) -> Self {
         Self {
             name: name.into(),
@@ -42,14 +35,6 @@ impl SettingError {
     }
 
     /// Fails unless `valid`.
-    ///
-    /// ```
-    /// use truetwin::setting::SettingError;
-    ///
-    /// let check = |hold: usize| SettingError::unless(hold > 0, "hold", hold, "take at least 1 sample");
-    /// assert!(check(3).is_ok());
-    /// assert_eq!(check(0).unwrap_err().value(), "0");
-    /// ```
     pub fn unless(
         valid: bool,
         name: impl Into<String>,

@@ -3,7 +3,7 @@
 use super::args::External;
 use super::failure::Failure;
 use crate::estimator::Project;
-use crate::external::program::{ProgramCommand, ProgramError, ProgramSettings, ProgramTwin};
+use crate::external::program::{ProgramCommand, ProgramSettings, ProgramTwin};
 use crate::study::Study;
 use std::path::Path;
 use std::time::Duration;
@@ -98,10 +98,4 @@ fn fmu(_: &External, path: &Path) -> Result<Study, Failure> {
         "--fmu {}: this build cannot read FMUs; rebuild with `--features fmi`",
         path.display()
     )))
-}
-
-impl From<ProgramError> for Failure {
-    fn from(error: ProgramError) -> Self {
-        Self::user(error)
-    }
 }

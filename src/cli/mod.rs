@@ -50,16 +50,6 @@ pub fn run<P: Into<Project>, E: Into<StudyError>>(
 }
 
 /// Runs the command line `arguments`, the program's name first, over studies or projects.
-///
-/// ```
-/// use std::process::ExitCode;
-/// use truetwin::study::{RecordPlan, Study};
-/// use truetwin::twins::VanDerPol;
-///
-/// let studies = [Study::new("mine", VanDerPol, RecordPlan::autonomous(0.05, 300))];
-/// let code = truetwin::cli::run_from(studies, ["mine", "twins", "--json"]);
-/// assert_eq!(code, ExitCode::SUCCESS);
-/// ```
 pub fn run_from<P: Into<Project>, E: Into<StudyError>>(
     projects: impl IntoIterator<Item = Result<P, E>>,
     arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>,

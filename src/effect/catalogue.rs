@@ -13,16 +13,6 @@ static LIBRARY: LazyLock<Vec<Arc<EffectKind>>> =
     LazyLock::new(|| library::rows().into_iter().map(Arc::new).collect());
 
 /// The kinds of effects that a program knows: the library's, then its own.
-///
-/// ```
-/// use truetwin::effect::Catalogue;
-/// use truetwin::twin::Twin;
-/// use truetwin::twins::VanDerPol;
-///
-/// let possible = Catalogue::default().applicable(&Twin::new(VanDerPol));
-/// assert!(possible.iter().any(|effect| effect.target() == "x2"));
-/// assert!(possible.iter().all(|effect| effect.target() != "actuator")); // the oscillator has no input
-/// ```
 #[derive(Debug, Clone)]
 pub struct Catalogue(Vec<Arc<EffectKind>>);
 

@@ -20,20 +20,6 @@ struct EffectFile {
 impl Catalogue {
     /// Reads effects from the text of a file.
     ///
-    /// ```
-    /// use truetwin::effect::Catalogue;
-    /// let effects = Catalogue::default().parse(
-    ///     r#"
-    ///     [[effect]]
-    ///     id = "sensor-lag"
-    ///     target = "sensor"
-    ///     magnitudes = { tau = 2.5 }
-    ///     "#,
-    /// )?;
-    /// assert_eq!(effects[0].given().get("tau"), Some(2.5));
-    /// # Ok::<(), truetwin::effect::EffectError>(())
-    /// ```
-    ///
     /// Targets and magnitudes are checked when the effects are added to a twin.
     pub fn parse(&self, text: &str) -> Result<Vec<Effect>, EffectError> {
         self.parse_file(text, Path::new("effects"))

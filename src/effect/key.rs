@@ -5,15 +5,6 @@ use std::fmt;
 use std::str::FromStr;
 
 /// An effect at one target; text writes it `id@target`.
-///
-/// ```
-/// use truetwin::effect::EffectKey;
-///
-/// let key: EffectKey = "state-ceiling@h1".parse()?;
-/// assert_eq!((key.id.as_str(), key.target.as_str()), ("state-ceiling", "h1"));
-/// assert_eq!(key.magnitude("level"), "state-ceiling@h1.level");
-/// # Ok::<(), truetwin::effect::EffectError>(())
-/// ```
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct EffectKey {
     /// Id of the kind, as in files.
@@ -55,14 +46,6 @@ impl FromStr for EffectKey {
 }
 
 /// Effects chosen by name: an id, at every target, or `id@target`.
-///
-/// ```
-/// use truetwin::effect::{EffectKey, EffectPattern};
-///
-/// let pattern = EffectPattern::from("sensor-lag");
-/// assert!(pattern.matches(&EffectKey::new("sensor-lag", "sensor2")));
-/// assert!(!EffectPattern::from("sensor-lag@sensor1").matches(&EffectKey::new("sensor-lag", "sensor2")));
-/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(from = "String", into = "String")]
 pub struct EffectPattern {

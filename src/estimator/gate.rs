@@ -51,14 +51,6 @@ use ndarray::{Array2, ArrayView1};
 use serde::{Deserialize, Serialize};
 
 /// Which form of the test.
-///
-/// ```
-/// use truetwin::estimator::gate::{GateForm, GateSettings};
-///
-/// let paper = GateSettings { form: GateForm::Paper, ..GateSettings::default() };
-/// assert_eq!(paper.whitening_simulations(128), 150); // whatever the number of features
-/// assert_eq!(GateSettings::default().whitening_simulations(128), 16 * 128);
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -80,13 +72,6 @@ pub enum GateForm {
 /// | `per_feature` | 16 | ≥ 2 | simulations a feature for μ and S; calibrated only |
 /// | `null` | 199 | ≥ 1/α − 1 | fresh simulations to rank among; calibrated only |
 /// | `epsilon` | 1e-8 | > 0 | added to S, in squared feature units; paper's form only |
-///
-/// ```
-/// use truetwin::estimator::gate::GateSettings;
-///
-/// let strict = GateSettings { alpha: 0.01, ..GateSettings::default() };
-/// assert!(strict.check().is_ok());
-/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct GateSettings {

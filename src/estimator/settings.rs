@@ -20,14 +20,6 @@ const MOST_SIMULATIONS: usize = 1_000_000_000_000;
 /// | `spread` | 2 | > 0 | standard deviations of the ellipsoid over those of the estimate; 1 in the paper |
 /// | `quadratic` | true | | a quadratic layer beside the tuned heads; not in the paper |
 /// | `rescale` | true | | standardise features and targets anew on the cloud; not in the paper |
-///
-/// ```
-/// use truetwin::estimator::{CloudSampler, CloudSettings};
-///
-/// let wide = CloudSettings { spread: 4.0, sampler: CloudSampler::Box, ..CloudSettings::default() };
-/// assert_eq!(wide.draws(1), 400);
-/// assert_eq!(wide.draws(10), 1000); // `size` is the most
-/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CloudSettings {
@@ -59,13 +51,6 @@ impl Default for CloudSettings {
 }
 
 /// How features become network inputs.
-///
-/// ```
-/// use truetwin::estimator::{Inputs, Settings};
-///
-/// let settings = Settings { inputs: Inputs::Each, ..Settings::default() };
-/// assert!(settings.check().is_ok());
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -85,17 +70,6 @@ impl CloudSettings {
 }
 
 /// Every number of the method.
-///
-/// ```
-/// use truetwin::estimator::Settings;
-///
-/// let mut settings = Settings::default();
-/// settings.gate.alpha = 0.05;
-/// settings.training.epochs = 50;
-/// assert!(settings.check().is_ok());
-/// settings.bank_size = 10;
-/// assert_eq!(settings.check().unwrap_err().name(), "bank size");
-/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {

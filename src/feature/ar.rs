@@ -16,22 +16,6 @@ use std::sync::Arc;
 /// For twins without input. File: `{ kind = "ar", order = 5 }`.
 ///
 /// Source: Lakshminarayanan, Guerrero & Rojas, section V (AR(5) for the van der Pol oscillator).
-///
-/// ```
-/// use std::sync::Arc;
-/// use truetwin::feature::{Ar, FeatureRecipe};
-/// use truetwin::record::{Drive, Signal};
-/// use truetwin::twin::DigitalTwin;
-/// use truetwin::twins::VanDerPol;
-///
-/// let twin = Twin::new(VanDerPol);
-/// let map = Ar { order: 2 }.bind(&twin)?;
-/// // A cosine obeys y(t) = 2·cos(ω)·y(t − 1) − y(t − 2).
-/// let cosine = Signal::from_shape_fn((50, 1), |(t, _)| (0.3 * t as f64).cos());
-/// let a = map.extract(&Drive::autonomous(1.0, 50)?, &cosine)?;
-/// assert!((a[0] - 2.0 * 0.3f64.cos()).abs() < 1e-6 && (a[1] + 1.0).abs() < 1e-6);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ar {

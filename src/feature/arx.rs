@@ -16,21 +16,6 @@ use std::sync::Arc;
 /// File: `{ kind = "arx", outputs = 64, inputs = 64 }`.
 ///
 /// Source: Lakshminarayanan, Guerrero & Rojas, section V (ARX(64, 64) for the tanks).
-///
-/// ```
-/// use std::sync::Arc;
-/// use truetwin::feature::{Arx, FeatureRecipe};
-/// use truetwin::record::Drive;
-/// use truetwin::twin::{DigitalTwin, Noise, Twin};
-/// use truetwin::twins::CascadedTanks;
-///
-/// let twin = Twin::new(CascadedTanks);
-/// let drive = Drive::new(0.5, ndarray::Array2::from_shape_fn((200, 1), |(t, _)| (t / 20 % 3) as f64))?;
-/// let outputs = twin.simulate(&[0.6, 0.5, 0.55, 1.0], &drive, Noise::new(1, "doc", 0))?;
-/// let map = Arx { outputs: 3, inputs: 2 }.bind(&twin)?;
-/// assert_eq!(map.extract(&drive, &outputs)?.len(), 5);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Arx {

@@ -16,25 +16,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Where the study's noise is that of the measurement alone, Gauss–Newton on these features is a least-squares fit
 /// of the free run: it *tracks*, also when no parameters make the twin right, and it sees unknown starts.
 /// File: `{ kind = "deviation", blocks = 64 }`.
-///
-/// ```
-/// use std::sync::Arc;
-/// use truetwin::feature::{Deviation, FeatureRecipe};
-/// use truetwin::record::Drive;
-/// use truetwin::twin::{DigitalTwin, Noise, Twin};
-/// use truetwin::twins::VanDerPol;
-///
-/// let twin = Twin::new(VanDerPol);
-/// let drive = Drive::autonomous(0.05, 300)?;
-/// let outputs = twin.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
-///
-/// let map = Deviation { blocks: 10 }.bind(&twin)?;
-/// assert_eq!(map.dim(), 10);
-/// let at_the_centre = twin.simulate(&twin.parameters().centre(), &drive, Noise::OFF)?;
-/// assert!(map.extract(&drive, &at_the_centre)?.iter().all(|mean| mean.abs() < 1e-12));
-/// assert!(map.extract(&drive, &outputs)?.iter().any(|mean| mean.abs() > 0.01));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Deviation {

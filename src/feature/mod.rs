@@ -78,22 +78,6 @@ pub trait FeatureMap: Send + Sync {
 }
 
 /// A map centred on a record, and where the record puts θ.
-///
-/// ```
-/// use std::sync::Arc;
-/// use truetwin::feature::{Ar, Centred, FeatureRecipe};
-/// use truetwin::record::{Drive, Record};
-/// use truetwin::twin::{DigitalTwin, Noise, Twin};
-/// use truetwin::twins::VanDerPol;
-///
-/// let twin = Twin::new(VanDerPol);
-/// let drive = Drive::autonomous(0.05, 50)?;
-/// let outputs = twin.simulate(&[1.5], &drive, Noise::OFF)?;
-/// let found: Option<Centred> =
-///     Ar { order: 2 }.bind(&twin)?.centred(&Record::new(drive, outputs)?, &[1.5], Noise::OFF)?;
-/// assert!(found.is_none()); // AR coefficients have no reference
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Clone)]
 #[non_exhaustive]
 pub struct Centred {
@@ -152,20 +136,6 @@ pub trait FeatureRecipe: Debug + Send + Sync {
 }
 
 /// Why there are no features.
-///
-/// ```
-/// use std::sync::Arc;
-/// use truetwin::feature::{Ar, FeatureError, FeatureRecipe};
-/// use truetwin::record::{Drive, Signal};
-/// use truetwin::twin::DigitalTwin;
-/// use truetwin::twins::VanDerPol;
-///
-/// let twin = Twin::new(VanDerPol);
-/// let map = Ar { order: 5 }.bind(&twin)?;
-/// let error = map.extract(&Drive::autonomous(0.05, 20)?, &Signal::ones((20, 1))).unwrap_err();
-/// assert!(matches!(error, FeatureError::Constant { channel: 1, .. }));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FeatureError {

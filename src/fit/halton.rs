@@ -20,8 +20,6 @@ use crate::math::MathError;
 ///
 /// [`MathError::Unbounded`] where a bound is infinite.
 ///
-/// # Example
-///
 /// # Reference
 ///
 /// Owen, "A randomized Halton algorithm in R", arXiv:1706.02808, 2017.

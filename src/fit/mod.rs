@@ -13,9 +13,10 @@ mod box_step;
 mod gauss_newton;
 mod halton;
 mod problem;
+mod settings;
 mod solver;
 
 pub use bounds::Bounds;
-pub use gauss_newton::GaussNewton;
 pub use halton::space_filling;
 pub use problem::ResidualProblem;
+pub use settings::GaussNewton;

@@ -5,7 +5,7 @@ use argmin::core::{
 use nalgebra::{DMatrix, DVector};
 
 use super::box_step::box_step;
-use super::gauss_newton::StopReason;
+use super::settings::StopReason;
 use super::{Bounds, GaussNewton, ResidualProblem};
 
 /// Armijo's constant: the part of the slope that a step must deliver.

@@ -5,20 +5,6 @@ use super::layers::*;
 /// A shallow network for few features: the one that Van der Pol uses.
 ///
 /// Up to 16 features; trunk 256, 128 with ReLU; heads of two layers of 128 with tanh; dropout 0.1.
-///
-/// ```
-/// use ndarray::{Array2, array};
-/// use truetwin::network::{Compact, Training, architecture};
-/// use truetwin::progress::Progress;
-///
-/// let features = Array2::from_shape_fn((64, 2), |(i, j)| ((i * 7 + j * 5) % 16) as f64 / 8.0 - 1.0);
-/// let targets = features.dot(&array![[1.0], [-0.5]]);
-/// let quick = Training { epochs: 3, ..Training::default() };
-///
-/// let (network, _) = architecture::<Compact>().train(&features, &targets, &quick, 1, &Progress::silent())?;
-/// assert_eq!((network.inputs(), network.outputs()), (2, 1));
-/// # Ok::<(), truetwin::network::NetworkError>(())
-/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Compact;
 
@@ -35,12 +21,6 @@ impl HeadArchitecture for Compact {
 ///
 /// Up to 128 features; trunk 256, 256 with layer normalisation and leaky ReLU; heads of three layers of 64 with layer
 /// normalisation and tanh; dropout 0.15.
-///
-/// ```
-/// use truetwin::network::{Deep, architecture};
-///
-/// assert_eq!(architecture::<Deep>().max_features(), 128);
-/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Deep;
 

@@ -30,16 +30,6 @@ const SECOND: &str = "second/";
 /// numbers of epoch, block and step, which everything random is drawn from. It is one file, which appears whole; one that is
 /// damaged or of another network counts as none, and the training begins anew. What else a training depends on (samples,
 /// settings, seed) is the caller's to compare before the state is gone on with.
-///
-/// ```
-/// use std::time::Duration;
-/// use truetwin::network::Checkpoints;
-///
-/// let place = tempfile::tempdir()?;
-/// let every_minute = Checkpoints::new(place.path().join("training"), Duration::from_secs(60));
-/// let never = Checkpoints::none();
-/// # Ok::<(), std::io::Error>(())
-/// ```
 #[derive(Debug, Default)]
 pub struct Checkpoints(Option<Place>);
 

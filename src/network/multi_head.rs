@@ -17,12 +17,6 @@ use std::marker::PhantomData;
 use std::sync::Arc;
 
 /// Makes `A` usable where types are no longer known.
-///
-/// ```
-/// use truetwin::network::{Deep, architecture};
-///
-/// assert_eq!(architecture::<Deep>().id(), "deep");
-/// ```
 pub fn architecture<A: HeadArchitecture>() -> Arc<dyn Architecture> {
     const {
         assert!(

@@ -5,13 +5,6 @@ use crate::setting::SettingError;
 use serde::{Deserialize, Serialize};
 
 /// How the learning rate moves over the epochs e = 0 … E−1.
-///
-/// ```
-/// use truetwin::network::{Schedule, Training};
-///
-/// let settings = Training { schedule: Schedule::Cosine, ..Training::default() };
-/// assert!(settings.check().is_ok());
-/// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -161,21 +154,6 @@ impl Training {
 ///
 /// Both losses are Σ_j w_j·huber_δ, averaged over rows and without the orthogonality penalty, so that they can be
 /// compared; the training loss is measured on the way, with dropout.
-///
-/// ```
-/// use ndarray::{Array2, array};
-/// use truetwin::network::{Compact, History, Training, architecture};
-/// use truetwin::progress::Progress;
-///
-/// let features = Array2::from_shape_fn((64, 2), |(i, j)| ((i * 7 + j * 5) % 16) as f64 / 8.0 - 1.0);
-/// let targets = features.dot(&array![[1.0], [-0.5]]);
-/// let quick = Training { epochs: 3, ..Training::default() };
-///
-/// let compact = architecture::<Compact>();
-/// let (_, history): (_, History) = compact.train(&features, &targets, &quick, 1, &Progress::silent())?;
-/// assert_eq!((history.epochs_run, history.training.len(), history.holdout.len()), (3, 3, 3));
-/// # Ok::<(), truetwin::network::NetworkError>(())
-/// ```
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]

@@ -11,16 +11,6 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// One tensor of a network.
-///
-/// ```
-/// use truetwin::network::{Compact, NamedTensor, NetworkError, architecture};
-///
-/// let only = NamedTensor { name: "trunk.0.bias".into(), shape: vec![256], values: vec![0.0; 256] };
-/// assert!(matches!(
-///     architecture::<Compact>().restore(2, 1, &[only]),
-///     Err(NetworkError::MissingTensor { .. })
-/// ));
-/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NamedTensor {

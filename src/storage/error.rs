@@ -1,6 +1,6 @@
 //! The error of files and work folders.
 
-use super::files::{folder, with_remedy};
+use super::remedy::{folder, with_remedy};
 use std::io;
 use std::path::{Path, PathBuf};
 

@@ -9,6 +9,7 @@
 
 mod error;
 pub(crate) mod files;
+mod remedy;
 mod unfinished;
 pub(crate) mod untrusted;
 pub mod work;

@@ -29,6 +29,9 @@ pub enum StudyError {
         /// Message of the parser, in one line.
         message: String,
     },
+    /// A program or an FMU cannot be used as a twin.
+    #[error("{0}")]
+    Simulator(String),
     /// The study is about an unknown twin.
     #[error("no twin is called \"{given}\"{}; there are {known}", did_you_mean(given, known.split(", ")))]
     Twin {

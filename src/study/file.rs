@@ -46,16 +46,6 @@ const MOST: u64 = 1 << 20;
 /// target = "sensor"
 /// magnitudes = { tau = 3.0 }                   # what is not given is estimated
 /// ```
-///
-/// ```
-/// use truetwin::study::{RecordPlan, Study, StudyFile};
-/// use truetwin::twins::VanDerPol;
-///
-/// let file = StudyFile::parse("twin = 'oscillator'\n[prior]\nnu = [1.0, 2.0]", "S.toml".as_ref())?;
-/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 300))?.configure(&file)?;
-/// assert_eq!(study.twin().parameters().centre(), [1.5]);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct StudyFile {
@@ -103,14 +93,6 @@ pub struct StudyFile {
 }
 
 /// `[record]`.
-///
-/// ```
-/// use truetwin::study::StudyFile;
-///
-/// let file = StudyFile::parse("twin = 'tanks'\n[record]\nstep = 4.0", "S.toml".as_ref())?;
-/// assert_eq!((file.record.step, file.record.samples), (Some(4.0), None)); // the twin's own length
-/// # Ok::<(), truetwin::study::StudyError>(())
-/// ```
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RecordTable {
@@ -132,14 +114,6 @@ impl RecordTable {
 }
 
 /// `[library]`: effects that a diagnosis may name.
-///
-/// ```
-/// use truetwin::study::StudyFile;
-///
-/// let file = StudyFile::parse("twin = 'tanks'\n[library]\nwithout = ['sensor-bias', 'state-ceiling@h1']", "S.toml".as_ref())?;
-/// assert_eq!(file.library.without.len(), 2);
-/// # Ok::<(), truetwin::study::StudyError>(())
-/// ```
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Library {

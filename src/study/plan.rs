@@ -11,13 +11,6 @@ use std::path::{Path, PathBuf};
 const MOST_SAMPLES: usize = 50_000_000;
 
 /// Where the inputs of simulated records come from.
-///
-/// ```
-/// use truetwin::study::{InputPlan, RecordPlan};
-///
-/// let plan = RecordPlan::levels(0.5, 100, 0.0, 3.0, 30);
-/// assert!(matches!(plan.input, Some(InputPlan::Levels(levels)) if levels.hold == 30));
-/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(
     untagged,
@@ -33,16 +26,6 @@ pub enum InputPlan {
 }
 
 /// A staircase of random levels.
-///
-/// ```
-/// use truetwin::study::{InputPlan, Levels, RecordPlan};
-/// use truetwin::twin::Interval;
-///
-/// let levels = Levels { levels: Interval::new(0.0, 3.0)?, hold: 30 };
-/// let plan = RecordPlan { step: 0.5, samples: 100, input: Some(InputPlan::Levels(levels)) };
-/// assert_eq!(plan, RecordPlan::levels(0.5, 100, 0.0, 3.0, 30));
-/// # Ok::<(), truetwin::twin::TwinError>(())
-/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Levels {
@@ -162,18 +145,6 @@ impl RecordPlan {
 }
 
 /// Draws the inputs of simulated records.
-///
-/// ```
-/// use truetwin::study::{DriveSource, RecordPlan};
-/// use truetwin::record::Signals;
-/// use truetwin::twin::Noise;
-///
-/// let source: DriveSource = RecordPlan::levels(0.1, 300, 0.0, 1.0, 20).prepare(&Signals::default())?;
-/// let drive = source.draw(Noise::new(1, "input", 0))?;
-/// assert_eq!(drive.inputs()[[0, 0]], drive.inputs()[[19, 0]]);
-/// assert_eq!(drive, source.draw(Noise::new(1, "input", 0))?); // the same seed, the same levels
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Debug, Clone)]
 pub struct DriveSource {
     plan: RecordPlan,

@@ -16,39 +16,6 @@ pub struct Now<'a> {
 }
 
 /// The rule that carries the state over one step Δt, the input held.
-///
-/// ```
-/// use truetwin::prelude::*;
-/// use truetwin::twin::Integrator;
-///
-/// /// ẋ = −k·x, exactly x(0)·exp(−k·t).
-/// struct Decay(Integrator);
-/// impl StateSpace for Decay {
-///     fn outline(&self) -> Outline {
-///         let k = Parameter::new("k", "1/s", 0.5, 2.0);
-///         Outline::new().parameter(k).state("x", "-").output("y", "-")
-///     }
-///     fn start(&self, _: &Now, x: &mut [f64]) {
-///         x[0] = 1.0;
-///     }
-///     fn drift(&self, now: &Now, x: &[f64], dx: &mut [f64]) {
-///         dx[0] = -now.theta[0] * x[0];
-///     }
-///     fn observe(&self, _: &Now, x: &[f64], y: &mut [f64]) {
-///         y[0] = x[0];
-///     }
-///     fn integrator(&self) -> Integrator {
-///         self.0
-///     }
-/// }
-/// let drive = Drive::autonomous(0.1, 11)?;
-/// let error = |integrator| {
-///     let y = Decay(integrator).simulate(&[1.0], &drive, Noise::OFF)?;
-///     Ok::<f64, SimulationError>((y[[10, 0]] - (-1.0f64).exp()).abs())
-/// };
-/// assert!(error(Integrator::RungeKutta4)? < 1e-4 * error(Integrator::Euler)?);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]

@@ -47,14 +47,6 @@ impl Role {
 }
 
 /// One parameter.
-///
-/// ```
-/// use truetwin::twin::Parameter;
-///
-/// // The network is trained where k lies in [0.1, 1]; nature allows [0, 3].
-/// let k = Parameter::new("k", "1/s", 0.1, 1.0).within(0.0, 3.0);
-/// assert_eq!((k.prior.low(), k.bounds.high()), (0.1, 3.0));
-/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
     /// Short name, as on the command line and in study files.

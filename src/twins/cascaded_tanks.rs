@@ -17,17 +17,6 @@ const SMALLEST_LEVEL: f64 = 1e-6;
 ///
 /// Source: Lakshminarayanan, Guerrero & Rojas, section V-B, after Wigren & Schoukens (2013). The output's
 /// standard deviation is that of the authors' code.
-///
-/// ```
-/// use truetwin::record::{Drive, Signal};
-/// use truetwin::twin::{DigitalTwin, Noise};
-/// use truetwin::twins::CascadedTanks;
-///
-/// let drive = Drive::new(0.5, Signal::from_elem((2000, 1), 1.5))?;
-/// let y = CascadedTanks.simulate(&[0.6, 0.5, 0.5, 1.0], &drive, Noise::OFF)?;
-/// assert!((y[[1999, 0]] - 6.25).abs() < 1e-3); // at rest k₁·√h₁ = k₄·u and k₂·√h₁ = k₃·√h₂
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Debug, Clone, Copy, Default)]
 pub struct CascadedTanks;
 

@@ -12,17 +12,6 @@ use crate::twin::{Now, Outline, Parameter, StateSpace};
 /// standard deviation Δt·√0.02 (0.00707 at Δt = 0.05 s). The position is measured without error.
 ///
 /// Source: Lakshminarayanan, Guerrero & Rojas, section V-A.
-///
-/// ```
-/// use truetwin::record::Drive;
-/// use truetwin::twin::{DigitalTwin, Noise};
-/// use truetwin::twins::VanDerPol;
-///
-/// let y = VanDerPol.simulate(&[1.0], &Drive::autonomous(0.05, 300)?, Noise::OFF)?;
-/// let height = y.iter().fold(0.0f64, |most, v| most.max(v.abs()));
-/// assert!((height - 2.0).abs() < 0.2); // the limit cycle
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Debug, Clone, Copy, Default)]
 pub struct VanDerPol;
 

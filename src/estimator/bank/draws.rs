@@ -25,33 +25,6 @@ pub struct Draw<'a> {
 }
 
 /// Parameters and the features simulated there, row by row.
-///
-/// ```
-/// use std::borrow::Cow;
-/// use std::sync::Arc;
-/// use truetwin::estimator::bank::{Draw, Draws, FeatureSimulator};
-/// use truetwin::feature::Ar;
-/// use truetwin::progress::Progress;
-/// use truetwin::record::Drive;
-/// use truetwin::twin::{DigitalTwin, Noise};
-/// use truetwin::twins::VanDerPol;
-///
-/// let simulator = FeatureSimulator::new(Arc::new(VanDerPol), &Ar { order: 2 })?;
-/// let drive = Drive::autonomous(0.05, 200)?;
-///
-/// let space = simulator.twin().parameters();
-/// let stage = Progress::silent().stage("bank", 20);
-/// let draws: Draws = simulator.draws(
-///     0..20,
-///     |row| Noise::new(1, "bank", row),
-///     |_row, _attempt, noise| {
-///         Ok(Some(Draw { theta: space.draw_prior(noise), drive: Cow::Borrowed(&drive) }))
-///     },
-///     &stage,
-/// )?;
-/// assert_eq!((draws.theta.dim(), draws.features.dim()), ((20, 1), (20, 2)));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draws {
     /// Parameters, M × d.

@@ -10,23 +10,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A twin seen through its features; counts every simulation, also those that the features make.
-///
-/// ```
-/// use std::sync::Arc;
-/// use truetwin::estimator::bank::FeatureSimulator;
-/// use truetwin::feature::Ar;
-/// use truetwin::record::{Drive, Record};
-/// use truetwin::twin::{DigitalTwin, Noise};
-/// use truetwin::twins::VanDerPol;
-///
-/// let simulator = FeatureSimulator::new(Arc::new(VanDerPol), &Ar { order: 2 })?;
-/// let drive = Drive::autonomous(0.05, 200)?;
-///
-/// let outputs = simulator.twin().simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
-/// let features = simulator.observe(&Record::new(drive, outputs)?)?;
-/// assert_eq!((features.len(), simulator.calls()), (simulator.dim(), 1));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 pub struct FeatureSimulator {
     twin: Twin,
     calls: Arc<AtomicUsize>,

@@ -29,21 +29,6 @@ pub const CHECKPOINT: Duration = Duration::from_secs(10);
 /// The folder `EST.part` takes the bank, shard by shard, and the state of the training. Interrupted at any moment, the same
 /// pretraining goes on with it, and gives the bytes of one that nothing has disturbed, which are also those of
 /// [`pretrain`](super::pretrain()) and [`save`](Estimator::save).
-///
-/// ```
-/// use truetwin::evaluate::paper::reference_studies;
-/// use truetwin::progress::Progress;
-/// use truetwin::estimator::{Estimator, PretrainOptions, Pretraining};
-///
-/// let studies = reference_studies()?;
-/// let options = PretrainOptions { bank_size: Some(100), epochs: Some(1), ..PretrainOptions::default() };
-/// let place = tempfile::tempdir()?;
-/// let path = place.path().join("first.est");
-/// let (_, history) = Pretraining::new(&studies[0], options).write(&path, &Progress::silent())?;
-/// assert_eq!(history.epochs_run, 1);
-/// assert_eq!(Estimator::load(&path, &studies)?.settings().bank_size, 100);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 pub struct Pretraining<'a> {
     project: Project,
     options: PretrainOptions,
@@ -52,27 +37,6 @@ pub struct Pretraining<'a> {
 }
 
 /// A bank to train on that is there.
-///
-/// ```
-/// use truetwin::evaluate::paper::reference_studies;
-/// use truetwin::progress::Progress;
-/// use truetwin::estimator::shards::{BankPlan, ShardedBank};
-/// use truetwin::estimator::{GivenBank, PresetName, PretrainOptions, Pretraining, Project};
-/// use truetwin::storage::work::Share;
-///
-/// let project = &Project::from(&reference_studies()?[0]);
-/// let (place, silent) = (tempfile::tempdir()?, Progress::silent());
-/// let folder = place.path().join("bank");
-/// let plan = BankPlan { project: project.clone(), preset: PresetName::Default, size: 100, seed: 1 };
-/// plan.fill(&folder, Share::WHOLE, &silent)?;
-/// let bank = ShardedBank::open(&folder)?;
-/// let given = GivenBank { bank: &bank, checksum: bank.checksum() };
-/// let options = PretrainOptions { epochs: Some(1), ..PretrainOptions::default() };
-/// let pretraining = Pretraining::new(project, options).with_bank(given);
-/// let (estimator, _) = pretraining.write(&place.path().join("first.est"), &silent)?;
-/// assert_eq!(estimator.settings().bank_size, 100);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 pub struct GivenBank<'a> {
     /// Its rows.
     pub bank: &'a dyn Bank,

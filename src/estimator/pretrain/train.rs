@@ -72,25 +72,6 @@ pub fn pretrain(
 /// # Errors
 ///
 /// [`EstimatorError`]; also for rows of another width.
-///
-/// ```
-/// use truetwin::progress::Progress;
-/// use truetwin::estimator::shards::Prior;
-/// use truetwin::study::{RecordPlan, Study};
-/// use truetwin::twins::VanDerPol;
-/// use truetwin::estimator::{PresetName, PretrainOptions, Project, pretrain_on};
-///
-/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 100))?;
-/// let project = Project::from(&study);
-/// let features = &project.recipe(PresetName::Default).features;
-/// let stage = Progress::silent().stage("bank", 150);
-/// let bank = Prior::new(&study, features.as_ref())?.rows(0..150, 1, "bank", &stage)?;
-///
-/// let short = PretrainOptions { epochs: Some(2), ..PretrainOptions::default() };
-/// let (estimator, history) = pretrain_on(&study, &bank, &short, &Progress::silent())?;
-/// assert_eq!((estimator.settings().bank_size, history.epochs_run), (150, 2));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 pub fn pretrain_on(
     project: impl Into<Project>,
     bank: &dyn Bank,

@@ -4,16 +4,6 @@ use ndarray::{Array1, Array2, Axis};
 use serde::{Deserialize, Serialize};
 
 /// z = (x − mean)/scale for each column; a column that never changes has scale 1.
-///
-/// ```
-/// use ndarray::array;
-/// use truetwin::estimator::Scaler;
-///
-/// let samples = array![[1.0], [3.0]];
-/// let scaler = Scaler::fit(&samples);
-/// assert_eq!(scaler.apply(&samples), array![[-1.0], [1.0]]);
-/// assert_eq!(scaler.invert(&scaler.apply(&samples)), samples);
-/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scaler {
     /// Means.

@@ -9,14 +9,6 @@ use ndarray::{Array1, Array2};
 /// Two forms: each feature by itself ([`each`](Self::each)), or along the principal axes of the correlation matrix
 /// ([`principal`](Self::principal)). Features such as AR coefficients are 0.99 correlated and the information sits in their differences,
 /// which principal axes show at unit size; axes along which nothing varies are zero.
-///
-/// ```
-/// use ndarray::array;
-/// use truetwin::estimator::Standardiser;
-///
-/// let features = array![[1.0, 10.0], [3.0, 30.0]];
-/// assert_eq!(Standardiser::each(&features).apply(&features), array![[-1.0, -1.0], [1.0, 1.0]]);
-/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Standardiser {
     /// Means of the features (n).

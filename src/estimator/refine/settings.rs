@@ -17,14 +17,6 @@ use serde::{Deserialize, Serialize};
 /// | `ridge` | 1 | ≥ 0 | λ added to JᵀJ in G, θ in units of the prior's width |
 /// | `step` | 0.01 | > 0 | finite-difference step, in prior widths |
 /// | `cutoff` | 1e-3 | [0, 1) | singular values of J below this part of the largest are left out of a step |
-///
-/// ```
-/// use truetwin::estimator::refine::RefineSettings;
-///
-/// let quick = RefineSettings { starts: 2, seeds: 8, ..RefineSettings::default() };
-/// assert!(quick.check().is_ok());
-/// assert!(RefineSettings { rounds: 0, ..quick }.check().is_err());
-/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RefineSettings {

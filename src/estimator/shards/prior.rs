@@ -12,21 +12,6 @@ use std::ops::Range;
 /// Draws from a study's prior: θ uniform in the prior, each with noise and, where the study draws inputs, an input of its own.
 ///
 /// Source: Lakshminarayanan, Guerrero & Rojas, section III.
-///
-/// ```
-/// use truetwin::feature::Ar;
-/// use truetwin::progress::Progress;
-/// use truetwin::estimator::shards::Prior;
-/// use truetwin::study::{RecordPlan, Study};
-/// use truetwin::twins::VanDerPol;
-///
-/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 100))?;
-/// let prior = Prior::new(&study, &Ar { order: 2 })?;
-/// let stage = Progress::silent().stage("bank", 10);
-/// let draws = prior.rows(0..10, 1, "bank", &stage)?;
-/// assert!(draws.theta.iter().all(|nu| (0.0..=2.5).contains(nu)));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 pub struct Prior {
     simulator: FeatureSimulator,
     space: ParameterSpace,

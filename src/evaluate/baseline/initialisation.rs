@@ -14,16 +14,6 @@ const GOOD_SPREAD: f64 = 0.1;
 /// | ts | θ_init, the pretrained estimate |
 /// | bad | for each parameter the bound farther from the truth |
 ///
-/// ```
-/// use truetwin::evaluate::baseline::Initialisation;
-/// use truetwin::twin::{Noise, Parameter, ParameterSpace};
-/// let space = ParameterSpace::new([Parameter::new("nu", "-", 0.0, 2.5).within(0.0, 7.0)]);
-/// let noise = Noise::new(1, "start", 0);
-/// assert_eq!(Initialisation::Bad.theta(&space, &[3.0], &[2.4], noise)?, [7.0]);
-/// assert_eq!(Initialisation::Ts.theta(&space, &[3.0], &[2.4], noise)?, [2.4]);
-/// # Ok::<(), truetwin::twin::TwinError>(())
-/// ```
-///
 /// Source: Lakshminarayanan, Guerrero & Rojas, section V; the spread is that of the authors' code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]

@@ -21,14 +21,6 @@ use std::sync::Arc;
 const DEMO: &str = include_str!("demo-van-der-pol.csv");
 
 /// The reference twins under their command-line names, `van-der-pol` and `tanks`.
-///
-/// ```
-/// use truetwin::evaluate::paper::reference_studies;
-///
-/// let names: Vec<String> = reference_studies()?.iter().map(|study| study.name().to_owned()).collect();
-/// assert_eq!(names, ["van-der-pol", "tanks"]);
-/// # Ok::<(), truetwin::study::StudyError>(())
-/// ```
 pub fn reference_studies() -> Result<Vec<Study>, StudyError> {
     let projects = reference_projects()?.into_iter();
     Ok(projects.map(|project| project.study().clone()).collect())

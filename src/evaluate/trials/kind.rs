@@ -4,13 +4,6 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Kind of truth of a trial, which decides the right answer.
-///
-/// ```
-/// use truetwin::evaluate::trials::Kind;
-///
-/// assert!(Kind::ALL.iter().all(|kind| Kind::named(kind.id()) == Some(*kind)));
-/// assert!(!Kind::None.is_structural());
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]

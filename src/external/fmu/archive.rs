@@ -1,9 +1,10 @@
 //! The archive that an FMU is.
 
-use super::FmuError;
 use super::description::{ModelDescription, Version};
+use super::error;
 use super::unpack::{MOST_BYTES, unpack};
 use crate::storage::untrusted::read;
+use crate::study::StudyError;
 use fmi::fmi2::import::Fmi2Import;
 use fmi::fmi3::import::Fmi3Import;
 use fmi::traits::FmiImport;
@@ -21,15 +22,9 @@ pub(super) enum Archive {
 }
 
 /// Unpacks an FMU into a temporary folder and reads its description.
-pub(super) fn open(path: &Path) -> Result<(ModelDescription, TempDir), FmuError> {
-    let at = |problem: String| FmuError::Archive {
-        path: path.into(),
-        problem,
-    };
-    let file = File::open(path).map_err(|error| FmuError::Io {
-        path: path.into(),
-        error,
-    })?;
+pub(super) fn open(path: &Path) -> Result<(ModelDescription, TempDir), StudyError> {
+    let at = |problem: String| error::archive(path, &problem);
+    let file = File::open(path).map_err(|error| error::io(path, &error))?;
     let folder = tempfile::Builder::new().prefix("truetwin-fmu-").tempdir();
     let folder = folder.map_err(|error| at(format!("no temporary folder: {error}")))?;
     unpack(file, folder.path(), MOST_BYTES).map_err(at)?;

@@ -11,12 +11,10 @@ mod instance;
 mod unpack;
 mod worker;
 
-pub use error::FmuError;
-
 use super::lending::Lending;
 use super::name;
 use crate::record::{Drive, Signal, Signals};
-use crate::study::{RecordPlan, Study};
+use crate::study::{RecordPlan, Study, StudyError};
 use crate::twin::{DigitalTwin, Noise, ParameterSpace, SimulationError};
 use archive::Archive;
 use description::Variable;
@@ -31,13 +29,6 @@ use worker::{References, Worker};
 /// |---|---|---|
 /// | `variables` | all | names of the parameters to estimate, of inputs and outputs; of a kind that none is named of, all are used |
 /// | `workers` | as many as threads simulate | instances at once; 1 of an FMU that allows no more |
-///
-/// ```
-/// use truetwin::external::fmu::FmuSettings;
-///
-/// let some = FmuSettings { variables: vec!["stiffness".into(), "y".into()], ..FmuSettings::default() };
-/// assert_eq!(some.workers, None);
-/// ```
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct FmuSettings {
     /// Names of the real parameters, inputs and outputs that the twin has; the others keep their start.
@@ -55,13 +46,6 @@ pub struct FmuSettings {
 /// Row k is read when time k·Δt is reached, before input k is set: an output that depends on an input directly lags it by a
 /// sample. A step that fails is a divergence at its time; a refused initialisation costs the run. Instances are reset between
 /// runs and have a thread each. The FMU runs in this process: if it crashes or hangs, so does this.
-///
-/// ```no_run
-/// use truetwin::external::fmu::{FmuSettings, FmuTwin};
-/// let twin = FmuTwin::open("models/Rig.fmu".as_ref(), FmuSettings::default())?;
-/// truetwin::cli::run([twin.into_study()]);
-/// # Ok::<(), truetwin::external::fmu::FmuError>(())
-/// ```
 pub struct FmuTwin {
     /// Ended before the folder goes.
     workers: Lending<Worker>,
@@ -90,12 +74,9 @@ impl FmuTwin {
     /// # Errors
     ///
     /// A file that is no FMU for co-simulation, or not for this platform; variables that it does not have.
-    pub fn open(path: &Path, settings: FmuSettings) -> Result<Self, FmuError> {
+    pub fn open(path: &Path, settings: FmuSettings) -> Result<Self, StudyError> {
         let (mut description, folder) = archive::open(path)?;
-        let variables = |problem: String| FmuError::Variables {
-            path: path.into(),
-            problem,
-        };
+        let variables = |problem: String| error::at(path, problem);
         description.select(&settings.variables).map_err(variables)?;
         for list in [
             &mut description.parameters,
@@ -112,10 +93,7 @@ impl FmuTwin {
         if description.outputs.is_empty() {
             return Err(variables("no real output; export it with one".into()));
         }
-        let failed = |problem: String| FmuError::Instance {
-            path: path.into(),
-            problem,
-        };
+        let failed = |problem: String| error::instance(path, &problem);
         let archive = Archive::new(&description, folder).map_err(|e| failed(e.to_string()))?;
         let lacks = archive.lacks(&description.identifier);
         if let Some(function) = lacks.map_err(|e| failed(e.to_string()))? {
@@ -162,9 +140,9 @@ impl FmuTwin {
     /// # Errors
     ///
     /// As [`Study::new`]: no parameter, or boxes without room.
-    pub fn into_study(self) -> Result<Study, FmuError> {
+    pub fn into_study(self) -> Result<Study, StudyError> {
         let (path, name, plan) = (self.path.clone(), self.name.clone(), self.plan.clone());
-        Study::new(&name, self, plan).map_err(|error| FmuError::Study { path, error })
+        Study::new(&name, self, plan).map_err(|error| error::at(&path, error))
     }
 }
 

@@ -1,34 +1,25 @@
-//! Why a program is no twin.
+//! Messages of programs that cannot be used as twins.
 
+use super::ProgramCommand;
 use crate::storage::files::with_remedy;
 use crate::study::StudyError;
 
-/// Why a program cannot be used as a twin.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ProgramError {
-    /// A setting out of its range.
-    #[error("the program's {0}")]
-    Settings(String),
-    /// The system cannot start it.
-    #[error("the program `{command}` cannot be started: {}", with_remedy(error))]
-    Start {
-        /// The command.
-        command: String,
-        /// What the system said.
-        error: std::io::Error,
-    },
-    /// It does not say what it is.
-    #[error(
+/// A setting out of its range.
+pub(super) fn setting(problem: &str) -> StudyError {
+    StudyError::Simulator(format!("the program's {problem}"))
+}
+
+/// The system cannot start the program.
+pub(super) fn start(command: &ProgramCommand, error: &std::io::Error) -> StudyError {
+    StudyError::Simulator(format!(
+        "the program `{command}` cannot be started: {}",
+        with_remedy(error)
+    ))
+}
+
+/// The program does not describe itself.
+pub(super) fn describe(command: &ProgramCommand, problem: &str) -> StudyError {
+    StudyError::Simulator(format!(
         "the program `{command}` {problem}; asked to describe itself, it must answer one line of JSON with name, parameters, outputs and record"
-    )]
-    Describe {
-        /// The command.
-        command: String,
-        /// What it did instead.
-        problem: String,
-    },
-    /// What it says makes no study.
-    #[error(transparent)]
-    Study(#[from] StudyError),
+    ))
 }

@@ -31,11 +31,10 @@ mod text;
 mod worker;
 
 pub use command::ProgramCommand;
-pub use error::ProgramError;
 pub use settings::ProgramSettings;
 
 use crate::record::{Drive, Signal, Signals};
-use crate::study::{RecordPlan, Study};
+use crate::study::{RecordPlan, Study, StudyError};
 use crate::twin::{DigitalTwin, Noise, ParameterSpace, SimulationError};
 use description::Description;
 use health::Health;
@@ -59,14 +58,6 @@ use worker::Trouble;
 ///
 /// The results depend neither on the number of workers nor on restarts, as long as the program keeps its word that the same
 /// request gets the same answer.
-///
-/// ```no_run
-/// use truetwin::external::program::{ProgramCommand, ProgramSettings, ProgramTwin};
-/// let command = ProgramCommand::new("python3", ["examples/pendulum.py"]);
-/// let study = ProgramTwin::start(command, ProgramSettings::default())?.into_study()?;
-/// assert_eq!(study.name(), "pendulum");
-/// # Ok::<(), truetwin::external::program::ProgramError>(())
-/// ```
 ///
 /// Then `truetwin::cli::run([study])` is a command line over it, and `truetwin --program 'python3 examples/pendulum.py'` is
 /// the same without Rust.
@@ -94,18 +85,13 @@ impl ProgramTwin {
     ///
     /// Settings out of range; a program that cannot be started, ends, is late, or does not describe a twin. The message
     /// has the end of its standard error.
-    pub fn start(command: ProgramCommand, settings: ProgramSettings) -> Result<Self, ProgramError> {
+    pub fn start(command: ProgramCommand, settings: ProgramSettings) -> Result<Self, StudyError> {
         settings.check()?;
         let most = (settings.workers).unwrap_or_else(rayon::current_num_threads);
         let introduced = introduce(&command, settings.timeout);
-        let met = introduced.map_err(|error| ProgramError::Start {
-            command: command.to_string(),
-            error,
-        })?;
-        let (worker, description) = met.map_err(|trouble| ProgramError::Describe {
-            command: command.to_string(),
-            problem: trouble.text(),
-        })?;
+        let met = introduced.map_err(|error| error::start(&command, &error))?;
+        let (worker, description) =
+            met.map_err(|trouble| error::describe(&command, &trouble.text()))?;
         let pool = Pool::new(command, settings.timeout, most);
         pool.adopt(worker);
         Ok(Self {
@@ -132,9 +118,9 @@ impl ProgramTwin {
     /// # Errors
     ///
     /// As [`Study::new`].
-    pub fn into_study(self) -> Result<Study, ProgramError> {
+    pub fn into_study(self) -> Result<Study, StudyError> {
         let (name, plan) = (self.name().to_owned(), self.plan().clone());
-        Ok(Study::new(&name, self, plan)?)
+        Study::new(&name, self, plan)
     }
 
     /// One request, asked of fresh workers until one answers or the attempts are used up.

@@ -1,6 +1,7 @@
 //! How a program is run.
 
-use super::ProgramError;
+use super::error;
+use crate::study::StudyError;
 use std::time::Duration;
 
 /// Most copies of a program.
@@ -17,14 +18,6 @@ const LONGEST: Duration = Duration::from_secs(366 * 24 * 3600);
 /// | `workers` | as many as threads simulate | 1 … 1024 | copies of the program that run at once |
 /// | `timeout` | 60 s | above 0, at most a year | for one answer; to start and describe itself, a copy has at least 30 s |
 /// | `retries` | 2 | 0 … 100 | attempts on a fresh copy after one that ended or was late |
-///
-/// ```
-/// use std::time::Duration;
-/// use truetwin::external::program::ProgramSettings;
-///
-/// let patient = ProgramSettings { timeout: Duration::from_secs(600), workers: Some(2), ..ProgramSettings::default() };
-/// assert_eq!(patient.retries, 2);
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ProgramSettings {
     /// Copies of the program that run at once; `None`: one for each thread of the rayon pool that starts the twin.
@@ -47,8 +40,8 @@ impl Default for ProgramSettings {
 
 impl ProgramSettings {
     /// Whether each field is in its range.
-    pub(super) fn check(&self) -> Result<(), ProgramError> {
-        let wrong = |text: String| Err(ProgramError::Settings(text));
+    pub(super) fn check(&self) -> Result<(), StudyError> {
+        let wrong = |text: String| Err(error::setting(&text));
         if let Some(workers) = self.workers
             && !(1..=MOST_WORKERS).contains(&workers)
         {

@@ -28,20 +28,6 @@ use std::sync::Arc;
 ///
 /// File: `{ kind = "armax", outputs = 2, inputs = 2, noise = 2 }`.
 ///
-/// ```
-/// use truetwin::feature::{Armax, FeatureRecipe};
-/// use truetwin::record::{Drive, Signal};
-/// use truetwin::twin::{DigitalTwin, Noise, Twin};
-/// use truetwin::twins::CascadedTanks;
-///
-/// let twin = Twin::new(CascadedTanks);
-/// let drive = Drive::new(0.5, Signal::ones((400, 1)))?;
-/// let y = twin.simulate(&[0.6, 0.5, 0.55, 1.0], &drive, Noise::new(1, "example", 0))?;
-/// let map = Armax { outputs: 2, inputs: 1, noise: 2 }.bind(&twin)?;
-/// assert_eq!(map.extract(&drive, &y)?.len(), 2 + 1 + 2 + 1);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-///
 /// Source: Hannan & Rissanen, "Recursive estimation of mixed autoregressive-moving average order", *Biometrika* 69, 1982;
 /// Hannan & Kavalieris, "A method for autoregressive-moving average estimation", *Biometrika* 71, 1984; Ljung, *System
 /// Identification*, 2nd ed., chapter 10.

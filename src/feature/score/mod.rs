@@ -25,24 +25,6 @@ use std::sync::Arc;
 /// learnt from simulations. File: `{ kind = "score" }`.
 ///
 /// Source: Alsing & Wandelt, "Generalized massive optimal data compression", MNRAS 476 (2018).
-///
-/// ```
-/// use std::sync::Arc;
-/// use truetwin::feature::{Score, FeatureRecipe};
-/// use truetwin::record::Drive;
-/// use truetwin::twin::{DigitalTwin, Noise, Twin};
-/// use truetwin::twins::VanDerPol;
-///
-/// let twin = Twin::new(VanDerPol);
-/// let drive = Drive::autonomous(0.05, 300)?;
-/// let outputs = twin.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
-///
-/// let map = Score::default().bind(&twin)?;
-/// assert_eq!(map.dim(), 3); // 2·d + 1
-/// let step = map.extract(&drive, &outputs)?[0]; // from the prior's centre, 1.25, towards 1.5
-/// assert!(step > 0.0);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Score {

@@ -9,18 +9,6 @@ const LOG_STEP: f64 = 1e-3;
 const LINEAR_STEP: f64 = 1e-2;
 
 /// φ: log θ_j where the lower bound of θ_j is positive, otherwise θ_j itself.
-///
-/// ```
-/// use truetwin::likelihood::kalman::Coordinates;
-/// use truetwin::twin::{Parameter, ParameterSpace};
-/// let space = ParameterSpace::new([
-///     Parameter::new("k", "1/s", 0.5, 2.0),
-///     Parameter::new("offset", "m", -1.0, 1.0),
-/// ]);
-/// let phi = Coordinates::new(&space);
-/// assert_eq!(phi.of(&[1.0, 0.3]), [0.0, 0.3]);
-/// assert_eq!(phi.steps(), [1e-3, 0.02]);
-/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coordinates {
     log: Vec<bool>,

@@ -6,22 +6,6 @@ use crate::twin::{SimulationError, TwinError};
 
 /// Why a record could not be filtered. [`Diverged`](Self::Diverged), [`NoSpread`](Self::NoSpread) and a twin that
 /// refuses θ cost this θ alone; the rest ends the work.
-///
-/// ```
-/// use truetwin::likelihood::kalman::{FilterError, FilterSettings, log_likelihood};
-/// use truetwin::record::{Drive, Record};
-/// use truetwin::twin::{DigitalTwin, Noise};
-/// use truetwin::twins::VanDerPol;
-///
-/// let drive = Drive::autonomous(0.05, 100)?;
-/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
-/// let record = Record::new(drive, outputs)?;
-///
-/// let settings = FilterSettings { noise_floor: -1.0, ..FilterSettings::default() };
-/// let error = log_likelihood(&VanDerPol, &[1.5], &record, &settings).unwrap_err();
-/// assert!(matches!(error, FilterError::Setting(_)) && !error.is_recoverable());
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FilterError {

@@ -2,30 +2,11 @@
 
 use super::gaussian::{Belief, Gaussian};
 use super::pass::{Innovation, Sink};
+use super::{FilterError, Kalman};
 use crate::record::Signal;
 use ndarray::{Array3, s};
 
 /// A record as the filter saw it; N samples, p outputs, n states.
-///
-/// ```
-/// use truetwin::likelihood::kalman::{FilterSettings, Filtered, States, filter};
-/// use truetwin::record::{Drive, Record};
-/// use truetwin::twin::{DigitalTwin, Noise};
-/// use truetwin::twins::VanDerPol;
-///
-/// let drive = Drive::autonomous(0.05, 100)?;
-/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
-/// let record = Record::new(drive, outputs)?;
-///
-/// let settings = FilterSettings { keep_states: true, ..FilterSettings::default() };
-/// let found: Filtered = filter(&VanDerPol, &[1.5], &record, &settings)?;
-/// assert_eq!(found.innovations.dim(), (100, 1));
-/// let total: f64 = found.log_densities.iter().sum();
-/// assert!((total - found.log_likelihood).abs() < 1e-9 * total.abs());
-/// let states: States = found.states.ok_or("the settings ask for them")?;
-/// assert_eq!(states.means.dim(), (100, 2));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Filtered {
@@ -89,21 +70,6 @@ impl Sink for Filtered {
 }
 
 /// Means and covariances of the states at each sample; N samples, n states in the order of the twin's outline.
-///
-/// ```
-/// use truetwin::likelihood::kalman::{FilterSettings, States, smooth};
-/// use truetwin::record::{Drive, Record};
-/// use truetwin::twin::{DigitalTwin, Noise};
-/// use truetwin::twins::VanDerPol;
-///
-/// let drive = Drive::autonomous(0.05, 100)?;
-/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
-/// let record = Record::new(drive, outputs)?;
-///
-/// let states: States = smooth(&VanDerPol, &[1.5], &record, &FilterSettings::default())?.states;
-/// assert_eq!((states.means.dim(), states.covariances.dim()), ((100, 2), (100, 2, 2)));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct States {
@@ -151,5 +117,22 @@ impl States {
         for (to, from) in covariance.iter_mut().zip(state.cov) {
             *to = *from;
         }
+    }
+}
+
+impl Kalman<'_> {
+    /// Everything that [`Filtered`] holds.
+    ///
+    /// # Errors
+    ///
+    /// As [`log_likelihood`](Self::log_likelihood).
+    pub fn filter(&self, theta: &[f64]) -> Result<Filtered, FilterError> {
+        let states = self.settings.keep_states.then_some(self.states);
+        let mut filtered = Filtered::new(self.record.samples(), self.channels, states);
+        filtered.log_likelihood = self.run(theta, &mut filtered)?;
+        if let Some(states) = &mut filtered.states {
+            states.map(|state| self.told(state));
+        }
+        Ok(filtered)
     }
 }

@@ -2,9 +2,7 @@
 
 use super::clip::clip;
 use super::gaussian::Gaussian;
-use super::pass::{Pass, Sink};
-use super::size::{Any, Fixed};
-use super::{FilterError, FilterSettings, Filtered, Method};
+use super::{FilterError, FilterSettings, Method};
 use crate::record::Record;
 use crate::twin::{Interval, ParameterSpace, StateSpace, TwinError};
 
@@ -48,7 +46,7 @@ pub struct Kalman<'a> {
     pub(super) parameters: ParameterSpace,
     pub(super) states: usize,
     pub(super) outputs: Vec<f64>,
-    channels: usize,
+    pub(super) channels: usize,
     /// Limits of the states.
     limits: Vec<Interval>,
     /// Limits of the points that are carried through the equations; those of a derivative have none.
@@ -104,41 +102,6 @@ impl<'a> Kalman<'a> {
     /// The parameters of the twin.
     pub fn parameters(&self) -> &ParameterSpace {
         &self.parameters
-    }
-
-    /// log p(y | θ), in nats.
-    ///
-    /// # Errors
-    ///
-    /// [`FilterError`]: θ of another length, a twin that refuses it, a filter that diverged or has no spread.
-    pub fn log_likelihood(&self, theta: &[f64]) -> Result<f64, FilterError> {
-        self.run(theta, &mut ())
-    }
-
-    /// Everything that [`Filtered`] holds.
-    ///
-    /// # Errors
-    ///
-    /// As [`log_likelihood`](Self::log_likelihood).
-    pub fn filter(&self, theta: &[f64]) -> Result<Filtered, FilterError> {
-        let states = self.settings.keep_states.then_some(self.states);
-        let mut filtered = Filtered::new(self.record.samples(), self.channels, states);
-        filtered.log_likelihood = self.run(theta, &mut filtered)?;
-        if let Some(states) = &mut filtered.states {
-            states.map(|state| self.told(state));
-        }
-        Ok(filtered)
-    }
-
-    /// One pass over the record; the log-likelihood.
-    pub(super) fn run<K: Sink>(&self, theta: &[f64], sink: &mut K) -> Result<f64, FilterError> {
-        match (self.states, self.channels) {
-            (1, 1) => Pass::new(Fixed::<1>, self, theta)?.run(sink),
-            (2, 1) => Pass::new(Fixed::<2>, self, theta)?.run(sink),
-            (3, 1) => Pass::new(Fixed::<3>, self, theta)?.run(sink),
-            (4, 1) => Pass::new(Fixed::<4>, self, theta)?.run(sink),
-            (states, outputs) => Pass::new(Any { states, outputs }, self, theta)?.run(sink),
-        }
     }
 
     /// Whether θ has the twin's length.

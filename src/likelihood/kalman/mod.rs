@@ -74,22 +74,6 @@ use crate::twin::StateSpace;
 /// # Errors
 ///
 /// As [`Kalman::new`] and [`Kalman::filter`].
-///
-/// ```
-/// use truetwin::likelihood::kalman::{FilterSettings, filter};
-/// use truetwin::record::{Drive, Record};
-/// use truetwin::twin::{DigitalTwin, Noise};
-/// use truetwin::twins::VanDerPol;
-///
-/// let drive = Drive::autonomous(0.05, 100)?;
-/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
-/// let record = Record::new(drive, outputs)?;
-///
-/// let found = filter(&VanDerPol, &[1.5], &record, &FilterSettings::default())?;
-/// let mean_square = found.standardised.mapv(|z| z * z).mean().ok_or("samples")?;
-/// assert!((mean_square - 1.0).abs() < 0.5); // innovations of the right twin have variance 1
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 pub fn filter(
     twin: &dyn StateSpace,
     theta: &[f64],
@@ -104,21 +88,6 @@ pub fn filter(
 /// # Errors
 ///
 /// As [`Kalman::new`] and [`Kalman::log_likelihood`].
-///
-/// ```
-/// use truetwin::likelihood::kalman::{FilterSettings, log_likelihood};
-/// use truetwin::record::{Drive, Record};
-/// use truetwin::twin::{DigitalTwin, Noise};
-/// use truetwin::twins::VanDerPol;
-///
-/// let drive = Drive::autonomous(0.05, 100)?;
-/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
-/// let record = Record::new(drive, outputs)?;
-///
-/// let at = |nu: f64| log_likelihood(&VanDerPol, &[nu], &record, &FilterSettings::default());
-/// assert!(at(1.5)? > at(1.7)?);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 pub fn log_likelihood(
     twin: &dyn StateSpace,
     theta: &[f64],
@@ -133,22 +102,6 @@ pub fn log_likelihood(
 /// # Errors
 ///
 /// As [`Kalman::new`] and [`Kalman::smooth`].
-///
-/// ```
-/// use truetwin::likelihood::kalman::{FilterSettings, Smoothed, smooth};
-/// use truetwin::record::{Drive, Record};
-/// use truetwin::twin::{DigitalTwin, Noise};
-/// use truetwin::twins::VanDerPol;
-///
-/// let drive = Drive::autonomous(0.05, 100)?;
-/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
-/// let record = Record::new(drive, outputs)?;
-///
-/// let smoothed: Smoothed = smooth(&VanDerPol, &[1.5], &record, &FilterSettings::default())?;
-/// let position = smoothed.states.means[[50, 0]];
-/// assert!((position - record.outputs()[[50, 0]]).abs() < 1e-3); // measured without error
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 pub fn smooth(
     twin: &dyn StateSpace,
     theta: &[f64],

@@ -3,7 +3,7 @@
 use super::gaussian::{Belief, Columns, Root, regular};
 use super::likelihood::{LOG_TWO_PI, LogLikelihood};
 use super::moments::Moments;
-use super::size::{Numbers, Size};
+use super::size::{Any, Fixed, Numbers, Size};
 use super::update::{Measured, Update};
 use super::{FilterError, Kalman};
 use crate::twin::{Now, Outliers};
@@ -306,6 +306,28 @@ impl<'k, S: Size> Pass<'k, S> {
             FilterError::NoSpread { at }
         } else {
             FilterError::Diverged { at }
+        }
+    }
+}
+
+impl Kalman<'_> {
+    /// log p(y | θ), in nats.
+    ///
+    /// # Errors
+    ///
+    /// [`FilterError`]: θ of another length, a twin that refuses it, a filter that diverged or has no spread.
+    pub fn log_likelihood(&self, theta: &[f64]) -> Result<f64, FilterError> {
+        self.run(theta, &mut ())
+    }
+
+    /// One pass over the record; the log-likelihood.
+    pub(super) fn run<K: Sink>(&self, theta: &[f64], sink: &mut K) -> Result<f64, FilterError> {
+        match (self.states, self.channels) {
+            (1, 1) => Pass::new(Fixed::<1>, self, theta)?.run(sink),
+            (2, 1) => Pass::new(Fixed::<2>, self, theta)?.run(sink),
+            (3, 1) => Pass::new(Fixed::<3>, self, theta)?.run(sink),
+            (4, 1) => Pass::new(Fixed::<4>, self, theta)?.run(sink),
+            (states, outputs) => Pass::new(Any { states, outputs }, self, theta)?.run(sink),
         }
     }
 }

@@ -17,23 +17,6 @@ use nalgebra::{DMatrix, DMatrixView, DVector};
 /// Far from it the OPG is much too large, and steps by it too short: search with `fisher`. Takes 2·d + 1 passes over
 /// the record.
 ///
-/// ```
-/// use truetwin::likelihood::kalman::{FilterSettings, Kalman, Score};
-/// use truetwin::effect::*;
-/// use truetwin::record::*;
-/// use truetwin::twin::*;
-/// use truetwin::twins::VanDerPol;
-///
-/// let drive = Drive::autonomous(0.05, 300)?;
-/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
-/// let record = Record::new(drive, outputs)?;
-/// let settings = FilterSettings::default();
-/// let score = Score::at(&Kalman::new(&VanDerPol, &record, &settings)?, &[1.4])?;
-/// let step = score.gradient[0] / score.fisher[(0, 0)];
-/// assert!((1.4 + step - 1.5).abs() < 0.05);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-///
 /// Source: Alsing & Wandelt, "Generalized massive optimal data compression" (2018), for the score as a summary.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Score {

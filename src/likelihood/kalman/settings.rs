@@ -6,24 +6,6 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// How means and covariances are carried through the equations.
-///
-/// ```
-/// use truetwin::likelihood::kalman::{FilterSettings, Method, log_likelihood};
-/// use truetwin::record::{Drive, Record};
-/// use truetwin::twin::{DigitalTwin, Noise};
-/// use truetwin::twins::VanDerPol;
-///
-/// let drive = Drive::autonomous(0.05, 100)?;
-/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
-/// let record = Record::new(drive, outputs)?;
-///
-/// let points = FilterSettings::default();
-/// let extended = FilterSettings::default().with_method(Method::Extended);
-/// let difference = log_likelihood(&VanDerPol, &[1.5], &record, &points)?
-///     - log_likelihood(&VanDerPol, &[1.5], &record, &extended)?;
-/// assert!(difference.abs() < 1.0); // little noise: nearly linear
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -45,16 +27,6 @@ pub enum Method {
 /// | `noise_floor` | 1e-13 | [0, 1) | least variance of the measurement noise, as a share of the output's variance over the record |
 /// | `start_covariance` | none | symmetric, ≥ 0 | covariance of the first state, in products of state units; none: the start is known |
 /// | `keep_states` | no | | keep filtered means and covariances in [`Filtered`](super::Filtered) |
-///
-/// ```
-/// use truetwin::likelihood::kalman::FilterSettings;
-///
-/// let unsure_of_the_start = FilterSettings {
-///     start_covariance: Some(nalgebra::dmatrix![0.01, 0.0; 0.0, 0.01]),
-///     ..FilterSettings::default()
-/// };
-/// assert!(!unsure_of_the_start.keep_states);
-/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FilterSettings {

@@ -14,23 +14,6 @@ use super::{FilterError, Kalman, States};
 /// The cross-covariances come from the filter's own points. Limited states are held in their limits at the end.
 ///
 /// Source: Särkkä, *Bayesian Filtering and Smoothing* (2013), chapter 9.
-///
-/// ```
-/// use truetwin::likelihood::kalman::{FilterSettings, Kalman, Smoothed};
-/// use truetwin::record::{Drive, Record};
-/// use truetwin::twin::{DigitalTwin, Noise};
-/// use truetwin::twins::VanDerPol;
-///
-/// let drive = Drive::autonomous(0.05, 100)?;
-/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
-/// let record = Record::new(drive, outputs)?;
-///
-/// let settings = FilterSettings::default();
-/// let kalman = Kalman::new(&VanDerPol, &record, &settings)?;
-/// let smoothed: Smoothed = kalman.smooth(&[1.5])?;
-/// assert!((smoothed.log_likelihood - kalman.log_likelihood(&[1.5])?).abs() < 1e-6);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Smoothed {

@@ -26,20 +26,6 @@ pub trait Activation: Debug + Default + Clone + Send + Sync + 'static {
 }
 
 /// max(z, 0.01·z): PyTorch's leaky ReLU. (dfdx's `LeakyReLU` has the slope 0.05.)
-///
-/// ```
-/// use truetwin::network::layers::*;
-///
-/// struct Small;
-/// impl HeadArchitecture for Small {
-///     const ID: &'static str = "leaky";
-///     type Features = Const<4>;
-///     type Hidden = Const<8>;
-///     type Trunk = Dense<4, 8, Leaky>; // inside of a fused layer
-///     type Head = (Linear<8, 4>, Leaky, Linear<4, 1>); // and as one of its own
-/// }
-/// assert_eq!(truetwin::network::architecture::<Small>().id(), "leaky");
-/// ```
 #[derive(Debug, Default, Clone, Copy)]
 pub struct Leaky;
 

@@ -27,21 +27,6 @@ pub struct Dense<const I: usize, const O: usize, A = Tanh>(PhantomData<A>);
 ///
 /// out = dropout(A(γ·(z − mean z)/√(var z + 1e-5) + β)), z = xWᵀ + b, x: rows × I, out: rows × O. W and b start uniform
 /// in ±1/√I, γ at 1, β at 0.
-///
-/// ```
-/// use truetwin::network::layers::*;
-///
-/// struct Normed;
-/// impl HeadArchitecture for Normed {
-///     const ID: &'static str = "normed";
-///     type Features = Const<8>;
-///     type Hidden = Const<16>;
-///     type Trunk = (NormDense<8, 16, Leaky>, NormDense<16, 16, Tanh>);
-///     type Head = Linear<16, 1>;
-///     const DROPOUT: f64 = 0.1;
-/// }
-/// assert_eq!(truetwin::network::architecture::<Normed>().max_features(), 8);
-/// ```
 #[derive(Debug)]
 pub struct NormDense<const I: usize, const O: usize, A>(PhantomData<A>);
 

@@ -22,27 +22,6 @@ const MOST: u64 = 1 << 28;
 /// | `manifest.json` | everything the pieces depend on; a call that differs is refused |
 /// | `PART/0000.json`, … | one piece each; appears when it is complete |
 /// | others | inputs of the work, and results made of the pieces |
-///
-/// ```
-/// use truetwin::evaluate::paper::{Benchmark, MonteCarlo, Origin, Scenario, reference_projects};
-/// use truetwin::estimator::PretrainOptions;
-/// use truetwin::storage::StorageError;
-/// use truetwin::storage::work::WorkFolder;
-///
-/// let project = &reference_projects()?[0];
-/// let study = project.study();
-/// let place = tempfile::tempdir()?;
-/// let training = PretrainOptions::default();
-/// let open = |seed| -> Result<WorkFolder, _> {
-///     let plan = MonteCarlo { benchmark: Benchmark::of(study), scenario: Scenario::First, runs: 10, seed };
-///     plan.folder(&place.path().join("runs"), study, Origin::Trained(&training))
-/// };
-/// open(1)?;
-/// open(1)?; // the same call resumes it
-/// let error: StorageError = open(2).err().ok_or("another call is refused")?;
-/// assert!(error.to_string().contains("seed"), "{error}");
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Debug, Clone)]
 pub struct WorkFolder {
     path: PathBuf,

@@ -7,14 +7,6 @@ use std::str::FromStr;
 /// Share `index` of `of`: it has piece k if k ≡ index (mod of).
 ///
 /// Written `i/n`. Job arrays may count from 0 or from 1: 0/n is n/n.
-///
-/// ```
-/// use truetwin::storage::work::Share;
-/// let share: Share = "1/3".parse()?;
-/// assert_eq!((0..7).filter(|k| share.takes(*k)).collect::<Vec<_>>(), [1, 4]);
-/// assert_eq!("0/3".parse::<Share>()?, "3/3".parse()?);
-/// # Ok::<(), truetwin::storage::StorageError>(())
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Share {
     index: usize,

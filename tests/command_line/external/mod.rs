@@ -8,8 +8,9 @@ use std::path::PathBuf;
 use std::process::Command;
 use std::sync::OnceLock;
 use std::time::Duration;
-use truetwin::external::program::{ProgramCommand, ProgramError, ProgramSettings, ProgramTwin};
+use truetwin::external::program::{ProgramCommand, ProgramSettings, ProgramTwin};
 use truetwin::record::{Drive, Signal};
+use truetwin::study::StudyError;
 use truetwin::twin::{DigitalTwin, Noise, SimulationError};
 
 /// Python 3, if there is one.
@@ -83,7 +84,7 @@ fn file(name: &str, text: &str) -> String {
 }
 
 /// The twin of a Python program.
-fn started(name: &str, text: &str, settings: ProgramSettings) -> Result<ProgramTwin, ProgramError> {
+fn started(name: &str, text: &str, settings: ProgramSettings) -> Result<ProgramTwin, StudyError> {
     let script = file(name, text);
     ProgramTwin::start(ProgramCommand::new(python().unwrap(), [script]), settings)
 }

@@ -6,8 +6,9 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
-use truetwin::external::fmu::{FmuError, FmuSettings, FmuTwin};
+use truetwin::external::fmu::{FmuSettings, FmuTwin};
 use truetwin::record::{Drive, Quantity, Signal};
+use truetwin::study::StudyError;
 use truetwin::twin::conformance::{Severity, check};
 use truetwin::twin::{DigitalTwin, Interval, Noise, Parameter, SimulationError};
 
@@ -263,7 +264,7 @@ fn what_is_no_fmu_is_named() {
         ..FmuSettings::default()
     };
     let error = FmuTwin::open(&all()[0], settings).unwrap_err();
-    assert!(matches!(error, FmuError::Variables { .. }));
+    assert!(matches!(error, StudyError::Simulator(_)));
     assert!(
         error
             .to_string()
