@@ -29,6 +29,9 @@ impl OtherState {
     }
 }
 
+/// Check of magnitudes at a step Δt; the error names the remedy.
+type MagnitudeCheck = fn(&[f64], f64) -> Result<(), String>;
+
 /// An effect that a twin may lack, wherever it stands: its law, and the magnitudes of the law.
 ///
 /// At the off values of its magnitudes an effect must change no bit of a trajectory.
@@ -55,7 +58,7 @@ pub struct EffectKind {
     memory: usize,
     least_memory: usize,
     mark: Option<fn(&[f64]) -> Mark>,
-    check: Option<fn(&[f64], f64) -> Result<(), String>>,
+    check: Option<MagnitudeCheck>,
 }
 
 impl EffectKind {

@@ -19,6 +19,8 @@ fn data(name: &str) -> Option<PathBuf> {
     let path = folder.join(name);
     let found = path.exists();
     let what = if found { "ran with" } else { "skipped, no" };
+    // `eprintln!` would be captured by the test harness.
+    #[allow(clippy::explicit_write)]
     writeln!(std::io::stderr(), "real records: {what} {}", path.display()).unwrap();
     found.then_some(path)
 }

@@ -138,7 +138,7 @@ impl<'a> Pretraining<'a> {
             seed: self.options.seed,
         };
         plan.fill(path, Share::WHOLE, progress)?;
-        Ok(ShardedBank::open(path)?.read()?)
+        ShardedBank::open(path)?.read()
     }
 
     /// Everything that the estimator depends on.

@@ -37,12 +37,12 @@
 //! depend on the state. Outliers ([`StateSpace::outliers`]) make the density of a row a mixture; what follows from it for the
 //! state is again a mean and a covariance.
 
+mod bound;
 mod clip;
 mod coordinates;
 mod error;
 mod filtered;
 mod gaussian;
-mod kalman;
 mod likelihood;
 mod linearised;
 mod moments;
@@ -57,11 +57,11 @@ mod update;
 #[cfg(test)]
 mod linear;
 
+pub use bound::Kalman;
 pub use coordinates::Coordinates;
 pub use error::FilterError;
 pub(crate) use error::recoverable;
 pub use filtered::{Filtered, States};
-pub use kalman::Kalman;
 pub use score::Score;
 pub use settings::{FilterSettings, Method};
 pub use smooth::Smoothed;

@@ -61,7 +61,7 @@ fn black_box_and_equations_agree_without_noise() {
     for effect in Catalogue::default().applicable(&Twin::new(BlackBox(CascadedTanks))) {
         let starts = effect
             .magnitudes()
-            .into_iter()
+            .iter()
             .map(|m| m.starts[m.starts.len() - 1]);
         let at: Vec<f64> = theta.iter().copied().chain(starts).collect();
         let y = |base: Twin| {

@@ -11,7 +11,7 @@ fn effects_move_no_draws() {
         let at = |n| run(base.clone(), &theta, effects.to_vec(), &drive, n);
         at(noise) - at(Noise::OFF)
     };
-    let plain = part(&vec![]);
+    let plain = part(&[]);
     for effects in [
         one("sensor-bias", "sensor", "magnitudes = { offset = 0.4 }"),
         one("sensor-drift", "sensor", "magnitudes = { rate = 0.01 }"),
