@@ -28,7 +28,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// What an application implements to see progress and to stop long work.
+/// Receiver of progress, implemented by an application; it can also stop long work.
 ///
 /// Methods are called from worker threads, often: keep them short.
 pub trait Listener: Send + Sync {

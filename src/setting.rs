@@ -25,7 +25,7 @@ pub struct SettingError {
 }
 
 impl SettingError {
-    /// Of the setting `name`, which is `value`, and must be what `remedy` says.
+    /// Creates an error for setting `name` of value `value`; `remedy` says what it must be.
     pub fn new(name: impl Into<String>, value: impl Display, remedy: impl Into<String>) -> Self {
         Self {
             name: name.into(),
@@ -57,7 +57,7 @@ impl SettingError {
         &self.value
     }
 
-    /// What it must be.
+    /// Returns the remedy.
     pub fn remedy(&self) -> &str {
         &self.remedy
     }

@@ -19,7 +19,7 @@ const OFTEN: usize = 3;
 const REPEATS: f64 = 2.0;
 /// Distinct values that tell a step from chance.
 const DISTINCT: usize = 8;
-/// How far from a multiple of the step a rounded value may lie, in steps.
+/// Largest distance of a rounded value from a multiple of the step, in steps.
 const TOLERANCE: f64 = 0.01;
 
 /// Distinct values and how often each comes, ascending.

@@ -103,7 +103,7 @@ impl Default for GateSettings {
 }
 
 impl GateSettings {
-    /// Whether each field is in its range.
+    /// Checks whether each field is in its range.
     pub fn check(&self) -> Result<(), SettingError> {
         let refuse = |field: &str, value: f64, remedy: &str| {
             Err(SettingError::new(format!("gate: {field}"), value, remedy))
@@ -164,13 +164,13 @@ pub struct GateOutcome {
     pub p_value: f64,
     /// Nominal rate.
     pub alpha: f64,
-    /// Whether the record is not what the twin makes at this θ.
+    /// `true` if the record is not what the twin makes at this θ.
     pub out_of_distribution: bool,
     /// s of the record.
     pub statistic: f64,
 }
 
-/// What the test simulates with.
+/// Simulator and settings of the test.
 #[derive(Clone, Copy)]
 pub struct GateTest<'a> {
     /// Twin and features.
@@ -181,7 +181,7 @@ pub struct GateTest<'a> {
     pub settings: &'a GateSettings,
     /// Randomness; divided into what μ and S need, and the null.
     pub noise: Noise,
-    /// Who listens.
+    /// Progress sink.
     pub progress: &'a Progress,
 }
 

@@ -1,4 +1,4 @@
-//! How an estimator is trained and refined.
+//! Settings of training and refinement.
 
 use crate::estimator::gate::{GateForm, GateSettings};
 use crate::estimator::refine::RefineSettings;
@@ -31,9 +31,9 @@ pub struct CloudSettings {
     pub sampler: CloudSampler,
     /// Scale of the ellipsoid.
     pub spread: f64,
-    /// Whether features and targets are standardised anew on the cloud.
+    /// `true` if features and targets are standardised anew on the cloud.
     pub rescale: bool,
-    /// Whether a quadratic layer stands beside the tuned heads.
+    /// `true` if a quadratic layer stands beside the tuned heads.
     pub quadratic: bool,
 }
 
@@ -50,7 +50,7 @@ impl Default for CloudSettings {
     }
 }
 
-/// How features become network inputs.
+/// Map from features to network inputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -75,7 +75,7 @@ impl CloudSettings {
 pub struct Settings {
     /// Simulations to train on, m.
     pub bank_size: usize,
-    /// How features become network inputs.
+    /// Map from features to network inputs.
     pub inputs: Inputs,
     /// Training of trunk and heads.
     pub training: Training,
@@ -116,7 +116,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// What the paper and its code use for every twin: K = 150 for the gate in its own form, three seeds, eight
+    /// Returns the settings of the paper and its code for every twin: K = 150 for the gate in its own form, three seeds, eight
     /// starts, the hybrid sampler, early stop on a fifth of the cloud.
     ///
     /// γ, λ and epochs differ between the paper's twins; here stand the oscillator's, in units of a prior of width 1.
@@ -159,7 +159,7 @@ impl Settings {
         }
     }
 
-    /// Whether each number is in its range.
+    /// Checks whether each number is in its range.
     pub fn check(&self) -> Result<(), SettingError> {
         self.training.check()?;
         self.tuning.check()?;

@@ -16,7 +16,7 @@ pub(super) fn made_fit(name: &str) -> String {
     name.chars().take(LONGEST).map(fit).collect()
 }
 
-/// Whether `name` can stand on a command line (`--theta a=1,b=2`), in a study file and in a table; else what is wrong.
+/// Checks whether `name` can stand on a command line (`--theta a=1,b=2`), in a study file and in a table; else what is wrong.
 pub(super) fn check(name: &str) -> Result<(), String> {
     if name.is_empty() {
         return Err("a name is empty; give each its own".into());
@@ -41,7 +41,7 @@ pub(super) fn made_fit_unit(unit: &str) -> String {
     unit.chars().take(LONGEST).map(fit).collect()
 }
 
-/// Whether a unit can be shown beside a number; else what is wrong.
+/// Checks whether a unit can be shown beside a number; else what is wrong.
 pub(super) fn check_unit(unit: &str) -> Result<(), String> {
     if unit.chars().count() > LONGEST {
         return Err(format!(

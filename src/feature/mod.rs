@@ -91,7 +91,7 @@ pub struct Centred {
 
 debug_by_name!(Centred);
 
-/// What study and estimator files hold of a feature map: `{ kind = "ar", order = 5 }`.
+/// Feature map as study and estimator files hold it: `{ kind = "ar", order = 5 }`.
 ///
 /// Register an own recipe with `#[typetag::serde(name = "…")]`; the name is its `kind`.
 ///
@@ -144,7 +144,7 @@ pub enum FeatureError {
     Setting {
         /// Recipe.
         kind: &'static str,
-        /// What is wrong, and the remedy.
+        /// Problem and remedy.
         problem: String,
     },
     /// Fewer samples than the features need.

@@ -71,7 +71,7 @@ impl Bounds {
         })
     }
 
-    /// Whether `theta`, of length d, is in the box.
+    /// Returns whether `theta`, of length d, is in the box.
     #[cfg(test)]
     pub fn contains(&self, theta: &DVector<f64>) -> bool {
         (0..self.dimension()).all(|j| (self.lower[j]..=self.upper[j]).contains(&theta[j]))

@@ -74,7 +74,7 @@ pub struct Minimum {
 }
 
 impl StopReason {
-    /// Whether a tolerance was met.
+    /// Returns whether a tolerance was met.
     pub fn converged(self) -> bool {
         matches!(self, Self::Gradient | Self::Decrease | Self::Step)
     }

@@ -71,7 +71,7 @@ pub struct LeastSquares<'a, R = DMatrix<f64>> {
     factor: Cholesky,
 }
 
-/// What [`LeastSquares::solve`] found.
+/// Solution of [`LeastSquares::solve`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
     /// β, n × right sides, in units of y over units of Φ's column.
@@ -270,7 +270,7 @@ mod tests {
         );
     }
 
-    /// What the regressors explain is found; of noise, what lies in directions below λ is left out, unless asked for.
+    /// The part that regressors explain is recovered; noise in directions below λ is left out, unless asked for.
     #[test]
     fn ill_conditioned_regressors_predict_as_well_as_the_svd() {
         let phi = ill_conditioned();

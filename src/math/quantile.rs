@@ -51,7 +51,7 @@ pub fn median(values: &[f64]) -> Result<f64, MathError> {
     quantile(values, 0.5)
 }
 
-/// How extreme `observed` is among `null`, large being extreme: a p-value that is exact in finite samples.
+/// Returns the p-value of `observed` among `null`, large being extreme; exact in finite samples.
 ///
 /// ```text
 /// p = (1 + #{k : s_k ≥ s}) / (B + 1)

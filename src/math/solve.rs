@@ -71,7 +71,7 @@ pub(crate) fn solve_above(
     })
 }
 
-/// What [`solve_truncated`] found.
+/// Solution of [`solve_truncated`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct TruncatedSolution {
     /// The shortest minimiser over the kept directions, length d.

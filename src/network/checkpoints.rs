@@ -77,7 +77,7 @@ impl Checkpoints {
         Self::default()
     }
 
-    /// What was kept, if it can be used.
+    /// Loads the last checkpoint, if it can be used.
     pub(super) fn load(&self, weight_decay: f64) -> Option<State> {
         let bytes = read_kept(&self.0.as_ref()?.path, MOST).ok()?;
         State::parse(&bytes, weight_decay)

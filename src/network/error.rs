@@ -1,4 +1,4 @@
-//! What can go wrong with a network, each with its remedy.
+//! Errors of networks, each with its remedy.
 
 use crate::progress::Cancelled;
 use crate::setting::SettingError;
@@ -27,7 +27,7 @@ pub enum NetworkError {
     /// A matrix has another size than the network or its partner asks for.
     #[error("{what}: expected {expected}, found {found}")]
     Size {
-        /// What was counted.
+        /// Name of the counted quantity.
         what: &'static str,
         /// The number that is needed.
         expected: usize,
@@ -37,7 +37,7 @@ pub enum NetworkError {
     /// A network needs at least one of these.
     #[error("no {what}; at least {least} needed")]
     Empty {
-        /// What is missing.
+        /// Name of the missing part.
         what: &'static str,
         /// The smallest number that works.
         least: usize,
@@ -62,7 +62,7 @@ pub enum NetworkError {
     Checkpoint {
         /// File.
         path: PathBuf,
-        /// What the system said, and what to do.
+        /// Message of the system, and the remedy.
         reason: String,
     },
     /// The loss left the finite numbers.
@@ -107,7 +107,7 @@ pub enum NetworkError {
         expected: Vec<usize>,
         /// Its stored shape.
         found: Vec<usize>,
-        /// How many values are stored.
+        /// Number of stored values.
         values: usize,
     },
     /// A stored tensor holds NaN or infinity.

@@ -73,7 +73,7 @@ use samples::Matrices;
 use std::fmt::Debug;
 use std::sync::Arc;
 
-/// What an architecture is written with; `use truetwin::network::layers::*` needs no dfdx of your own.
+/// Layers of an architecture; `use truetwin::network::layers::*` needs no dfdx of your own.
 ///
 /// Plain dfdx layers with their activations, our fused [`Dense`] and [`NormDense`], and [`Leaky`].
 pub mod layers {

@@ -1,4 +1,4 @@
-//! What a network is trained on.
+//! Training data of a network.
 
 use ndarray::Array2;
 use std::borrow::Cow;

@@ -1,10 +1,10 @@
-//! How a network is trained, and what came of it.
+//! Settings and history of a training.
 
 use super::NetworkError;
 use crate::setting::SettingError;
 use serde::{Deserialize, Serialize};
 
-/// How the learning rate moves over the epochs e = 0 … E−1.
+/// Learning rate over the epochs e = 0 … E−1.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -47,7 +47,7 @@ pub struct Training {
     pub batch: usize,
     /// Adam's learning rate η.
     pub learning_rate: f64,
-    /// How η moves over the epochs.
+    /// Learning rate η over the epochs.
     pub schedule: Schedule,
     /// L2 coefficient, added to the gradient.
     pub weight_decay: f64,
@@ -150,7 +150,7 @@ impl Training {
     }
 }
 
-/// How a training went, epoch by epoch.
+/// Losses of a training, epoch by epoch.
 ///
 /// Both losses are Σ_j w_j·huber_δ, averaged over rows and without the orthogonality penalty, so that they can be
 /// compared; the training loss is measured on the way, with dropout.

@@ -34,7 +34,7 @@ pub(crate) fn values_of(bytes: &[u8]) -> Vec<f32> {
         .collect()
 }
 
-/// What a visitor of tensors returns: it builds nothing.
+/// Return type of a visitor of tensors, which builds nothing.
 type Visited<S> = Result<Option<Tensor<S, f32, Cpu>>, NetworkError>;
 
 fn sizes<S: Shape>(tensor: &Tensor<S, f32, Cpu>) -> Vec<usize> {

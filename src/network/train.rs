@@ -10,7 +10,7 @@ use super::{Checkpoints, FirstWeight, History, Layers, NamedTensor, NetworkError
 use crate::progress::{Progress, Stage};
 use dfdx::prelude::{Backward, Const, ConstDim, Cpu};
 
-/// How a model is trained.
+/// Settings and seeds of one training.
 pub(super) struct Course<'a> {
     pub settings: &'a Training,
     pub seed: u64,

@@ -16,7 +16,7 @@ use std::sync::Arc;
 /// Longest study file, in bytes: a hundred times one that names every parameter and effect.
 const MOST: u64 = 1 << 20;
 
-/// What a study file holds; everything but `twin` is optional, unknown keys are refused.
+/// Content of a study file; everything but `twin` is optional, unknown keys are refused.
 ///
 /// ```toml
 /// twin = "tanks"

@@ -1,4 +1,4 @@
-//! What work over a study depends on, as far as the study decides it.
+//! Settings of a study that its results depend on.
 
 use super::{InputPlan, Study};
 use crate::storage::StorageError;

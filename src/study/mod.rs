@@ -252,12 +252,12 @@ impl Study {
         &self.file
     }
 
-    /// What drives are drawn from.
+    /// Prepares the source of drives.
     pub fn drives(&self) -> Result<DriveSource, StudyError> {
         self.plan.prepare(&self.twin.signals())
     }
 
-    /// Whether a record has the step and the channels of this study.
+    /// Checks whether a record has the step and the channels of this study.
     pub fn check_record(&self, record: &Record) -> Result<(), StudyError> {
         record.check_channels(&self.twin.signals())?;
         self.plan.check_step(record)

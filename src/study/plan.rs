@@ -1,4 +1,4 @@
-//! What a simulated record looks like: step, length, input.
+//! Plan of simulated records: step, length, input.
 
 use crate::record::{Drive, Record, RecordError, Signal, Signals, read_drive};
 use crate::storage::untrusted::MOST_NUMBERS;
@@ -132,7 +132,7 @@ impl RecordPlan {
         Ok(drive)
     }
 
-    /// Whether a record has the study's step, to 1e-3 of it.
+    /// Checks whether a record has the study's step, to 1e-3 of it.
     pub fn check_step(&self, record: &Record) -> Result<(), StudyError> {
         let (given, expected) = (record.drive().dt(), self.step);
         if (given - expected).abs() > 1e-3 * expected {

@@ -31,7 +31,7 @@ use std::fs::File;
 use std::io::{self, Read, Seek};
 use std::path::Path;
 
-/// What to do about a file from elsewhere.
+/// Remedy for a file from elsewhere.
 const GIVE: &str = "give theta (rows × parameters) and features (rows × features), one simulation a row, all finite";
 
 enum Form {
@@ -91,7 +91,7 @@ fn features_alone(features: &Array2<f64>) -> Draws {
     }
 }
 
-/// Whether a path has the name of a file of rows.
+/// Returns whether a path has the name of a file of rows.
 pub(crate) fn is_named(path: &Path) -> bool {
     form(path).is_ok()
 }
@@ -128,7 +128,7 @@ pub fn read(path: &Path, names: &[&str]) -> Result<Draws, EstimatorError> {
     Ok(draws)
 }
 
-/// Whether the rows are whole, finite, and of so many parameters.
+/// Checks whether the rows are whole, finite, and of so many parameters.
 pub(crate) fn check(draws: &Draws, parameters: usize) -> Result<(), String> {
     let (theta, features) = (&draws.theta, &draws.features);
     if theta.ncols() != parameters {

@@ -122,7 +122,7 @@ struct Run<'a> {
     progress: &'a Progress,
 }
 
-/// What the stages after the gate give.
+/// Results of the stages after the gate.
 struct Outcome {
     answer: Answer,
     gauss_newton: Option<Vec<f64>>,
@@ -164,7 +164,7 @@ impl Run<'_> {
         }
     }
 
-    /// Whether the record is what the twin makes at the network's estimate.
+    /// Returns whether the record is what the twin makes at the network's estimate.
     fn gate(
         &self,
         simulator: &FeatureSimulator,
@@ -312,7 +312,7 @@ impl Run<'_> {
         })
     }
 
-    /// Whether the tuned estimate stays within the misfit that θ could still explain by chance: the part of its whitened
+    /// Returns whether the tuned estimate stays within the misfit that θ could still explain by chance: the part of its whitened
     /// residual in the Jacobian's column space against χ²_d(0.999).
     fn keeps(&self, refinement: &Refinement<'_>, refined: &Refined, theta: &[f64]) -> bool {
         let threshold = ChiSquared::new(theta.len() as f64).map(|chi| chi.inverse_cdf(KEEP_TUNED));

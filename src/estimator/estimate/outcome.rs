@@ -9,7 +9,7 @@ use crate::record::Record;
 use crate::twin::Role;
 use serde::Serialize;
 
-/// What may be chosen for an estimate.
+/// Options of an estimate.
 #[derive(Debug, Clone, Default)]
 pub struct EstimateOptions {
     /// Seed of all simulations.
@@ -22,13 +22,13 @@ pub struct EstimateOptions {
     pub validation: Option<Record>,
 }
 
-/// What an estimate is made of. Skipped stages are `None`.
+/// Estimate with the results of its stages. Skipped stages are `None`.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Estimate {
     /// Names of θ: the twin's parameters, then unknown noise levels, starts and magnitudes.
     pub names: Vec<String>,
-    /// What each parameter stands for.
+    /// Role of each parameter.
     pub roles: Vec<Role>,
     /// The network's estimate.
     pub initial: Vec<f64>,
@@ -51,7 +51,7 @@ pub struct Estimate {
     pub information: Option<Information>,
     /// The test after the refit; `None` where no degree of freedom is left.
     pub after: Option<GateOutcome>,
-    /// Whether a refit was made at all.
+    /// `true` if a refit was made at all.
     pub refitted: bool,
     /// The free run at `theta`, unknown starts refitted; `None` where it diverges.
     pub tracking: Option<Tracking>,

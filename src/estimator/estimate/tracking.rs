@@ -1,4 +1,4 @@
-//! How well the calibrated twin follows a record, free of noise.
+//! Free run of the calibrated twin beside the record.
 
 use crate::fit::{Bounds, GaussNewton, ResidualProblem};
 use crate::math::MathError;

@@ -80,7 +80,7 @@ impl Header {
         }
     }
 
-    /// Whether header and tensors are those that were written.
+    /// Returns whether header and tensors are those that were written.
     pub fn is_intact(&self, tensors: &Tensors) -> bool {
         self.checksum(tensors).is_ok_and(|sum| sum == self.sha256)
     }

@@ -17,11 +17,11 @@ use std::time::Duration;
 /// Layout of the folder; raised when it changes.
 const LAYOUT: u32 = 1;
 const VERB: &str = "pretrain";
-/// What the name of the folder ends in, after that of the estimator.
+/// Ending of the folder's name, after that of the estimator.
 const ENDING: &str = ".part";
 const BANK: &str = "bank";
 const TRAINING: &str = "training";
-/// How often the training is kept unless said: often enough that little is lost, seldom enough that nobody waits for the disk.
+/// Default time between two checkpoints: little is lost, and nobody waits for the disk.
 pub const CHECKPOINT: Duration = Duration::from_secs(10);
 
 /// A pretraining whose work is kept beside the estimator's place until that is there.
@@ -40,7 +40,7 @@ pub struct Pretraining<'a> {
 pub struct GivenBank<'a> {
     /// Its rows.
     pub bank: &'a dyn Bank,
-    /// What tells it from any other.
+    /// Checksum of the content.
     pub checksum: String,
 }
 
@@ -164,7 +164,7 @@ impl<'a> Pretraining<'a> {
     }
 }
 
-/// Whether the same call would end with the same error again.
+/// Returns whether the same call would end with the same error again.
 fn ends_for_good(error: &EstimatorError) -> bool {
     matches!(
         error,
@@ -177,7 +177,7 @@ fn ends_for_good(error: &EstimatorError) -> bool {
     )
 }
 
-/// Whether nothing is kept in the folder yet.
+/// Returns whether nothing is kept in the folder yet.
 fn is_bare(folder: &WorkFolder) -> bool {
     !folder.file(TRAINING).exists() && !ShardedBank::is_begun(&folder.file(BANK))
 }

@@ -23,7 +23,7 @@ const MOST_IN_MEMORY: usize = 10_000_000;
 /// Largest network input, in standard deviations of the bank: far outside, the network should not extrapolate.
 const LIMIT: f64 = 6.0;
 
-/// What may be chosen for a pretraining.
+/// Options of a pretraining.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PretrainOptions {
     /// Recipe.

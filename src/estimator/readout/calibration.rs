@@ -1,4 +1,4 @@
-//! How far the pretrained network is off, measured where a prediction lies.
+//! Errors of the pretrained network near a prediction.
 
 use crate::math::quantile;
 use ndarray::Array2;
@@ -23,14 +23,14 @@ pub struct Calibration {
 pub struct Spread {
     /// Root mean square error.
     pub std_error: Vec<f64>,
-    /// What to add to a prediction for the lower end.
+    /// Offset of the lower end from the prediction.
     pub low: Vec<f64>,
-    /// What to add for the upper end.
+    /// Offset of the upper end.
     pub high: Vec<f64>,
 }
 
 impl Spread {
-    /// Of a normal error with these standard deviations.
+    /// Creates the intervals of normal errors with these standard deviations.
     pub fn normal(std_error: Vec<f64>, level: f64) -> Self {
         let reach = Normal::standard().inverse_cdf(0.5 + 0.5 * level);
         let ends = |sign: f64| std_error.iter().map(|s| sign * reach * s).collect();

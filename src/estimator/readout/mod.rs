@@ -87,7 +87,7 @@ impl Layer {
         estimates
     }
 
-    /// What q misses, in units r: the network's targets.
+    /// Returns the residuals of q, in units r: the network's targets.
     pub fn rest(&self, z: &Array2<f64>, targets: &Array2<f64>) -> Array2<f64> {
         let mut rest = targets - &self.quadratic.predict(z);
         for mut row in rest.rows_mut() {

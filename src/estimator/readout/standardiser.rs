@@ -1,4 +1,4 @@
-//! What stands between features and a network: an affine map to unit variance.
+//! Affine map from features to unit variance.
 
 use super::scaler::Scaler;
 use crate::math::{MathError, Whitening};

@@ -1,4 +1,4 @@
-//! What a record tells about θ: information, standard errors, and directions in words.
+//! Information of a record on θ: standard errors, and directions in words.
 
 use crate::estimator::error::EstimatorError;
 use crate::twin::{PRIOR_DEVIATION, ParameterSpace, Role, combination, oriented};
@@ -34,7 +34,7 @@ pub struct Direction {
     pub std_error: f64,
     /// In words: `0.58·k1 − 0.58·k2 + 0.57·k4`.
     pub combination: String,
-    /// Whether the prior knows it better than the record does: worse than 1/√12 of its width.
+    /// `true` if the prior knows it better than the record does: worse than 1/√12 of its width.
     pub weak: bool,
 }
 

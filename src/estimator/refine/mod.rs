@@ -99,7 +99,7 @@ impl Refined {
     }
 }
 
-/// Whether an error ends the search for a better start.
+/// Returns whether an error ends the search for a better start.
 fn is_fatal(error: &EstimatorError) -> bool {
     use EstimatorError::{Hopeless, Search, Undetermined, Whitening};
     match error {
@@ -108,7 +108,7 @@ fn is_fatal(error: &EstimatorError) -> bool {
     }
 }
 
-/// What the refinement works on.
+/// Record, simulator and settings of a refinement.
 pub struct Refinement<'a> {
     /// Twin and features.
     pub simulator: &'a FeatureSimulator,
@@ -118,11 +118,11 @@ pub struct Refinement<'a> {
     pub observed: &'a DVector<f64>,
     /// Settings.
     pub settings: &'a RefineSettings,
-    /// How features are whitened.
+    /// Whitening of the features.
     pub gate: &'a GateSettings,
     /// Randomness.
     pub noise: Noise,
-    /// Who listens; asked at every simulation.
+    /// Progress sink, asked at every simulation.
     pub progress: &'a Progress,
 }
 
@@ -249,7 +249,7 @@ impl Refinement<'_> {
         Ok(problem.jacobians(&theta).map_err(not_evaluated)?)
     }
 
-    /// What is known around `theta` without a search.
+    /// Returns information and directions at `theta` without a search.
     pub fn describe_at(&self, theta: &[f64]) -> Result<Refined, EstimatorError> {
         let space = self.simulator.twin().parameters();
         let theta = DVector::from_vec(space.clamp(theta));

@@ -74,7 +74,7 @@ impl RefineSettings {
         }
     }
 
-    /// Whether each field is in its range.
+    /// Checks whether each field is in its range.
     pub fn check(&self) -> Result<(), SettingError> {
         let counts = [
             ("starts", self.starts),

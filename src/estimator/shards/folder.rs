@@ -23,10 +23,10 @@ const FEWEST_ROWS: usize = 16;
 const MOST_ROWS: usize = 16_384;
 /// Folder of the shards.
 pub(super) const SHARDS: &str = "shards";
-/// What to do about a shard that is not what it was.
+/// Remedy for a damaged shard.
 const AGAIN: &str = "run the same `truetwin bank` call again, and it is made again";
 
-/// What lies in a folder of shards.
+/// Content of a folder of shards.
 #[derive(Debug, Clone)]
 pub(super) struct Shards {
     folder: WorkFolder,
@@ -60,7 +60,7 @@ fn parse(name: &str) -> Option<(usize, &str)> {
 }
 
 impl Shards {
-    /// Of a folder with this manifest.
+    /// Lists a folder with this manifest.
     pub fn list(folder: WorkFolder, manifest: Manifest) -> Result<Self, EstimatorError> {
         let number = |key: &str| {
             (manifest.get(key).and_then(Value::as_u64))
@@ -125,7 +125,7 @@ impl Shards {
         Some(self.folder.file(SHARDS).join(name(number, checksum)))
     }
 
-    /// What a message about a shard names.
+    /// Returns the path that a message about a shard names.
     fn place(&self, number: usize) -> PathBuf {
         (self.file(number)).unwrap_or_else(|| self.folder.path().into())
     }
@@ -165,12 +165,12 @@ impl Shards {
         EstimatorError::file(self.folder.path(), problem)
     }
 
-    /// Of a shard whose rows are wider or narrower than those of the first.
+    /// Returns the error of a shard whose rows are wider or narrower than those of the first.
     pub fn odd(&self, number: usize) -> EstimatorError {
         damaged(&self.place(number), "another number of features")
     }
 
-    /// Whether a shard is there and is what it was.
+    /// Checks whether a shard is there and is what it was.
     pub fn is_sound(&self, number: usize) -> Result<bool, EstimatorError> {
         match self.bytes(number) {
             Ok(_) => Ok(true),
@@ -215,7 +215,7 @@ impl Shards {
     }
 }
 
-/// Of a folder whose manifest says too little.
+/// Returns the error of a folder whose manifest is incomplete.
 fn foreign(path: &Path) -> StorageError {
     let path = path.into();
     StorageError::Foreign {
@@ -268,7 +268,7 @@ impl ShardedBank {
         Ok(Self { shards, seed })
     }
 
-    /// Whether there is any shard in a folder.
+    /// Returns whether there is any shard in a folder.
     pub(crate) fn is_begun(path: &Path) -> bool {
         let shards = std::fs::read_dir(path.join(SHARDS));
         shards.is_ok_and(|mut shards| shards.next().is_some())
@@ -299,7 +299,7 @@ impl ShardedBank {
         Draws::stacked(self.size(), parts, |index| self.shards.odd(index))
     }
 
-    /// What tells this bank from any other.
+    /// Returns the checksum of the bank.
     pub fn checksum(&self) -> String {
         self.shards.manifest.checksum()
     }

@@ -68,7 +68,7 @@ pub fn merge_into_file(
     Ok(draws.theta.nrows())
 }
 
-/// What lies in each folder; all must be of one call.
+/// Lists each folder; all must be of one call.
 fn listed(from: &[PathBuf]) -> Result<Vec<Shards>, EstimatorError> {
     let all = (from.iter())
         .map(|path| {
@@ -88,7 +88,7 @@ fn listed(from: &[PathBuf]) -> Result<Vec<Shards>, EstimatorError> {
     Ok(all)
 }
 
-/// Who has shards 0 … `of` − 1; all must be there, and agree.
+/// Returns the folders that hold shards 0 … `of` − 1; none may be missing, and copies must agree.
 fn holders(all: &[Shards], of: usize) -> Result<Vec<&Shards>, EstimatorError> {
     // What is there is counted before anything is made for every shard: a manifest may speak of far more.
     let there: BTreeSet<usize> = (all.iter().flat_map(|s| s.there.keys().copied())).collect();

@@ -1,4 +1,4 @@
-//! What a bank on disk holds, and who fills it.
+//! Plan of a bank on disk.
 
 use super::folder::{MOST, SHARDS, ShardedBank, Shards, VERB, rows_of_a_shard};
 use super::prior::Prior;
@@ -46,7 +46,7 @@ pub struct BankPlan {
     pub seed: u64,
 }
 
-/// How far a bank on disk has come.
+/// Progress of a bank on disk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Filled {
@@ -106,7 +106,7 @@ impl BankPlan {
         finish(path, manifest)
     }
 
-    /// How far the folder has come; one that is whole gets the checksums of its shards.
+    /// Returns the progress of the folder; a complete one gets the checksums of its shards.
     ///
     /// # Errors
     ///
@@ -126,7 +126,7 @@ impl BankPlan {
             .with("features", json!(features)))
     }
 
-    /// Whether a bank was made as this plan says.
+    /// Checks whether a bank was made as this plan says.
     ///
     /// # Errors
     ///
@@ -143,7 +143,7 @@ impl BankPlan {
     }
 }
 
-/// How far a folder of this manifest has come, which takes a simulation to make.
+/// Returns the progress of a folder; the manifest takes one simulation to make.
 fn finish(path: &Path, manifest: Manifest) -> Result<Filled, EstimatorError> {
     let shards = Shards::list(WorkFolder::resume(path, &manifest)?, manifest)?;
     shards.finish()?;

@@ -21,7 +21,7 @@ pub struct Prior {
 debug_by_name!(Prior);
 
 impl Prior {
-    /// Of a study, seen through features.
+    /// Creates the prior of a study, seen through features.
     ///
     /// # Errors
     ///

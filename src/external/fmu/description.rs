@@ -1,4 +1,4 @@
-//! What a model description says, of either version of the standard.
+//! Model description, of either version of the standard.
 
 use crate::record::Quantity;
 use crate::storage::untrusted::{MESSAGE, one_line};
@@ -23,7 +23,7 @@ pub(super) enum Version {
     Three,
 }
 
-/// What matters of `modelDescription.xml`.
+/// Used part of `modelDescription.xml`.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ModelDescription {
     pub version: Version,

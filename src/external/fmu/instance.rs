@@ -14,7 +14,7 @@ pub(super) enum Refusal {
     Fatal(String),
 }
 
-/// What a step led to.
+/// Result of a step.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Step {
     /// The end of the step.

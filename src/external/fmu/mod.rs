@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use worker::{References, Worker};
 
-/// How an FMU is used.
+/// Settings of an FMU.
 ///
 /// | field | default | |
 /// |---|---|---|

@@ -1,4 +1,4 @@
-//! What a program says about itself.
+//! Description that a program gives of itself.
 
 use super::super::name;
 use crate::record::{Quantity, Signals};
@@ -19,7 +19,7 @@ pub(super) struct Description {
     pub parameters: ParameterSpace,
     /// Inputs and outputs.
     pub signals: Signals,
-    /// What simulated records look like unless a study says otherwise.
+    /// Default plan of simulated records.
     pub record: RecordPlan,
 }
 

@@ -1,4 +1,4 @@
-//! What only a running program reaches otherwise, for the fuzz tests. No part of the library's interface.
+//! Entries for the fuzz tests that otherwise only a running program reaches. No part of the library's interface.
 
 use super::description::Description;
 use super::protocol;

@@ -8,7 +8,7 @@ const NEVER: usize = 5;
 /// Failed runs in a row, each at another θ, after which any program does. Repeated runs at one bad θ count once.
 const IN_A_ROW: usize = 30;
 
-/// What has become of the runs so far.
+/// Counts of successful and failed runs.
 #[derive(Default)]
 pub(super) struct Health(Mutex<State>);
 

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 /// Least time for a start: imports and licences take longer than a simulation.
 const START: Duration = Duration::from_secs(30);
-/// How long programs are waited for once their standard input is closed.
+/// Time that a program gets to end once its standard input is closed.
 const GRACE: Duration = Duration::from_millis(500);
 
 /// Starts workers when they are needed, keeps the idle ones, and ends all with itself.

@@ -73,7 +73,7 @@ pub(super) fn longest_answer(signals: &Signals, samples: usize) -> usize {
         .saturating_add(names + (1 << 16))
 }
 
-/// What a program answers to a simulation.
+/// Answer of a program to a simulation.
 #[derive(Debug, PartialEq)]
 pub(super) enum Answer {
     /// Outputs, samples × channels, all finite.

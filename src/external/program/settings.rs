@@ -1,4 +1,4 @@
-//! How a program is run.
+//! Settings of a program.
 
 use super::error;
 use crate::study::StudyError;
@@ -11,7 +11,7 @@ const MOST_RETRIES: usize = 100;
 /// Longest time-out: a year.
 const LONGEST: Duration = Duration::from_secs(366 * 24 * 3600);
 
-/// How a program is run.
+/// Settings of a program.
 ///
 /// | field | default | range | |
 /// |---|---|---|---|
@@ -39,7 +39,7 @@ impl Default for ProgramSettings {
 }
 
 impl ProgramSettings {
-    /// Whether each field is in its range.
+    /// Checks whether each field is in its range.
     pub(super) fn check(&self) -> Result<(), StudyError> {
         let wrong = |text: String| Err(error::setting(&text));
         if let Some(workers) = self.workers

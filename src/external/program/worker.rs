@@ -15,7 +15,7 @@ const KEPT: usize = 2048;
 /// Bytes that are read at once, and how many such pieces may wait to be looked at.
 const PIECE: usize = 1 << 16;
 const PIECES: usize = 4;
-/// How long a program that ends is waited for: its status and last words are worth it.
+/// Time that an ending program gets for its status and last words.
 const LAST_BREATH: Duration = Duration::from_millis(300);
 
 /// Why a worker gave no answer.
@@ -28,7 +28,7 @@ pub(super) enum Trouble {
 }
 
 impl Trouble {
-    /// What happened, to be read after the program's name.
+    /// Returns the problem in words that follow the program's name.
     pub fn text(self) -> String {
         let (Self::Gone(text) | Self::Nonsense(text)) = self;
         text
@@ -129,12 +129,12 @@ impl Worker {
         }
     }
 
-    /// Whether the process still runs.
+    /// Returns whether the process still runs.
     pub fn lives(&mut self) -> bool {
         matches!(self.child.try_wait(), Ok(None))
     }
 
-    /// What it wrote to standard error last, as the end of a message; empty where it wrote nothing.
+    /// Returns the last lines of standard error, as the end of a message; empty if there are none.
     pub fn last_words(&self) -> String {
         let words = self.words.lock().unwrap_or_else(PoisonError::into_inner);
         match last_words(&words) {

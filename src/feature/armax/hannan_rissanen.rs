@@ -93,7 +93,7 @@ pub(super) fn estimate(y: &[f64], inputs: &[Vec<f64>], orders: Orders) -> Result
     })
 }
 
-/// What a model is fitted to.
+/// Signals that a model is fitted to.
 struct Series<'a> {
     y: &'a [f64],
     inputs: &'a [Vec<f64>],
@@ -218,7 +218,7 @@ fn scale_zeros(c: &[f64], s: f64) -> Vec<f64> {
     (c.iter().zip(1..)).map(|(c, i)| c * s.powi(i)).collect()
 }
 
-/// Whether all zeros of 1 + Σ cᵢ z⁻ⁱ lie inside the unit circle: the Schur–Cohn test by stepping down.
+/// Returns whether all zeros of 1 + Σ cᵢ z⁻ⁱ lie inside the unit circle: the Schur–Cohn test by stepping down.
 fn is_invertible(mut c: Vec<f64>) -> bool {
     while let Some(k) = c.pop() {
         if k.is_nan() || k.abs() >= 1.0 {

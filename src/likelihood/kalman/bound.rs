@@ -104,7 +104,7 @@ impl<'a> Kalman<'a> {
         &self.parameters
     }
 
-    /// Whether θ has the twin's length.
+    /// Checks whether θ has the twin's length.
     pub(super) fn check(&self, theta: &[f64]) -> Result<(), TwinError> {
         if theta.len() == self.parameters.len() {
             return Ok(());

@@ -20,7 +20,7 @@ pub struct Coordinates {
 }
 
 impl Coordinates {
-    /// Of a twin's parameters.
+    /// Creates the coordinates of a twin's parameters.
     pub fn new(space: &ParameterSpace) -> Self {
         let log: Vec<bool> = space.iter().map(|p| p.bounds.low() > 0.0).collect();
         let theta_lower: Vec<f64> = space.iter().map(|p| p.bounds.low()).collect();
@@ -79,7 +79,7 @@ impl Coordinates {
             .collect()
     }
 
-    /// Whether each φ is a logarithm.
+    /// Returns whether each φ is a logarithm.
     pub fn is_log(&self) -> &[bool] {
         &self.log
     }

@@ -54,7 +54,7 @@ pub enum FilterError {
 }
 
 impl FilterError {
-    /// Whether another θ may do: the search goes on elsewhere.
+    /// Returns whether another θ may do: the search goes on elsewhere.
     pub fn is_recoverable(&self) -> bool {
         match self {
             Self::Diverged { .. } | Self::NoSpread { .. } => true,

@@ -1,4 +1,4 @@
-//! What a filter says about a record.
+//! Result of a filter over a record.
 
 use super::gaussian::{Belief, Gaussian};
 use super::pass::{Innovation, Sink};

@@ -13,7 +13,7 @@ pub(super) struct LogLikelihood {
 }
 
 impl LogLikelihood {
-    /// Of no rows.
+    /// Log-likelihood of no rows.
     pub const NONE: Self = Self {
         values: 0,
         squares: 0.0,
@@ -41,7 +41,7 @@ impl LogLikelihood {
         self.squares -= 2.0 * nats;
     }
 
-    /// Whether it is a number so far.
+    /// Returns whether it is a number so far.
     #[inline(always)]
     pub fn is_finite(&self) -> bool {
         self.squares.is_finite()

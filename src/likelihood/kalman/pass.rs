@@ -8,7 +8,7 @@ use super::update::{Measured, Update};
 use super::{FilterError, Kalman};
 use crate::twin::{Now, Outliers};
 
-/// What one row told.
+/// Innovation of one row.
 pub(super) struct Innovation<'w> {
     pub innovation: &'w [f64],
     /// p × p.
@@ -31,9 +31,9 @@ impl Innovation<'_> {
     }
 }
 
-/// Who listens to a pass. What is not needed is not computed.
+/// Receiver of the results of a pass. Results that it does not need are not computed.
 pub(super) trait Sink {
-    /// Whether [`carried`](Self::carried) is wanted.
+    /// `true` if [`carried`](Self::carried) is wanted.
     const CARRIED: bool = false;
     fn innovation(&mut self, _k: usize, _of: &Innovation<'_>) {}
     /// State given rows up to k.

@@ -35,7 +35,7 @@ pub struct Score {
 /// Steps of one-sided differences over those of central ones.
 const FORWARD: f64 = 1e-2;
 
-/// Of each row: log-density, innovation, covariance.
+/// Log-density, innovation and covariance of each row.
 struct Rows {
     width: usize,
     values: DVector<f64>,

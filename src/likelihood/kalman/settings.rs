@@ -5,7 +5,7 @@ use crate::setting::SettingError;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-/// How means and covariances are carried through the equations.
+/// Method that carries means and covariances through the equations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -30,13 +30,13 @@ pub enum Method {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FilterSettings {
-    /// How moments are carried through the equations.
+    /// Method that carries moments through the equations.
     pub method: Method,
     /// Least variance of the measurement noise, as a share of the output's variance.
     pub noise_floor: f64,
     /// Covariance of the first state.
     pub start_covariance: Option<DMatrix<f64>>,
-    /// Whether filtered states are kept.
+    /// `true` if filtered states are kept.
     pub keep_states: bool,
 }
 
@@ -59,7 +59,7 @@ impl FilterSettings {
         self
     }
 
-    /// Whether they can be used with a twin of `states` states.
+    /// Checks whether they can be used with a twin of `states` states.
     pub(super) fn check(&self, states: usize) -> Result<(), FilterError> {
         let floor = self.noise_floor;
         SettingError::unless(

@@ -10,7 +10,7 @@ pub(super) trait Size: Copy {
     /// A centre and four points for each state: (1 + 4·n)·n numbers.
     type Points: Numbers;
 
-    /// Whether sizes are known when this is compiled.
+    /// `true` if sizes are known when this is compiled.
     const KNOWN: bool;
 
     fn states(self) -> usize;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
-/// What of a standard normal number lies beyond a point, and the density there.
+/// Tail probability of a standard normal number, and its density there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Tail {
     /// Φ(−z).

@@ -1,4 +1,4 @@
-//! What a measurement says about the state.
+//! Measurement update of the state.
 
 use super::gaussian::Columns;
 use super::likelihood::LogLikelihood;
@@ -46,7 +46,7 @@ pub(super) struct Update<S: Size> {
     gain: S::Matrix,
     /// X − K·Y.
     rest: S::Matrix,
-    /// What the readout makes of the nodes of each output (5 × p), and of the row itself.
+    /// Readout of the nodes of each output (5 × p), and of the row itself.
     read: S::Points,
     again: S::Vector,
 }

@@ -30,7 +30,7 @@ pub struct Dense<const I: usize, const O: usize, A = Tanh>(PhantomData<A>);
 #[derive(Debug)]
 pub struct NormDense<const I: usize, const O: usize, A>(PhantomData<A>);
 
-/// What [`Dense`] becomes on a device: the layer with its tensors.
+/// [`Dense`] on a device: the layer with its tensors.
 #[derive(Debug, Clone)]
 pub struct BuiltDense<const I: usize, const O: usize, A, E: Dtype, D: Device<E>> {
     /// W, O × I.
@@ -42,7 +42,7 @@ pub struct BuiltDense<const I: usize, const O: usize, A, E: Dtype, D: Device<E>>
     activation: PhantomData<A>,
 }
 
-/// What [`NormDense`] becomes on a device: the layer with its tensors.
+/// [`NormDense`] on a device: the layer with its tensors.
 #[derive(Debug, Clone)]
 pub struct BuiltNormDense<const I: usize, const O: usize, A, E: Dtype, D: Device<E>> {
     /// W, O × I.

@@ -43,7 +43,7 @@ impl<'a> Matrix<'a> {
     }
 }
 
-/// What happens to the numbers that are already in the product's place.
+/// Treatment of the numbers that are already in the product's place.
 #[derive(Clone, Copy, PartialEq)]
 pub(in crate::network) enum Existing {
     Replace,

@@ -33,7 +33,7 @@ pub(super) struct Mask {
     pub(super) seed: u64,
 }
 
-/// What the backward pass needs of the forward pass.
+/// Results of the forward pass that the backward pass needs.
 pub(super) struct Saved {
     /// x̂, rows × outputs; empty without normalisation.
     normalised: Vec<f32>,

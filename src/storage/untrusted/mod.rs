@@ -1,4 +1,4 @@
-//! What comes from outside: how much of it is read, and how it is shown.
+//! Bounded, terminal-safe readers for untrusted input.
 //!
 //! Files may be cut off, endless, or made to harm. Every reader takes a limit that is far beyond honest files, so that memory
 //! is bounded whatever lies under a path; and what a file says about itself is shown without what steers a terminal.
@@ -48,7 +48,7 @@ pub(crate) fn read_kept(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     read(path, most)
 }
 
-/// Whether a file of a folder of our own is a plain file, and no link out of it.
+/// Checks whether a file of a folder of our own is a plain file, and no link out of it.
 ///
 /// # Errors
 ///
@@ -69,7 +69,7 @@ pub(crate) fn read_kept_text(path: &Path, most: u64) -> io::Result<String> {
     text(read_kept(path, most)?)
 }
 
-/// Whether a part of a folder of our own is a folder, and no link out of it.
+/// Checks whether a part of a folder of our own is a folder, and no link out of it.
 ///
 /// # Errors
 ///

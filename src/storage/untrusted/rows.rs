@@ -34,7 +34,7 @@ impl<R: Read> Read for Bounded<R> {
 }
 
 impl<R: Read> Rows<R> {
-    /// Of a text with a header.
+    /// Reads a text with a header.
     pub fn new(from: R) -> Self {
         let row = Rc::new(Cell::new(0));
         let bounded = Bounded {

@@ -7,7 +7,7 @@ const QUOTED: usize = 160;
 /// Longest name or path in a study or effect file, in characters.
 const LONGEST: usize = 1000;
 
-/// Whether a character steers what is around it instead of being seen: controls of terminals (U+009B alone begins an escape
+/// Returns whether a character steers what is around it instead of being seen: controls of terminals (U+009B alone begins an escape
 /// sequence), marks that turn the direction of writing, and those without width.
 pub(crate) fn hidden(c: char) -> bool {
     c.is_control()
@@ -60,7 +60,7 @@ pub(crate) fn one_line(text: &str, most: usize) -> String {
     line
 }
 
-/// Whether every key and text of a TOML table can be shown as a name; else what cannot.
+/// Checks whether every key and text of a TOML table can be shown as a name; else what cannot.
 pub(crate) fn check_names(table: &toml::Table) -> Result<(), String> {
     table.iter().try_for_each(|(key, value)| {
         check_name(key)?;
