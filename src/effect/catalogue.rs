@@ -145,3 +145,46 @@ fn rates(twin: &dyn StateSpace) -> Vec<(String, String)> {
     let name = |i: usize| states[i].name.clone();
     pairs.into_iter().map(|(i, j)| (name(i), name(j))).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::Magnitude;
+    use crate::twins::{CascadedTanks, VanDerPol};
+
+    fn magnet() -> EffectKind {
+        EffectKind::force("magnet", "", |m, at| -m[0] * at.x).magnitude(Magnitude::positive(
+            "strength",
+            "1/s",
+            &[0.1],
+        ))
+    }
+
+    fn keys(catalogue: &Catalogue, twin: &Twin) -> Vec<String> {
+        let effects = catalogue.applicable(twin).into_iter();
+        let magnets = effects.filter(|e| e.id() == "magnet");
+        magnets.map(|e| e.key().to_string()).collect()
+    }
+
+    #[test]
+    fn an_own_effect_is_offered_where_it_can_stand_and_known_to_files() {
+        let tanks = Twin::new(CascadedTanks);
+        let catalogue = Catalogue::default().with(magnet());
+        assert_eq!(keys(&catalogue, &tanks), ["magnet@h1", "magnet@h2"]);
+        let effects = catalogue.parse("[[effect]]\nid = 'magnet'\ntarget = 'h2'");
+        assert_eq!(effects.unwrap()[0].target(), "h2");
+        let only = Catalogue::default().with(magnet().only_on(["h2"]));
+        assert_eq!(keys(&only, &tanks), ["magnet@h2"]);
+        assert!(keys(&only, &Twin::new(VanDerPol)).is_empty());
+        assert_eq!(only.with(magnet()).kinds().len(), 31, "one of an id");
+    }
+
+    #[test]
+    fn an_unknown_id_is_answered_with_the_known_ones() {
+        let error = Catalogue::default().effect("sensor-bais", "sensor");
+        let message = error.unwrap_err().to_string();
+        for word in ["did you mean \"sensor-bias\"", "parameter-step"] {
+            assert!(message.contains(word), "{message}");
+        }
+    }
+}

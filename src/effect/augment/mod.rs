@@ -219,9 +219,9 @@ fn magnitude_parameters(effect: &Effect) -> Vec<Parameter> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effect::Catalogue;
+    use crate::effect::{Catalogue, EffectKind, Magnitude, OtherState};
     use crate::record::{Drive, Signal};
-    use crate::twin::Noise;
+    use crate::twin::{Noise, Now};
     use crate::twins::CascadedTanks;
 
     #[test]
@@ -242,5 +242,52 @@ mod tests {
             let run = |twin: &Twin| twin.simulate(&theta, &drive, noise).unwrap();
             assert_eq!(run(&long), run(&short));
         }
+    }
+
+    /// A force of one's own sees inputs, parameters bent by other effects, all states and the time.
+    #[test]
+    fn a_force_sees_the_whole_twin() {
+        let kind = EffectKind::force("all", "", |m, at| {
+            m[0] * (at.x + at.other + at.t + at.states[1] + at.u[0] + at.theta[3])
+        })
+        .magnitude(Magnitude::signed("size", "1", &[1.0]))
+        .other(OtherState::From);
+        let library = Catalogue::default().with(kind);
+        let effects = vec![
+            library.effect("all", "h1").unwrap().with_other("h2"),
+            library.effect("actuator-bias", "actuator").unwrap(),
+            library.effect("parameter-drift", "k4").unwrap(),
+        ];
+        let twin = augment(Twin::new(CascadedTanks), effects).unwrap();
+        let equations = twin.equations().unwrap();
+        let rate = |size: f64| {
+            let theta = [0.6, 0.5, 0.55, 1.0, size, 0.25, 0.5];
+            let now = Now {
+                t: 2.0,
+                dt: 0.5,
+                u: &[3.0],
+                theta: &theta,
+            };
+            // Two levels, and the held input behind the bias.
+            let mut rates = [0.0; 3];
+            equations.drift(&now, &[4.0, 7.0, 3.25], &mut rates);
+            rates[0]
+        };
+        let expected = 4.0 + 7.0 + 2.0 + 7.0 + 3.25 + 1.0 * (1.0 + 0.5 * 2.0);
+        assert!((rate(1.0) - rate(0.0) - expected).abs() < 1e-12);
+    }
+
+    /// A sensor in pascals has a bias of thousands; a fraction stays a fraction.
+    #[test]
+    fn bounds_of_magnitudes_are_the_limits_of_their_law() {
+        let library = Catalogue::default();
+        let of = |id| magnitude_parameters(&library.effect(id, "sensor").unwrap());
+        assert!(of("sensor-bias")[0].bounds.contains(-1e5));
+        let drift = &of("sensor-drift")[0];
+        assert!(drift.bounds.contains(1e3) && drift.start_range() == drift.prior);
+        let noise = of("sensor-noise")[0].bounds;
+        assert_eq!(noise.low(), 0.0);
+        assert!(noise.contains(1e4));
+        assert_eq!(of("sensor-rectification")[0].bounds.high(), 1.0);
     }
 }
