@@ -56,11 +56,19 @@ fn questions(sources: &Crate) -> Vec<String> {
     let outside = |file: &str| !file.starts_with("twin/") && !file.starts_with("likelihood/");
     let of = |needle| uses(sources, needle, outside);
     let handles = [of("Twin :: Equations"), of("Twin :: BlackBox")];
+    // A handle that is made asks nothing.
+    let made = [
+        of("Twin :: Equations ( Arc :: new"),
+        of("Twin :: BlackBox ( Arc :: new"),
+    ];
     let mut arms: BTreeMap<&str, [usize; 2]> = BTreeMap::new();
-    for (arm, places) in handles.iter().enumerate() {
-        places
-            .iter()
-            .for_each(|file| arms.entry(file).or_default()[arm] += 1);
+    for (arm, (places, made)) in handles.iter().zip(&made).enumerate() {
+        for file in places {
+            arms.entry(file).or_default()[arm] += 1;
+        }
+        for file in made {
+            arms.entry(file).or_default()[arm] -= 1;
+        }
     }
     let mut places = [of(". state_space ("), of(". equations (")].concat();
     for (file, counts) in arms {
@@ -114,17 +122,17 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
         })
         .collect();
     vec![
-        Ratchet::new("public items (aim 180)", 240, items.collect()),
-        Ratchet::new("error types (aim 15)", 20, errors),
+        Ratchet::new("public items (aim 180)", 230, items.collect()),
+        Ratchet::new("error types", 15, errors),
         Ratchet::new("folders with more than 18 files", 0, crowded(sources, 18)),
-        Ratchet::new("questions for equations (aim 8)", 11, questions(sources)),
+        Ratchet::new("questions for equations", 8, questions(sources)),
         Ratchet::new(
             "doc comments of odd first words",
-            180,
+            0,
             odd_first_words(sources),
         ),
         Ratchet::new("identities taken from strings", 5, identities(sources)),
-        Ratchet::new("import cycles inside a folder", 3, cycles(sources)),
+        Ratchet::new("import cycles inside a folder", 0, cycles(sources)),
     ]
 }
 
