@@ -204,7 +204,7 @@ mod tests {
         );
         fs::copy(path.join("runs/0000.json"), path.join("runs/0001.json")).unwrap();
         let error = run().unwrap_err().to_string();
-        assert!(error.contains("its number"), "{error}");
+        assert!(error.contains("holds another number"), "{error}");
     }
 
     #[test]

@@ -52,7 +52,7 @@ fn trials_are_gone_on_with_and_keys_stay_as_they_were_sealed() {
     );
     fs::copy(path.join("answers/0000.json"), &answer).unwrap();
     let error = score().unwrap_err().to_string();
-    assert!(error.contains("its number"), "{error}");
+    assert!(error.contains("holds another number"), "{error}");
     fs::remove_file(&answer).unwrap();
     fs::write(path.join("keys.json"), [&keys[..], b" "].concat()).unwrap();
     let error = score().unwrap_err().to_string();
@@ -95,7 +95,7 @@ fn the_same_seed_seals_the_same_keys_and_other_calls_are_refused() {
     let seed = Settings { seed: 2, ..all(20) };
     assert!(refused(seed, &at("one")).contains("seed was 1, now it is 2"));
     assert!(refused(all(21), &at("one")).contains("trials was 20, now it is 21"));
-    assert!(refused(all(1), place.path()).contains("no folder of `withheld`"));
+    assert!(refused(all(1), place.path()).contains("no folder of `truetwin withheld`"));
     assert!(refused(all(1), &at("a/b")).contains("make it first"));
     assert!(refused(all(0), &at("three")).contains("no trials"));
     assert_eq!(
