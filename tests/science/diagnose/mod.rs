@@ -153,7 +153,7 @@ fn what_cannot_be_diagnosed_is_refused_in_one_line() {
             .to_string()
     };
     let (usual, silent) = (DiagnoseSettings::default(), Progress::silent());
-    assert!(run(&[], &usual, &silent).contains("give at least one"));
+    assert!(run(&[], &usual, &silent).contains("at least one"));
     let short = Record::new(Drive::autonomous(0.05, 20).unwrap(), Signal::zeros((20, 1))).unwrap();
     assert!(run(&[short], &usual, &silent).contains("at least 50"));
     let unknown = DiagnoseSettings {
