@@ -100,7 +100,7 @@ debug_by_name!(Centred);
 /// use std::sync::Arc;
 /// use truetwin::feature::{FeatureError, FeatureMap, FeatureRecipe};
 /// use truetwin::record::{Drive, Signal};
-/// use truetwin::twin::DigitalTwin;
+/// use truetwin::twin::Twin;
 /// use truetwin::twins::VanDerPol;
 ///
 /// /// The mean square of the first output.

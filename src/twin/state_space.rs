@@ -11,7 +11,7 @@ use crate::twin::{Integrator, Interval, Noise, Now, Outline, SimulationError, Wo
 /// y = g(t, x, u, θ) + R·v       observe, v ~ N(0, I)
 /// ```
 ///
-/// Three methods are required; it is then a [`DigitalTwin`], and everything that needs equations (filters,
+/// Three methods are required; it is then a [`DigitalTwin`](super::DigitalTwin), and everything that needs equations (filters,
 /// effects in the dynamics, unknown starts) works with it.
 ///
 /// # Order within a sample
