@@ -35,7 +35,7 @@ impl Standardiser {
     ///
     /// # Errors
     ///
-    /// [`MathError`] where the samples are too few, not finite, or do not vary.
+    /// Fails where the samples are too few, not finite, or do not vary.
     pub fn principal(samples: &Array2<f64>, limit: f64) -> Result<Self, MathError> {
         let whitening = Whitening::calibrated(samples)?;
         let (mean, axes) = (whitening.mean(), whitening.matrix());
