@@ -113,8 +113,9 @@ pub mod twins;
 
 pub mod effect;
 
-mod fit;
 pub mod likelihood;
+
+pub mod fit;
 
 pub mod feature;
 pub mod network;

@@ -1,7 +1,7 @@
 //! One way to refuse a setting: which, its value, and what it must be.
 //!
 //! ```
-//! use truetwin::estimator::gate::GateSettings;
+//! use truetwin::estimator::GateSettings;
 //! use truetwin::setting::SettingError;
 //!
 //! let gate = GateSettings { alpha: 2.0, ..GateSettings::default() };
@@ -11,6 +11,15 @@
 //! ```
 
 use std::fmt::Display;
+
+/// Writes a number for a message: with an exponent where it is very large or small, digit by digit otherwise.
+pub(crate) fn number(value: f64) -> String {
+    let size = value.abs();
+    match size == 0.0 || !size.is_finite() || (1e-5..1e9).contains(&size) {
+        true => value.to_string(),
+        false => format!("{value:e}"),
+    }
+}
 
 /// A setting that cannot be used. The message has its name, its value and the remedy.
 ///
@@ -27,9 +36,10 @@ pub struct SettingError {
 impl SettingError {
     /// Creates an error for setting `name` of value `value`; `remedy` says what it must be.
     pub fn new(name: impl Into<String>, value: impl Display, remedy: impl Into<String>) -> Self {
+        let text = value.to_string();
         Self {
             name: name.into(),
-            value: value.to_string(),
+            value: text.parse().map_or(text, number),
             remedy: remedy.into(),
         }
     }
@@ -101,6 +111,24 @@ fn edits(a: &str, b: &str) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_of_a_message_are_short() {
+        for (value, expected) in [
+            (0.0, "0"),
+            (-2.5, "-2.5"),
+            (366e5, "36600000"),
+            (1e308, "1e308"),
+            (-5e-312, "-5e-312"),
+            (f64::NAN, "NaN"),
+            (f64::INFINITY, "inf"),
+        ] {
+            assert_eq!(number(value), expected);
+            assert_eq!(SettingError::new("ridge", value, "").value(), expected);
+        }
+        let text = SettingError::new("weights", "7 weights", "");
+        assert_eq!(text.value(), "7 weights");
+    }
 
     #[test]
     fn a_slip_of_the_keyboard_is_recognised() {

@@ -4,9 +4,7 @@
 use crate::Clock;
 use rayon::prelude::*;
 use std::hint::black_box;
-use truetwin::estimator::shards::Prior;
 use truetwin::feature::{Ar, Arx, FeatureRecipe};
-use truetwin::progress::Progress;
 use truetwin::record::Drive;
 use truetwin::study::{RecordPlan, Study};
 use truetwin::twin::{DigitalTwin, Noise};
@@ -32,10 +30,24 @@ fn bank(clock: &Clock) {
         ("tanks, ARX(64, 64)", &tanks, &arx(64)),
     ];
     for (name, study, features) in cases {
-        let prior = Prior::new(study, features).expect("fits the twin");
-        let stage = Progress::silent().stage("bank", BANK);
+        let (twin, drives) = (study.twin(), study.drives().expect("the plan is sound"));
+        let (space, map) = (
+            twin.parameters(),
+            features.bind(twin).expect("fits the twin"),
+        );
+        let row = |i| {
+            let noise = Noise::new(1, "bench", i);
+            let drive = drives.draw(noise).ok()?;
+            let outputs = twin
+                .simulate(&space.draw_prior(noise), &drive, noise)
+                .ok()?;
+            map.extract(&drive, &outputs).ok()
+        };
         clock.time(&format!("bank: {name}"), BANK as u64, || {
-            prior.rows(0..BANK as u64, 1, "bench", &stage)
+            (0..BANK as u64)
+                .into_par_iter()
+                .map(row)
+                .collect::<Vec<_>>()
         });
     }
 }

@@ -3,12 +3,9 @@
 
 use crate::Clock;
 use std::time::Duration;
-use truetwin::estimator::bank::FeatureSimulator;
-use truetwin::estimator::gate::GateTest;
-use truetwin::estimator::{EstimateOptions, PresetName, PretrainOptions, Project, pretrain};
+use truetwin::estimator::{EstimateOptions, PretrainOptions, pretrain};
 use truetwin::evaluate::paper::{Benchmark, MonteCarlo, Scenario, reference_studies};
 use truetwin::progress::Progress;
-use truetwin::twin::Noise;
 
 pub fn run(clock: &Clock) {
     if !clock.wants("estimate") {
@@ -28,26 +25,17 @@ pub fn run(clock: &Clock) {
             runs: 1,
             seed: 1,
         };
-        let (theta, record) = plan.record(&study, 0).expect("the paper has this point");
-        let twin = study.twin();
-        let project = Project::from(&study);
-        let preset = project.recipe(PresetName::Default);
-        let simulator = FeatureSimulator::new(twin.clone(), preset.features.as_ref())
-            .expect("the features fit the twin");
+        let (_, record) = plan.record(&study, 0).expect("the paper has this point");
         let name = |part: &str| format!("estimate: {}, {part}", study.name());
-        let gate = GateTest {
-            simulator: &simulator,
-            drive: record.drive(),
-            settings: &preset.settings.gate,
-            noise: Noise::new(1, "bench", 0),
-            progress: &silent,
-        };
-        clock.time(&name("gate"), 1, || gate.at(&theta));
         let options = EstimateOptions {
             always_refine: true,
             ..EstimateOptions::default()
         };
         let refined = || (estimator.estimate(&record, &options, &silent)).expect("it is estimated");
+        clock.print(&name("gate"), 1, |calls| {
+            let seconds = (0..calls).map(|_| refined().seconds.gate);
+            Duration::from_secs_f64(seconds.sum())
+        });
         clock.print(&name("Gauss–Newton"), 1, |calls| {
             let seconds = (0..calls).filter_map(|_| refined().seconds.gauss_newton);
             Duration::from_secs_f64(seconds.sum())

@@ -21,7 +21,7 @@ pub(super) struct External {
     /// Number of copies of the program or FMU that run at once [default: one per thread].
     #[arg(long, global = true, value_name = "N")]
     pub workers: Option<usize>,
-    /// Time limit for one answer of the program [default: 60].
+    /// Time limit for one answer of the program, its start and description included [default: 60].
     #[arg(long, global = true, value_name = "SECONDS")]
     pub timeout: Option<f64>,
 }

@@ -4,6 +4,7 @@ use super::args::External;
 use super::failure::Failure;
 use crate::estimator::Project;
 use crate::external::program::{ProgramCommand, ProgramSettings, ProgramTwin};
+use crate::setting::number;
 use crate::study::Study;
 use std::path::Path;
 use std::time::Duration;
@@ -62,7 +63,8 @@ fn program(options: &External, line: &str) -> Result<Study, Failure> {
     if let Some(seconds) = options.timeout {
         settings.timeout = Duration::try_from_secs_f64(seconds).map_err(|_| {
             Failure::user(format!(
-                "--timeout {seconds}: give a positive number of seconds"
+                "--timeout {}: give a positive number of seconds",
+                number(seconds)
             ))
         })?;
     }

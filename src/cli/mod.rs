@@ -50,7 +50,7 @@ pub fn run<P: Into<Project>, E: Into<StudyError>>(
 }
 
 /// Runs the command line `arguments`, the program's name first, over studies or projects.
-pub fn run_from<P: Into<Project>, E: Into<StudyError>>(
+fn run_from<P: Into<Project>, E: Into<StudyError>>(
     projects: impl IntoIterator<Item = Result<P, E>>,
     arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>,
 ) -> ExitCode {

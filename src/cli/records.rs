@@ -52,7 +52,8 @@ fn warn_of_outlier(path: &Path, record: &Record) {
     let signals = [("u", record.drive().inputs()), ("y", record.outputs())];
     for (letter, signal) in signals {
         for (j, channel) in signal.columns().into_iter().enumerate() {
-            let mut sizes: Vec<f64> = channel.iter().map(|value| value.abs()).collect();
+            let there = channel.iter().filter(|value| !value.is_nan());
+            let mut sizes: Vec<f64> = there.map(|value| value.abs()).collect();
             sizes.sort_unstable_by(f64::total_cmp);
             let usual = sizes[(NEARLY_ALL * (sizes.len() - 1) as f64) as usize];
             let largest = sizes[sizes.len() - 1];

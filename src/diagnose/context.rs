@@ -46,12 +46,7 @@ fn without_process_noise(twin: &Twin, record: &Record) -> bool {
     let outline = twin.outline();
     let theta = outline.parameters.centre();
     let drive = record.drive();
-    let now = Now {
-        t: 0.0,
-        dt: drive.dt(),
-        u: drive.input(0),
-        theta: &theta,
-    };
+    let now = Now::new(0.0, drive.dt(), drive.input(0), &theta);
     let mut process = vec![0.0; outline.states.len()];
     let mut measurement = vec![0.0; outline.outputs.len()];
     twin.noise(&now, &mut process, &mut measurement);

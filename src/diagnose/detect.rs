@@ -5,14 +5,14 @@ use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::explain::attribute::{Explanation, explanations};
 use crate::diagnose::explain::evalue::{combined, log_e};
 use crate::diagnose::explain::verdict::{left_the_prior, verdict};
-use crate::diagnose::fitting::base_fit::{ITERATIONS, base_fit};
-use crate::diagnose::fitting::climb::{Fitted, fit};
-use crate::diagnose::fitting::problem::Problem;
 use crate::diagnose::hypotheses::candidate::{candidates, not_tested};
 use crate::diagnose::outcome::{Detection, Verdict};
 use crate::diagnose::settings::DiagnoseSettings;
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::null::{NullDistribution, Test};
+use crate::fit::climb::{Fitted, fit};
+use crate::fit::problem::Problem;
+use crate::fit::starts::{ITERATIONS, base_fit};
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::twin::{Noise, Role};
@@ -44,7 +44,8 @@ pub(in crate::diagnose) fn detect<'a>(
 ) -> Result<Detected<'a>, DiagnoseError> {
     let problem = Problem::of_twin(context.twin, records);
     let stage = progress.stage("fit", 1);
-    let fitted = base_fit(&problem, settings, noise)?.ok_or(DiagnoseError::NoFit)?;
+    let fitted =
+        base_fit(&problem, settings.initial.as_deref(), noise)?.ok_or(DiagnoseError::NoFit)?;
     stage.tick()?;
     let mut all = candidates(context.study, &settings.without)?;
     if context.follows {

@@ -4,7 +4,7 @@ use crate::effect::EffectError;
 use crate::likelihood::kalman::FilterError;
 use crate::progress::Cancelled;
 use crate::record::RecordError;
-use crate::setting::SettingError;
+use crate::setting::{SettingError, number};
 use crate::twin::{SimulationError, TwinError};
 use std::fmt;
 
@@ -16,7 +16,7 @@ pub enum DiagnoseError {
     #[error("no record given; pass at least one")]
     NoRecord,
     /// Records of different steps.
-    #[error("{record} has a step of {given} s, the first record {expected} s; resample it")]
+    #[error("{record} has a step of {} s, the first record {} s; resample it", number(*given), number(*expected))]
     Steps {
         /// The record.
         record: GivenRecord,
@@ -51,7 +51,7 @@ pub enum DiagnoseError {
         "no simulation of the fitted twin could be evaluated; check units and step of the record, and the prior"
     )]
     NoSimulation,
-    /// A record with channels other than the twin's.
+    /// A record with channels or steps that the twin cannot have.
     #[error("{record} does not fit the twin: {error}")]
     Channels {
         /// The record.

@@ -4,12 +4,12 @@ use crate::diagnose::context::Context;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::explain::attribute::{elsewhere, explanations};
 use crate::diagnose::explain::extended::extend;
-use crate::diagnose::fitting::base_fit::base_fit;
-use crate::diagnose::fitting::problem::Problem;
 use crate::diagnose::hypotheses::candidate::{Candidate, candidates};
 use crate::diagnose::run::check;
 use crate::diagnose::settings::DiagnoseSettings;
 use crate::diagnose::test::fitted_twin::FittedTwin;
+use crate::fit::problem::Problem;
+use crate::fit::starts::base_fit;
 use crate::likelihood::ensemble::measured;
 use crate::progress::Progress;
 use crate::record::Record;
@@ -48,7 +48,7 @@ pub fn gain_of(
     let context = Context::new(study, &twin, records, validation.as_deref(), None);
     let problem = Problem::of_twin(context.twin, records);
     let noise = Noise::new(settings.seed, "diagnose", 0);
-    let Some(fitted) = base_fit(&problem, settings, noise)? else {
+    let Some(fitted) = base_fit(&problem, settings.initial.as_deref(), noise)? else {
         return Ok(None);
     };
     let Some(mut model) = FittedTwin::new(context.twin, problem, fitted, &[], named)? else {
@@ -96,7 +96,7 @@ pub fn held_out_score(
     let context = Context::new(study, &twin, &records, Some(&held_out), None);
     let problem = Problem::of_twin(context.twin, &records);
     let noise = Noise::new(settings.seed, "diagnose", 0);
-    let Some(fitted) = base_fit(&problem, settings, noise)? else {
+    let Some(fitted) = base_fit(&problem, settings.initial.as_deref(), noise)? else {
         return Ok(None);
     };
     if !listed {

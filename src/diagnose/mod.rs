@@ -3,7 +3,6 @@
 //! | room | question |
 //! |---|---|
 //! | `run.rs`, `detect.rs`, `summary.rs` | order of the steps, and the summary of their results |
-//! | `fitting/` | fits of a twin and its variants to the records, with a weak prior |
 //! | `residuals/` | statistics of innovations, cut by time, state, lag and frequency |
 //! | `hypotheses/` | what could be missing: listed effects and disturbances |
 //! | `test/` | is anything missing? The statistics of the records against those of simulations |
@@ -13,7 +12,7 @@
 //! | `outcome/` | results |
 //! | `gain.rs` | gain of a known effect, for trials |
 //!
-//! The arrows between rooms run one way: fitting, residuals ← hypotheses ← test ← explain ← locate, quantify ← run.
+//! The arrows between rooms run one way: residuals ← hypotheses ← test ← explain ← locate, quantify ← run.
 //! A twin without equations has its likelihood from [`likelihood::ensemble`](crate::likelihood).
 //!
 //! See docs/diagnosing-a-gap.md for the mathematics and how to read the answer.
@@ -22,7 +21,6 @@ mod context;
 mod detect;
 mod error;
 mod explain;
-mod fitting;
 mod gain;
 mod hypotheses;
 mod locate;

@@ -268,24 +268,26 @@ pub(in crate::diagnose) fn check(
         (records.iter().enumerate()).map(|(i, record)| (GivenRecord::Measured(i), record));
     let validation = validation.map(|record| (GivenRecord::Validation, record));
     for (which, record) in measured.chain(validation) {
-        (record.check_channels(&study.twin().signals())).map_err(|error| {
-            DiagnoseError::Channels {
+        (record.check_channels(&study.twin().signals()))
+            .and_then(|()| study.twin().check_drive(record.drive()))
+            .map_err(|error| DiagnoseError::Channels {
                 record: which,
                 error,
-            }
-        })?;
+            })?;
         let given = record.drive().dt();
-        if (given - expected).abs() > 1e-3 * expected {
+        let uniform = first.drive().is_uniform() && record.drive().is_uniform();
+        if uniform && (given - expected).abs() > 1e-3 * expected {
             return Err(DiagnoseError::Steps {
                 record: which,
                 given: six_digits(given),
                 expected: six_digits(expected),
             });
         }
-        if record.samples() < Thresholds::LEAST_SAMPLES {
+        let samples = record.measured_rows();
+        if samples < Thresholds::LEAST_SAMPLES {
             return Err(DiagnoseError::TooShort {
                 record: which,
-                samples: record.samples(),
+                samples,
                 least: Thresholds::LEAST_SAMPLES,
             });
         }
@@ -315,8 +317,9 @@ pub(in crate::diagnose) fn check(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::{Drive, Signal};
+    use crate::record::{Drive, Signal, Signals};
     use crate::study::RecordPlan;
+    use crate::twin::{DigitalTwin, ParameterSpace, SimulationError};
     use crate::twins::VanDerPol;
 
     /// An oscillator with a cubic spring, its extended given in milliseconds where seconds are expected: an conclusion or an error,
@@ -338,6 +341,71 @@ mod tests {
         assert!(
             matches!(conclusion, Err(DiagnoseError::NoSimulation)),
             "{conclusion:?}"
+        );
+    }
+
+    /// Records with missing outputs and varying steps are diagnosed as others are: of the twin itself no gap, of a sensor
+    /// that is off one.
+    #[test]
+    fn records_come_with_gaps_and_varying_steps() {
+        let mut source = Noise::new(5, "gaps", 0).source("cells");
+        let mut times = vec![0.0];
+        for k in 1..400 {
+            times.push(times[k - 1] + 0.05 * (0.5 + source.uniform()));
+        }
+        let drive = Drive::with_times(&times, Signal::zeros((400, 0))).unwrap();
+        let clean = VanDerPol
+            .simulate(&[1.5], &drive, Noise::new(1, "gaps", 0))
+            .unwrap();
+        let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 400)).unwrap();
+        let mut verdict = |bend: &dyn Fn(f64) -> f64| {
+            let outputs = clean.mapv(|y| match source.uniform() < 0.15 {
+                true => f64::NAN,
+                false => bend(y),
+            });
+            let record = Record::new(drive.clone(), outputs).unwrap();
+            let settings = DiagnoseSettings::default();
+            let found = diagnose(&study, &[record], None, &settings, &Progress::silent()).unwrap();
+            assert!(found.detection.p_value > 0.0, "{:?}", found.detection);
+            let shrinkage = found.shrinkage.unwrap();
+            assert!(shrinkage.before.is_finite() && shrinkage.before > 0.0);
+            found.verdict
+        };
+        assert_eq!(verdict(&|y| y), Verdict::NoGap);
+        assert_ne!(verdict(&|y| y + 0.6 * y * y), Verdict::NoGap);
+    }
+
+    /// A black box is simulated with one step.
+    #[test]
+    fn a_black_box_needs_one_step() {
+        struct Boxed;
+        impl DigitalTwin for Boxed {
+            fn parameters(&self) -> ParameterSpace {
+                DigitalTwin::parameters(&VanDerPol)
+            }
+            fn signals(&self) -> Signals {
+                DigitalTwin::signals(&VanDerPol)
+            }
+            fn simulate(
+                &self,
+                theta: &[f64],
+                drive: &Drive,
+                noise: Noise,
+            ) -> Result<Signal, SimulationError> {
+                DigitalTwin::simulate(&VanDerPol, theta, drive, noise)
+            }
+        }
+        let times: Vec<f64> = (0..200).map(|k| f64::from(k * k)).collect();
+        let drive = Drive::with_times(&times, Signal::zeros((200, 0))).unwrap();
+        let record = Record::new(drive, Signal::ones((200, 1))).unwrap();
+        let study = Study::new("boxed", Boxed, RecordPlan::autonomous(0.05, 200)).unwrap();
+        let settings = DiagnoseSettings::default();
+        let error = diagnose(&study, &[record], None, &settings, &Progress::silent());
+        let message = error.unwrap_err().to_string();
+        assert!(message.contains("record 1 does not fit the twin: column t: the steps vary"));
+        assert!(
+            message.ends_with("resample the record to one step"),
+            "{message}"
         );
     }
 }

@@ -54,7 +54,7 @@ impl Catalogue {
     }
 
     /// Returns the effect of an `[[effect]]` table.
-    pub fn resolve(&self, entry: &EffectEntry) -> Result<Effect, EffectError> {
+    pub(crate) fn resolve(&self, entry: &EffectEntry) -> Result<Effect, EffectError> {
         Effect::from_entry(self.kind(&entry.id)?.clone(), entry)
     }
 
@@ -132,12 +132,7 @@ fn rates(twin: &dyn StateSpace) -> Vec<(String, String)> {
             .collect();
         let u: Vec<f64> = outline.inputs.iter().map(|_| source.uniform()).collect();
         let theta = outline.parameters.draw_prior(Noise::new(0, "rates", point));
-        let now = Now {
-            t: 0.0,
-            dt: 1.0,
-            u: &u,
-            theta: &theta,
-        };
+        let now = Now::new(0.0, 1.0, &u, &theta);
         let mut dx = vec![0.0; x.len()];
         twin.drift(&now, &x, &mut dx);
         pairs.retain(|&(i, j)| dx[j] == x[i]);

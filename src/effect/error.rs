@@ -1,6 +1,6 @@
 //! The error of this room.
 
-use crate::setting::did_you_mean;
+use crate::setting::{did_you_mean, number};
 use crate::twin::Interval;
 use std::path::PathBuf;
 
@@ -30,7 +30,7 @@ pub enum EffectError {
         problem: String,
     },
     /// An id that neither the library nor the study has.
-    #[error("unknown id \"{id}\"{}; choose one of {known}", did_you_mean(id, known.split(", ")))]
+    #[error("unknown effect id \"{id}\"{}; choose one of {known}", did_you_mean(id, known.split(", ")))]
     Unknown {
         /// The id.
         id: String,
@@ -116,7 +116,7 @@ pub enum EffectError {
         limit: u32,
     },
     /// A magnitude out of its limits.
-    #[error("effect {id}: {name} = {value} is outside {limits}; choose a value inside")]
+    #[error("effect {id}: {name} = {} is outside {limits}; choose a value inside", number(*value))]
     Value {
         /// Effect.
         id: String,

@@ -1,5 +1,6 @@
 //! One row of the library: id, law, magnitudes.
 
+use super::batch::Batch;
 use super::law::{ForcePoint, Instant, Law};
 use super::magnitude::Magnitude;
 use super::marks::Mark;
@@ -51,6 +52,7 @@ pub struct EffectKind {
     id: String,
     formula: String,
     law: Law,
+    batch: Batch,
     magnitudes: Vec<Magnitude>,
     other: Option<OtherState>,
     only_on: Option<Vec<String>>,
@@ -68,7 +70,8 @@ impl EffectKind {
         formula: &str,
         law: impl Fn(&[f64], Instant, &mut [f64], f64) -> f64 + Send + Sync + 'static,
     ) -> Self {
-        Self::new(id, formula, Law::Sensor(Arc::new(law)))
+        let law = Arc::new(law);
+        Self::new(id, formula, Law::Sensor(law.clone())).batch(Batch::Signal(law))
     }
 
     /// Creates an effect that changes an input: `law(m, now, memory, u)` returns the signal that acts.
@@ -77,7 +80,8 @@ impl EffectKind {
         formula: &str,
         law: impl Fn(&[f64], Instant, &mut [f64], f64) -> f64 + Send + Sync + 'static,
     ) -> Self {
-        Self::new(id, formula, Law::Actuator(Arc::new(law)))
+        let law = Arc::new(law);
+        Self::new(id, formula, Law::Actuator(law.clone())).batch(Batch::Signal(law))
     }
 
     /// Creates an effect on the rate of a state: `law(m, at)` is added to it.
@@ -86,7 +90,8 @@ impl EffectKind {
         formula: &str,
         law: impl Fn(&[f64], &ForcePoint<'_>) -> f64 + Send + Sync + 'static,
     ) -> Self {
-        Self::new(id, formula, Law::Force(Arc::new(law)))
+        let law = Arc::new(law);
+        Self::new(id, formula, Law::Force(law.clone())).batch(Batch::Force(law))
     }
 
     /// Creates an effect on a state after each step: `law(m, x, other)` changes both.
@@ -95,7 +100,8 @@ impl EffectKind {
         formula: &str,
         law: impl Fn(&[f64], &mut f64, Option<&mut f64>) + Send + Sync + 'static,
     ) -> Self {
-        Self::new(id, formula, Law::Limit(Arc::new(law)))
+        let law = Arc::new(law);
+        Self::new(id, formula, Law::Limit(law.clone())).batch(Batch::Limit(law))
     }
 
     /// Creates an effect on a parameter: `law(m, t, value)` returns its value at time t.
@@ -139,6 +145,7 @@ impl EffectKind {
             id: id.into(),
             formula: formula.into(),
             law,
+            batch: Batch::None,
             magnitudes: vec![],
             other: None,
             only_on: None,
@@ -148,6 +155,11 @@ impl EffectKind {
             mark: None,
             check: None,
         }
+    }
+
+    fn batch(mut self, batch: Batch) -> Self {
+        self.batch = batch;
+        self
     }
 
     /// Adds a magnitude, behind those before it.
@@ -218,8 +230,13 @@ impl EffectKind {
     }
 
     /// Returns the law.
-    pub fn law(&self) -> &Law {
+    pub(crate) fn law(&self) -> &Law {
         &self.law
+    }
+
+    /// Returns the form of the law over several points.
+    pub(super) fn over_points(&self) -> &Batch {
+        &self.batch
     }
 
     /// Returns the magnitudes in the order of θ.

@@ -14,6 +14,7 @@
 //! | a twin with effects | [`augment`] |
 
 mod augment;
+mod batch;
 mod catalogue;
 mod check;
 mod error;
@@ -33,7 +34,9 @@ pub(crate) use check::targets;
 pub use error::EffectError;
 pub use key::{EffectKey, EffectPattern};
 pub use kind::{EffectKind, OtherState};
-pub use law::{ForcePoint, Instant, Law, TargetKind};
+pub use law::{ForcePoint, Instant};
+pub(crate) use law::{Law, TargetKind};
 pub use magnitude::{Given, Magnitude};
 pub(crate) use marks::Mark;
-pub use placed::{Effect, EffectEntry};
+pub use placed::Effect;
+pub(crate) use placed::EffectEntry;

@@ -6,6 +6,7 @@ use crate::estimator::readout::{Calibration, Readout};
 use crate::estimator::recipe::PresetName;
 use crate::estimator::settings::Settings;
 use crate::feature::{FeatureError, FeatureRecipe};
+use crate::math::one_row;
 use crate::network::{Architecture, Network, NetworkError};
 use crate::record::Record;
 use crate::study::Study;
@@ -23,7 +24,7 @@ pub struct Estimator {
     pub(super) settings: Settings,
     pub(super) recipe: Arc<dyn FeatureRecipe>,
     pub(super) architecture: Arc<dyn Architecture>,
-    pub(super) readout: Readout,
+    pub(crate) readout: Readout,
     pub(super) calibration: Calibration,
     pub(super) seed: u64,
 }
@@ -62,17 +63,12 @@ impl Estimator {
     }
 
     /// The trained network.
-    pub fn network(&self) -> &Arc<dyn Network> {
+    pub(crate) fn network(&self) -> &Arc<dyn Network> {
         self.readout.network()
     }
 
-    /// The network with what stands around it.
-    pub fn readout(&self) -> &Readout {
-        &self.readout
-    }
-
     /// Twin and features, with a call counter of its own.
-    pub fn simulator(&self) -> Result<FeatureSimulator, FeatureError> {
+    pub(crate) fn simulator(&self) -> Result<FeatureSimulator, FeatureError> {
         FeatureSimulator::new(self.study().twin().clone(), self.recipe.as_ref())
     }
 
@@ -95,11 +91,6 @@ impl Estimator {
 
     /// θ_init from a record's features.
     pub fn predict_one(&self, features: &DVector<f64>) -> Result<Vec<f64>, NetworkError> {
-        Ok(self.predict(&one_row(features))?.row(0).to_vec())
+        Ok(self.predict(&one_row(features.as_slice()))?.row(0).to_vec())
     }
-}
-
-/// A vector as a matrix of one row.
-pub(super) fn one_row(features: &DVector<f64>) -> Array2<f64> {
-    Array2::from_shape_fn((1, features.len()), |(_, j)| features[j])
 }

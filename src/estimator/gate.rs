@@ -9,39 +9,13 @@
 //! | [`GateForm::Paper`] | the same K = 150 simulations | 13 % at n = 5, 100 % at n = 128 |
 //!
 //! Source: Lakshminarayanan, Guerrero & Rojas, section IV-A.
-//!
-//! ```
-//! use std::sync::Arc;
-//! use truetwin::estimator::bank::FeatureSimulator;
-//! use truetwin::feature::Ar;
-//! use truetwin::estimator::gate::{Gate, GateOutcome, GateSettings, GateTest};
-//! use truetwin::progress::Progress;
-//! use truetwin::record::{Drive, Record};
-//! use truetwin::twin::{DigitalTwin, Noise};
-//! use truetwin::twins::VanDerPol;
-//!
-//! let simulator = FeatureSimulator::new(Arc::new(VanDerPol), &Ar { order: 2 })?;
-//! let drive = Drive::autonomous(0.05, 200)?;
-//!
-//! let outputs = VanDerPol.simulate(&[3.0], &drive, Noise::new(7, "measured", 0))?;
-//! let features = simulator.observe(&Record::new(drive.clone(), outputs)?)?;
-//! let test = GateTest {
-//!     simulator: &simulator,
-//!     drive: &drive,
-//!     settings: &GateSettings::default(),
-//!     noise: Noise::new(1, "gate", 0),
-//!     progress: &Progress::silent(),
-//! };
-//! let gate: Gate = test.at(&[3.0])?;
-//! let right: GateOutcome = gate.test(&features);
-//! let wrong = test.at(&[1.0])?.test(&features);
-//! assert!(!right.out_of_distribution && wrong.out_of_distribution);
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
+
+#[cfg(test)]
+mod tests;
 
 use crate::estimator::bank::FeatureSimulator;
 use crate::estimator::error::EstimatorError;
-use crate::math::{Whitening, median, rank_p_value};
+use crate::math::{Whitening, median, rank_p_value, to_vector};
 use crate::progress::Progress;
 use crate::record::Drive;
 use crate::setting::SettingError;
@@ -230,8 +204,7 @@ impl GateTest<'_> {
                 let estimates = estimate(ranked)?;
                 let distance = |(row, estimate): (ArrayView1<'_, f64>, ArrayView1<'_, f64>)| {
                     let moved = DVector::from_fn(theta.len(), |j, _| estimate[j] - theta[j]);
-                    let x = DVector::from_iterator(row.len(), row.iter().copied());
-                    (whitening.residual(&x) - &jacobian * moved).norm_squared()
+                    (whitening.residual(&to_vector(&row)) - &jacobian * moved).norm_squared()
                 };
                 (ranked.rows().into_iter().zip(estimates.rows()))
                     .map(distance)
@@ -276,7 +249,7 @@ impl GateTest<'_> {
             (residual.norm_squared() - used.tr_mul(&residual).norm_squared()).max(0.0)
         };
         let null = (simulated.ranked().rows().into_iter())
-            .map(|row| rest(&DVector::from_iterator(row.len(), row.iter().copied())))
+            .map(|row| rest(&to_vector(&row)))
             .collect();
         let statistic = rest(features);
         let gate = Gate {

@@ -1,8 +1,7 @@
 //! The Two-Stage estimator: pretrained on simulations, tested, refined, tuned.
 //!
-//! [`pretrain`] makes an [`Estimator`] ([`pretrain_on`] of a bank that is there, [`Pretraining`] so that it can be interrupted);
-//! [`Estimator::estimate`] takes a record through gate, Gauss–Newton, cloud and tuned heads; [`Estimator::save`] and
-//! [`Estimator::load`] keep it in one file.
+//! [`pretrain`] makes an [`Estimator`] ([`Pretraining`] so that it can be interrupted); [`Estimator::estimate`] takes a record
+//! through gate, Gauss–Newton, cloud and tuned heads; [`Estimator::save`] and [`Estimator::load`] keep it in one file.
 //!
 //! Source: Lakshminarayanan, Guerrero & Rojas, "Fine-Tuning a Simulation-Driven Estimator".
 //!
@@ -23,8 +22,6 @@
 //! let file = place.path().join("oscillator.est");
 //! estimator.save(&file)?;
 //! let estimator: Estimator = Estimator::load(&file, &[study])?;
-//! let around_the_network: &Readout = estimator.readout();
-//! assert_eq!(around_the_network.targets.mean.len(), 1);
 //!
 //! // A record of ν = 3, outside of the prior [0, 2.5].
 //! let drive = Drive::autonomous(0.05, 200)?;
@@ -49,24 +46,30 @@ mod estimator;
 mod file;
 mod pretrain;
 mod project;
-mod readout;
+pub(crate) mod readout;
 mod recipe;
 mod settings;
 
-pub mod bank;
-pub mod gate;
-pub mod refine;
-pub(crate) mod sample;
-pub mod shards;
+#[doc(hidden)]
+pub mod fuzzing;
 
+pub(crate) mod bank;
+pub(crate) mod gate;
+pub(crate) mod refine;
+pub(crate) mod sample;
+pub(crate) mod shards;
+
+pub use bank::Draws;
 pub use error::EstimatorError;
 pub(crate) use estimate::track;
 pub use estimate::{Estimate, EstimateOptions, Nuisance, Seconds, Tracking};
 pub use estimator::Estimator;
-pub use pretrain::{CHECKPOINT, GivenBank, PretrainOptions, Pretraining, pretrain, pretrain_on};
+pub use gate::{GateForm, GateOutcome, GateSettings};
+pub(crate) use pretrain::GivenBank;
+pub use pretrain::{PretrainOptions, Pretraining, pretrain};
 pub use project::Project;
 pub(crate) use readout::INTERVAL_LEVEL;
-pub use readout::{Readout, Scaler, Standardiser};
 pub use recipe::{PresetName, Recipe};
+pub use refine::{Direction, Information, RefineSettings};
 pub use sample::CloudSampler;
 pub use settings::{CloudSettings, Inputs, Settings};

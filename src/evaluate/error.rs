@@ -5,7 +5,7 @@ use crate::likelihood::kalman::FilterError;
 use crate::math::MathError;
 use crate::progress::Cancelled;
 use crate::record::RecordError;
-use crate::setting::SettingError;
+use crate::setting::{SettingError, number};
 use crate::storage::StorageError;
 use crate::study::StudyError;
 use crate::twin::{Interval, SimulationError, TwinError};
@@ -22,7 +22,8 @@ pub enum EvaluateError {
     NoPoint(String),
     /// A published test point lies outside the study's bounds.
     #[error(
-        "the paper's test point {name} = {value} lies outside the study's bounds {bounds}; widen [bounds], or take --scenario 0 (θ from the prior) or --scenario uniform (θ from the bounds)"
+        "the paper's test point {name} = {} lies outside the study's bounds {bounds}; widen [bounds], or take --scenario 0 (θ from the prior) or --scenario uniform (θ from the bounds)",
+        number(*value)
     )]
     Outside {
         /// Parameter.

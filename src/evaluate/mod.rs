@@ -2,11 +2,10 @@
 //!
 //! | to … | look at |
 //! |---|---|
-//! | compare with the prediction-error method and the dual Kalman filter | [`baseline`] |
-//! | reproduce the paper's tables | [`paper`] |
+//! | reproduce the paper's tables, beside the prediction-error method and the dual Kalman filter | [`paper`] |
 //! | diagnose sealed records whose missing effect is withheld | [`trials`] |
 
-pub mod baseline;
+pub(crate) mod baseline;
 mod error;
 pub mod paper;
 pub mod trials;

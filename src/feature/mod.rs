@@ -25,7 +25,8 @@ pub use score::Score;
 
 use crate::likelihood::kalman::FilterError;
 use crate::math::MathError;
-use crate::record::{Drive, Record, Signal};
+use crate::record::{Drive, Record, RecordError, Signal};
+use crate::setting::number;
 use crate::twin::{Noise, SimulationError, Twin};
 use nalgebra::DMatrix;
 use std::fmt::Debug;
@@ -147,6 +148,9 @@ pub enum FeatureError {
         /// Problem and remedy.
         problem: String,
     },
+    /// A record with missing outputs or varying steps.
+    #[error(transparent)]
+    Record(#[from] RecordError),
     /// Fewer samples than the features need.
     #[error(
         "the record has {samples} samples, these features need {needed}; lower their order or take a longer record"
@@ -159,7 +163,8 @@ pub enum FeatureError {
     },
     /// An output that never changes.
     #[error(
-        "output {channel} is constant ({value}); nothing can be estimated from it: check the sensor, or drive the system"
+        "output {channel} is constant ({}); nothing can be estimated from it: check the sensor, or drive the system",
+        number(*value)
     )]
     Constant {
         /// Channel, from 1.

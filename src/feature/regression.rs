@@ -1,9 +1,8 @@
 //! Least squares of a signal on its own past and that of other signals.
 
 use super::{FeatureError, check_varies};
-use crate::math::{Fit, Lagged, LaggedSignals, LeastSquares, MathError};
+use crate::math::{Fit, Lagged, LaggedSignals, LeastSquares, MathError, one_column};
 use crate::record::Signal;
-use nalgebra::DMatrix;
 
 /// Coefficients of each output on its own last `p` values and the last `q` of each input:
 ///
@@ -44,8 +43,7 @@ pub(super) fn coefficients(
 
 /// Regresses the first signal on the lags of all, from sample `start` on.
 pub(super) fn regress(signals: Vec<Lagged>, start: usize) -> Result<Fit, MathError> {
-    let target = &signals[0].values[start..];
-    let target = DMatrix::from_column_slice(target.len(), 1, target);
+    let target = one_column(&signals[0].values[start..]);
     let phi = LaggedSignals::new(signals, start);
     LeastSquares::with_gram(&phi, &phi.gram())?.solve(&target)
 }

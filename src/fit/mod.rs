@@ -1,22 +1,38 @@
-//! Minimisation in a box: all that names argmin, and the only module that does.
+//! Fits of a twin to measured records: one engine for estimates, diagnoses and baselines.
 //!
-//! | for | take |
+//! | file | question |
 //! |---|---|
-//! | residuals with a Jacobian | [`GaussNewton::minimise`] |
-//! | starts that are spread over a box | [`space_filling`] |
-//!
-//! What is minimised implements [`ResidualProblem`]; it says with [`MathError`](crate::math::MathError) whether a failure costs one point (a
-//! twin that diverged) or everything. Nothing here prints or draws unseeded randomness.
+//! | `run.rs`, `outcome.rs` | a fit from beginning to end, and its result |
+//! | `magnitude.rs`, `effects.rs` | how large an effect may be, and where a search for it begins |
+//! | `problem.rs`, `axis.rs` | what is unknown, in which bounds, and what is known before |
+//! | `starts.rs`, `growing.rs` | where does a search begin |
+//! | `climb.rs`, `slope.rs` | the most probable θ |
+//! | `certificate.rs` | has the search arrived, and what lies at a bound |
+//! | `evidence.rs` | the likelihood averaged over the prior |
+//! | `reference.rs` | linear gain of a direction beside θ |
+//! | `posterior.rs` | draws of θ given the records |
+//! | `least_squares/` | Gauss–Newton on residuals, on argmin |
 
-mod bounds;
-mod box_step;
-mod gauss_newton;
-mod halton;
-mod problem;
-mod settings;
-mod solver;
+pub(crate) mod axis;
+pub(crate) mod certificate;
+pub(crate) mod climb;
+mod effects;
+pub(crate) mod evidence;
+pub(crate) mod first_part;
+pub(crate) mod growing;
+pub(crate) mod least_squares;
+mod magnitude;
+mod outcome;
+pub(crate) mod posterior;
+pub(crate) mod problem;
+pub(crate) mod reference;
+mod run;
+mod slope;
+pub(crate) mod starts;
 
-pub use bounds::Bounds;
-pub use halton::space_filling;
-pub use problem::ResidualProblem;
-pub use settings::GaussNewton;
+pub use certificate::Side;
+pub use outcome::{
+    Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedStart, FittedValue,
+    OutputErrors, Warning,
+};
+pub(crate) use run::{Subject, run};

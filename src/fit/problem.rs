@@ -1,25 +1,289 @@
-use crate::math::MathError;
-use nalgebra::{DMatrix, DVector};
+//! A twin and the records that it is fitted to.
 
-/// A vector of residuals r(θ) whose half squared norm is to be small.
+use crate::fit::axis::Axis;
+use crate::likelihood::ensemble::{self, Predictor};
+use crate::likelihood::kalman::{Coordinates, FilterError, Filtered, Score};
+use crate::likelihood::{Likelihood, likelihood_of};
+use crate::record::{Record, Signal};
+use crate::twin::{Outline, Parameter, ParameterSpace, Role, Twin};
+use std::sync::Arc;
+
+/// Longest step of a fit in the logarithm of a black box's noise level.
+const LONGEST_NOISE: f64 = 2.0;
+
+/// A twin and records, with one θ for all of them but for unknown starts, of which each record has its own.
 ///
-/// θ has length d, r has length m (any, but the same at all θ), the Jacobian ∂r/∂θ is m × d. A prior or ridge enters as
-/// further rows: γ/2 ‖θ − θ₀‖² is the rows √γ (θ − θ₀).
-pub trait ResidualProblem {
-    /// d, the number of parameters.
-    fn dimension(&self) -> usize;
+/// The full θ is the twin's, then the starts of the second record, and so on.
+#[derive(Clone)]
+pub(crate) struct Problem<'a> {
+    pub twin: Twin,
+    pub records: &'a [Record],
+    /// Indices of the twin's parameters in the full θ, for each record.
+    pub(super) places: Vec<Vec<usize>>,
+    pub axes: Vec<Axis>,
+    pub coordinates: Coordinates,
+    coordinates_of: Vec<Coordinates>,
+    likelihood: Arc<dyn Likelihood>,
+    /// Gain at which a fit is done, in nats.
+    done: f64,
+}
 
-    /// r(θ).
-    ///
-    /// # Errors
-    ///
-    /// [`MathError::Rejected`] where θ has no residual, [`MathError::Fatal`] to stop.
-    fn residual(&self, theta: &DVector<f64>) -> Result<DVector<f64>, MathError>;
+/// Log-likelihood at one θ.
+pub(super) struct Evaluation {
+    pub log_likelihood: f64,
+    /// Innovations of each record of a black box: the slope at the same θ needs them, and they cost an ensemble.
+    pub innovations: Option<Vec<Filtered>>,
+}
 
-    /// ∂r/∂θ; [`Stencil`](crate::math::Stencil) has finite differences.
-    ///
-    /// # Errors
-    ///
-    /// As [`residual`](Self::residual).
-    fn jacobian(&self, theta: &DVector<f64>) -> Result<DMatrix<f64>, MathError>;
+impl<'a> Problem<'a> {
+    /// `axes` belong to the parameters of the twin; their likelihood is a filter's, or, without equations, that of an ensemble.
+    pub fn new(twin: Twin, axes: Vec<Axis>, records: &'a [Record]) -> Self {
+        let space = twin.parameters();
+        let mut all = axes;
+        let mut places = Vec::new();
+        for r in 0..records.len() {
+            let mut of_record = Vec::new();
+            for (j, p) in space.iter().enumerate() {
+                if r > 0 && p.role == Role::Start {
+                    all.push(all[j].clone());
+                    of_record.push(all.len() - 1);
+                } else {
+                    of_record.push(j);
+                }
+            }
+            places.push(of_record);
+        }
+        let coordinates = |axes: &mut dyn Iterator<Item = &Axis>| {
+            Coordinates::new(&ParameterSpace::new(axes.map(|axis| {
+                let mut p = Parameter::new("", "", 0.0, axis.width);
+                p.bounds = axis.bounds;
+                p
+            })))
+        };
+        // What simulations say is not worth the last of a gain.
+        let likelihood = likelihood_of(&twin);
+        Self {
+            coordinates: coordinates(&mut all.iter()),
+            coordinates_of: places
+                .iter()
+                .map(|place| coordinates(&mut place.iter().map(|&j| &all[j])))
+                .collect(),
+            places,
+            axes: all,
+            done: if likelihood.is_simulated() {
+                5e-2
+            } else {
+                5e-3
+            },
+            likelihood,
+            twin,
+            records,
+        }
+    }
+
+    /// A twin with the weak priors of its own parameters.
+    pub fn of_twin(twin: &Twin, records: &'a [Record]) -> Self {
+        let space = twin.parameters();
+        let axes = space.iter().map(Axis::of).collect();
+        let mut problem = Self::new(twin.clone(), axes, records);
+        if problem.is_simulated() {
+            // An effect may explain all of a simulator's misfit.
+            for (axis, p) in problem.axes.iter_mut().zip(space.iter()) {
+                if p.role == Role::Noise {
+                    axis.longest = LONGEST_NOISE;
+                }
+            }
+        }
+        problem
+    }
+
+    /// True where each likelihood costs an ensemble of simulations.
+    pub fn is_simulated(&self) -> bool {
+        self.likelihood.is_simulated()
+    }
+
+    /// The same twin on other records.
+    pub fn on<'b>(&self, records: &'b [Record]) -> Problem<'b> {
+        let d = self.twin.parameters().len();
+        Problem::new(self.twin.clone(), self.axes[..d].to_vec(), records)
+    }
+
+    /// The same problem with all but the unknown starts held.
+    pub fn starts_only(&self) -> Option<Self> {
+        let space = self.twin.parameters();
+        let d = space.len();
+        let free = |j: usize| j >= d || space[j].role == Role::Start;
+        let mut problem = self.clone();
+        for (j, axis) in problem.axes.iter_mut().enumerate() {
+            axis.held = !free(j);
+        }
+        (0..self.dimension()).any(free).then_some(problem)
+    }
+
+    /// States, inputs and outputs; of a black box, its predicted outputs stand for states.
+    pub fn outline(&self) -> Outline {
+        self.likelihood.outline()
+    }
+
+    /// Returns the predictors of all records of a black box at θ.
+    pub fn predictors(&self, theta: &[f64]) -> Result<Vec<Predictor>, FilterError> {
+        (self.records.iter().enumerate())
+            .map(|(r, record)| ensemble::predictor(&self.twin, &self.of_record(r, theta), record))
+            .collect()
+    }
+
+    /// Number of samples of all records.
+    pub fn samples(&self) -> usize {
+        self.records.iter().map(Record::samples).sum()
+    }
+
+    /// Dimension of the full θ.
+    pub fn dimension(&self) -> usize {
+        self.axes.len()
+    }
+
+    /// θ of one record.
+    pub fn of_record(&self, r: usize, theta: &[f64]) -> Vec<f64> {
+        self.places[r].iter().map(|&j| theta[j]).collect()
+    }
+
+    /// Full θ from that of one record: all records start alike.
+    pub fn full(&self, theta: &[f64]) -> Vec<f64> {
+        let mut full = vec![0.0; self.dimension()];
+        for r in 0..self.places.len() {
+            self.place(r, theta, &mut full);
+        }
+        full
+    }
+
+    /// Full θ from that of another problem, whose records are the first of these: others start as its first one does.
+    pub fn carried(&self, other: &Problem<'_>, theta: &[f64]) -> Vec<f64> {
+        let mut full = self.full(&other.of_record(0, theta));
+        for r in 0..other.records.len() {
+            self.place(r, &other.of_record(r, theta), &mut full);
+        }
+        full
+    }
+
+    /// Puts θ of one record into the full θ.
+    pub fn place(&self, r: usize, theta: &[f64], full: &mut [f64]) {
+        for (&j, value) in self.places[r].iter().zip(theta) {
+            full[j] = *value;
+        }
+    }
+
+    /// The nearest θ within the bounds.
+    pub fn clamp(&self, theta: &[f64]) -> Vec<f64> {
+        let axes = self.axes.iter().zip(theta);
+        axes.map(|(axis, v)| axis.bounds.clamp(*v)).collect()
+    }
+
+    /// The prior's centre.
+    pub fn centre(&self) -> Vec<f64> {
+        self.axes.iter().map(|a| a.bounds.clamp(a.centre)).collect()
+    }
+
+    /// Where a search from θ begins: within the bounds, noise loud.
+    pub fn begin(&self, theta: &[f64]) -> Vec<f64> {
+        (self.axes.iter().zip(theta))
+            .map(|(axis, v)| axis.bounds.clamp(axis.begin.unwrap_or(*v)))
+            .collect()
+    }
+
+    /// Log-density of the priors, up to a constant: of all axes, or of those that count.
+    pub fn log_prior(&self, theta: &[f64], all: bool) -> f64 {
+        let phi = self.coordinates.of(theta);
+        self.prior_terms()
+            .enumerate()
+            .filter(|(j, _)| all || self.axes[*j].counts)
+            .map(|(j, (centre, precision))| -0.5 * precision * (phi[j] - centre).powi(2))
+            .sum()
+    }
+
+    /// Centre and precision of the priors in φ.
+    pub fn prior_terms(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        let logs = self.coordinates.is_log().iter();
+        self.axes.iter().zip(logs).map(|(axis, log)| {
+            let centre = if *log { axis.centre.ln() } else { axis.centre };
+            (centre, axis.deviation.powi(-2))
+        })
+    }
+
+    /// Log-likelihood of all records at θ.
+    pub fn log_likelihood(&self, theta: &[f64]) -> Result<f64, FilterError> {
+        Ok(self.evaluate(theta)?.log_likelihood)
+    }
+
+    /// Log-likelihood of all records at θ, with the innovations of a black box.
+    pub(super) fn evaluate(&self, theta: &[f64]) -> Result<Evaluation, FilterError> {
+        let (mut log_likelihood, mut innovations) = (0.0, Some(vec![]));
+        for (r, record) in self.records.iter().enumerate() {
+            let theta = self.of_record(r, theta);
+            let (value, filtered) = self.likelihood.log_likelihood(&theta, record)?;
+            log_likelihood += value;
+            innovations = innovations.zip(filtered).map(|(mut all, filtered)| {
+                all.push(filtered);
+                all
+            });
+        }
+        Ok(Evaluation {
+            log_likelihood,
+            innovations,
+        })
+    }
+
+    /// Gradient and information of one record at the full θ; `None` where only differences give them.
+    pub(super) fn score(&self, r: usize, theta: &[f64]) -> Result<Option<Score>, FilterError> {
+        let (own, coordinates) = (self.of_record(r, theta), &self.coordinates_of[r]);
+        self.likelihood.score(&own, &self.records[r], coordinates)
+    }
+
+    /// Gain at which a fit is done, in nats.
+    pub fn done(&self) -> f64 {
+        self.done
+    }
+
+    /// The same problem, its fits carried on until they gain less than `nats`.
+    pub fn until(&self, nats: f64) -> Self {
+        Self {
+            done: nats,
+            ..self.clone()
+        }
+    }
+
+    /// The same problem with some entries held where they are.
+    pub fn holding(&self, held: impl Fn(usize) -> bool) -> Self {
+        let mut problem = self.clone();
+        for (j, axis) in problem.axes.iter_mut().enumerate() {
+            axis.held |= held(j);
+        }
+        problem
+    }
+
+    /// Innovations of each record.
+    pub fn filtered(&self, theta: &[f64]) -> Result<Vec<Filtered>, FilterError> {
+        (self.records.iter().enumerate())
+            .map(|(r, record)| self.likelihood.filtered(&self.of_record(r, theta), record))
+            .collect()
+    }
+
+    /// Innovations and filtered states of each record.
+    pub fn states(&self, theta: &[f64]) -> Result<Vec<(Filtered, Signal)>, FilterError> {
+        (self.records.iter().enumerate())
+            .map(|(r, record)| self.likelihood.states(&self.of_record(r, theta), record))
+            .collect()
+    }
+
+    /// Points around θ whose innovations tell their derivatives: (moved θ, distance in φ), one for each entry.
+    pub fn neighbours(&self, theta: &[f64]) -> Vec<(Vec<f64>, f64)> {
+        // Runs are smooth in θ up to a simulator's own tolerance only.
+        let share = if self.is_simulated() { 1.0 } else { 0.1 };
+        let phi = self.coordinates.of(theta);
+        (0..phi.len())
+            .map(|j| {
+                let (moved, distance) = self.coordinates.beside(&phi, j, share);
+                (self.coordinates.theta(&moved), distance)
+            })
+            .collect()
+    }
 }

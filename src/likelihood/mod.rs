@@ -2,6 +2,8 @@
 
 pub(crate) mod ensemble;
 pub mod kalman;
+mod measured;
 mod of_twin;
 
+pub(crate) use measured::{Beliefs, Level, measured};
 pub(crate) use of_twin::{Likelihood, likelihood_of};

@@ -97,7 +97,7 @@ impl Likelihood for Ensemble {
     }
     fn states(&self, theta: &[f64], record: &Record) -> Result<(Filtered, Signal), FilterError> {
         let filtered = self.filtered(theta, record)?;
-        let predicted = filtered.predictions(record.outputs());
+        let predicted = filtered.held_predictions(record.outputs());
         Ok((filtered, predicted))
     }
     fn log_likelihood(

@@ -1,4 +1,4 @@
-use crate::setting::SettingError;
+use crate::setting::{SettingError, number};
 use std::error::Error;
 
 /// A computation that has no result: its input is at fault, or what it evaluates.
@@ -19,10 +19,10 @@ pub enum MathError {
         dimension: usize,
     },
     /// A probability outside [0, 1].
-    #[error("probability = {0}; it must lie in [0, 1]")]
+    #[error("probability = {}; it must lie in [0, 1]", number(*.0))]
     Probability(f64),
     /// A level outside (0, 1).
-    #[error("level = {0}; it must lie strictly between 0 and 1, such as 0.95")]
+    #[error("level = {}; it must lie strictly between 0 and 1, such as 0.95", number(*.0))]
     Level(f64),
     /// More successes than trials.
     #[error("count = {count} of {of}; there cannot be more successes than trials")]
@@ -47,7 +47,7 @@ pub enum MathError {
     #[error("samples has {0} draws; a covariance needs at least 2, a good one 16 for each feature")]
     TooFewDraws(usize),
     /// NaN or infinity among draws.
-    #[error("samples[{row}, {column}] = {value} (draw, feature); leave out draws that diverged")]
+    #[error("samples[{row}, {column}] = {} (draw, feature); leave out draws that diverged", number(*value))]
     Draw {
         /// The draw.
         row: usize,
@@ -67,7 +67,7 @@ pub enum MathError {
         draws: usize,
     },
     /// An ε that is not positive.
-    #[error("epsilon = {0}; it must be positive and finite, such as 1e-8")]
+    #[error("epsilon = {}; it must be positive and finite, such as 1e-8", number(*.0))]
     Epsilon(f64),
     /// A decomposition that overflowed.
     #[error("the covariance could not be decomposed; features near 1e300 need smaller units")]
@@ -91,10 +91,10 @@ pub enum MathError {
         length: usize,
     },
     /// A ridge out of range.
-    #[error("ridge = {0}; it must lie in (0, 0.01], such as 1e-10")]
+    #[error("ridge = {}; it must lie in (0, 0.01], such as 1e-10", number(*.0))]
     Ridge(f64),
     /// A cutoff that is no fraction.
-    #[error("relative_cutoff = {0}; choose one in [0, 1), such as 1e-8")]
+    #[error("relative_cutoff = {}; choose one in [0, 1), such as 1e-8", number(*.0))]
     Cutoff(f64),
     /// NaN or infinity in a matrix or right side.
     #[error(
@@ -106,7 +106,8 @@ pub enum MathError {
     NotGram,
     /// A step of a difference that is not positive, or too small beside its parameter.
     #[error(
-        "step = {step} of parameter {index} cannot be taken; choose about 1e-5 of the parameter's scale"
+        "step = {} of parameter {index} cannot be taken; choose about 1e-5 of the parameter's scale",
+        number(*step)
     )]
     Step {
         /// The parameter.
@@ -116,7 +117,8 @@ pub enum MathError {
     },
     /// θ outside of its bounds.
     #[error(
-        "parameter {index} = {value} is outside of its bounds [{lower}, {upper}]; clamp it first"
+        "parameter {index} = {} is outside of its bounds [{}, {}]; clamp it first",
+        number(*value), number(*lower), number(*upper)
     )]
     Outside {
         /// The parameter.
@@ -129,7 +131,7 @@ pub enum MathError {
         upper: f64,
     },
     /// Bounds that leave a parameter no room.
-    #[error("parameter {index} is held at {value} by its bounds; take it out of θ or widen them")]
+    #[error("parameter {index} is held at {} by its bounds; take it out of θ or widen them", number(*value))]
     NoRoom {
         /// The parameter.
         index: usize,
@@ -156,7 +158,8 @@ pub enum MathError {
     },
     /// An interval that holds no number.
     #[error(
-        "parameter {index} has the bounds [{lower}, {upper}]; the lower must be at most the upper"
+        "parameter {index} has the bounds [{}, {}]; the lower must be at most the upper",
+        number(*lower), number(*upper)
     )]
     EmptyInterval {
         /// The parameter.

@@ -8,9 +8,11 @@
 
 mod cholesky;
 mod clopper_pearson;
+mod convert;
 mod difference;
 mod error;
 mod lagged;
+mod lanes;
 mod least_squares;
 mod quantile;
 mod rounding;
@@ -23,9 +25,11 @@ mod widest;
 #[cfg(test)]
 pub(crate) use clopper_pearson::binomial_bounds;
 pub(crate) use clopper_pearson::clopper_pearson;
+pub(crate) use convert::{one_column, one_row, to_array, to_matrix, to_vector};
 pub(crate) use difference::Stencil;
 pub use error::MathError;
 pub(crate) use lagged::{Lagged, LaggedSignals};
+pub(crate) use lanes::{LANES, Lanes};
 pub(crate) use least_squares::{Fit, LeastSquares, Regressors};
 pub(crate) use quantile::{median, quantile, rank_p_value};
 pub(crate) use rounding::six_digits;

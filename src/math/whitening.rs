@@ -1,4 +1,5 @@
 use super::MathError;
+use super::convert::to_matrix;
 use nalgebra::{DMatrix, DVector};
 use ndarray::ArrayRef2;
 
@@ -168,8 +169,10 @@ impl Whitening {
     /// [`squared_distance`](Self::squared_distance) of each row of `samples`, B × n.
     pub fn squared_distances(&self, samples: &ArrayRef2<f64>) -> Vec<f64> {
         // One product of matrices: thirty times as fast as a product for each row.
-        let (draws, features) = samples.dim();
-        let centred = DMatrix::from_fn(features, draws, |j, i| samples[[i, j]] - self.mean[j]);
+        let mut centred = to_matrix(&samples.t());
+        for mut column in centred.column_iter_mut() {
+            column -= &self.mean;
+        }
         let whitened = &self.matrix * centred;
         whitened.column_iter().map(|w| w.norm_squared()).collect()
     }
@@ -191,7 +194,7 @@ impl Draws {
         {
             return Err(MathError::Draw { row, column, value });
         }
-        let mut centred = DMatrix::from_fn(draws, features, |i, j| samples[[i, j]]);
+        let mut centred = to_matrix(samples);
         let mean = DVector::from_fn(features, |j, _| centred.column(j).mean());
         let scale = ((draws - 1) as f64).sqrt().recip();
         for (mut column, &mean) in centred.column_iter_mut().zip(mean.iter()) {

@@ -1,7 +1,7 @@
 //! Errors of networks, each with its remedy.
 
 use crate::progress::Cancelled;
-use crate::setting::SettingError;
+use crate::setting::{SettingError, number};
 use std::path::PathBuf;
 
 /// Why a network could not be built, trained, evaluated or restored.
@@ -43,7 +43,7 @@ pub enum NetworkError {
         least: usize,
     },
     /// A value is NaN, infinite, or too large for 32 bits.
-    #[error("{what}, row {row}, column {column}: {value} is not a finite 32-bit number")]
+    #[error("{what}, row {row}, column {column}: {} is not a finite 32-bit number", number(*value))]
     NotFinite {
         /// Which matrix.
         what: &'static str,
@@ -67,8 +67,9 @@ pub enum NetworkError {
     },
     /// The loss left the finite numbers.
     #[error(
-        "the loss is not finite in epoch {epoch} at learning rate {learning_rate}; \
-         lower learning_rate or standardise features and targets"
+        "the loss is not finite in epoch {epoch} at learning rate {}; \
+         lower learning_rate or standardise features and targets",
+        number(*learning_rate)
     )]
     Diverged {
         /// The epoch, from 1.

@@ -83,10 +83,10 @@ pub mod layers {
 }
 
 /// A batch of rows of width `C`.
-pub type Batch<C> = Tensor<(usize, C), f32, Cpu, NoneTape>;
+pub(crate) type Batch<C> = Tensor<(usize, C), f32, Cpu, NoneTape>;
 
 /// A batch of rows of width `C` whose gradients are recorded.
-pub type TapedBatch<C> = Tensor<(usize, C), f32, Cpu, OwnedTape<f32, Cpu>>;
+pub(crate) type TapedBatch<C> = Tensor<(usize, C), f32, Cpu, OwnedTape<f32, Cpu>>;
 
 /// Layers on a device that map rows of width `I` to rows of width `O`, with and without a tape.
 ///

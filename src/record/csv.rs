@@ -1,7 +1,8 @@
 //! Records and inputs as CSV files; or as Parquet files with the same columns, in a build with the feature `parquet`.
 //!
-//! A header, then one row a sample: `t` in seconds, uniform to 1e-3 of a step and increasing; inputs `u` or
-//! `u1,u2,…`; outputs `y` or `y1,y2,…`. Rows are counted as an editor counts lines: the header is row 1.
+//! A header, then one row a sample: `t` in seconds, increasing; inputs `u` or `u1,u2,…`; outputs `y` or `y1,y2,…`. An output
+//! that was not measured is an empty cell, `nan` or `NA`. Steps that are the same to 1e-3 count as one. Rows are counted as an
+//! editor counts lines: the header is row 1.
 
 use super::parquet;
 use super::table::Table;
@@ -45,7 +46,7 @@ fn read(path: &Path) -> Result<Table, RecordError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::{Signal, drive_csv_text, write_record};
+    use crate::record::{Signal, drive_csv_text, record_csv_text, write_record};
 
     fn written(text: &str) -> Result<Record, RecordError> {
         let folder = tempfile::tempdir().unwrap();
@@ -68,10 +69,17 @@ mod tests {
 
     #[test]
     fn cells_are_named_by_row_and_column() {
-        for bad in ["NaN", "abc", "", "inf"] {
+        for bad in ["abc", "inf", "-", "N/A"] {
             let text = message(&format!("t,u,y\n0,1,2\n1,1,{bad}\n2,1,2\n"));
             assert!(text.contains("row 3, column y"), "{text}");
             assert!(text.contains(&format!("\"{bad}\"")), "{text}");
+            assert!(text.contains("leave the cell of an output empty"), "{text}");
+        }
+        for missing in ["", "nan", "NaN", "NA"] {
+            let text = message(&format!("t,u,y\n0,1,2\n1,{missing},2\n2,1,2\n"));
+            assert!(text.contains("row 3, column u: no value;"), "{text}");
+            let text = message(&format!("t,u,y\n0,1,2\n1,1,2\n{missing},1,2\n"));
+            assert!(text.contains("row 4, column t: no value;"), "{text}");
         }
     }
 
@@ -87,15 +95,35 @@ mod tests {
     }
 
     #[test]
-    fn time_must_increase_uniformly() {
-        assert!(message("t,y\n0,1\n1,1\n0.5,1\n").contains("row 4, column t"));
+    fn time_must_increase() {
+        for times in ["0.5", "1", "-1"] {
+            let text = message(&format!("t,y\n0,1\n1,1\n{times},1\n"));
+            assert!(text.contains("row 4, column t"), "{text}");
+        }
+        let even = written("t,y\n0,1\n1.0001,1\n2,1\n").unwrap();
         assert!(
-            message("t,y\n0,1\n1,1\n2,1\n4,1\n5,1\n").contains("row 5, column t: 4 s where 3 s")
-        );
-        assert!(
-            written("t,y\n0,1\n1.0001,1\n2,1\n").is_ok(),
+            even.drive().is_uniform(),
             "1e-4 of a step is within tolerance"
         );
+        let tiny = message("t,y\n0,1\n1e-310,1\n2e-310,1\n");
+        assert!(tiny.contains("1e-310"), "{tiny}");
+        let uneven = written("t,y\n10,1\n11,1\n12,1\n14,1\n15,1\n").unwrap();
+        let steps: Vec<f64> = (0..5).map(|k| uneven.drive().step(k)).collect();
+        assert_eq!(steps, [1.0, 1.0, 2.0, 1.0, 1.0]);
+        assert_eq!((uneven.drive().dt(), uneven.drive().time(3)), (1.0, 4.0));
+    }
+
+    #[test]
+    fn missing_outputs_survive_the_file() {
+        let text = "t,u,y1,y2\n0,1,1.5,\n0.25,2,,\n1,3,,-0.5\n";
+        let record = written(&text.replace(",,\n1", ",nan,NA\n1")).unwrap();
+        assert_eq!(record.missing(), 4);
+        assert_eq!(record_csv_text(&record), text);
+        assert_eq!(written(text).unwrap(), record);
+        let text = message("t,y1,y2\n0,1,\n1,1,\n2,1,nan\n");
+        assert!(text.contains("output 2 has no value"), "{text}");
+        let text = message("t,y\n0,\n1,1\n2,\n");
+        assert!(text.contains("1 rows with a measured output"), "{text}");
     }
 
     #[test]

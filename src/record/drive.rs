@@ -1,12 +1,16 @@
 //! The time grid and the inputs of one experiment.
 
 use crate::record::RecordError;
-use ndarray::Array2;
+use ndarray::{Array2, s};
+use std::sync::Arc;
 
-/// Samples by channels: row k belongs to time k·Δt. A system without inputs has zero columns and N rows.
+/// Samples by channels: row k belongs to [`Drive::time`] of k. A system without inputs has zero columns and N rows.
 pub type Signal = Array2<f64>;
 
-/// Step, length and inputs of one experiment, each input held over a step.
+/// Steps that differ by less than this share of the step count as one.
+const UNIFORM: f64 = 1e-3;
+
+/// Time grid and inputs of one experiment, each input held over a step. All steps are Δt, unless times are given.
 ///
 /// ```
 /// use truetwin::record::Drive;
@@ -18,12 +22,14 @@ pub type Signal = Array2<f64>;
 pub struct Drive {
     dt: f64,
     inputs: Signal,
+    /// Seconds from the first sample, one a row, where steps vary.
+    times: Option<Arc<[f64]>>,
 }
 
 impl Drive {
     /// A drive of step Δt = `dt` seconds with `inputs` (N × channels).
     pub fn new(dt: f64, inputs: Signal) -> Result<Self, RecordError> {
-        if !(dt > 0.0 && dt.is_finite()) {
+        if !(dt > 0.0 && dt.is_normal()) {
             return Err(RecordError::Step(dt));
         }
         if inputs.nrows() == 0 {
@@ -45,7 +51,92 @@ impl Drive {
         } else {
             inputs.as_standard_layout().into_owned()
         };
-        Ok(Self { dt, inputs })
+        Ok(Self {
+            dt,
+            inputs,
+            times: None,
+        })
+    }
+
+    /// A drive with one row of `inputs` at each of `times`, in seconds. Times increase; their steps may vary. Steps that
+    /// are the same to 1e-3 become one step Δt, else Δt is the median step.
+    ///
+    /// ```
+    /// use truetwin::record::{Drive, Signal};
+    /// let drive = Drive::with_times(&[0.0, 0.1, 0.4, 0.5], Signal::ones((4, 1)))?;
+    /// assert_eq!((drive.time(2), drive.dt()), (0.4, 0.1));
+    /// assert!((drive.step(1) - 0.3).abs() < 1e-12);
+    /// # Ok::<(), truetwin::record::RecordError>(())
+    /// ```
+    pub fn with_times(times: &[f64], inputs: Signal) -> Result<Self, RecordError> {
+        if times.len() != inputs.nrows() {
+            return Err(RecordError::Times {
+                times: times.len(),
+                inputs: inputs.nrows(),
+            });
+        }
+        if times.len() < 2 {
+            return Err(RecordError::Empty);
+        }
+        for (k, pair) in times.windows(2).enumerate() {
+            let step = pair[1] - pair[0];
+            // Also where a time is NaN.
+            if !(step > 0.0 && step.is_finite()) {
+                return Err(RecordError::TimeOrder {
+                    sample: k + 1,
+                    time: pair[1],
+                    before: pair[0],
+                });
+            }
+            if !step.is_normal() {
+                return Err(RecordError::Step(step));
+            }
+        }
+        let (first, last) = (times[0], times[times.len() - 1]);
+        let dt = (last - first) / (times.len() - 1) as f64;
+        let mut drive = Self::new(dt, inputs)?;
+        let off = |(k, t): (usize, &f64)| (t - first - k as f64 * dt).abs() > UNIFORM * dt;
+        if times.iter().enumerate().any(off) {
+            drive.times = Some(times.iter().map(|t| t - first).collect());
+            let mut steps: Vec<f64> = times.windows(2).map(|t| t[1] - t[0]).collect();
+            let middle = (steps.len() - 1) / 2;
+            drive.dt = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+        }
+        Ok(drive)
+    }
+
+    /// Checks that all steps are the same, as a twin needs it that is told one step.
+    pub(crate) fn check_uniform(&self) -> Result<(), RecordError> {
+        match self.is_uniform() {
+            true => Ok(()),
+            false => Err(RecordError::OneStep),
+        }
+    }
+
+    /// The first samples, at least one of them.
+    pub(crate) fn first(&self, samples: usize) -> Self {
+        let rows = samples.clamp(1, self.samples());
+        Self {
+            dt: self.dt,
+            inputs: self.inputs.slice(s![..rows, ..]).to_owned(),
+            times: self.times.as_ref().map(|times| times[..rows].into()),
+        }
+    }
+
+    /// The same time grid with other inputs, as many rows.
+    pub(crate) fn with_inputs(&self, inputs: Signal) -> Result<Self, RecordError> {
+        let new = Self::new(self.dt, inputs)?;
+        let (given, rows) = (new.samples(), self.samples());
+        match &self.times {
+            Some(_) if given != rows => Err(RecordError::Times {
+                times: rows,
+                inputs: given,
+            }),
+            times => Ok(Self {
+                times: times.clone(),
+                ..new
+            }),
+        }
     }
 
     /// A drive without inputs, N = `samples`.
@@ -53,9 +144,22 @@ impl Drive {
         Self::new(dt, Signal::zeros((samples, 0)))
     }
 
-    /// Step Δt in seconds.
+    /// Step Δt in seconds; the median one where steps vary.
     pub fn dt(&self) -> f64 {
         self.dt
+    }
+
+    /// Step from sample k to the next, in seconds; Δt after the last.
+    pub fn step(&self, k: usize) -> f64 {
+        match &self.times {
+            Some(times) if k + 1 < times.len() => times[k + 1] - times[k],
+            _ => self.dt,
+        }
+    }
+
+    /// Returns `true` if all steps are Δt.
+    pub fn is_uniform(&self) -> bool {
+        self.times.is_none()
     }
 
     /// Number of samples N.
@@ -68,9 +172,15 @@ impl Drive {
         &self.inputs
     }
 
-    /// Time of sample k, in seconds from the first.
+    /// Time of sample k, in seconds from the first; steps of Δt behind the last.
     pub fn time(&self, k: usize) -> f64 {
-        k as f64 * self.dt
+        match &self.times {
+            None => k as f64 * self.dt,
+            Some(times) => {
+                let last = times.len() - 1;
+                times[k.min(last)] + k.saturating_sub(last) as f64 * self.dt
+            }
+        }
     }
 
     /// The inputs at sample k.
@@ -96,9 +206,37 @@ mod tests {
     }
 
     #[test]
+    fn steps_may_vary() {
+        let drive = Drive::with_times(&[5.0, 5.1, 5.4, 5.5], Signal::zeros((4, 0))).unwrap();
+        assert!(!drive.is_uniform());
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
+        for (k, step) in [0.1, 0.3, 0.1, 0.1].into_iter().enumerate() {
+            near(drive.step(k), step);
+        }
+        for (k, time) in [0.0, 0.1, 0.4, 0.5, 0.6, 0.7].into_iter().enumerate() {
+            near(drive.time(k), time);
+        }
+        let even = Drive::with_times(&[1.0, 1.25, 1.5], Signal::ones((3, 1))).unwrap();
+        assert_eq!(even, Drive::new(0.25, Signal::ones((3, 1))).unwrap());
+        let other = drive.with_inputs(Signal::ones((4, 1))).unwrap();
+        assert_eq!((other.time(2), other.input(3)), (drive.time(2), &[1.0][..]));
+        assert!(drive.with_inputs(Signal::ones((5, 1))).is_err());
+        for times in [
+            [0.0, 1.0, 1.0],
+            [0.0, f64::NAN, 2.0],
+            [0.0, 1.0, f64::INFINITY],
+        ] {
+            let error = Drive::with_times(&times, Signal::zeros((3, 0))).unwrap_err();
+            assert!(error.to_string().contains("time must increase"), "{error}");
+        }
+    }
+
+    #[test]
     fn bad_drives_are_refused() {
         let error = |dt, samples| Drive::autonomous(dt, samples).unwrap_err();
         assert!(matches!(error(0.0, 3), RecordError::Step(0.0)));
+        let message = error(5e-312, 3).to_string();
+        assert!(message.starts_with("step = 5e-312 s; choose"), "{message}");
         assert!(matches!(error(0.1, 0), RecordError::Empty));
         let mut inputs = Signal::zeros((3, 1));
         inputs[[1, 0]] = f64::NAN;

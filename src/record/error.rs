@@ -1,5 +1,6 @@
 //! Errors of drives, records and their files.
 
+use crate::setting::number;
 use crate::storage::files::with_remedy;
 use std::path::{Path, PathBuf};
 
@@ -7,8 +8,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordError {
-    /// A step that is no positive number.
-    #[error("step = {0} s; the step must be a positive number of seconds")]
+    /// A step that is not positive, not finite, or too small for a normal number.
+    #[error("step = {} s; choose a positive number of seconds, at least 2.3e-308", number(*.0))]
     Step(f64),
     /// No sample at all.
     #[error("no samples; at least one is needed")]
@@ -21,11 +22,73 @@ pub enum RecordError {
         /// Rows of outputs.
         outputs: usize,
     },
+    /// Times and inputs of different lengths.
+    #[error("{times} times and {inputs} rows of inputs; both need the same number")]
+    Times {
+        /// Times.
+        times: usize,
+        /// Rows of inputs.
+        inputs: usize,
+    },
+    /// A time that does not follow the one before it.
+    #[error(
+        "sample {sample}: {} s follows {} s; time must increase: sort the rows, remove repeated ones",
+        number(*time),
+        number(*before)
+    )]
+    TimeOrder {
+        /// Sample, from 0.
+        sample: usize,
+        /// Its time.
+        time: f64,
+        /// Time of the sample before.
+        before: f64,
+    },
+    /// An output without any value.
+    #[error(
+        "output {channel} has no value; give it at least one, or leave the channel out of record and twin"
+    )]
+    NoValue {
+        /// Channel, from 1.
+        channel: usize,
+    },
+    /// A missing output where every one is needed.
+    #[error(
+        "row {row}, column {column} is missing; features need every output: fill it in, or use `truetwin fit` or `truetwin diagnose`, which take such records"
+    )]
+    Incomplete {
+        /// Row of the file; the header is row 1.
+        row: usize,
+        /// Column of the file.
+        column: String,
+    },
+    /// A step that differs from the others where all need to be the same.
+    #[error(
+        "row {row}, column t: a step of {} s where {} s is usual; features need one step: resample the record, or use `truetwin fit` or `truetwin diagnose`, which take such records",
+        number(*given),
+        number(*expected)
+    )]
+    Uneven {
+        /// Row of the file that the step leads to; the header is row 1.
+        row: usize,
+        /// The step in seconds.
+        given: f64,
+        /// The median step in seconds.
+        expected: f64,
+    },
+    /// Steps that vary where a twin takes one.
+    #[error(
+        "column t: the steps vary, and a black-box twin is simulated with one step; resample the record to one step"
+    )]
+    OneStep,
+    /// Too few rows with an output.
+    #[error("{0} rows with a measured output; at least 2 are needed")]
+    TooFewValues(usize),
     /// No output channel.
     #[error("the record has no output; give at least one column y")]
     NoOutput,
-    /// An input or output that is NaN or infinite.
-    #[error("{kind} {channel}, sample {sample} is {value}; {kind}s must be finite")]
+    /// An input that is NaN or infinite, or an output that is infinite.
+    #[error("{kind} {channel}, sample {sample} is {}; {kind}s must be finite", number(*value))]
     NotFinite {
         /// "input" or "output".
         kind: &'static str,

@@ -1,25 +1,28 @@
 //! A measured experiment.
 
 use super::channels::column_names;
+use crate::math::six_digits;
 use crate::record::{Drive, RecordError, Signal, Signals};
 
-/// Inputs and outputs measured with one step Δt.
+/// Inputs and outputs measured on one time grid. An output that is NaN is missing: it was not measured.
 ///
 /// ```
 /// use truetwin::record::{Drive, Record, Signal};
 /// let drive = Drive::new(0.5, Signal::ones((3, 1)))?;
 /// let record = Record::new(drive, Signal::zeros((3, 1)))?;
 /// assert_eq!(record.outputs().nrows(), 3);
+/// assert!(record.is_complete());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Record {
     drive: Drive,
     outputs: Signal,
 }
 
 impl Record {
-    /// A record of inputs under `drive` and outputs (N × channels).
+    /// A record of inputs under `drive` and outputs (N × channels), NaN where one is missing. Each channel needs a value, and
+    /// two rows need one.
     pub fn new(drive: Drive, outputs: Signal) -> Result<Self, RecordError> {
         if outputs.nrows() != drive.samples() {
             return Err(RecordError::Lengths {
@@ -30,17 +33,27 @@ impl Record {
         if outputs.ncols() == 0 {
             return Err(RecordError::NoOutput);
         }
-        if let Some(((sample, channel), &value)) =
-            outputs.indexed_iter().find(|(_, v)| !v.is_finite())
-        {
-            return Err(RecordError::NotFinite {
-                kind: "output",
-                channel: channel + 1,
-                sample,
-                value,
-            });
+        check_outputs(&outputs, f64::is_infinite)?;
+        if outputs.iter().any(|v| v.is_nan()) {
+            let measured = |v: &f64| !v.is_nan();
+            let mut columns = outputs.columns().into_iter();
+            if let Some(j) = columns.position(|column| !column.iter().any(measured)) {
+                return Err(RecordError::NoValue { channel: j + 1 });
+            }
+            let mut rows = outputs.rows().into_iter();
+            let full = rows.by_ref().filter(|row| row.iter().any(measured)).take(2);
+            let full = full.count();
+            if full < 2 {
+                return Err(RecordError::TooFewValues(full));
+            }
         }
         Ok(Self { drive, outputs })
+    }
+
+    /// As [`new`](Self::new), of simulated outputs, none of which may be missing.
+    pub(crate) fn complete(drive: Drive, outputs: Signal) -> Result<Self, RecordError> {
+        check_outputs(&outputs, |v| !v.is_finite())?;
+        Self::new(drive, outputs)
     }
 
     /// Time grid and inputs.
@@ -56,6 +69,61 @@ impl Record {
     /// Number of samples N.
     pub fn samples(&self) -> usize {
         self.drive.samples()
+    }
+
+    /// Returns `true` if no output is missing.
+    pub fn is_complete(&self) -> bool {
+        self.missing() == 0
+    }
+
+    /// Number of missing outputs, over all rows and channels.
+    pub fn missing(&self) -> usize {
+        self.outputs.iter().filter(|v| v.is_nan()).count()
+    }
+
+    /// Number of rows with an output that is not missing.
+    pub(crate) fn measured_rows(&self) -> usize {
+        let rows = self.outputs.rows().into_iter();
+        rows.filter(|row| row.iter().any(|v| !v.is_nan())).count()
+    }
+
+    /// Checks that no output is missing and all steps are the same, as features need it.
+    ///
+    /// # Errors
+    ///
+    /// [`RecordError::Incomplete`], which names the first place; [`RecordError::Uneven`], which names the oddest step.
+    pub fn check_complete(&self) -> Result<(), RecordError> {
+        let mut cells = self.outputs.indexed_iter();
+        if let Some(((k, j), _)) = cells.find(|(_, v)| v.is_nan()) {
+            return Err(RecordError::Incomplete {
+                row: k + 2,
+                column: column_names("y", self.outputs.ncols()).swap_remove(j),
+            });
+        }
+        let drive = &self.drive;
+        if drive.is_uniform() {
+            return Ok(());
+        }
+        let off = |k: &usize| (drive.step(*k) - drive.dt()).abs();
+        let farthest = (0..self.samples()).max_by(|a, b| off(a).total_cmp(&off(b)));
+        let k = farthest.unwrap_or_default();
+        Err(RecordError::Uneven {
+            row: k + 3,
+            given: six_digits(drive.step(k)),
+            expected: six_digits(drive.dt()),
+        })
+    }
+
+    /// The same cells of other outputs emptied, as many rows and channels.
+    pub(crate) fn with_gaps_in(&self, mut outputs: Signal) -> Signal {
+        if outputs.dim() == self.outputs.dim() {
+            for (to, own) in outputs.iter_mut().zip(&self.outputs) {
+                if own.is_nan() {
+                    *to = f64::NAN;
+                }
+            }
+        }
+        outputs
     }
 
     /// Checks that a twin with these channels can be compared with the record.
@@ -82,6 +150,29 @@ impl Record {
     }
 }
 
+/// Refuses outputs of which one is `wrong`.
+fn check_outputs(outputs: &Signal, wrong: impl Fn(f64) -> bool) -> Result<(), RecordError> {
+    let first = outputs.indexed_iter().find(|(_, v)| wrong(**v));
+    first.map_or(Ok(()), |((sample, channel), &value)| {
+        Err(RecordError::NotFinite {
+            kind: "output",
+            channel: channel + 1,
+            sample,
+            value,
+        })
+    })
+}
+
+/// Missing outputs are equal.
+impl PartialEq for Record {
+    fn eq(&self, other: &Self) -> bool {
+        self.drive == other.drive
+            && self.outputs.dim() == other.outputs.dim()
+            && (self.outputs.iter().zip(&other.outputs))
+                .all(|(a, b)| a == b || (a.is_nan() && b.is_nan()))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -100,5 +191,42 @@ mod tests {
         let record = Record::new(drive, Signal::zeros((3, 1))).unwrap();
         let error = record.check_channels(&Signals::default()).unwrap_err();
         assert!(error.to_string().contains("0 inputs, the twin has 1 (u)"));
+    }
+    #[test]
+    fn outputs_may_be_missing() {
+        let nan = f64::NAN;
+        let record = |outputs: [f64; 6]| {
+            let outputs = Signal::from_shape_vec((3, 2), outputs.to_vec()).unwrap();
+            Record::new(Drive::autonomous(0.1, 3).unwrap(), outputs)
+        };
+        let some = record([1.0, nan, nan, nan, 3.0, 4.0]).unwrap();
+        assert!(!some.is_complete());
+        assert_eq!(some.missing(), 3);
+        assert_eq!(some, some.clone());
+        assert_ne!(some, record([1.0, 2.0, nan, nan, 3.0, 4.0]).unwrap());
+        let emptied = some.with_gaps_in(Signal::ones((3, 2)));
+        assert_eq!(
+            Record::new(some.drive().clone(), emptied)
+                .unwrap()
+                .missing(),
+            3
+        );
+        let refused = some.check_complete().unwrap_err().to_string();
+        assert!(
+            refused.starts_with("row 2, column y2 is missing;"),
+            "{refused}"
+        );
+        let times = [0.0, 0.1, 0.2, 0.5];
+        let uneven = Drive::with_times(&times, Signal::zeros((4, 0))).unwrap();
+        let uneven = Record::new(uneven, Signal::zeros((4, 1))).unwrap();
+        let refused = uneven.check_complete().unwrap_err().to_string();
+        let expected = "row 5, column t: a step of 0.3 s where 0.1 s is usual;";
+        assert!(refused.starts_with(expected), "{refused}");
+        assert!(refused.contains("truetwin fit") && refused.contains("truetwin diagnose"));
+        let message = |outputs| record(outputs).unwrap_err().to_string();
+        let no_value = message([1.0, nan, 2.0, nan, 3.0, nan]);
+        assert!(no_value.starts_with("output 2 has no value;"), "{no_value}");
+        let few = message([1.0, 2.0, nan, nan, nan, nan]);
+        assert!(few.starts_with("1 rows with a measured output;"), "{few}");
     }
 }

@@ -16,7 +16,8 @@ mod table;
 mod write;
 
 pub use channels::{Quantity, Signals};
-pub use csv::{parse_record, read_drive, read_record};
+pub(crate) use csv::parse_record;
+pub use csv::{read_drive, read_record};
 pub use drive::{Drive, Signal};
 pub use error::RecordError;
 pub use measured::Record;

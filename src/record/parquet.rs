@@ -93,6 +93,7 @@ fn line(row: &parquet::record::Row) -> String {
         .map(|(_, field)| match field {
             Field::Double(value) => value.to_string(),
             Field::Float(value) => f64::from(*value).to_string(),
+            Field::Null => String::new(),
             // Anything else that is no number is named by the checks of a cell.
             other => other.to_string().replace([',', '\n', '"'], " "),
         })

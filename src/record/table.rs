@@ -2,6 +2,7 @@
 
 use super::channels::column_names;
 use crate::record::{Drive, Record, RecordError, Signal};
+use crate::setting::number;
 use crate::storage::untrusted::{MOST_NUMBERS, Rows, excerpt, quoted};
 use std::io::{Cursor, Read};
 use std::path::Path;
@@ -15,7 +16,7 @@ const LARGEST: f64 = 1e100;
 
 /// The numbers of a file.
 pub(super) struct Table {
-    dt: f64,
+    times: Vec<f64>,
     inputs: Signal,
     outputs: Signal,
 }
@@ -29,7 +30,7 @@ impl Table {
                 format!("{names}: an input file has t and inputs alone; remove the output columns");
             return Err(RecordError::file(path, problem));
         }
-        Drive::new(self.dt, self.inputs).map_err(|error| RecordError::file(path, error))
+        Drive::with_times(&self.times, self.inputs).map_err(|error| RecordError::file(path, error))
     }
 
     /// The table as a record, which needs outputs.
@@ -38,7 +39,7 @@ impl Table {
             let problem = "no output column; a record needs y, or y1,y2,…";
             return Err(RecordError::file(path, problem));
         }
-        (Drive::new(self.dt, self.inputs))
+        (Drive::with_times(&self.times, self.inputs))
             .and_then(|drive| Record::new(drive, self.outputs))
             .map_err(|error| RecordError::file(path, error))
     }
@@ -77,7 +78,7 @@ impl Table {
                 return Err(large(format!("more than {MOST_NUMBERS} numbers")));
             }
             for ((cell, &place), name) in cells.iter().zip(&places).zip(&header) {
-                row[place] = number(cell).map_err(|problem| {
+                row[place] = cell_value(cell, name).map_err(|problem| {
                     let row = cells.position().map_or(t.len() + 2, |p| p.line() as usize);
                     RecordError::cell(path, row, name, problem)
                 })?;
@@ -91,13 +92,13 @@ impl Table {
             let problem = format!("{rows} rows of data; at least 2 are needed to know the step");
             return Err(RecordError::file(path, problem));
         }
-        let dt = uniform_step(path, t)?;
+        check_order(path, &t)?;
         let signal = |width: usize, values: Vec<f64>| {
             Signal::from_shape_vec((rows, width), values)
                 .map_err(|error| RecordError::file(path, error))
         };
         Ok(Self {
-            dt,
+            times: t,
             inputs: signal(inputs, u)?,
             outputs: signal(outputs, y)?,
         })
@@ -117,8 +118,22 @@ fn check_encoding(start: &[u8]) -> Result<(), String> {
     Ok(())
 }
 
-/// Parses a cell.
-fn number(cell: &str) -> Result<f64, String> {
+/// Parses a cell of a column. An output may be missing, which is NaN here.
+fn cell_value(cell: &str, column: &str) -> Result<f64, String> {
+    let missing = cell.is_empty() || cell == "NA" || cell.eq_ignore_ascii_case("nan");
+    match column.as_bytes().first() {
+        _ if !missing => parse_number(cell),
+        Some(b'y') => Ok(f64::NAN),
+        Some(b'u') => Err(
+            "no value; an input is needed in each row: give the one that acted, or remove the row"
+                .into(),
+        ),
+        _ => Err("no value; each row needs its time: give it, or remove the row".into()),
+    }
+}
+
+/// Parses a number.
+fn parse_number(cell: &str) -> Result<f64, String> {
     match cell.parse::<f64>() {
         Ok(value) if value.is_finite() && value.abs() > LARGEST => Err(format!(
             "{} is beyond ±{LARGEST:e}, the largest value of a record; correct or remove the row",
@@ -132,7 +147,7 @@ fn number(cell: &str) -> Result<f64, String> {
             ))
         }
         _ => Err(format!(
-            "\"{}\" is no finite number; correct or remove the row",
+            "\"{}\" is no finite number; correct it, or leave the cell of an output empty if it was not measured",
             quoted(cell)
         )),
     }
@@ -227,33 +242,25 @@ fn place(name: &str, inputs: usize) -> usize {
     }
 }
 
-/// The common step of a time column.
-fn uniform_step(path: &Path, t: Vec<f64>) -> Result<f64, RecordError> {
-    let span = t[t.len() - 1] - t[0];
-    let dt = span / (t.len() - 1) as f64;
-    if let Some(k) = (1..t.len()).find(|&k| t[k] <= t[k - 1]) {
-        let problem = format!(
-            "{} s follows {} s; time must increase: sort the rows, remove repeated ones",
-            t[k],
-            t[k - 1]
-        );
-        return Err(RecordError::cell(path, k + 2, "t", problem));
+/// Checks that time increases from row to row, by steps that can be computed with.
+fn check_order(path: &Path, t: &[f64]) -> Result<(), RecordError> {
+    for (k, pair) in t.windows(2).enumerate() {
+        let step = pair[1] - pair[0];
+        if step <= 0.0 {
+            let problem = format!(
+                "{} s follows {} s; time must increase: sort the rows, remove repeated ones",
+                number(pair[1]),
+                number(pair[0])
+            );
+            return Err(RecordError::cell(path, k + 3, "t", problem));
+        }
+        if !step.is_normal() {
+            let problem = format!(
+                "column t: a step of {} s is too small to compute with; write t in seconds",
+                number(step)
+            );
+            return Err(RecordError::file(path, problem));
+        }
     }
-    let off = |k: usize, expected: f64| {
-        let problem = format!(
-            "{} s where {expected} s was expected; time must increase by the same step to 1e-3 of it: resample the record",
-            t[k]
-        );
-        RecordError::cell(path, k + 2, "t", problem)
-    };
-    // A single gap shifts the mean step: name the row where the steps first change, not where they add up.
-    let first = t[1] - t[0];
-    if let Some(k) = (1..t.len()).find(|&k| (t[k] - t[0] - k as f64 * dt).abs() > 1e-3 * dt) {
-        let jump = (1..t.len()).find(|&k| (t[k] - t[k - 1] - first).abs() > 1e-3 * first);
-        return Err(jump.map_or_else(
-            || off(k, t[0] + k as f64 * dt),
-            |k| off(k, t[k - 1] + first),
-        ));
-    }
-    Ok(dt)
+    Ok(())
 }

@@ -10,7 +10,8 @@ pub(crate) fn drive_csv_text(drive: &Drive) -> String {
     csv_text(drive, &Signal::zeros((drive.samples(), 0)))
 }
 
-/// The text of a record file; reading it gives the same bits of u and y.
+/// The text of a record file; reading it gives the same bits of u and y, and of t where steps vary. A missing output is an
+/// empty cell.
 pub(crate) fn record_csv_text(record: &Record) -> String {
     csv_text(record.drive(), record.outputs())
 }
@@ -22,9 +23,16 @@ fn csv_text(drive: &Drive, outputs: &Signal) -> String {
     let mut text = header.join(",");
     text.push('\n');
     for k in 0..drive.samples() {
-        text.push_str(&rounded_time(drive.time(k), drive.dt()).to_string());
+        let t = match drive.is_uniform() {
+            true => rounded_time(drive.time(k), drive.dt()),
+            false => drive.time(k),
+        };
+        text.push_str(&t.to_string());
         for value in drive.input(k).iter().chain(outputs.row(k)) {
-            text.push_str(&format!(",{value}"));
+            text.push(',');
+            if !value.is_nan() {
+                text.push_str(&value.to_string());
+            }
         }
         text.push('\n');
     }

@@ -2,10 +2,10 @@
 //!
 //! | result of | JSON | text | pictures and pages |
 //! |---|---|---|---|
-//! | `estimate` | [`estimate_json`] | [`estimate_text`], [`trajectories_csv`] | [`overlay_svg`] |
+//! | `estimate` | [`estimate_json`] | [`estimate_text`] | [`overlay_svg`] |
+//! | `fit` | [`fit_json`] | [`fit_text`] | [`overlay_svg`] |
 //! | `diagnose` | [`gap_json`] | [`gap_text`] | [`gap_html`], [`gap_pictures`] |
-//! | `reproduce` | [`reproduce_json`] | [`reproduce_text`] | [`mean_runs_svg`], [`first_run_svg`] |
-//! | `withheld` | [`scorecard_json`] | [`scorecard_text`] | [`scorecard_html`] |
+//! | `withheld` | | | [`scorecard_html`] |
 //!
 //! ```
 //! use truetwin::diagnose::{DiagnoseSettings, diagnose};
@@ -30,6 +30,7 @@
 mod chart;
 mod digits;
 mod estimate;
+mod fit;
 #[cfg(test)]
 mod fixture;
 mod gap;
@@ -39,8 +40,11 @@ mod scorecard;
 mod table;
 mod units;
 
-pub use estimate::{estimate_json, estimate_text, overlay_svg, trajectories_csv};
+pub(crate) use estimate::trajectories_csv;
+pub use estimate::{estimate_json, estimate_text, overlay_svg};
+pub use fit::{fit_json, fit_text};
 pub(crate) use gap::NEXT_INPUT;
 pub use gap::{gap_html, gap_json, gap_pictures, gap_text};
-pub use reproduce::{first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
-pub use scorecard::{scorecard_html, scorecard_json, scorecard_text};
+pub(crate) use reproduce::{first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
+pub use scorecard::scorecard_html;
+pub(crate) use scorecard::{scorecard_json, scorecard_text};

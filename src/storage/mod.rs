@@ -5,14 +5,16 @@
 //! | write a file that appears complete or not at all | `files` |
 //! | write a folder likewise, remove leftovers of killed processes | `unfinished` |
 //! | read files of others, within limits | `untrusted` |
-//! | keep pieces of long work in a folder, share it among jobs and ranks | [`work`] |
+//! | keep pieces of long work in a folder, share it among jobs and ranks | `work` |
 
 mod error;
 pub(crate) mod files;
+#[doc(hidden)]
+pub mod fuzzing;
 mod remedy;
 mod unfinished;
 pub(crate) mod untrusted;
-pub mod work;
+pub(crate) mod work;
 
 pub use error::StorageError;
 pub(crate) use unfinished::{NewFolder, sweep_beside};

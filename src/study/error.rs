@@ -1,6 +1,8 @@
 //! The error of a study.
 
 use crate::effect::EffectError;
+use crate::likelihood::kalman::FilterError;
+use crate::progress::Cancelled;
 use crate::record::RecordError;
 use crate::setting::did_you_mean;
 use crate::storage::files::with_remedy;
@@ -46,12 +48,33 @@ pub enum StudyError {
     /// An effect does not fit the twin.
     #[error(transparent)]
     Effect(#[from] EffectError),
+    /// An effect of the study file is unknown, or does not fit the twin.
+    #[error("{}, line {line}: {error}", path.display())]
+    EffectAt {
+        /// File.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// The problem there, and the remedy.
+        error: EffectError,
+    },
     /// The twin's own parameters, `[fixed]` or `[library]` are wrong.
     #[error("{0}")]
     Table(String),
     /// Step, length or input are wrong, or a record has another step.
     #[error("{0}")]
     Plan(String),
+    /// The likelihood of a record cannot be computed.
+    #[error(transparent)]
+    Filter(#[from] FilterError),
+    /// The work was stopped.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// No parameters fit a record.
+    #[error(
+        "the twin cannot be filtered at any parameters that were tried; check units, step and [bounds]"
+    )]
+    NoFit,
     /// A record, its file, or its channels are wrong.
     #[error(transparent)]
     Record(#[from] RecordError),

@@ -1,16 +1,18 @@
 //! The study file: a twin in the user's own setting.
 
-use crate::effect::{EffectEntry, EffectPattern};
+use crate::effect::{EffectEntry, EffectError, EffectPattern};
 use crate::feature::FeatureRecipe;
 use crate::record::read_drive;
+use crate::setting::number;
 use crate::storage::files::folder;
 use crate::storage::untrusted::{MESSAGE, check_names, one_line, read_text};
 use crate::study::error::StudyError;
+use crate::study::lines::{line, with_line};
 use crate::study::plan::InputPlan;
-use crate::twin::{Interval, Level};
+use crate::twin::{Hold, Interval, NoiseLevel, StartLevel};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Longest study file, in bytes: a hundred times one that names every parameter and effect.
@@ -24,6 +26,8 @@ const MOST: u64 = 1 << 20;
 /// step = 4.0
 /// samples = 1024
 /// input = { levels = [0.5, 6.0], hold = 25 }   # or a file: "U.csv"
+/// hold = "linear"   # inputs on the line between samples; "zero" holds them
+/// substeps = 4      # steps of the integrator within a sample
 /// [prior]
 /// k1 = [0.01, 0.1]
 /// start.h1 = [0.0, 10.0]
@@ -34,10 +38,11 @@ const MOST: u64 = 1 << 20;
 /// [limits]
 /// h1 = [0.0, 10.0]
 /// [noise]
-/// h1 = 0.0          # standard deviation of the increment a step
-/// y = "estimate"    # or a standard deviation
+/// h1 = 0.1          # declared: standard deviation of the increment a step of the study
+/// h2 = { std = 0.05, known = true, per = "second" }   # not fitted; in units of the state per √s
+/// y = "estimate"    # a parameter of its own, which an estimator learns
 /// [start]
-/// h1 = "estimate"   # or a value
+/// h1 = { mean = 2.0, std = 0.5 }   # or a value that is known, or "estimate"
 /// [features]
 /// kind = "deviation"
 /// blocks = 64
@@ -53,43 +58,46 @@ pub struct StudyFile {
     pub twin: String,
     /// Step, length and input of simulated records.
     #[serde(skip_serializing_if = "RecordTable::is_empty")]
-    pub record: RecordTable,
+    pub(crate) record: RecordTable,
     /// Prior boxes.
     #[serde(
         skip_serializing_if = "BTreeMap::is_empty",
         deserialize_with = "dotted"
     )]
-    pub prior: BTreeMap<String, Interval>,
+    pub(crate) prior: BTreeMap<String, Interval>,
     /// Physical bounds.
     #[serde(
         skip_serializing_if = "BTreeMap::is_empty",
         deserialize_with = "dotted"
     )]
-    pub bounds: BTreeMap<String, Interval>,
+    pub(crate) bounds: BTreeMap<String, Interval>,
     /// Parameters that are known.
     #[serde(
         skip_serializing_if = "BTreeMap::is_empty",
         deserialize_with = "dotted"
     )]
-    pub fixed: BTreeMap<String, f64>,
+    pub(crate) fixed: BTreeMap<String, f64>,
     /// Limits of states.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub limits: BTreeMap<String, Interval>,
+    pub(crate) limits: BTreeMap<String, Interval>,
     /// Noise of states and outputs.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub noise: BTreeMap<String, Level>,
+    pub(crate) noise: BTreeMap<String, NoiseLevel>,
     /// Starts of states.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub start: BTreeMap<String, Level>,
+    pub(crate) start: BTreeMap<String, StartLevel>,
     /// Features, in place of the preset's.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub features: Option<Arc<dyn FeatureRecipe>>,
+    pub(crate) features: Option<Arc<dyn FeatureRecipe>>,
     /// Effects added to the twin.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub effect: Vec<EffectEntry>,
+    pub(crate) effect: Vec<EffectEntry>,
     /// Which effects a diagnosis may name.
     #[serde(skip_serializing_if = "Library::is_empty")]
-    pub library: Library,
+    pub(crate) library: Library,
+    /// Path and text that it was parsed from, for the lines in messages; none if it was made in the program.
+    #[serde(skip)]
+    pub(crate) origin: Option<(PathBuf, Arc<str>)>,
 }
 
 /// `[record]`.
@@ -105,11 +113,22 @@ pub struct RecordTable {
     /// Inputs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub input: Option<InputPlan>,
+    /// Inputs between samples, also of measured records.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hold: Option<Hold>,
+    /// Steps of the integrator within a sample, also of measured records.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub substeps: Option<usize>,
 }
 
 impl RecordTable {
     fn is_empty(&self) -> bool {
         *self == Self::default()
+    }
+
+    /// Returns `true` if it says what simulated records look like.
+    pub(crate) fn is_plan(&self) -> bool {
+        self.step.is_some() || self.samples.is_some() || self.input.is_some()
     }
 }
 
@@ -148,9 +167,10 @@ impl StudyFile {
                 || record.samples.is_some_and(|n| n != samples);
             if other {
                 return Err(StudyError::Plan(format!(
-                    "{}: [record] contradicts {}, which has {samples} samples, step {step} s; leave step and samples out",
+                    "{}: [record] contradicts {}, which has {samples} samples, step {} s; leave step and samples out",
                     path.display(),
-                    input.display()
+                    input.display(),
+                    number(step)
                 )));
             }
             (record.step, record.samples) = (Some(step), Some(samples));
@@ -170,14 +190,22 @@ impl StudyFile {
             return Err(wrong(1, &format!("more than {} MiB of text", MOST >> 20)));
         }
         let syntax = |error: toml::de::Error| {
-            let at = error.span().map_or(0, |span| span.start);
-            let before = text.bytes().take(at);
-            wrong(before.filter(|b| *b == b'\n').count() + 1, error.message())
+            let start = error.span().map_or(0, |span| span.start);
+            wrong(line(text, start), error.message())
         };
-        let file = toml::from_str(text).map_err(syntax)?;
+        let mut file: Self = toml::from_str(text).map_err(syntax)?;
         let table = toml::from_str(text).map_err(syntax)?;
         check_names(&table).map_err(|problem| wrong(1, &problem))?;
+        file.origin = Some((path.into(), text.into()));
         Ok(file)
+    }
+
+    /// Adds to the error of effect `index` its line, if the file was parsed from a text.
+    pub(super) fn effect_error(&self, index: usize, error: EffectError) -> StudyError {
+        match (&self.origin, self.effect.get(index)) {
+            (Some(origin), Some(entry)) => with_line(error, origin, index, entry),
+            _ => error.into(),
+        }
     }
 }
 
@@ -227,6 +255,8 @@ mod tests {
             step = 4
             samples = 1024
             input = { levels = [0.5, 6.0], hold = 25 }
+            hold = "linear"
+            substeps = 4
             [prior]
             k1 = [0.01, 0.1]
             start.h1 = [0, 10]
@@ -249,10 +279,20 @@ mod tests {
         "#;
         let file = parse(text).unwrap();
         assert_eq!(file.prior["start.h1"], Interval::new(0.0, 10.0).unwrap());
-        assert_eq!(file.noise["y"], Level::Estimate);
-        assert_eq!(file.start["h2"], Level::Known(5.2));
-        let again = parse(&toml::to_string(&file).unwrap()).unwrap();
-        assert_eq!(format!("{file:?}"), format!("{again:?}"));
+        assert_eq!(file.noise["y"], NoiseLevel::Estimate);
+        assert_eq!(
+            file.start["h2"],
+            StartLevel::Declared {
+                mean: 5.2,
+                std: 0.0
+            }
+        );
+        let written = toml::to_string(&file).unwrap();
+        let again = parse(&written).unwrap();
+        assert_eq!(written, toml::to_string(&again).unwrap());
+        for part in ["start.h1", "inf", "sensor-lag", "arx"] {
+            assert!(written.contains(part), "{written}");
+        }
     }
 
     #[test]
@@ -268,6 +308,12 @@ mod tests {
             ),
             ("twin = 'x'\n[features]\nkind = 'arma'\n", "`arx`"),
             ("twin = \n", "s.toml, line 1"),
+            (
+                "twin = 'x'\n[record]\nhold = 'cubic'\n",
+                "s.toml, line 3: unknown variant `cubic`, expected `zero` or `linear`",
+            ),
+            ("twin = 'x'\n[record]\nsubsteps = 1e9\n", "s.toml, line 3"),
+            ("twin = 'x'\n[record]\nsubsteps = -1\n", "s.toml, line 3"),
             ("twin = 'x'\n[noise]\ny = 'guess'\n", "s.toml, line 3"),
         ] {
             let message = parse(text).unwrap_err();

@@ -2,19 +2,27 @@
 
 mod error;
 mod file;
+mod fit;
+mod lines;
 mod manifest;
 mod plan;
 
 pub use error::StudyError;
-pub use file::{Library, RecordTable, StudyFile};
-pub use plan::{DriveSource, InputPlan, Levels, RecordPlan};
+pub use file::StudyFile;
+pub(crate) use file::{Library, RecordTable};
+pub(crate) use plan::InputPlan;
+#[cfg(feature = "fmi")]
+pub(crate) use plan::Levels;
+pub use plan::{DriveSource, RecordPlan};
 
 use crate::effect::{
-    Catalogue, Effect, EffectKey, EffectKind, EffectPattern, augment, given_magnitudes,
+    Catalogue, Effect, EffectError, EffectKey, EffectKind, EffectPattern, augment, given_magnitudes,
 };
 use crate::record::Record;
 use crate::setting::did_you_mean;
-use crate::twin::{Adaptation, DigitalTwin, Role, Twin, TwinError, adapt, check_twin, fix};
+use crate::twin::{
+    Adaptation, DigitalTwin, MOST_SUBSTEPS, Role, Stepping, Twin, TwinError, adapt, check_twin, fix,
+};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -128,12 +136,15 @@ impl Study {
             bounds: part(&file.bounds, true),
             ..Adaptation::default()
         };
-        let effects = (file.effect.iter())
-            .map(|entry| self.catalogue.resolve(entry))
+        let effects = (file.effect.iter().enumerate())
+            .map(|(index, entry)| {
+                (self.catalogue.resolve(entry)).map_err(|error| file.effect_error(index, error))
+            })
             .collect::<Result<Vec<_>, _>>()?;
-        let mut twin = adapt(self.base.clone(), &first, step)
+        let mut twin = adapt(self.stepped(&file.record)?, &first, step)
             .map_err(|error| self.naming_magnitudes(error, &effects))?;
-        twin = augment(twin, effects.clone())?;
+        twin =
+            augmented(&twin, &effects).map_err(|(index, error)| file.effect_error(index, error))?;
         if second != Adaptation::default() {
             twin = adapt(twin, &second, step)?;
         }
@@ -150,6 +161,7 @@ impl Study {
             step,
             samples,
             input,
+            ..
         } = file.record.clone();
         Ok(Self {
             twin,
@@ -160,6 +172,30 @@ impl Study {
             },
             file: file.clone(),
             ..self.clone()
+        })
+    }
+
+    /// Returns the twin as registered, with the substeps and the hold of a file.
+    fn stepped(&self, record: &RecordTable) -> Result<Twin, StudyError> {
+        let (hold, substeps) = (record.hold, record.substeps);
+        let (key, value) = match (hold, substeps) {
+            (None, None) => return Ok(self.base.clone()),
+            (_, Some(n)) => ("substeps", n),
+            (Some(_), None) => ("hold", 1),
+        };
+        if !(1..=MOST_SUBSTEPS).contains(&value) {
+            return Err(StudyError::Plan(format!(
+                "[record] substeps = {value}; choose between 1 and {MOST_SUBSTEPS}"
+            )));
+        }
+        let change = |stepping: &mut Stepping| {
+            stepping.hold = hold.unwrap_or(stepping.hold);
+            stepping.substeps = substeps.unwrap_or(stepping.substeps);
+        };
+        self.base.stepped(change).ok_or_else(|| {
+            StudyError::Plan(format!(
+                "[record] {key} needs the twin's equations, which a black box does not show; remove it"
+            ))
         })
     }
 
@@ -257,16 +293,27 @@ impl Study {
         self.plan.prepare(&self.twin.signals())
     }
 
-    /// Checks whether a record has the step and the channels of this study.
+    /// Checks whether features can be taken of a record: it has the step and the channels of this study, and no output is
+    /// missing.
     pub fn check_record(&self, record: &Record) -> Result<(), StudyError> {
         record.check_channels(&self.twin.signals())?;
+        record.check_complete()?;
         self.plan.check_step(record)
     }
+}
+
+/// Adds effects to a twin; an error comes with the index of the first effect that cannot be added.
+fn augmented(twin: &Twin, effects: &[Effect]) -> Result<Twin, (usize, EffectError)> {
+    (1..=effects.len()).try_fold(twin.clone(), |_, n| {
+        augment(twin.clone(), effects[..n].to_vec()).map_err(|error| (n - 1, error))
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::{Drive, Signal};
+    use crate::twin::{Noise, ParameterSpace, SimulationError};
     use crate::twins::CascadedTanks;
 
     fn refused(tables: &str) -> String {
@@ -283,6 +330,85 @@ mod tests {
         let message = refused(&format!("[prior]\nk9 = [0.0, 1.0]\n{effect}"));
         for name in ["k9", "k1, k2, k3, k4", "sensor-lag@sensor.tau"] {
             assert!(message.contains(name), "{message}");
+        }
+    }
+
+    #[test]
+    fn substeps_have_a_range_and_need_equations() {
+        for n in ["0", "1000000000"] {
+            let message = refused(&format!("[record]\nsubsteps = {n}"));
+            assert_eq!(
+                message,
+                format!("[record] substeps = {n}; choose between 1 and 1000")
+            );
+        }
+        struct Boxed;
+        impl DigitalTwin for Boxed {
+            fn parameters(&self) -> ParameterSpace {
+                DigitalTwin::parameters(&CascadedTanks)
+            }
+            fn simulate(
+                &self,
+                theta: &[f64],
+                drive: &Drive,
+                noise: Noise,
+            ) -> Result<Signal, SimulationError> {
+                DigitalTwin::simulate(&CascadedTanks, theta, drive, noise)
+            }
+        }
+        let plan = RecordPlan::levels(0.5, 60, 0.0, 3.0, 30);
+        let study = Study::new("boxed", Boxed, plan).unwrap();
+        for key in ["hold = 'linear'", "substeps = 2"] {
+            let text = format!("twin = 'boxed'\n[record]\n{key}");
+            let file = StudyFile::parse(&text, "s.toml".as_ref()).unwrap();
+            let message = study.configure(&file).unwrap_err().to_string();
+            let name = key.split(' ').next().unwrap();
+            assert!(
+                message.starts_with(&format!("[record] {name} needs")),
+                "{message}"
+            );
+            assert!(message.ends_with("remove it"), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_wrong_effect_is_named_by_its_line() {
+        let first = "[[effect]]\nid = 'sensor-lag'\ntarget = 'sensor'\n";
+        for (second, expected) in [
+            (
+                "id = 'lagg'\ntarget = 'sensor'",
+                "line 6: unknown effect id \"lagg\"",
+            ),
+            (
+                "id = 'state-ceiling'\ntarget = 'h9'\nto = 'h2'",
+                "line 7: effect state-ceiling: the twin has no state \"h9\"",
+            ),
+            (
+                "id = 'state-ceiling'\ntarget = 'h1'\nto = 'h9'",
+                "line 8: effect state-ceiling: the twin has no state \"h9\"",
+            ),
+            (
+                "id = 'sensor-bias'\ntarget = 'sensor'\nfrom = 'h1'",
+                "line 8: effect sensor-bias has no from",
+            ),
+            (
+                "id = 'sensor-lag'\ntarget = 'sensor'",
+                "line 7: effect sensor-lag on sensor is given twice",
+            ),
+            (
+                "id = 'sensor-bias'\ntarget = 'sensor'\nmagnitudes = { ofset = 1 }",
+                "line 8: effect sensor-bias has no magnitude \"ofset\"",
+            ),
+            (
+                "id = 'sensor-bias'\ntarget = 'sensor'\n[effect.magnitudes]\noffset = nan",
+                "line 9: effect sensor-bias: offset = NaN",
+            ),
+        ] {
+            let message = refused(&format!("{first}[[effect]]\n{second}\n"));
+            assert!(
+                message.starts_with(&format!("s.toml, {expected}")),
+                "{message}"
+            );
         }
     }
 

@@ -1,6 +1,7 @@
 //! Plan of simulated records: step, length, input.
 
 use crate::record::{Drive, Record, RecordError, Signal, Signals, read_drive};
+use crate::setting::number;
 use crate::storage::untrusted::MOST_NUMBERS;
 use crate::study::error::StudyError;
 use crate::twin::{Interval, Noise};
@@ -42,7 +43,7 @@ pub struct Levels {
 ///
 /// let with_input = RecordPlan::levels(0.1, 300, 0.0, 1.0, 20); // levels in [0, 1], each for 20 samples
 /// let without = RecordPlan::autonomous(0.1, 300);
-/// assert!(with_input.input.is_some() && without.input.is_none());
+/// assert_eq!((with_input.samples, without.step), (300, 0.1));
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordPlan {
@@ -51,7 +52,7 @@ pub struct RecordPlan {
     /// Samples N.
     pub samples: usize,
     /// Inputs; `None` for a twin without.
-    pub input: Option<InputPlan>,
+    pub(crate) input: Option<InputPlan>,
 }
 
 impl RecordPlan {
@@ -122,6 +123,12 @@ impl RecordPlan {
 
     fn read(&self, path: &Path, channels: usize) -> Result<Drive, StudyError> {
         let drive = read_drive(path)?;
+        if !drive.is_uniform() {
+            return Err(StudyError::Plan(format!(
+                "{}, column t: the steps vary; simulated records need one step: resample the inputs",
+                path.display()
+            )));
+        }
         let given = drive.inputs().ncols();
         if given != channels {
             return Err(StudyError::Plan(format!(
@@ -136,6 +143,7 @@ impl RecordPlan {
     pub fn check_step(&self, record: &Record) -> Result<(), StudyError> {
         let (given, expected) = (record.drive().dt(), self.step);
         if (given - expected).abs() > 1e-3 * expected {
+            let (given, expected) = (number(given), number(expected));
             return Err(StudyError::Plan(format!(
                 "the record's step is {given} s, the study's {expected} s; resample the record, or set [record] step = {given} in a study file and pretrain again"
             )));

@@ -1,13 +1,62 @@
-//! One step of any equations: of one state, or of all points of a filter at once.
+//! One step of any equations; the points of several filters.
 
+use super::integrator::{Between, Refined};
+use super::points::{gather, scatter};
 use super::simulation::simulate_equations;
+use crate::math::Lanes;
 use crate::record::{Drive, Signal};
-use crate::twin::{Advance, Noise, Now, Points, SimulationError, StateSpace, Workspace};
+use crate::twin::{
+    Advance, Hold, Interval, LanePoints, Layout, Noise, Now, Points, SimulationError, StateSpace,
+    Stepping, Workspace,
+};
+
+/// States of a twin in lanes, at most.
+const MOST: usize = 4;
+
+impl Workspace {
+    /// For the states of `twin`, and its substeps.
+    pub fn new(twin: &(impl StateSpace + ?Sized)) -> Self {
+        let outline = twin.outline();
+        let stepping = twin.stepping();
+        let refined = (stepping != Stepping::default()).then(|| {
+            let limits = twin.limits().into_iter().enumerate();
+            Box::new(Refined {
+                substeps: stepping.substeps.max(1),
+                limits: limits
+                    .filter(|(_, limit)| *limit != Interval::EVERYTHING)
+                    .collect(),
+                inputs: vec![0.0; outline.inputs.len()],
+            })
+        });
+        let mut work = Self::of_states(outline.states.len());
+        work.refined = refined;
+        work
+    }
+}
+
+impl<'a> Between<'a> {
+    /// Samples of a drive, if `twin` joins inputs by lines; none if it holds them. The last input is held.
+    pub fn rows(twin: &(impl StateSpace + ?Sized), drive: &'a Drive) -> Vec<Self> {
+        let last = drive.samples() - 1;
+        match twin.stepping().hold {
+            Hold::Zero => vec![],
+            Hold::Linear => (0..=last)
+                .map(|k| Self {
+                    next: drive.input((k + 1).min(last)),
+                    share: 0.0,
+                })
+                .collect(),
+        }
+    }
+}
 
 impl<T: StateSpace> Advance for T {
     #[inline]
     fn advance(&self, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
         self.update(now, x);
+        if work.refined.is_some() {
+            return advance_refined(self, now, x, work);
+        }
         self.integrator()
             .step(now, x, work, |now, x, dx| self.drift(now, x, dx));
     }
@@ -21,96 +70,328 @@ impl<T: StateSpace> Advance for T {
         simulate_equations(self, theta, drive, noise)
     }
 
-    fn advance_each(&self, now: &Now<'_>, points: Points<'_>, work: &mut Workspace) -> bool {
+    fn advance_lanes(&self, now: &[Now<'_>], points: LanePoints<'_>, work: &mut Workspace) -> bool {
         // Loops of known length, for the sizes of most twins.
         match points.shifts.len() {
-            1 => advance_each(self, 1, now, points, work),
-            2 => advance_each(self, 2, now, points, work),
-            3 => advance_each(self, 3, now, points, work),
-            n => advance_each(self, n, now, points, work),
+            1 => advance_lanes(self, 1, now, points, work),
+            2 => advance_lanes(self, 2, now, points, work),
+            3 => advance_lanes(self, 3, now, points, work),
+            n => advance_lanes(self, n, now, points, work),
         }
     }
 
-    fn observe_each(&self, now: &Now<'_>, (n, p): (usize, usize), points: &[f64], y: &mut [f64]) {
-        for (x, y) in points.chunks_exact(n).zip(y.chunks_exact_mut(p)) {
-            self.observe(now, x, y);
+    fn observe_lanes(
+        &self,
+        now: &[Now<'_>],
+        n: usize,
+        x: &[Lanes],
+        y: &mut [Lanes],
+        buffer: &mut [f64],
+    ) {
+        match n {
+            1 => observe_lanes(self, 1, now, x, y, buffer),
+            2 => observe_lanes(self, 2, now, x, y, buffer),
+            3 => observe_lanes(self, 3, now, x, y, buffer),
+            n => observe_lanes(self, n, now, x, y, buffer),
         }
     }
 
-    fn readout_each(&self, now: &Now<'_>, p: usize, y: &mut [f64]) -> bool {
-        match p {
-            1 => readout_each(self, 1, now, y),
-            p => readout_each(self, p, now, y),
+    fn noise_lanes(&self, now: &[Now<'_>], process: &mut [Lanes], measurement: &mut Lanes) {
+        match process.len() {
+            1 => noise_lanes(self, 1, now, process, measurement),
+            2 => noise_lanes(self, 2, now, process, measurement),
+            3 => noise_lanes(self, 3, now, process, measurement),
+            n => noise_lanes(self, n, now, process, measurement),
         }
+    }
+
+    fn readout_lanes(&self, now: &[Now<'_>], y: &mut [Lanes]) -> bool {
+        let mut changed = false;
+        for (lane, at) in now.iter().enumerate() {
+            for y in &mut *y {
+                changed |= self.readout_each(at, 1, &mut y.0[lane..=lane]);
+            }
+        }
+        changed
     }
 }
 
-#[inline(always)]
-fn readout_each<T: StateSpace>(twin: &T, p: usize, now: &Now<'_>, y: &mut [f64]) -> bool {
-    let mut changed = false;
-    for y in y.chunks_exact_mut(p) {
-        changed |= changes(y, |y| twin.readout(now, y));
+/// Steps of Δt/n, inputs on the line to the next sample where the twin says so. States are put into their limits between
+/// substeps, as they would be between samples of a finer step.
+#[cold]
+fn advance_refined<T: StateSpace>(twin: &T, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
+    let Some(mut refined) = work.refined.take() else {
+        return;
+    };
+    let n = refined.substeps;
+    let h = now.dt / n as f64;
+    for i in 0..n {
+        if i > 0 {
+            for &(j, limit) in &refined.limits {
+                x[j] = limit.clamp(x[j]);
+            }
+        }
+        let sub = Now {
+            t: now.t + i as f64 * h,
+            dt: h,
+            ..*now
+        };
+        let inputs = &mut refined.inputs;
+        let rule = twin.integrator();
+        rule.step_in_stages(&sub, x, work, |share, stage, x, dx| {
+            let Some(between) = now.between else {
+                return twin.drift(stage, x, dx);
+            };
+            let between = Between {
+                share: (i as f64 + share) / n as f64,
+                ..*between
+            };
+            between.line(now.u, inputs);
+            let stage = Now {
+                u: inputs,
+                between: Some(&between),
+                ..*stage
+            };
+            twin.drift(&stage, x, dx);
+        });
     }
-    changed
+    work.refined = Some(refined);
 }
 
 #[inline(always)]
-fn advance_each<T: StateSpace>(
+fn advance_lanes<T: StateSpace>(
     twin: &T,
     n: usize,
-    now: &Now<'_>,
-    points: Points<'_>,
+    now: &[Now<'_>],
+    points: LanePoints<'_>,
     work: &mut Workspace,
 ) -> bool {
-    let Points {
-        moving,
-        limits,
-        shifted,
-        shifts,
-    } = points;
-    let (limits, shifts) = (&limits[..n], &shifts[..n]);
-    for x in moving.chunks_exact_mut(n) {
-        for (x, limit) in x.iter_mut().zip(limits) {
-            *x = limit.clamp(*x);
-        }
-        twin.advance(now, x, work);
-    }
-    let (centre, around) = moving.split_at_mut(n);
+    let (moving, length) = (1 + 2 * n, (1 + 4 * n) * n);
+    let (all, one) = (&mut points.all[..length], &mut points.one[..length]);
+    let (shifts, shift) = (&points.shifts[..n], &mut points.shift[..n]);
     let mut bent = false;
-    for ((i, &shift), pair) in (shifts.iter().enumerate()).zip(shifted.chunks_exact_mut(2 * n)) {
-        if shift == 0.0 {
-            continue;
-        }
-        for (x, shift) in pair.chunks_exact_mut(n).zip([shift, -shift]) {
-            for (j, (x, centre)) in x.iter_mut().zip(&*centre).enumerate() {
-                *x = centre + if j == i { shift } else { 0.0 };
+    for (lane, at) in now.iter().enumerate() {
+        gather(&all[..moving * n], lane, &mut one[..moving * n]);
+        gather(shifts, lane, shift);
+        let point = Points {
+            all: &mut *one,
+            moving,
+            limits: points.limits,
+            shifts: &*shift,
+        };
+        let before = bent;
+        bent |= twin.advance_each(at, point, work);
+        scatter(
+            &one[..moving * n],
+            (lane, now.len()),
+            &mut all[..moving * n],
+        );
+        if bent {
+            if !before {
+                straight(all, shifts, lane);
             }
-            bent |= changes(x, |x| twin.constrain(now, x));
+            scatter(
+                &one[moving * n..],
+                (lane, now.len()),
+                &mut all[moving * n..],
+            );
         }
     }
-    // The centre last: the shifts start from it as it is before.
-    for x in around.chunks_exact_mut(n) {
-        twin.constrain(now, x);
-    }
-    bent | changes(centre, |x| twin.constrain(now, x))
+    bent
 }
 
-/// Runs `with` and tells whether it changed `values`. Nothing is left of this for a `with` that does nothing.
-#[inline(always)]
-fn changes(values: &mut [f64], with: impl FnOnce(&mut [f64])) -> bool {
-    let (mut few, many);
-    let before = if values.len() <= 4 {
-        few = [0.0; 4];
-        few[..values.len()].copy_from_slice(values);
-        &few[..values.len()]
-    } else {
-        many = values.to_vec();
-        &many
-    };
-    with(values);
-    let mut changed = false;
-    for (value, before) in values.iter().zip(before) {
-        changed |= value.to_bits() != before.to_bits();
+/// Shifted points of the lanes before `lane`, on which no constraint acted.
+#[cold]
+fn straight(all: &mut [Lanes], shifts: &[Lanes], lane: usize) {
+    let n = shifts.len();
+    let (moving, shifted) = all.split_at_mut((1 + 2 * n) * n);
+    for (i, pair) in shifted.chunks_exact_mut(2 * n).enumerate() {
+        for (x, sign) in pair.chunks_exact_mut(n).zip([1.0, -1.0]) {
+            for (j, x) in x.iter_mut().enumerate() {
+                let shift = if j == i {
+                    shifts[i] * sign
+                } else {
+                    Lanes::ZERO
+                };
+                let to = moving[j] + shift;
+                x.0[..lane].copy_from_slice(&to.0[..lane]);
+                if lane > 0 {
+                    x.0[lane..].fill(to.0[0]);
+                }
+            }
+        }
     }
-    changed
+}
+
+#[inline(always)]
+fn observe_lanes<T: StateSpace>(
+    twin: &T,
+    n: usize,
+    now: &[Now<'_>],
+    x: &[Lanes],
+    y: &mut [Lanes],
+    buffer: &mut [f64],
+) {
+    let points = 1 + 2 * n;
+    let (x, y) = (&x[..points * n], &mut y[..points]);
+    let buffer = &mut buffer[..points * n];
+    let mut outputs = [0.0; 1 + 2 * MOST];
+    let outputs = &mut outputs[..points];
+    for (lane, at) in now.iter().enumerate() {
+        gather(x, lane, buffer);
+        twin.observe_each(at, Layout::dense(n), 1, buffer, outputs);
+        scatter(outputs, (lane, now.len()), y);
+    }
+}
+
+#[inline(always)]
+fn noise_lanes<T: StateSpace>(
+    twin: &T,
+    n: usize,
+    now: &[Now<'_>],
+    process: &mut [Lanes],
+    measurement: &mut Lanes,
+) {
+    let mut levels = [0.0; MOST + 1];
+    let (q, r) = levels[..=n].split_at_mut(n);
+    for (lane, at) in now.iter().enumerate() {
+        q.fill(0.0);
+        r.fill(0.0);
+        twin.noise(at, q, r);
+        scatter(q, (lane, now.len()), &mut process[..n]);
+        scatter(r, (lane, now.len()), std::slice::from_mut(measurement));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::likelihood::kalman::{FilterSettings, Kalman};
+    use crate::record::Record;
+    use crate::twin::{Integrator, Outline, Parameter, Twin, fix};
+
+    /// ẋ = u − k·x³ within limits, y = x.
+    struct Vessel(Integrator);
+    impl StateSpace for Vessel {
+        fn outline(&self) -> Outline {
+            Outline::new()
+                .parameter(Parameter::new("k", "1/s", 0.0, 1.0).within(0.0, 20.0))
+                .parameter(Parameter::new("gain", "-", 0.5, 2.0))
+                .state("x", "m")
+                .input("u", "m/s")
+                .output("y", "m")
+        }
+        fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+            dx[0] = now.theta[1] * now.u[0] - now.theta[0] * x[0].powi(3);
+        }
+        fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+            y[0] = x[0];
+        }
+        fn noise(&self, _: &Now<'_>, _: &mut [f64], measurement: &mut [f64]) {
+            measurement[0] = 1e-3;
+        }
+        fn limits(&self) -> Vec<Interval> {
+            vec![Interval::unchecked(0.0, 1.5)]
+        }
+        fn integrator(&self) -> Integrator {
+            self.0
+        }
+    }
+
+    const RULES: [Integrator; 2] = [Integrator::Euler, Integrator::RungeKutta4];
+
+    fn refined(rule: Integrator, substeps: usize, hold: Hold) -> Twin {
+        let twin = Twin::new(Vessel(rule));
+        let change = |to: &mut Stepping| *to = Stepping { substeps, hold };
+        twin.stepped(change).unwrap()
+    }
+
+    fn inputs(samples: usize) -> Signal {
+        Signal::from_shape_fn((samples, 1), |(k, _)| [2.0, 5.0, -3.0, 1.0][k / 5 % 4])
+    }
+
+    /// Substeps are the samples of a finer step, limits included, to the bit.
+    #[test]
+    fn substeps_are_a_finer_step() {
+        let (samples, n) = (40, 4);
+        let coarse = Drive::new(0.5, inputs(samples)).unwrap();
+        let held = Signal::from_shape_fn((samples * n, 1), |(k, _)| coarse.input(k / n)[0]);
+        let fine = Drive::new(0.125, held).unwrap();
+        for rule in RULES {
+            let theta = [1.0, 1.0];
+            let own = Twin::new(Vessel(rule)).free_run(&theta, &fine).unwrap();
+            let run = refined(rule, n, Hold::Zero)
+                .free_run(&theta, &coarse)
+                .unwrap();
+            assert!(run.iter().any(|y| *y == 1.5) && run.iter().any(|y| *y == 0.0));
+            for k in 0..samples {
+                assert_eq!(run[[k, 0]], own[[k * n, 0]], "{rule:?}, row {k}");
+            }
+        }
+    }
+
+    /// ẋ = u with u on lines: the trapezoidal rule is exact, and so are both rules in their own order.
+    #[test]
+    fn inputs_lie_on_lines() {
+        let u = [0.0, 1.0, 3.0, 2.0];
+        let drive = Drive::new(0.1, Signal::from_shape_fn((4, 1), |(k, _)| u[k])).unwrap();
+        let run = |rule, substeps, hold| {
+            let run = refined(rule, substeps, hold).free_run(&[0.0, 1.0], &drive);
+            run.unwrap().column(0).to_vec()
+        };
+        let near = |a: Vec<f64>, b: [f64; 4]| {
+            assert!(
+                a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-15),
+                "{a:?} {b:?}"
+            );
+        };
+        near(
+            run(Integrator::RungeKutta4, 1, Hold::Linear),
+            [0.0, 0.05, 0.25, 0.5],
+        );
+        near(
+            run(Integrator::Euler, 1, Hold::Linear),
+            [0.0, 0.0, 0.1, 0.4],
+        );
+        near(
+            run(Integrator::Euler, 2, Hold::Linear),
+            [0.0, 0.025, 0.175, 0.45],
+        );
+        near(
+            run(Integrator::RungeKutta4, 3, Hold::Zero),
+            [0.0, 0.0, 0.1, 0.4],
+        );
+        // Steps that vary, too: 0.1 · ½ + 0.3 · 2 + 0.1 · 2.5.
+        let times = Drive::with_times(&[0.0, 0.1, 0.4, 0.5], drive.inputs().clone()).unwrap();
+        let twin = refined(Integrator::RungeKutta4, 2, Hold::Linear);
+        let uneven = twin.free_run(&[0.0, 1.0], &times).unwrap();
+        near(uneven.column(0).to_vec(), [0.0, 0.05, 0.65, 0.9]);
+    }
+
+    /// The filter moves as the simulation does, through wrappers, too.
+    #[test]
+    fn the_filter_takes_the_same_steps() {
+        let drive = Drive::new(0.3, inputs(60)).unwrap();
+        for rule in RULES {
+            let twin = refined(rule, 3, Hold::Linear);
+            let fixed = fix(twin.clone(), &[("gain".to_owned(), 0.5)].into()).unwrap();
+            let outputs = twin.free_run(&[0.2, 0.5], &drive).unwrap();
+            assert_eq!(fixed.free_run(&[0.2], &drive).unwrap(), outputs);
+            let record = Record::new(drive.clone(), outputs).unwrap();
+            let settings = FilterSettings::default();
+            let equations = fixed.equations().unwrap();
+            let seen = Kalman::new(equations, &record, &settings)
+                .and_then(|kalman| kalman.filter(&[0.2]))
+                .unwrap();
+            let largest = seen
+                .innovations
+                .iter()
+                .fold(0.0, |a: f64, e| a.max(e.abs()));
+            assert!(largest < 1e-12, "{rule:?}: {largest}");
+            let plain = Kalman::new(&Vessel(rule), &record, &settings)
+                .and_then(|kalman| kalman.filter(&[0.2, 0.5]))
+                .unwrap();
+            assert!(plain.innovations.iter().any(|e| e.abs() > 1e-2));
+        }
+    }
 }

@@ -11,9 +11,11 @@
 //! # Ok::<(), truetwin::record::RecordError>(())
 //! ```
 
+use crate::math::deviation;
 use crate::record::{Drive, Signal};
 use crate::twin::{
-    DigitalTwin, Noise, PRIOR_DEVIATION, Parameter, ParameterSpace, SimulationError, combination,
+    DigitalTwin, MOST_SUBSTEPS, Noise, Now, PRIOR_DEVIATION, Parameter, ParameterSpace,
+    SimulationError, StateSpace, Twin, combination,
 };
 use nalgebra::DMatrix;
 use serde::Serialize;
@@ -79,6 +81,8 @@ const PAIRED: f64 = 1e-2;
 /// 6. *paired*: noise draws do not depend on θ (common random numbers);
 /// 7. *identifiable*: no direction in θ leaves the free run unchanged, or moves it less than the noise does over the whole
 ///    prior (first order, centre of the prior, noise taken as white).
+///
+/// `truetwin check` adds *step*: half the step moves no output by more than its noise.
 pub fn check(twin: &dyn DigitalTwin, drive: &Drive, seed: u64) -> Vec<Finding> {
     let space = twin.parameters();
     if let Err(error) = space.check() {
@@ -123,6 +127,90 @@ pub fn check(twin: &dyn DigitalTwin, drive: &Drive, seed: u64) -> Vec<Finding> {
     findings.push(setting.paired(&first, spread));
     findings.push(setting.identifiable(spread));
     findings
+}
+
+/// Largest error of the step where no measurement noise is declared, as a share of an output's deviation.
+const STEP_SHARE: f64 = 0.01;
+
+/// Differences of the noise-free outputs at θ between one step and half of it, rms by output; none for a black box.
+pub(crate) fn step_error(
+    twin: &Twin,
+    theta: &[f64],
+    drive: &Drive,
+) -> Result<Vec<(String, f64)>, SimulationError> {
+    let Some(finer) = twin.stepped(|stepping| stepping.substeps *= 2) else {
+        return Ok(vec![]);
+    };
+    let difference = twin.free_run(theta, drive)? - finer.free_run(theta, drive)?;
+    let squares = difference.mapv(|d| d * d);
+    Ok((twin.signals().outputs.into_iter().zip(squares.columns()))
+        .map(|(output, squares)| (output.name, squares.mean().unwrap_or(0.0).sqrt()))
+        .collect())
+}
+
+/// Compares the [`step_error`] at θ with the measurement noise of each output; `None` for a black box.
+pub(crate) fn check_step(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<Finding> {
+    const CHECK: &str = "step";
+    let equations = twin.equations()?;
+    let errors = match step_error(twin, theta, drive) {
+        Ok(errors) => errors,
+        Err(error) => return Some(Finding::warning(CHECK, format!("not known: {error}"))),
+    };
+    let levels = match step_levels(equations, theta, drive) {
+        Ok(levels) => levels,
+        Err(error) => return Some(Finding::warning(CHECK, format!("not known: {error}"))),
+    };
+    let units = twin.signals().outputs.into_iter().map(|output| output.unit);
+    let coarse: Vec<String> = (errors.iter().zip(&levels).zip(units))
+        .filter(|((error, (level, _)), _)| error.1 > *level)
+        .map(|(((name, error), (level, source)), unit)| {
+            let (error, level) = (short(*error), short(*level));
+            format!("{name} moves by {error} {unit} rms, {source} is {level} {unit}")
+        })
+        .collect();
+    if coarse.is_empty() {
+        return Some(Finding::pass(
+            CHECK,
+            "half the step moves no output by more than its noise",
+        ));
+    }
+    let substeps = (4 * equations.stepping().substeps).min(MOST_SUBSTEPS);
+    Some(Finding::warning(
+        CHECK,
+        format!(
+            "too long: with half the step, {}; set [record] substeps = {substeps} in a study file, or use another integrator",
+            coarse.join("; ")
+        ),
+    ))
+}
+
+/// Limit of each output's move, and the limit's name.
+fn step_levels(
+    twin: &dyn StateSpace,
+    theta: &[f64],
+    drive: &Drive,
+) -> Result<Vec<(f64, &'static str)>, SimulationError> {
+    let outline = twin.outline();
+    let mut process = vec![0.0; outline.states.len()];
+    let mut measurement = vec![0.0; outline.outputs.len()];
+    let now = Now::new(0.0, drive.step(0), drive.input(0), theta);
+    twin.noise(&now, &mut process, &mut measurement);
+    let run = twin.run(theta, drive, Noise::OFF)?;
+    let levels = measurement.iter().zip(run.columns());
+    Ok(levels
+        .map(|(noise, column)| match noise.abs() {
+            noise if noise > 0.0 => (noise, "its noise"),
+            _ => (
+                STEP_SHARE * deviation(&column.to_vec()),
+                "1 % of its deviation",
+            ),
+        })
+        .collect())
+}
+
+/// A number to three digits.
+fn short(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
 }
 
 /// A twin and the run that it is checked by.
@@ -300,6 +388,8 @@ fn rms(a: &Signal, b: &Signal) -> f64 {
 mod tests {
     use super::*;
     use crate::record::{Quantity, Signals};
+    use crate::twin::Outline;
+    use std::sync::Arc;
     use std::sync::atomic::{AtomicU64, Ordering};
 
     /// y = a·b·k/10 + noise, with a flaw.
@@ -373,6 +463,57 @@ mod tests {
             ("paired", Severity::Failure)
         );
         assert_eq!(worst(Flaw::Diverges), [("finite", Severity::Warning)]);
+    }
+
+    /// ẋ = −k·(x − u) from 0, y₁ = x with noise, y₂ = x without.
+    struct Lag;
+    impl StateSpace for Lag {
+        fn outline(&self) -> Outline {
+            Outline::new()
+                .parameter(Parameter::new("k", "1/s", 0.1, 20.0))
+                .state("x", "V")
+                .input("u", "V")
+                .output("y1", "V")
+                .output("y2", "V")
+        }
+        fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+            dx[0] = now.theta[0] * (now.u[0] - x[0]);
+        }
+        fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+            y.fill(x[0]);
+        }
+        fn noise(&self, _: &Now<'_>, _: &mut [f64], measurement: &mut [f64]) {
+            measurement[0] = 0.05;
+        }
+    }
+
+    #[test]
+    fn a_step_that_is_too_long_is_named_by_output() {
+        let inputs = Signal::from_shape_fn((100, 1), |(k, _)| (k / 20 % 2) as f64);
+        let drive = Drive::new(0.1, inputs).unwrap();
+        let twin = Twin::new(Lag);
+        let slow = check_step(&twin, &[0.1], &drive).unwrap();
+        assert_eq!(slow.severity, Severity::Pass, "{}", slow.message);
+        let stiff = check_step(&twin, &[15.0], &drive).unwrap();
+        assert_eq!(stiff.severity, Severity::Warning);
+        for part in [
+            "y1 moves by",
+            "its noise is 0.05 V",
+            "y2 moves by",
+            "1 % of its deviation is",
+            "substeps = 4",
+        ] {
+            assert!(stiff.message.contains(part), "{}", stiff.message);
+        }
+        let errors = step_error(&twin, &[15.0], &drive).unwrap();
+        assert_eq!(errors[1].0, "y2");
+        assert!(errors[1].1 > 0.05, "{errors:?}");
+        // What it advises helps.
+        let finer = twin.stepped(|stepping| stepping.substeps = 64).unwrap();
+        let fine = check_step(&finer, &[15.0], &drive).unwrap();
+        assert_eq!(fine.severity, Severity::Pass, "{}", fine.message);
+        let boxed: Arc<dyn DigitalTwin> = Arc::new(Flawed(Flaw::None, AtomicU64::new(0)));
+        assert!(check_step(&Twin::from(boxed), &[1.0, 1.0], &drive).is_none());
     }
 
     /// A black box's mean over seeds cannot be flat to 1e-6, but a product's direction is: draws are paired.

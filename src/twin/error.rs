@@ -1,13 +1,13 @@
 //! Errors of a twin's parameters, names and settings, and of its simulations.
 
-use crate::setting::did_you_mean;
+use crate::setting::{did_you_mean, number};
 
 /// A fault in a twin, its parameters, a point or a new setting.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TwinError {
     /// An interval whose ends are exchanged, equal or NaN.
-    #[error("invalid interval [{low}, {high}]: low must be below high")]
+    #[error("invalid interval [{}, {}]: low must be below high", number(*low), number(*high))]
     Interval {
         /// Lower end.
         low: f64,
@@ -68,7 +68,7 @@ pub enum TwinError {
         names: String,
     },
     /// A value outside the physical bounds, or not a number.
-    #[error("{name} = {value} is outside its bounds {bounds}; choose a value inside")]
+    #[error("{name} = {} is outside its bounds {bounds}; choose a value inside", number(*value))]
     OutOfBounds {
         /// Parameter.
         name: String,
@@ -101,7 +101,7 @@ pub enum TwinError {
     )]
     BlackBox(&'static str),
     /// A noise level or start that the twin cannot have.
-    #[error("[{table}] {name} = {value}; {remedy}")]
+    #[error("[{table}] {name} = {}; {remedy}", number(*value))]
     Value {
         /// Table of the study file.
         table: &'static str,
@@ -122,7 +122,7 @@ pub enum TwinError {
 #[non_exhaustive]
 pub enum SimulationError {
     /// A trajectory that left the finite numbers: these parameters are not for this input.
-    #[error("the simulation diverged at t = {at} s")]
+    #[error("the simulation diverged at t = {} s", number(*at))]
     Diverged {
         /// Time of the first non-finite value, in seconds.
         at: f64,
@@ -139,6 +139,11 @@ impl SimulationError {
     /// A fatal error from a message.
     pub fn fatal(message: impl Into<String>) -> Self {
         Self::Fatal(message.into().into())
+    }
+
+    /// A fatal error from an error.
+    pub(crate) fn of(error: impl std::error::Error + Send + Sync + 'static) -> Self {
+        Self::Fatal(error.into())
     }
 
     /// Tells whether only this run is lost: a search goes on elsewhere, a draw is drawn again.

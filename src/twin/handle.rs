@@ -1,9 +1,10 @@
 //! The handle by which every stage holds a twin.
 
 use super::digital_twin::FREE_RUNS;
-use crate::record::{Drive, Signal, Signals};
+use crate::record::{Drive, RecordError, Signal, Signals};
 use crate::twin::{
     DigitalTwin, Modified, Modify, Noise, Outline, ParameterSpace, SimulationError, StateSpace,
+    Stepping,
 };
 use std::sync::Arc;
 
@@ -58,7 +59,10 @@ impl Twin {
     ) -> Result<Signal, SimulationError> {
         match self {
             Self::Equations(twin) => twin.run(theta, drive, noise),
-            Self::BlackBox(twin) => twin.simulate(theta, drive, noise),
+            Self::BlackBox(twin) => {
+                self.check_drive(drive).map_err(SimulationError::of)?;
+                twin.simulate(theta, drive, noise)
+            }
         }
     }
 
@@ -66,7 +70,18 @@ impl Twin {
     pub fn free_run(&self, theta: &[f64], drive: &Drive) -> Result<Signal, SimulationError> {
         match self {
             Self::Equations(twin) => twin.run(theta, drive, Noise::OFF),
-            Self::BlackBox(twin) => twin.free_run(theta, drive),
+            Self::BlackBox(twin) => {
+                self.check_drive(drive).map_err(SimulationError::of)?;
+                twin.free_run(theta, drive)
+            }
+        }
+    }
+
+    /// Checks that the twin can be simulated on the time grid of a drive: a black box needs one step.
+    pub(crate) fn check_drive(&self, drive: &Drive) -> Result<(), RecordError> {
+        match self {
+            Self::Equations(_) => Ok(()),
+            Self::BlackBox(_) => drive.check_uniform(),
         }
     }
 
@@ -89,6 +104,19 @@ impl Twin {
             Self::Equations(_) => 1,
             Self::BlackBox(_) => FREE_RUNS as usize,
         }
+    }
+
+    /// The twin with another stepping, as `change` makes it; `None` for a black box.
+    pub(crate) fn stepped(&self, change: impl FnOnce(&mut Stepping)) -> Option<Self> {
+        let Self::Equations(base) = self else {
+            return None;
+        };
+        let (base, mut stepping) = (base.clone(), base.stepping());
+        change(&mut stepping);
+        Some(Self::Equations(Arc::new(Modified(Stepped {
+            base,
+            stepping,
+        }))))
     }
 
     /// The twin with `hook` called before each of its runs; an error of the hook stops the run.
@@ -146,6 +174,22 @@ pub(crate) trait Hook: Fn() -> Result<(), SimulationError> + Send + Sync + 'stat
 
 impl<F: Fn() -> Result<(), SimulationError> + Send + Sync + 'static> Hook for F {}
 
+/// Equations with another stepping.
+struct Stepped {
+    base: Arc<dyn StateSpace>,
+    stepping: Stepping,
+}
+
+impl Modify for Stepped {
+    fn base(&self) -> &dyn StateSpace {
+        self.base.as_ref()
+    }
+
+    fn stepping(&self) -> Stepping {
+        self.stepping
+    }
+}
+
 /// A twin with a hook before each run.
 struct Watched<B: ?Sized, H> {
     base: Arc<B>,
@@ -191,7 +235,9 @@ impl<H: Hook> DigitalTwin for Watched<dyn DigitalTwin, H> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::{Adaptation, Interval, Level, Now, Parameter, TwinError, adapt, fix};
+    use crate::twin::{
+        Adaptation, Interval, NoiseLevel, Now, Parameter, StartLevel, TwinError, adapt, fix,
+    };
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     /// ẋ = −k·x, y = x with a noisy sensor.
@@ -262,8 +308,8 @@ mod tests {
     fn unknown_starts_and_noise_levels_are_found_by_name() {
         let adaptation = Adaptation {
             prior: [("start.x".to_owned(), Interval::unchecked(0.0, 5.0))].into(),
-            noise: [("y".to_owned(), Level::Estimate)].into(),
-            start: [("x".to_owned(), Level::Estimate)].into(),
+            noise: [("y".to_owned(), NoiseLevel::Estimate)].into(),
+            start: [("x".to_owned(), StartLevel::Estimate)].into(),
             ..Adaptation::default()
         };
         let twin = adapt(Twin::new(Decay), &adaptation, 0.1).unwrap();

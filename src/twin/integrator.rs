@@ -1,5 +1,6 @@
 //! Fixed-step integrators that carry the equations from one sample to the next.
 
+use crate::twin::Interval;
 use serde::{Deserialize, Serialize};
 
 /// Time, step, inputs and parameters at which equations are evaluated.
@@ -7,15 +8,82 @@ use serde::{Deserialize, Serialize};
 pub struct Now<'a> {
     /// Time in seconds from the first sample.
     pub t: f64,
-    /// Step Δt in seconds.
+    /// Step Δt in seconds: to the next sample, or a substep where [`StateSpace::drift`](super::StateSpace::drift) is evaluated.
     pub dt: f64,
-    /// Inputs, held over the step.
+    /// Inputs at this time.
     pub u: &'a [f64],
     /// Parameters θ.
     pub theta: &'a [f64],
+    /// Position between samples; `None` where inputs are held.
+    pub(crate) between: Option<&'a Between<'a>>,
 }
 
-/// The rule that carries the state over one step Δt, the input held.
+impl<'a> Now<'a> {
+    /// Time `t`, step `dt`, inputs `u` held over the step, and parameters θ.
+    pub fn new(t: f64, dt: f64, u: &'a [f64], theta: &'a [f64]) -> Self {
+        Self {
+            t,
+            dt,
+            u,
+            theta,
+            between: None,
+        }
+    }
+}
+
+/// A position between two samples whose inputs are joined by a line.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Between<'a> {
+    /// Inputs at the next sample.
+    pub next: &'a [f64],
+    /// Share of the step that has passed.
+    pub share: f64,
+}
+
+impl Between<'_> {
+    /// Input on the line from `u` to the next sample's.
+    #[inline]
+    pub fn line(&self, u: &[f64], to: &mut [f64]) {
+        for ((to, u), next) in to.iter_mut().zip(u).zip(self.next) {
+            *to = u + self.share * (next - u);
+        }
+    }
+}
+
+/// Inputs between two samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Hold {
+    /// Held at the value of the sample before.
+    #[default]
+    Zero,
+    /// On the line from one sample to the next; the last is held.
+    Linear,
+}
+
+/// Most substeps of a sample.
+pub(crate) const MOST_SUBSTEPS: usize = 1000;
+
+/// Substeps of the integrator within a sample, and inputs there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stepping {
+    /// Steps of Δt/n within a sample, n ≥ 1.
+    pub substeps: usize,
+    /// Inputs between samples.
+    pub hold: Hold,
+}
+
+impl Default for Stepping {
+    /// One step, inputs held.
+    fn default() -> Self {
+        Self {
+            substeps: 1,
+            hold: Hold::Zero,
+        }
+    }
+}
+
+/// The rule that carries the state over one step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -27,25 +95,57 @@ pub enum Integrator {
     RungeKutta4,
 }
 
-/// Buffers that outlive a step, so that the loop allocates nothing.
+/// Buffers of one twin that outlive a step, so that the loop allocates nothing.
 #[derive(Debug, Clone, Default)]
 pub struct Workspace {
     slopes: [Vec<f64>; 4],
     stage: Vec<f64>,
+    /// Substeps and lines of inputs; `None` where a sample is one step and inputs are held.
+    pub(super) refined: Option<Box<Refined>>,
+}
+
+/// Rule by which a twin moves between samples.
+#[derive(Debug, Clone)]
+pub(super) struct Refined {
+    pub substeps: usize,
+    /// Limits that are felt, by state.
+    pub limits: Vec<(usize, Interval)>,
+    /// Inputs at a stage.
+    pub inputs: Vec<f64>,
 }
 
 impl Workspace {
-    /// For `states` states.
-    pub fn new(states: usize) -> Self {
+    /// For `states` states, without substeps.
+    pub(super) fn of_states(states: usize) -> Self {
         Self {
             slopes: std::array::from_fn(|_| vec![0.0; states]),
             stage: vec![0.0; states],
+            refined: None,
         }
+    }
+
+    /// Returns whether a sample takes several steps, or inputs lie on lines.
+    pub(super) fn has_substeps(&self) -> bool {
+        self.refined.is_some()
+    }
+
+    /// A buffer for `states` states.
+    pub(super) fn stage(&mut self, states: usize) -> &mut [f64] {
+        grown(&mut self.stage, states)
     }
 }
 
+/// The first `length` numbers of a buffer, which grows where it is shorter.
+#[inline]
+fn grown(buffer: &mut Vec<f64>, length: usize) -> &mut [f64] {
+    if buffer.len() < length {
+        buffer.resize(length, 0.0);
+    }
+    &mut buffer[..length]
+}
+
 impl Integrator {
-    /// One step in place: `x(t)` becomes `x(t + Δt)` under `drift(now, x, dx)`.
+    /// One step in place, the input held: `x(t)` becomes `x(t + Δt)` under `drift(now, x, dx)`.
     #[inline]
     pub fn step(
         self,
@@ -54,6 +154,18 @@ impl Integrator {
         work: &mut Workspace,
         mut drift: impl FnMut(&Now<'_>, &[f64], &mut [f64]),
     ) {
+        self.step_in_stages(now, x, work, |_, now, x, dx| drift(now, x, dx));
+    }
+
+    /// As [`step`](Self::step); `drift` is also told the share of the step that has passed at each stage.
+    #[inline]
+    pub(super) fn step_in_stages(
+        self,
+        now: &Now<'_>,
+        x: &mut [f64],
+        work: &mut Workspace,
+        mut drift: impl FnMut(f64, &Now<'_>, &[f64], &mut [f64]),
+    ) {
         let dt = now.dt;
         match self {
             Self::Euler => {
@@ -61,16 +173,16 @@ impl Integrator {
                 let mut few = [0.0; 4];
                 let slope = match x.len() {
                     n @ ..=4 => &mut few[..n],
-                    n => &mut work.slopes[0][..n],
+                    n => grown(&mut work.slopes[0], n),
                 };
-                drift(now, x, slope);
+                drift(0.0, now, x, slope);
                 for (x, d) in x.iter_mut().zip(slope) {
                     *x += dt * *d;
                 }
             }
             Self::RungeKutta4 => {
-                let [k1, k2, k3, k4] = &mut work.slopes;
-                let stage = &mut work.stage;
+                let [k1, k2, k3, k4] = work.slopes.each_mut().map(|k| grown(k, x.len()));
+                let stage = grown(&mut work.stage, x.len());
                 let half = Now {
                     t: now.t + 0.5 * dt,
                     ..*now
@@ -79,13 +191,13 @@ impl Integrator {
                     t: now.t + dt,
                     ..*now
                 };
-                drift(now, x, k1);
+                drift(0.0, now, x, k1);
                 shifted(x, 0.5 * dt, k1, stage);
-                drift(&half, stage, k2);
+                drift(0.5, &half, stage, k2);
                 shifted(x, 0.5 * dt, k2, stage);
-                drift(&half, stage, k3);
+                drift(0.5, &half, stage, k3);
                 shifted(x, dt, k3, stage);
-                drift(&end, stage, k4);
+                drift(1.0, &end, stage, k4);
                 for (i, x) in x.iter_mut().enumerate() {
                     *x += dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
                 }
@@ -107,14 +219,9 @@ mod tests {
 
     /// Global error of ẋ = −x + t at t = 1, whose solution is 2e^{−t} + t − 1.
     fn error(integrator: Integrator, steps: usize) -> f64 {
-        let (dt, mut x, mut work) = (1.0 / steps as f64, [1.0], Workspace::new(1));
+        let (dt, mut x, mut work) = (1.0 / steps as f64, [1.0], Workspace::of_states(1));
         for k in 0..steps {
-            let now = Now {
-                t: k as f64 * dt,
-                dt,
-                u: &[],
-                theta: &[],
-            };
+            let now = Now::new(k as f64 * dt, dt, &[], &[]);
             integrator.step(&now, &mut x, &mut work, |now, x, dx| dx[0] = now.t - x[0]);
         }
         (x[0] - 2.0 * (-1.0f64).exp()).abs()

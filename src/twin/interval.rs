@@ -1,5 +1,6 @@
 //! A closed interval of real numbers.
 
+use crate::setting::number;
 use crate::twin::TwinError;
 use serde::{Deserialize, Serialize};
 
@@ -91,7 +92,7 @@ impl From<Interval> for [f64; 2] {
 
 impl std::fmt::Display for Interval {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "[{}, {}]", self.low, self.high)
+        write!(f, "[{}, {}]", number(self.low), number(self.high))
     }
 }
 

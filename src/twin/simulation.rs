@@ -2,8 +2,8 @@
 
 use crate::record::{Drive, Signal, Signals};
 use crate::twin::{
-    DigitalTwin, Interval, Noise, Now, Outline, ParameterSpace, SimulationError, StateSpace,
-    Workspace,
+    Between, DigitalTwin, Interval, Noise, Now, Outline, ParameterSpace, SimulationError,
+    StateSpace, Workspace,
 };
 use std::sync::Arc;
 
@@ -82,17 +82,17 @@ pub(super) fn simulate_equations(
         .collect();
     let (mut q, mut r) = (vec![0.0; n], vec![0.0; p]);
     let mut x = vec![0.0; n];
-    let mut work = Workspace::new(n);
+    let mut work = Workspace::new(twin);
+    let between = Between::rows(twin, drive);
     let mut outputs = vec![0.0; drive.samples() * p];
-    let mut now = Now {
-        t: 0.0,
-        dt: drive.dt(),
-        u: drive.input(0),
-        theta,
-    };
+    let mut now = Now::new(0.0, drive.step(0), drive.input(0), theta);
     twin.start(&now, &mut x);
+    if !noise.is_off() {
+        draw_start(twin, &now, &outline, noise, &mut x);
+    }
     for k in 0..drive.samples() {
-        (now.t, now.u) = (drive.time(k), drive.input(k));
+        (now.t, now.dt, now.u) = (drive.time(k), drive.step(k), drive.input(k));
+        now.between = between.get(k);
         let y = &mut outputs[k * p..(k + 1) * p];
         twin.observe(&now, &x, y);
         if !noise.is_off() {
@@ -129,6 +129,27 @@ pub(super) fn simulate_equations(
         .map_err(|error| SimulationError::Fatal(error.into()))?;
     twin.corrupt_outputs(theta, noise, &mut outputs);
     Ok(outputs)
+}
+
+/// Moves the start by draws of its own deviations, within the limits.
+fn draw_start(
+    twin: &(impl StateSpace + ?Sized),
+    now: &Now<'_>,
+    outline: &Outline,
+    noise: Noise,
+    x: &mut [f64],
+) {
+    let mut std = vec![0.0; x.len()];
+    twin.start_deviation(now, &mut std);
+    if std.iter().all(|std| *std == 0.0) {
+        return;
+    }
+    let moved = (x.iter_mut().zip(&outline.states)).zip(std.iter().zip(twin.limits()));
+    for ((x, state), (std, limit)) in moved.filter(|(_, (std, _))| **std != 0.0) {
+        let mut source = noise.source(&format!("start/{}", state.name));
+        *x = limit.clamp(*x + std * source.normal());
+    }
+    twin.begin(now, x);
 }
 
 #[cfg(test)]

@@ -1,7 +1,12 @@
 //! Twins that show their equations.
 
+use super::points::{advance_one_by_one, readout_one_by_one};
+use crate::math::Lanes;
 use crate::record::{Drive, Signal};
-use crate::twin::{Integrator, Interval, Noise, Now, Outline, SimulationError, Workspace};
+use crate::twin::{
+    Integrator, Interval, LanePoints, Layout, Noise, Now, Outline, Points, SimulationError,
+    Stepping, Workspace,
+};
 
 /// A twin given by its equations
 ///
@@ -18,6 +23,10 @@ use crate::twin::{Integrator, Interval, Noise, Now, Outline, SimulationError, Wo
 ///
 /// Row k is y(t_k), observed first; then u_k acts from t_k to t_k + Δt: [`update`](Self::update), drift, noise,
 /// [`constrain`](Self::constrain), [`limits`](Self::limits). Row 0 is the start.
+///
+/// The integrator may take several steps within a sample, and inputs may lie on the line to the next sample
+/// ([`stepping`](Self::stepping)). The drift and the limits then act at each substep, as with a finer step; update, noise and
+/// constraints once a sample.
 ///
 /// ```
 /// use truetwin::prelude::*;
@@ -58,11 +67,19 @@ pub trait StateSpace: Advance + Send + Sync {
         x.fill(0.0);
     }
 
+    /// Standard deviations of the state at the first sample, around [`start`](Self::start): a filter integrates over it, a noisy
+    /// run draws from it. Zero, a known start, by default; the slice comes zeroed.
+    fn start_deviation(&self, _now: &Now<'_>, _std: &mut [f64]) {}
+
+    /// Sets the states that follow from the others at the first sample: memories of effects.
+    #[doc(hidden)]
+    fn begin(&self, _now: &Now<'_>, _x: &mut [f64]) {}
+
     /// Noise levels: standard deviation of the increment added to each state a step, and of each output.
     /// None by default. Both slices come zeroed.
     fn noise(&self, _now: &Now<'_>, _process: &mut [f64], _measurement: &mut [f64]) {}
 
-    /// Boxes that the states are held in after each step; unbounded by default.
+    /// Boxes that the states are held in after each step and substep; unbounded by default.
     fn limits(&self) -> Vec<Interval> {
         vec![Interval::EVERYTHING; self.outline().states.len()]
     }
@@ -95,10 +112,73 @@ pub trait StateSpace: Advance + Send + Sync {
         Integrator::Euler
     }
 
+    /// Substeps of the integrator within a sample, and inputs between samples; one, with inputs held, by default. A study file
+    /// changes them: `[record] substeps` and `hold`.
+    fn stepping(&self) -> Stepping {
+        Stepping::default()
+    }
+
     /// One run. Wrappers that leave the motion alone run the twin that they hold.
     #[doc(hidden)]
     fn run(&self, theta: &[f64], drive: &Drive, noise: Noise) -> Result<Signal, SimulationError> {
         self.run_equations(theta, drive, noise)
+    }
+
+    /// Rates of several points. Twins made of others pass this and the following calls on, one for all points.
+    #[doc(hidden)]
+    fn drift_each(&self, now: &Now<'_>, at: Layout, x: &[f64], dx: &mut [f64]) {
+        for (x, dx) in at.each(x).zip(at.each_mut(dx)) {
+            self.drift(now, x, dx);
+        }
+    }
+
+    /// Outputs, `p` each, of several points.
+    #[doc(hidden)]
+    fn observe_each(&self, now: &Now<'_>, at: Layout, p: usize, x: &[f64], y: &mut [f64]) {
+        for (x, y) in at.each(x).zip(y.chunks_exact_mut(p)) {
+            self.observe(now, x, y);
+        }
+    }
+
+    /// Moves what changes at samples only, of several points.
+    #[doc(hidden)]
+    fn update_each(&self, now: &Now<'_>, at: Layout, x: &mut [f64]) {
+        for x in at.each_mut(x) {
+            self.update(now, x);
+        }
+    }
+
+    /// Constrains several points.
+    #[doc(hidden)]
+    fn constrain_each(&self, now: &Now<'_>, at: Layout, x: &mut [f64]) {
+        for x in at.each_mut(x) {
+            self.constrain(now, x);
+        }
+    }
+
+    /// Puts outputs, `p` each, through the readout; returns whether it changed any.
+    #[doc(hidden)]
+    fn readout_each(&self, now: &Now<'_>, p: usize, y: &mut [f64]) -> bool {
+        match p {
+            1 => readout_one_by_one(1, y, |y| self.readout(now, y)),
+            p => readout_one_by_one(p, y, |y| self.readout(now, y)),
+        }
+    }
+
+    /// Carries the points of a filter over a step; returns whether a constraint acted on any that matters to the noise.
+    #[doc(hidden)]
+    fn advance_each(&self, now: &Now<'_>, points: Points<'_>, work: &mut Workspace) -> bool {
+        // Loops of known length, for the sizes of most twins.
+        let advance = |x: &mut [f64]| self.advance(now, x, work);
+        let constrain = |x: &mut [f64]| self.constrain(now, x);
+        match points.shifts.len() {
+            1 => advance_one_by_one(1, points, advance, constrain),
+            2 => advance_one_by_one(2, points, advance, constrain),
+            3 => advance_one_by_one(3, points, advance, constrain),
+            4 => advance_one_by_one(4, points, advance, constrain),
+            5 => advance_one_by_one(5, points, advance, constrain),
+            n => advance_one_by_one(n, points, advance, constrain),
+        }
     }
 }
 
@@ -120,32 +200,29 @@ pub trait Advance {
         noise: Noise,
     ) -> Result<Signal, SimulationError>;
 
-    /// Carries points over a step; see [`Points`]. Returns whether a constraint acted on any that matters to the noise.
+    /// Carries the points of several filters over a step, one filter a lane; returns as [`advance_each`](Self::advance_each) for
+    /// any of them.
     #[doc(hidden)]
-    fn advance_each(&self, now: &Now<'_>, points: Points<'_>, work: &mut Workspace) -> bool;
+    fn advance_lanes(&self, now: &[Now<'_>], points: LanePoints<'_>, work: &mut Workspace) -> bool;
 
-    /// Outputs, `p` each, of points, `n` each.
+    /// One output of the points, `n` states each, of several filters, one filter a lane; `buffer` holds those of one of them.
     #[doc(hidden)]
-    fn observe_each(&self, now: &Now<'_>, sizes: (usize, usize), points: &[f64], y: &mut [f64]);
+    fn observe_lanes(
+        &self,
+        now: &[Now<'_>],
+        n: usize,
+        x: &[Lanes],
+        y: &mut [Lanes],
+        buffer: &mut [f64],
+    );
 
-    /// Puts outputs, `p` each, through the readout; returns whether it changed any.
+    /// Noise levels of the states, four at most, and the output of several filters, one filter a lane.
     #[doc(hidden)]
-    fn readout_each(&self, now: &Now<'_>, p: usize, y: &mut [f64]) -> bool;
-}
+    fn noise_lanes(&self, now: &[Now<'_>], process: &mut [Lanes], measurement: &mut Lanes);
 
-/// Points that a filter carries over a step; n states each, one point after the other.
-#[doc(hidden)]
-#[derive(Debug)]
-pub struct Points<'w> {
-    /// Put into the limits, advanced, constrained; the first is the centre.
-    pub moving: &'w mut [f64],
-    /// Limits by state.
-    pub limits: &'w [Interval],
-    /// Two for each state: the centre after its motion, with that state shifted up and down; constrained. Those of a
-    /// state without shift are left alone.
-    pub shifted: &'w mut [f64],
-    /// Shift of each state.
-    pub shifts: &'w [f64],
+    /// Puts values of one output of several filters, one filter a lane, through the readout; returns whether it changed any.
+    #[doc(hidden)]
+    fn readout_lanes(&self, now: &[Now<'_>], y: &mut [Lanes]) -> bool;
 }
 
 /// Rare large errors: with this probability, N(0, scale²) is added to a sample.

@@ -3,6 +3,7 @@
 mod bank;
 mod cli;
 mod external;
+#[cfg(feature = "mpi")]
 #[path = "../common/files.rs"]
 mod files;
 #[cfg(feature = "fmi")]

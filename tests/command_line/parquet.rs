@@ -46,18 +46,21 @@ fn a_record_is_read_bit_for_bit_and_checked_as_csv_is() {
     assert_eq!(record.outputs().column(0).to_vec(), y);
     assert_eq!(record.drive().inputs().column(0).to_vec(), [0.0, 1.0, 2.0]);
     let refused = || read_record(&path).unwrap_err().to_string();
-    write(&path, &[0.0, 0.5, 1.5], &y);
+    write(&path, &[0.0, 0.5, 0.5], &y);
     assert!(
         refused().contains("r.parquet, row 4, column t"),
         "{}",
         refused()
     );
-    write(&path, &[0.0, 0.5, 1.0], &[1.0, f64::NAN, 2.0]);
+    write(&path, &[0.0, 0.5, 1.0], &[1.0, f64::INFINITY, 2.0]);
     assert!(
-        refused().contains("row 3, column y: \"NaN\""),
+        refused().contains("row 3, column y: \"inf\""),
         "{}",
         refused()
     );
+    write(&path, &[0.0, 0.5, 1.5], &[1.0, f64::NAN, 2.0]);
+    let record = read_record(&path).unwrap();
+    assert_eq!((record.missing(), record.drive().step(1)), (1, 1.0));
     std::fs::write(&path, "t,u,y").unwrap();
     assert!(refused().contains("r.parquet"), "{}", refused());
 }

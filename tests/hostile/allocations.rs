@@ -7,10 +7,8 @@ use truetwin::twins::{CascadedTanks, VanDerPol};
 
 /// Allocations of one simulation of so many samples.
 fn allocations(twin: &dyn DigitalTwin, plan: &RecordPlan, samples: usize, theta: &[f64]) -> usize {
-    let plan = RecordPlan {
-        samples,
-        ..plan.clone()
-    };
+    let mut plan = plan.clone();
+    plan.samples = samples;
     let noise = Noise::new(1, "allocations", 0);
     let drive = plan.prepare(&twin.signals()).unwrap().draw(noise).unwrap();
     let (outputs, count) = memory::allocations(|| twin.simulate(theta, &drive, noise));

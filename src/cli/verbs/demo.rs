@@ -86,5 +86,5 @@ fn simulated(context: &Context<'_>, study: &Study) -> Result<Record, Failure> {
     let drive = study.drives()?.draw(noise)?;
     let theta = study.twin().parameters().draw_bounds(noise);
     let outputs = study.twin().simulate(&theta, &drive, noise)?;
-    Ok(Record::new(drive, outputs)?)
+    Ok(Record::complete(drive, outputs)?)
 }

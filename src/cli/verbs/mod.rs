@@ -7,6 +7,7 @@ mod diagnose;
 mod effects;
 mod estimate;
 mod features;
+mod fit;
 mod merge;
 mod pretrain;
 mod reproduce;
@@ -29,6 +30,7 @@ pub(super) enum Command {
     Features(features::Features),
     Merge(merge::Merge),
     Pretrain(pretrain::Pretrain),
+    Fit(fit::Fit),
     Estimate(estimate::Estimate),
     Diagnose(diagnose::Diagnose),
     Reproduce(reproduce::Reproduce),
@@ -50,6 +52,7 @@ impl Command {
             Self::Features(verb) => verb,
             Self::Merge(verb) => verb,
             Self::Pretrain(verb) => verb,
+            Self::Fit(verb) => verb,
             Self::Estimate(verb) => verb,
             Self::Diagnose(verb) => verb,
             Self::Reproduce(verb) => verb,

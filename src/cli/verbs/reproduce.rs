@@ -8,7 +8,7 @@ use crate::estimator::{
     Estimator, EstimatorError, PretrainOptions, Pretraining, Project, pretrain,
 };
 use crate::evaluate::paper::{
-    Benchmark, FreeRuns, MeanRuns, MonteCarlo, Origin, Run, Scenario, score,
+    AnswerRuns, Benchmark, MeanRuns, MonteCarlo, Origin, Run, Scenario, score,
 };
 use crate::report::{first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
 use crate::storage::StorageError;
@@ -164,7 +164,7 @@ impl Verb for Reproduce {
                 return Ok(ExitCode::SUCCESS);
             }
         }
-        let runs = plan.run(&estimator, folder.as_ref(), context.progress)?;
+        let runs = plan.run_in(&estimator, folder.as_ref(), context.progress)?;
         let scores = score(study, &plan, &runs);
         let json = reproduce_json(study, &plan, estimator.preset(), &scores);
         let text = reproduce_text(study, &plan, estimator.preset(), &scores);
@@ -235,7 +235,7 @@ fn draw(
         folder.write("trajectories.svg", &svg)?;
     }
     if let Some(first) = runs.first() {
-        let free = FreeRuns::of(study, plan, first)?;
+        let free = AnswerRuns::of(study, plan, first)?;
         folder.write("first-record.svg", &first_run_svg(study, &free))?;
     }
     Ok(())

@@ -6,8 +6,8 @@ use crate::cli::failure::Failure;
 use crate::cli::output;
 use crate::effect::{augment, given_magnitudes};
 use crate::record::{Drive, Record, read_drive, record_csv_text, write_record};
-use crate::setting::did_you_mean;
-use crate::twin::{DigitalTwin, Noise, ParameterSpace, Role};
+use crate::setting::{did_you_mean, number};
+use crate::twin::{Noise, ParameterSpace, Role, Twin};
 use clap::Args;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -67,7 +67,7 @@ impl Verb for Simulate {
         check_inputs(&twin, &drive, self)?;
         let noise = if self.noise_free { Noise::OFF } else { noise };
         let outputs = twin.simulate(&theta, &drive, noise)?;
-        let record = Record::new(drive, outputs)?;
+        let record = Record::complete(drive, outputs)?;
         match &self.out {
             Some(out) => write_record(out, &record)?,
             None if !context.json => output::print(&record_csv_text(&record))?,
@@ -133,8 +133,10 @@ fn complete(
         let value = match (value, magnitudes.get(&p.name), p.role) {
             (Some(value), _, _) if !p.bounds.contains(value) => {
                 return Err(Failure::user(format!(
-                    "--theta: {} = {value} is outside its bounds {}; choose a value inside",
-                    p.name, p.bounds
+                    "--theta: {} = {} is outside its bounds {}; choose a value inside",
+                    p.name,
+                    number(value),
+                    p.bounds
                 )));
             }
             (Some(value), _, _) => value,
@@ -154,15 +156,16 @@ fn complete(
     Ok(theta)
 }
 
-fn check_inputs(twin: &dyn DigitalTwin, drive: &Drive, options: &Simulate) -> Result<(), Failure> {
+fn check_inputs(twin: &Twin, drive: &Drive, options: &Simulate) -> Result<(), Failure> {
     let (given, expected) = (drive.inputs().ncols(), twin.signals().inputs.len());
-    if given == expected {
-        return Ok(());
-    }
     let path = options
         .input
         .as_deref()
         .unwrap_or(std::path::Path::new("input"));
+    if given == expected {
+        let checked = twin.check_drive(drive);
+        return checked.map_err(|error| Failure::from(error).within(path));
+    }
     Err(Failure::user(format!(
         "{}: {given} inputs, the twin has {expected}; give t and one column for each input",
         path.display()

@@ -2,15 +2,15 @@
 
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::explain::frequency::peaks;
-use crate::diagnose::fitting::climb::{Fitted, climb, fit};
-use crate::diagnose::fitting::problem::Problem;
-use crate::diagnose::fitting::reference::{Gain, Reference};
 use crate::diagnose::hypotheses::candidate::{Addition, Candidate, Kind};
 use crate::diagnose::hypotheses::dictionary::{Dictionary, Point};
 use crate::diagnose::hypotheses::variant::Variant;
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::statistics::Statistics;
 use crate::diagnose::thresholds::Thresholds;
+use crate::fit::climb::{Fitted, climb, fit};
+use crate::fit::problem::Problem;
+use crate::fit::reference::{Gain, Reference};
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::progress::Stage;
 use crate::record::Record;

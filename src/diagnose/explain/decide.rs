@@ -5,14 +5,14 @@ use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::explain::attribute::{Explanation, probabilities};
 use crate::diagnose::explain::extended::{Accepted, ExtendedTwin, extend, improves};
 use crate::diagnose::explain::several::{promises, several};
-use crate::diagnose::fitting::base_fit::ITERATIONS;
-use crate::diagnose::fitting::climb::fit;
 use crate::diagnose::outcome::Decision;
 use crate::diagnose::settings::DiagnoseSettings;
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::null::Test;
 use crate::diagnose::test::statistics::Statistics;
 use crate::diagnose::thresholds::Thresholds;
+use crate::fit::climb::fit;
+use crate::fit::starts::ITERATIONS;
 use crate::progress::Stage;
 use crate::twin::Noise;
 

@@ -1,8 +1,8 @@
 //! Start frequencies of a periodic effect: the likelihood has tops far narrower than a dictionary.
 
-use crate::diagnose::fitting::reference::Reference;
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::thresholds::Thresholds;
+use crate::fit::reference::Reference;
 use crate::likelihood::kalman::{FilterError, recoverable};
 
 /// Magnitudes (amplitude, frequency, phase) at the best frequencies of a candidate that has a frequency and a phase.

@@ -9,10 +9,10 @@ use crate::diagnose::explain::attribute::{
     Explanation, ITERATIONS, base_validation, explanations, probabilities, scored,
 };
 use crate::diagnose::explain::extended::{Accepted, ExtendedTwin, extend, improves};
-use crate::diagnose::fitting::climb::fit;
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::statistics::Statistics;
 use crate::diagnose::thresholds::Thresholds;
+use crate::fit::climb::fit;
 use crate::progress::Stage;
 use crate::record::Record;
 use crate::twin::Noise;

@@ -2,13 +2,13 @@
 
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::explain::attribute::{Explanation, explanations};
-use crate::diagnose::fitting::axis::Axis;
-use crate::diagnose::fitting::climb::{Fitted, fit};
-use crate::diagnose::fitting::problem::Problem;
 use crate::diagnose::outcome::Verdict;
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::statistics::Statistics;
 use crate::diagnose::thresholds::Thresholds;
+use crate::fit::axis::Axis;
+use crate::fit::climb::{Fitted, fit};
+use crate::fit::problem::Problem;
 use crate::progress::Stage;
 use crate::twin::Role;
 use statrs::distribution::{ChiSquared, ContinuousCDF};

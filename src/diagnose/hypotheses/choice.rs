@@ -1,8 +1,8 @@
 //! Parts of a plan: choices of magnitudes in use, their axes and units.
 
-use crate::diagnose::fitting::axis::Axis;
 use crate::diagnose::thresholds::Thresholds;
 use crate::effect::{Effect, Mark};
+use crate::fit::axis::{Axis, EvidencePrior};
 use crate::twin::Interval;
 
 /// A choice of an effect's magnitudes to use.
@@ -29,6 +29,8 @@ pub(in crate::diagnose) fn axis(
         longest,
         counts: false,
         held: false,
+        begin: None,
+        evidence: EvidencePrior::Normal,
     }
 }
 

@@ -1,14 +1,14 @@
 //! Dictionary of candidates: magnitudes to try, in the units of the record.
 
 use crate::diagnose::error::DiagnoseError;
-use crate::diagnose::fitting::problem::Problem;
-use crate::diagnose::fitting::reference::{Gain, Reference};
 use crate::diagnose::hypotheses::candidate::{Addition, Candidate};
 use crate::diagnose::hypotheses::choice::product;
 use crate::diagnose::hypotheses::plan::{Lead, Plan, Planner};
 use crate::diagnose::hypotheses::scales::Scales;
 use crate::diagnose::hypotheses::variant::Variant;
 use crate::diagnose::thresholds::Thresholds;
+use crate::fit::problem::Problem;
+use crate::fit::reference::{Gain, Reference};
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::twin::Twin;
 use rayon::prelude::*;

@@ -4,7 +4,7 @@ use crate::diagnose::hypotheses::disturbed_signals;
 use crate::diagnose::hypotheses::entry::{Entry, share};
 use crate::record::Quantity;
 use crate::twin::{
-    Modified, Modify, Now, Outline, Parameter, ParameterSpace, Role, StateSpace, Twin,
+    Layout, Modified, Modify, Now, Outline, Parameter, ParameterSpace, Role, StateSpace, Twin,
 };
 use smallvec::SmallVec;
 use std::sync::Arc;
@@ -40,6 +40,19 @@ struct Disturbed {
     outline: Outline,
 }
 
+impl Disturbed {
+    /// Calls `then` with parameter i as the disturbance `d` moves it.
+    fn bent<R>(&self, now: &Now<'_>, i: usize, d: f64, then: impl FnOnce(&Now<'_>) -> R) -> R {
+        let own = &now.theta[..now.theta.len() - 1];
+        let mut theta: SmallVec<[f64; 16]> = SmallVec::from_slice(own);
+        theta[i] *= d.clamp(-5.0, 5.0).exp();
+        then(&Now {
+            theta: &theta,
+            ..*now
+        })
+    }
+}
+
 impl Modify for Disturbed {
     fn base(&self) -> &dyn StateSpace {
         self.base.as_ref()
@@ -50,49 +63,78 @@ impl Modify for Disturbed {
     fn theta<R>(&self, theta: &[f64], then: impl FnOnce(&[f64]) -> R) -> R {
         then(&theta[..theta.len() - 1])
     }
-    /// A disturbed parameter moves with the disturbance, the added state.
-    fn now<R>(&self, now: &Now<'_>, added: &[f64], then: impl FnOnce(&Now<'_>) -> R) -> R {
-        let own = &now.theta[..now.theta.len() - 1];
-        let Entry::Parameter(i) = self.entry else {
-            return then(&Now { theta: own, ..*now });
-        };
-        let d = added.first().copied().unwrap_or(0.0);
-        let mut theta: SmallVec<[f64; 16]> = SmallVec::from_slice(own);
-        theta[i] *= d.clamp(-5.0, 5.0).exp();
-        then(&Now {
-            theta: &theta,
-            ..*now
-        })
-    }
     fn outline(&self) -> Outline {
         self.outline.clone()
     }
-    fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
-        let (x, d) = x.split_at(x.len() - 1);
-        let (dx, rate) = dx.split_at_mut(x.len());
-        rate[0] = 0.0;
-        self.now(now, d, |now| self.base.drift(now, x, dx));
-        if let Entry::State(i) = self.entry {
-            dx[i] += d[0];
+    fn drift_each(&self, now: &Now<'_>, at: Layout, x: &[f64], dx: &mut [f64]) {
+        let own = at.states - 1;
+        if let Entry::Parameter(i) = self.entry {
+            for (x, dx) in at.each(x).zip(at.each_mut(dx)) {
+                let (x, d) = x.split_at(own);
+                let (dx, rate) = dx.split_at_mut(own);
+                rate[0] = 0.0;
+                self.bent(now, i, d[0], |now| self.base.drift(now, x, dx));
+            }
+            return;
+        }
+        self.now(now, |now| {
+            self.base.drift_each(now, at.without(1), x, dx);
+        });
+        for (x, dx) in at.each(x).zip(at.each_mut(dx)) {
+            dx[own] = 0.0;
+            if let Entry::State(i) = self.entry {
+                dx[i] += x[own];
+            }
         }
     }
-    fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
-        let (x, d) = x.split_at(x.len() - 1);
-        self.now(now, d, |now| self.base.observe(now, x, y));
+    fn observe_each(&self, now: &Now<'_>, at: Layout, p: usize, x: &[f64], y: &mut [f64]) {
+        let own = at.states - 1;
+        if let Entry::Parameter(i) = self.entry {
+            for (x, y) in at.each(x).zip(y.chunks_exact_mut(p)) {
+                let (x, d) = x.split_at(own);
+                self.bent(now, i, d[0], |now| self.base.observe(now, x, y));
+            }
+            return;
+        }
+        self.now(now, |now| {
+            self.base.observe_each(now, at.without(1), p, x, y);
+        });
         if let Entry::Sensor(j) = self.entry {
-            y[j] += d[0];
+            for (x, y) in at.each(x).zip(y.chunks_exact_mut(p)) {
+                y[j] += x[own];
+            }
         }
     }
     fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
         let (process, own) = process.split_at_mut(process.len() - 1);
-        self.now(now, &[], |now| self.base.noise(now, process, measurement));
+        self.now(now, |now| self.base.noise(now, process, measurement));
         own[0] = share(self.memory) * now.theta[now.theta.len() - 1];
     }
-    fn update(&self, now: &Now<'_>, x: &mut [f64]) {
-        let (x, d) = x.split_at_mut(x.len() - 1);
-        self.now(now, d, |now| self.base.update(now, x));
+    fn constrain_each(&self, now: &Now<'_>, at: Layout, x: &mut [f64]) {
+        let Entry::Parameter(i) = self.entry else {
+            return self.now(now, |now| {
+                self.base.constrain_each(now, at.without(1), x);
+            });
+        };
+        for x in at.each_mut(x) {
+            let (x, d) = x.split_at_mut(at.states - 1);
+            self.bent(now, i, d[0], |now| self.base.constrain(now, x));
+        }
+    }
+    fn update_each(&self, now: &Now<'_>, at: Layout, x: &mut [f64]) {
+        let own = at.states - 1;
+        if let Entry::Parameter(i) = self.entry {
+            for x in at.each_mut(x) {
+                let (x, d) = x.split_at_mut(own);
+                self.bent(now, i, d[0], |now| self.base.update(now, x));
+            }
+        } else {
+            self.now(now, |now| self.base.update_each(now, at.without(1), x));
+        }
         // Limits and motion of this step see the new value, as a held input does.
-        d[0] *= self.memory;
+        for x in at.each_mut(x) {
+            x[own] *= self.memory;
+        }
     }
 }
 

@@ -58,7 +58,8 @@ impl DigitalTwin for Disturbed {
         if let Entry::Actuator(j) = self.entry {
             let mut inputs = drive.inputs().clone();
             self.add(sigma[0], noise, j, &mut inputs);
-            let drive = Drive::new(drive.dt(), inputs)
+            let drive = drive
+                .with_inputs(inputs)
                 .map_err(|_| SimulationError::Diverged { at: 0.0 })?;
             return self.base.simulate(own, &drive, noise);
         }

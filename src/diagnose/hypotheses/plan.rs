@@ -1,8 +1,6 @@
 //! Plan of one candidate: its variants, start magnitudes, and the axis of each magnitude in a fit.
 
 use crate::diagnose::error::DiagnoseError;
-use crate::diagnose::fitting::axis::Axis;
-use crate::diagnose::fitting::problem::Problem;
 use crate::diagnose::hypotheses::candidate::{Addition, Candidate, Kind, with, with_disturbance};
 use crate::diagnose::hypotheses::choice::{Choice, axis, choices, log_axis, unit, unset_log_axis};
 use crate::diagnose::hypotheses::entry::Entry;
@@ -10,6 +8,8 @@ use crate::diagnose::hypotheses::scales::Scales;
 use crate::diagnose::hypotheses::variant::Variant;
 use crate::diagnose::thresholds::Thresholds;
 use crate::effect::{Effect, Law, Magnitude, Mark, TargetKind};
+use crate::fit::axis::Axis;
+use crate::fit::problem::Problem;
 use crate::math::quantile;
 use crate::math::{deviation, ends, largest};
 use crate::twin::{Interval, Twin};

@@ -15,7 +15,8 @@ impl Scales<'_> {
     pub fn columns(&self, kind: TargetKind, target: usize) -> Vec<f64> {
         let column = |signal: &Signal| -> Vec<f64> {
             if target < signal.ncols() {
-                signal.column(target).to_vec()
+                let values = signal.column(target).into_iter().copied();
+                values.filter(|v| !v.is_nan()).collect()
             } else {
                 vec![]
             }
@@ -30,14 +31,14 @@ impl Scales<'_> {
         all.concat()
     }
 
-    /// Step in seconds.
+    /// Step in seconds; the median one where steps vary.
     pub fn dt(&self) -> f64 {
         self.records[0].drive().dt()
     }
 
     /// Length of the longest record in seconds.
     pub fn duration(&self) -> f64 {
-        let longest = self.records.iter().map(Record::samples).max().unwrap_or(1);
-        longest as f64 * self.dt()
+        let ends = self.records.iter().map(|r| r.drive().time(r.samples()));
+        ends.fold(0.0, f64::max)
     }
 }

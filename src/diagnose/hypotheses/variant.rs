@@ -1,9 +1,9 @@
 //! A candidate as a twin, with the axes that its magnitudes move on.
 
-use crate::diagnose::fitting::axis::Axis;
-use crate::diagnose::fitting::problem::Problem;
 use crate::diagnose::thresholds::Thresholds;
 use crate::effect::Magnitude;
+use crate::fit::axis::Axis;
+use crate::fit::problem::Problem;
 use crate::twin::{Interval, Twin};
 use std::collections::BTreeMap;
 

@@ -7,14 +7,14 @@
 //! Source: Dawid, "Statistical theory: the prequential approach" (1984).
 
 use crate::diagnose::error::DiagnoseError;
-use crate::diagnose::fitting::climb::climb;
-use crate::diagnose::fitting::first_part::first_part;
-use crate::diagnose::fitting::problem::Problem;
 use crate::diagnose::outcome::Onset;
 use crate::diagnose::residuals::local::level;
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::null::{largest, standardised};
 use crate::diagnose::thresholds::Thresholds;
+use crate::fit::climb::climb;
+use crate::fit::first_part::first_part;
+use crate::fit::problem::Problem;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::math::rank_p_value;
 use crate::record::Record;
@@ -54,8 +54,8 @@ pub(in crate::diagnose) fn onset(
                     Err(error) if error.costs_one_run() => return Ok(None),
                     Err(error) => return Err(error.into()),
                 };
-                let record = Record::new(drive.clone(), outputs)?;
-                foresight(&model.problem, &theta, &record)
+                let replicate = Record::new(drive.clone(), record.with_gaps_in(outputs))?;
+                foresight(&model.problem, &theta, &replicate)
             })
             .collect::<Result<_, DiagnoseError>>()?;
         let failed = others.iter().filter(|o| o.is_none()).count();
@@ -83,7 +83,7 @@ pub(in crate::diagnose) fn onset(
 }
 
 /// Returns for each block but the first few and each output √(n·mean² + n/2·(mean square − 1)²) of its innovations at the θ of all
-/// samples before; `None` for short records and where a filter does not work.
+/// samples before; `None` for short records, for those whose start has an output without any value, and where a filter does not work.
 fn foresight(
     problem: &Problem<'_>,
     theta: &[f64],
@@ -97,13 +97,17 @@ fn foresight(
     let mut theta = theta.to_vec();
     let mut all = vec![];
     for block in Thresholds::ONSET_LEARNT..Thresholds::ONSET_BLOCKS {
-        let before = [first_part(record, end(block))?];
+        let Some(before) = first_part(record, end(block)).map(|part| [part]) else {
+            return Ok(None);
+        };
         let learnt = problem.on(&before);
         let Some(fitted) = climb(&learnt, &learnt.full(&theta), WARM)? else {
             return Ok(None);
         };
         theta = learnt.of_record(0, &fitted.theta);
-        let until = [first_part(record, end(block + 1))?];
+        let Some(until) = first_part(record, end(block + 1)).map(|part| [part]) else {
+            return Ok(None);
+        };
         let seen = problem.on(&until);
         let Some(filtered) = innovations(&seen, &theta)? else {
             return Ok(None);

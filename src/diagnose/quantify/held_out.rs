@@ -5,14 +5,14 @@ use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::explain::attribute::Explanation;
 use crate::diagnose::explain::decide::Conclusion;
 use crate::diagnose::explain::extended::{Accepted, ExtendedTwin, additions};
-use crate::diagnose::fitting::climb::{Fitted, fit};
-use crate::diagnose::fitting::first_part::first_part;
-use crate::diagnose::fitting::posterior::posterior;
-use crate::diagnose::fitting::problem::Problem;
 use crate::diagnose::outcome::Shrinkage;
 use crate::diagnose::settings::DiagnoseSettings;
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::free_run::{Runner, closed, interval, root};
+use crate::fit::climb::{Fitted, fit};
+use crate::fit::first_part::first_part;
+use crate::fit::posterior::posterior;
+use crate::fit::problem::Problem;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::record::Record;
 use crate::twin::{Noise, Role};
@@ -49,7 +49,10 @@ pub(in crate::diagnose) fn shrinkage(
         }
         None if whole.samples() >= SHORTEST_SPLIT => {
             let split = held_out_from(whole.samples());
-            short = vec![first_part(whole, split)?];
+            let Some(part) = first_part(whole, split) else {
+                return Ok(None);
+            };
+            short = vec![part];
             let refit = |problem: &Problem<'_>, theta: &[f64]| -> Result<_, FilterError> {
                 let problem = problem.on(&short);
                 Ok(fit(&problem, &[problem.full(theta)], 10)?.map(|f| f.theta))
@@ -66,7 +69,8 @@ pub(in crate::diagnose) fn shrinkage(
     };
     let Some(base) = base else { return Ok(None) };
     let runner = Runner::new(twin, &[], base.clone())?;
-    let Some(before) = runner.errors(record, from) else {
+    let before = runner.errors(record, from);
+    let Some(before) = before.filter(|errors| !errors.is_empty()) else {
         return Ok(None);
     };
     let unfitted = settings

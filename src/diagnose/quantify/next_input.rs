@@ -9,12 +9,12 @@
 
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::explain::attribute::Explanation;
-use crate::diagnose::fitting::climb::climb;
-use crate::diagnose::fitting::problem::Problem;
-use crate::diagnose::fitting::reference::Reference;
 use crate::diagnose::outcome::NextInput;
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::thresholds::Thresholds;
+use crate::fit::climb::climb;
+use crate::fit::problem::Problem;
+use crate::fit::reference::Reference;
 use crate::likelihood::kalman::recoverable;
 use crate::record::{Drive, Record, Signal};
 use crate::twin::Noise;
@@ -186,6 +186,8 @@ impl Rival<'_> {
     fn record(&self, drive: &Drive, noise: Noise) -> Result<Option<Record>, DiagnoseError> {
         let theta = self.problem.of_record(0, &self.theta);
         match self.problem.twin.simulate(&theta, drive, noise) {
+            // A black box may diverge without saying so.
+            Ok(outputs) if outputs.iter().any(|v| !v.is_finite()) => Ok(None),
             Ok(outputs) => Ok(Some(Record::new(drive.clone(), outputs)?)),
             Err(error) if error.costs_one_run() => Ok(None),
             Err(error) => Err(error.into()),

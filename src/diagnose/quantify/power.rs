@@ -11,7 +11,6 @@
 //! is solved for the magnitude, shapes (frequencies, times, exponents) where they show best. To first order, and of the scan
 //! alone: tails that only the omnibus statistics see are not counted.
 
-use crate::diagnose::fitting::reference::Reference;
 use crate::diagnose::hypotheses::dictionary::Point;
 use crate::diagnose::hypotheses::variant::Variant;
 use crate::diagnose::outcome::Visible;
@@ -19,6 +18,7 @@ use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::null::NullDistribution;
 use crate::diagnose::thresholds::Thresholds;
 use crate::effect::Magnitude;
+use crate::fit::reference::Reference;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use rayon::prelude::*;
 

@@ -125,17 +125,15 @@ impl Bins {
     /// Variables that sort a sample: states and inputs a step before, since a sample tells about the step that led to
     /// it, and predicted outputs.
     pub fn columns(&self, filtered: &Filtered, states: &Signal, record: &Record) -> Signal {
-        let (drive, y) = (record.drive(), record.outputs());
+        let drive = record.drive();
+        let predicted = filtered.held_predictions(record.outputs());
         let inputs = drive.inputs().ncols();
         Signal::from_shape_fn((record.samples(), self.variables.len()), |(k, v)| {
             let before = k.saturating_sub(1);
             match v {
                 v if v < self.states => states[[before, v]],
                 v if v < self.states + inputs => drive.input(before)[v - self.states],
-                v => {
-                    let j = self.predicted[v - self.states - inputs];
-                    y[[k, j]] - filtered.innovations[[k, j]]
-                }
+                v => predicted[[k, self.predicted[v - self.states - inputs]]],
             }
         })
     }

@@ -18,14 +18,14 @@ pub(in crate::diagnose) fn omnibus(
 ) -> Vec<f64> {
     let channels = (states.first()).map_or(0, |(f, _)| f.standardised.ncols());
     let mut all = Vec::new();
+    let predicted: Vec<Signal> = (states.iter().zip(records))
+        .map(|((f, _), record)| f.held_predictions(record.outputs()))
+        .collect();
     for j in 0..channels {
         let mut sums: Vec<f64> = Vec::new();
-        for ((f, states), record) in states.iter().zip(records) {
+        for (((f, states), record), predicted) in states.iter().zip(records).zip(&predicted) {
             let v: Vec<f64> = f.standardised.column(j).to_vec();
-            let predicted: Vec<f64> = (record.outputs().column(j).iter())
-                .zip(f.innovations.column(j))
-                .map(|(y, e)| y - e)
-                .collect();
+            let predicted = predicted.column(j).to_vec();
             let inputs: Vec<Vec<f64>> = (record.drive().inputs().columns().into_iter())
                 .map(|u| u.to_vec())
                 .collect();

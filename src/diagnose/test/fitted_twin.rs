@@ -1,13 +1,13 @@
 //! A fitted twin with its dictionary of effects.
 
 use crate::diagnose::error::DiagnoseError;
-use crate::diagnose::fitting::climb::Fitted;
-use crate::diagnose::fitting::problem::Problem;
-use crate::diagnose::fitting::reference::Reference;
 use crate::diagnose::hypotheses::candidate::{Addition, Candidate};
 use crate::diagnose::hypotheses::dictionary::Dictionary;
 use crate::diagnose::hypotheses::scales::Scales;
 use crate::diagnose::residuals::cut::Bins;
+use crate::fit::climb::Fitted;
+use crate::fit::problem::Problem;
+use crate::fit::reference::Reference;
 use crate::record::{Record, Signal};
 use crate::twin::Twin;
 use std::sync::Arc;

@@ -8,6 +8,7 @@ use crate::estimator::track;
 use crate::math::{median, quantile};
 use crate::record::{Record, Signal};
 use crate::twin::{Noise, Twin};
+use ndarray::Array1;
 use rayon::prelude::*;
 
 /// A twin and θ to run free.
@@ -28,7 +29,8 @@ impl Runner {
         })
     }
 
-    /// Squared errors of the free run over the variance of y, mean over channels, by sample from `from` on.
+    /// Squared errors of the free run over the variance of y, mean over channels, by sample from `from` on. Missing outputs, and
+    /// samples without any, are left out.
     pub fn errors(&self, record: &Record, from: usize) -> Option<Vec<f64>> {
         let outputs = self.outputs(record)?;
         Some(squares(record.outputs(), &outputs, from))
@@ -53,7 +55,8 @@ impl Runner {
                     .ok()?;
                 // In units of the measured record, as the other errors are.
                 let scale = variances(record.outputs());
-                Some(root(&scaled(&(outputs - &free), &scale, from)))
+                let errors = record.with_gaps_in(outputs - &free);
+                Some(root(&scaled(&errors, &scale, from)))
             })
             .collect();
         median(&errors).ok()
@@ -77,15 +80,20 @@ pub(in crate::diagnose) fn free_runs(
 
 fn variances(y: &Signal) -> Vec<f64> {
     (y.columns().into_iter())
-        .map(|y| y.var(0.0).max(1e-300))
+        .map(|y| {
+            let there: Array1<f64> = y.iter().copied().filter(|v| !v.is_nan()).collect();
+            there.var(0.0).max(1e-300)
+        })
         .collect()
 }
 
 fn scaled(difference: &Signal, variances: &[f64], from: usize) -> Vec<f64> {
     (difference.rows().into_iter().skip(from))
-        .map(|row| {
-            let squares = row.iter().zip(variances).map(|(d, v)| d * d / v);
-            squares.sum::<f64>() / variances.len() as f64
+        .filter_map(|row| {
+            let there = || row.iter().zip(variances).filter(|(d, _)| !d.is_nan());
+            let squares = there().map(|(d, v)| d * d / v);
+            let count = there().count();
+            (count > 0).then(|| squares.sum::<f64>() / count as f64)
         })
         .collect()
 }

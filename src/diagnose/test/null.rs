@@ -1,15 +1,15 @@
 //! Null distribution of the statistics: the fitted twin simulated, refitted and evaluated like the records.
 
 use crate::diagnose::error::DiagnoseError;
-use crate::diagnose::fitting::climb::climb;
-use crate::diagnose::fitting::problem::Problem;
-use crate::diagnose::fitting::reference::Reference;
 use crate::diagnose::residuals::local::local;
 use crate::diagnose::residuals::omnibus::omnibus;
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::shared::Shared;
 use crate::diagnose::test::statistics::Statistics;
 use crate::diagnose::thresholds::Thresholds;
+use crate::fit::climb::climb;
+use crate::fit::problem::Problem;
+use crate::fit::reference::Reference;
 use crate::likelihood::kalman::FilterError;
 use crate::math::{quantile, rank_p_value};
 use crate::progress::Stage;
@@ -96,7 +96,9 @@ impl<'a> FittedTwin<'a> {
             match self.problem.twin.simulate(&theta, drive, noise) {
                 // A black box may diverge without saying so.
                 Ok(outputs) if outputs.iter().any(|v| !v.is_finite()) => return Ok(None),
-                Ok(outputs) => records.push(Record::new(drive.clone(), outputs)?),
+                Ok(outputs) => {
+                    records.push(Record::new(drive.clone(), record.with_gaps_in(outputs))?);
+                }
                 Err(error) if error.costs_one_run() => return Ok(None),
                 Err(error) => return Err(error.into()),
             }

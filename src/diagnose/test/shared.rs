@@ -10,12 +10,12 @@
 //!
 //! Gains have θ projected out, which is the same step. A diagnosis of K simulated records then costs K runs, not K fits.
 
-use crate::diagnose::fitting::problem::Problem;
-use crate::diagnose::fitting::reference::{Gain, Reference, weak};
 use crate::diagnose::residuals::local::local;
 use crate::diagnose::residuals::omnibus::omnibus;
 use crate::diagnose::test::fitted_twin::FittedTwin;
 use crate::diagnose::test::statistics::Statistics;
+use crate::fit::problem::Problem;
+use crate::fit::reference::{Gain, Reference, weak};
 use crate::likelihood::ensemble::{Predictor, standardised};
 use crate::likelihood::kalman::{FilterError, Filtered, recoverable};
 use crate::record::{Record, Signal};
@@ -88,7 +88,7 @@ impl Shared {
         let states: Vec<(Filtered, Signal)> = (0..records.len())
             .map(|r| {
                 let moved = moved(&reference.filtered[r], &beside, r, &step);
-                let predicted = moved.predictions(records[r].outputs());
+                let predicted = moved.held_predictions(records[r].outputs());
                 (moved, predicted)
             })
             .collect();

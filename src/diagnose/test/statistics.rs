@@ -1,6 +1,6 @@
 //! Statistics of records under a fitted twin.
 
-use crate::diagnose::fitting::reference::Gain;
+use crate::fit::reference::Gain;
 
 /// All statistics of one set of records, larger where less was expected.
 #[derive(Debug, Clone)]

@@ -2,17 +2,19 @@
 
 use super::outliers::strike;
 use super::{Place, Placed, Slots};
-use crate::effect::law::{
-    ForceLaw, ForcePoint, Instant, Law, LimitLaw, NOISE_ENTERS, NoiseLaw, ParameterLaw, SignalLaw,
-};
+use crate::effect::batch::{Batch, Channel, ForceBatch, LimitBatch, SignalBatch};
+use crate::effect::law::{ForcePoint, Instant, Law, NOISE_ENTERS, NoiseLaw, ParameterLaw};
 use crate::record::{Quantity, Signal};
-use crate::twin::{Modify, Noise, Now, Outliers, Outline, SimulationError, StateSpace};
+use crate::twin::{
+    Between, Hold, Layout, Modify, Noise, Now, Outliers, Outline, SimulationError, StateSpace,
+};
 use smallvec::SmallVec;
 use std::ops::Range;
 use std::sync::Arc;
 
 /// Short vectors that stay on the stack in the simulation loop.
-type Short = SmallVec<[f64; 16]>;
+type Short = SmallVec<[f64; SHORT]>;
+const SHORT: usize = 16;
 
 /// Equations with effects. The state is the base twin's, then one held value for each input (where an
 /// actuator effect stands), then the memories of the signal effects; the added ones carry no noise.
@@ -23,10 +25,12 @@ pub(super) struct AugmentedEquations {
     states: usize,
     /// Held inputs in the state; empty without actuator effects.
     held: Range<usize>,
+    /// The same at the next sample, where inputs lie on lines between samples; else empty.
+    next: Range<usize>,
     sensors: Vec<OnSignal>,
     actuators: Vec<OnSignal>,
-    forces: Vec<Placed<ForceLaw>>,
-    ceilings: Vec<Placed<LimitLaw>>,
+    forces: Vec<Placed<dyn ForceBatch>>,
+    ceilings: Vec<Placed<dyn LimitBatch>>,
     parameters: Vec<Placed<ParameterLaw>>,
     process: Vec<Placed<NoiseLaw>>,
     measurement: Vec<Placed<NoiseLaw>>,
@@ -35,9 +39,9 @@ pub(super) struct AugmentedEquations {
 
 /// A signal effect and its memory in the state.
 struct OnSignal {
-    law: Arc<SignalLaw>,
+    law: Arc<dyn SignalBatch>,
     at: Place,
-    memory: Range<usize>,
+    channel: Channel,
     after_noise: bool,
 }
 
@@ -52,10 +56,18 @@ impl AugmentedEquations {
         for j in 1..=held.len() {
             outline.states.push(hidden(format!("held/{j}")));
         }
-        let mut signals = |pick: fn(&Law) -> Option<&Arc<SignalLaw>>| {
+        let next = match base.stepping().hold {
+            Hold::Linear => held.end..held.end + held.len(),
+            Hold::Zero => held.end..held.end,
+        };
+        for j in 1..=next.len() {
+            outline.states.push(hidden(format!("next/{j}")));
+        }
+        let mut signals = |pick: fn(&Law) -> bool| {
             let mut placed = Vec::new();
             for slot in &slots.all {
-                let Some(law) = pick(slot.effect.law()) else {
+                let kind = slot.effect.kind();
+                let (Batch::Signal(law), true) = (kind.over_points(), pick(kind.law())) else {
                     continue;
                 };
                 let from = outline.states.len();
@@ -67,42 +79,40 @@ impl AugmentedEquations {
                 placed.push(OnSignal {
                     law: law.clone(),
                     at: slot.place.clone(),
-                    memory: from..outline.states.len(),
-                    after_noise: slot.effect.kind().position() > NOISE_ENTERS,
+                    channel: Channel {
+                        memory: from..outline.states.len(),
+                        target: slot.place.target,
+                    },
+                    after_noise: kind.position() > NOISE_ENTERS,
                 });
             }
             placed
         };
-        let sensors = signals(|law| match law {
-            Law::Sensor(law) => Some(law),
-            _ => None,
-        });
-        let actuators = signals(|law| match law {
-            Law::Actuator(law) => Some(law),
-            _ => None,
-        });
+        let sensors = signals(|law| matches!(law, Law::Sensor(_)));
+        let actuators = signals(|law| matches!(law, Law::Actuator(_)));
         Self {
             states,
             held,
+            next,
             sensors,
             actuators,
-            forces: slots.of_law(|law| match law {
-                Law::Force(law) => Some(law),
+            forces: slots.of_law(|kind| match kind.over_points() {
+                Batch::Force(law) => Some(law),
                 _ => None,
             }),
-            ceilings: slots.of_law(|law| match law {
-                Law::Limit(law) => Some(law),
+            ceilings: slots.of_law(|kind| match kind.over_points() {
+                Batch::Limit(law) => Some(law),
                 _ => None,
             }),
-            parameters: slots.of_law(|law| match law {
+            parameters: slots.of_law(|kind| match kind.law() {
                 Law::Parameter(law) => Some(law),
                 _ => None,
             }),
-            process: slots.of_law(|law| match law {
+            process: slots.of_law(|kind| match kind.law() {
                 Law::ProcessNoise(law) => Some(law),
                 _ => None,
             }),
-            measurement: slots.of_law(|law| match law {
+            measurement: slots.of_law(|kind| match kind.law() {
                 Law::MeasurementNoise(law) => Some(law),
                 _ => None,
             }),
@@ -145,44 +155,143 @@ impl AugmentedEquations {
         with(base, &now)
     }
 
+    /// Adds the forces to the rates. `inner` is the base twin's.
+    #[inline]
+    fn push(&self, now: &Now<'_>, inner: &Now<'_>, own: Layout, x: &[f64], dx: &mut [f64]) {
+        for Placed { law, at } in &self.forces {
+            let point = ForcePoint {
+                x: 0.0,
+                other: 0.0,
+                t: inner.t,
+                states: &[],
+                u: inner.u,
+                theta: inner.theta,
+            };
+            law.push(at.m(now.theta), at.pair(), &point, own, x, dx);
+        }
+    }
+
     /// The inputs of this sample behind the actuator effects; advances their memories in `x`.
     fn actuate(&self, now: &Now<'_>, x: &mut [f64]) -> Short {
         let mut u = Short::from_slice(now.u);
         for actuator in &self.actuators {
-            actuator.pass(now, &mut x[actuator.memory.clone()], &mut u);
+            actuator.pass(now, (Layout::dense(x.len()), x), (now.u.len(), &mut u));
         }
         u
     }
 
-    /// Passes `y` through the sensor effects before (or after) the noise; advances their memories in `x`.
-    fn sense(&self, now: &Now<'_>, x: &mut [f64], y: &mut [f64], after_noise: bool) {
+    /// As [`actuate`](Self::actuate), the memories left as they are.
+    fn actuated(&self, now: &Now<'_>, x: &[f64]) -> Short {
+        let mut u = Short::from_slice(now.u);
+        for actuator in &self.actuators {
+            actuator.peek(now, (Layout::dense(x.len()), x), (now.u.len(), &mut u));
+        }
+        u
+    }
+
+    /// Sets the base twin's states by `base`, then fills the memories with the first values of their signals.
+    fn set_out(
+        &self,
+        now: &Now<'_>,
+        x: &mut [f64],
+        base: impl FnOnce(&dyn StateSpace, &Now<'_>, &mut [f64]),
+    ) {
+        let mut u = Short::from_slice(now.u);
+        for actuator in &self.actuators {
+            actuator.begin(now, x, &mut u);
+        }
+        if !self.held.is_empty() {
+            x[self.held.clone()].copy_from_slice(&u);
+        }
+        if !self.next.is_empty() {
+            x[self.next.clone()].copy_from_slice(&u);
+        }
+        let mut y = Short::from_elem(0.0, self.outline.outputs.len());
+        self.inner(now, &u, |twin, now| {
+            let x = &mut x[..self.states];
+            base(twin, now, x);
+            twin.observe(now, x, &mut y);
+        });
         for sensor in &self.sensors {
-            if sensor.after_noise == after_noise {
-                // After the noise nobody remembers, and `x` is empty.
-                let memory = x.get_mut(sensor.memory.clone()).unwrap_or_default();
-                sensor.pass(now, memory, y);
+            sensor.begin(now, x, &mut y);
+        }
+    }
+
+    /// The inputs of the next sample behind the actuator effects, kept in `x`; memories stay as they are.
+    fn foresee(&self, now: &Now<'_>, x: &mut [f64]) -> Option<Short> {
+        let between = now.between.filter(|_| !self.next.is_empty())?;
+        let later = Now {
+            t: now.t + now.dt,
+            u: between.next,
+            ..*now
+        };
+        let next = self.actuated(&later, x);
+        x[self.next.clone()].copy_from_slice(&next);
+        Some(next)
+    }
+
+    /// Sensor effects before the noise, or after it.
+    fn sensors(&self, after_noise: bool) -> impl Iterator<Item = &OnSignal> {
+        (self.sensors.iter()).filter(move |sensor| sensor.after_noise == after_noise)
+    }
+
+    /// Advances the memories of the sensor effects; `observe` gives the outputs of points, so many at once that they need
+    /// no heap.
+    fn remember(
+        &self,
+        now: &Now<'_>,
+        at: Layout,
+        x: &mut [f64],
+        observe: impl Fn(&[f64], &mut [f64]),
+    ) {
+        let p = self.outline.outputs.len();
+        let mut outputs = [0.0; SHORT];
+        let mut heap = vec![0.0; if p > SHORT { p } else { 0 }];
+        let y = if p > SHORT {
+            &mut heap
+        } else {
+            &mut outputs[..]
+        };
+        for x in x.chunks_mut(SHORT / p.min(SHORT) * at.stride) {
+            let y = &mut y[..x.len() / at.stride * p];
+            observe(x, y);
+            for sensor in self.sensors(false) {
+                sensor.pass(now, (at, x), (p, y));
             }
         }
     }
 }
 
 impl OnSignal {
-    /// Passes its channel of a sample through the effect.
-    #[inline]
-    fn pass(&self, now: &Now<'_>, memory: &mut [f64], channels: &mut [f64]) {
-        let instant = Instant {
-            t: now.t,
-            dt: now.dt,
-        };
-        let value = &mut channels[self.at.target];
-        *value = (self.law)(self.at.m(now.theta), instant, memory, *value);
+    /// Passes its channel of points through the effect; advances its memory.
+    fn pass(&self, now: &Now<'_>, states: (Layout, &mut [f64]), channels: (usize, &mut [f64])) {
+        let m = self.at.m(now.theta);
+        (self.law).pass(m, instant(now), &self.channel, states, channels);
+    }
+
+    /// As [`pass`](Self::pass), the memory left as it is.
+    fn peek(&self, now: &Now<'_>, states: (Layout, &[f64]), channels: (usize, &mut [f64])) {
+        let m = self.at.m(now.theta);
+        (self.law).peek(m, instant(now), &self.channel, states, channels);
+    }
+
+    /// As [`pass`](Self::pass) of an effect without memory; returns whether any value changed.
+    fn read(&self, now: &Now<'_>, channels: (usize, &mut [f64])) -> bool {
+        let m = self.at.m(now.theta);
+        (self.law).read(m, instant(now), self.channel.target, channels)
     }
 
     /// Fills the memory with the first value of the channel, and passes that through the effect.
     fn begin(&self, now: &Now<'_>, x: &mut [f64], channels: &mut [f64]) {
-        let memory = &mut x[self.memory.clone()];
-        memory.fill(channels[self.at.target]);
-        self.pass(now, &mut Short::from_slice(memory), channels);
+        x[self.channel.memory.clone()].fill(channels[self.channel.target]);
+        self.peek(now, (Layout::dense(x.len()), x), (channels.len(), channels));
+    }
+}
+
+fn instant(now: &Now<'_>) -> Instant {
+    Instant {
+        t: now.t,
+        dt: now.dt,
     }
 }
 
@@ -203,87 +312,111 @@ impl Modify for AugmentedEquations {
         self.outline.clone()
     }
 
-    fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
-        let (base, added) = dx.split_at_mut(self.states);
-        added.fill(0.0);
-        // Inputs as the effects left them at the last sample.
-        let u = if self.held.is_empty() {
-            now.u
-        } else {
-            &x[self.held.clone()]
-        };
-        let states = &x[..self.states];
-        self.inner(now, u, |twin, own| {
-            twin.drift(own, states, base);
-            for Placed { law, at } in &self.forces {
-                let point = ForcePoint {
-                    x: x[at.target],
-                    other: at.other.map_or(0.0, |j| x[j]),
-                    t: own.t,
-                    states,
-                    u: own.u,
-                    theta: own.theta,
-                };
-                base[at.target] += law(at.m(now.theta), &point);
+    fn drift_each(&self, now: &Now<'_>, at: Layout, x: &[f64], dx: &mut [f64]) {
+        let own = at.without(self.added());
+        if own.states < at.states {
+            for dx in at.each_mut(dx) {
+                dx[own.states..].fill(0.0);
             }
-        });
+        }
+        if self.held.is_empty() {
+            return self.inner(now, now.u, |twin, inner| {
+                twin.drift_each(inner, own, x, dx);
+                self.push(now, inner, own, x, dx);
+            });
+        }
+        // Inputs as the effects left them at the last sample, or between it and the next.
+        let mut line = Short::new();
+        for (x, dx) in at.each(x).zip(at.each_mut(dx)) {
+            let u = match now.between {
+                Some(between) if !self.next.is_empty() => {
+                    let between = Between {
+                        next: &x[self.next.clone()],
+                        ..*between
+                    };
+                    line.resize(self.held.len(), 0.0);
+                    between.line(&x[self.held.clone()], &mut line);
+                    &line
+                }
+                _ => &x[self.held.clone()],
+            };
+            let (states, rates) = (&x[..own.states], &mut dx[..own.states]);
+            self.inner(now, u, |twin, inner| {
+                twin.drift(inner, states, rates);
+                self.push(now, inner, Layout::dense(own.states), states, rates);
+            });
+        }
     }
 
-    fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
-        let own = &x[..self.states];
-        if self.actuators.is_empty() && self.sensors.is_empty() {
-            return self.inner(now, now.u, |twin, now| twin.observe(now, own, y));
+    fn observe_each(&self, now: &Now<'_>, at: Layout, p: usize, x: &[f64], y: &mut [f64]) {
+        let own = at.without(self.added());
+        if self.actuators.is_empty() {
+            self.inner(now, now.u, |twin, now| twin.observe_each(now, own, p, x, y));
+        } else {
+            for (x, y) in at.each(x).zip(y.chunks_exact_mut(p)) {
+                let u = self.actuated(now, x);
+                let states = &x[..own.states];
+                self.inner(now, &u, |twin, now| twin.observe(now, states, y));
+            }
         }
         // Memories advance in `update`, once a sample; looking changes nothing.
-        let mut scratch = Short::from_slice(x);
-        let u = self.actuate(now, &mut scratch);
-        self.inner(now, &u, |twin, now| twin.observe(now, own, y));
-        self.sense(now, &mut scratch, y, false);
+        for sensor in self.sensors(false) {
+            sensor.peek(now, (at, x), (p, y));
+        }
     }
 
-    fn readout(&self, now: &Now<'_>, y: &mut [f64]) {
-        self.inner(now, now.u, |twin, now| twin.readout(now, y));
-        self.sense(now, &mut [], y, true);
+    fn readout_each(&self, now: &Now<'_>, p: usize, y: &mut [f64]) -> bool {
+        let mut changed = self.inner(now, now.u, |twin, now| twin.readout_each(now, p, y));
+        for sensor in self.sensors(true) {
+            // After the noise nobody remembers.
+            changed |= sensor.read(now, (p, y));
+        }
+        changed
     }
 
     fn start(&self, now: &Now<'_>, x: &mut [f64]) {
         x.fill(0.0);
-        let mut u = Short::from_slice(now.u);
-        for actuator in &self.actuators {
-            actuator.begin(now, x, &mut u);
-        }
-        if !self.held.is_empty() {
-            x[self.held.clone()].copy_from_slice(&u);
-        }
-        let mut y = Short::from_elem(0.0, self.outline.outputs.len());
-        self.inner(now, &u, |twin, now| {
-            let x = &mut x[..self.states];
-            twin.start(now, x);
-            twin.observe(now, x, &mut y);
-        });
-        for sensor in &self.sensors {
-            sensor.begin(now, x, &mut y);
-        }
+        self.set_out(now, x, |twin, now, x| twin.start(now, x));
     }
 
-    fn update(&self, now: &Now<'_>, x: &mut [f64]) {
-        if self.actuators.is_empty() && self.sensors.is_empty() {
-            return self.inner(now, now.u, |twin, now| {
-                twin.update(now, &mut x[..self.states]);
+    fn begin(&self, now: &Now<'_>, x: &mut [f64]) {
+        self.set_out(now, x, |twin, now, x| twin.begin(now, x));
+    }
+
+    fn update_each(&self, now: &Now<'_>, at: Layout, x: &mut [f64]) {
+        let own = at.without(self.added());
+        if self.actuators.is_empty() {
+            return self.inner(now, now.u, |twin, inner| {
+                if !self.sensors.is_empty() {
+                    let p = self.outline.outputs.len();
+                    let observe = |x: &[f64], y: &mut [f64]| twin.observe_each(inner, own, p, x, y);
+                    self.remember(now, at, x, observe);
+                }
+                twin.update_each(inner, own, x);
             });
         }
-        let u = self.actuate(now, x);
-        if !self.held.is_empty() {
+        for x in at.each_mut(x) {
+            let u = self.actuate(now, x);
             x[self.held.clone()].copy_from_slice(&u);
-        }
-        if !self.sensors.is_empty() {
-            let mut y = Short::from_elem(0.0, self.outline.outputs.len());
-            self.inner(now, &u, |twin, now| {
-                twin.observe(now, &x[..self.states], &mut y);
+            let next = self.foresee(now, x);
+            let between = now.between.map(|between| Between {
+                next: next.as_deref().unwrap_or(between.next),
+                ..*between
             });
-            self.sense(now, x, &mut y, false);
+            let now = &Now {
+                between: between.as_ref(),
+                ..*now
+            };
+            self.inner(now, &u, |twin, inner| {
+                if !self.sensors.is_empty() {
+                    let observe = |x: &[f64], y: &mut [f64]| {
+                        twin.observe(inner, &x[..own.states], y);
+                    };
+                    self.remember(now, Layout::dense(at.states), x, observe);
+                }
+                twin.update(inner, &mut x[..own.states]);
+            });
         }
-        self.inner(now, &u, |twin, now| twin.update(now, &mut x[..self.states]));
     }
 
     fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
@@ -302,16 +435,12 @@ impl Modify for AugmentedEquations {
         }
     }
 
-    fn constrain(&self, now: &Now<'_>, x: &mut [f64]) {
-        for Placed { law, at } in &self.ceilings {
-            let (i, j) = (at.target, at.other.filter(|j| *j != at.target));
-            let mut value = x[i];
-            law(at.m(now.theta), &mut value, j.map(|j| &mut x[j]));
-            x[i] = value;
+    fn constrain_each(&self, now: &Now<'_>, at: Layout, x: &mut [f64]) {
+        for Placed { law, at: place } in &self.ceilings {
+            law.hold(place.m(now.theta), place.pair(), at, x);
         }
-        self.inner(now, now.u, |twin, now| {
-            twin.constrain(now, &mut x[..self.states]);
-        });
+        let own = at.without(self.added());
+        self.inner(now, now.u, |twin, now| twin.constrain_each(now, own, x));
     }
 
     fn check_parameters(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {

@@ -4,9 +4,10 @@ mod black_box;
 mod equations;
 mod outliers;
 
+use super::batch::Pair;
 use super::check::{check_effects, targets};
 use super::error::EffectError;
-use super::law::Law;
+use super::kind::EffectKind;
 use super::placed::Effect;
 use crate::twin::{Interval, Modified, Parameter, ParameterSpace, Role, SimulationError, Twin};
 use black_box::AugmentedBlackBox;
@@ -96,6 +97,14 @@ struct Place {
 }
 
 impl Place {
+    /// Target and other state.
+    fn pair(&self) -> Pair {
+        Pair {
+            target: self.target,
+            other: self.other,
+        }
+    }
+
     fn m<'a>(&self, theta: &'a [f64]) -> &'a [f64] {
         &theta[self.magnitudes.clone()]
     }
@@ -160,11 +169,11 @@ impl Slots {
     }
 
     /// The functions of one kind of law.
-    fn of_law<L: ?Sized>(&self, pick: impl Fn(&Law) -> Option<&Arc<L>>) -> Vec<Placed<L>> {
+    fn of_law<L: ?Sized>(&self, pick: impl Fn(&EffectKind) -> Option<&Arc<L>>) -> Vec<Placed<L>> {
         (self.all.iter())
             .filter_map(|slot| {
                 Some(Placed {
-                    law: pick(slot.effect.law())?.clone(),
+                    law: pick(slot.effect.kind())?.clone(),
                     at: slot.place.clone(),
                 })
             })
@@ -219,9 +228,9 @@ fn magnitude_parameters(effect: &Effect) -> Vec<Parameter> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effect::{Catalogue, EffectKind, Magnitude, OtherState};
+    use crate::effect::{Catalogue, Magnitude, OtherState};
     use crate::record::{Drive, Signal};
-    use crate::twin::{Noise, Now};
+    use crate::twin::{Hold, Noise, Now, Stepping};
     use crate::twins::CascadedTanks;
 
     #[test]
@@ -262,12 +271,7 @@ mod tests {
         let equations = twin.equations().unwrap();
         let rate = |size: f64| {
             let theta = [0.6, 0.5, 0.55, 1.0, size, 0.25, 0.5];
-            let now = Now {
-                t: 2.0,
-                dt: 0.5,
-                u: &[3.0],
-                theta: &theta,
-            };
+            let now = Now::new(2.0, 0.5, &[3.0], &theta);
             // Two levels, and the held input behind the bias.
             let mut rates = [0.0; 3];
             equations.drift(&now, &[4.0, 7.0, 3.25], &mut rates);
@@ -289,5 +293,46 @@ mod tests {
         assert_eq!(noise.low(), 0.0);
         assert!(noise.contains(1e4));
         assert_eq!(of("sensor-rectification")[0].bounds.high(), 1.0);
+    }
+
+    /// Between samples, effects on inputs leave a line a line: off, no bit changes; a bias moves both ends.
+    #[test]
+    fn actuator_effects_keep_inputs_on_lines() {
+        let linear = |stepping: &mut Stepping| {
+            stepping.hold = Hold::Linear;
+            stepping.substeps = 3;
+        };
+        let base = Twin::new(CascadedTanks).stepped(linear).unwrap();
+        let levels = |shift: f64| {
+            let levels = |(k, _)| shift + [1.5, 2.5, 0.5][k / 10 % 3];
+            Drive::new(0.5, Signal::from_shape_fn((60, 1), levels)).unwrap()
+        };
+        let theta = [0.6, 0.5, 0.55, 1.0];
+        let with = |magnitudes: &[f64]| [&theta[..], magnitudes].concat();
+        let plain = base
+            .simulate(&theta, &levels(0.0), Noise::new(1, "line", 0))
+            .unwrap();
+        let run = |ids: &[&str], magnitudes: &[f64]| {
+            let library = Catalogue::default();
+            let effects = ids.iter().map(|id| library.effect(id, "actuator").unwrap());
+            // One after the other, so that one twin holds another.
+            let twin = effects.fold(base.clone(), |twin, effect| {
+                augment(twin, vec![effect]).unwrap()
+            });
+            let noise = Noise::new(1, "line", 0);
+            twin.simulate(&with(magnitudes), &levels(0.0), noise)
+                .unwrap()
+        };
+        assert_eq!(run(&["actuator-bias"], &[0.0]), plain);
+        assert_eq!(run(&["actuator-lag", "actuator-bias"], &[0.0, 0.0]), plain);
+        let shifted = base
+            .simulate(&theta, &levels(0.25), Noise::new(1, "line", 0))
+            .unwrap();
+        let biased = run(&["actuator-bias"], &[0.25]);
+        assert!((&biased - &shifted).iter().all(|d| d.abs() < 1e-12));
+        assert_ne!(
+            run(&["actuator-bias", "actuator-lag"], &[0.25, 2.0]),
+            biased
+        );
     }
 }

@@ -1,6 +1,7 @@
 //! Laws and magnitudes that sensors and actuators share.
 
 use super::super::magnitude::Magnitude;
+use crate::setting::number;
 
 /// Samples that a delay keeps: the present one and 63 before it. Each is a state for whoever simulates or filters
 /// the twin, so there are no more of them than delays in practice need.
@@ -69,7 +70,10 @@ pub(super) fn check_delay(delay: f64, dt: f64) -> Result<(), String> {
         return Ok(());
     }
     Err(format!(
-        "delay = {delay} s, but at a step of {dt} s at most {longest} s are kept; choose a shorter delay or a longer step"
+        "delay = {} s, but at a step of {} s at most {} s are kept; choose a shorter delay or a longer step",
+        number(delay),
+        number(dt),
+        number(longest)
     ))
 }
 

@@ -6,19 +6,6 @@
 //! | `.csv` | a column for each parameter, by name, then `x1` … `xn` | anything |
 //!
 //! Both keep every bit. The same draws give the same bytes: an archive carries no time.
-//!
-//! ```
-//! use ndarray::array;
-//! use truetwin::estimator::bank::{Draws, file};
-//! let draws = Draws { theta: array![[1.0], [2.0]], features: array![[0.1, 0.2], [0.3, 0.4]], redrawn: 0 };
-//! let folder = tempfile::tempdir()?;
-//! for name in ["bank.npz", "bank.csv"] {
-//!     let path = folder.path().join(name);
-//!     file::write(&path, &draws, &["a"])?;
-//!     assert_eq!(file::read(&path, &["a"])?, draws);
-//! }
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
 
 use super::draws::Draws;
 use super::npy;

@@ -5,7 +5,7 @@
 //! | simulate a twin and take features | [`FeatureSimulator`] |
 //! | make many rows, each a pure function of its number | [`FeatureSimulator::draws`], [`Draws`] |
 //! | train on more rows than fit into memory | [`Bank`] |
-//! | exchange rows with NumPy and spreadsheets | [`mod@file`] |
+//! | exchange rows with NumPy and spreadsheets | [`file`] |
 
 mod draws;
 pub mod file;

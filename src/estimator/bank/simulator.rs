@@ -55,6 +55,7 @@ impl FeatureSimulator {
 
     /// Features of a record.
     pub fn observe(&self, record: &Record) -> Result<DVector<f64>, FeatureError> {
+        record.check_complete()?;
         let features = self.map.extract(record.drive(), record.outputs())?;
         Ok(DVector::from_vec(features))
     }
@@ -71,6 +72,7 @@ impl FeatureSimulator {
         initial: &[f64],
         noise: Noise,
     ) -> Result<Option<(Self, Centred)>, FeatureError> {
+        record.check_complete()?;
         let found = self.map.centred(record, initial, noise)?;
         Ok(found.map(|centred| {
             let simulator = Self {

@@ -1,11 +1,12 @@
 //! Free run of the calibrated twin beside the record.
 
-use crate::fit::{Bounds, GaussNewton, ResidualProblem};
+use crate::fit::least_squares::{Bounds, GaussNewton, ResidualProblem};
 use crate::math::MathError;
 use crate::math::Stencil;
 use crate::record::{Record, Signal};
 use crate::twin::{DigitalTwin, Interval, ParameterSpace, Role};
 use nalgebra::{DMatrix, DVector};
+use ndarray::Array1;
 
 /// A free run beside a record.
 #[derive(Debug, Clone)]
@@ -13,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 pub struct Tracking {
     /// Outputs of the free run, N × channels.
     pub outputs: Signal,
-    /// Root mean square of record − free run over all samples and channels, in output units.
+    /// Root mean square of record − free run over all outputs that are not missing, in output units.
     pub rmse: f64,
     /// θ with unknown starts refitted to this record.
     pub theta: Vec<f64>,
@@ -54,7 +55,11 @@ pub fn track(
     let outputs = twin
         .free_run(&fitted, record.drive())
         .map_err(|error| MathError::Start(error.into()))?;
-    let squares = (record.outputs() - &outputs).mapv(|d| d * d);
+    let errors = record.outputs() - &outputs;
+    let squares: Array1<f64> = (errors.iter())
+        .filter(|d| !d.is_nan())
+        .map(|d| d * d)
+        .collect();
     Ok(Tracking {
         rmse: squares.mean().unwrap_or(0.0).sqrt(),
         outputs,
@@ -82,8 +87,10 @@ impl ResidualProblem for StartFit<'_> {
             theta[j] = *value;
         }
         let run = (self.twin.free_run(&theta, self.record.drive())).map_err(MathError::rejected)?;
-        let rows = self.record.outputs().iter().zip(&run).map(|(y, f)| f - y);
-        Ok(DVector::from_iterator(run.len(), rows))
+        let rows = (self.record.outputs().iter().zip(&run))
+            .filter(|(y, _)| !y.is_nan())
+            .map(|(y, f)| f - y);
+        Ok(DVector::from_vec(rows.collect()))
     }
 
     fn jacobian(&self, starts: &DVector<f64>) -> Result<DMatrix<f64>, MathError> {

@@ -2,12 +2,13 @@
 
 use crate::estimator::bank::Draws;
 use crate::estimator::error::EstimatorError;
-use crate::estimator::estimator::{Estimator, one_row};
+use crate::estimator::estimator::Estimator;
 use crate::estimator::readout::{
     Calibration, INTERVAL_LEVEL, Layer, Readout, Scaler, Spread, Standardiser,
 };
 use crate::estimator::refine::Refined;
 use crate::estimator::settings::Settings;
+use crate::math::one_row;
 use crate::network::Training;
 use crate::progress::Progress;
 use nalgebra::DVector;
@@ -88,7 +89,12 @@ pub fn tune(
         network,
     };
     let space = estimator.study().twin().parameters();
-    let theta = space.clamp(&readout.predict(&one_row(observed))?.row(0).to_vec());
+    let theta = space.clamp(
+        &readout
+            .predict(&one_row(observed.as_slice()))?
+            .row(0)
+            .to_vec(),
+    );
     let calibration = Calibration {
         predicted: readout.predict(&unseen)?,
         truth,

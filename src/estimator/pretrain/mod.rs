@@ -1,7 +1,10 @@
 //! Pretraining: a bank of simulations, and a network trained on it.
 
 mod resumable;
+#[cfg(test)]
+mod tests;
 mod train;
 
-pub use resumable::{CHECKPOINT, GivenBank, Pretraining};
-pub use train::{PretrainOptions, pretrain, pretrain_on};
+pub(crate) use resumable::GivenBank;
+pub use resumable::Pretraining;
+pub use train::{PretrainOptions, pretrain};

@@ -57,14 +57,14 @@ impl<'a> Pretraining<'a> {
 
     /// On a bank that is there; [`PretrainOptions::bank_size`] says nothing then.
     #[must_use]
-    pub fn with_bank(self, bank: GivenBank<'a>) -> Self {
+    pub(crate) fn with_bank(self, bank: GivenBank<'a>) -> Self {
         Self {
             bank: Some(bank),
             ..self
         }
     }
 
-    /// Keeps the state of the training so often, instead of each [`CHECKPOINT`].
+    /// Keeps the state of the training so often, instead of each 10 s.
     #[must_use]
     pub fn with_checkpoints(self, every: Duration) -> Self {
         Self { every, ..self }

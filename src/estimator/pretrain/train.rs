@@ -64,7 +64,8 @@ pub fn pretrain(
     )
 }
 
-/// Trains the network on a bank that is there, of this study's prior and the preset's features.
+/// Trains the network on a bank that is there, of this study's prior and the preset's features; goes on with what was kept of
+/// the training.
 ///
 /// A bank of at most 64 MiB as 32-bit numbers gives, row for row, the estimator of [`pretrain`]; of a larger one, no more than
 /// that is in memory at a time ([`Architecture::train_on`](crate::network::Architecture::train_on)).
@@ -72,17 +73,6 @@ pub fn pretrain(
 /// # Errors
 ///
 /// [`EstimatorError`]; also for rows of another width.
-pub fn pretrain_on(
-    project: impl Into<Project>,
-    bank: &dyn Bank,
-    options: &PretrainOptions,
-    progress: &Progress,
-) -> Result<(Estimator, History), EstimatorError> {
-    let project = project.into();
-    pretrain_from(&project, bank, options, &Checkpoints::none(), progress)
-}
-
-/// As [`pretrain_on`], and goes on with what was kept of the training.
 pub(super) fn pretrain_from(
     project: &Project,
     bank: &dyn Bank,

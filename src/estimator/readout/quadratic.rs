@@ -1,6 +1,6 @@
 //! A quadratic map from features to parameters, fitted by ridge regression.
 
-use nalgebra::DMatrix;
+use crate::math::{to_array, to_matrix};
 use ndarray::{Array2, Axis, concatenate};
 
 /// ŷ = B·[1, z, s⊗s], where s = A·[1, z] is the best linear estimate of the targets; n features, d targets.
@@ -54,13 +54,13 @@ fn with_products(terms: &Array2<f64>, estimates: &Array2<f64>) -> Array2<f64> {
 fn regress(terms: &Array2<f64>, targets: &Array2<f64>, ridge: f64) -> Option<Array2<f64>> {
     let transposed = terms.t();
     let (gram, right) = (transposed.dot(terms), transposed.dot(targets));
-    let gram = DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, j| {
-        gram[[i, j]] + if i == j && i > 0 { ridge } else { 0.0 }
-    });
-    let right = DMatrix::from_fn(right.nrows(), right.ncols(), |i, j| right[[i, j]]);
-    let solution = gram.cholesky()?.solve(&right);
+    let mut gram = to_matrix(&gram);
+    for i in 1..gram.nrows() {
+        gram[(i, i)] += ridge;
+    }
+    let solution = gram.cholesky()?.solve(&to_matrix(&right));
     let finite = solution.iter().all(|v| v.is_finite());
-    finite.then(|| Array2::from_shape_fn(solution.shape(), |at| solution[at]))
+    finite.then(|| to_array(&solution))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Affine map from features to unit variance.
 
 use super::scaler::Scaler;
-use crate::math::{MathError, Whitening};
+use crate::math::{MathError, Whitening, to_array};
 use ndarray::{Array1, Array2};
 
 /// Network inputs z = clip((x − mean)·W, ±limit), as many as features.
@@ -42,9 +42,7 @@ impl Standardiser {
         let n = mean.len();
         Ok(Self {
             mean: mean.as_slice().to_vec(),
-            matrix: Array2::from_shape_fn((n, n), |(i, j)| {
-                if j < axes.nrows() { axes[(j, i)] } else { 0.0 }
-            }),
+            matrix: to_array(&axes.transpose().resize_horizontally(n, 0.0)),
             limit,
         })
     }

@@ -10,43 +10,12 @@
 //!
 //! Source: Lakshminarayanan, Guerrero & Rojas, section IV-B; Wood, "Statistical inference for noisy nonlinear
 //! ecological dynamic systems", Nature 466 (2010), for the synthetic likelihood.
-//!
-//! ```
-//! use std::sync::Arc;
-//! use truetwin::estimator::bank::FeatureSimulator;
-//! use truetwin::feature::Ar;
-//! use truetwin::estimator::gate::GateSettings;
-//! use truetwin::progress::Progress;
-//! use truetwin::estimator::refine::{Direction, Information, RefineSettings, Refined, Refinement};
-//! use truetwin::record::{Drive, Record};
-//! use truetwin::twin::{DigitalTwin, Noise};
-//! use truetwin::twins::VanDerPol;
-//!
-//! let simulator = FeatureSimulator::new(Arc::new(VanDerPol), &Ar { order: 5 })?;
-//! let drive = Drive::autonomous(0.05, 200)?;
-//! let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(7, "measured", 0))?;
-//! let observed = simulator.observe(&Record::new(drive.clone(), outputs)?)?;
-//! let few = RefineSettings { starts: 1, ..RefineSettings::default() };
-//! let refined: Refined = Refinement {
-//!     simulator: &simulator,
-//!     drive: &drive,
-//!     observed: &observed,
-//!     settings: &few,
-//!     gate: &GateSettings::default(),
-//!     noise: Noise::new(1, "refine", 0),
-//!     progress: &Progress::silent(),
-//! }
-//! .run(&[1.2])?;
-//! let information: &Information = &refined.information;
-//! assert!((refined.theta[0] - 1.5).abs() < 0.5);
-//! let least_known: &Direction = &information.directions[0];
-//! assert!(!least_known.weak);
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
 
 mod information;
 mod problem;
 mod settings;
+#[cfg(test)]
+mod tests;
 
 pub use information::{Direction, Information};
 pub use settings::RefineSettings;
@@ -54,7 +23,7 @@ pub use settings::RefineSettings;
 use crate::estimator::bank::FeatureSimulator;
 use crate::estimator::error::EstimatorError;
 use crate::estimator::gate::GateSettings;
-use crate::fit::{Bounds, GaussNewton, ResidualProblem, space_filling};
+use crate::fit::least_squares::{Bounds, GaussNewton, ResidualProblem, space_filling};
 use crate::math::{MathError, Whitening};
 use crate::progress::Progress;
 use crate::record::Drive;
@@ -78,8 +47,6 @@ pub struct Refined {
     pub residual: DVector<f64>,
     /// G and what follows from it.
     pub information: Information,
-    /// Starts that led nowhere (diverged).
-    pub failed_starts: usize,
 }
 
 impl Refined {
@@ -151,24 +118,24 @@ impl Refinement<'_> {
             .progress
             .stage("Gauss–Newton", settings.starts + settings.rounds);
         let initial = DVector::from_vec(space.clamp(initial));
-        let (theta, local, failed) = match (settings.starts, settings.rounds) {
+        let (theta, local) = match (settings.starts, settings.rounds) {
             // Nothing to choose from, and little way to go.
-            (1, 1) => (initial.clone(), self.whiten(&initial)?, 0),
+            (1, 1) => (initial.clone(), self.whiten(&initial)?),
             _ => self.survey(&space, &initial, &stage)?,
         };
         let (theta, local) = self.polish(&space, &initial, theta, local, &stage)?;
         stage.finish();
-        self.describe(&space, &initial, theta, local, failed)
+        self.describe(&space, &initial, theta, local)
     }
 
-    /// The best of several starts, and how many failed.
+    /// The best of several starts.
     fn survey(
         &self,
         space: &ParameterSpace,
         initial: &DVector<f64>,
         stage: &crate::progress::Stage,
-    ) -> Result<(DVector<f64>, Local, usize), EstimatorError> {
-        let (mut best, mut failed, mut last): (Option<Candidate>, _, _) = (None, 0, String::new());
+    ) -> Result<(DVector<f64>, Local), EstimatorError> {
+        let (mut best, mut last): (Option<Candidate>, _) = (None, String::new());
         for start in starts(space, initial, self.settings.starts)? {
             let survey = self.problem(space, initial, self.settings.survey_seeds);
             match self.climb(survey, &start, space) {
@@ -182,10 +149,7 @@ impl Refinement<'_> {
                     }
                 }
                 Err(error) if is_fatal(&error) => return Err(error),
-                Err(error) => {
-                    failed += 1;
-                    last = error.to_string();
-                }
+                Err(error) => last = error.to_string(),
             }
             stage.tick()?;
         }
@@ -195,7 +159,7 @@ impl Refinement<'_> {
                 "Gauss–Newton found no estimate from {starts} starts: {last}; widen the bounds or check the twin"
             ))
         })?;
-        Ok((theta, local, failed))
+        Ok((theta, local))
     }
 
     /// S^{-1/2}(f̄(θ) − x_obs) with the covariance at θ_GN.
@@ -254,7 +218,7 @@ impl Refinement<'_> {
         let space = self.simulator.twin().parameters();
         let theta = DVector::from_vec(space.clamp(theta));
         let local = self.whiten(&theta)?;
-        self.describe(&space, &theta.clone(), theta, local, 0)
+        self.describe(&space, &theta.clone(), theta, local)
     }
 
     /// S at `theta`, from the same noise everywhere.
@@ -346,7 +310,6 @@ impl Refinement<'_> {
         initial: &DVector<f64>,
         theta: DVector<f64>,
         Local { whitening, spread }: Local,
-        failed_starts: usize,
     ) -> Result<Refined, EstimatorError> {
         let problem = self.problem(space, initial, self.settings.seeds);
         let jacobian = problem.feature_jacobian(&theta).map_err(not_evaluated)?;
@@ -365,7 +328,6 @@ impl Refinement<'_> {
             jacobian,
             residual,
             information,
-            failed_starts,
         })
     }
 }

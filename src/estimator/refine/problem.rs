@@ -2,7 +2,7 @@
 
 use crate::estimator::bank::FeatureSimulator;
 use crate::estimator::error::EstimatorError;
-use crate::fit::ResidualProblem;
+use crate::fit::least_squares::ResidualProblem;
 use crate::math::{MathError, Stencil, Whitening};
 use crate::progress::Progress;
 use crate::record::Drive;

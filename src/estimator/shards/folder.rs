@@ -284,11 +284,6 @@ impl ShardedBank {
         self.seed
     }
 
-    /// Names of the parameters.
-    pub fn names(&self) -> &[String] {
-        &self.shards.names
-    }
-
     /// All rows, in memory.
     ///
     /// # Errors

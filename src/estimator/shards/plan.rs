@@ -15,25 +15,6 @@ use std::path::Path;
 const LAYOUT: u32 = 2;
 
 /// A bank to be filled: simulations from a study's prior, as features of a preset.
-///
-/// ```
-/// use truetwin::estimator::bank::Bank;
-/// use truetwin::evaluate::paper::reference_studies;
-/// use truetwin::progress::Progress;
-/// use truetwin::estimator::shards::{BankPlan, ShardedBank};
-/// use truetwin::estimator::{PresetName, Project};
-///
-/// let project = Project::from(&reference_studies()?[0]);
-/// let plan = BankPlan { project, preset: PresetName::Paper, size: 40, seed: 1 };
-/// let place = tempfile::tempdir()?;
-/// let folder = place.path().join("bank");
-/// // Two jobs of an array, one after the other, in any order.
-/// plan.fill(&folder, "1/2".parse()?, &Progress::silent())?;
-/// let filled = plan.fill(&folder, "2/2".parse()?, &Progress::silent())?;
-/// assert_eq!((filled.there, filled.of), (3, 3));
-/// assert_eq!(ShardedBank::open(&folder)?.rows(), 40);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 #[derive(Debug, Clone)]
 pub struct BankPlan {
     /// Twin, prior, records.

@@ -2,10 +2,10 @@
 
 use crate::evaluate::EvaluateError;
 use crate::likelihood::kalman::FilterError;
-use crate::math::Stencil;
+use crate::math::{Stencil, to_vector};
 use crate::record::{Record, Signal};
 use crate::setting::SettingError;
-use crate::twin::{Interval, Now, ParameterSpace, StateSpace, Workspace};
+use crate::twin::{Between, Interval, Now, ParameterSpace, StateSpace, Workspace};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -41,22 +41,6 @@ pub enum DualStart {
 /// | `measurement` | 0.02 | > 0 | √R, in output units |
 ///
 /// The numbers are those of the authors' code, whatever the twin's own noise is.
-///
-/// ```
-/// use truetwin::evaluate::baseline::DualFilter;
-/// use truetwin::effect::*;
-/// use truetwin::record::*;
-/// use truetwin::twin::*;
-/// use truetwin::twins::VanDerPol;
-///
-/// let drive = Drive::autonomous(0.05, 300)?;
-/// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
-/// let record = Record::new(drive, outputs)?;
-/// let found = DualFilter::default().run(&VanDerPol, &record, &[1.3])?;
-/// assert!((found.theta[0] - 1.5).abs() < 0.2);
-/// assert_eq!(found.trajectory.dim(), (300, 1));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 ///
 /// Source: Wan & Nelson, "Dual extended Kalman filter methods", in Haykin (ed.), *Kalman Filtering and Neural Networks*
 /// (2001), chapter 5, without the gain's own derivative.
@@ -137,16 +121,18 @@ impl DualFilter {
             inputs: outline.inputs.clone(),
             outputs: outline.outputs.clone(),
         })?;
+        record.check_complete()?;
         let space = &outline.parameters;
         let mut theta = space.clamp(start);
         space.check_point(&theta)?;
         let drive = record.drive();
         twin.check_parameters(&theta, drive.dt())?;
         let (n, p, d) = (outline.states.len(), outline.outputs.len(), theta.len());
-        let mut step = Step::new(twin, space, n, p);
+        let mut step = Step::new(twin, space, p);
+        let between = Between::rows(twin, drive);
 
         let mut x = vec![0.0; n];
-        let first = at(record, 0, &theta);
+        let first = at(record, &between, 0, &theta);
         twin.start(&first, &mut x);
         if self.start == DualStart::FirstOutput {
             x.fill(record.outputs()[[0, 0]]);
@@ -159,11 +145,11 @@ impl DualFilter {
         let noise = DMatrix::identity(p, p) * (sd * sd);
         let mut trajectory = Signal::zeros((record.samples(), d));
         for k in 0..record.samples() {
-            let now = at(record, k, &theta);
+            let now = at(record, &between, k, &theta);
             let diverged = || FilterError::Diverged { at: now.t };
             let seen = step.observe(&now, x.as_slice());
             let slope = step.observe_slope(&now, x.as_slice())?;
-            let error = DVector::from_iterator(p, record.outputs().row(k).iter().copied()) - seen;
+            let error = to_vector(&record.outputs().row(k)) - seen;
             let gain = gain(&spread, &slope, &noise).ok_or_else(diverged)?;
             let kept = DMatrix::identity(n, n) - &gain * &slope;
             x += &gain * &error;
@@ -185,7 +171,7 @@ impl DualFilter {
                 *to = *from;
             }
 
-            let now = at(record, k, &theta);
+            let now = at(record, &between, k, &theta);
             let motion = step.advance_slope(&now, x.as_slice())?;
             sensitivity = &motion * (kept * sensitivity) + step.theta_slope(&now, x.as_slice())?;
             x = DVector::from_vec(step.advance(&now, x.as_slice()));
@@ -207,14 +193,11 @@ impl DualFilter {
 }
 
 /// Row `k` of a record at θ.
-fn at<'a>(record: &'a Record, k: usize, theta: &'a [f64]) -> Now<'a> {
+fn at<'a>(record: &'a Record, between: &'a [Between<'a>], k: usize, theta: &'a [f64]) -> Now<'a> {
     let drive = record.drive();
-    Now {
-        t: drive.time(k),
-        dt: drive.dt(),
-        u: drive.input(k),
-        theta,
-    }
+    let mut now = Now::new(drive.time(k), drive.dt(), drive.input(k), theta);
+    now.between = between.get(k);
+    now
 }
 
 /// P·Cᵀ·(C·P·Cᵀ + R)⁻¹.
@@ -240,7 +223,7 @@ struct Step<'a> {
 }
 
 impl<'a> Step<'a> {
-    fn new(twin: &'a dyn StateSpace, space: &ParameterSpace, n: usize, p: usize) -> Self {
+    fn new(twin: &'a dyn StateSpace, space: &ParameterSpace, p: usize) -> Self {
         Self {
             twin,
             limits: twin.limits(),
@@ -248,7 +231,7 @@ impl<'a> Step<'a> {
             steps: space.widths().iter().map(|w| DIFFERENCE * w).collect(),
             lower: space.bounds().iter().map(|b| b.low()).collect(),
             upper: space.bounds().iter().map(|b| b.high()).collect(),
-            work: Workspace::new(n),
+            work: Workspace::new(twin),
         }
     }
 

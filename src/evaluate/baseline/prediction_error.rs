@@ -1,7 +1,7 @@
 //! Fitting the noise-free output.
 
 use crate::evaluate::EvaluateError;
-use crate::fit::{Bounds, GaussNewton, ResidualProblem};
+use crate::fit::least_squares::{Bounds, GaussNewton, ResidualProblem};
 use crate::math::MathError;
 use crate::math::Stencil;
 use crate::record::Record;
@@ -25,20 +25,6 @@ use serde::{Deserialize, Serialize};
 ///
 /// Works on any twin: of a black box, the mean of 32 runs is its noise-free output. Disturbances inside the dynamics
 /// are not modelled, so that the fit is neither efficient nor, in weak directions, safe: it drifts along them.
-///
-/// ```
-/// use truetwin::evaluate::baseline::PredictionErrorMethod;
-/// use truetwin::effect::*;
-/// use truetwin::record::*;
-/// use truetwin::twin::*;
-/// use truetwin::twins::VanDerPol;
-///
-/// let drive = Drive::autonomous(0.05, 300)?;
-/// let record = Record::new(drive.clone(), VanDerPol.simulate(&[1.5], &drive, Noise::OFF)?)?;
-/// let fit = PredictionErrorMethod::default().fit(&VanDerPol, &record, &[1.4])?;
-/// assert!((fit.theta[0] - 1.5).abs() < 1e-3);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 ///
 /// Source: Ljung, *System Identification* (1999), chapter 7; the numbers are those of the authors' code of
 /// Lakshminarayanan, Guerrero & Rojas.
@@ -79,15 +65,6 @@ pub struct PredictionErrorFit {
 }
 
 impl PredictionErrorMethod {
-    /// Without ridge, until nothing is gained any more.
-    pub fn converged() -> Self {
-        Self {
-            iterations: 200,
-            ridge: 0.0,
-            ..Self::default()
-        }
-    }
-
     /// Fits θ from `start`, which is brought into the bounds first.
     ///
     /// # Errors
@@ -114,6 +91,7 @@ impl PredictionErrorMethod {
             "it must lie between 0 and 1 prior widths",
         )?;
         record.check_channels(&twin.signals())?;
+        record.check_complete()?;
         let space = twin.parameters();
         let start = space.clamp(start);
         space.check_point(&start)?;
@@ -243,6 +221,7 @@ impl ResidualProblem for OutputError<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evaluate::baseline::tests::converged;
     use crate::record::{Drive, Signal};
     use crate::twin::Noise;
     use crate::twins::{CascadedTanks, VanDerPol};
@@ -259,7 +238,7 @@ mod tests {
             let record = noise_free(&VanDerPol, &[nu], drive.clone());
             for (settings, tolerance) in [
                 (PredictionErrorMethod::default(), 1e-3),
-                (PredictionErrorMethod::converged(), 1e-6),
+                (converged(), 1e-6),
             ] {
                 let fit = settings.fit(&VanDerPol, &record, &[1.03 * nu]).unwrap();
                 let error = (fit.theta[0] - nu).abs();
@@ -281,7 +260,7 @@ mod tests {
         let start = [0.63, 0.48, 0.57, 0.97];
         for (settings, tolerance) in [
             (PredictionErrorMethod::default(), 2e-3),
-            (PredictionErrorMethod::converged(), 1e-4),
+            (converged(), 1e-4),
         ] {
             let fit = settings.fit(&CascadedTanks, &record, &start).unwrap();
             for (found, true_value) in invariants(&fit.theta).iter().zip(invariants(&truth)) {
@@ -295,10 +274,7 @@ mod tests {
     fn estimates_stay_in_the_bounds() {
         let drive = Drive::autonomous(0.05, 60).unwrap();
         let record = noise_free(&VanDerPol, &[0.0], drive);
-        for settings in [
-            PredictionErrorMethod::default(),
-            PredictionErrorMethod::converged(),
-        ] {
+        for settings in [PredictionErrorMethod::default(), converged()] {
             let fit = settings.fit(&VanDerPol, &record, &[9.0]).unwrap();
             assert!((0.0..=7.0).contains(&fit.theta[0]), "{fit:?}");
         }

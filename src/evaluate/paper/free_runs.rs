@@ -9,7 +9,7 @@ use crate::study::Study;
 /// One run's record, and noise-free runs of the twin at the truth and at every answer.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
-pub struct FreeRuns {
+pub struct AnswerRuns {
     /// The record, simulated again.
     pub record: Record,
     /// N × channels.
@@ -18,7 +18,7 @@ pub struct FreeRuns {
     pub answers: Vec<(Method, Option<Signal>)>,
 }
 
-impl FreeRuns {
+impl AnswerRuns {
     /// Simulates the twin at the truth and the answers of a run of `plan`.
     pub fn of(study: &Study, plan: &MonteCarlo, run: &Run) -> Result<Self, EvaluateError> {
         let draws = plan.draws(study)?;
@@ -64,7 +64,7 @@ impl MeanRuns {
         let mut answers: Vec<Sum> = Method::all().iter().map(|_| Sum::default()).collect();
         let mut times = Vec::new();
         for run in runs {
-            let one = FreeRuns::of(study, plan, run)?;
+            let one = AnswerRuns::of(study, plan, run)?;
             if times.is_empty() {
                 let drive = one.record.drive();
                 times = (0..drive.samples()).map(|k| drive.time(k)).collect();

@@ -5,8 +5,6 @@
 //! | run the estimator and the baselines on many simulated records | [`MonteCarlo::run`], [`Run`] |
 //! | turn the runs into errors and coverage | [`score`], [`Scores`] |
 //! | choose where true parameters come from | [`Scenario`] |
-//! | keep runs in a folder and go on later | [`MonteCarlo::run`] |
-//! | draw what the answers predict | [`FreeRuns`], [`MeanRuns`] |
 //! | have a twin's test points, invariants, published figures | [`Benchmark`] |
 //!
 //! ```
@@ -22,7 +20,7 @@
 //!
 //! // A twin of one's own has no published points; true parameters come from all of its bounds.
 //! let plan = MonteCarlo { benchmark: Benchmark::default(), scenario: Scenario::Uniform, runs: 2, seed: 1 };
-//! let runs: Vec<Run> = plan.run(&estimator, None, &Progress::silent())?;
+//! let runs: Vec<Run> = plan.run(&estimator, &Progress::silent())?;
 //! let scores: Scores = score(&study, &plan, &runs);
 //! assert_eq!((scores.methods[0].method, scores.methods[0].failed), (Method::TsPre, 0));
 //! assert_eq!(scores.coverage[0].of, 2);
@@ -32,6 +30,8 @@
 mod folder;
 mod free_runs;
 mod invariant;
+#[cfg(test)]
+mod limits;
 mod method;
 mod monte_carlo;
 mod presets;
@@ -40,8 +40,9 @@ mod run;
 mod scenario;
 mod score;
 
+pub use crate::evaluate::baseline::Initialisation;
 pub(crate) use folder::Origin;
-pub use free_runs::{FreeRuns, MeanRuns};
+pub(crate) use free_runs::{AnswerRuns, MeanRuns};
 use invariant::{Invariant, Symmetry};
 pub use method::Method;
 pub use monte_carlo::MonteCarlo;

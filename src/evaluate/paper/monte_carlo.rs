@@ -61,6 +61,15 @@ impl MonteCarlo {
     pub fn run(
         &self,
         estimator: &Estimator,
+        progress: &Progress,
+    ) -> Result<Vec<Run>, EvaluateError> {
+        self.run_in(estimator, None, progress)
+    }
+
+    /// As [`run`](Self::run); keeps runs in a folder and takes those that it has.
+    pub(crate) fn run_in(
+        &self,
+        estimator: &Estimator,
         folder: Option<&WorkFolder>,
         progress: &Progress,
     ) -> Result<Vec<Run>, EvaluateError> {
@@ -72,8 +81,8 @@ impl MonteCarlo {
         Ok(runs)
     }
 
-    /// As [`run`](Self::run), but only the runs of a share; returns these and all that the folder had before.
-    pub fn run_share(
+    /// As `run_in`, but only the runs of a share; returns these and all that the folder had before.
+    pub(crate) fn run_share(
         &self,
         estimator: &Estimator,
         folder: Option<&WorkFolder>,
@@ -167,7 +176,7 @@ mod tests {
         let plan = plan(Scenario::Uniform, 3);
         let on = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            let runs = || plan.run(oscillator(), None, &Progress::silent()).unwrap();
+            let runs = || plan.run(oscillator(), &Progress::silent()).unwrap();
             answers(pool.unwrap().install(runs))
         };
         let one = on(1);
@@ -183,7 +192,7 @@ mod tests {
         let plan = plan(Scenario::First, 3);
         let run = || {
             let folder = open(&path, &plan).unwrap();
-            plan.run(oscillator(), Some(&folder), &Progress::silent())
+            plan.run_in(oscillator(), Some(&folder), &Progress::silent())
         };
         let first = run().unwrap();
         assert_eq!(
@@ -219,14 +228,14 @@ mod tests {
         };
         assert_eq!(share("2/2"), [0, 2]);
         assert_eq!(share("1/2"), [0, 1, 2]);
-        let runs = plan.run(oscillator(), Some(&folder), &Progress::silent());
-        let alone = plan.run(oscillator(), None, &Progress::silent());
+        let runs = plan.run_in(oscillator(), Some(&folder), &Progress::silent());
+        let alone = plan.run(oscillator(), &Progress::silent());
         assert_eq!(answers(runs.unwrap()), answers(alone.unwrap()));
     }
 
     /// The same study without a folder, with the times of `timed`.
     fn plan_again(plan: &MonteCarlo, timed: &[Run]) -> Vec<Run> {
-        let mut runs = plan.run(oscillator(), None, &Progress::silent()).unwrap();
+        let mut runs = plan.run(oscillator(), &Progress::silent()).unwrap();
         for (run, timed) in runs.iter_mut().zip(timed) {
             for (answer, timed) in run.answers.iter_mut().zip(&timed.answers) {
                 answer.ms = timed.ms;
@@ -261,7 +270,7 @@ mod tests {
         let plan = plan(Scenario::First, 2);
         let folder = open(&place.path().join("study"), &plan).unwrap();
         let progress = Progress::new(Arc::new(Stopped));
-        let error = plan.run(oscillator(), Some(&folder), &progress);
+        let error = plan.run_in(oscillator(), Some(&folder), &progress);
         assert!(matches!(error, Err(EvaluateError::Cancelled(_))));
         assert_eq!(fs::read_dir(folder.file("runs")).unwrap().count(), 0);
     }
@@ -295,7 +304,7 @@ mod tests {
             benchmark: Benchmark::of(&study),
             ..plan(Scenario::Uniform, 6)
         };
-        let runs = plan.run(&estimator, None, &Progress::silent()).unwrap();
+        let runs = plan.run(&estimator, &Progress::silent()).unwrap();
         assert!(runs.iter().all(|run| run.truth[0] <= 3.0), "{runs:?}");
         let scores = score(&study, &plan, &runs);
         let failed: Vec<usize> = scores.methods.iter().map(|s| s.failed).collect();

@@ -6,8 +6,7 @@
 //! Source: Lakshminarayanan, Guerrero & Rojas, section V.
 
 use super::{Benchmark, Invariant, Method, Published, Symmetry, TestPoint};
-use crate::estimator::refine::RefineSettings;
-use crate::estimator::{CloudSettings, PresetName, Project, Recipe, Settings};
+use crate::estimator::{CloudSettings, PresetName, Project, Recipe, RefineSettings, Settings};
 use crate::evaluate::baseline::Initialisation::{Bad, Good, Ts};
 use crate::feature::{Ar, Arx};
 use crate::network::{Compact, Deep, Training, architecture};

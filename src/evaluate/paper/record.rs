@@ -36,7 +36,7 @@ pub(super) fn simulated(
             Ok(outputs) => {
                 return Ok(Simulated {
                     truth,
-                    record: Record::new(drive, outputs)?,
+                    record: Record::complete(drive, outputs)?,
                     noise,
                 });
             }

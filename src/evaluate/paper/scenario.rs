@@ -3,7 +3,7 @@
 use super::{Invariant, Method, Symmetry};
 use crate::evaluate::EvaluateError;
 use crate::record::{Drive, RecordError, Signal};
-use crate::study::{DriveSource, RecordTable, Study};
+use crate::study::{DriveSource, Study};
 use crate::twin::Noise;
 use serde::Serialize;
 
@@ -120,7 +120,7 @@ impl<'a> Draws<'a> {
             })
             .collect::<Result<_, _>>()?;
         // A study that says what its records look like means its own.
-        let own = benchmark.levels.is_empty() || study.file().record != RecordTable::default();
+        let own = benchmark.levels.is_empty() || study.file().record.is_plan();
         let inputs = if own {
             Inputs::Study(study.drives()?)
         } else {

@@ -12,7 +12,6 @@
 //! use truetwin::evaluate::paper::reference_studies;
 //! use truetwin::progress::Progress;
 //! use truetwin::evaluate::trials::*;
-//! use truetwin::storage::work::Share;
 //!
 //! let study = &reference_studies()?[0];
 //! let settings = Settings { trials: 2, kinds: vec![Kind::None], detection_only: true, ..Settings::default() };
@@ -22,8 +21,6 @@
 //! assert_eq!(sealed.seal().len(), 64); // the SHA-256 of the keys, to be published now
 //!
 //! // Diagnoses come from the records alone; then the keys are opened.
-//! sealed.answer(Share::WHOLE, &Progress::silent())?;
-//! sealed.open_keys(Share::WHOLE, &Progress::silent())?;
 //! let card: Scorecard = sealed.score(&Progress::silent())?;
 //! assert_eq!(card.false_alarms.of, 2);
 //! # Ok::<(), Box<dyn std::error::Error>>(())

@@ -200,7 +200,11 @@ impl Sealed<'_> {
     /// # Errors
     ///
     /// As [`score`](Self::score).
-    pub fn answer(&self, share: Share, progress: &Progress) -> Result<Vec<Answer>, EvaluateError> {
+    pub(crate) fn answer(
+        &self,
+        share: Share,
+        progress: &Progress,
+    ) -> Result<Vec<Answer>, EvaluateError> {
         let left_out = self.left_out()?;
         self.pieces(ANSWERS, share).all(
             &progress.stage("trials", self.trials.settings.trials),
@@ -227,7 +231,11 @@ impl Sealed<'_> {
     /// # Errors
     ///
     /// As [`score`](Self::score); [`EvaluateError::Unanswered`] before every answer is there, whatever the share.
-    pub fn open_keys(&self, share: Share, progress: &Progress) -> Result<usize, EvaluateError> {
+    pub(crate) fn open_keys(
+        &self,
+        share: Share,
+        progress: &Progress,
+    ) -> Result<usize, EvaluateError> {
         Ok(self.open(share, progress)?.len())
     }
 

@@ -2,6 +2,7 @@
 
 use super::super::name;
 use crate::record::{Quantity, Signals};
+use crate::setting::number;
 use crate::storage::untrusted::{MESSAGE, one_line};
 use crate::study::{InputPlan, RecordPlan, RecordTable};
 use crate::twin::{Interval, Parameter, ParameterSpace};
@@ -118,9 +119,10 @@ fn plan(table: &RecordTable) -> Result<RecordPlan, String> {
             "record: step and samples are needed, as {\"step\": 0.1, \"samples\": 300}".into(),
         );
     };
-    if !(step > 0.0 && step.is_finite()) || samples == 0 {
+    if !(step > 0.0 && step.is_normal()) || samples == 0 {
         return Err(format!(
-            "record: step = {step} s, samples = {samples}; both must be positive"
+            "record: step = {} s, samples = {samples}; both must be positive",
+            number(step)
         ));
     }
     if let Some(InputPlan::File(path)) = &table.input {
@@ -128,6 +130,12 @@ fn plan(table: &RecordTable) -> Result<RecordPlan, String> {
             "record: input is the file {}; say {{\"levels\": [low, high], \"hold\": n}}, and name files in a study file",
             path.display()
         ));
+    }
+    if table.hold.is_some() || table.substeps.is_some() {
+        return Err(
+            "record: hold and substeps need the twin's equations, which a program does not show; leave them out"
+                .into(),
+        );
     }
     Ok(RecordPlan {
         step,

@@ -8,15 +8,13 @@ use super::worker::{Trouble, Worker};
 use crate::storage::untrusted::excerpt;
 use std::time::{Duration, Instant};
 
-/// Least time for a start: imports and licences take longer than a simulation.
-const START: Duration = Duration::from_secs(30);
 /// Time that a program gets to end once its standard input is closed.
 const GRACE: Duration = Duration::from_millis(500);
 
 /// Starts workers when they are needed, keeps the idle ones, and ends all with itself.
 pub(super) struct Pool {
     command: ProgramCommand,
-    /// For one answer.
+    /// For one answer, the description included.
     timeout: Duration,
     workers: Lending<Worker>,
 }
@@ -81,14 +79,13 @@ impl Drop for Pool {
     }
 }
 
-/// Starts a worker and asks what it is.
+/// Starts a worker and asks what it is; start and description together take at most `timeout`.
 pub(super) fn introduce(
     command: &ProgramCommand,
     timeout: Duration,
 ) -> std::io::Result<Result<(Worker, Description), Trouble>> {
     let mut worker = Worker::start(command)?;
-    let time = timeout.max(START);
-    let answer = worker.ask(protocol::describe(), LONGEST_DESCRIPTION, time);
+    let answer = worker.ask(protocol::describe(), LONGEST_DESCRIPTION, timeout);
     Ok(answer.and_then(|line| match Description::parse(&line) {
         Ok(description) => Ok((worker, description)),
         Err(problem) => Err(nonsense(&line, &problem, &worker)),

@@ -1,6 +1,7 @@
 //! The lines that go to a program and come from it.
 
 use crate::record::{Drive, Quantity, Signal, Signals};
+use crate::setting::number;
 use crate::storage::untrusted::{MESSAGE, excerpt, one_line};
 use serde::{Deserialize, Serialize, Serializer};
 use std::collections::BTreeMap;
@@ -121,7 +122,9 @@ pub(super) fn answer(
                 Ok(Answer::Diverged(at))
             } else {
                 Err(format!(
-                    "diverged = {at}; give a time between 0 and {end} s, the end of the record"
+                    "diverged = {}; give a time between 0 and {} s, the end of the record",
+                    number(at),
+                    number(end)
                 ))
             }
         }

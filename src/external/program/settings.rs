@@ -1,6 +1,7 @@
 //! Settings of a program.
 
 use super::error;
+use crate::setting::number;
 use crate::study::StudyError;
 use std::time::Duration;
 
@@ -16,13 +17,13 @@ const LONGEST: Duration = Duration::from_secs(366 * 24 * 3600);
 /// | field | default | range | |
 /// |---|---|---|---|
 /// | `workers` | as many as threads simulate | 1 … 1024 | copies of the program that run at once |
-/// | `timeout` | 60 s | above 0, at most a year | for one answer; to start and describe itself, a copy has at least 30 s |
+/// | `timeout` | 60 s | above 0, at most a year | for one answer; the first one, the description, includes the start of the copy |
 /// | `retries` | 2 | 0 … 100 | attempts on a fresh copy after one that ended or was late |
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ProgramSettings {
     /// Copies of the program that run at once; `None`: one for each thread of the rayon pool that starts the twin.
     pub workers: Option<usize>,
-    /// Longest time that one answer may take.
+    /// Longest time that one answer may take, the description included.
     pub timeout: Duration,
     /// Further attempts at a simulation whose worker ended or was late.
     pub retries: usize,
@@ -50,7 +51,7 @@ impl ProgramSettings {
             ));
         }
         if self.timeout.is_zero() || self.timeout > LONGEST {
-            let seconds = self.timeout.as_secs_f64();
+            let seconds = number(self.timeout.as_secs_f64());
             return wrong(format!(
                 "timeout = {seconds} s; choose more than 0 s, at most {} s",
                 LONGEST.as_secs()

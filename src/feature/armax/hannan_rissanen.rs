@@ -1,7 +1,7 @@
 //! The estimate of an ARMAX model of one output.
 
 use crate::feature::regression::regress;
-use crate::math::{Lagged, LaggedSignals, LeastSquares, MathError, Regressors};
+use crate::math::{Lagged, LaggedSignals, LeastSquares, MathError, Regressors, one_column};
 use nalgebra::DMatrix;
 
 /// Refinements after the two regressions: where noise prevails these start far off, and three are too few.
@@ -172,7 +172,7 @@ impl<'a> Series<'a> {
             }
         }
         let (gram, psi) = (&psi * psi.transpose(), psi.transpose());
-        let target = DMatrix::from_column_slice(rows, 1, &residuals[start..]);
+        let target = one_column(&residuals[start..]);
         let fit = LeastSquares::with_ridge(&psi, &gram, RIDGE)?.solve(&target)?;
         Ok(fit.coefficients.as_slice().to_vec())
     }

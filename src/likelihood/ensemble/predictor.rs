@@ -19,7 +19,7 @@ use crate::likelihood::kalman::Filtered;
 use crate::math::quantile;
 use crate::record::Signal;
 use nalgebra::{DMatrix, DVector};
-use ndarray::Array3;
+use ndarray::{Array1, Array3};
 
 /// Rows before a row that it is predicted from.
 const LAGS: usize = 4;
@@ -37,20 +37,20 @@ const ALIVE: f64 = 1e-3;
 #[derive(Debug, Clone)]
 pub(crate) struct Predictor {
     mean: Signal,
-    lags: usize,
     runs: f64,
     rows: Vec<Row>,
     tail: Tail,
 }
 
 impl Predictor {
-    /// Fits all rows to the runs; `outputs` give the scale of each output.
+    /// Fits all rows to the runs; `outputs` give the scale of each output, and which cells are missing.
     pub(crate) fn new(ensemble: &Ensemble, outputs: &Signal) -> Self {
         let p = ensemble.outputs();
         let m = ensemble.runs;
         let lags = LAGS.min(m / RUNS_EACH / p).max(1);
         let floors: Vec<f64> = (outputs.columns().into_iter())
             .map(|y| {
+                let y: Array1<f64> = y.iter().copied().filter(|v| !v.is_nan()).collect();
                 let size = y
                     .std(0.0)
                     .max(1e-3 * y.iter().fold(0.0, |a, v| v.abs().max(a)));
@@ -58,10 +58,14 @@ impl Predictor {
             })
             .collect();
         let mut rows: Vec<Row> = (0..ensemble.mean.nrows())
-            .map(|k| row(ensemble, k, lags.min(k), &floors))
+            .map(|k| {
+                let past = (1..=lags.min(k)).flat_map(|lag| (0..p).map(move |j| (k - lag, j)));
+                let known = past.filter(|&(k, j)| !outputs[[k, j]].is_nan()).collect();
+                row(ensemble, k, known, &floors)
+            })
             .collect();
         let least: Vec<f64> = (0..p).map(|j| least(&rows, j)).collect();
-        let tail = Tail::of(ensemble, &rows, lags, &least);
+        let tail = Tail::of(ensemble, &rows, &least);
         for row in &mut rows {
             for (j, least) in least.iter().enumerate() {
                 row.covariance[(j, j)] = row.covariance[(j, j)].max(*least);
@@ -69,14 +73,13 @@ impl Predictor {
         }
         Self {
             mean: ensemble.mean.clone(),
-            lags,
             runs: m as f64,
             rows,
             tail,
         }
     }
 
-    /// Innovations of a record.
+    /// Innovations of a record whose missing cells are those that the predictor was made for.
     pub fn filter(&self, outputs: &Signal) -> Filtered {
         let (samples, p) = outputs.dim();
         let errors = outputs - &self.mean;
@@ -89,11 +92,18 @@ impl Predictor {
             states: None,
         };
         for (k, row) in self.rows.iter().enumerate() {
-            let lags = self.lags.min(k);
-            let z = DVector::from_fn(lags * p, |i, _| errors[[k - 1 - i / p, i % p]]);
-            let e = DVector::from_fn(p, |j, _| errors[[k, j]]) - &row.weights * &z;
+            let past = row.past.iter().map(|&cell| errors[cell]);
+            let z = DVector::from_iterator(row.past.len(), past);
+            let mut e = DVector::from_fn(p, |j, _| errors[[k, j]]) - &row.weights * &z;
             let wide = 1.0 + 1.0 / self.runs + (&row.whitening * &z).norm_squared();
-            let covariance = &row.covariance * wide;
+            let mut covariance = &row.covariance * wide;
+            let missing = |j: usize| errors[[k, j]].is_nan();
+            for j in (0..p).filter(|&j| missing(j)) {
+                e[j] = 0.0;
+                covariance.row_mut(j).fill(0.0);
+                covariance.column_mut(j).fill(0.0);
+                covariance[(j, j)] = 1.0;
+            }
             let (v, log_determinant) = standardised(&covariance, &e);
             for i in 0..p {
                 filtered.innovations[[k, i]] = e[i];
@@ -102,7 +112,9 @@ impl Predictor {
                     filtered.covariances[[k, i, j]] = covariance[(i, j)];
                 }
             }
-            let density = self.tail.log_density(&v) - 0.5 * log_determinant;
+            let there = (0..p).filter(|&j| !missing(j)).map(|j| v[j]);
+            let there = DVector::from_vec(there.collect());
+            let density = self.tail.log_density(&there) - 0.5 * log_determinant;
             filtered.log_densities[k] = density;
             filtered.log_likelihood += density;
         }
@@ -143,7 +155,7 @@ pub(crate) fn standardised(s: &DMatrix<f64>, e: &DVector<f64>) -> (DVector<f64>,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::likelihood::kalman::{FilterSettings, filter};
+    use crate::likelihood::kalman::{FilterSettings, Kalman};
     use crate::record::{Drive, Record};
     use crate::twin::{DigitalTwin, Noise};
     use crate::twins::CascadedTanks;
@@ -161,7 +173,9 @@ mod tests {
                 .simulate(&theta, &drive, Noise::new(3, "t", seed))
                 .unwrap();
             let record = Record::new(drive.clone(), outputs).unwrap();
-            let best = filter(&CascadedTanks, &theta, &record, &FilterSettings::default()).unwrap();
+            let settings = FilterSettings::default();
+            let kalman = Kalman::new(&CascadedTanks, &record, &settings).unwrap();
+            let best = kalman.filter(&theta).unwrap();
             let ours = {
                 let ensemble = Ensemble::new(&CascadedTanks, &theta, record.drive()).unwrap();
                 Predictor::new(&ensemble, record.outputs()).filter(record.outputs())
@@ -172,5 +186,37 @@ mod tests {
         println!("{lost} nats, mean square {square}");
         assert!(lost < 25.0, "{lost} nats");
         assert!((square - 1.0).abs() < 0.12, "{square}");
+    }
+
+    /// Missing outputs have no part in a density, and the others are predicted about as well as a filter does.
+    #[test]
+    fn missing_outputs_are_left_out() {
+        let theta = [0.6, 0.5, 0.55, 1.0];
+        let inputs =
+            Signal::from_shape_fn((400, 1), |(k, _)| [2.6, 0.4, 2.0, 1.2, 1.7][k / 30 % 5]);
+        let drive = Drive::new(0.5, inputs).unwrap();
+        let mut outputs = CascadedTanks
+            .simulate(&theta, &drive, Noise::new(3, "t", 1))
+            .unwrap();
+        for k in (0..400).filter(|k| k % 7 == 3 || (100..120).contains(k)) {
+            outputs[[k, 0]] = f64::NAN;
+        }
+        let record = Record::new(drive, outputs).unwrap();
+        let settings = FilterSettings::default();
+        let best = Kalman::new(&CascadedTanks, &record, &settings)
+            .and_then(|kalman| kalman.filter(&theta))
+            .unwrap();
+        let ours = crate::likelihood::ensemble::predictor(&CascadedTanks, &theta, &record)
+            .unwrap()
+            .filter(record.outputs());
+        let lost = best.log_likelihood - ours.log_likelihood;
+        assert!((-5.0..30.0).contains(&lost), "{lost} nats");
+        for (k, y) in record.outputs().column(0).iter().enumerate() {
+            let (v, density) = (ours.standardised[[k, 0]], ours.log_densities[k]);
+            assert_eq!(y.is_nan(), (v, density) == (0.0, 0.0), "row {k}");
+            assert!(v.is_finite());
+        }
+        let held = ours.held_predictions(record.outputs());
+        assert!(held.iter().all(|y| y.is_finite()));
     }
 }

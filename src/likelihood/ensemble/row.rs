@@ -6,6 +6,8 @@ use nalgebra::DMatrix;
 /// Regression of one row on the rows before it.
 #[derive(Debug, Clone)]
 pub(super) struct Row {
+    /// Outputs that it is predicted from, by row before it and channel.
+    pub past: Vec<(usize, usize)>,
     /// B, transposed: outputs × regressors.
     pub weights: DMatrix<f64>,
     /// Inverse of the root of A.
@@ -14,12 +16,12 @@ pub(super) struct Row {
     pub covariance: DMatrix<f64>,
 }
 
-/// Fits row `k` to the `lags` rows before it.
-pub(super) fn row(ensemble: &Ensemble, k: usize, lags: usize, floors: &[f64]) -> Row {
+/// Fits row `k` to outputs of rows before it.
+pub(super) fn row(ensemble: &Ensemble, k: usize, past: Vec<(usize, usize)>, floors: &[f64]) -> Row {
     let p = ensemble.outputs();
     let m = ensemble.runs as f64;
-    let n = lags * p;
-    let at = |i: usize| ensemble.of(k - 1 - i / p, i % p);
+    let n = past.len();
+    let at = |i: usize| ensemble.of(past[i].0, past[i].1);
     let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
     let mut gram = DMatrix::zeros(n, n);
     for i in 0..n {
@@ -27,7 +29,7 @@ pub(super) fn row(ensemble: &Ensemble, k: usize, lags: usize, floors: &[f64]) ->
             gram[(i, j)] = dot(at(i), at(j));
             gram[(j, i)] = gram[(i, j)];
         }
-        gram[(i, i)] = gram[(i, i)] * (1.0 + 1e-12) + m * floors[i % p];
+        gram[(i, i)] = gram[(i, i)] * (1.0 + 1e-12) + m * floors[past[i].1];
     }
     let cross = DMatrix::from_fn(n, p, |i, j| dot(at(i), ensemble.of(k, j)));
     let mut own = DMatrix::from_fn(p, p, |i, j| dot(ensemble.of(k, i), ensemble.of(k, j)));
@@ -54,5 +56,6 @@ pub(super) fn row(ensemble: &Ensemble, k: usize, lags: usize, floors: &[f64]) ->
         weights: along.tr_mul(&whitening),
         whitening,
         covariance,
+        past,
     }
 }

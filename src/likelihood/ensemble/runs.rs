@@ -24,6 +24,7 @@ impl Ensemble {
         theta: &[f64],
         drive: &Drive,
     ) -> Result<Self, SimulationError> {
+        drive.check_uniform().map_err(SimulationError::of)?;
         let noise = Noise::new(0, "ensemble", 0);
         let runs: Vec<Option<Signal>> = (0..RUNS)
             .into_par_iter()

@@ -67,8 +67,10 @@ pub(crate) fn dithered(records: &[Record], noise: Noise) -> Result<Vec<Record>, 
         .collect()
 }
 
-/// Deviation, or what is left of it where nothing moves.
+/// Deviation, or what is left of it where nothing moves; missing values are left out.
 fn size(values: &[f64]) -> f64 {
+    let values: Vec<f64> = values.iter().copied().filter(|v| !v.is_nan()).collect();
+    let values = values.as_slice();
     let least = (1e-3 * largest(values)).max(1e-100);
     deviation(values).max(least)
 }

@@ -28,16 +28,16 @@ pub(crate) enum Tail {
 
 impl Tail {
     /// Estimates the tail from the runs' own residuals, in rows of more than the least variance.
-    pub fn of(ensemble: &Ensemble, rows: &[Row], lags: usize, least: &[f64]) -> Self {
+    pub fn of(ensemble: &Ensemble, rows: &[Row], least: &[f64]) -> Self {
         let p = ensemble.outputs();
         let (mut squares, mut fourths, mut count) = (0.0, 0.0, 0.0);
         let mut residual = vec![0.0; ensemble.runs];
         for (k, row) in rows.iter().enumerate() {
             for j in (0..p).filter(|&j| row.covariance[(j, j)] > least[j]) {
                 residual.copy_from_slice(ensemble.of(k, j));
-                for i in 0..lags.min(k) * p {
+                for (i, &(before, channel)) in row.past.iter().enumerate() {
                     let weight = row.weights[(j, i)];
-                    let past = ensemble.of(k - 1 - i / p, i % p);
+                    let past = ensemble.of(before, channel);
                     (residual.iter_mut().zip(past)).for_each(|(r, e)| *r -= weight * e);
                 }
                 let scale = row.covariance[(j, j)].recip();

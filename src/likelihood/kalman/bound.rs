@@ -2,9 +2,9 @@
 
 use super::clip::clip;
 use super::gaussian::Gaussian;
-use super::{FilterError, FilterSettings, Method};
+use super::{FilterError, FilterSettings};
 use crate::record::Record;
-use crate::twin::{Interval, ParameterSpace, StateSpace, TwinError};
+use crate::twin::{Between, Interval, ParameterSpace, StateSpace, TwinError};
 
 /// A filter for many θ on one record: what does not depend on θ is prepared once.
 ///
@@ -14,10 +14,14 @@ use crate::twin::{Interval, ParameterSpace, StateSpace, TwinError};
 ///          carry (m, P) to row k + 1 under u_k, the states held in their limits
 /// ```
 ///
-/// [`Method::Points`]: m and P are carried by points at ±√3 standard deviations along each direction that varies, state
+/// [`Method::Points`](super::Method::Points): m and P are carried by points at ±√3 standard deviations along each direction that varies, state
 /// and process noise alike; what does not vary (a known start, unused memories) costs no point. Points start
 /// within the limits; what arrives is a normal state, and a limited one gets the mean and variance of the clipped
 /// normal, its covariances the share that is inside.
+///
+/// [`Method::Extended`](super::Method::Extended): the same with derivatives at the mean, held in its limits, in place of points.
+///
+/// Missing outputs are left out of the row; a row without any is only carried on. Steps may vary from row to row.
 ///
 /// A twin without measurement noise gets a variance of `noise_floor` times that of the record's output.
 ///
@@ -47,10 +51,12 @@ pub struct Kalman<'a> {
     pub(super) states: usize,
     pub(super) outputs: Vec<f64>,
     pub(super) channels: usize,
+    /// By row; empty where inputs are held.
+    pub(super) between: Vec<Between<'a>>,
+    /// `true` if outputs are missing.
+    pub(super) gaps: bool,
     /// Limits of the states.
-    limits: Vec<Interval>,
-    /// Limits of the points that are carried through the equations; those of a derivative have none.
-    pub(super) point_limits: Vec<Interval>,
+    pub(super) limits: Vec<Interval>,
     pub(super) floor: Vec<f64>,
     pub(super) start_covariance: Option<Vec<f64>>,
 }
@@ -76,12 +82,8 @@ impl<'a> Kalman<'a> {
             outputs: outline.outputs,
         })?;
         let limits = twin.limits();
-        let point_limits = match settings.method {
-            Method::Points => limits.clone(),
-            Method::Extended => vec![Interval::EVERYTHING; states],
-        };
         let floor = (record.outputs().columns().into_iter())
-            .map(|y| settings.noise_floor * scale(y.iter().copied()))
+            .map(|y| settings.noise_floor * scale(y.iter().copied().filter(|v| !v.is_nan())))
             .collect();
         Ok(Self {
             twin,
@@ -91,8 +93,9 @@ impl<'a> Kalman<'a> {
             states,
             outputs: record.outputs().iter().copied().collect(),
             channels: record.outputs().ncols(),
+            between: Between::rows(twin, record.drive()),
+            gaps: !record.is_complete(),
             limits,
-            point_limits,
             floor,
             start_covariance: (settings.start_covariance.as_ref())
                 .map(|p| p.transpose().as_slice().to_vec()),
@@ -119,23 +122,7 @@ impl<'a> Kalman<'a> {
     /// Holds the states in their limits; whether covariances were scaled.
     #[inline(always)]
     pub(super) fn hold(&self, mean: &mut [f64], cov: &mut [f64], scale: &mut [f64]) -> bool {
-        match self.settings.method {
-            Method::Points => clip(mean, cov, &self.limits, scale),
-            Method::Extended => {
-                self.clamp_mean(mean);
-                false
-            }
-        }
-    }
-
-    /// After a row, only the linear filter holds its mean; the points of the other are held when they are carried on.
-    #[inline(always)]
-    pub(super) fn clamp_mean(&self, mean: &mut [f64]) {
-        if self.settings.method == Method::Extended {
-            for (mean, limit) in mean.iter_mut().zip(&self.limits) {
-                *mean = limit.clamp(*mean);
-            }
-        }
+        clip(mean, cov, &self.limits, scale)
     }
 
     /// A state as it is told to people: within its limits.

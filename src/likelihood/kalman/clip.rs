@@ -4,7 +4,7 @@ use super::tail::Tail;
 use crate::twin::Interval;
 
 /// Beyond this many standard deviations a limit is not felt: its share is below 2e-12.
-const UNFELT: f64 = 7.0;
+pub(super) const UNFELT: f64 = 7.0;
 
 /// Moments of c = clamp(x, a, b), x ~ N(m, s²):
 ///

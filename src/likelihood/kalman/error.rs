@@ -1,7 +1,7 @@
 //! Why a record could not be filtered.
 use crate::math::MathError;
 use crate::record::RecordError;
-use crate::setting::SettingError;
+use crate::setting::{SettingError, number};
 use crate::twin::{SimulationError, TwinError};
 
 /// Why a record could not be filtered. [`Diverged`](Self::Diverged), [`NoSpread`](Self::NoSpread) and a twin that
@@ -19,15 +19,16 @@ pub enum FilterError {
     #[error(transparent)]
     Simulation(#[from] SimulationError),
     /// A mean or variance left the finite numbers.
-    #[error("the filter diverged at t = {at} s; these parameters are not for this record")]
+    #[error("the filter diverged at t = {} s; these parameters are not for this record", number(*at))]
     Diverged {
         /// Time in seconds.
         at: f64,
     },
     /// The covariance of an innovation has no inverse.
     #[error(
-        "the outputs at t = {at} s are predicted without any uncertainty; give one of them measurement noise, \
-         or raise noise_floor"
+        "the outputs at t = {} s are predicted without any uncertainty; give one of them measurement noise, \
+         or raise noise_floor",
+        number(*at)
     )]
     NoSpread {
         /// Time in seconds.

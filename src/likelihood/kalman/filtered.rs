@@ -6,7 +6,8 @@ use super::{FilterError, Kalman};
 use crate::record::Signal;
 use ndarray::{Array3, s};
 
-/// A record as the filter saw it; N samples, p outputs, n states.
+/// A record as the filter saw it; N samples, p outputs, n states. A missing output has innovation 0, variance 1, no covariance
+/// with others, and no part in a density.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Filtered {
@@ -43,9 +44,24 @@ impl Filtered {
         Signal::from_shape_fn((samples, p), |(k, j)| self.covariances[[k, j, j]])
     }
 
-    /// Prediction of each output from the past, given the outputs themselves (N × p).
+    /// Prediction of each output from the past, given the outputs themselves (N × p); NaN where one is missing.
     pub fn predictions(&self, outputs: &Signal) -> Signal {
         outputs - &self.innovations
+    }
+
+    /// As [`predictions`](Self::predictions), each missing one replaced by the one before it, or else by the next.
+    pub(crate) fn held_predictions(&self, outputs: &Signal) -> Signal {
+        let mut predictions = self.predictions(outputs);
+        for mut column in predictions.columns_mut() {
+            let mut last = column.iter().copied().find(|v| !v.is_nan()).unwrap_or(0.0);
+            for value in &mut column {
+                match value.is_nan() {
+                    true => *value = last,
+                    false => last = *value,
+                }
+            }
+        }
+        predictions
     }
 }
 

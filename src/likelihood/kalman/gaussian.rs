@@ -1,6 +1,7 @@
 //! A mean and a covariance that may be singular.
 
 use super::size::Numbers;
+use crate::math::{Kernel, widest};
 
 /// Pivots below this share of their variance are rounding.
 const RELATIVE_PIVOT: f64 = 1e-15;
@@ -130,31 +131,8 @@ impl<M: Numbers> Root<M> {
 
     /// Factors a covariance (n × n, row-major).
     pub fn factor(&mut self, mean: &[f64], cov: &[f64]) {
-        let n = mean.len();
-        self.rank = 0;
-        for j in 0..n {
-            let (done, rest) = self.all.as_mut().split_at_mut(self.rank * n);
-            let column = &mut rest[..n];
-            let variance = cov[j * n + j];
-            let mut pivot = variance;
-            for before in done.chunks_exact(n) {
-                pivot -= before[j] * before[j];
-            }
-            // Also where it is NaN: that shows in the innovation.
-            if pivot.is_nan() || pivot <= least_pivot(mean[j], variance) {
-                continue;
-            }
-            let inverse = 1.0 / pivot.sqrt();
-            column[..j].fill(0.0);
-            for i in j..n {
-                let mut entry = cov[i * n + j];
-                for before in done.chunks_exact(n) {
-                    entry -= before[i] * before[j];
-                }
-                column[i] = entry * inverse;
-            }
-            self.rank += 1;
-        }
+        let all = self.all.as_mut();
+        self.rank = widest(Factor { mean, cov, all });
     }
 
     /// A solution of P·x = b in place, for b in the range of P; components without a pivot become zero.
@@ -180,6 +158,50 @@ impl<M: Numbers> Root<M> {
             let known: f64 = (pivot + 1..n).map(|i| column[i] * b[i]).sum();
             b[pivot] = (z[c] - known) / column[pivot];
         }
+    }
+}
+
+/// Columns of a root, one after the other; their number.
+struct Factor<'w> {
+    mean: &'w [f64],
+    cov: &'w [f64],
+    all: &'w mut [f64],
+}
+
+impl Kernel for Factor<'_> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn run(self) -> usize {
+        let Self { mean, cov, all } = self;
+        let n = mean.len();
+        let mut rank = 0;
+        for j in 0..n {
+            let (done, rest) = all.split_at_mut(rank * n);
+            let column = &mut rest[..n];
+            column[..j].fill(0.0);
+            for i in j..n {
+                column[i] = cov[i * n + j];
+            }
+            // Along the column inside, so that the sums go side by side.
+            for before in done.chunks_exact(n) {
+                let share = before[j];
+                for (entry, before) in column[j..].iter_mut().zip(&before[j..]) {
+                    *entry -= before * share;
+                }
+            }
+            let pivot = column[j];
+            // Also where it is NaN: that shows in the innovation.
+            if pivot.is_nan() || pivot <= least_pivot(mean[j], cov[j * n + j]) {
+                continue;
+            }
+            let inverse = 1.0 / pivot.sqrt();
+            for entry in &mut column[j..] {
+                *entry *= inverse;
+            }
+            rank += 1;
+        }
+        rank
     }
 }
 

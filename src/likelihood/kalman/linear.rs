@@ -1,6 +1,6 @@
 //! Linear twins with normal noise, for which the filter is exact.
 
-use super::{FilterError, FilterSettings, Kalman, Method, Score, filter, log_likelihood, smooth};
+use super::{FilterError, FilterSettings, Kalman, Method, Score};
 use crate::record::*;
 use crate::twin::*;
 use nalgebra::{DMatrix, DVector, dmatrix, dvector};
@@ -54,8 +54,8 @@ impl StateSpace for Chain {
     fn start(&self, _: &Now<'_>, x: &mut [f64]) {
         x.copy_from_slice(&[1.0, -0.5]);
     }
-    fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
-        process.copy_from_slice(&Q);
+    fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+        process.copy_from_slice(&Q.map(|q| q * (now.dt / DT).sqrt()));
         measurement.copy_from_slice(&R[..self.outputs]);
     }
     fn readout(&self, _: &Now<'_>, y: &mut [f64]) {
@@ -76,28 +76,31 @@ struct Exact {
     smoothed: Vec<(DVector<f64>, DMatrix<f64>)>,
 }
 
-/// The textbook's recursions, with matrices written out.
+/// The textbook's recursions, with matrices written out; of each row the outputs that are there.
 fn exact(twin: &Chain, theta: &[f64], record: &Record, start: &DMatrix<f64>) -> Exact {
-    let a = dmatrix![1.0, DT; -DT * theta[0], 1.0 - 0.4 * DT];
-    let c = twin.c();
-    let q = DMatrix::from_diagonal(&dvector![Q[0], Q[1]].map(|v| v * v));
-    let r = DMatrix::from_diagonal(&DVector::from_column_slice(&R[..twin.outputs]).map(|v| v * v));
+    let carry = |dt: f64| dmatrix![1.0, dt; -dt * theta[0], 1.0 - 0.4 * dt];
     let (mut m, mut p) = (dvector![1.0, -0.5], start.clone());
     let mut log_likelihood = 0.0;
     let (mut filtered, mut predicted) = (vec![], vec![(m.clone(), p.clone())]);
     for k in 0..record.samples() {
         let y = record.outputs().row(k).to_vec();
-        let e = DVector::from_vec(y) - &c * &m;
+        let there: Vec<usize> = (0..y.len()).filter(|&j| !y[j].is_nan()).collect();
+        let c = twin.c().select_rows(&there);
+        let r = DVector::from_iterator(there.len(), there.iter().map(|&j| R[j] * R[j]));
+        let r = DMatrix::from_diagonal(&r);
+        let y = DVector::from_iterator(there.len(), there.iter().map(|&j| y[j]));
+        let e = y - &c * &m;
         let s = &c * &p * c.transpose() + &r;
         let inverse = s.clone().try_inverse().unwrap();
-        log_likelihood -= 0.5
-            * ((s * 2.0 * std::f64::consts::PI).determinant().ln()
-                + (e.transpose() * &inverse * &e)[0]);
+        log_likelihood -=
+            0.5 * ((s * 2.0 * std::f64::consts::PI).determinant().ln() + e.dot(&(&inverse * &e)));
         let gain = &p * c.transpose() * inverse;
         m += &gain * e;
         p = &p - &gain * &c * &p;
         filtered.push((m.clone(), p.clone()));
-        let push = DT * (record.drive().input(k)[0] + theta[1]);
+        let dt = record.drive().step(k);
+        let q = DMatrix::from_diagonal(&dvector![Q[0], Q[1]].map(|v| v * v * dt / DT));
+        let (a, push) = (carry(dt), dt * (record.drive().input(k)[0] + theta[1]));
         m = &a * m + dvector![0.0, push];
         p = &a * p * a.transpose() + &q;
         predicted.push((m.clone(), p.clone()));
@@ -106,6 +109,7 @@ fn exact(twin: &Chain, theta: &[f64], record: &Record, start: &DMatrix<f64>) -> 
     for k in (0..record.samples() - 1).rev() {
         let (m, p) = &filtered[k];
         let (ahead, spread) = &predicted[k + 1];
+        let a = carry(record.drive().step(k));
         let gain = p * a.transpose() * spread.clone().try_inverse().unwrap();
         let (later, sure) = smoothed[k + 1].clone();
         smoothed[k] = (
@@ -122,42 +126,50 @@ fn exact(twin: &Chain, theta: &[f64], record: &Record, start: &DMatrix<f64>) -> 
 
 const METHODS: [Method; 2] = [Method::Points, Method::Extended];
 
-/// One and two outputs, a start that is known and one that is not, both methods: the exact filter and smoother.
-#[test]
-fn linear_twins_are_filtered_and_smoothed_exactly() {
+/// Holds filter and smoother against the exact ones, from starts that are known and not, with both methods.
+fn agrees_with_the_exact_filter(twin: &Chain, record: &Record) {
     let theta = [1.2, 0.3];
-    for outputs in [1, 2] {
-        let twin = Chain::new(outputs);
-        let record = record(&twin, &theta);
-        // Invertible, so that the textbook's smoother has its inverse.
-        for start in [dmatrix![1e-6, 0.0; 0.0, 1e-6], dmatrix![0.5, 0.2; 0.2, 0.4]] {
-            let expected = exact(&twin, &theta, &record, &start);
-            for method in METHODS {
-                let settings = FilterSettings {
-                    method,
-                    start_covariance: Some(start.clone()),
-                    keep_states: true,
-                    ..FilterSettings::default()
-                };
-                let found = filter(&twin, &theta, &record, &settings).unwrap();
-                let error = found.log_likelihood - expected.log_likelihood;
-                assert!(error.abs() < 1e-9, "{method:?}: {error}");
-                let sum: f64 = found.log_densities.iter().sum();
-                assert!((sum - found.log_likelihood).abs() < 1e-9);
-                let fast = log_likelihood(&twin, &theta, &record, &settings).unwrap();
-                assert_eq!(fast, found.log_likelihood);
-                let smoothed = smooth(&twin, &theta, &record, &settings).unwrap();
-                for (states, expected) in [
-                    (found.states.unwrap(), &expected.filtered),
-                    (smoothed.states, &expected.smoothed),
-                ] {
-                    for (k, (m, p)) in expected.iter().enumerate() {
-                        for i in 0..2 {
-                            assert!((states.means[[k, i]] - m[i]).abs() < 1e-8);
-                            for j in 0..2 {
-                                let error = states.covariances[[k, i, j]] - p[(i, j)];
-                                assert!(error.abs() < 1e-8, "{method:?}, row {k}: {error}");
-                            }
+    // Invertible, so that the textbook's smoother has its inverse.
+    for start in [dmatrix![1e-6, 0.0; 0.0, 1e-6], dmatrix![0.5, 0.2; 0.2, 0.4]] {
+        let expected = exact(twin, &theta, record, &start);
+        for method in METHODS {
+            let settings = FilterSettings {
+                method,
+                start_covariance: Some(start.clone()),
+                keep_states: true,
+                ..FilterSettings::default()
+            };
+            let found = Kalman::new(twin, record, &settings)
+                .and_then(|k| k.filter(&theta))
+                .unwrap();
+            let error = found.log_likelihood - expected.log_likelihood;
+            assert!(error.abs() < 1e-9, "{method:?}: {error}");
+            let sum: f64 = found.log_densities.iter().sum();
+            assert!((sum - found.log_likelihood).abs() < 1e-9);
+            let fast = Kalman::new(twin, record, &settings)
+                .and_then(|k| k.log_likelihood(&theta))
+                .unwrap();
+            assert_eq!(fast, found.log_likelihood);
+            for (cell, y) in record.outputs().indexed_iter().filter(|(_, y)| y.is_nan()) {
+                assert_eq!(
+                    (found.innovations[cell], found.standardised[cell]),
+                    (0.0, 0.0),
+                    "{y}"
+                );
+            }
+            let smoothed = Kalman::new(twin, record, &settings)
+                .and_then(|k| k.smooth(&theta))
+                .unwrap();
+            for (states, expected) in [
+                (found.states.unwrap(), &expected.filtered),
+                (smoothed.states, &expected.smoothed),
+            ] {
+                for (k, (m, p)) in expected.iter().enumerate() {
+                    for i in 0..2 {
+                        assert!((states.means[[k, i]] - m[i]).abs() < 1e-8);
+                        for j in 0..2 {
+                            let error = states.covariances[[k, i, j]] - p[(i, j)];
+                            assert!(error.abs() < 1e-8, "{method:?}, row {k}: {error}");
                         }
                     }
                 }
@@ -166,12 +178,94 @@ fn linear_twins_are_filtered_and_smoothed_exactly() {
     }
 }
 
+#[test]
+fn linear_twins_are_filtered_and_smoothed_exactly() {
+    for outputs in [1, 2] {
+        let twin = Chain::new(outputs);
+        agrees_with_the_exact_filter(&twin, &record(&twin, &[1.2, 0.3]));
+    }
+}
+
+/// Empties each cell with probability `share`.
+fn with_gaps(record: &Record, share: f64) -> Record {
+    let mut source = Noise::new(7, "gaps", 0).source("cells");
+    let outputs = record.outputs().mapv(|y| match source.uniform() < share {
+        true => f64::NAN,
+        false => y,
+    });
+    Record::new(record.drive().clone(), outputs).unwrap()
+}
+
+/// Steps between a quarter and three times the usual one.
+fn with_steps(twin: &Chain, record: &Record) -> Record {
+    let mut source = Noise::new(8, "steps", 0).source("steps");
+    let mut times = vec![0.0];
+    for k in 1..record.samples() {
+        times.push(times[k - 1] + DT * (0.25 + 2.75 * source.uniform()));
+    }
+    let drive = Drive::with_times(&times, record.drive().inputs().clone()).unwrap();
+    assert!(!drive.is_uniform());
+    let outputs = twin.simulate(&[1.2, 0.3], &drive, Noise::new(3, "linear", 0));
+    Record::new(drive, outputs.unwrap()).unwrap()
+}
+
+/// One cell in ten missing: in two outputs alone and together.
+#[test]
+fn missing_outputs_are_left_out_exactly() {
+    for outputs in [1, 2] {
+        let twin = Chain::new(outputs);
+        let some = with_gaps(&record(&twin, &[1.2, 0.3]), 0.1);
+        assert!((5..40).contains(&some.missing()), "{}", some.missing());
+        agrees_with_the_exact_filter(&twin, &some);
+        // More than half missing: rows without any output among them.
+        let few = with_gaps(&record(&twin, &[1.2, 0.3]), 0.6);
+        agrees_with_the_exact_filter(&twin, &few);
+    }
+}
+
+#[test]
+fn varying_steps_are_filtered_exactly() {
+    for outputs in [1, 2] {
+        let twin = Chain::new(outputs);
+        let uneven = with_steps(&twin, &record(&twin, &[1.2, 0.3]));
+        agrees_with_the_exact_filter(&twin, &uneven);
+        agrees_with_the_exact_filter(&twin, &with_gaps(&uneven, 0.1));
+    }
+}
+
+/// Rows without an output have no part in the score, and the score stays the derivative.
+#[test]
+fn a_missing_output_has_no_score() {
+    for outputs in [1, 2] {
+        let twin = Chain::new(outputs);
+        let record = with_gaps(&with_steps(&twin, &record(&twin, &[1.2, 0.3])), 0.5);
+        let settings = FilterSettings::default();
+        let kalman = Kalman::new(&twin, &record, &settings).unwrap();
+        let score = Score::at(&kalman, &[1.2, 0.3]).unwrap();
+        let empty = |k: usize| record.outputs().row(k).iter().all(|y| y.is_nan());
+        assert!((0..record.samples()).any(empty));
+        for k in (0..record.samples()).filter(|&k| empty(k)) {
+            assert!(score.samples.row(k).iter().all(|g| *g == 0.0));
+        }
+        let known = DMatrix::identity(2, 2) * 1e-18;
+        let value = |c: f64| exact(&twin, &[1.2, c], &record, &known).log_likelihood;
+        let h = 1e-5;
+        let expected = (value(0.3 + h) - value(0.3 - h)) / (2.0 * h);
+        let (error, scale) = (score.gradient[1] - expected, score.fisher[(1, 1)].sqrt());
+        assert!(error.abs() < 1e-3 * scale, "{error} of {scale}");
+        let rows = (0..record.samples()).filter(|&k| !empty(k)).count() as f64;
+        assert!(scale.is_finite() && score.outer[(1, 1)] < 100.0 * rows * score.fisher[(1, 1)]);
+    }
+}
+
 /// With a known start the first prediction is certain but for the sensor.
 #[test]
 fn a_known_start_leaves_the_measurement_noise() {
     let twin = Chain::new(2);
     let record = record(&twin, &[1.0, 0.0]);
-    let found = filter(&twin, &[1.0, 0.0], &record, &FilterSettings::default()).unwrap();
+    let found = Kalman::new(&twin, &record, &FilterSettings::default())
+        .and_then(|k| k.filter(&[1.0, 0.0]))
+        .unwrap();
     let variances = found.variances();
     for j in 0..2 {
         assert!((variances[[0, j]] - R[j] * R[j]).abs() < 1e-14);
@@ -286,7 +380,9 @@ fn a_saturating_sensor_is_known_to_saturate() {
             outputs: 1,
             ceiling,
         };
-        log_likelihood(&twin, &theta, &record, &settings).unwrap()
+        Kalman::new(&twin, &record, &settings)
+            .and_then(|k| k.log_likelihood(&theta))
+            .unwrap()
     };
     assert_eq!(of(1e9), of(f64::INFINITY));
     assert!(
@@ -303,17 +399,23 @@ fn what_does_not_fit_is_named() {
     let theta = [1.2, 0.3];
     let fitting = record(&twin, &theta);
     let settings = FilterSettings::default();
-    let short = log_likelihood(&twin, &[1.0], &fitting, &settings).unwrap_err();
+    let short = Kalman::new(&twin, &fitting, &settings)
+        .and_then(|k| k.log_likelihood(&[1.0]))
+        .unwrap_err();
     assert!(
         short.to_string().contains("1 values for 2 parameters"),
         "{short}"
     );
     let other = Chain::new(2);
-    let error = log_likelihood(&other, &theta, &fitting, &settings).unwrap_err();
+    let error = Kalman::new(&other, &fitting, &settings)
+        .and_then(|k| k.log_likelihood(&theta))
+        .unwrap_err();
     assert!(
         error.to_string().contains("1 outputs, the twin has 2"),
         "{error}"
     );
-    let error = log_likelihood(&twin, &[1e200, 0.0], &fitting, &settings).unwrap_err();
+    let error = Kalman::new(&twin, &fitting, &settings)
+        .and_then(|k| k.log_likelihood(&[1e200, 0.0]))
+        .unwrap_err();
     assert!(error.is_recoverable(), "{error}");
 }

@@ -17,11 +17,21 @@
 use super::gaussian::Columns;
 use super::size::{Numbers, Size};
 use super::{Method, linearised};
-use crate::twin::{Interval, Now, Points, StateSpace, Workspace};
+use crate::math::{Kernel, widest};
+use crate::twin::{Interval, Layout, Now, Points, StateSpace, Workspace};
 use std::f64::consts::SQRT_2;
 
 /// √3: points of the three-point Gauss–Hermite rule, in standard deviations.
-const REACH: f64 = 1.732_050_807_568_877_2;
+pub(super) const REACH: f64 = 1.732_050_807_568_877_2;
+/// Slope of the difference of two points.
+pub(super) const HALF_PER_REACH: f64 = 0.5 / REACH;
+/// √2/3: weight of a bend in the covariance.
+pub(super) const BEND: f64 = SQRT_2 / 3.0;
+
+/// Up to so many states a sum of products keeps its entries in registers one by one.
+const FEW: usize = 4;
+/// Sizes that are known when this is compiled.
+const KNOWN: usize = 10;
 
 /// Buffers of one filter run: n states, p outputs.
 pub(super) struct Moments<'a, S: Size> {
@@ -29,6 +39,8 @@ pub(super) struct Moments<'a, S: Size> {
     twin: &'a dyn StateSpace,
     method: Method,
     limits: &'a [Interval],
+    /// Limits of points that give a derivative.
+    unlimited: Vec<Interval>,
     work: Workspace,
     /// Standard deviation of each noise, in the reach of its points.
     shifts: S::Vector,
@@ -42,7 +54,7 @@ pub(super) struct Moments<'a, S: Size> {
 }
 
 impl<'a, S: Size> Moments<'a, S> {
-    /// With `limits` for the points, by state.
+    /// Creates the buffers; `limits` go by state.
     pub fn new(size: S, twin: &'a dyn StateSpace, method: Method, limits: &'a [Interval]) -> Self {
         let (n, p) = (size.states(), size.outputs());
         Self {
@@ -50,7 +62,8 @@ impl<'a, S: Size> Moments<'a, S> {
             twin,
             method,
             limits,
-            work: Workspace::new(n),
+            unlimited: vec![Interval::EVERYTHING; n],
+            work: Workspace::new(twin),
             shifts: S::Vector::zeros(n),
             points: S::Points::zeros((1 + 4 * n) * n),
             outputs: S::Points::zeros((1 + 2 * n) * p),
@@ -77,19 +90,21 @@ impl<'a, S: Size> Moments<'a, S> {
             Method::Points => root.rank,
             Method::Extended => n,
         };
-        let (moving, shifted) = self.points.as_mut().split_at_mut((1 + 2 * pairs) * n);
-        let shifted = &mut shifted[..2 * n * n];
+        let moving = 1 + 2 * pairs;
+        let all = &mut self.points.as_mut()[..(moving + 2 * n) * n];
         match self.method {
             Method::Points => {
-                spread(mean, root, moving);
+                spread(mean, root, &mut all[..moving * n]);
                 for (shift, q) in shifts.iter_mut().zip(q) {
                     *shift = REACH * q;
                 }
             }
             Method::Extended => {
                 let at = &mut self.at.as_mut()[..n];
-                at.copy_from_slice(mean);
-                linearised::points(at, root, moving);
+                for ((at, mean), limit) in at.iter_mut().zip(&*mean).zip(self.limits) {
+                    *at = limit.clamp(*mean);
+                }
+                linearised::points(at, root, &mut all[..moving * n]);
                 for ((shift, q), x) in shifts.iter_mut().zip(q).zip(&*mean) {
                     *shift = if *q == 0.0 {
                         0.0
@@ -100,12 +115,17 @@ impl<'a, S: Size> Moments<'a, S> {
             }
         }
         let points = Points {
+            all,
             moving,
-            limits: self.limits,
-            shifted,
+            limits: match self.method {
+                Method::Points => self.limits,
+                Method::Extended => &self.unlimited,
+            },
             shifts,
         };
         let bent = self.twin.advance_each(now, points, &mut self.work);
+        let all = &mut self.points.as_mut()[..(moving + 2 * n) * n];
+        let (moving, shifted) = all.split_at_mut(moving * n);
         if self.method == Method::Extended {
             linearised::slopes(
                 &self.at.as_ref()[..n],
@@ -185,7 +205,7 @@ impl<'a, S: Size> Moments<'a, S> {
                 linearised::points(at, root, points);
             }
         }
-        self.twin.observe_each(now, (n, p), points, outputs);
+        (self.twin).observe_each(now, Layout::dense(n), p, points, outputs);
         if self.method == Method::Extended {
             linearised::slopes(
                 &self.at.as_ref()[..n],
@@ -227,10 +247,10 @@ fn differences(images: &mut [f64], centre: &[f64], mean: &mut [f64]) {
     for pair in images.chunks_exact_mut(2 * m) {
         let (plus, minus) = pair.split_at_mut(m);
         for i in 0..m {
-            let slope = (plus[i] - minus[i]) * (0.5 / REACH);
+            let slope = (plus[i] - minus[i]) * HALF_PER_REACH;
             let bend = 0.5 * (plus[i] + minus[i]) - centre[i];
             mean[i] += bend * (1.0 / 3.0);
-            (plus[i], minus[i]) = (slope, bend * (SQRT_2 / 3.0));
+            (plus[i], minus[i]) = (slope, bend * BEND);
         }
     }
 }
@@ -246,13 +266,49 @@ pub(super) fn outer(deviations: &[f64], n: usize, sum: &mut [f64]) {
 #[inline(always)]
 pub(super) fn add_outer(deviations: &[f64], n: usize, sum: &mut [f64]) {
     let sum = &mut sum[..n * n];
-    for i in 0..n {
-        for j in 0..=i {
-            let mut entry = sum[i * n + j];
-            for d in deviations.chunks_exact(n) {
-                entry += d[i] * d[j];
+    if n <= FEW {
+        for i in 0..n {
+            for j in 0..=i {
+                let mut entry = sum[i * n + j];
+                for d in deviations.chunks_exact(n) {
+                    entry += d[i] * d[j];
+                }
+                (sum[i * n + j], sum[j * n + i]) = (entry, entry);
             }
-            (sum[i * n + j], sum[j * n + i]) = (entry, entry);
         }
+        return;
+    }
+    if n <= KNOWN {
+        add_rows(deviations, n, sum);
+    } else {
+        widest(Rows { deviations, n, sum });
+    }
+}
+
+/// As [`add_outer`], a row of the sum side by side; each entry adds up in the same order.
+#[inline(always)]
+fn add_rows(deviations: &[f64], n: usize, sum: &mut [f64]) {
+    for (i, row) in sum.chunks_exact_mut(n).enumerate() {
+        for d in deviations.chunks_exact(n) {
+            let share = d[i];
+            for (entry, d) in row.iter_mut().zip(d) {
+                *entry += share * d;
+            }
+        }
+    }
+}
+
+struct Rows<'w> {
+    deviations: &'w [f64],
+    n: usize,
+    sum: &'w mut [f64],
+}
+
+impl Kernel for Rows<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        add_rows(self.deviations, self.n, self.sum);
     }
 }

@@ -3,7 +3,8 @@
 use super::gaussian::{Belief, Columns, Root, regular};
 use super::likelihood::{LOG_TWO_PI, LogLikelihood};
 use super::moments::Moments;
-use super::size::{Any, Fixed, Numbers, Size};
+use super::size::{Any, Fixed, Numbers, Size, Wide};
+use super::start::spread_start;
 use super::update::{Measured, Update};
 use super::{FilterError, Kalman};
 use crate::twin::{Now, Outliers};
@@ -14,6 +15,8 @@ pub(super) struct Innovation<'w> {
     /// p × p.
     pub covariance: &'w [f64],
     pub standardised: &'w [f64],
+    /// The row of the record; NaN where an output is missing, and so has no density.
+    measured: &'w [f64],
     /// Variance of each output given those before it.
     pivots: &'w [f64],
     /// Nats by which the density exceeds a normal one.
@@ -23,9 +26,10 @@ pub(super) struct Innovation<'w> {
 impl Innovation<'_> {
     /// log p(y_k | y_0 … y_{k−1}), in nats.
     pub fn log_density(&self) -> f64 {
-        let values = self.standardised.iter().zip(self.pivots);
+        let values = (self.standardised.iter().zip(self.pivots)).zip(self.measured);
         let sum: f64 = values
-            .map(|(e, pivot)| LOG_TWO_PI + pivot.ln() + e * e)
+            .filter(|(_, y)| !y.is_nan())
+            .map(|((e, pivot), _)| LOG_TWO_PI + pivot.ln() + e * e)
             .sum();
         self.excess - 0.5 * sum
     }
@@ -33,8 +37,11 @@ impl Innovation<'_> {
 
 /// Receiver of the results of a pass. Results that it does not need are not computed.
 pub(super) trait Sink {
-    /// `true` if [`carried`](Self::carried) is wanted.
-    const CARRIED: bool = false;
+    /// Returns `true` if [`carried`](Self::carried) is wanted.
+    #[inline(always)]
+    fn wants_carried(&self) -> bool {
+        false
+    }
     fn innovation(&mut self, _k: usize, _of: &Innovation<'_>) {}
     /// State given rows up to k.
     fn filtered(&mut self, _k: usize, _state: Belief<'_>) {}
@@ -108,12 +115,7 @@ impl<'k, S: Size> Pass<'k, S> {
         let drive = kalman.record.drive();
         kalman.twin.check_parameters(theta, drive.dt())?;
         let (n, p) = (size.states(), size.outputs());
-        let now = Now {
-            t: 0.0,
-            dt: drive.dt(),
-            u: drive.input(0),
-            theta,
-        };
+        let now = Now::new(0.0, drive.step(0), drive.input(0), theta);
         let (twin, method) = (kalman.twin, kalman.settings.method);
         Ok(Self {
             size,
@@ -121,7 +123,7 @@ impl<'k, S: Size> Pass<'k, S> {
             now,
             root: Root::new(n),
             copy: State::zero(n),
-            moments: Moments::new(size, twin, method, &kalman.point_limits),
+            moments: Moments::new(size, twin, method, &kalman.limits),
             update: Update::new(size),
             q: S::Vector::zeros(n),
             r: S::Vector::zeros(p),
@@ -133,7 +135,7 @@ impl<'k, S: Size> Pass<'k, S> {
     }
 
     /// Over the whole record; the log-likelihood.
-    pub fn run<K: Sink>(mut self, sink: &mut K) -> Result<f64, FilterError> {
+    pub fn run<K: Sink + ?Sized>(mut self, sink: &mut K) -> Result<f64, FilterError> {
         let n = self.size.states();
         self.start();
         let mut state = State::zero(n);
@@ -150,16 +152,12 @@ impl<'k, S: Size> Pass<'k, S> {
     /// The first state, into the copy.
     fn start(&mut self) {
         let (mean, cov) = self.copy.slices(self.size.states());
-        self.kalman.twin.start(&self.now, mean);
-        if let Some(covariance) = &self.kalman.start_covariance {
-            cov.copy_from_slice(covariance);
-            self.kalman.hold(mean, cov, self.scale.as_mut());
-        }
+        (self.kalman).start(&self.now, mean, cov, self.scale.as_mut());
     }
 
     /// Puts row k into the state.
     #[inline(always)]
-    fn measure<K: Sink>(
+    fn measure<K: Sink + ?Sized>(
         &mut self,
         k: usize,
         state: &mut State<S>,
@@ -167,7 +165,8 @@ impl<'k, S: Size> Pass<'k, S> {
     ) -> Result<(), FilterError> {
         let (n, p) = (self.size.states(), self.size.outputs());
         let drive = self.kalman.record.drive();
-        (self.now.t, self.now.u) = (drive.time(k), drive.input(k));
+        (self.now.t, self.now.dt, self.now.u) = (drive.time(k), drive.step(k), drive.input(k));
+        self.now.between = self.kalman.between.get(k);
         let (q, r) = (&mut self.q.as_mut()[..n], &mut self.r.as_mut()[..p]);
         q.fill(0.0);
         r.fill(0.0);
@@ -187,13 +186,13 @@ impl<'k, S: Size> Pass<'k, S> {
         if !self.likelihood.is_finite() {
             return Err(FilterError::Diverged { at: self.now.t });
         }
-        self.kalman.clamp_mean(state.slices(n).0);
         sink.innovation(
             k,
             &Innovation {
                 innovation: &self.update.innovation.as_ref()[..p],
                 covariance: &self.update.covariance.as_ref()[..p * p],
                 standardised: &self.update.standardised.as_ref()[..p],
+                measured: &self.kalman.outputs[k * p..(k + 1) * p],
                 pivots: &self.update.pivots.as_ref()[..p],
                 excess: self.update.excess,
             },
@@ -215,19 +214,17 @@ impl<'k, S: Size> Pass<'k, S> {
             floor: &self.kalman.floor[..p],
             outliers: &self.outliers,
         };
-        self.update.apply(
-            (self.kalman.twin, &self.now),
-            &row,
-            root,
-            outputs,
-            (mean, cov),
-            &mut self.likelihood,
-        )
+        let (at, state) = ((self.kalman.twin, &self.now), (mean, cov));
+        if self.kalman.gaps && row.y.iter().any(|y| y.is_nan()) {
+            let likelihood = &mut self.likelihood;
+            return (self.update).apply_present(at, &row, root, outputs, state, likelihood);
+        }
+        (self.update).apply(at, &row, root, outputs, state, &mut self.likelihood)
     }
 
     /// Carries the state from row k to the next.
     #[inline(always)]
-    fn carry<K: Sink>(&mut self, k: usize, state: &mut State<S>, sink: &mut K) {
+    fn carry<K: Sink + ?Sized>(&mut self, k: usize, state: &mut State<S>, sink: &mut K) {
         match self.regular(state) {
             Some(columns) => {
                 let all = Columns::all(self.size.states(), columns.as_ref());
@@ -242,7 +239,7 @@ impl<'k, S: Size> Pass<'k, S> {
     }
 
     #[inline(always)]
-    fn predict<K: Sink>(
+    fn predict<K: Sink + ?Sized>(
         &mut self,
         k: usize,
         state: &mut State<S>,
@@ -254,7 +251,7 @@ impl<'k, S: Size> Pass<'k, S> {
         (self.moments).predict(&self.now, self.q.as_ref(), root, (mean, cov));
         let scale = &mut self.scale.as_mut()[..n];
         let felt = self.kalman.hold(mean, cov, scale);
-        if K::CARRIED {
+        if sink.wants_carried() {
             let mut cross = vec![0.0; n * n];
             self.moments.cross(root, &mut cross);
             if felt {
@@ -311,22 +308,50 @@ impl<'k, S: Size> Pass<'k, S> {
 }
 
 impl Kalman<'_> {
+    /// The first state; `cov` comes zeroed.
+    pub(super) fn start(
+        &self,
+        now: &Now<'_>,
+        mean: &mut [f64],
+        cov: &mut [f64],
+        scale: &mut [f64],
+    ) {
+        self.twin.start(now, mean);
+        match &self.start_covariance {
+            Some(covariance) => cov.copy_from_slice(covariance),
+            None if !spread_start(self.twin, now, mean, cov) => return,
+            None => {}
+        }
+        self.hold(mean, cov, scale);
+    }
+
     /// log p(y | θ), in nats.
     ///
     /// # Errors
     ///
     /// [`FilterError`]: θ of another length, a twin that refuses it, a filter that diverged or has no spread.
     pub fn log_likelihood(&self, theta: &[f64]) -> Result<f64, FilterError> {
-        self.run(theta, &mut ())
+        self.run_into(theta, &mut ())
     }
 
-    /// One pass over the record; the log-likelihood.
-    pub(super) fn run<K: Sink>(&self, theta: &[f64], sink: &mut K) -> Result<f64, FilterError> {
+    /// One pass over the record; the log-likelihood. The pass is compiled once for all sinks.
+    pub(super) fn run(&self, theta: &[f64], sink: &mut dyn Sink) -> Result<f64, FilterError> {
+        self.run_into(theta, sink)
+    }
+
+    fn run_into<K: Sink + ?Sized>(&self, theta: &[f64], sink: &mut K) -> Result<f64, FilterError> {
         match (self.states, self.channels) {
             (1, 1) => Pass::new(Fixed::<1>, self, theta)?.run(sink),
             (2, 1) => Pass::new(Fixed::<2>, self, theta)?.run(sink),
             (3, 1) => Pass::new(Fixed::<3>, self, theta)?.run(sink),
             (4, 1) => Pass::new(Fixed::<4>, self, theta)?.run(sink),
+            (5, 1) => Pass::new(Fixed::<5>, self, theta)?.run(sink),
+            (6, 1) => Pass::new(Fixed::<6>, self, theta)?.run(sink),
+            (7, 1) => Pass::new(Fixed::<7>, self, theta)?.run(sink),
+            (8, 1) => Pass::new(Fixed::<8>, self, theta)?.run(sink),
+            (9, 1) => Pass::new(Fixed::<9>, self, theta)?.run(sink),
+            (10, 1) => Pass::new(Fixed::<10>, self, theta)?.run(sink),
+            (states, 1) => Pass::new(Wide { states }, self, theta)?.run(sink),
             (states, outputs) => Pass::new(Any { states, outputs }, self, theta)?.run(sink),
         }
     }

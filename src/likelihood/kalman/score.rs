@@ -1,8 +1,9 @@
 //! The gradient of the log-likelihood.
 
+use super::lanes::{Together, together};
 use super::pass::{Innovation, Sink};
 use super::{Coordinates, FilterError, Kalman};
-use crate::math::Stencil;
+use crate::math::{LANES, Stencil};
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
 /// Gradient of the log-likelihood in the [`Coordinates`] φ, by central differences (one-sided at a bound); d
@@ -78,12 +79,40 @@ impl Score {
     }
 
     /// As [`at`](Self::at), by one-sided differences with steps of a hundredth: d + 1 passes over the record instead of
-    /// 2·d + 1, the gradient off by half a step times the information. For searches, and for features.
+    /// 2·d + 1, the gradient off by half a step times the information. For searches, and for features. Small twins run
+    /// all passes side by side.
     ///
     /// # Errors
     ///
     /// As [`at`](Self::at).
     pub fn forward(
+        kalman: &Kalman<'_>,
+        theta: &[f64],
+        coordinates: &Coordinates,
+    ) -> Result<Self, FilterError> {
+        match side_by_side(&[kalman], theta, coordinates) {
+            Some(mut scores) => Ok(scores.swap_remove(0)),
+            None => Self::forward_one_by_one(kalman, theta, coordinates),
+        }
+    }
+
+    /// As [`forward`](Self::forward), of several records at the same θ: side by side where twin, times and length agree.
+    pub fn forward_each(
+        kalmans: &[&Kalman<'_>],
+        theta: &[f64],
+        coordinates: &Coordinates,
+    ) -> Vec<Result<Self, FilterError>> {
+        match side_by_side(kalmans, theta, coordinates) {
+            Some(scores) => scores.into_iter().map(Ok).collect(),
+            None => (kalmans.iter())
+                .map(|kalman| Self::forward(kalman, theta, coordinates))
+                .collect(),
+        }
+    }
+
+    /// As [`forward`](Self::forward), one pass after the other.
+    #[doc(hidden)]
+    pub fn forward_one_by_one(
         kalman: &Kalman<'_>,
         theta: &[f64],
         coordinates: &Coordinates,
@@ -101,6 +130,22 @@ impl Score {
         Self::assemble(kalman, log_likelihood, &centre, &jacobian)
     }
 
+    /// From derivatives of log-densities and of innovations and variances, both in standard deviations.
+    fn of_one_output(
+        log_likelihood: f64,
+        samples: DMatrix<f64>,
+        changes: [&DMatrix<f64>; 2],
+    ) -> Self {
+        let [shift, spread] = changes;
+        Self {
+            log_likelihood,
+            gradient: samples.row_sum_tr(),
+            outer: samples.tr_mul(&samples),
+            fisher: shift.tr_mul(shift) + spread.tr_mul(spread) * 0.5,
+            samples,
+        }
+    }
+
     fn assemble(
         kalman: &Kalman<'_>,
         log_likelihood: f64,
@@ -115,7 +160,11 @@ impl Score {
             let shift =
                 DMatrix::from_fn(n, d, |k, j| jacobian[(k * width + 1, j)] / scale(k).sqrt());
             let change = DMatrix::from_fn(n, d, |k, j| jacobian[(k * width + 2, j)] / scale(k));
-            shift.tr_mul(&shift) + change.tr_mul(&change) * 0.5
+            return Ok(Self::of_one_output(
+                log_likelihood,
+                samples,
+                [&shift, &change],
+            ));
         } else {
             let mut fisher = DMatrix::zeros(d, d);
             for k in 0..n {
@@ -138,6 +187,73 @@ impl Score {
             fisher,
             samples,
         })
+    }
+}
+
+/// One-sided scores of several records at θ by lanes; `None` where these cannot hold them.
+fn side_by_side(
+    kalmans: &[&Kalman<'_>],
+    theta: &[f64],
+    coordinates: &Coordinates,
+) -> Option<Vec<Score>> {
+    kalmans.first()?.check(theta).ok()?;
+    let phi = coordinates.of(theta);
+    let moves: Vec<_> = (0..phi.len())
+        .map(|j| {
+            let (moved, distance) = coordinates.beside(&phi, j, FORWARD);
+            (coordinates.theta(&moved), distance)
+        })
+        .collect();
+    let thetas = || std::iter::once(theta).chain(moves.iter().map(|(theta, _)| &theta[..]));
+    let jobs: Vec<(&Kalman<'_>, &[f64])> = (kalmans.iter())
+        .flat_map(|kalman| thetas().map(|theta| (*kalman, theta)))
+        .collect();
+    let runs: Vec<Together> = (jobs.chunks(LANES)).map(together).collect::<Option<_>>()?;
+    let scores = (0..kalmans.len()).map(|record| {
+        let lane = |j: usize| {
+            let job = record * (moves.len() + 1) + j;
+            (&runs[job / LANES], job % LANES)
+        };
+        let (centre, c) = lane(0);
+        let (n, d) = (centre.rows.len(), moves.len());
+        let [mut samples, mut shifts, mut spreads] = [(); 3].map(|()| DMatrix::zeros(n, d));
+        // Reciprocals of variance and deviation.
+        let scales: Vec<[f64; 2]> = (centre.rows.iter())
+            .map(|[_, s]| [1.0 / s.0[c], 1.0 / s.0[c].sqrt()])
+            .collect();
+        for (j, (_, distance)) in moves.iter().enumerate() {
+            let (moved, m) = lane(j + 1);
+            let rows = (centre.rows.iter().zip(&moved.rows)).zip(&scales);
+            let [samples, shifts, spreads] = [&mut samples, &mut shifts, &mut spreads]
+                .map(|of| of.as_mut_slice()[j * n..(j + 1) * n].iter_mut());
+            let to = samples.zip(shifts).zip(spreads);
+            let per_distance = 1.0 / distance;
+            for (([[e, _], [e_moved, s_moved]], [per_s, per_sd]), ((sample, shift), spread)) in
+                rows.map(|((a, b), scale)| ([a, b], scale)).zip(to)
+            {
+                let (e, e_moved, s_moved) = (e.0[c], e_moved.0[m], s_moved.0[m]);
+                let ratio = s_moved * per_s;
+                let square = e_moved * e_moved / s_moved - e * e * per_s;
+                *sample = -0.5 * (ln_near_one(ratio) + square) * per_distance;
+                *shift = (e_moved - e) * per_distance * per_sd;
+                *spread = (ratio - 1.0) * per_distance;
+            }
+        }
+        let log_likelihood = centre.log_likelihoods.0[c];
+        Score::of_one_output(log_likelihood, samples, [&shifts, &spreads])
+    });
+    Some(scores.collect())
+}
+
+/// ln, by its series where it is short.
+#[inline(always)]
+fn ln_near_one(ratio: f64) -> f64 {
+    let s = (ratio - 1.0) / (ratio + 1.0);
+    let s2 = s * s;
+    if s2 < 1e-6 {
+        2.0 * s * (1.0 + s2 * (1.0 / 3.0 + s2 * (0.2 + s2 / 7.0)))
+    } else {
+        ratio.ln()
     }
 }
 

@@ -36,21 +36,49 @@ impl Numbers for Vec<f64> {
     }
 }
 
-/// N states, up to four, and one output.
+/// N states, up to ten, and one output.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Fixed<const N: usize>;
 
-impl<const N: usize> Size for Fixed<N> {
-    type Vector = [f64; 4];
-    type Matrix = [f64; 16];
-    type Points = [f64; 68];
+macro_rules! fixed {
+    ($($n:literal),+) => {
+        $(impl Size for Fixed<$n> {
+            type Vector = [f64; $n];
+            type Matrix = [f64; $n * $n];
+            type Points = [f64; (1 + 4 * $n) * $n];
 
-    const KNOWN: bool = true;
+            const KNOWN: bool = true;
+
+            #[inline(always)]
+            fn states(self) -> usize {
+                $n
+            }
+            #[inline(always)]
+            fn outputs(self) -> usize {
+                1
+            }
+        })+
+    };
+}
+
+fixed!(1, 2, 3, 4, 5, 6, 7, 8, 9, 10);
+
+/// Any number of states, and one output.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Wide {
+    pub states: usize,
+}
+
+impl Size for Wide {
+    type Vector = Vec<f64>;
+    type Matrix = Vec<f64>;
+    type Points = Vec<f64>;
+
+    const KNOWN: bool = false;
 
     #[inline(always)]
     fn states(self) -> usize {
-        const { assert!(N <= 4) };
-        N
+        self.states
     }
     #[inline(always)]
     fn outputs(self) -> usize {

@@ -29,7 +29,9 @@ struct Tape {
 }
 
 impl Sink for Tape {
-    const CARRIED: bool = true;
+    fn wants_carried(&self) -> bool {
+        true
+    }
     fn filtered(&mut self, _: usize, state: Belief<'_>) {
         self.filtered.push(Gaussian::of(state));
     }

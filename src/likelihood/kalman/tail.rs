@@ -12,7 +12,7 @@ pub(super) struct Tail {
 }
 
 /// 1/√(2π).
-const DENSITY: f64 = 0.398_942_280_401_432_7;
+pub(super) const DENSITY: f64 = 0.398_942_280_401_432_7;
 
 /// (1 + 2·x)·erfcx(x) on [0, 5] by powers of s = 2.2 − 9.6/(x + 3), by Chebyshev interpolation; relative error
 /// 5e-17.
@@ -60,7 +60,8 @@ impl Tail {
 }
 
 /// By Estrin's scheme, whose products do not wait for each other.
-fn polynomial(s: f64) -> f64 {
+#[inline(always)]
+pub(super) fn polynomial(s: f64) -> f64 {
     let c = &SCALED;
     let (s2, s4, s8) = (s * s, (s * s) * (s * s), (s * s * s * s) * (s * s * s * s));
     let four = |i: usize| (c[i] + c[i + 1] * s) + (c[i + 2] + c[i + 3] * s) * s2;

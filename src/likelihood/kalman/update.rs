@@ -111,7 +111,71 @@ impl<S: Size> Update<S> {
             self.struck(row.outliers);
             likelihood.shift(self.excess);
         }
+        self.standardise(likelihood, |_| true)?;
+        self.correct(root, outputs, (mean, cov));
+        Some(())
+    }
+
+    /// As [`apply`](Self::apply), for a row with missing outputs. To the others they are outputs of unit noise that follow no
+    /// state and were measured as predicted; in the likelihood they have no part.
+    #[cold]
+    pub fn apply_present(
+        &mut self,
+        (twin, now): (&dyn StateSpace, &Now<'_>),
+        row: &Measured<'_>,
+        root: Columns<'_>,
+        outputs: &mut [f64],
+        (mean, cov): (&mut [f64], &mut [f64]),
+        likelihood: &mut LogLikelihood,
+    ) -> Option<()> {
+        let p = self.size.outputs();
+        let missing = |j: usize| row.y[j].is_nan();
+        // A sensor's readout may look at all outputs.
+        let filled: Vec<f64> = (row.y.iter().zip(row.predicted))
+            .map(|(y, predicted)| if y.is_nan() { *predicted } else { *y })
+            .collect();
+        let filled = Measured { y: &filled, ..*row };
+        for j in 0..p {
+            self.noise.as_mut()[j] = (row.noise[j] * row.noise[j]).max(row.floor[j]);
+            self.innovation.as_mut()[j] = filled.y[j] - row.predicted[j];
+        }
+        self.spread(outputs);
+        if self.reads(twin, now, &filled) {
+            self.bend((twin, now), &filled, outputs);
+        }
+        for j in (0..p).filter(|&j| missing(j)) {
+            (self.noise.as_mut()[j], self.innovation.as_mut()[j]) = (1.0, 0.0);
+            outputs.iter_mut().skip(j).step_by(p).for_each(|y| *y = 0.0);
+        }
+        self.spread(outputs);
+        self.excess = 0.0;
+        if !row.outliers.is_empty() {
+            let outliers: Vec<Outliers> = (row.outliers.iter().enumerate())
+                .map(|(j, outlier)| match missing(j) {
+                    true => Outliers::default(),
+                    false => *outlier,
+                })
+                .collect();
+            self.struck(&outliers);
+            likelihood.shift(self.excess);
+        }
+        self.standardise(likelihood, |j| !missing(j))?;
+        // A row without any output leaves the state to the bit.
+        if !(0..p).all(missing) {
+            self.correct(root, outputs, (mean, cov));
+        }
+        Some(())
+    }
+
+    /// C⁻¹·(y − ȳ), and the density of the outputs that `counts` picks.
+    #[inline(always)]
+    fn standardise(
+        &mut self,
+        likelihood: &mut LogLikelihood,
+        counts: impl Fn(usize) -> bool,
+    ) -> Option<()> {
         self.factor()?;
+        let p = self.size.outputs();
         let (factor, pivots) = (self.factor.as_ref(), self.pivots.as_ref());
         let (innovation, standardised) = (self.innovation.as_ref(), self.standardised.as_mut());
         for i in 0..p {
@@ -120,9 +184,10 @@ impl<S: Size> Update<S> {
                 rest -= c * e;
             }
             standardised[i] = rest / factor[i * p + i];
-            likelihood.add(pivots[i], rest * rest / pivots[i]);
+            if counts(i) {
+                likelihood.add(pivots[i], rest * rest / pivots[i]);
+            }
         }
-        self.correct(root, outputs, (mean, cov));
         Some(())
     }
 

@@ -1,7 +1,7 @@
 //! The paper's trajectory figures: what the twin shows at each method's answer.
 
 use crate::evaluate::baseline::Initialisation::Bad;
-use crate::evaluate::paper::{FreeRuns, MeanRuns, Method};
+use crate::evaluate::paper::{AnswerRuns, MeanRuns, Method};
 use crate::record::Signal;
 use crate::report::chart::{Chart, Panel, Series, Style, roomy};
 use crate::report::digits::named;
@@ -58,7 +58,7 @@ pub fn mean_runs_svg(study: &Study, means: &MeanRuns) -> Option<String> {
 
 /// One record and free runs at what it made of the pretrained network, of the final answer, and of both baselines from
 /// their bad starts.
-pub fn first_run_svg(study: &Study, runs: &FreeRuns) -> String {
+pub fn first_run_svg(study: &Study, runs: &AnswerRuns) -> String {
     let drive = runs.record.drive();
     let times: Vec<f64> = (0..drive.samples()).map(|k| drive.time(k)).collect();
     let outputs = study.twin().signals().outputs;

@@ -3,7 +3,7 @@
 use super::{first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
 use crate::estimator::{PresetName, PretrainOptions, pretrain};
 use crate::evaluate::paper::{
-    Benchmark, FreeRuns, MeanRuns, Method, MonteCarlo, Run, Scenario, Scores, reference_projects,
+    AnswerRuns, Benchmark, MeanRuns, Method, MonteCarlo, Run, Scenario, Scores, reference_projects,
     score,
 };
 use crate::progress::Progress;
@@ -37,7 +37,7 @@ fn made() -> &'static Made {
             runs: 2,
             seed: 1,
         };
-        let runs = plan.run(&estimator, None, &Progress::silent()).unwrap();
+        let runs = plan.run(&estimator, &Progress::silent()).unwrap();
         let scores = score(&study, &plan, &runs);
         Made {
             study,
@@ -130,7 +130,7 @@ fn the_figures_show_every_family_and_leave_out_who_is_silent() {
         assert!(svg.contains(expected), "{expected}");
     }
     assert!(!svg.contains(">TS-pre<"));
-    let first = FreeRuns::of(study, plan, &runs[0]).unwrap();
+    let first = AnswerRuns::of(study, plan, &runs[0]).unwrap();
     let svg = first_run_svg(study, &first);
     assert!(svg.contains(">measured<") && svg.contains(">dual-EKF<") && !svg.contains(">TS-pre<"));
     let uniform = MonteCarlo {
@@ -150,7 +150,7 @@ fn the_first_record_is_the_one_that_was_estimated() {
     let Made {
         study, plan, runs, ..
     } = made();
-    let first = FreeRuns::of(study, plan, &runs[0]).unwrap();
+    let first = AnswerRuns::of(study, plan, &runs[0]).unwrap();
     let apart = (first.record.outputs() - first.truth.as_ref().unwrap()).mapv(|d| d * d);
     assert!(apart.mean().unwrap().sqrt() < 0.3, "{:?}", apart.mean());
 }

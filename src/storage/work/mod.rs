@@ -9,8 +9,6 @@
 //! | do a share of the pieces: of a job array, of the ranks of a cluster | [`Share`] |
 
 mod folder;
-#[doc(hidden)]
-pub mod fuzzing;
 mod lock;
 mod manifest;
 mod new_work;

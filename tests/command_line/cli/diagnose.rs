@@ -119,6 +119,21 @@ fn wrong_calls_are_refused_in_one_line_that_names_what_and_where() {
         &["no/such", "make it first"],
     );
 
+    let rows: String = (0..60).map(|k| format!("{k}e-312,{}\n", k % 7)).collect();
+    let tiny = place().join("tiny.csv").display().to_string();
+    fs::write(&tiny, format!("t,y\n{rows}")).unwrap();
+    refuses(
+        &[&tiny],
+        &[
+            "tiny.csv: column t: a step of 1e-312 s is too small",
+            "write t in seconds",
+        ],
+    );
+    refused(
+        &["simulate", "--theta", "nu=1e308", "--twin", "van-der-pol"],
+        &["nu = 1e308 is outside"],
+    );
+
     let other = [&record, "--validation", &tanks];
     refuses(
         &other,
@@ -174,11 +189,11 @@ fn an_unknown_effect_is_answered_with_the_known_ones() {
     ];
     refused(
         &[&simulate[..], &[&at("typo.toml")]].concat(),
-        &[&known[..], &["unknown id", "typo.toml, line 1"]].concat(),
+        &[&known[..], &["unknown effect id", "typo.toml, line 1"]].concat(),
     );
     refused(
         &["diagnose", &record, "--study", &at("study.toml")],
-        &[&known[..], &["study.toml: unknown id"]].concat(),
+        &[&known[..], &["study.toml, line 3: unknown effect id"]].concat(),
     );
 }
 

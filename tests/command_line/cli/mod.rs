@@ -1,6 +1,7 @@
 //! The command line as a user meets it: exit codes, one-line messages, JSON, nothing half-written.
 
 mod diagnose;
+mod fit;
 mod reproduce;
 mod shell;
 mod withheld;
@@ -223,11 +224,18 @@ fn wrong_records_are_named_by_file_row_column_value_and_remedy() {
         (0..300).fold("t,y\n".to_owned(), |text, k| text + &change(k) + "\n")
     };
     let row = |k: usize| format!("{},{}", k as f64 / 20.0, (k as f64).sin());
-    for bad in ["NaN", "broken", ""] {
-        let cell = |k: usize| if k == 40 { format!("2,{bad}") } else { row(k) };
+    let with = |cell: &str| {
+        let text = rows(&|k| match k == 40 {
+            true => format!("2,{cell}"),
+            false => row(k),
+        });
+        file("cell.csv", &text)
+    };
+    estimate(&with("broken"), &["cell.csv, row 42, column y", "correct"]);
+    for missing in ["NaN", ""] {
         estimate(
-            &file("cell.csv", &rows(&cell)),
-            &["cell.csv, row 42, column y", "correct"],
+            &with(missing),
+            &["cell.csv: row 42, column y is missing", "truetwin diagnose"],
         );
     }
     estimate(
@@ -241,7 +249,10 @@ fn wrong_records_are_named_by_file_row_column_value_and_remedy() {
     let jump = |k: usize| if k < 50 { row(k) } else { row(k + 1) };
     estimate(
         &file("jump.csv", &rows(&jump)),
-        &["jump.csv, row 52, column t: 2.55 s where 2.5 s", "resample"],
+        &[
+            "jump.csv: row 52, column t: a step of 0.1 s where 0.05 s",
+            "resample",
+        ],
     );
     let back = |k: usize| if k == 9 { "0.1,1".into() } else { row(k) };
     estimate(
@@ -403,6 +414,14 @@ fn wrong_studies_are_refused_with_file_and_line() {
         "twin = 'tanks'\nsamples = 3\n",
         &["line 2", "unknown field"],
     );
+    for (key, parts) in [
+        ("substeps = 0", ["substeps = 0", "between 1 and 1000"]),
+        ("substeps = 1001", ["substeps = 1001", "between 1 and 1000"]),
+        ("substeps = 1e9", ["line 3", "floating point"]),
+        ("hold = 'cubic'", ["line 3", "`zero` or `linear`"]),
+    ] {
+        check(&format!("twin = 'tanks'\n[record]\n{key}\n"), &parts);
+    }
     check(
         "twin = 'tanks'\n[fixed]\nk4 = 9\n",
         &["k4 = 9", "[0.5, 1.5]"],
@@ -436,7 +455,7 @@ fn wrong_studies_are_refused_with_file_and_line() {
     );
     check(
         "twin = 'tanks'\n[noise]\ny = 'foo'\n",
-        &["line 3", "a number, or \"estimate\""],
+        &["line 3", "or \"estimate\""],
     );
     check(
         "twin = 'tanks'\n[prior]\nk1 = [0.5, 9]\n",

@@ -88,7 +88,7 @@ fn results_depend_neither_on_workers_nor_on_crashes_nor_on_chatter() {
     same("pretty.py", "print(flush=True)", 1);
     let late = "if os.getpid() % 2 == 0 and count == 9: time.sleep(60)";
     let settings = ProgramSettings {
-        timeout: Duration::from_secs(1),
+        timeout: Duration::from_secs(2),
         ..workers(2)
     };
     assert!(

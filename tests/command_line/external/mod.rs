@@ -93,11 +93,11 @@ fn twin(name: &str, before: &str, settings: ProgramSettings) -> ProgramTwin {
     started(name, &lag(before), settings).unwrap()
 }
 
-/// Impatient: for programs that hang on purpose.
+/// Short time-outs for programs that hang on purpose; Python must start within one.
 fn impatient() -> ProgramSettings {
     ProgramSettings {
         workers: Some(2),
-        timeout: Duration::from_millis(600),
+        timeout: Duration::from_millis(1500),
         retries: 0,
     }
 }

@@ -4,7 +4,7 @@ use super::readers;
 use crate::memory;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use truetwin::estimator::bank::file as bank;
+use truetwin::estimator::fuzzing as bank;
 use truetwin::record::read_record;
 use truetwin::study::StudyFile;
 

@@ -109,8 +109,7 @@ fuzzed!(
 #[test]
 #[ignore = "writes into tests/hostile/fuzz/seeds"]
 fn seeds_that_are_not_text() {
-    use truetwin::estimator::shards::BankPlan;
-    use truetwin::estimator::{PresetName, PretrainOptions, pretrain};
+    use truetwin::estimator::{PresetName, PretrainOptions, fuzzing, pretrain};
     use truetwin::progress::Progress;
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/hostile/fuzz/seeds");
     let new = |name: &str| {
@@ -132,18 +131,11 @@ fn seeds_that_are_not_text() {
         epochs: Some(1),
         seed: 1,
     };
-    let (estimator, _) = pretrain(&project, &options, &Progress::silent()).unwrap();
+    let (estimator, _) = pretrain(project.clone(), &options, &Progress::silent()).unwrap();
     estimator.save(&new("estimator/tiny.est")).unwrap();
-    let plan = BankPlan {
-        project,
-        preset: PresetName::Default,
-        size: 20,
-        seed: 1,
-    };
     let place = tempfile::tempdir().unwrap();
     let folder = place.path().join("bank");
-    plan.fill(&folder, "1/1".parse().unwrap(), &Progress::silent())
-        .unwrap();
+    fuzzing::fill(project, 20, &folder).unwrap();
     let mut text = std::fs::read_to_string(folder.join("manifest.json")).unwrap();
     text.push_str(readers::NAMES);
     for entry in std::fs::read_dir(folder.join("shards")).unwrap() {

@@ -12,15 +12,13 @@ use std::sync::OnceLock;
 use truetwin::effect::{Catalogue, augment};
 use truetwin::estimator::Estimator;
 use truetwin::estimator::Project;
-use truetwin::estimator::bank::{Bank, Draws, file as bank_file};
-use truetwin::estimator::shards::{ShardedBank, merge, merge_into_file};
+use truetwin::estimator::{Draws, fuzzing as banks};
 use truetwin::evaluate::paper::{Run, reference_projects};
 use truetwin::external::program::fuzzing as program;
 use truetwin::network::HeadArchitecture;
 use truetwin::network::layers::*;
-use truetwin::progress::Progress;
 use truetwin::record::{read_drive, read_record};
-use truetwin::storage::work::fuzzing as work;
+use truetwin::storage::fuzzing as work;
 use truetwin::study::{RecordPlan, Study, StudyFile};
 use truetwin::twins::VanDerPol;
 
@@ -187,15 +185,11 @@ pub fn manifest(data: &[u8]) -> Result<(), String> {
     let from = [folder.clone()];
     let out = place().join("merged");
     let _ = fs::remove_dir_all(&out);
-    hold_message("manifest", merge(&from, &out, &Progress::silent()));
+    hold_message("manifest", banks::merged(&from, &out));
     let table = place().join("merged.csv");
-    hold_message(
-        "manifest",
-        merge_into_file(&from, &table, &Progress::silent()),
-    );
-    let bank = ShardedBank::open(&folder).map_err(text)?;
-    for part in 0..bank.parts().len().min(3) {
-        hold_message("manifest", bank.part(part));
+    hold_message("manifest", banks::merged_into_file(&from, &table));
+    for part in banks::parts(&folder).map_err(text)? {
+        hold_message("manifest", part);
     }
     Ok(())
 }
@@ -226,9 +220,7 @@ pub fn bank(data: &[u8]) -> Result<(), String> {
         [0x93, b'N', ..] => file("bank.npz", &archive(data)),
         _ => file("bank.csv", data),
     };
-    bank_file::read(&path, &["a", "b"])
-        .map(|_| ())
-        .map_err(text)
+    banks::read(&path, &["a", "b"]).map_err(text)
 }
 
 /// An archive with sound `theta` and these bytes as `features`.
@@ -261,7 +253,7 @@ pub fn write_bank(path: &Path) {
         features: array![[0.5, 0.25, 1.0], [1e-9, -3.0, 7.0]],
         redrawn: 0,
     };
-    bank_file::write(path, &draws, &["a", "b"]).expect("a new file");
+    banks::write(path, &draws, &["a", "b"]).expect("a new file");
 }
 
 /// A line, as a worker hands it on.

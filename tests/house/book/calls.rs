@@ -125,7 +125,7 @@ fn every_call_is_taken() {
         }
     }
     assert!(refused.is_empty(), "{}", refused.join("\n"));
-    assert!(checked > 70, "{checked}");
+    assert!(checked > 80, "{checked}");
 }
 
 #[test]

@@ -19,18 +19,13 @@ pub fn log_likelihood(
     let n = twin.outline().states.len();
     let limits = twin.limits();
     let (mut q, mut r) = (vec![0.0; n], vec![0.0; 1]);
-    let mut now = Now {
-        t: 0.0,
-        dt: drive.dt(),
-        u: drive.input(0),
-        theta,
-    };
+    let mut now = Now::new(0.0, drive.dt(), drive.input(0), theta);
     let mut start = vec![0.0; n];
     twin.start(&now, &mut start);
     let mut x = start.repeat(count);
     let mut chosen = x.clone();
     let mut weights = vec![0.0; count];
-    let mut work = Workspace::new(n);
+    let mut work = Workspace::new(twin);
     let (mut total, mut y) = (0.0, [0.0]);
     for k in 0..record.samples() {
         (now.t, now.u) = (drive.time(k), drive.input(k));

@@ -1,7 +1,7 @@
 //! The position is measured exactly, so that second differences give the likelihood in closed form.
 
 use super::{maximum_likelihood, mean, record};
-use truetwin::likelihood::kalman::{FilterSettings, Kalman, Method, Score, smooth};
+use truetwin::likelihood::kalman::{FilterSettings, Kalman, Method, Score};
 use truetwin::record::{Drive, Record};
 use truetwin::twins::VanDerPol;
 
@@ -79,7 +79,9 @@ fn maximum_likelihood_is_efficient() {
 #[test]
 fn smoothed_speeds_are_differences_of_positions() {
     let record = simulated(1.0, 7);
-    let smoothed = smooth(&VanDerPol, &[1.0], &record, &FilterSettings::default()).unwrap();
+    let smoothed = Kalman::new(&VanDerPol, &record, &FilterSettings::default())
+        .and_then(|k| k.smooth(&[1.0]))
+        .unwrap();
     let y = record.outputs();
     for k in 0..299 {
         let speed = (y[[k + 1, 0]] - y[[k, 0]]) / DT;

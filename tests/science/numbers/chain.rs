@@ -1,8 +1,9 @@
 //! A chain of leaking tanks in units of anybody's choice.
 
-use truetwin::record::*;
-use truetwin::study::{RecordPlan, Study};
-use truetwin::twin::*;
+use super::{
+    DigitalTwin, Noise, Now, Outline, Parameter, ParameterSpace, Quantity, Record, RecordPlan,
+    StateSpace, Study,
+};
 
 /// Units of a twin's numbers: each is the plain one times its unit.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,7 +3,6 @@
 use super::chain::{Chain, Units};
 use truetwin::diagnose::{DiagnoseSettings, Diagnosis, diagnose};
 use truetwin::estimator::{Estimate, EstimateOptions, Estimator, PretrainOptions, pretrain};
-use truetwin::evaluate::baseline::{DualFilter, DualStart, PredictionErrorMethod};
 use truetwin::progress::Progress;
 use truetwin::record::{Record, Signal};
 
@@ -89,42 +88,6 @@ fn estimates_do_not_depend_on_units() {
             ("high", &given.high, &plain.high, 1e-2),
         ] {
             all(what, units, given, plain, unit, tolerance);
-        }
-    }
-}
-
-/// The settings of the paper's baselines are in units of the twin's.
-#[test]
-fn baselines_do_not_depend_on_units() {
-    let fit = |units: Units| {
-        let chain = Chain::pair(units);
-        let record = chain.record(1.5, SAMPLES, 6);
-        let start: Vec<f64> = (0..2).map(|i| chain.rate(i)).collect();
-        let converged = PredictionErrorMethod::converged();
-        let few = PredictionErrorMethod::default();
-        let few = PredictionErrorMethod {
-            ridge: few.ridge * (units.outputs / units.parameters).powi(2),
-            ..few
-        };
-        let [converged, few] = [converged, few].map(|m| m.fit(&chain, &record, &start).unwrap());
-        let plain = DualFilter::default();
-        let filter = DualFilter {
-            state_variance: plain.state_variance * units.states.powi(2),
-            parameter_variance: plain.parameter_variance * units.parameters.powi(2),
-            state_walk: plain.state_walk * units.states.powi(2),
-            parameter_walk: plain.parameter_walk * units.parameters.powi(2),
-            measurement: plain.measurement * units.outputs,
-            start: DualStart::Twin,
-        };
-        let dual = filter.run(&chain, &record, &start).unwrap();
-        [converged.theta, few.theta, dual.theta]
-    };
-    let plain = fit(Units::PLAIN);
-    for units in UNITS {
-        let given = fit(units);
-        let unit = units.parameters;
-        for (k, what) in ["converged", "six steps", "dual filter"].iter().enumerate() {
-            all(what, units, &given[k], &plain[k], unit, 1e-4);
         }
     }
 }

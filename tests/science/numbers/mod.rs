@@ -4,3 +4,7 @@ mod chain;
 mod magnitudes;
 mod odd;
 mod sizes;
+
+use truetwin::record::{Quantity, Record};
+use truetwin::study::{RecordPlan, Study};
+use truetwin::twin::{DigitalTwin, Noise, Now, Outline, Parameter, ParameterSpace, StateSpace};

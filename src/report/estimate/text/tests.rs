@@ -1,6 +1,5 @@
 use super::*;
-use crate::estimator::gate::GateOutcome;
-use crate::estimator::refine::Direction;
+use crate::estimator::{Direction, GateOutcome};
 use crate::record::{Drive, Signal};
 use crate::report::fixture::estimates;
 use crate::study::RecordPlan;

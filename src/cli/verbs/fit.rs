@@ -1,0 +1,68 @@
+//! `fit`: finds the most probable parameters of a twin, given records.
+
+use crate::cli::args::Subject;
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::{output, records};
+use crate::fit::FitSettings;
+use crate::report::{fit_json, fit_text, overlay_svg};
+use clap::Args;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Fit the parameters, noise levels and starts of a twin to measured records; no training.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+        truetwin fit R.csv --twin tanks --out result\n\
+        If the free run does not follow the record, next: truetwin diagnose R.csv --twin tanks --out gap")]
+pub(in crate::cli) struct Fit {
+    /// Measured records of one system.
+    #[arg(value_name = "R.csv", required = true)]
+    records: Vec<PathBuf>,
+    #[command(flatten)]
+    subject: Subject,
+    /// New folder for fit.json and a picture of each record (overlay.svg, overlay-2.svg, …).
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+impl Verb for Fit {
+    fn subject(&self) -> Option<&Subject> {
+        Some(&self.subject)
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        let folder = self.out.as_deref().map(output::NewFolder::new);
+        let folder = folder.transpose()?;
+        let study = context.study(&self.subject)?;
+        let (records, _) = records::read(&self.records, None)?;
+        for (record, path) in records.iter().zip(&self.records) {
+            (record.check_channels(&study.twin().signals()))
+                .map_err(|error| Failure::from(error).within(path))?;
+        }
+        let settings = FitSettings {
+            seed: context.seed,
+            ..FitSettings::default()
+        };
+        let fit = study.fit(&records, &settings, context.progress)?;
+        if let Some(folder) = folder {
+            let json = serde_json::to_string_pretty(&fit_json(&study, &fit));
+            folder.write("fit.json", &json.map_err(Failure::internal)?)?;
+            for (r, (record, run)) in records.iter().zip(&fit.free_runs).enumerate() {
+                let Some(run) = run else { continue };
+                let name = match r {
+                    0 => "overlay.svg".to_owned(),
+                    r => format!("overlay-{}.svg", r + 1),
+                };
+                folder.write(&name, &overlay_svg(&study, record, None, run))?;
+            }
+            folder.finish()?;
+        }
+        if context.json {
+            output::print_json(&fit_json(&study, &fit))?;
+        } else {
+            output::print(&fit_text(&study, &fit))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}

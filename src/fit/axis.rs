@@ -1,0 +1,110 @@
+//! Axis of one entry of θ in a fit.
+
+use crate::likelihood::Level;
+use crate::twin::{Interval, Parameter};
+
+/// Standard deviation of the weak log-prior of a positive parameter.
+const LOG_DEVIATION: f64 = 0.6;
+/// Longest step of a fit in a logarithm; otherwise, as a share of the width.
+const LONGEST: f64 = 0.5;
+/// The same for the logarithm of a noise level, which has a way to go from loud noise.
+const LONGEST_NOISE: f64 = 1.5;
+
+/// Axis of one entry of θ in a fit.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Axis {
+    /// Range; a logarithm is taken where the lower end is positive.
+    pub bounds: Interval,
+    /// Centre of the weak prior, in θ.
+    pub centre: f64,
+    /// Standard deviation of the weak prior in φ; infinite for none.
+    pub deviation: f64,
+    /// Scale of differences, in θ; of no meaning for a logarithm.
+    pub width: f64,
+    /// Longest step of a fit in φ.
+    pub longest: f64,
+    /// True where the prior counts in comparisons: that of the twin's own parameters does.
+    pub counts: bool,
+    /// True where a fit leaves it at its start.
+    pub held: bool,
+    /// Where every search begins, whatever the point that it is given says.
+    pub begin: Option<f64>,
+    /// Stands for the normal prior in evidence.
+    pub evidence: EvidencePrior,
+}
+
+/// Prior of an entry of θ, as evidence counts it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum EvidencePrior {
+    /// Normal in φ, as in the fit.
+    Normal,
+    /// Size of an effect, off at 0: normal of a deviation that is itself unknown, between what is just visible and this, where the
+    /// effect is as large as the twin's own terms.
+    Magnitude { largest: f64 },
+    /// Uniform in φ over this range: the shape of an effect.
+    Uniform { low: f64, high: f64 },
+}
+
+impl Axis {
+    /// Returns the axis of a parameter of the twin itself, an unknown start or noise level.
+    pub fn of(p: &Parameter) -> Self {
+        let (prior, bounds) = (p.prior, p.bounds);
+        let centre = prior.centre();
+        if bounds.low() > 0.0 {
+            let span = (prior.high() / prior.low()).ln() / 12f64.sqrt();
+            Self {
+                bounds,
+                centre,
+                deviation: LOG_DEVIATION.max(span),
+                width: 1.0,
+                longest: LONGEST,
+                counts: true,
+                held: false,
+                begin: None,
+                evidence: EvidencePrior::Normal,
+            }
+        } else {
+            Self {
+                bounds,
+                centre,
+                deviation: prior.width(),
+                width: prior.width(),
+                longest: LONGEST * prior.width(),
+                counts: true,
+                held: false,
+                begin: None,
+                evidence: EvidencePrior::Normal,
+            }
+        }
+    }
+
+    /// Returns the axis of a fitted noise level: log-normal around its median. Searches begin where the noise is loud.
+    pub fn of_level(level: &Level) -> Self {
+        Self {
+            bounds: level.parameter.bounds,
+            centre: level.median,
+            deviation: level.deviation,
+            width: 1.0,
+            longest: LONGEST_NOISE,
+            counts: true,
+            held: false,
+            begin: Some(level.loud),
+            evidence: EvidencePrior::Normal,
+        }
+    }
+
+    /// Returns whether φ is the logarithm.
+    pub fn is_log(&self) -> bool {
+        self.bounds.low() > 0.0
+    }
+
+    /// The same axis, held in the prior box of its parameter.
+    pub fn inside(mut self, prior: Interval) -> Self {
+        let low = self.bounds.low().max(prior.low());
+        let high = self.bounds.high().min(prior.high());
+        if low < high {
+            self.bounds = Interval::unchecked(low, high);
+        }
+        self
+    }
+}

@@ -1,0 +1,85 @@
+//! The first fit of a black box: on the beginning of the records, then on more of them, then on all.
+//!
+//! Runs do not follow a record, they start with it: at a wrong θ a run of an oscillator is soon in another phase, and the
+//! likelihood of a whole record has a top for each cycle that is lost. Over the first quarter of a record there is one.
+
+use crate::fit::climb::{Fitted, climb};
+use crate::fit::first_part::first_part;
+use crate::fit::problem::Problem;
+use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::record::Record;
+use crate::twin::Noise;
+use rayon::prelude::*;
+
+/// Shares of the records, and how many of the best fits go on to the next.
+const SHARES: [f64; 2] = [0.25, 0.5];
+const KEPT: usize = 2;
+/// Points whose likelihood is looked at over the first share, and how many become starts.
+const SCREENED: u64 = 32;
+const STARTS: usize = 4;
+/// Iterations of a fit.
+const ITERATIONS: usize = 25;
+
+/// The best θ of all starts; `None` where the twin can be simulated at none.
+pub(crate) fn base_fit(
+    problem: &Problem<'_>,
+    initial: Option<&[f64]>,
+    noise: Noise,
+) -> Result<Option<Fitted>, FilterError> {
+    let space = problem.twin.parameters();
+    let initial = initial.map(|theta| problem.clamp(&problem.full(theta)));
+    let mut starts: Vec<Vec<f64>> = (0..SCREENED)
+        .map(|i| {
+            let noise = noise.child("starts").sample(i);
+            let theta = match i % 2 {
+                0 => space.draw_prior(noise),
+                _ => space.draw_bounds(noise),
+            };
+            problem.clamp(&problem.full(&theta))
+        })
+        .chain([problem.centre()])
+        .chain(initial.clone())
+        .collect();
+    for (level, share) in SHARES.into_iter().enumerate() {
+        let begun: Vec<Record> = (problem.records.iter())
+            .map(|r| {
+                let part = first_part(r, ((share * r.samples() as f64) as usize).max(1));
+                part.unwrap_or_else(|| r.clone())
+            })
+            .collect();
+        let short = problem.on(&begun);
+        if level == 0 {
+            let values: Vec<Option<f64>> = (starts.par_iter())
+                .map(|theta| {
+                    let value = recoverable(short.log_likelihood(theta))?;
+                    Ok(value.map(|v| v + short.log_prior(theta, true)))
+                })
+                .collect::<Result<_, FilterError>>()?;
+            let mut all: Vec<(f64, Vec<f64>)> = (values.into_iter().zip(starts))
+                .filter_map(|(value, theta)| Some((value?, theta)))
+                .collect();
+            all.sort_by(|a, b| b.0.total_cmp(&a.0));
+            starts = all
+                .into_iter()
+                .take(STARTS)
+                .map(|(_, theta)| theta)
+                .collect();
+        }
+        let mut fits = fits(&short, &starts)?;
+        fits.truncate(KEPT);
+        starts = fits.into_iter().map(|f| f.theta).collect();
+    }
+    starts.extend(initial);
+    starts.push(problem.centre());
+    Ok(fits(problem, &starts)?.into_iter().next())
+}
+
+/// Fits from all starts, best first.
+fn fits(problem: &Problem<'_>, starts: &[Vec<f64>]) -> Result<Vec<Fitted>, FilterError> {
+    let fits: Vec<Option<Fitted>> = (starts.par_iter())
+        .map(|start| climb(problem, start, ITERATIONS))
+        .collect::<Result<_, _>>()?;
+    let mut fits: Vec<Fitted> = fits.into_iter().flatten().collect();
+    fits.sort_by(|a, b| b.objective.total_cmp(&a.objective));
+    Ok(fits)
+}

@@ -1,0 +1,164 @@
+//! Result of a fit.
+
+use super::certificate::Side;
+use crate::record::Signal;
+use serde::Serialize;
+
+/// Settings of a fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FitSettings {
+    /// Seed of random starts and of the draws that correct the evidence.
+    pub seed: u64,
+    /// Level of the intervals, in (0, 1).
+    pub level: f64,
+}
+
+impl Default for FitSettings {
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            level: 0.9,
+        }
+    }
+}
+
+/// The most probable parameters of a twin, given its records.
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
+pub struct Fit {
+    /// Parameters and magnitudes of effects.
+    pub parameters: Vec<FittedValue>,
+    /// Noise levels of states (per √s) and outputs.
+    pub noise: Vec<FittedNoise>,
+    /// States at the first sample of each record, given the whole record; empty for a twin without equations.
+    pub starts: Vec<FittedStart>,
+    /// Level of the intervals.
+    pub level: f64,
+    /// log p(y | θ), in nats.
+    pub log_likelihood: f64,
+    /// The likelihood averaged over the prior, in nats; none where it cannot be told.
+    pub evidence: Option<FitEvidence>,
+    /// End of the search.
+    pub convergence: Convergence,
+    /// Errors of each output.
+    pub errors: Vec<OutputErrors>,
+    /// Reasons for doubt.
+    pub warnings: Vec<Warning>,
+    /// Number of samples of all records.
+    pub samples: usize,
+    /// Wall time in seconds.
+    pub seconds: f64,
+    /// Free run beside each record, N × outputs; none where it diverges.
+    #[serde(skip)]
+    pub free_runs: Vec<Option<Signal>>,
+}
+
+/// A parameter, or a magnitude of an effect.
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
+pub struct FittedValue {
+    /// Name, as in study files.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Most probable value.
+    pub value: f64,
+    /// Standard error, first order.
+    pub std_error: f64,
+    /// Lower end of the interval.
+    pub low: f64,
+    /// Upper end of the interval.
+    pub high: f64,
+    /// The bound that the value lies at.
+    pub at_bound: Option<Side>,
+}
+
+/// A fitted noise level.
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
+pub struct FittedNoise {
+    /// State or output.
+    pub name: String,
+    /// `process` or `measurement`.
+    pub role: &'static str,
+    /// Unit of the level.
+    pub unit: String,
+    /// Most probable level.
+    pub value: f64,
+    /// Standard error of the level, first order.
+    pub std_error: f64,
+    /// Level that the twin or its study declares.
+    pub declared: Option<f64>,
+}
+
+/// A state at the first sample of a record.
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
+pub struct FittedStart {
+    /// Record, from 1.
+    pub record: usize,
+    /// State.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Mean given the whole record.
+    pub value: f64,
+    /// Standard deviation given the whole record.
+    pub std_error: f64,
+}
+
+/// Evidence of a twin.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct FitEvidence {
+    /// log Z, in nats.
+    pub log_evidence: f64,
+    /// log Z by Laplace's approximation alone.
+    pub laplace: f64,
+    /// Standard error of what draws correct; none where Laplace stands alone.
+    pub std_error: Option<f64>,
+    /// Number of independent draws that the correction is worth.
+    pub effective_draws: f64,
+}
+
+/// The end of a search.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct Convergence {
+    /// `true` where the gradient is gone and more than one search ended here.
+    pub converged: bool,
+    /// Distance to the top, in standard deviations.
+    pub distance: f64,
+    /// Searches that ended at the same top.
+    pub agreeing: usize,
+    /// All searches.
+    pub searches: usize,
+}
+
+/// Errors of one output over all records.
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
+pub struct OutputErrors {
+    /// Output.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Root mean square of the one-step prediction errors.
+    pub one_step: f64,
+    /// Root mean square of record − free run, from the start given the record; none where a run diverges.
+    pub free_run: Option<f64>,
+    /// Standard deviation of the record: what a constant would reach.
+    pub deviation: f64,
+}
+
+/// Something that makes the result doubtful.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct Warning {
+    /// Kind, for programs.
+    pub code: &'static str,
+    /// The problem, for people.
+    pub what: String,
+    /// Advice.
+    pub remedy: &'static str,
+}

@@ -1,0 +1,386 @@
+//! Fit of a twin to records, with fitted noise and uncertain starts.
+
+use super::axis::Axis;
+use super::certificate::{Certificate, Side};
+use super::climb::Fitted;
+use super::effects::begin;
+use super::evidence::evidence;
+use super::magnitude::{Kind, kinds, largest, shape_axis, size_axis};
+use super::outcome::{
+    Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedStart, FittedValue,
+    OutputErrors, Warning,
+};
+use super::posterior::posterior;
+use super::problem::Problem;
+use super::starts::{base_fit, polish, search};
+use crate::effect::Effect;
+use crate::likelihood::kalman::{FilterError, FilterSettings, Kalman, Smoothed};
+use crate::likelihood::{Beliefs, Level, measured};
+use crate::math::{deviation, quantile};
+use crate::record::{Record, Signal};
+use crate::twin::{Adaptation, Noise, Role, StartLevel, Twin, adapt};
+use statrs::distribution::{ContinuousCDF, Normal};
+use std::time::Instant;
+
+/// Iterations of each search: loud noise has a way to go.
+const ITERATIONS: usize = 80;
+/// Different posterior draws that intervals need: three of them lie beyond an end at 0.9.
+const LEAST_DRAWS: usize = 60;
+
+/// Subject of a fit: a twin in its study's setting.
+pub(crate) struct Subject<'a> {
+    pub twin: &'a Twin,
+    /// Effects whose free magnitudes are entries of θ.
+    pub effects: &'a [Effect],
+    pub beliefs: &'a Beliefs,
+}
+
+/// Fits a twin to records; `None` where it works at no start.
+pub(crate) fn run(
+    subject: &Subject<'_>,
+    records: &[Record],
+    settings: &FitSettings,
+) -> Result<Option<Fit>, FilterError> {
+    let clock = Instant::now();
+    let noise = Noise::new(settings.seed, "fit", 0);
+    let measured = measured(subject.twin, records, subject.beliefs)?;
+    let (twin, levels) = (measured.twin, measured.levels);
+    let space = twin.parameters();
+    let own = space.len() - levels.len();
+    let mut axes: Vec<Axis> = (space.iter().take(own).map(Axis::of))
+        .chain(levels.iter().map(Axis::of_level))
+        .collect();
+    let mut problem = Problem::new(twin.clone(), axes.clone(), records);
+    if let Some(equations) = twin.equations() {
+        // Sizes of effects are known once states are: where the twin follows the record with loud noise.
+        let kinds = kinds(subject.effects, records);
+        let begin = problem.begin(&problem.centre());
+        let states = problem.states(&begin);
+        if let Ok(states) = states {
+            let states: Vec<Signal> = states.into_iter().map(|(_, states)| states).collect();
+            for (j, parameter) in space.iter().enumerate().take(own) {
+                match kinds.get(&parameter.name) {
+                    Some(Kind::Size(off)) => {
+                        let mut theta = begin.clone();
+                        theta[j] = *off;
+                        let entry = (j, parameter);
+                        if let Some(size) = largest(equations, &theta, entry, records, &states) {
+                            axes[j] = size_axis(parameter, size);
+                        }
+                    }
+                    Some(Kind::Shape { low, high }) => {
+                        axes[j] = shape_axis(parameter, *low, *high);
+                    }
+                    Some(Kind::Other) | None => {}
+                }
+            }
+            problem = Problem::new(twin.clone(), axes, records);
+        }
+    }
+    let fits = search_all(&problem, subject.effects, noise)?;
+    let Some((fitted, certificate)) =
+        (fits.first().cloned()).zip(Certificate::new(&problem, &fits))
+    else {
+        return Ok(None);
+    };
+    let evidence = evidence(&problem, &fitted, Some(noise.child("evidence")))?;
+    let draws = if problem.is_simulated() {
+        vec![]
+    } else {
+        posterior(&problem, &fitted, noise.child("posterior"))?
+    };
+    let spread = Spread::new(&problem, &fitted, &draws, settings.level);
+    let (parameters, noise_levels) = values(&problem, &fitted, &certificate, &levels, &spread);
+    let smoothed = smoothed(&problem, &fitted)?;
+    let free_runs = free_runs(&problem, &fitted, &smoothed);
+    let errors = errors(&problem, &fitted, &free_runs)?;
+    let convergence = Convergence {
+        converged: certificate.has_converged(),
+        distance: certificate.distance,
+        agreeing: certificate.agreeing,
+        searches: certificate.searches,
+    };
+    let warnings = warnings(&parameters, &convergence, &errors);
+    Ok(Some(Fit {
+        parameters,
+        noise: noise_levels,
+        starts: starts(&problem, &smoothed),
+        level: settings.level,
+        log_likelihood: fitted.log_likelihood,
+        evidence: evidence.map(|e| FitEvidence {
+            log_evidence: e.log_evidence,
+            laplace: e.laplace,
+            std_error: e.error,
+            effective_draws: e.effective,
+        }),
+        convergence,
+        errors,
+        warnings,
+        samples: problem.samples(),
+        seconds: clock.elapsed().as_secs_f64(),
+        free_runs,
+    }))
+}
+
+/// Fits from all starts, best first. Effects begin where a fit without them says that they promise most.
+fn search_all(
+    problem: &Problem<'_>,
+    effects: &[Effect],
+    noise: Noise,
+) -> Result<Vec<Fitted>, FilterError> {
+    let space = problem.twin.parameters();
+    let is_magnitude = |j: usize| space[j].role == Role::Magnitude;
+    let mut initial = vec![];
+    if !problem.is_simulated() && (0..space.len()).any(is_magnitude) {
+        let without = problem.holding(is_magnitude);
+        let base = search(&without, &[], noise.child("without"), ITERATIONS)?;
+        if let Some(base) = base.first() {
+            initial = begin(&without, &base.theta, effects)?;
+        }
+    }
+    let fits = if problem.is_simulated() {
+        base_fit(problem, None, noise)?.into_iter().collect()
+    } else {
+        search(problem, &initial, noise, ITERATIONS)?
+    };
+    polish(problem, fits, ITERATIONS)
+}
+
+/// Standard errors and intervals of θ of the first record.
+struct Spread {
+    errors: Vec<f64>,
+    low: Vec<f64>,
+    high: Vec<f64>,
+}
+
+impl Spread {
+    /// From posterior draws, where enough of them differ; otherwise first order in φ.
+    fn new(problem: &Problem<'_>, fitted: &Fitted, draws: &[Vec<f64>], level: f64) -> Self {
+        let d = problem.twin.parameters().len();
+        let mut first: Vec<u64> = draws
+            .iter()
+            .map(|theta| theta.iter().map(|v| v.to_bits()).fold(0, u64::wrapping_add))
+            .collect();
+        first.sort_unstable();
+        first.dedup();
+        let column = |j: usize| -> Vec<f64> { draws.iter().map(|theta| theta[j]).collect() };
+        let end = |j: usize, p: f64| quantile(&column(j), p).unwrap_or(f64::NAN);
+        if first.len() >= LEAST_DRAWS {
+            return Self {
+                errors: (0..d).map(|j| deviation(&column(j))).collect(),
+                low: (0..d).map(|j| end(j, 0.5 - 0.5 * level)).collect(),
+                high: (0..d).map(|j| end(j, 0.5 + 0.5 * level)).collect(),
+            };
+        }
+        let c = &problem.coordinates;
+        let phi = c.of(&fitted.theta);
+        let slopes = c.slopes(&fitted.theta);
+        let errors = fitted.std_errors(problem);
+        let reach = Normal::standard().inverse_cdf(0.5 + 0.5 * level);
+        let end = |j: usize, sign: f64| {
+            let mut moved = phi.clone();
+            moved[j] += sign * reach * errors[j] / slopes[j];
+            c.theta(&moved)[j]
+        };
+        Self {
+            low: (0..d).map(|j| end(j, -1.0)).collect(),
+            high: (0..d).map(|j| end(j, 1.0)).collect(),
+            errors,
+        }
+    }
+}
+
+/// Parameters and noise levels with errors and intervals.
+fn values(
+    problem: &Problem<'_>,
+    fitted: &Fitted,
+    certificate: &Certificate,
+    levels: &[Level],
+    spread: &Spread,
+) -> (Vec<FittedValue>, Vec<FittedNoise>) {
+    let space = problem.twin.parameters();
+    let errors = &spread.errors;
+    let (mut parameters, mut noise) = (vec![], vec![]);
+    for (j, p) in space.iter().enumerate() {
+        if p.role == Role::Noise {
+            let level = levels.iter().find(|level| level.parameter.name == p.name);
+            noise.push(FittedNoise {
+                name: p.target().to_owned(),
+                role: match level {
+                    Some(level) if level.is_process => "process",
+                    _ => "measurement",
+                },
+                unit: p.unit.clone(),
+                value: fitted.theta[j],
+                std_error: errors[j],
+                declared: level.and_then(|level| level.declared),
+            });
+            continue;
+        }
+        parameters.push(FittedValue {
+            name: p.name.clone(),
+            unit: p.unit.clone(),
+            value: fitted.theta[j],
+            std_error: errors[j],
+            low: spread.low[j],
+            high: spread.high[j],
+            at_bound: certificate.at_bound[j],
+        });
+    }
+    (parameters, noise)
+}
+
+/// States of each record given all of it; empty for a black box.
+fn smoothed(problem: &Problem<'_>, fitted: &Fitted) -> Result<Vec<Smoothed>, FilterError> {
+    let Some(equations) = problem.twin.equations() else {
+        return Ok(vec![]);
+    };
+    let settings = FilterSettings::default();
+    (problem.records.iter().enumerate())
+        .map(|(r, record)| {
+            Kalman::new(equations, record, &settings)?.smooth(&problem.of_record(r, &fitted.theta))
+        })
+        .collect()
+}
+
+fn starts(problem: &Problem<'_>, smoothed: &[Smoothed]) -> Vec<FittedStart> {
+    let states = problem.outline().states;
+    (smoothed.iter().enumerate())
+        .flat_map(|(r, smoothed)| {
+            let deviations = smoothed.states.standard_deviations();
+            (states.iter().enumerate())
+                .filter(|(_, state)| !crate::twin::is_memory(&state.name))
+                .map(|(i, state)| FittedStart {
+                    record: r + 1,
+                    name: state.name.clone(),
+                    unit: state.unit.clone(),
+                    value: smoothed.states.means[[0, i]],
+                    std_error: deviations[[0, i]],
+                })
+                .collect::<Vec<_>>()
+        })
+        .collect()
+}
+
+/// Noise-free runs from the start given the record; none where a run diverges.
+fn free_runs(problem: &Problem<'_>, fitted: &Fitted, smoothed: &[Smoothed]) -> Vec<Option<Signal>> {
+    (problem.records.iter().enumerate())
+        .map(|(r, record)| {
+            let theta = problem.of_record(r, &fitted.theta);
+            let twin = match smoothed.get(r) {
+                Some(smoothed) => begun(&problem.twin, smoothed, record.drive().dt())?,
+                None => problem.twin.clone(),
+            };
+            let run = twin.free_run(&theta, record.drive()).ok()?;
+            run.iter().all(|v| v.is_finite()).then_some(run)
+        })
+        .collect()
+}
+
+/// The twin with the start that a record shows.
+fn begun(twin: &Twin, smoothed: &Smoothed, step: f64) -> Option<Twin> {
+    let outline = twin.outline()?;
+    let limits = twin.equations()?.limits();
+    let start = (outline.states.iter().zip(limits).enumerate())
+        .filter(|(_, (state, _))| !crate::twin::is_memory(&state.name))
+        .map(|(i, (state, limit))| {
+            let mean = limit.clamp(smoothed.states.means[[0, i]]);
+            (state.name.clone(), StartLevel::Declared { mean, std: 0.0 })
+        })
+        .collect();
+    let adaptation = Adaptation {
+        start,
+        ..Adaptation::default()
+    };
+    adapt(twin.clone(), &adaptation, step).ok()
+}
+
+fn errors(
+    problem: &Problem<'_>,
+    fitted: &Fitted,
+    free_runs: &[Option<Signal>],
+) -> Result<Vec<OutputErrors>, FilterError> {
+    let filtered = problem.filtered(&fitted.theta)?;
+    let outputs = problem.outline().outputs;
+    let rms = |values: &[f64]| {
+        (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+    };
+    Ok((outputs.iter().enumerate())
+        .map(|(j, output)| {
+            let (mut one_step, mut free, mut all) = (vec![], vec![], vec![]);
+            for (r, record) in problem.records.iter().enumerate() {
+                for k in 0..record.samples() {
+                    let y = record.outputs()[[k, j]];
+                    if !y.is_finite() {
+                        continue;
+                    }
+                    all.push(y);
+                    // The first row is predicted from the start, which a record is not to be judged by.
+                    if k > 0 {
+                        one_step.push(filtered[r].innovations[[k, j]]);
+                    }
+                    if let Some(run) = &free_runs[r] {
+                        free.push(y - run[[k, j]]);
+                    }
+                }
+            }
+            OutputErrors {
+                name: output.name.clone(),
+                unit: output.unit.clone(),
+                one_step: rms(&one_step),
+                free_run: free_runs.iter().all(Option::is_some).then(|| rms(&free)),
+                deviation: deviation(&all),
+            }
+        })
+        .collect())
+}
+
+fn warnings(
+    parameters: &[FittedValue],
+    convergence: &Convergence,
+    errors: &[OutputErrors],
+) -> Vec<Warning> {
+    let mut all = Vec::new();
+    let mut warn = |code, what, remedy| all.push(Warning { code, what, remedy });
+    if !convergence.converged {
+        let what = format!(
+            "the search has not arrived: {:.2} standard deviations from the top, {} of {} searches agree",
+            convergence.distance, convergence.agreeing, convergence.searches
+        );
+        warn(
+            "not-converged",
+            what,
+            "narrow [prior], or fix a parameter that the record does not identify",
+        );
+    }
+    for p in parameters {
+        if let Some(side) = p.at_bound {
+            let side = match side {
+                Side::Low => "lower",
+                Side::High => "upper",
+            };
+            let what = format!("{} lies at its {side} bound", p.name);
+            warn(
+                "at-bound",
+                what,
+                "widen [bounds] if other values are possible; its error means little here",
+            );
+        }
+    }
+    for e in errors {
+        match e.free_run {
+            None => warn(
+                "free-run-diverges",
+                format!("the free run of {} diverges", e.name),
+                "judge by one-step errors, or look for what the twin lacks: truetwin diagnose",
+            ),
+            Some(rmse) if rmse >= e.deviation => warn(
+                "no-better-than-constant",
+                format!("the free run of {} is no better than a constant", e.name),
+                "look for what the twin lacks: truetwin diagnose",
+            ),
+            Some(_) => {}
+        }
+    }
+    all
+}

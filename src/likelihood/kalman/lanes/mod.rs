@@ -1,0 +1,75 @@
+//! The filter at eight parameters, or on eight records, at once.
+//!
+//! Each number of the recursion is eight numbers side by side ([`Lanes`]), one for each pair of parameters and record, which the
+//! processor handles together. The twin's equations stay plain f64 and are called for one lane after the other.
+
+#![allow(clippy::needless_range_loop)] // indices, as in the formulas
+
+mod clip;
+mod pass;
+
+use super::{Kalman, Method};
+use crate::math::{LANES, Lanes, widest};
+use pass::{Job, Pass, Rows};
+
+/// Rows of up to eight filters run side by side.
+pub(super) struct Together {
+    /// log p(y | θ) of each lane, in nats.
+    pub log_likelihoods: Lanes,
+    /// Innovation and its variance of each row.
+    pub rows: Rows,
+}
+
+impl Kalman<'_> {
+    /// Returns whether lanes can hold this filter.
+    pub(super) fn fits_lanes(&self) -> bool {
+        (1..=4).contains(&self.states)
+            && self.channels == 1
+            && self.settings.method == Method::Points
+    }
+
+    /// Returns whether both can run side by side: the same twin, times and gaps.
+    pub(super) fn runs_beside(&self, other: &Self) -> bool {
+        let same = std::ptr::eq(self.record, other.record) || {
+            let (a, b) = (self.record.drive(), other.record.drive());
+            let regular = a.is_uniform() && b.is_uniform() && a.dt() == b.dt();
+            let whole = !self.gaps && !other.gaps;
+            regular && whole && a.samples() == b.samples()
+        };
+        same && std::ptr::addr_eq(self.twin, other.twin)
+            && self.limits == other.limits
+            && self.settings == other.settings
+    }
+}
+
+/// Runs up to eight filters side by side; `None` where one of them fails or needs more than lanes offer, to be run one by one.
+pub(super) fn together(jobs: &[(&Kalman<'_>, &[f64])]) -> Option<Together> {
+    let first = jobs.first()?.0;
+    for (kalman, theta) in jobs {
+        let twin = kalman.twin;
+        kalman.check(theta).ok()?;
+        twin.check_parameters(theta, kalman.record.drive().dt())
+            .ok()?;
+        if !kalman.fits_lanes() || !kalman.runs_beside(first) || !twin.outliers(theta).is_empty() {
+            return None;
+        }
+    }
+    let jobs: Vec<Job<'_>> = (jobs.iter())
+        .map(|&(kalman, theta)| Job { kalman, theta })
+        .collect();
+    let mut rows = Vec::with_capacity(first.record.samples());
+    let (jobs, to) = (&jobs[..jobs.len().min(LANES)], &mut rows);
+    let log_likelihoods = match first.states {
+        1 => widest(Pass::<1, 5> { jobs, rows: to }),
+        2 => widest(Pass::<2, 18> { jobs, rows: to }),
+        3 => widest(Pass::<3, 39> { jobs, rows: to }),
+        _ => widest(Pass::<4, 68> { jobs, rows: to }),
+    }?;
+    (log_likelihoods.0.iter().all(|v| v.is_finite())).then_some(Together {
+        log_likelihoods,
+        rows,
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,277 @@
+//! One pass over the rows for eight pairs of parameters and record at once.
+//!
+//! The recursion is that of the scalar pass, for one output. Lanes never branch apart: a column without pivot is zero, a limit
+//! that some lane feels is computed in all. What needs more (readouts that bend, outliers) is left to the scalar pass.
+
+use super::super::Kalman;
+use super::super::likelihood::LOG_TWO_PI;
+use super::super::moments::{BEND, HALF_PER_REACH, REACH};
+use super::clip::clip;
+use crate::math::{Kernel, LANES, Lanes};
+use crate::twin::{LanePoints, Now, Workspace};
+
+/// Parameters on a record.
+#[derive(Clone, Copy)]
+pub(super) struct Job<'j> {
+    pub kalman: &'j Kalman<'j>,
+    pub theta: &'j [f64],
+}
+
+/// Innovation and its variance, row by row; 0 and 1 where the output is missing.
+pub(super) type Rows = Vec<[Lanes; 2]>;
+
+/// A pass of up to eight jobs over records of the same length, step, gaps and twin; N states, P = (1 + 4·N)·N numbers of
+/// points.
+pub(super) struct Pass<'p, const N: usize, const P: usize> {
+    pub jobs: &'p [Job<'p>],
+    pub rows: &'p mut Rows,
+}
+
+/// Nodes of the readout at which a sensor that bends its signal shows it; see `update`.
+const OUTERMOST: f64 = 2.856_970_013_872_806;
+
+impl<const N: usize, const P: usize> Kernel for Pass<'_, N, P> {
+    type Output = Option<Lanes>;
+
+    /// Log-likelihoods, not finite in lanes that failed; `None` where the scalar pass is needed.
+    #[inline(always)]
+    fn run(self) -> Option<Lanes> {
+        let Self { jobs, rows } = self;
+        let first = jobs[0].kalman;
+        let (twin, drive) = (first.twin, first.record.drive());
+        let limits = &first.limits[..N];
+        let mut nows = jobs_at(jobs, 0);
+        let mut mean = [Lanes::ZERO; N];
+        let mut cov = [[Lanes::ZERO; N]; N];
+        let mut floor = Lanes::all(first.floor[0]);
+        for lane in 0..LANES {
+            let job = &jobs[if lane < jobs.len() { lane } else { 0 }];
+            let (mut m, mut p) = ([0.0; N], vec![0.0; N * N]);
+            (job.kalman).start(&nows[lane], &mut m, &mut p, &mut [0.0; N]);
+            floor.0[lane] = job.kalman.floor[0];
+            for i in 0..N {
+                mean[i].0[lane] = m[i];
+                for j in 0..N {
+                    cov[i][j].0[lane] = p[i * N + j];
+                }
+            }
+        }
+        let mut root = [[Lanes::ZERO; N]; N];
+        let mut points = [Lanes::ZERO; P];
+        let mut outputs = [Lanes::ZERO; P];
+        let (mut q, mut shifts) = ([Lanes::ZERO; N], [Lanes::ZERO; N]);
+        let (mut one, mut shift) = ([0.0; P], [0.0; N]);
+        let mut work = Workspace::new(twin);
+        let (zero, unit) = (Lanes::ZERO, Lanes::all(1.0));
+        let (mut squares, mut logs, mut product) = (zero, zero, unit);
+        let mut valid = unit;
+        let (samples, mut values) = (first.record.samples(), 0);
+        rows.clear();
+        for k in 0..samples {
+            if k > 0 {
+                let (t, dt) = (drive.time(k), drive.step(k));
+                for (now, job) in nows.iter_mut().zip(jobs) {
+                    (now.t, now.dt, now.u) = (t, dt, job.kalman.record.drive().input(k));
+                    now.between = job.kalman.between.get(k);
+                }
+            }
+            let active = &nows[..jobs.len()];
+            let mut r = zero;
+            twin.noise_lanes(active, &mut q, &mut r);
+            // Row k into the state.
+            if first.gaps && first.outputs[k].is_nan() {
+                rows.push([zero, unit]);
+            } else {
+                factor(&mean, &cov, &mut root);
+                spread(&mean, &root, &mut points);
+                twin.observe_lanes(active, N, &points, &mut outputs, &mut one);
+                let mut predicted = outputs[0];
+                let mut noise = (r * r).max(floor);
+                let mut variance = noise;
+                let mut slopes = [zero; N];
+                for j in 0..N {
+                    let (plus, minus) = (outputs[1 + 2 * j], outputs[2 + 2 * j]);
+                    slopes[j] = (plus - minus) * HALF_PER_REACH;
+                    let bend = (plus + minus) * 0.5 - outputs[0];
+                    predicted += bend * (1.0 / 3.0);
+                    let bend = bend * BEND;
+                    noise += bend * bend;
+                    variance += bend * bend + slopes[j] * slopes[j];
+                }
+                let sd = variance.sqrt();
+                let mut ends = [predicted + sd * OUTERMOST, predicted - sd * OUTERMOST];
+                if twin.readout_lanes(active, &mut ends) {
+                    return None;
+                }
+                let mut y = zero;
+                for lane in 0..LANES {
+                    let job = &jobs[if lane < jobs.len() { lane } else { 0 }];
+                    y.0[lane] = job.kalman.outputs[k];
+                }
+                let e = y - predicted;
+                rows.push([e, variance]);
+                let per_variance = variance.recip();
+                let good = (zero.below(variance)).and(variance.below(Lanes::all(f64::INFINITY)));
+                valid = good.select(valid, Lanes::all(f64::NAN));
+                values += 1;
+                squares += e * e * per_variance;
+                let next = product * variance;
+                let inside = (Lanes::all(1e-250).below(next)).and(next.below(Lanes::all(1e250)));
+                if inside.not().any() {
+                    logs += product.ln() + variance.ln();
+                    product = unit;
+                } else {
+                    product = next;
+                }
+                let mut gain = [zero; N];
+                for j in 0..N {
+                    for i in 0..N {
+                        gain[i] += root[j][i] * slopes[j];
+                    }
+                }
+                for i in 0..N {
+                    gain[i] = gain[i] * per_variance;
+                    mean[i] += gain[i] * e;
+                }
+                let mut rest = root;
+                for j in 0..N {
+                    for i in 0..N {
+                        rest[j][i] = rest[j][i] - gain[i] * slopes[j];
+                    }
+                }
+                for i in 0..N {
+                    let share = gain[i] * noise;
+                    for j in 0..=i {
+                        let mut entry = zero;
+                        for d in &rest {
+                            entry += d[i] * d[j];
+                        }
+                        entry += share * gain[j];
+                        (cov[i][j], cov[j][i]) = (entry, entry);
+                    }
+                }
+            }
+            if k + 1 == samples {
+                break;
+            }
+            // The state to row k + 1.
+            factor(&mean, &cov, &mut root);
+            spread(&mean, &root, &mut points);
+            for i in 0..N {
+                shifts[i] = q[i] * REACH;
+            }
+            let lanes = LanePoints {
+                all: &mut points,
+                limits,
+                shifts: &shifts,
+                one: &mut one,
+                shift: &mut shift,
+            };
+            let bent = twin.advance_lanes(active, lanes, &mut work);
+            let (centre, images) = points.split_at_mut(N);
+            for i in 0..N {
+                mean[i] = centre[i];
+                for j in 0..N {
+                    cov[i][j] = zero;
+                }
+            }
+            let (images, noises) = images.split_at_mut(2 * N * N);
+            differences(images, centre, &mut mean);
+            add_outer(images, &mut cov);
+            if bent {
+                for i in 0..N {
+                    if (q[i].below(zero)).any() || (zero.below(q[i])).any() {
+                        let pair = &mut noises[2 * i * N..2 * (i + 1) * N];
+                        differences(pair, centre, &mut mean);
+                        add_outer(pair, &mut cov);
+                    }
+                }
+            } else {
+                for i in 0..N {
+                    cov[i][i] += q[i] * q[i];
+                }
+            }
+            clip(&mut mean, &mut cov, limits);
+        }
+        let sum = squares + (logs + product.ln()) + values as f64 * LOG_TWO_PI;
+        Some(sum * -0.5 * valid)
+    }
+}
+
+/// The twin's view of each job at a row; lanes without a job repeat the first.
+fn jobs_at<'j>(jobs: &'j [Job<'j>], k: usize) -> [Now<'j>; LANES] {
+    std::array::from_fn(|lane| {
+        let job = &jobs[if lane < jobs.len() { lane } else { 0 }];
+        let drive = job.kalman.record.drive();
+        let mut now = Now::new(drive.time(k), drive.step(k), drive.input(k), job.theta);
+        now.between = job.kalman.between.get(k);
+        now
+    })
+}
+
+/// Columns of Cholesky's root; those without pivot are zero.
+#[inline(always)]
+fn factor<const N: usize>(mean: &[Lanes; N], cov: &[[Lanes; N]; N], root: &mut [[Lanes; N]; N]) {
+    let (zero, unit) = (Lanes::ZERO, Lanes::all(1.0));
+    for j in 0..N {
+        let mut pivot = cov[j][j];
+        for k in 0..j {
+            pivot = pivot - root[k][j] * root[k][j];
+        }
+        let least = cov[j][j] * 1e-15 + mean[j] * mean[j] * 1e-28;
+        let counts = least.below(pivot);
+        let sd = counts.select(pivot, unit).sqrt();
+        let per_sd = counts.select(sd.recip(), zero);
+        for i in 0..j {
+            root[j][i] = zero;
+        }
+        root[j][j] = counts.select(sd, zero);
+        for i in j + 1..N {
+            let mut entry = cov[i][j];
+            for k in 0..j {
+                entry = entry - root[k][i] * root[k][j];
+            }
+            root[j][i] = entry * per_sd;
+        }
+    }
+}
+
+/// The mean, then two points on each column of the root.
+#[inline(always)]
+fn spread<const N: usize>(mean: &[Lanes; N], root: &[[Lanes; N]; N], points: &mut [Lanes]) {
+    points[..N].copy_from_slice(mean);
+    for j in 0..N {
+        let pair = &mut points[(1 + 2 * j) * N..(3 + 2 * j) * N];
+        for i in 0..N {
+            let away = root[j][i] * REACH;
+            (pair[i], pair[N + i]) = (mean[i] + away, mean[i] - away);
+        }
+    }
+}
+
+/// Makes slopes and bends of the images of two points, and adds to the mean what the bends do to it.
+#[inline(always)]
+fn differences<const N: usize>(images: &mut [Lanes], centre: &[Lanes], mean: &mut [Lanes; N]) {
+    for pair in images.chunks_exact_mut(2 * N) {
+        for i in 0..N {
+            let (plus, minus) = (pair[i], pair[N + i]);
+            let bend = (plus + minus) * 0.5 - centre[i];
+            mean[i] += bend * (1.0 / 3.0);
+            (pair[i], pair[N + i]) = ((plus - minus) * HALF_PER_REACH, bend * BEND);
+        }
+    }
+}
+
+/// Adds Σ D Dᵀ, both triangles.
+#[inline(always)]
+fn add_outer<const N: usize>(deviations: &[Lanes], sum: &mut [[Lanes; N]; N]) {
+    for i in 0..N {
+        for j in 0..=i {
+            let mut entry = sum[i][j];
+            for d in deviations.chunks_exact(N) {
+                entry += d[i] * d[j];
+            }
+            (sum[i][j], sum[j][i]) = (entry, entry);
+        }
+    }
+}

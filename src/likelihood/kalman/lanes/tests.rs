@@ -1,0 +1,156 @@
+//! Lanes against the scalar pass.
+
+use super::*;
+use crate::effect::{Catalogue, augment};
+use crate::likelihood::kalman::{Coordinates, FilterSettings, Score};
+use crate::record::{Drive, Record, Signal};
+use crate::twin::{DigitalTwin, Noise, StateSpace};
+use crate::twins::{CascadedTanks, VanDerPol};
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+const CENTRE: [f64; 4] = [0.6, 0.5, 0.55, 1.0];
+
+fn tanks_drive() -> Drive {
+    let levels = Signal::from_shape_fn((150, 1), |(k, _)| ((k / 20) * 7 % 5) as f64 * 0.6);
+    Drive::new(0.5, levels).unwrap()
+}
+
+fn record(twin: &dyn StateSpace, theta: &[f64], drive: &Drive, run: u64) -> Record {
+    let outputs = twin.run(theta, drive, Noise::new(1, "lanes", run)).unwrap();
+    Record::new(drive.clone(), outputs).unwrap()
+}
+
+/// θ about `centre`, each entry up to 40 % off; the first is the centre.
+fn thetas(centre: &[f64]) -> Vec<Vec<f64>> {
+    let mut source = Noise::new(2, "lanes", 0).source("theta");
+    let mut away = |i: usize| {
+        1.0 + if i == 0 {
+            0.0
+        } else {
+            0.8 * (source.uniform() - 0.5)
+        }
+    };
+    (0..7)
+        .map(|i| centre.iter().map(|v| v * away(i)).collect())
+        .collect()
+}
+
+fn agree(twin: &dyn StateSpace, centre: &[f64], record: &Record, settings: &FilterSettings) {
+    let kalman = Kalman::new(twin, record, settings).unwrap();
+    let thetas = thetas(centre);
+    let jobs: Vec<_> = thetas.iter().map(|theta| (&kalman, &theta[..])).collect();
+    let lanes = together(&jobs).unwrap();
+    for (lane, theta) in thetas.iter().enumerate() {
+        let scalar = kalman.filter(theta).unwrap();
+        let (found, expected) = (lanes.log_likelihoods.0[lane], scalar.log_likelihood);
+        let error = (found - expected).abs() / expected.abs().max(1.0);
+        assert!(error < 1e-12, "lane {lane}: {found} {expected}");
+        for (k, [e, s]) in lanes.rows.iter().enumerate() {
+            let (scale, variance) = (s.0[lane].sqrt(), scalar.covariances[[k, 0, 0]]);
+            assert!((e.0[lane] - scalar.innovations[[k, 0]]).abs() < 1e-10 * scale);
+            assert!((s.0[lane] / variance - 1.0).abs() < 1e-10);
+        }
+    }
+}
+
+#[test]
+fn lanes_are_the_scalar_pass() {
+    let settings = FilterSettings::default();
+    let free = Drive::autonomous(0.05, 200).unwrap();
+    agree(
+        &VanDerPol,
+        &[1.5],
+        &record(&VanDerPol, &[1.5], &free, 0),
+        &settings,
+    );
+    let measured = record(&CascadedTanks, &CENTRE, &tanks_drive(), 0);
+    agree(&CascadedTanks, &CENTRE, &measured, &settings);
+    // An unknown start at the floor, where the limit is felt.
+    let spread = FilterSettings {
+        start_covariance: Some(DMatrix::from_diagonal_element(2, 2, 0.3)),
+        ..FilterSettings::default()
+    };
+    agree(&CascadedTanks, &CENTRE, &measured, &spread);
+    // Every third output missing.
+    let outputs = Signal::from_shape_fn((150, 1), |(k, _)| match k % 3 {
+        1 => f64::NAN,
+        _ => measured.outputs()[[k, 0]],
+    });
+    let gaps = Record::new(tanks_drive(), outputs).unwrap();
+    agree(&CascadedTanks, &CENTRE, &gaps, &settings);
+}
+
+/// A ceiling acts on some lanes and not on others; a lag adds a state; a forces law acts on each point.
+#[test]
+fn lanes_of_twins_with_effects_are_the_scalar_pass() {
+    let settings = FilterSettings::default();
+    let library = Catalogue::default();
+    let ceiling = library
+        .effect("state-ceiling", "h1")
+        .unwrap()
+        .with_other("h2");
+    let lag = library.effect("sensor-lag", "sensor").unwrap();
+    let drag = library.effect("quadratic-drag", "h1").unwrap();
+    for (effect, magnitudes) in [(ceiling, &[3.0, 0.5][..]), (lag, &[1.2]), (drag, &[0.05])] {
+        let twin: Arc<dyn DigitalTwin> =
+            Arc::new(augment(Arc::new(CascadedTanks), vec![effect]).unwrap());
+        let twin = twin.equations().unwrap();
+        let centre = [&CENTRE[..], magnitudes].concat();
+        let measured = record(twin.as_ref(), &centre, &tanks_drive(), 1);
+        agree(twin.as_ref(), &centre, &measured, &settings);
+    }
+}
+
+/// One by one and side by side, alone and with other records.
+#[test]
+fn scores_by_lanes_are_those_of_single_passes() {
+    let settings = FilterSettings::default();
+    let records: Vec<Record> = (0..3)
+        .map(|run| record(&CascadedTanks, &CENTRE, &tanks_drive(), run))
+        .collect();
+    let kalmans: Vec<Kalman<'_>> = (records.iter())
+        .map(|record| Kalman::new(&CascadedTanks, record, &settings).unwrap())
+        .collect();
+    let coordinates = Coordinates::new(kalmans[0].parameters());
+    let all: Vec<&Kalman<'_>> = kalmans.iter().collect();
+    let batch = Score::forward_each(&all, &CENTRE, &coordinates);
+    for (kalman, batch) in kalmans.iter().zip(batch) {
+        let one = Score::forward_one_by_one(kalman, &CENTRE, &coordinates).unwrap();
+        let alone = Score::forward(kalman, &CENTRE, &coordinates).unwrap();
+        for lanes in [alone, batch.unwrap()] {
+            assert!((lanes.log_likelihood - one.log_likelihood).abs() < 1e-9);
+            // Differences over steps of 1e-5 in log θ.
+            assert!((&lanes.gradient - &one.gradient).amax() < 1e-6);
+            let scale = one.fisher.amax();
+            assert!((&lanes.fisher - &one.fisher).amax() < 1e-8 * scale);
+            assert!((&lanes.outer - &one.outer).amax() < 1e-6 * scale);
+            assert!((&lanes.samples - &one.samples).amax() < 1e-6);
+        }
+    }
+}
+
+/// What lanes do not hold goes the scalar way, errors included.
+#[test]
+fn what_lanes_do_not_hold_is_run_one_by_one() {
+    let settings = FilterSettings::default();
+    let measured = record(&CascadedTanks, &CENTRE, &tanks_drive(), 0);
+    let kalman = Kalman::new(&CascadedTanks, &measured, &settings).unwrap();
+    let coordinates = Coordinates::new(kalman.parameters());
+    assert!(together(&[(&kalman, &CENTRE), (&kalman, &[f64::NAN; 4])]).is_none());
+    assert!(Score::forward(&kalman, &[f64::NAN; 4], &coordinates).is_err());
+    assert!(Score::forward(&kalman, &[1.0], &coordinates).is_err());
+    let saturated = Catalogue::default()
+        .effect("sensor-saturation", "sensor")
+        .unwrap();
+    let twin: Arc<dyn DigitalTwin> =
+        Arc::new(augment(Arc::new(CascadedTanks), vec![saturated]).unwrap());
+    let twin = twin.equations().unwrap();
+    let theta = [&CENTRE[..], &[0.0, 2.0]].concat();
+    let measured = record(twin.as_ref(), &theta, &tanks_drive(), 0);
+    let kalman = Kalman::new(twin.as_ref(), &measured, &settings).unwrap();
+    assert!(together(&[(&kalman, &theta)]).is_none());
+    let coordinates = Coordinates::new(kalman.parameters());
+    let one = Score::forward_one_by_one(&kalman, &theta, &coordinates).unwrap();
+    assert_eq!(Score::forward(&kalman, &theta, &coordinates).unwrap(), one);
+}

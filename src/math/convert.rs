@@ -1,0 +1,47 @@
+//! Conversions between slices, vectors and matrices of nalgebra, and arrays of ndarray.
+
+use nalgebra::{DMatrix, DVector};
+use ndarray::{Array2, ArrayRef1, ArrayRef2};
+
+/// Returns the matrix with the entries of an array.
+pub fn to_matrix(array: &ArrayRef2<f64>) -> DMatrix<f64> {
+    DMatrix::from_row_iterator(array.nrows(), array.ncols(), array.iter().copied())
+}
+
+/// Returns the array with the entries of a matrix.
+pub fn to_array(matrix: &DMatrix<f64>) -> Array2<f64> {
+    Array2::from_shape_fn(matrix.shape(), |at| matrix[at])
+}
+
+/// Returns the vector with the entries of a row or a column of an array.
+pub fn to_vector(line: &ArrayRef1<f64>) -> DVector<f64> {
+    DVector::from_iterator(line.len(), line.iter().copied())
+}
+
+/// Returns the array of one row.
+pub fn one_row(values: &[f64]) -> Array2<f64> {
+    Array2::from_shape_fn((1, values.len()), |(_, j)| values[j])
+}
+
+/// Returns the matrix of one column.
+pub fn one_column(values: &[f64]) -> DMatrix<f64> {
+    DMatrix::from_column_slice(values.len(), 1, values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::array;
+
+    #[test]
+    fn entries_stay_where_they_are() {
+        let plain = array![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]];
+        let matrix = to_matrix(&plain);
+        assert_eq!((matrix.shape(), matrix[(0, 2)]), ((2, 3), 3.0));
+        assert_eq!(to_array(&matrix), plain);
+        assert_eq!(to_matrix(&plain.t()), matrix.transpose());
+        assert_eq!(to_vector(&plain.column(1)).as_slice(), [2.0, 5.0]);
+        assert_eq!(one_row(&[7.0, 8.0]), array![[7.0, 8.0]]);
+        assert_eq!(one_column(&[7.0, 8.0]).shape(), (2, 1));
+    }
+}

@@ -1,0 +1,99 @@
+//! Fit of a study's twin to records.
+
+use super::{Study, StudyError};
+use crate::effect::Effect;
+use crate::fit::{Fit, FitSettings, Subject, run};
+use crate::likelihood::Beliefs;
+use crate::progress::Progress;
+use crate::record::Record;
+use crate::setting::SettingError;
+use crate::twin::{NoiseLevel, StartLevel};
+
+impl Study {
+    /// Finds the most probable parameters of the twin, given measured records of one system: no training, no simulations of a prior.
+    ///
+    /// Noise levels are fitted with the parameters, and the first state is uncertain, unless the study says that they are known.
+    /// θ has a weak normal prior in φ (log θ where bounds are positive) of the prior box's width, 0.6 at least; `[bounds]` hold.
+    /// The same seed gives the same bits on any number of threads.
+    ///
+    /// ```
+    /// use truetwin::fit::FitSettings;
+    /// use truetwin::prelude::*;
+    /// use truetwin::twins::CascadedTanks;
+    ///
+    /// let study = Study::new("tanks", CascadedTanks, RecordPlan::levels(0.5, 300, 0.0, 3.0, 30))?;
+    /// let noise = Noise::new(1, "measured", 0);
+    /// let drive = study.drives()?.draw(noise)?;
+    /// let outputs = CascadedTanks.simulate(&[0.6, 0.5, 0.55, 1.0], &drive, noise)?;
+    /// let record = Record::new(drive, outputs)?;
+    /// let fit = study.fit(&[record], &FitSettings::default(), &Progress::silent())?;
+    /// assert!(fit.convergence.converged);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`StudyError`]: records that do not fit the twin, settings that cannot be used, a twin that no start fits, cancellation.
+    pub fn fit(
+        &self,
+        records: &[Record],
+        settings: &FitSettings,
+        progress: &Progress,
+    ) -> Result<Fit, StudyError> {
+        let level = settings.level;
+        SettingError::unless(
+            level > 0.0 && level < 1.0,
+            "level",
+            level,
+            "choose a level between 0 and 1, such as 0.9",
+        )
+        .map_err(|error| StudyError::Table(error.to_string()))?;
+        for record in records {
+            record.check_channels(&self.twin.signals())?;
+        }
+        if records.is_empty() {
+            return Err(StudyError::Plan(
+                "no record is given; give at least one".into(),
+            ));
+        }
+        let effects = self.added_effects()?;
+        let subject = Subject {
+            twin: &self.twin,
+            effects: &effects,
+            beliefs: &self.beliefs(),
+        };
+        let stage = progress.stage("fit", 1);
+        let fit = run(&subject, records, settings)?.ok_or(StudyError::NoFit)?;
+        stage.tick()?;
+        Ok(fit)
+    }
+
+    /// Effects that the study's file adds to the twin.
+    fn added_effects(&self) -> Result<Vec<Effect>, StudyError> {
+        let effects = self
+            .file
+            .effect
+            .iter()
+            .map(|entry| self.catalogue.resolve(entry));
+        Ok(effects.collect::<Result<_, _>>()?)
+    }
+
+    /// The study's word on noise levels and starts, for likelihoods of measured records.
+    pub(crate) fn beliefs(&self) -> Beliefs {
+        let declared = (self.file.noise.iter()).filter_map(|(name, level)| match level {
+            NoiseLevel::Declared { known, factor, .. } => Some((name.clone(), *known, *factor)),
+            _ => None,
+        });
+        let starts = (self.file.start.iter()).filter(|(_, level)| {
+            matches!(level, StartLevel::Declared { .. } | StartLevel::Estimate)
+        });
+        Beliefs {
+            step: self.plan.step,
+            known: (declared.clone().filter(|(_, known, _)| *known))
+                .map(|(name, ..)| name)
+                .collect(),
+            factors: declared.map(|(name, _, factor)| (name, factor)).collect(),
+            starts: starts.map(|(name, _)| name.clone()).collect(),
+        }
+    }
+}

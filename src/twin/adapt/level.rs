@@ -1,0 +1,251 @@
+//! Noise levels and starts as a study declares them.
+
+use crate::twin::TwinError;
+use serde::{Deserialize, Serialize};
+
+/// Default of [`NoiseLevel::Declared`]'s `factor`: one standard deviation of a declared level is a factor e. A level that is off by
+/// a factor of three costs 0.6 nats, less than a record of 50 samples knows about it.
+const FACTOR: f64 = std::f64::consts::E;
+
+/// A noise level: `0.1`, `{ std = 0.1, known = true }`, or `"estimate"`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(from = "NoiseText", into = "NoiseText")]
+pub(crate) enum NoiseLevel {
+    /// Declared: simulations use it. A likelihood of a measured record fits it, unless it is known.
+    Declared {
+        /// Standard deviation; 0 declares nothing.
+        std: f64,
+        /// `true` if nothing is to be fitted.
+        known: bool,
+        /// Factor that one standard deviation of the fitted level's logarithm is, above 1.
+        factor: f64,
+        /// Unit of a state's level.
+        per: Per,
+    },
+    /// Unknown: it becomes a parameter, which an estimator learns.
+    Estimate,
+}
+
+/// Time in which a state's noise adds up to its level.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Per {
+    /// A step of the study: `std` is that of the increment added at each.
+    #[default]
+    Step,
+    /// A second: `std` is in units of the state per √s.
+    Second,
+}
+
+impl NoiseLevel {
+    /// A declared level, a state's per step.
+    pub(crate) fn declared(std: f64) -> Self {
+        Self::Declared {
+            std,
+            known: false,
+            factor: FACTOR,
+            per: Per::Step,
+        }
+    }
+
+    /// Checks numbers of the level of `name`.
+    pub(super) fn check(self, name: &str) -> Result<(), TwinError> {
+        let Self::Declared { std, factor, .. } = self else {
+            return Ok(());
+        };
+        let wrong = |value, remedy| TwinError::Value {
+            table: "noise",
+            name: name.into(),
+            value,
+            remedy,
+        };
+        if !(std >= 0.0 && std.is_finite()) {
+            return Err(wrong(std, "a standard deviation is 0 or more"));
+        }
+        if !(factor > 1.0 && factor.is_finite()) {
+            let remedy = "factor is how many times larger or smaller the level may well be: above 1, such as 2";
+            return Err(wrong(factor, remedy));
+        }
+        Ok(())
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "expected a number, { std = .., known = true, factor = 2.0, per = \"step\" or \"second\" }, or \"estimate\""
+)]
+enum NoiseText {
+    Number(f64),
+    Table(NoiseTable),
+    Word(Word),
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct NoiseTable {
+    std: f64,
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    known: bool,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    factor: Option<f64>,
+    #[serde(default)]
+    per: Per,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Word {
+    Estimate,
+}
+
+impl From<NoiseText> for NoiseLevel {
+    fn from(text: NoiseText) -> Self {
+        match text {
+            NoiseText::Number(std) => Self::declared(std),
+            NoiseText::Table(table) => Self::Declared {
+                std: table.std,
+                known: table.known,
+                factor: table.factor.unwrap_or(FACTOR),
+                per: table.per,
+            },
+            NoiseText::Word(Word::Estimate) => Self::Estimate,
+        }
+    }
+}
+
+impl From<NoiseLevel> for NoiseText {
+    fn from(level: NoiseLevel) -> Self {
+        match level {
+            NoiseLevel::Declared { std, .. } if level == NoiseLevel::declared(std) => {
+                Self::Number(std)
+            }
+            NoiseLevel::Declared {
+                std,
+                known,
+                factor,
+                per,
+            } => Self::Table(NoiseTable {
+                std,
+                known,
+                factor: (factor != FACTOR).then_some(factor),
+                per,
+            }),
+            NoiseLevel::Estimate => Self::Word(Word::Estimate),
+        }
+    }
+}
+
+/// A state at the first sample: `2.0`, `{ mean = 2.0, std = 0.5 }`, or `"estimate"`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(from = "StartText", into = "StartText")]
+pub(crate) enum StartLevel {
+    /// Normal around a mean; simulations draw from it, filters integrate over it. A deviation of 0 is a known start.
+    Declared {
+        /// Mean, in units of the state.
+        mean: f64,
+        /// Standard deviation, in units of the state.
+        std: f64,
+    },
+    /// Unknown: it becomes a parameter, which an estimator learns.
+    Estimate,
+}
+
+impl StartLevel {
+    /// Checks numbers of the start of `name`, whose limits are `limit`.
+    pub(super) fn check(self, name: &str, limit: crate::twin::Interval) -> Result<(), TwinError> {
+        let Self::Declared { mean, std } = self else {
+            return Ok(());
+        };
+        let wrong = |value, remedy| TwinError::Value {
+            table: "start",
+            name: name.into(),
+            value,
+            remedy,
+        };
+        if !(limit.contains(mean) && mean.is_finite()) {
+            return Err(wrong(mean, "a start lies within the state's limits"));
+        }
+        if !(std >= 0.0 && std.is_finite()) {
+            return Err(wrong(std, "a standard deviation is 0 or more"));
+        }
+        Ok(())
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "expected a number, { mean = .., std = .. }, or \"estimate\""
+)]
+enum StartText {
+    Number(f64),
+    Table(StartTable),
+    Word(Word),
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StartTable {
+    mean: f64,
+    std: f64,
+}
+
+impl From<StartText> for StartLevel {
+    fn from(text: StartText) -> Self {
+        match text {
+            StartText::Number(mean) => Self::Declared { mean, std: 0.0 },
+            StartText::Table(StartTable { mean, std }) => Self::Declared { mean, std },
+            StartText::Word(Word::Estimate) => Self::Estimate,
+        }
+    }
+}
+
+impl From<StartLevel> for StartText {
+    fn from(level: StartLevel) -> Self {
+        match level {
+            StartLevel::Declared { mean, std: 0.0 } => Self::Number(mean),
+            StartLevel::Declared { mean, std } => Self::Table(StartTable { mean, std }),
+            StartLevel::Estimate => Self::Word(Word::Estimate),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, PartialEq, Serialize, Deserialize)]
+    struct File {
+        h: NoiseLevel,
+        x: StartLevel,
+    }
+
+    #[test]
+    fn every_form_is_read_and_written_again() {
+        for text in [
+            "h = 0.1\nx = 2.0\n",
+            "h = \"estimate\"\nx = \"estimate\"\n",
+            "[h]\nstd = 0.1\nknown = true\nper = \"second\"\n\n[x]\nmean = 2.0\nstd = 0.5\n",
+        ] {
+            let file: File = toml::from_str(text).unwrap();
+            assert_eq!(toml::to_string(&file).unwrap(), text);
+        }
+        let error = toml::from_str::<File>("h = { std = 0.1, sd = 1.0 }\nx = 1.0").unwrap_err();
+        assert!(error.message().contains("known = true"), "{error}");
+    }
+
+    #[test]
+    fn numbers_that_cannot_be_used_are_named() {
+        let factor = NoiseLevel::Declared {
+            std: 0.1,
+            known: false,
+            factor: 0.5,
+            per: Per::Step,
+        };
+        for (level, value) in [(NoiseLevel::declared(-0.1), "-0.1"), (factor, "0.5")] {
+            let error = level.check("h1").unwrap_err().to_string();
+            assert!(error.contains(value), "{error}");
+        }
+    }
+}

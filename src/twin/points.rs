@@ -1,0 +1,193 @@
+//! Several states side by side, carried through equations by one call.
+
+use crate::math::{LANES, Lanes};
+use crate::twin::Interval;
+
+/// So many numbers are kept on the stack.
+const FEW: usize = 4;
+
+/// Layout of points side by side: each takes `stride` numbers, and the first `states` of these are the twin's.
+#[doc(hidden)]
+#[derive(Debug, Clone, Copy)]
+pub struct Layout {
+    /// Number of states of the twin.
+    pub states: usize,
+    /// Numbers from one point to the next.
+    pub stride: usize,
+}
+
+impl Layout {
+    /// Creates the layout of points with nothing between them.
+    #[inline(always)]
+    pub(crate) fn dense(states: usize) -> Self {
+        Self {
+            states,
+            stride: states,
+        }
+    }
+
+    /// Returns the layout of the base twin's states, without the last `added` ones.
+    #[inline(always)]
+    pub(crate) fn without(self, added: usize) -> Self {
+        Self {
+            states: self.states - added,
+            ..self
+        }
+    }
+
+    /// Returns the states of each point.
+    #[inline(always)]
+    pub(crate) fn each(self, x: &[f64]) -> impl ExactSizeIterator<Item = &[f64]> {
+        x.chunks_exact(self.stride).map(move |x| &x[..self.states])
+    }
+
+    /// As [`each`](Self::each), to be changed.
+    #[inline(always)]
+    pub(crate) fn each_mut(self, x: &mut [f64]) -> impl ExactSizeIterator<Item = &mut [f64]> {
+        (x.chunks_exact_mut(self.stride)).map(move |x| &mut x[..self.states])
+    }
+}
+
+/// Points that a filter carries over a step; n states each, one point after the other.
+#[doc(hidden)]
+#[derive(Debug)]
+pub struct Points<'w> {
+    /// First the `moving` points: put into the limits, advanced, constrained; the first is the centre. Behind them two for
+    /// each state: the centre after its motion, with that state shifted up and down, constrained. Those of a state
+    /// without shift hold nothing of use.
+    pub all: &'w mut [f64],
+    /// Number of moving points.
+    pub moving: usize,
+    /// Limits by state.
+    pub limits: &'w [Interval],
+    /// Shift of each state.
+    pub shifts: &'w [f64],
+}
+
+/// Points of several filters side by side, one filter a lane; as [`Points`] otherwise.
+#[doc(hidden)]
+#[derive(Debug)]
+pub struct LanePoints<'w> {
+    /// One moving point and two for each state, then two for each state. The last come back where a constraint acted.
+    pub all: &'w mut [Lanes],
+    /// Limits by state.
+    pub limits: &'w [Interval],
+    /// Shift of each state.
+    pub shifts: &'w [Lanes],
+    /// A buffer for the points of one lane.
+    pub one: &'w mut [f64],
+    /// A buffer for the shifts of one lane.
+    pub shift: &'w mut [f64],
+}
+
+/// Copies one lane out.
+#[inline(always)]
+pub(super) fn gather(from: &[Lanes], lane: usize, to: &mut [f64]) {
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = from.0[lane];
+    }
+}
+
+/// Copies one lane in; the first also into the lanes that no filter uses.
+#[inline(always)]
+pub(super) fn scatter(from: &[f64], (lane, used): (usize, usize), to: &mut [Lanes]) {
+    for (to, from) in to.iter_mut().zip(from) {
+        to.0[lane] = *from;
+    }
+    if lane == 0 && used < LANES {
+        for (to, from) in to.iter_mut().zip(from) {
+            to.0[used..].fill(*from);
+        }
+    }
+}
+
+impl Points<'_> {
+    /// Puts the moving points into their limits.
+    #[inline(always)]
+    pub(in crate::twin) fn limit(&mut self, n: usize) {
+        let limits = &self.limits[..n];
+        for x in self.all[..self.moving * n].chunks_exact_mut(n) {
+            for (x, limit) in x.iter_mut().zip(limits) {
+                *x = limit.clamp(*x);
+            }
+        }
+    }
+}
+
+/// Value of state j in the point whose state i is shifted.
+#[inline(always)]
+pub(in crate::twin) fn shifted_value(centre: &[f64], (i, shift): (usize, f64), j: usize) -> f64 {
+    centre[j] + if j == i { shift } else { 0.0 }
+}
+
+/// Carries one point after the other, the equations inline: for twins that users write.
+#[inline(always)]
+pub(super) fn advance_one_by_one(
+    n: usize,
+    mut points: Points<'_>,
+    mut advance: impl FnMut(&mut [f64]),
+    constrain: impl Fn(&mut [f64]),
+) -> bool {
+    points.limit(n);
+    let shifts = &points.shifts[..n];
+    let (moving, shifted) = points.all.split_at_mut(points.moving * n);
+    for x in moving.chunks_exact_mut(n) {
+        advance(x);
+    }
+    let (centre, around) = moving.split_at_mut(n);
+    let mut bent = false;
+    for ((i, &shift), pair) in (shifts.iter().enumerate()).zip(shifted.chunks_exact_mut(2 * n)) {
+        if shift == 0.0 {
+            continue;
+        }
+        for (x, shift) in pair.chunks_exact_mut(n).zip([shift, -shift]) {
+            for (j, x) in x.iter_mut().enumerate() {
+                *x = shifted_value(centre, (i, shift), j);
+            }
+            // Few numbers are copied, and nothing is left of it for a twin without constraints; many are not.
+            if n <= FEW {
+                bent |= changes(x, &constrain);
+                continue;
+            }
+            constrain(x);
+            for (j, x) in x.iter().enumerate() {
+                bent |= x.to_bits() != shifted_value(centre, (i, shift), j).to_bits();
+            }
+        }
+    }
+    // The centre last: the shifts start from it as it is before.
+    for x in around.chunks_exact_mut(n) {
+        constrain(x);
+    }
+    bent | changes(centre, constrain)
+}
+
+/// Puts outputs, `p` each, through the readout; returns whether it changed any.
+#[inline(always)]
+pub(super) fn readout_one_by_one(p: usize, y: &mut [f64], readout: impl Fn(&mut [f64])) -> bool {
+    let mut changed = false;
+    for y in y.chunks_exact_mut(p) {
+        changed |= changes(y, &readout);
+    }
+    changed
+}
+
+/// Runs `with` and tells whether it changed `values`. Nothing is left of this for a `with` that does nothing.
+#[inline(always)]
+fn changes(values: &mut [f64], with: impl FnOnce(&mut [f64])) -> bool {
+    let (mut few, many);
+    let before = if values.len() <= FEW {
+        few = [0.0; FEW];
+        few[..values.len()].copy_from_slice(values);
+        &few[..values.len()]
+    } else {
+        many = values.to_vec();
+        &many
+    };
+    with(values);
+    let mut changed = false;
+    for (value, before) in values.iter().zip(before) {
+        changed |= value.to_bits() != before.to_bits();
+    }
+    changed
+}

@@ -1,0 +1,87 @@
+//! `fit` as a user meets it.
+
+use super::{done, json, refused};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn place() -> PathBuf {
+    let name = format!("fit-{}", std::process::id());
+    let place = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    fs::create_dir_all(&place).unwrap();
+    place
+}
+
+#[test]
+fn a_record_is_fitted_and_bad_calls_are_refused() {
+    let place = place();
+    let at = |name: &str| place.join(name).display().to_string();
+    let study = |name: &str, tables: &str| {
+        fs::write(place.join(name), format!("twin = 'tanks'\n{tables}")).unwrap();
+        at(name)
+    };
+    let (record, out) = (at("r.csv"), at("out"));
+    let truth = "k1=0.6,k2=0.5,k3=0.55,k4=1";
+    done(&[
+        "simulate", "--twin", "tanks", "--theta", truth, "--out", &record,
+    ]);
+
+    let value = json(&["fit", &record, "--twin", "tanks", "--out", &out, "--json"]);
+    assert_eq!(value["schema"], "truetwin.fit/1");
+    assert_eq!(value["parameters"].as_array().unwrap().len(), 4);
+    assert_eq!(value["noise"].as_array().unwrap().len(), 3);
+    assert_eq!(value["convergence"]["converged"], true);
+    let k1 = &value["parameters"][0];
+    assert!((k1["value"].as_f64().unwrap() - 0.6).abs() < 5.0 * k1["std_error"].as_f64().unwrap());
+    assert!(place.join("out/fit.json").exists() && place.join("out/overlay.svg").exists());
+    let text = done(&["fit", &record, "--twin", "tanks"]);
+    for part in [
+        "k1",
+        "noise of",
+        "one-step error",
+        "Converged",
+        "Log evidence",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+
+    // Known levels and starts are no part of the fit.
+    let held = study(
+        "held.toml",
+        "[noise]\nh1 = { std = 0.1, known = true }\ny = { std = 0.15, known = true }\n[start]\nh1 = 0.0\n",
+    );
+    let value = json(&["fit", &record, "--study", &held, "--json"]);
+    assert_eq!(value["noise"].as_array().unwrap().len(), 1);
+    assert_eq!(value["starts"][0]["std_error"].as_f64(), Some(0.0));
+    let fixed = study(
+        "fixed.toml",
+        "[fixed]\nk1 = 0.6\nk2 = 0.5\nk3 = 0.55\nk4 = 1.0\n",
+    );
+    refused(
+        &["fit", &record, "--study", &fixed],
+        &["no parameter to estimate"],
+    );
+
+    refused(
+        &["fit", &record, "--twin", "tanks", "--out", &out],
+        &["out", "exists"],
+    );
+    for (tables, parts) in [
+        ("[noise]\nh1 = -0.1\n", ["-0.1", "0 or more"]),
+        (
+            "[noise]\nh1 = { std = 0.1, factor = 0.5 }\n",
+            ["0.5", "above 1"],
+        ),
+        (
+            "[noise]\ny = 'estimate'\n[prior]\nnoise.y = [-0.2, 0.3]\n",
+            ["noise.y", "begin at 0"],
+        ),
+        (
+            "[start]\nh1 = { mean = 1.0, std = -1.0 }\n",
+            ["-1", "0 or more"],
+        ),
+    ] {
+        let study = study("bad.toml", tables);
+        refused(&["fit", &record, "--study", &study], &parts);
+    }
+    fs::remove_dir_all(&place).unwrap();
+}

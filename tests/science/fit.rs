@@ -1,0 +1,249 @@
+//! `Study::fit`: parameters with fitted noise, on simulated records and, where they are at hand, on real rigs.
+
+#[path = "../../examples/rigs.rs"]
+#[allow(dead_code, unreachable_pub, clippy::duplicate_mod)]
+mod rigs;
+
+use crate::real_records::data;
+use rigs::{Carriage, Heater};
+use truetwin::evaluate::paper::reference_studies;
+use truetwin::fit::{Fit, FitSettings};
+use truetwin::prelude::*;
+use truetwin::record::read_record;
+use truetwin::study::StudyFile;
+use truetwin::twin::DigitalTwin;
+use truetwin::twins::CascadedTanks;
+
+const TRUTH: [f64; 4] = [0.6, 0.5, 0.55, 1.0];
+
+fn tanks() -> Study {
+    let mut all = reference_studies().unwrap().into_iter();
+    all.find(|study| study.name() == "tanks").unwrap()
+}
+
+fn simulated(seed: u64) -> Record {
+    let noise = Noise::new(seed, "fit", 0);
+    let drive = tanks().drives().unwrap().draw(noise).unwrap();
+    let outputs = CascadedTanks.simulate(&TRUTH, &drive, noise).unwrap();
+    Record::new(drive, outputs).unwrap()
+}
+
+fn fitted(study: &Study, records: &[Record]) -> Fit {
+    study
+        .fit(records, &FitSettings::default(), &Progress::silent())
+        .unwrap()
+}
+
+fn value(fit: &Fit, name: &str) -> f64 {
+    let found = fit.parameters.iter().find(|p| p.name == name);
+    found.unwrap_or_else(|| panic!("{name}")).value
+}
+
+/// Intervals of 12 records hold the truth as often as they say; noise levels come out within a third.
+#[test]
+fn intervals_cover_and_noise_levels_are_found() {
+    let (mut held, mut all) = (0, 0);
+    for seed in 0..12 {
+        let fit = fitted(&tanks(), &[simulated(seed)]);
+        assert!(fit.convergence.converged, "{:?}", fit.convergence);
+        for (p, truth) in fit.parameters.iter().zip(TRUTH) {
+            all += 1;
+            held += usize::from((p.low..=p.high).contains(&truth));
+        }
+        let y = fit.noise.iter().find(|level| level.name == "y").unwrap();
+        assert!((y.value / 0.15).ln().abs() < 0.3, "{y:?}");
+    }
+    // 48 intervals at 0.9, four to a record: 43 ± 2.1 if independent, ± 4.2 if four alike.
+    assert!(held >= 35, "{held} of {all}");
+}
+
+/// One cell in ten is emptied: θ moves by less than its own errors.
+#[test]
+fn a_tenth_of_the_cells_may_be_missing() {
+    let mut far = 0;
+    for seed in 20..26 {
+        let record = simulated(seed);
+        let mut outputs = record.outputs().clone();
+        let mut source = Noise::new(seed, "cells", 0).source("missing");
+        for v in &mut outputs {
+            if source.uniform() < 0.1 {
+                *v = f64::NAN;
+            }
+        }
+        let holes = Record::new(record.drive().clone(), outputs).unwrap();
+        let (whole, part) = (fitted(&tanks(), &[record]), fitted(&tanks(), &[holes]));
+        for (a, b) in whole.parameters.iter().zip(&part.parameters) {
+            far += usize::from((a.value - b.value).abs() > a.std_error.max(b.std_error));
+        }
+    }
+    assert!(far <= 2, "{far} of 24");
+}
+
+/// The same run logged at 1, 2 and 4 steps: parameters and noise per √s agree.
+#[test]
+fn a_coarser_log_tells_the_same_physics() {
+    let fine = 0.125;
+    let study = |step: f64| {
+        let plan = RecordPlan::levels(
+            fine,
+            (200.0 / fine) as usize,
+            0.0,
+            3.0,
+            (15.0 / fine) as usize,
+        );
+        let text = format!(
+            "twin = 'tanks'\n[record]\nsubsteps = {}\n[noise]\nh1 = {{ std = 0.14, per = 'second' }}\nh2 = {{ std = 0.14, per = 'second' }}\ny = 0.15\n",
+            step / fine
+        );
+        let file = StudyFile::parse(&text, "coarse.toml".as_ref()).unwrap();
+        Study::new("tanks", CascadedTanks, plan)
+            .unwrap()
+            .configure(&file)
+            .unwrap()
+    };
+    let noise = Noise::new(5, "thinned", 0);
+    let drive = study(fine).drives().unwrap().draw(noise).unwrap();
+    let outputs = study(fine).twin().simulate(&TRUTH, &drive, noise).unwrap();
+    let fits: Vec<Fit> = [2, 4, 8]
+        .map(|every| {
+            let thin = |signal: &Signal| {
+                Signal::from_shape_fn((signal.nrows() / every, 1), |(k, _)| signal[[k * every, 0]])
+            };
+            let step = every as f64 * fine;
+            let drive = Drive::new(step, thin(drive.inputs())).unwrap();
+            let record = Record::new(drive, thin(&outputs)).unwrap();
+            fitted(&study(step), &[record])
+        })
+        .into();
+    for fit in &fits {
+        for (p, truth) in fit.parameters.iter().zip(TRUTH) {
+            assert!((p.value - truth).abs() < 4.0 * p.std_error, "{p:?}");
+        }
+        for level in fit.noise.iter().filter(|level| level.role == "process") {
+            assert!((level.value / 0.14).ln().abs() < 1.0, "{level:?}");
+        }
+    }
+}
+
+/// Two records of one system share θ: errors shrink.
+#[test]
+fn two_records_know_more_than_one() {
+    let (one, two) = (simulated(30), simulated(31));
+    let alone = fitted(&tanks(), std::slice::from_ref(&one));
+    let both = fitted(&tanks(), &[one, two]);
+    assert_eq!(both.starts.len(), 4);
+    let (a, b) = (alone.parameters[0].std_error, both.parameters[0].std_error);
+    assert!(b < 0.85 * a, "{a} {b}");
+}
+
+#[test]
+fn a_value_at_its_bound_is_told() {
+    let text = "twin = 'tanks'\n[prior]\nk1 = [0.2, 0.4]\n[bounds]\nk1 = [0.1, 0.45]\n";
+    let file = StudyFile::parse(text, "s.toml".as_ref()).unwrap();
+    let study = tanks().configure(&file).unwrap();
+    let fit = fitted(&study, &[simulated(40)]);
+    assert_eq!(fit.parameters[0].at_bound, Some(truetwin::fit::Side::High));
+    assert!(
+        fit.warnings.iter().any(|w| w.code == "at-bound"),
+        "{:?}",
+        fit.warnings
+    );
+}
+
+/// The carriage's record at 20 ms: forces averaged over each step, every other position.
+fn carriage() -> Option<Record> {
+    let record = read_record(&data("emps-estimation.csv")?).unwrap();
+    let n = record.samples() / 2;
+    let mean =
+        |k: usize| 0.5 * (record.drive().input(2 * k)[0] + record.drive().input(2 * k + 1)[0]);
+    let inputs = Signal::from_shape_fn((n, 1), |(k, _)| mean(k));
+    let outputs = Signal::from_shape_fn((n, 1), |(k, _)| record.outputs()[[2 * k, 0]]);
+    Some(Record::new(Drive::new(0.02, inputs).unwrap(), outputs).unwrap())
+}
+
+fn positioning(effects: &str) -> Study {
+    let plan = RecordPlan::levels(0.02, 1242, -100.0, 100.0, 50);
+    let file = StudyFile::parse(
+        &format!("twin = 'positioning'\n{effects}"),
+        "s.toml".as_ref(),
+    );
+    Study::new("positioning", Carriage, plan)
+        .unwrap()
+        .configure(&file.unwrap())
+        .unwrap()
+}
+
+fn effect(id: &str, rest: &str) -> String {
+    format!("[[effect]]\nid = '{id}'\ntarget = 'v'\n{rest}\n")
+}
+
+/// Nothing declared, nothing tuned: friction and offset of a real carriage, as its authors publish them (95.1 kg, 203.5 N·s/m,
+/// 20.4 N, 3.2 N).
+#[test]
+fn the_carriage_shows_its_friction() {
+    let Some(record) = carriage() else { return };
+    let records = [record];
+    let base = fitted(&positioning(""), &records);
+    assert!((value(&base, "M") - 97.0).abs() < 1.5 && (value(&base, "Fv") - 413.0).abs() < 6.0);
+    let evidence = |fit: &Fit| fit.evidence.unwrap().log_evidence;
+    let gain = |effects: &str| {
+        let fit = fitted(&positioning(effects), &records);
+        let gain = evidence(&fit) - evidence(&base);
+        println!("{gain:.1} nats: {}", effects.replace('\n', " "));
+        (gain, fit)
+    };
+    let (friction, _) = gain(&effect("coulomb-friction", ""));
+    let (periodic, _) = gain(&effect("periodic-disturbance", ""));
+    let (coupling, _) = gain(&effect("cross-coupling", "from = 'q'"));
+    assert!(friction > periodic + 300.0 && periodic > coupling && coupling > 30.0);
+    let (both, fit) = gain(
+        &[
+            effect("coulomb-friction", ""),
+            effect("constant-forcing", ""),
+        ]
+        .concat(),
+    );
+    assert!(both > friction + 200.0);
+    let mass = value(&fit, "M");
+    assert!((mass - 92.0).abs() < 4.0, "{mass}");
+    assert!((value(&fit, "Fv") - 197.0).abs() < 20.0);
+    assert!((value(&fit, "coulomb-friction@v.force") * mass - 21.0).abs() < 2.0);
+    assert!((value(&fit, "constant-forcing@v.force") * mass - 3.2).abs() < 0.4);
+}
+
+/// A real heater lacks a lag, and nothing else.
+#[test]
+fn the_heater_shows_its_lag() {
+    let Some(path) = data("tclab-first.csv") else {
+        return;
+    };
+    let records = [read_record(&path).unwrap()];
+    let evidence = |effects: &str| {
+        let text = format!("twin = 'heater'\n{effects}");
+        let file = StudyFile::parse(&text, "s.toml".as_ref()).unwrap();
+        let plan = RecordPlan::levels(1.0, 600, 0.0, 100.0, 60);
+        let study = Study::new("heater", Heater, plan)
+            .unwrap()
+            .configure(&file)
+            .unwrap();
+        fitted(&study, &records).evidence.unwrap().log_evidence
+    };
+    let base = evidence("");
+    let of = |id: &str, target: &str| {
+        let gain = evidence(&format!("[[effect]]\nid = '{id}'\ntarget = '{target}'\n")) - base;
+        println!("{gain:.1} nats: {id}@{target}");
+        gain
+    };
+    let lag = of("sensor-lag", "sensor");
+    assert!(lag > 100.0);
+    assert!(of("actuator-lag", "actuator") > 100.0);
+    assert!(of("periodic-disturbance", "T") < lag - 50.0);
+    for (id, target) in [
+        ("linear-loss", "T"),
+        ("quadratic-drag", "T"),
+        ("sensor-drift", "sensor"),
+        ("actuator-dead-zone", "actuator"),
+    ] {
+        assert!(of(id, target) < 3.0, "{id}");
+    }
+}
