@@ -127,6 +127,7 @@ pub mod external;
 pub mod estimator;
 
 pub mod diagnose;
+mod evid;
 
 pub mod evaluate;
 

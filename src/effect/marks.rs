@@ -61,6 +61,11 @@ pub(super) fn clipped(outputs: &[f64]) -> Mark {
     }
 }
 
+/// Returns whether outputs stop at an end of their range: many samples exactly there.
+pub(crate) fn stops(outputs: &[f64]) -> bool {
+    matches!(clipped(outputs), Mark::Present(_))
+}
+
 /// Mark of rounding, as its step: all distances are multiples of the least one, and there are few values or the step is none of
 /// digits.
 pub(super) fn rounded(outputs: &[f64]) -> Mark {

@@ -37,6 +37,11 @@ impl Effect {
         }
     }
 
+    /// Creates an effect that no library lists.
+    pub(crate) fn unlisted(kind: EffectKind, target: &str) -> Self {
+        Self::new(Arc::new(kind), target, None)
+    }
+
     /// Creates the effect of a file's table.
     pub(super) fn from_entry(
         kind: Arc<EffectKind>,

@@ -43,6 +43,20 @@ pub(crate) enum EvidencePrior {
     Magnitude { largest: f64 },
     /// Uniform in φ over this range: the shape of an effect.
     Uniform { low: f64, high: f64 },
+    /// As the family says that the entry belongs to.
+    Member,
+}
+
+/// Coefficients of an unknown function: normal, of variance τ²·w for one of several lists of weights w that add up to 1, so that τ is
+/// the deviation of the function itself.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Family {
+    /// Entries of θ.
+    pub entries: Vec<usize>,
+    /// Lists of weights, one for each scale of length.
+    pub weights: Vec<Vec<f64>>,
+    /// Largest τ: where the function is as large as the twin's own terms.
+    pub largest: f64,
 }
 
 impl Axis {
@@ -96,6 +110,11 @@ impl Axis {
     /// Returns whether φ is the logarithm.
     pub fn is_log(&self) -> bool {
         self.bounds.low() > 0.0
+    }
+
+    /// Returns whether a size can only be added: half of a normal prior lies within the bounds.
+    pub fn is_one_sided(&self) -> bool {
+        matches!(self.evidence, EvidencePrior::Magnitude { .. }) && self.bounds.low() >= 0.0
     }
 
     /// The same axis, held in the prior box of its parameter.

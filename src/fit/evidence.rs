@@ -22,7 +22,7 @@ use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::twin::Noise;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use std::f64::consts::TAU;
+use std::f64::consts::{LN_2, TAU};
 
 /// Values of τ.
 const SIZES: usize = 6;
@@ -51,10 +51,28 @@ pub(crate) struct Evidence {
 }
 
 /// A normal approximation of the posterior over the entries that are free.
-struct Laplace {
-    log_evidence: f64,
-    centre: DVector<f64>,
-    precision: DMatrix<f64>,
+pub(crate) struct Laplace {
+    pub log_evidence: f64,
+    /// Entries that are free.
+    pub free: Vec<usize>,
+    /// Mean and precision, in φ of the free entries.
+    pub centre: DVector<f64>,
+    pub precision: DMatrix<f64>,
+    /// Deviations of the priors of sizes: entry and deviation.
+    pub sizes: Vec<(usize, f64)>,
+}
+
+/// Evidence by Laplace alone: averaged over all sizes, and the approximation at the most probable ones. `credit` bounds what an
+/// unfinished fit is credited with.
+pub(crate) fn laplace(
+    problem: &Problem<'_>,
+    fitted: &Fitted,
+    credit: f64,
+) -> Option<(f64, Laplace)> {
+    let mut expansion = Expansion::new(problem, fitted);
+    expansion.credit = credit;
+    let blocks = expansion.blocks();
+    expansion.laplace(&blocks)
 }
 
 /// The posterior around a fit.
@@ -69,6 +87,7 @@ struct Expansion<'a> {
     /// Gradient of the likelihood alone.
     gradient: DVector<f64>,
     information: DMatrix<f64>,
+    credit: f64,
 }
 
 /// Evidence of a twin around the fit that maximises it.
@@ -108,10 +127,17 @@ pub(crate) fn evidence(
     }))
 }
 
-/// A magnitude and the deviations that its prior may have.
+/// Magnitudes that share one prior, and the deviations that it may give each of them.
 struct Block {
-    entry: usize,
-    sizes: [f64; SIZES],
+    entries: Vec<usize>,
+    options: Vec<Vec<f64>>,
+}
+
+impl Block {
+    fn deviation(&self, option: usize, entry: usize) -> Option<f64> {
+        let at = self.entries.iter().position(|j| *j == entry)?;
+        Some(self.options[option][at])
+    }
 }
 
 impl<'a> Expansion<'a> {
@@ -141,51 +167,81 @@ impl<'a> Expansion<'a> {
             phi,
             gradient,
             information,
+            credit: CREDIT,
         }
     }
 
     /// Magnitudes among the free entries, with the sizes that count.
     fn blocks(&self) -> Vec<Block> {
-        (self.free.iter())
-            .filter_map(|&entry| {
-                let EvidencePrior::Magnitude { largest } = self.problem.axes[entry].evidence else {
-                    return None;
-                };
-                let visible = 1.0 / self.own_information(entry).sqrt().max(1e-300);
-                let largest = largest.max(2.0 * visible);
-                let ratio = (largest / visible).ln() / (SIZES - 1) as f64;
-                let sizes = std::array::from_fn(|i| visible * (ratio * i as f64).exp());
-                Some(Block { entry, sizes })
+        let alone = (self.free.iter()).filter_map(|&entry| match self.problem.axes[entry].evidence {
+            EvidencePrior::Magnitude { largest } => Some((vec![entry], vec![vec![1.0]], largest)),
+            _ => None,
+        });
+        let families = self.problem.families.iter().filter_map(|family| {
+            let free: Vec<usize> = (0..family.entries.len())
+                .filter(|&a| self.free.contains(&family.entries[a]))
+                .collect();
+            let weights = (family.weights.iter())
+                .map(|weights| free.iter().map(|&a| weights[a]).collect())
+                .collect();
+            let entries = free.iter().map(|&a| family.entries[a]).collect();
+            (!free.is_empty()).then_some((entries, weights, family.largest))
+        });
+        alone
+            .chain(families)
+            .map(|(entries, weights, largest): (Vec<usize>, Vec<Vec<f64>>, f64)| {
+                let own = self.own_information(&entries);
+                let options = (weights.iter())
+                    .flat_map(|weights| {
+                        let roots: Vec<f64> = weights.iter().map(|w| w.sqrt()).collect();
+                        let scaled = DMatrix::from_fn(entries.len(), entries.len(), |a, b| {
+                            roots[a] * own[(a, b)] * roots[b]
+                        });
+                        let most = scaled.symmetric_eigenvalues().max().max(1e-300);
+                        let visible = 1.0 / most.sqrt();
+                        let largest = largest.max(2.0 * visible);
+                        let ratio = (largest / visible).ln() / (SIZES - 1) as f64;
+                        (0..SIZES).map(move |i| {
+                            let size = visible * (ratio * i as f64).exp();
+                            roots.iter().map(|root| size * root).collect()
+                        })
+                    })
+                    .collect();
+                Block { entries, options }
             })
             .collect()
     }
 
-    /// Information about one entry that no other can imitate.
-    fn own_information(&self, entry: usize) -> f64 {
+    /// Information about some entries that no other can imitate.
+    fn own_information(&self, entries: &[usize]) -> DMatrix<f64> {
         let others: Vec<usize> = (self.free.iter().copied())
-            .filter(|j| *j != entry)
+            .filter(|j| !entries.contains(j))
             .collect();
-        let total = self.information[(entry, entry)];
+        let part = |rows: &[usize], columns: &[usize]| {
+            DMatrix::from_fn(rows.len(), columns.len(), |a, b| {
+                self.information[(rows[a], columns[b])]
+            })
+        };
+        let total = part(entries, entries);
         let precisions: Vec<f64> = self.problem.prior_terms().map(|(_, p)| p).collect();
-        let matrix = DMatrix::from_fn(others.len(), others.len(), |a, b| {
-            let prior = if a == b {
-                precisions[others[a]].max(1e-12)
-            } else {
-                0.0
-            };
-            self.information[(others[a], others[b])] + prior
-        });
-        let cross = DVector::from_fn(others.len(), |a, _| self.information[(others[a], entry)]);
-        match matrix.cholesky() {
-            Some(factor) => (total - cross.dot(&factor.solve(&cross))).max(1e-12 * total),
-            None => total,
+        let mut matrix = part(&others, &others);
+        for (a, &j) in others.iter().enumerate() {
+            matrix[(a, a)] += precisions[j].max(1e-12);
         }
-        .max(1e-300)
+        let cross = part(&others, entries);
+        let mut own = match matrix.cholesky() {
+            Some(factor) => &total - cross.tr_mul(&factor.solve(&cross)),
+            None => total.clone(),
+        };
+        for a in 0..entries.len() {
+            own[(a, a)] = own[(a, a)].max(1e-12 * total[(a, a)]).max(1e-300);
+        }
+        own
     }
 
     /// Laplace over all sizes: log Z, and the approximation at the most probable sizes.
     fn laplace(&self, blocks: &[Block]) -> Option<(f64, Laplace)> {
-        let mut chosen = vec![SIZES / 2; blocks.len()];
+        let mut chosen: Vec<usize> = blocks.iter().map(|b| b.options.len() / 2).collect();
         let at = |chosen: &[usize]| self.at_sizes(blocks, chosen);
         // Others at their best: sizes of different effects hardly know of each other.
         for _ in 0..2 {
@@ -195,14 +251,14 @@ impl<'a> Expansion<'a> {
                     tried[b] = i;
                     at(&tried).map_or(f64::NEG_INFINITY, |l| l.log_evidence)
                 };
-                let best = (0..SIZES).max_by(|a, b| value(*a).total_cmp(&value(*b)));
+                let best = (0..blocks[b].options.len()).max_by(|a, b| value(*a).total_cmp(&value(*b)));
                 chosen[b] = best.unwrap_or(chosen[b]);
             }
         }
         let best = at(&chosen)?;
         let mut log = best.log_evidence;
         for b in 0..blocks.len() {
-            let all: Vec<f64> = (0..SIZES)
+            let all: Vec<f64> = (0..blocks[b].options.len())
                 .map(|i| {
                     let mut tried = chosen.clone();
                     tried[b] = i;
@@ -222,12 +278,18 @@ impl<'a> Expansion<'a> {
         let mut means = DVector::zeros(d);
         let mut precisions = DVector::zeros(d);
         let mut log_density = 0.0;
+        let mut sizes = Vec::new();
         for (a, &j) in self.free.iter().enumerate() {
             let (mean, precision) = match self.problem.axes[j].evidence {
                 EvidencePrior::Normal => prior[j],
-                EvidencePrior::Magnitude { .. } => {
-                    let b = blocks.iter().position(|b| b.entry == j)?;
-                    (0.0, blocks[b].sizes[chosen[b]].powi(-2))
+                EvidencePrior::Magnitude { .. } | EvidencePrior::Member => {
+                    let deviation = (blocks.iter().zip(chosen))
+                        .find_map(|(block, option)| block.deviation(*option, j))?;
+                    sizes.push((j, deviation));
+                    if self.problem.axes[j].is_one_sided() {
+                        log_density += LN_2;
+                    }
+                    (0.0, deviation.powi(-2))
                 }
                 EvidencePrior::Uniform { low, high } => {
                     log_density -= (high - low).ln();
@@ -262,7 +324,7 @@ impl<'a> Expansion<'a> {
             .sum();
         let log_determinant: f64 = (0..d).map(|a| 2.0 * factor.l_dirty()[(a, a)].ln()).sum();
         let log_evidence = self.fitted.log_likelihood
-            + gain.min(CREDIT)
+            + gain.min(self.credit)
             + log_density
             + normal
             + 0.5 * d as f64 * TAU.ln()
@@ -270,8 +332,10 @@ impl<'a> Expansion<'a> {
             + self.beyond_bounds(&prior);
         Some(Laplace {
             log_evidence,
+            free: self.free.clone(),
             centre,
             precision,
+            sizes,
         })
     }
 
@@ -295,20 +359,33 @@ impl<'a> Expansion<'a> {
         let normal = |v: f64, mean: f64, precision: f64| {
             0.5 * (precision / TAU).ln() - 0.5 * precision * (v - mean).powi(2)
         };
-        (self.free.iter().enumerate())
+        let of_entries: f64 = (self.free.iter().enumerate())
             .map(|(a, &j)| match self.problem.axes[j].evidence {
                 EvidencePrior::Normal => normal(phi[a], prior[j].0, prior[j].1),
-                EvidencePrior::Magnitude { .. } => {
-                    let sizes = blocks.iter().find(|b| b.entry == j).map(|b| b.sizes);
-                    let sizes = sizes.unwrap_or([1.0; SIZES]);
-                    log_mean(&sizes.map(|size| normal(phi[a], 0.0, size.powi(-2))))
-                }
+                EvidencePrior::Magnitude { .. } | EvidencePrior::Member => 0.0,
                 EvidencePrior::Uniform { low, high } if (low..=high).contains(&phi[a]) => {
                     -(high - low).ln()
                 }
                 EvidencePrior::Uniform { .. } => f64::NEG_INFINITY,
             })
-            .sum()
+            .sum();
+        let value = |entry: usize| self.free.iter().position(|j| *j == entry).map(|a| phi[a]);
+        let of_blocks: f64 = (blocks.iter())
+            .map(|block| {
+                let each: Vec<f64> = (block.options.iter())
+                    .map(|deviations| {
+                        (block.entries.iter().zip(deviations))
+                            .filter_map(|(j, d)| {
+                                let half = if self.problem.axes[*j].is_one_sided() { LN_2 } else { 0.0 };
+                                Some(normal(value(*j)?, 0.0, d.powi(-2)) + half)
+                            })
+                            .sum()
+                    })
+                    .collect();
+                log_mean(&each)
+            })
+            .sum();
+        of_entries + of_blocks
     }
 
     /// log Z from draws around a Laplace approximation, its standard error, and the effective number of draws.
@@ -516,9 +593,9 @@ mod tests {
         let expansion = Expansion::new(&problem, &fitted);
         let blocks = expansion.blocks();
         let deviation = problem.axes[0].deviation;
-        let each = blocks[0]
-            .sizes
-            .map(|size| exact(&records[0], [deviation.powi(2), size * size]));
+        let each: Vec<f64> = (blocks[0].options.iter())
+            .map(|size| exact(&records[0], [deviation.powi(2), size[0] * size[0]]))
+            .collect();
         let found = evidence(&problem, &fitted, None).unwrap().unwrap();
         assert!(
             (found.laplace - log_mean(&each)).abs() < 0.02,

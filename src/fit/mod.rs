@@ -21,7 +21,7 @@ pub(crate) mod evidence;
 pub(crate) mod first_part;
 pub(crate) mod growing;
 pub(crate) mod least_squares;
-mod magnitude;
+pub(crate) mod magnitude;
 mod outcome;
 pub(crate) mod posterior;
 pub(crate) mod problem;

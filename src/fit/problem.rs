@@ -1,6 +1,6 @@
 //! A twin and the records that it is fitted to.
 
-use crate::fit::axis::Axis;
+use crate::fit::axis::{Axis, Family};
 use crate::likelihood::ensemble::{self, Predictor};
 use crate::likelihood::kalman::{Coordinates, FilterError, Filtered, Score};
 use crate::likelihood::{Likelihood, likelihood_of};
@@ -21,6 +21,8 @@ pub(crate) struct Problem<'a> {
     /// Indices of the twin's parameters in the full θ, for each record.
     pub(super) places: Vec<Vec<usize>>,
     pub axes: Vec<Axis>,
+    /// Entries whose priors belong together.
+    pub families: Vec<Family>,
     pub coordinates: Coordinates,
     coordinates_of: Vec<Coordinates>,
     likelihood: Arc<dyn Likelihood>,
@@ -70,6 +72,7 @@ impl<'a> Problem<'a> {
                 .collect(),
             places,
             axes: all,
+            families: vec![],
             done: if likelihood.is_simulated() {
                 5e-2
             } else {

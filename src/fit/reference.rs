@@ -121,6 +121,16 @@ impl Reference {
         &self.r
     }
 
+    /// What θ answers to so many multiples of a direction: a step in φ.
+    pub fn answer(&self, direction: &DVector<f64>, alpha: f64) -> DVector<f64> {
+        &self.answer - self.factor.solve(&self.directions.tr_mul(direction)) * alpha
+    }
+
+    /// Direction of an entry of θ.
+    pub fn column(&self, j: usize) -> nalgebra::DVectorView<'_, f64> {
+        self.directions.column(j)
+    }
+
     /// The Gauss–Newton step of θ, the weak prior pulling as `pull` says.
     pub fn step(&self, pull: &DVector<f64>) -> DVector<f64> {
         (self.factor).solve(&(self.directions.tr_mul(&self.r) + pull))

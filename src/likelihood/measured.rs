@@ -12,6 +12,7 @@
 
 use super::ensemble;
 use super::kalman::{FilterError, FilterSettings, Kalman, recoverable};
+use crate::effect::stops;
 use crate::math::deviation;
 use crate::record::Record;
 use crate::twin::{
@@ -33,6 +34,10 @@ const SHARE: f64 = 0.03;
 const LOUD: f64 = 0.1;
 /// Range of a fitted level, as powers of e around its guess: rounding at one end, nonsense at the other.
 const RANGE: f64 = 12.0;
+
+/// Least measurement noise of outputs that stop at an end of their range, as a share of their motion: where the twin stops there, too,
+/// noise that vanishes would make those samples infinitely likely.
+const STOPPED: f64 = 1e-3;
 
 /// A study's word on noise levels and starts.
 #[derive(Debug, Clone, Default)]
@@ -139,7 +144,8 @@ fn build(
     let step = records[0].drive().dt();
     let longest = records.iter().map(Record::samples).max().unwrap_or(1) as f64 * step;
     let mut levels = Vec::new();
-    let mut add = |name: &str, unit: String, is_process, declared: f64, guess: f64, loud: f64| {
+    let mut add = |name: &str, unit: String, floor: f64, declared: f64, guess: f64, loud: f64| {
+        let is_process = floor == 0.0;
         let role_name = Role::Noise.name(name);
         if beliefs.known.contains(name) || outline.parameters.position(&role_name).is_ok() {
             return None;
@@ -150,7 +156,7 @@ fn build(
             (guess, UNDECLARED)
         };
         let reach = RANGE.exp();
-        let bounds = Interval::unchecked(median / reach, median * reach);
+        let bounds = Interval::unchecked((median / reach).max(floor), median * reach);
         let parameter = Parameter {
             name: role_name,
             unit,
@@ -180,7 +186,7 @@ fn build(
         let declared = q[i] / beliefs.step.sqrt();
         let guess = WANDER * sizes[i] / longest.sqrt();
         let loud = LOUD * sizes[i] / step.sqrt();
-        if let Some(parameter) = add(&state.name, unit, true, declared, guess, loud) {
+        if let Some(parameter) = add(&state.name, unit, 0.0, declared, guess, loud) {
             noisy.process[i] = Source::Fitted {
                 parameter,
                 declared,
@@ -193,7 +199,9 @@ fn build(
     for (j, output) in outline.outputs.iter().enumerate() {
         let (guess, loud) = (SHARE * outputs[j], LOUD * outputs[j]);
         let unit = output.unit.clone();
-        if let Some(parameter) = add(&output.name, unit, false, r[j], guess, loud) {
+        let stops = records.iter().any(|r| stops(&r.outputs().column(j).to_vec()));
+        let floor = if stops { STOPPED * outputs[j] } else { f64::MIN_POSITIVE };
+        if let Some(parameter) = add(&output.name, unit, floor, r[j], guess, loud) {
             noisy.measurement[j] = Source::Fitted {
                 parameter,
                 declared: r[j],

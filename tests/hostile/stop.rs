@@ -243,7 +243,7 @@ fn trials_and_records_survive_kills_at_any_moment() {
             "reproduce --twin van-der-pol --runs 12 --bank-size 200 --epochs 2",
             "runs",
             "reproduce.json",
-            400,
+            2500,
         ),
     ] {
         let verb = call.split(' ').next().unwrap();

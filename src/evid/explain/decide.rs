@@ -1,0 +1,216 @@
+//! Decision by posterior odds.
+//!
+//! ```text
+//! D     = log Σ w_h·Z_h − log Z_0                     w: 0.6 shared by listed effects, 0.4 by unknown functions;  a gap if D > 0
+//! r(E)  = max_U log Z(E + U) − log Z(E)               E leaves nothing to explain if r < 4
+//! named : the largest log Z of what leaves nothing;  a larger set must be 2 nats better, an unknown function alone must not be better
+//! ```
+
+use super::search::Found;
+use crate::evid::outcome::Decision;
+use crate::evid::thresholds::Thresholds;
+use crate::fit::evidence::log_mean;
+use std::collections::BTreeMap;
+
+/// Everything that was found.
+pub(in crate::evid) struct Findings<'a> {
+    /// Listed effects alone, best first.
+    pub listed: Vec<Found<'a>>,
+    /// Unknown functions alone, best first.
+    pub unknown: Vec<Found<'a>>,
+    /// Pairs and triples of listed effects, best first.
+    pub several: Vec<Found<'a>>,
+    /// Sets of listed effects with what unknown functions add on top, best first.
+    pub beside: Vec<(Vec<String>, Vec<Found<'a>>)>,
+}
+
+/// Posterior probabilities.
+#[derive(Debug, Clone, Default)]
+pub(in crate::evid) struct Chances {
+    /// Nothing is missing.
+    pub nothing: f64,
+    /// Something unknown alone.
+    pub unknown: f64,
+    /// Sets of listed effects beside something unknown.
+    pub parts: Vec<(Vec<String>, f64)>,
+    /// Listed effects by their keys: alone, as part of a set, or beside something unknown.
+    pub effects: BTreeMap<String, f64>,
+    /// Sets of listed effects that explain everything.
+    pub sets: Vec<(Vec<String>, f64)>,
+    /// Places.
+    pub places: BTreeMap<String, f64>,
+    /// log of the odds of a gap against none, prior odds even.
+    pub log_odds: f64,
+}
+
+impl Findings<'_> {
+    /// What unknown functions add on top of a set, in nats; `None` where that was not asked.
+    pub fn left(&self, keys: &[String]) -> Option<f64> {
+        let (_, on_top) = self.beside.iter().find(|(k, _)| same(k, keys))?;
+        let own = self.gain(keys)?;
+        Some(on_top.first().map_or(0.0, |f| f.gain - own))
+    }
+
+    fn gain(&self, keys: &[String]) -> Option<f64> {
+        (self.listed.iter().chain(&self.several)).find(|f| same(&f.keys(), keys)).map(|f| f.gain)
+    }
+
+    /// Posterior probabilities of all hypotheses.
+    pub fn chances(&self) -> Chances {
+        let (listed, unknown) = (self.listed.len().max(1) as f64, self.unknown.len().max(1) as f64);
+        let each = Thresholds::LISTED / listed;
+        let every = (1.0 - Thresholds::LISTED) / unknown;
+        // (log weight, listed effects, with something unknown, places)
+        let mut all: Vec<(f64, Vec<String>, bool, Vec<String>)> = vec![];
+        let places = |found: &Found<'_>| -> Vec<String> {
+            found.terms.iter().map(|t| t.target.clone()).collect()
+        };
+        for found in &self.listed {
+            all.push((each.ln() + found.gain, found.keys(), false, places(found)));
+        }
+        for found in &self.unknown {
+            all.push((every.ln() + found.gain, vec![], true, places(found)));
+        }
+        let pair = (0.5 * (listed - 1.0)).max(1.0).ln();
+        for found in &self.several {
+            let price = pair * (found.terms.len() - 1) as f64;
+            all.push((each.ln() + found.gain - price, found.keys(), false, places(found)));
+        }
+        for (keys, on_top) in &self.beside {
+            let price = pair * (keys.len() - 1) as f64;
+            for found in on_top {
+                let weight = each.ln() + every.ln() + Thresholds::SECOND.ln() + found.gain - price;
+                all.push((weight, keys.clone(), true, vec![found.last().target.clone()]));
+            }
+        }
+        let logs: Vec<f64> = all.iter().map(|(w, ..)| *w).collect();
+        let sum = log_mean(&logs) + (logs.len() as f64).ln();
+        let nothing = 1.0 / (1.0 + sum.exp());
+        let mut chances = Chances { nothing, log_odds: sum, ..Chances::default() };
+        let whole = sum.max(0.0) + (-sum.abs()).exp().ln_1p();
+        for (weight, keys, unknown, places) in all {
+            let p = (weight - whole).exp();
+            for key in &keys {
+                *chances.effects.entry(key.clone()).or_default() += p;
+            }
+            match (unknown, keys.is_empty()) {
+                (false, _) => chances.sets.push((keys, p)),
+                (true, true) => chances.unknown += p,
+                (true, false) => match chances.parts.iter_mut().find(|(k, _)| same(k, &keys)) {
+                    Some((_, all)) => *all += p,
+                    None => chances.parts.push((keys, p)),
+                },
+            }
+            for place in &places {
+                *chances.places.entry(place.clone()).or_default() += p / places.len() as f64;
+            }
+        }
+        chances.sets.sort_by(|a, b| b.1.total_cmp(&a.1));
+        chances.parts.sort_by(|a, b| b.1.total_cmp(&a.1));
+        chances
+    }
+}
+
+fn same(a: &[String], b: &[String]) -> bool {
+    a.len() == b.len() && a.iter().all(|key| b.contains(key))
+}
+
+/// The decision, the effects that the twin is given, and their rivals.
+#[derive(Debug, Clone, Default)]
+pub(in crate::evid) struct Conclusion {
+    pub decision: Option<Decision>,
+    pub accepted: Vec<String>,
+    pub class: Vec<String>,
+    /// Share of all nats that what remains beside the accepted takes.
+    pub remains: Option<(String, f64)>,
+}
+
+/// Decides about a gap.
+pub(in crate::evid) fn decide(findings: &Findings<'_>, most_effects: usize) -> Conclusion {
+    let best_unknown = findings.unknown.first().map_or(f64::NEG_INFINITY, |f| f.gain);
+    let listed = findings.listed.len().max(2) as f64;
+    let price = (0.5 * (listed - 1.0)).max(1.0).ln();
+    let top = findings.listed.first().map_or(f64::NEG_INFINITY, |f| f.gain);
+    // (keys, value with its price, what is left)
+    let singles = (findings.listed.iter()).filter(|f| f.gain > top - Thresholds::CANDIDATES);
+    let candidates: Vec<(Vec<String>, f64, f64)> = singles
+        .chain(&findings.several)
+        .filter_map(|f| {
+            let keys = f.keys();
+            let left = findings.left(&keys)?;
+            Some((keys, f.gain - price * (f.terms.len() - 1) as f64, left))
+        })
+        .collect();
+    let mut chosen: Option<&(Vec<String>, f64, f64)> = None;
+    for count in 1..=most_effects {
+        let best = (candidates.iter())
+            .filter(|c| c.0.len() == count && c.2 < Thresholds::ADEQUATE)
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some(best) = best
+            && chosen.is_none_or(|c| best.1 > c.1 + Thresholds::WORTH_ANOTHER)
+        {
+            chosen = Some(best);
+        }
+    }
+    if chosen.is_some_and(|c| best_unknown > c.1) {
+        chosen = None;
+    }
+    if let Some((keys, _, _)) = chosen {
+        return named(findings, keys, Decision::Named, None);
+    }
+    // Listed effects that explain most, beside something unknown.
+    let chances = findings.chances();
+    let partial: f64 = chances.parts.iter().map(|(_, p)| p).sum();
+    if let Some((keys, _)) = chances.parts.first()
+        && partial > chances.unknown
+        && let Some(own) = findings.gain(keys)
+        && let Some(left) = findings.left(keys)
+        && left < Thresholds::REST * (own + left)
+        && let Some(rest) = findings.beside.iter().find(|(k, _)| same(k, keys)).and_then(|(_, on_top)| on_top.first())
+    {
+        let place = rest.last().target.clone();
+        return named(findings, keys, Decision::Partial, Some((place, left / (own + left))));
+    }
+    Conclusion {
+        decision: Some(Decision::NoneOfThese),
+        ..Conclusion::default()
+    }
+}
+
+/// A set that is named, with single effects that the records cannot tell from it.
+fn named(
+    findings: &Findings<'_>,
+    keys: &[String],
+    decision: Decision,
+    remains: Option<(String, f64)>,
+) -> Conclusion {
+    let mut class = keys.to_vec();
+    if let [key] = keys {
+        let own = findings.gain(keys).unwrap_or(f64::NAN);
+        let rivals = (findings.listed.iter())
+            .filter(|f| f.gain > own - Thresholds::RIVALS && f.keys()[0] != *key)
+            .map(|f| f.keys()[0].clone());
+        class.extend(rivals);
+    } else {
+        // A partner that another effect could stand in for.
+        let own = findings.gain(keys).unwrap_or(f64::NAN);
+        for found in &findings.several {
+            let others = found.keys();
+            let shared = others.iter().filter(|k| keys.contains(k)).count();
+            if found.gain > own - Thresholds::RIVALS && others.len() == keys.len() && shared + 1 == keys.len() {
+                class.extend(others.into_iter().filter(|k| !keys.contains(k)));
+            }
+        }
+    }
+    class.dedup();
+    let decision = match decision {
+        Decision::Named if class.len() > keys.len() => Decision::Class,
+        other => other,
+    };
+    Conclusion {
+        decision: Some(decision),
+        accepted: keys.to_vec(),
+        class: if class.len() > keys.len() { class } else { vec![] },
+        remains,
+    }
+}

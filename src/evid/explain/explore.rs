@@ -1,0 +1,151 @@
+//! The order of the search: single explanations, what they leave, pairs, triples.
+
+use super::decide::Findings;
+use super::search::{Breadth, Found, listed, own_theta, sort, unknown};
+use crate::evid::error::DiagnoseError;
+use crate::evid::hypotheses::scales::Scales;
+use crate::evid::hypotheses::term::Term;
+use crate::evid::model::Model;
+use crate::evid::thresholds::Thresholds;
+use std::sync::Arc;
+
+/// Terms of a diagnosis.
+pub(in crate::evid) struct Terms<'t> {
+    pub listed: &'t [Arc<Term>],
+    /// Unknown functions whose range covers these models' states as well.
+    pub unknown: &'t dyn Fn(&[Scales<'_>]) -> Vec<Arc<Term>>,
+}
+
+/// Finds out what explains the records beside the twin; stops early where nothing does.
+pub(in crate::evid) fn explore<'a>(
+    base: &Model<'a>,
+    terms: &Terms<'_>,
+    breadth: Breadth,
+) -> Result<Findings<'a>, DiagnoseError> {
+    let origin = base.log_evidence;
+    let first = (terms.unknown)(&[]);
+    let mut unknown_alone = unknown(base, &first, origin, breadth)?;
+    let best = unknown_alone.first().map_or(0.0, |f| f.gain);
+    let breadth = Breadth { deep: best > Thresholds::DEEP, ..breadth };
+    let mut singles = listed(base, terms.listed, origin, &[], Breadth { listed: if best > Thresholds::NULL_LIKE { usize::MAX } else { breadth.listed }, ..breadth })?;
+    let top = singles.first().map_or(0.0, |f| f.gain);
+    if best <= Thresholds::NULL_LIKE && top > Thresholds::NULL_LIKE {
+        singles = listed(base, terms.listed, origin, &[], Breadth { listed: usize::MAX, ..breadth })?;
+    }
+    let top = singles.first().map_or(0.0, |f| f.gain);
+    let mut findings = Findings { listed: vec![], unknown: vec![], several: vec![], beside: vec![] };
+    if top > Thresholds::WIDER {
+        // The twin that is misfitted may not go where the corrected one goes.
+        let seen = scales(&singles[..singles.len().min(2)])?;
+        for found in unknown(base, &(terms.unknown)(&seen), origin, breadth)? {
+            match unknown_alone.iter_mut().find(|f| f.keys() == found.keys()) {
+                Some(old) if found.gain > old.gain => *old = found,
+                _ => {}
+            }
+        }
+        sort(&mut unknown_alone);
+    }
+    findings.listed = singles;
+    findings.unknown = unknown_alone;
+    if findings.chances().log_odds <= 0.0 {
+        return Ok(findings);
+    }
+    let narrow = Breadth { functions: breadth.functions.div_ceil(2).max(2), ..breadth };
+    let mut enough = false;
+    for i in 0..findings.listed.len().min(3) {
+        let found = findings.listed[i].clone();
+        if found.gain < top - Thresholds::CANDIDATES {
+            break;
+        }
+        let Some(left) = on_top(&found, terms, origin, narrow)? else { continue };
+        let added = left.first().map_or(0.0, |f| f.gain - found.gain);
+        findings.beside.push((found.keys(), left));
+        if added < Thresholds::ADEQUATE {
+            enough = true;
+            break;
+        }
+    }
+    findings.several = pairs(&findings, terms, origin, breadth, enough)?;
+    let single = top;
+    for i in 0..findings.several.len().min(2) {
+        let found = findings.several[i].clone();
+        if found.gain < single + Thresholds::WORTH_ANOTHER {
+            break;
+        }
+        if let Some(left) = on_top(&found, terms, origin, narrow)? {
+            let added = left.first().map_or(0.0, |f| f.gain - found.gain);
+            findings.beside.push((found.keys(), left));
+            if added < Thresholds::ADEQUATE {
+                break;
+            }
+        }
+    }
+    Ok(findings)
+}
+
+/// What unknown functions add on top of fitted effects.
+fn on_top<'a>(
+    found: &Found<'a>,
+    terms: &Terms<'_>,
+    origin: f64,
+    breadth: Breadth,
+) -> Result<Option<Vec<Found<'a>>>, DiagnoseError> {
+    let Some(model) = &found.model else { return Ok(None) };
+    let seen = scales(std::slice::from_ref(found))?;
+    Ok(Some(unknown(model, &(terms.unknown)(&seen), origin, breadth)?))
+}
+
+/// Second effects on top of the best singles; thirds on top of the best pair where much is left.
+fn pairs<'a>(
+    findings: &Findings<'a>,
+    terms: &Terms<'_>,
+    origin: f64,
+    breadth: Breadth,
+    enough: bool,
+) -> Result<Vec<Found<'a>>, DiagnoseError> {
+    let firsts = if enough { 1 } else { 3 };
+    let thetas: Vec<Vec<f64>> = findings.listed.iter().take(2).filter_map(own_theta).collect();
+    let mut all: Vec<Found<'a>> = vec![];
+    let sources: Vec<Found<'a>> = match findings.beside.iter().find(|_| enough) {
+        Some(_) => {
+            let adequate = |f: &&Found<'a>| findings.left(&f.keys()).is_some_and(|l| l < Thresholds::ADEQUATE);
+            findings.listed.iter().find(adequate).cloned().into_iter().collect()
+        }
+        None => findings.listed.iter().take(firsts).cloned().collect(),
+    };
+    for first in &sources {
+        let Some(model) = &first.model else { continue };
+        let others: Vec<Arc<Term>> = (terms.listed.iter())
+            .filter(|t| !first.terms.iter().any(|own| own.key() == t.key()))
+            .cloned()
+            .collect();
+        let seconds = Breadth { listed: if enough { 4 } else { 8 }, least: 3.0, ..breadth };
+        let found = listed(model, &others, origin, &thetas, seconds)?;
+        for pair in found.into_iter().filter(|f| f.model.is_some()) {
+            let keys = pair.keys();
+            match all.iter_mut().find(|p| p.keys().iter().all(|k| keys.contains(k))) {
+                Some(old) if old.gain >= pair.gain => {}
+                Some(old) => *old = pair,
+                None => all.push(pair),
+            }
+        }
+    }
+    sort(&mut all);
+    all.truncate(Thresholds::PAIRS);
+    Ok(all)
+}
+
+/// Sizes of the states along fitted models.
+fn scales<'a>(found: &[Found<'a>]) -> Result<Vec<Scales<'a>>, DiagnoseError> {
+    let mut all = vec![];
+    for model in found.iter().filter_map(|f| f.model.as_ref()) {
+        all.push(Scales {
+            records: model.problem.records,
+            states: model.states()?,
+            outline: model.problem.outline(),
+            rates: vec![],
+            defined: vec![],
+        });
+    }
+    Ok(all)
+}

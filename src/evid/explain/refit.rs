@@ -1,0 +1,168 @@
+//! Fits of terms together with θ and noise levels.
+
+use super::scan::{Beginning, Linear, Promise};
+use crate::evid::error::DiagnoseError;
+use crate::evid::model::{Extended, Model};
+use crate::fit::climb::{Fitted, climb};
+use crate::fit::evidence::laplace;
+use crate::likelihood::kalman::recoverable;
+use rayon::prelude::*;
+
+/// Shares of the step to the top of the quadratic that a function's fit may begin at.
+const SHARES: [f64; 4] = [1.0, 0.5, 0.2, 0.0];
+
+/// Effort of a fit.
+#[derive(Clone, Copy)]
+pub(in crate::evid) struct Effort {
+    /// Starts of the term.
+    pub starts: usize,
+    pub iterations: usize,
+}
+
+/// Iterations at each level of held noise, and those of the free fit that follows.
+const HELD: usize = 6;
+const RELEASED: usize = 40;
+
+/// Fits a promise beside a model from its best starts, with θ as it answers them and with those given; `None` where it works at none.
+pub(in crate::evid) fn fit_promise<'a>(
+    model: &Model<'a>,
+    promise: &Promise,
+    thetas: &[Vec<f64>],
+    effort: Effort,
+) -> Result<Option<Model<'a>>, DiagnoseError> {
+    let extended = model.extend(&promise.term)?;
+    let chosen: Vec<&Beginning> = promise.starts.iter().take(effort.starts).collect();
+    let mut from: Vec<Vec<f64>> = (chosen.iter())
+        .map(|start| begin(model, &extended, start))
+        .collect::<Result<_, DiagnoseError>>()?;
+    if let Some(first) = chosen.first() {
+        let first = model.beside(&extended, &first.m);
+        from.extend(thetas.iter().map(|own| extended.from(own, first.clone())));
+    }
+    let fits: Vec<Option<Fitted>> = (from.par_iter())
+        .map(|start| climb(&extended.problem, start, effort.iterations))
+        .collect::<Result<_, _>>()?;
+    let best = (fits.into_iter().flatten()).reduce(|a, b| if b.objective > a.objective { b } else { a });
+    let problem = extended.problem.clone();
+    Ok(best.and_then(|fitted| extended.fitted(model.base, fitted, problem)))
+}
+
+/// The model with its noise held loud, θ fitted to that: predictions then hardly reach beyond a row, and the likelihood has no narrow
+/// valleys.
+pub(in crate::evid) fn loudly<'a>(model: &Model<'a>) -> Result<Option<Model<'a>>, DiagnoseError> {
+    let is_noise = |j: usize| model.problem.axes[j].begin.is_some();
+    let problem = model.problem.holding(is_noise);
+    let start = problem.begin(&model.fitted.theta);
+    Ok(climb(&problem, &start, 2 * HELD)?.map(|fitted| Model {
+        problem,
+        fitted,
+        ..model.clone()
+    }))
+}
+
+/// Fits a promise beside the loud model, the noise let down in steps to that of the model and then free.
+pub(in crate::evid) fn fit_annealed<'a>(
+    model: &Model<'a>,
+    loud: &Model<'a>,
+    promise: &Promise,
+    starts: usize,
+) -> Result<Option<Model<'a>>, DiagnoseError> {
+    let held = loud.extend(&promise.term)?;
+    let free = model.extend(&promise.term)?;
+    let fits: Vec<Option<Fitted>> = (promise.starts.par_iter().take(starts))
+        .map(|start| {
+            let mut theta = begin(loud, &held, start)?;
+            for share in [0.0, 0.5] {
+                let c = &held.problem.coordinates;
+                let (mut phi, quiet) = (c.of(&theta), model.problem.coordinates.of(&model.fitted.theta));
+                let loudest = loud.problem.coordinates.of(&loud.fitted.theta);
+                for (j, axis) in loud.problem.axes.iter().enumerate() {
+                    if axis.begin.is_some() {
+                        phi[j] = (1.0 - share) * loudest[j] + share * quiet[j];
+                    }
+                }
+                let Some(fitted) = climb(&held.problem, &c.theta(&phi), HELD)? else {
+                    return Ok(None);
+                };
+                theta = fitted.theta;
+            }
+            Ok(climb(&free.problem, &theta, RELEASED)?)
+        })
+        .collect::<Result<_, DiagnoseError>>()?;
+    let best = (fits.into_iter().flatten()).reduce(|a, b| if b.objective > a.objective { b } else { a });
+    let problem = free.problem.clone();
+    Ok(best.and_then(|fitted| free.fitted(model.base, fitted, problem)))
+}
+
+/// The likeliest point on the way from the model to a start: all of it, or less where the quadratic promised too much.
+fn begin(
+    model: &Model<'_>,
+    extended: &Extended<'_>,
+    start: &Beginning,
+) -> Result<Vec<f64>, DiagnoseError> {
+    let c = &model.problem.coordinates;
+    let phi = c.of(&model.fitted.theta);
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    for share in SHARES {
+        let moved: Vec<f64> = phi.iter().zip(&start.answer).map(|(phi, step)| phi + share * step).collect();
+        let theta = model.problem.clamp(&c.theta(&moved));
+        let mut m = start.m.clone();
+        if start.scales {
+            m[0] *= share.max(SHARES[SHARES.len() - 2]);
+        }
+        let full = model.beside_at(extended, &theta, &m);
+        if let Some(value) = recoverable(extended.problem.log_likelihood(&full))? {
+            let value = value + extended.problem.log_prior(&full, true);
+            if best.as_ref().is_none_or(|(b, _)| value > *b) {
+                best = Some((value, full));
+            }
+        }
+    }
+    Ok(best.map_or_else(|| model.beside(extended, &start.m), |(_, theta)| theta))
+}
+
+/// Fits an unknown function's coefficients under the prior that is most probable, and once more if that moved.
+pub(in crate::evid) fn fit_function<'a>(
+    model: &Model<'a>,
+    linear: Linear<'a>,
+    iterations: usize,
+) -> Result<Option<Model<'a>>, DiagnoseError> {
+    let Linear { extended, found, theta, .. } = linear;
+    let mut problem = extended.with_sizes(&found);
+    // From the top of the quadratic, or nearer where that is too far.
+    let c = &extended.problem.coordinates;
+    let phi = c.of(&theta);
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    for share in SHARES {
+        let mut moved = phi.clone();
+        for (a, &j) in found.free.iter().enumerate() {
+            moved[j] += share * (found.centre[a] - phi[j]);
+        }
+        let theta = problem.clamp(&c.theta(&moved));
+        if let Some(value) = recoverable(problem.log_likelihood(&theta))? {
+            let value = value + problem.log_prior(&theta, true);
+            if best.as_ref().is_none_or(|(b, _)| value > *b) {
+                best = Some((value, theta));
+            }
+        }
+    }
+    let Some((_, mut start)) = best else {
+        return Ok(None);
+    };
+    let mut kept: Option<(f64, Fitted, _)> = None;
+    for _ in 0..2 {
+        let Some(fitted) = climb(&problem, &start, iterations)? else {
+            break;
+        };
+        let Some((value, found)) = laplace(&problem, &fitted, 1.5) else {
+            break;
+        };
+        if kept.as_ref().is_some_and(|(k, ..)| value <= *k + 0.1) {
+            break;
+        }
+        start.clone_from(&fitted.theta);
+        kept = Some((value, fitted, problem.clone()));
+        problem = extended.with_sizes(&found);
+    }
+    Ok(kept.and_then(|(_, fitted, problem)| extended.fitted(model.base, fitted, problem)))
+}

@@ -1,0 +1,159 @@
+//! Promise of a term beside a fitted model, before any refit.
+//!
+//! The innovations of the model with a little of the term give a direction; the gain along it, θ free to answer, is the promise of a
+//! listed effect. An unknown function's coefficients have a score each, so that its evidence has a closed form.
+
+use crate::evid::error::DiagnoseError;
+use crate::evid::hypotheses::term::{Start, Term};
+use crate::evid::model::{Extended, Model};
+use crate::fit::axis::EvidencePrior;
+use crate::fit::evidence::{Laplace, laplace};
+use crate::fit::reference::Reference;
+use crate::likelihood::kalman::recoverable;
+use nalgebra::DVector;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Size at which a direction is taken, as a share of the largest one.
+const SMALL: f64 = 0.01;
+
+/// A term and its best starts.
+pub(in crate::evid) struct Promise {
+    pub term: Arc<Term>,
+    /// Best first.
+    pub starts: Vec<Beginning>,
+}
+
+/// Where a fit of a term may begin.
+#[derive(Clone)]
+pub(in crate::evid) struct Beginning {
+    /// Gain to second order, in nats.
+    pub nats: f64,
+    /// Magnitudes.
+    pub m: Vec<f64>,
+    /// True where less of the first magnitude is less of the term.
+    pub scales: bool,
+    /// What θ of the model answers to it, in φ.
+    pub answer: DVector<f64>,
+}
+
+impl Promise {
+    /// The best gain, in nats.
+    pub fn nats(&self) -> f64 {
+        self.starts.first().map_or(0.0, |start| start.nats)
+    }
+}
+
+/// Promises of terms beside a model, best first; terms that nothing can be told of are left out.
+pub(in crate::evid) fn scan(
+    model: &Model<'_>,
+    terms: &[Arc<Term>],
+) -> Result<Vec<Promise>, DiagnoseError> {
+    let Some(reference) = recoverable(Reference::new(&model.problem, &model.fitted.theta))?.flatten()
+    else {
+        return Ok(vec![]);
+    };
+    let mut all: Vec<Promise> = (terms.par_iter())
+        .map(|term| {
+            let extended = model.extend(term)?;
+            let mut starts: Vec<Beginning> = (term.starts.par_iter())
+                .map(|start| promise(model, &reference, &extended, start))
+                .collect::<Result<Vec<_>, DiagnoseError>>()?
+                .into_iter()
+                .flatten()
+                .collect();
+            starts.sort_by(|a, b| b.nats.total_cmp(&a.nats));
+            Ok(Promise { term: term.clone(), starts })
+        })
+        .collect::<Result<_, DiagnoseError>>()?;
+    all.retain(|promise| !promise.starts.is_empty());
+    all.sort_by(|a, b| b.nats().total_cmp(&a.nats()));
+    Ok(all)
+}
+
+/// The gain of one start, and its magnitudes.
+fn promise(
+    model: &Model<'_>,
+    reference: &Reference,
+    extended: &Extended<'_>,
+    start: &Start,
+) -> Result<Option<Beginning>, DiagnoseError> {
+    let problem = &extended.problem;
+    let first = &problem.axes[extended.entries[0]];
+    let mut m = start.m.clone();
+    let step = match first.evidence {
+        EvidencePrior::Magnitude { largest } if start.scales => {
+            let step = SMALL * largest;
+            m[0] = if first.bounds.contains(step) { step } else { -step };
+            m[0]
+        }
+        _ => 1.0,
+    };
+    let theta = model.beside(extended, &m);
+    let Some(filtered) = recoverable(problem.filtered(&theta))? else {
+        return Ok(None);
+    };
+    let direction = reference.direction(&filtered);
+    if start.scales {
+        let (low, high) = (first.bounds.low() / step, first.bounds.high() / step);
+        let gain = reference.gain(&direction, (low.min(high), low.max(high)));
+        m[0] = gain.alpha * step;
+        return Ok((gain.nats > 0.0).then(|| Beginning {
+            nats: gain.nats,
+            m,
+            scales: true,
+            answer: reference.answer(&direction, gain.alpha),
+        }));
+    }
+    let value: f64 = filtered.iter().map(|f| f.log_likelihood).sum();
+    let gain = reference.gain(&direction, (0.0, 1.5));
+    Ok(Some(Beginning {
+        nats: gain.nats.max(value - model.fitted.log_likelihood),
+        m,
+        scales: false,
+        answer: reference.answer(&direction, 1.0),
+    }))
+}
+
+/// Evidence of an unknown function to second order, before any refit.
+pub(in crate::evid) struct Linear<'a> {
+    pub term: Arc<Term>,
+    pub extended: Extended<'a>,
+    /// Nats over the model.
+    pub gain: f64,
+    pub found: Laplace,
+    pub theta: Vec<f64>,
+}
+
+/// Unknown functions beside a model, best first.
+pub(in crate::evid) fn functions<'a>(
+    model: &Model<'a>,
+    terms: &[Arc<Term>],
+) -> Result<Vec<Linear<'a>>, DiagnoseError> {
+    let mut all: Vec<Linear<'a>> = (terms.par_iter())
+        .map(|term| {
+            let mut best: Option<Linear<'a>> = None;
+            for start in &term.starts {
+                let extended = model.extend(term)?;
+                let theta = model.beside(&extended, &start.m);
+                let Some(fitted) = extended.at(&theta)? else {
+                    continue;
+                };
+                let Some((log_evidence, found)) = laplace(&extended.problem, &fitted, f64::INFINITY)
+                else {
+                    continue;
+                };
+                let gain = log_evidence - model.log_evidence;
+                if best.as_ref().is_none_or(|b| gain > b.gain) {
+                    best = Some(Linear { term: term.clone(), extended, gain, found, theta });
+                }
+            }
+            Ok(best)
+        })
+        .collect::<Result<Vec<_>, DiagnoseError>>()?
+        .into_iter()
+        .flatten()
+        .collect();
+    all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    Ok(all)
+}

@@ -1,0 +1,267 @@
+//! Search for what a model lacks: all hypotheses are screened, the promising ones refitted.
+
+use super::refit::{Effort, fit_annealed, fit_function, fit_promise, loudly};
+use super::scan::{functions, scan};
+use crate::evid::error::DiagnoseError;
+use crate::evid::hypotheses::term::{Nature, Term};
+use crate::evid::model::Model;
+use crate::fit::evidence::log_mean;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Nats that the best of all frequencies is worth less than it looks, before a refit says how sharp it is.
+const PRICE_OF_FREQUENCY: f64 = 2.5;
+
+/// One explanation beside a model.
+#[derive(Clone)]
+pub(in crate::evid) struct Found<'a> {
+    pub terms: Vec<Arc<Term>>,
+    /// log Z over that of the twin, in nats: one term's may be used in several ways, which share its prior.
+    pub gain: f64,
+    /// The fit, where it was worth one.
+    pub model: Option<Model<'a>>,
+}
+
+impl Found<'_> {
+    /// Keys of the terms.
+    pub fn keys(&self) -> Vec<String> {
+        self.terms.iter().map(|t| t.key()).collect()
+    }
+
+    /// The term that was added last.
+    pub fn last(&self) -> &Term {
+        &self.terms[self.terms.len() - 1]
+    }
+}
+
+/// How many hypotheses are refitted.
+#[derive(Clone, Copy)]
+pub(in crate::evid) struct Breadth {
+    /// Listed effects in the first round.
+    pub listed: usize,
+    /// Functions.
+    pub functions: usize,
+    /// Nats that a screened hypothesis must promise.
+    pub least: f64,
+    /// True where much is missing, so that fits begin with loud noise, too.
+    pub deep: bool,
+}
+
+/// Of terms that are one hypothesis used in several ways, the best; its prior is shared among them.
+fn merged<'a>(all: Vec<Found<'a>>, ways: &BTreeMap<String, usize>) -> Vec<Found<'a>> {
+    let mut best: BTreeMap<Vec<String>, Found<'a>> = BTreeMap::new();
+    for found in all {
+        let keys = found.keys();
+        match best.get(&keys) {
+            Some(old) if old.gain >= found.gain => {}
+            _ => {
+                best.insert(keys, found);
+            }
+        }
+    }
+    let mut all: Vec<Found<'a>> = (best.into_values())
+        .map(|mut found| {
+            let ways = ways.get(&found.last().key()).copied().unwrap_or(1);
+            found.gain -= (ways as f64).ln();
+            found
+        })
+        .collect();
+    sort(&mut all);
+    all
+}
+
+/// Best first.
+pub(in crate::evid) fn sort(all: &mut [Found<'_>]) {
+    all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+}
+
+fn ways(terms: &[Arc<Term>]) -> BTreeMap<String, usize> {
+    let mut ways = BTreeMap::new();
+    for term in terms {
+        *ways.entry(term.key()).or_insert(0) += 1;
+    }
+    ways
+}
+
+/// Listed effects beside a model, refitted; best first. `origin` is log Z of the twin; `thetas` are further starts of the twin's own θ.
+pub(in crate::evid) fn listed<'a>(
+    model: &Model<'a>,
+    terms: &[Arc<Term>],
+    origin: f64,
+    thetas: &[Vec<f64>],
+    breadth: Breadth,
+) -> Result<Vec<Found<'a>>, DiagnoseError> {
+    let promises = scan(model, terms)?;
+    let chosen: Vec<_> = (promises.iter().enumerate())
+        .filter(|(i, p)| *i < breadth.listed && p.nats() > breadth.least)
+        .map(|(_, p)| p)
+        .collect();
+    let loud = if breadth.deep { loudly(model)? } else { None };
+    let louder = match &loud {
+        Some(loud) => scan(loud, terms)?,
+        None => vec![],
+    };
+    let found = |m: Model<'a>| Found {
+        terms: m.terms.clone(),
+        gain: m.log_evidence - origin,
+        model: Some(m),
+    };
+    let mut fits: Vec<Option<Found<'a>>> = (chosen.par_iter())
+        .map(|promise| {
+            let effort = Effort { starts: 2, iterations: 6 };
+            Ok(fit_promise(model, promise, thetas, effort)?.map(found))
+        })
+        .collect::<Result<_, DiagnoseError>>()?;
+    if let Some(loud) = &loud {
+        let again: Vec<Option<Found<'a>>> = (louder.par_iter())
+            .filter(|p| p.nats() > breadth.least)
+            .map(|promise| Ok(fit_annealed(model, loud, promise, 2)?.map(found)))
+            .collect::<Result<_, DiagnoseError>>()?;
+        for other in again.into_iter().flatten() {
+            let own = |f: &Option<Found<'a>>| {
+                f.as_ref().is_some_and(|f| Arc::ptr_eq(&f.terms[f.terms.len() - 1], &other.terms[other.terms.len() - 1]))
+            };
+            match fits.iter_mut().find(|f| own(f)) {
+                Some(Some(old)) if old.gain >= other.gain => {}
+                Some(old) => *old = Some(other),
+                None => fits.push(Some(other)),
+            }
+        }
+    }
+    let mut all: Vec<Found<'a>> = fits.into_iter().flatten().collect();
+    sort(&mut all);
+    // Those near the best get more starts and carry on.
+    let top = all.first().map_or(0.0, |f| f.gain);
+    let floor = model.log_evidence - origin;
+    let again: Vec<usize> = (0..all.len())
+        .filter(|&i| (i < 5 || all[i].gain > top - 4.0) && (all[i].gain > floor + 1.0 || i < 2))
+        .collect();
+    let best: Vec<Vec<f64>> = all.iter().take(2).filter_map(own_theta).collect();
+    let better: Vec<Option<Found<'a>>> = (again.par_iter())
+        .map(|&i| {
+            let found = &all[i];
+            let term = &found.terms[found.terms.len() - 1];
+            let promise = promises.iter().find(|p| Arc::ptr_eq(&p.term, term));
+            let thetas: Vec<Vec<f64>> =
+                best.iter().filter(|t| own_theta(found).as_ref() != Some(t)).cloned().collect();
+            let effort = Effort { starts: 3, iterations: 12 };
+            let fitted = match promise {
+                Some(promise) => fit_promise(model, promise, &thetas, effort)?,
+                None => None,
+            };
+            let on = match &found.model {
+                Some(m) => crate::fit::climb::climb(&m.problem, &m.fitted.theta, 12)?,
+                None => None,
+            };
+            let carried = match (&found.model, on) {
+                (Some(m), Some(fitted)) => refreshed(m, fitted),
+                _ => None,
+            };
+            let best = [fitted, carried]
+                .into_iter()
+                .flatten()
+                .reduce(|a, b| if b.fitted.objective > a.fitted.objective { b } else { a });
+            Ok(best.map(|m| Found {
+                terms: m.terms.clone(),
+                gain: m.log_evidence - origin,
+                model: Some(m),
+            }))
+        })
+        .collect::<Result<_, DiagnoseError>>()?;
+    for (i, found) in again.into_iter().zip(better) {
+        if let Some(found) = found
+            && found.gain > all[i].gain
+        {
+            all[i] = found;
+        }
+    }
+    // What was not refitted is no better than its promise.
+    for promise in &promises {
+        if !all.iter().any(|f| Arc::ptr_eq(&f.terms[f.terms.len() - 1], &promise.term)) {
+            let terms: Vec<Arc<Term>> = model.terms.iter().chain([&promise.term]).cloned().collect();
+            all.push(Found { terms, gain: floor + promise.nats().min(0.0), model: None });
+        }
+    }
+    Ok(merged(all, &ways(terms)))
+}
+
+/// The model at another fit.
+fn refreshed<'a>(model: &Model<'a>, fitted: crate::fit::climb::Fitted) -> Option<Model<'a>> {
+    let mark: f64 = model.terms.iter().map(|t| t.mark).sum();
+    let (log_evidence, _) = crate::fit::evidence::laplace(&model.problem, &fitted, 1.5)?;
+    Some(Model { fitted, log_evidence: log_evidence + mark, ..model.clone() })
+}
+
+/// θ of the twin without terms.
+pub(in crate::evid) fn own_theta(found: &Found<'_>) -> Option<Vec<f64>> {
+    let model = found.model.as_ref()?;
+    let d = model.base.parameters().len();
+    Some(model.theta()[..d].to_vec())
+}
+
+/// Unknown functions beside a model; best first.
+pub(in crate::evid) fn unknown<'a>(
+    model: &Model<'a>,
+    terms: &[Arc<Term>],
+    origin: f64,
+    breadth: Breadth,
+) -> Result<Vec<Found<'a>>, DiagnoseError> {
+    let floor = model.log_evidence - origin;
+    let of = |natures: &[Nature]| -> Vec<Arc<Term>> {
+        terms.iter().filter(|t| natures.contains(&t.nature)).cloned().collect()
+    };
+    let mut all: Vec<Found<'a>> = vec![];
+    for (natures, price) in [
+        (&[Nature::Function, Nature::Past][..], 0.0),
+        (&[Nature::Periodic], PRICE_OF_FREQUENCY),
+    ] {
+        let linear = functions(model, &of(natures))?;
+        let fits: Vec<(Vec<Arc<Term>>, f64, Option<Model<'a>>)> = (linear.into_par_iter())
+            .enumerate()
+            .map(|(i, linear)| {
+                let (terms, gain) = (linear.extended.terms.clone(), linear.gain - price);
+                let iterations = if gain > 10.0 { 6 } else { 4 };
+                let fitted = match i < breadth.functions && linear.gain > breadth.least {
+                    true => fit_function(model, linear, iterations)?,
+                    false => None,
+                };
+                Ok((terms, gain, fitted))
+            })
+            .collect::<Result<_, DiagnoseError>>()?;
+        // What was not refitted is no better than the best that was.
+        let best = (fits.iter())
+            .filter_map(|(.., m)| Some(m.as_ref()?.log_evidence - model.log_evidence))
+            .fold(breadth.least, f64::max);
+        all.extend(fits.into_iter().map(|(terms, gain, model)| Found {
+            gain: (model.as_ref()).map_or(floor + gain.min(best), |m| m.log_evidence - origin),
+            terms,
+            model,
+        }));
+    }
+    let promises = scan(model, &of(&[Nature::Time]))?;
+    // The starts of a disturbance are sizes from its prior: their mean likelihood is the evidence, but for what θ answers.
+    let rough: Vec<f64> = (promises.iter())
+        .map(|p| log_mean(&p.starts.iter().map(|start| start.nats).collect::<Vec<_>>()))
+        .collect();
+    let mut order: Vec<usize> = (0..rough.len()).collect();
+    order.sort_by(|a, b| rough[*b].total_cmp(&rough[*a]));
+    let fits: Vec<(usize, Option<Model<'a>>)> = (order.into_par_iter())
+        .enumerate()
+        .map(|(n, i)| {
+            let worth = n < breadth.functions && (rough[i] > 0.0 || promises[i].nats() > breadth.least);
+            let effort = Effort { starts: 2, iterations: 6 };
+            let fitted = if worth { fit_promise(model, &promises[i], &[], effort)? } else { None };
+            Ok((i, fitted))
+        })
+        .collect::<Result<_, DiagnoseError>>()?;
+    let best = (fits.iter())
+        .filter_map(|(_, m)| Some(m.as_ref()?.log_evidence - model.log_evidence))
+        .fold(breadth.least, f64::max);
+    all.extend(fits.into_iter().map(|(i, fitted)| Found {
+        terms: model.terms.iter().chain([&promises[i].term]).cloned().collect(),
+        gain: (fitted.as_ref()).map_or(floor + rough[i].min(best), |m| m.log_evidence - origin),
+        model: fitted,
+    }));
+    Ok(merged(all, &ways(terms)))
+}

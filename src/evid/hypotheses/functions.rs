@@ -1,0 +1,288 @@
+//! Unknown functions: rivals that stand for whatever the library does not list.
+//!
+//! ```text
+//! δ(z) = Σ β_k·φ_k(z),   φ_k(z) = √2·sin(kπ·(z − a)/(b − a)),   β ~ N(0, τ²·Λ),   Λ_k ∝ exp(−½(kπℓ/L)²),  ΣΛ = 1
+//! ```
+//!
+//! a, b: the range that the variable is seen in, a fifth wider at both ends; τ: the deviation of δ in the unit of what it is added to; ℓ:
+//! length in ranges; L: b − a in ranges. With two variables, products of the φ.
+//!
+//! Source: Solin & Särkkä, "Hilbert space methods for reduced-rank Gaussian process regression", *Statistics and Computing* 30 (2020).
+
+use super::term::{Nature, Part, Start, Term};
+use crate::effect::{Effect, EffectKind, Magnitude};
+use crate::fit::axis::{Axis, EvidencePrior};
+use crate::twin::{Interval, Parameter};
+use std::collections::BTreeMap;
+use std::f64::consts::{PI, SQRT_2};
+
+/// Terms of a function of one variable. At the shortest length the last one has e^−2 of the first one's variance; half of them cannot
+/// turn as fast as a ceiling does, twice of them double the time.
+pub(super) const TERMS: usize = 10;
+/// Most that the orders of a product of two add up to.
+const ORDER: usize = 7;
+const HIGHEST: usize = 6;
+/// Lengths in ranges of the variable.
+const LENGTHS: [f64; 3] = [0.15, 0.3, 0.7];
+const LENGTHS_OF_TWO: [f64; 2] = [0.3, 0.7];
+/// Share of the range by which a function's is wider at each end: its terms vanish at the ends.
+const MARGIN: f64 = 0.2;
+/// Time constants that a signal's past is seen through, in seconds, from a few steps to a part of the record.
+pub(super) const PASTS: usize = 4;
+
+/// Names of coefficients: effects name their magnitudes before any record is seen.
+static NAMES: [&str; 21] = [
+    "b1", "b2", "b3", "b4", "b5", "b6", "b7", "b8", "b9", "b10", "b11", "b12", "b13", "b14", "b15",
+    "b16", "b17", "b18", "b19", "b20", "b21",
+];
+
+/// A variable of a function and the range that it is seen in.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::evid) struct Variable {
+    pub name: String,
+    pub of: Of,
+    pub low: f64,
+    pub high: f64,
+}
+
+/// Kind of a function's variable.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::evid) enum Of {
+    /// State of this index.
+    State(usize),
+    /// Input of this index.
+    Input(usize),
+    /// The signal that passes a sensor or actuator.
+    Signal,
+}
+
+impl Variable {
+    fn ends(&self) -> (f64, f64) {
+        let span = (self.high - self.low).max(1e-12 * self.high.abs()).max(f64::MIN_POSITIVE);
+        (self.low - MARGIN * span, self.high + MARGIN * span)
+    }
+}
+
+/// Pairs of orders of a function of two variables.
+fn pairs() -> impl Iterator<Item = (usize, usize)> {
+    (1..=HIGHEST).flat_map(|i| (1..=HIGHEST).map(move |j| (i, j))).filter(|(i, j)| i + j <= ORDER)
+}
+
+/// Weights of the coefficients for each length.
+fn weights(variables: usize) -> Vec<Vec<f64>> {
+    let whole = 1.0 + 2.0 * MARGIN;
+    let one = |squares: &dyn Fn(f64) -> Vec<f64>, length: f64| -> Vec<f64> {
+        let raw: Vec<f64> = squares(PI / whole).iter().map(|w| (-0.5 * w * length * length).exp()).collect();
+        let least = 1e-5 * raw.iter().copied().fold(0.0, f64::max);
+        let raw: Vec<f64> = raw.into_iter().map(|w| w.max(least)).collect();
+        let sum: f64 = raw.iter().sum();
+        raw.into_iter().map(|w| w / sum).collect()
+    };
+    match variables {
+        1 => LENGTHS
+            .map(|length| {
+                one(&|unit| (1..=TERMS).map(|k| (k as f64 * unit).powi(2)).collect(), length)
+            })
+            .to_vec(),
+        _ => LENGTHS_OF_TWO
+            .map(|length| {
+                let squares = |unit: f64| {
+                    pairs().map(|(i, j)| ((i * i + j * j) as f64) * unit * unit).collect()
+                };
+                one(&squares, length)
+            })
+            .to_vec(),
+    }
+}
+
+/// √2·sin(kπz) for k = 1… into `out`, z = (value − a)/(b − a) held in [0, 1].
+fn sines(value: f64, (a, b): (f64, f64), out: &mut [f64]) {
+    let z = ((value - a) / (b - a)).clamp(0.0, 1.0);
+    let (sin, cos) = (PI * z).sin_cos();
+    let (mut before, mut now) = (0.0, SQRT_2 * sin);
+    for out in out {
+        *out = now;
+        (before, now) = (now, 2.0 * cos * now - before);
+    }
+}
+
+/// The sum of a function of one variable.
+fn sum_of_one(m: &[f64], value: f64, ends: (f64, f64)) -> f64 {
+    let mut phi = [0.0; TERMS];
+    sines(value, ends, &mut phi[..m.len()]);
+    m.iter().zip(phi).map(|(m, phi)| m * phi).sum()
+}
+
+fn sum_of_two(m: &[f64], values: [f64; 2], ends: [(f64, f64); 2]) -> f64 {
+    let mut phi = [[0.0; HIGHEST]; 2];
+    for ((phi, value), ends) in phi.iter_mut().zip(values).zip(ends) {
+        sines(value, ends, phi);
+    }
+    (pairs().zip(m)).map(|((i, j), m)| m * phi[0][i - 1] * phi[1][j - 1] * std::f64::consts::FRAC_1_SQRT_2).sum()
+}
+
+/// The value of a fitted function where its variable is `value`; of one variable.
+pub(in crate::evid) fn basis(value: f64, variable: &(String, f64, f64), count: usize) -> Vec<f64> {
+    let mut phi = vec![0.0; count];
+    sines(value, (variable.1, variable.2), &mut phi);
+    phi
+}
+
+fn with_coefficients(mut kind: EffectKind, count: usize) -> EffectKind {
+    for name in NAMES.iter().take(count) {
+        kind = kind.magnitude(Magnitude::signed(name, "", &[1.0]));
+    }
+    kind
+}
+
+/// A term of an unknown kind from its effect.
+fn term(
+    kind: EffectKind,
+    target: &str,
+    nature: Nature,
+    weights: Vec<Vec<f64>>,
+    largest: f64,
+    variables: Vec<(String, f64, f64)>,
+) -> Term {
+    let effect = Effect::unlisted(kind, target);
+    let axes = (effect.magnitudes().iter()).map(|_| coefficient(largest)).collect();
+    let starts = vec![Start { m: vec![0.0; effect.magnitudes().len()], scales: false }];
+    Term {
+        id: effect.id().into(),
+        target: target.into(),
+        nature,
+        axes,
+        family: Some((weights, largest)),
+        starts,
+        variables,
+        mark: 0.0,
+        part: Part::Effect { effect, held: BTreeMap::new(), kept: None },
+    }
+}
+
+/// Axis of a coefficient.
+fn coefficient(largest: f64) -> Axis {
+    let mut parameter = Parameter::new("", "", -largest, largest);
+    parameter.bounds = Interval::unchecked(-1e3 * largest, 1e3 * largest);
+    Axis {
+        centre: 0.0,
+        deviation: largest,
+        width: 0.1 * largest,
+        longest: largest,
+        counts: false,
+        evidence: EvidencePrior::Member,
+        ..Axis::of(&parameter)
+    }
+}
+
+/// An unknown term f(variables) of the rate of a state.
+pub(super) fn of_state(target: &str, variables: &[Variable], largest: f64) -> Term {
+    let names: Vec<&str> = variables.iter().map(|v| v.name.as_str()).collect();
+    let id = format!("f({})", names.join(","));
+    let ends: Vec<(f64, f64)> = variables.iter().map(Variable::ends).collect();
+    let of: Vec<Of> = variables.iter().map(|v| v.of).collect();
+    let value = |of: Of, at: &crate::effect::ForcePoint<'_>| match of {
+        Of::State(i) => at.states[i],
+        Of::Input(i) => at.u[i],
+        Of::Signal => at.x,
+    };
+    let kind = match (of.as_slice(), ends.as_slice()) {
+        (&[of], &[ends]) => with_coefficients(
+            EffectKind::force(&id, "ẋ + f", move |m, at| sum_of_one(m, value(of, at), ends)),
+            TERMS,
+        ),
+        (&[a, b], &[first, second]) => with_coefficients(
+            EffectKind::force(&id, "ẋ + f", move |m, at| {
+                sum_of_two(m, [value(a, at), value(b, at)], [first, second])
+            }),
+            NAMES.len(),
+        ),
+        _ => unreachable!("functions have one or two variables"),
+    };
+    let seen = variables.iter().zip(ends).map(|(v, (a, b))| (v.name.clone(), a, b));
+    term(kind, target, Nature::Function, weights(variables.len()), largest, seen.collect())
+}
+
+/// An unknown distortion f(s) of a signal.
+pub(super) fn of_signal(target: &str, is_sensor: bool, variable: &Variable, largest: f64) -> Term {
+    let id = format!("f({})", variable.name);
+    let ends = variable.ends();
+    let law = move |m: &[f64], _: crate::effect::Instant, _: &mut [f64], s: f64| s + sum_of_one(m, s, ends);
+    let kind = match is_sensor {
+        true => EffectKind::sensor(&id, "s + f(s)", law),
+        false => EffectKind::actuator(&id, "u + f(u)", law),
+    };
+    let seen = vec![(variable.name.clone(), ends.0, ends.1)];
+    term(with_coefficients(kind, TERMS), target, Nature::Function, weights(1), largest, seen)
+}
+
+/// An unknown answer of a signal to its past: s + Σ β_k·(s seen through a first-order lag of τ_k − s).
+pub(super) fn of_past(target: &str, is_sensor: bool, name: &str, times: [f64; PASTS]) -> Term {
+    let id = format!("past({name})");
+    let law = move |m: &[f64], now: crate::effect::Instant, memory: &mut [f64], s: f64| {
+        let mut sum = s;
+        for ((m, z), tau) in m.iter().zip(memory).zip(times) {
+            let a = (-now.dt / tau).exp();
+            *z = a * *z + (1.0 - a) * s;
+            sum += m * (*z - s);
+        }
+        sum
+    };
+    let kind = match is_sensor {
+        true => EffectKind::sensor(&id, "s + Σ b·(lagged s − s)", law),
+        false => EffectKind::actuator(&id, "u + Σ b·(lagged u − u)", law),
+    };
+    let kind = with_coefficients(kind, PASTS).memory(PASTS);
+    term(kind, target, Nature::Past, vec![vec![1.0 / PASTS as f64; PASTS]], 2.0, vec![])
+}
+
+/// A wave of unknown size, phase and frequency: on a signal, a rate or, relative, a parameter.
+pub(super) fn wave(kind: &str, target: &str, largest: f64, frequency: Axis) -> Term {
+    const ID: &str = "periodic";
+    use std::f64::consts::TAU;
+    let wave = |m: &[f64], t: f64| {
+        let (sin, cos) = (TAU * m[2] * t).sin_cos();
+        m[0] * sin + m[1] * cos
+    };
+    let effect = match kind {
+        "sensor" => EffectKind::sensor(ID, "s + wave", move |m, now, _, s| s + wave(m, now.t)),
+        "actuator" => EffectKind::actuator(ID, "u + wave", move |m, now, _, u| u + wave(m, now.t)),
+        "state" => EffectKind::force(ID, "ẋ + wave", move |m, at| wave(m, at.t)),
+        _ => EffectKind::parameter(ID, "θ·(1 + wave)", move |m, t, value| {
+            value * (1.0 + wave(m, t)).max(0.0)
+        }),
+    };
+    let effect = with_coefficients(effect, 2)
+        .magnitude(Magnitude::positive("frequency", "Hz", &[0.1]).shape());
+    let mut term = term(effect, target, Nature::Periodic, vec![vec![0.5; 2]], largest, vec![]);
+    term.axes[2] = frequency;
+    term
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sines by their recurrence.
+    #[test]
+    fn terms_are_sines() {
+        let mut phi = [0.0; TERMS];
+        sines(0.3, (-1.0, 2.0), &mut phi);
+        for (k, value) in (1..).zip(phi) {
+            let expected = SQRT_2 * (f64::from(k) * PI * 1.3 / 3.0).sin();
+            assert!((value - expected).abs() < 1e-12, "{k}");
+        }
+    }
+
+    #[test]
+    fn weights_add_up_to_one_and_long_lengths_are_smooth() {
+        for (variables, count) in [(1, TERMS), (2, NAMES.len())] {
+            for list in weights(variables) {
+                assert_eq!(list.len(), count);
+                assert!((list.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+            }
+        }
+        let lists = weights(1);
+        assert!(lists[0][4] > 3.0 * lists[2][4]);
+    }
+}

@@ -1,0 +1,301 @@
+//! Listed effects as hypotheses: sizes and shapes of their magnitudes in the units of the record.
+
+use super::scales::Scales;
+use super::term::{Nature, Part, Start, Term, with_terms};
+use crate::evid::error::DiagnoseError;
+use crate::evid::thresholds::Thresholds;
+use crate::effect::{Effect, Law, Magnitude, Mark, TargetKind, targets};
+use crate::fit::axis::{Axis, EvidencePrior};
+use crate::fit::magnitude::{largest, shape_axis, size_axis};
+use crate::math::{ends, quantile};
+use crate::twin::{Interval, Parameter, Twin};
+use std::collections::BTreeMap;
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// Twin and record that effects are looked for in.
+pub(in crate::evid) struct Library<'a> {
+    pub twin: &'a Twin,
+    /// The fitted θ of the first record.
+    pub theta: &'a [f64],
+    pub scales: &'a Scales<'a>,
+    /// Frequencies that the residuals show most, in Hz.
+    pub frequencies: &'a [f64],
+}
+
+impl Library<'_> {
+    /// Hypotheses of one effect: one for each way to use its magnitudes.
+    pub fn terms(&self, effect: &Effect) -> Result<Vec<Term>, DiagnoseError> {
+        let known = targets(effect.law().target(), Some(&self.scales.outline), &self.twin.signals());
+        let target = known.iter().position(|k| k == effect.target()).unwrap_or(0);
+        let kind = effect.law().target();
+        let values = self.scales.columns(kind, target);
+        if values.is_empty() && kind != TargetKind::Parameter {
+            return Ok(vec![]);
+        }
+        if kind == TargetKind::State && self.scales.defined.get(target) == Some(&true) {
+            // A rate that the twin defines as another state is no law that could be wrong.
+            return Ok(vec![]);
+        }
+        let mark = match effect.law() {
+            Law::Sensor(_) => effect.kind().marks(&values),
+            _ => Mark::Unmarked,
+        };
+        if mark == Mark::Absent && effect.magnitudes().iter().all(|m| !m.is_threshold()) {
+            // The record refutes it: no value repeats.
+            return Ok(vec![]);
+        }
+        let mut terms = vec![];
+        for (off, register) in self.ways(effect, &mark) {
+            if let Some(term) = self.term(effect, &values, &mark, &off, register)? {
+                terms.push(term);
+            }
+        }
+        Ok(terms)
+    }
+
+    /// Magnitudes that are off, and the memory of a delay, of each way to use an effect.
+    fn ways(&self, effect: &Effect, mark: &Mark) -> Vec<(Vec<usize>, Option<usize>)> {
+        let magnitudes = effect.magnitudes();
+        if let Mark::Present(m) = mark {
+            return vec![((0..m.len()).filter(|&i| m[i].is_infinite()).collect(), None)];
+        }
+        let thresholds: Vec<usize> =
+            (0..magnitudes.len()).filter(|&i| magnitudes[i].is_threshold()).collect();
+        let (least, most) = effect.kind().memories();
+        match thresholds.len() {
+            0 | 1 if self.twin.equations().is_some() && least < most => {
+                (0..Thresholds::REGISTERS.len()).map(|i| (vec![], Some(i))).collect()
+            }
+            0 | 1 => vec![(vec![], None)],
+            _ => (thresholds.iter())
+                .map(|i| (thresholds.iter().copied().filter(|j| j != i).collect(), None))
+                .collect(),
+        }
+    }
+
+    fn term(
+        &self,
+        effect: &Effect,
+        values: &[f64],
+        mark: &Mark,
+        off: &[usize],
+        register: Option<usize>,
+    ) -> Result<Option<Term>, DiagnoseError> {
+        let magnitudes = effect.magnitudes();
+        let held: BTreeMap<String, f64> = (off.iter())
+            .map(|&i| (magnitudes[i].name.to_owned(), magnitudes[i].off.unwrap_or(0.0)))
+            .collect();
+        let free: Vec<&Magnitude> = (magnitudes.iter()).filter(|m| !held.contains_key(m.name)).collect();
+        if free.is_empty() {
+            return Ok(None);
+        }
+        let mut term = Term {
+            id: effect.id().into(),
+            target: effect.target().into(),
+            nature: Nature::Listed,
+            part: Part::Effect {
+                effect: effect.clone(),
+                held,
+                kept: register.map(|i| Thresholds::REGISTERS[i]),
+            },
+            axes: vec![],
+            family: None,
+            starts: vec![],
+            variables: vec![],
+            mark: match mark {
+                Mark::Unmarked => 0.0,
+                Mark::Absent => Thresholds::MARK_ABSENT,
+                Mark::Present(_) => Thresholds::MARK_PRESENT,
+            },
+        };
+        let twin = with_terms(self.twin, std::iter::once(&term))?;
+        let space = twin.parameters();
+        let names = term.names();
+        let mut grids: Vec<Vec<f64>> = vec![];
+        let mut scales = false;
+        for (i, (m, name)) in free.iter().zip(&names).enumerate() {
+            let j = space.position(name).map_err(crate::evid::error::DiagnoseError::from)?;
+            let (grid, axis) = self.magnitude(m, effect.law(), values, register, (&twin, j, &space[j]));
+            if matches!(axis.evidence, EvidencePrior::Magnitude { .. }) && i == 0 {
+                scales = true;
+            }
+            grids.push(grid);
+            term.axes.push(axis);
+        }
+        if let Mark::Present(m) = mark {
+            // What the outputs show is not to be fitted.
+            let shown = m.iter().enumerate().filter(|(i, _)| !off.contains(i));
+            grids = shown.map(|(_, v)| vec![*v]).collect();
+            term.axes.iter_mut().for_each(|axis| axis.held = true);
+            scales = false;
+        }
+        term.starts = (product(&grids).into_iter()).map(|m| Start { m, scales }).collect();
+        Ok((term.axes.iter().all(|a| a.bounds.low() <= a.bounds.high())).then_some(term))
+    }
+
+    /// Values of one magnitude to try, and its axis.
+    fn magnitude(
+        &self,
+        m: &Magnitude,
+        law: &Law,
+        values: &[f64],
+        register: Option<usize>,
+        (twin, j, parameter): (&Twin, usize, &Parameter),
+    ) -> (Vec<f64>, Axis) {
+        let (dt, duration) = (self.scales.dt(), self.scales.duration());
+        let (low, high) = if values.is_empty() { (0.0, 1.0) } else { ends(values) };
+        let span = (high - low).max(1e-9);
+        let size = {
+            let s = crate::math::deviation(values).max(1e-3 * low.abs().max(high.abs()));
+            if s > 0.0 { s } else { 1.0 }
+        };
+        let logarithmic = |low: f64, high: f64, grid: Vec<f64>| {
+            let mut parameter = parameter.clone();
+            parameter.bounds = Interval::unchecked(low, high);
+            parameter.prior = parameter.bounds;
+            let axis = Axis {
+                counts: false,
+                longest: 0.7,
+                deviation: 3.0,
+                centre: (low * high).sqrt(),
+                evidence: EvidencePrior::Uniform { low: low.ln(), high: high.ln() },
+                ..Axis::of(&parameter)
+            };
+            (grid.into_iter().map(|v| v.clamp(low, high)).collect(), axis)
+        };
+        let linear = |low: f64, high: f64, grid: Vec<f64>| {
+            let mut parameter = parameter.clone();
+            parameter.bounds = Interval::unchecked(low, high);
+            parameter.prior = parameter.bounds;
+            let axis = shape_axis(&parameter, low, high);
+            let axis = Axis {
+                counts: false,
+                centre: 0.5 * (low + high),
+                deviation: 2.0 * (high - low),
+                longest: 0.15 * (high - low),
+                width: 0.05 * (high - low),
+                evidence: EvidencePrior::Uniform { low, high },
+                ..axis
+            };
+            (grid.into_iter().map(|v| v.clamp(low, high)).collect(), axis)
+        };
+        if matches!(law, Law::Outliers(_)) {
+            return match m.unit {
+                "1" => logarithmic(0.003, 0.3, vec![0.03, 0.08]),
+                _ => logarithmic(0.05 * size, 10.0 * size, vec![0.5 * size, 2.0 * size]),
+            };
+        }
+        if law.is_noise() {
+            return logarithmic(1e-4 * size, 2.0 * size, vec![3e-3 * size, 0.02 * size, 0.1 * size]);
+        }
+        if m.is_threshold() && m.unit == "signal/s" {
+            let grid = [0.05, 0.2].map(|v| v * size / dt).to_vec();
+            return logarithmic(2.0 * size / duration, 2.0 * size / dt, grid);
+        }
+        if m.is_threshold() {
+            let upper = m.off.is_some_and(|off| off > 0.0);
+            let shares: [f64; 6] = [0.97, 0.9, 0.8, 0.65, 0.5, 0.35];
+            let levels = (shares.iter())
+                .filter_map(|p| quantile(values, if upper { *p } else { 1.0 - p }).ok());
+            return linear(low, low + span, levels.collect());
+        }
+        match (m.unit, m.off) {
+            ("s", Some(_)) if register.is_some() => {
+                let register = register.unwrap_or(0);
+                let reach = (Thresholds::REGISTERS[register] - 1) as f64 * dt;
+                linear(0.0, reach, Thresholds::DELAYS[register].iter().map(|v| v * dt).collect())
+            }
+            ("s", Some(_)) => {
+                let grid = [1.0, 4.0, 12.0, 40.0].map(|steps| steps * dt).to_vec();
+                logarithmic(0.3 * dt, (duration / 8.0).max(0.6 * dt), grid)
+            }
+            ("s", None) => {
+                let times = (1..=Thresholds::TIMES).map(|i| duration * i as f64 / (Thresholds::TIMES + 1) as f64);
+                let (grid, axis) = linear(0.0, duration, times.collect());
+                (grid, Axis { held: false, ..axis })
+            }
+            ("Hz", _) => self.frequency(parameter),
+            ("rad", _) => {
+                let grid = vec![-FRAC_PI_2, 0.0, FRAC_PI_2, 2.0 * FRAC_PI_2];
+                let (grid, axis) = linear(m.limits.low(), m.limits.high(), grid);
+                // Each angle counts once, however often the limits hold it.
+                let evidence = EvidencePrior::Uniform { low: -PI, high: PI };
+                (grid, Axis { evidence, ..axis })
+            }
+            ("signal", Some(_)) if m.limits.low() >= 0.0 => {
+                linear(0.0, 2.0 * size, vec![0.2 * size, 0.6 * size])
+            }
+            (_, Some(_)) => {
+                let found = twin.equations().and_then(|equations| {
+                    let mut theta = self.theta.to_vec();
+                    theta.resize(twin.parameters().len(), 0.0);
+                    for (k, value) in theta.iter_mut().enumerate().skip(self.theta.len()) {
+                        // Shapes somewhere in their range, sizes off.
+                        let p = &twin.parameters()[k];
+                        *value = if k == j { 0.0 } else { p.prior.centre() };
+                    }
+                    let states = self.padded(equations.outline().states.len());
+                    largest(equations, &theta, (j, parameter), self.scales.records, &states)
+                });
+                let found = found.unwrap_or_else(|| match m.unit {
+                    "1" => 0.5,
+                    "signal" => size,
+                    "signal/s" => 2.0 * size / duration,
+                    "1/s" => 1.0 / duration,
+                    _ => size,
+                });
+                let axis = Axis { counts: false, ..size_axis(parameter, found) };
+                (vec![0.0], axis)
+            }
+            _ => {
+                let (first, last) = ends(m.starts);
+                let (low, high) = match m.limits.is_finite() {
+                    true => (m.limits.low(), m.limits.high()),
+                    false => (m.limits.low().max(first - 3.0 * (last - first)), m.limits.high().min(last + 3.0 * (last - first))),
+                };
+                let grid = match m.limits.is_finite() {
+                    true => [0.1, 0.3, 0.6].map(|s| low + s * (high - low)).to_vec(),
+                    false => m.starts.to_vec(),
+                };
+                linear(low, high, grid)
+            }
+        }
+    }
+
+    /// States of the twin, and zeros for memories that an effect adds.
+    fn padded(&self, count: usize) -> Vec<crate::record::Signal> {
+        (self.scales.states.iter())
+            .map(|states| {
+                crate::record::Signal::from_shape_fn((states.nrows(), count), |(k, i)| {
+                    if i < states.ncols() { states[[k, i]] } else { 0.0 }
+                })
+            })
+            .collect()
+    }
+
+    /// Frequencies to try, and their axis: uniform up to half the sampling rate.
+    pub fn frequency(&self, parameter: &Parameter) -> (Vec<f64>, Axis) {
+        let (low, high) = (0.7 / self.scales.duration(), 0.5 / self.scales.dt());
+        let mut parameter = parameter.clone();
+        parameter.bounds = Interval::unchecked(low, high);
+        parameter.prior = parameter.bounds;
+        let axis = Axis {
+            counts: false,
+            // A search must stay at its peak of the spectrum.
+            longest: 0.02,
+            deviation: 10.0,
+            evidence: EvidencePrior::Uniform { low: low.ln(), high: high.ln() },
+            ..Axis::of(&parameter)
+        };
+        (self.frequencies.to_vec(), axis)
+    }
+}
+
+/// Every combination of one value of each list.
+fn product(lists: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    lists.iter().fold(vec![vec![]], |all, list| {
+        (all.iter())
+            .flat_map(|head| list.iter().map(move |v| [&head[..], &[*v]].concat()))
+            .collect()
+    })
+}

@@ -1,0 +1,116 @@
+//! One hypothesis of what a twin lacks: a term that is added to it.
+
+use super::disturbed_equations::disturbed;
+use super::entry::Entry;
+use crate::evid::error::DiagnoseError;
+use crate::effect::{Effect, EffectKey, augment_short};
+use crate::fit::axis::Axis;
+use crate::twin::{Twin, fix};
+use std::collections::BTreeMap;
+
+/// Kind of hypothesis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::evid) enum Nature {
+    /// An effect of the library.
+    Listed,
+    /// An unknown function of states, inputs or signals.
+    Function,
+    /// An unknown answer to the past of a signal.
+    Past,
+    /// An unknown function of time that wanders.
+    Time,
+    /// An unknown function of time that repeats.
+    Periodic,
+}
+
+/// What is added to the twin.
+#[derive(Debug, Clone)]
+pub(in crate::evid) enum Part {
+    /// An effect, some magnitudes of which may be held at their off value; `kept` values of a delay's memory.
+    Effect {
+        effect: Effect,
+        held: BTreeMap<String, f64>,
+        kept: Option<usize>,
+    },
+    /// A disturbance that keeps a share `memory` of itself at each step.
+    Disturbance { entry: Entry, memory: f64 },
+}
+
+/// Values of a term's magnitudes at which a search looks.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::evid) struct Start {
+    pub m: Vec<f64>,
+    /// True where the first magnitude is a size: a small value of it gives a direction, and the best multiple is the start.
+    pub scales: bool,
+}
+
+/// A term that a twin may lack.
+#[derive(Debug, Clone)]
+pub(in crate::evid) struct Term {
+    /// Id of the effect, or a word for the unknown.
+    pub id: String,
+    /// State, sensor, actuator or parameter.
+    pub target: String,
+    pub nature: Nature,
+    pub part: Part,
+    /// One for each free magnitude.
+    pub axes: Vec<Axis>,
+    /// Weights of an unknown function's coefficients, and its largest size.
+    pub family: Option<(Vec<Vec<f64>>, f64)>,
+    pub starts: Vec<Start>,
+    /// Variables of a function, with the range that it is drawn over.
+    pub variables: Vec<(String, f64, f64)>,
+    /// Nats that the outputs themselves speak for it.
+    pub mark: f64,
+}
+
+impl Term {
+    /// `id@target`.
+    pub fn key(&self) -> String {
+        EffectKey::new(&self.id, &self.target).to_string()
+    }
+
+    pub fn is_listed(&self) -> bool {
+        self.nature == Nature::Listed
+    }
+
+    /// Returns whether only noise changes, so that no free run moves.
+    pub fn is_noise(&self) -> bool {
+        match &self.part {
+            Part::Effect { effect, .. } => effect.law().is_noise(),
+            Part::Disturbance { .. } => true,
+        }
+    }
+
+    /// Names of the free magnitudes in θ, in the order of the axes.
+    pub fn names(&self) -> Vec<String> {
+        match &self.part {
+            Part::Effect { effect, held, .. } => (effect.magnitudes().iter())
+                .filter(|m| !held.contains_key(m.name))
+                .map(|m| effect.key().magnitude(m.name))
+                .collect(),
+            Part::Disturbance { .. } => vec!["disturbance".into()],
+        }
+    }
+}
+
+/// The twin with terms: effects first, a disturbance last.
+pub(in crate::evid) fn with_terms<'t>(
+    base: &Twin,
+    terms: impl Iterator<Item = &'t Term> + Clone,
+) -> Result<Twin, DiagnoseError> {
+    let (mut effects, mut memories) = (vec![], vec![]);
+    let mut off = BTreeMap::new();
+    for term in terms.clone() {
+        if let Part::Effect { effect, held, kept } = &term.part {
+            effects.push(effect.clone());
+            memories.push(kept.unwrap_or(effect.kind().memories().1));
+            off.extend((held.iter()).map(|(name, v)| (effect.key().magnitude(name), *v)));
+        }
+    }
+    let twin = fix(augment_short(base.clone(), effects, memories)?, &off)?;
+    Ok(terms.fold(twin, |twin, term| match term.part {
+        Part::Disturbance { entry, memory } => disturbed(twin, entry, memory),
+        Part::Effect { .. } => twin,
+    }))
+}

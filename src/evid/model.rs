@@ -1,0 +1,150 @@
+//! A twin with terms, fitted to the records.
+
+use super::error::DiagnoseError;
+use super::hypotheses::term::{Term, with_terms};
+use crate::fit::axis::{EvidencePrior, Family};
+use crate::fit::climb::{Fitted, climb};
+use crate::fit::evidence::{Laplace, laplace};
+use crate::fit::problem::Problem;
+use crate::record::{Record, Signal};
+use crate::twin::Twin;
+use std::sync::Arc;
+
+/// What an unfinished fit of a hypothesis is credited with beyond where it ended, in nats.
+const CREDIT: f64 = 1.5;
+
+/// A twin with terms, fitted.
+#[derive(Clone)]
+pub(in crate::evid) struct Model<'a> {
+    /// The twin without terms, its noise levels in θ.
+    pub base: &'a Twin,
+    pub terms: Vec<Arc<Term>>,
+    pub problem: Problem<'a>,
+    pub fitted: Fitted,
+    /// log Z, in nats.
+    pub log_evidence: f64,
+}
+
+/// A model with one more term, not yet fitted.
+pub(in crate::evid) struct Extended<'a> {
+    pub terms: Vec<Arc<Term>>,
+    pub problem: Problem<'a>,
+    /// Entries of the new term's magnitudes.
+    pub entries: Vec<usize>,
+}
+
+impl<'a> Model<'a> {
+    /// The twin alone; `None` where its evidence cannot be told.
+    pub fn bare(base: &'a Twin, problem: Problem<'a>, fitted: Fitted) -> Option<Self> {
+        let (log_evidence, _) = laplace(&problem, &fitted, CREDIT)?;
+        Some(Self {
+            base,
+            terms: vec![],
+            problem,
+            fitted,
+            log_evidence,
+        })
+    }
+
+    /// θ of the first record.
+    pub fn theta(&self) -> Vec<f64> {
+        self.problem.of_record(0, &self.fitted.theta)
+    }
+
+    /// Filtered states of each record.
+    pub fn states(&self) -> Result<Vec<Signal>, DiagnoseError> {
+        let all = self.problem.states(&self.fitted.theta)?;
+        Ok(all.into_iter().map(|(_, states)| states).collect())
+    }
+
+    /// The model with one more term.
+    pub fn extend(&self, term: &Arc<Term>) -> Result<Extended<'a>, DiagnoseError> {
+        let terms: Vec<Arc<Term>> = self.terms.iter().chain([term]).cloned().collect();
+        let twin = with_terms(self.base, terms.iter().map(Arc::as_ref))?;
+        let d = self.problem.twin.parameters().len();
+        let mut axes = self.problem.axes[..d].to_vec();
+        axes.extend(term.axes.iter().cloned());
+        let entries: Vec<usize> = (d..d + term.axes.len()).collect();
+        let mut problem = Problem::new(twin, axes, self.problem.records);
+        problem.families = self.problem.families.clone();
+        if let Some((weights, largest)) = &term.family {
+            let count = weights[0].len();
+            problem.families.push(Family {
+                entries: entries[..count].to_vec(),
+                weights: weights.clone(),
+                largest: *largest,
+            });
+        }
+        Ok(Extended {
+            terms,
+            problem,
+            entries,
+        })
+    }
+
+    /// Full θ of the extended model where the new term has these magnitudes.
+    pub fn beside(&self, extended: &Extended<'_>, m: &[f64]) -> Vec<f64> {
+        self.beside_at(extended, &self.fitted.theta, m)
+    }
+
+    /// The same at another full θ of this model.
+    pub fn beside_at(&self, extended: &Extended<'_>, theta: &[f64], m: &[f64]) -> Vec<f64> {
+        let mut theta = extended.problem.carried(&self.problem, theta);
+        for (&j, value) in extended.entries.iter().zip(m) {
+            theta[j] = extended.problem.axes[j].bounds.clamp(*value);
+        }
+        theta
+    }
+}
+
+impl<'a> Extended<'a> {
+    /// Full θ of a new start: θ of the twin from elsewhere, in the first `known` entries.
+    pub fn from(&self, own: &[f64], mut theta: Vec<f64>) -> Vec<f64> {
+        let d = own.len();
+        for r in 0..self.problem.records.len() {
+            let mut of_record = self.problem.of_record(r, &theta);
+            of_record[..d].copy_from_slice(own);
+            self.problem.place(r, &of_record, &mut theta);
+        }
+        theta
+    }
+
+    /// Slope and information at θ, without a step.
+    pub fn at(&self, theta: &[f64]) -> Result<Option<Fitted>, DiagnoseError> {
+        Ok(climb(&self.problem, theta, 0)?)
+    }
+
+    /// The problem with the priors of coefficients and sizes that an approximation found most probable.
+    pub fn with_sizes(&self, found: &Laplace) -> Problem<'a> {
+        let mut problem = self.problem.clone();
+        for &(j, deviation) in &found.sizes {
+            if problem.axes[j].evidence == EvidencePrior::Member {
+                problem.axes[j].deviation = deviation;
+            }
+        }
+        problem
+    }
+
+    /// The fitted model.
+    pub fn fitted(self, base: &'a Twin, fitted: Fitted, problem: Problem<'a>) -> Option<Model<'a>> {
+        let (log_evidence, _) = laplace(&problem, &fitted, CREDIT)?;
+        let mark: f64 = self.terms.iter().map(|t| t.mark).sum();
+        log_evidence.is_finite().then_some(Model {
+            base,
+            terms: self.terms,
+            problem,
+            fitted,
+            log_evidence: log_evidence + mark,
+        })
+    }
+}
+
+/// Keys of terms, in their order.
+pub(in crate::evid) fn keys(terms: &[Arc<Term>]) -> Vec<String> {
+    terms.iter().map(|t| t.key()).collect()
+}
+
+/// Records of a model.
+pub(in crate::evid) fn records<'a>(model: &Model<'a>) -> &'a [Record] {
+    model.problem.records
+}
