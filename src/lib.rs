@@ -127,7 +127,6 @@ pub mod external;
 pub mod estimator;
 
 pub mod diagnose;
-mod evid;
 
 pub mod evaluate;
 

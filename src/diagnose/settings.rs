@@ -6,21 +6,18 @@ use crate::effect::EffectPattern;
 ///
 /// | setting | default | range | meaning |
 /// |---|---|---|---|
-/// | `alpha` | 0.05 | (0, 1) | level of every test |
-/// | `replicates` | 60 | ≥ 1/alpha | simulations of the structural test |
-/// | `unexplained` | 99 | ≥ 50 | simulations of the test that a named effect must pass |
+/// | `alpha` | 0.05 | (0, 1) | level of the test whether θ left its prior |
+/// | `calibrate` | 0 | | records of the fitted twin that are simulated and diagnosed alike, for a p-value |
 /// | `seed` | 1 | | of everything random |
 /// | `without` | none | ids, or `id@target` | effects that are not to be named |
 /// | `initial` | none | | θ that an estimator gave, a start of the fit |
 /// | `detection_only` | no | | stop after the verdict: neither where, nor which, nor how far |
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiagnoseSettings {
-    /// Level of every test.
+    /// Level of the test whether θ left its prior.
     pub alpha: f64,
-    /// Simulations of the structural test.
-    pub replicates: usize,
-    /// Simulations of the test with the effect added.
-    pub unexplained: usize,
+    /// Records of the fitted twin that are simulated and diagnosed alike, for a p-value.
+    pub calibrate: usize,
     /// Seed of everything random.
     pub seed: u64,
     /// Effects that are not to be named: `id` or `id@target`.
@@ -35,8 +32,7 @@ impl Default for DiagnoseSettings {
     fn default() -> Self {
         Self {
             alpha: 0.05,
-            replicates: 60,
-            unexplained: 99,
+            calibrate: 0,
             seed: 1,
             without: vec![],
             initial: None,

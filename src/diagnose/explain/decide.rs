@@ -1,228 +1,227 @@
-//! Decision among fitted explanations: one, a class of rivals, several together, or none of these.
+//! Decision by posterior odds.
+//!
+//! ```text
+//! D     = log Σ w_h·Z_h − log Z_0                     w: 0.6 shared by listed effects, 0.4 by unknown functions;  a gap if D > 0
+//! r(E)  = max_U log Z(E + U) − log Z(E)               E leaves nothing to explain if r < 4
+//! named : the largest log Z of what leaves nothing;  a larger set must be 2 nats better, an unknown function alone must not be better
+//! ```
 
-use crate::diagnose::context::Context;
-use crate::diagnose::error::DiagnoseError;
-use crate::diagnose::explain::attribute::{Explanation, probabilities};
-use crate::diagnose::explain::extended::{Accepted, ExtendedTwin, extend, improves};
-use crate::diagnose::explain::several::{promises, several};
+use super::search::Found;
 use crate::diagnose::outcome::Decision;
-use crate::diagnose::settings::DiagnoseSettings;
-use crate::diagnose::test::fitted_twin::FittedTwin;
-use crate::diagnose::test::null::Test;
-use crate::diagnose::test::statistics::Statistics;
 use crate::diagnose::thresholds::Thresholds;
-use crate::fit::climb::fit;
-use crate::fit::starts::ITERATIONS;
-use crate::progress::Stage;
-use crate::twin::Noise;
+use crate::fit::evidence::log_mean;
+use std::collections::BTreeMap;
 
-/// Decision with the accepted fits.
-pub(in crate::diagnose) struct Conclusion {
-    pub decision: Decision,
-    /// Accepted fits with their fitted twins' own numbering already resolved.
-    pub accepted: Vec<Accepted>,
-    pub class: Vec<String>,
-    pub unexplained: Option<f64>,
-    pub catch_all: Option<String>,
+/// Everything that was found.
+#[derive(Default)]
+pub(in crate::diagnose) struct Findings<'a> {
+    /// Listed effects alone, best first.
+    pub listed: Vec<Found<'a>>,
+    /// Unknown functions alone, best first.
+    pub unknown: Vec<Found<'a>>,
+    /// Pairs and triples of listed effects, best first.
+    pub several: Vec<Found<'a>>,
+    /// Sets of listed effects with what unknown functions add on top, best first.
+    pub beside: Vec<(Vec<String>, Vec<Found<'a>>)>,
 }
 
-/// An conclusion, and the twins that it rests on.
-pub(in crate::diagnose) struct Decided<'a> {
-    pub conclusion: Conclusion,
-    /// The twin with the accepted effects.
-    pub extended: Option<ExtendedTwin<'a>>,
-    /// The twin with the best listed effect, where none is accepted.
-    pub best: Option<ExtendedTwin<'a>>,
-    /// Test of the twin with the accepted or best effects.
-    pub left: Option<Remainder>,
+/// Posterior probabilities.
+#[derive(Debug, Clone, Default)]
+pub(in crate::diagnose) struct Chances {
+    /// Nothing is missing.
+    pub nothing: f64,
+    /// Something unknown alone.
+    pub unknown: f64,
+    /// Sets of listed effects beside something unknown.
+    pub parts: Vec<(Vec<String>, f64)>,
+    /// Listed effects by their keys: alone, as part of a set, or beside something unknown.
+    pub effects: BTreeMap<String, f64>,
+    /// Sets of listed effects that explain everything.
+    pub sets: Vec<(Vec<String>, f64)>,
+    /// Places.
+    pub places: BTreeMap<String, f64>,
+    /// log of the odds of a gap against none, prior odds even.
+    pub log_odds: f64,
 }
 
-/// Structural test of a twin with effects.
-pub(in crate::diagnose) struct Remainder {
-    /// On the records, and on these and the validation record together: the smaller one.
-    pub p_value: f64,
-    /// On the records.
-    pub test: Test,
-    /// Statistics of the records.
-    pub statistics: Statistics,
-}
-
-impl<'a> Decided<'a> {
-    /// The effects of a extended; of a single one also its rivals among the listed effects with their scores.
-    fn among(
-        listed: &[(String, f64)],
-        extended: ExtendedTwin<'a>,
-        left: Option<Remainder>,
-    ) -> Self {
-        let score = extended.score;
-        let mut decided = Self::named(extended, left);
-        let conclusion = &mut decided.conclusion;
-        if let [only] = &conclusion.class[..] {
-            let rivals = (listed.iter())
-                .filter(|(key, s)| key != only && *s >= score - Thresholds::RIVALS)
-                .map(|(key, _)| key.clone());
-            conclusion.class = [only.clone()].into_iter().chain(rivals).collect();
-            if conclusion.class.len() > 1 {
-                conclusion.decision = Decision::Class;
-            }
-        }
-        decided
+impl<'a> Findings<'a> {
+    /// Notes what unknown functions add on top of a set; returns whether they add nothing of weight.
+    pub fn add(&mut self, found: &Found<'a>, on_top: Option<Vec<Found<'a>>>) -> bool {
+        let Some(on_top) = on_top else { return false };
+        let added = on_top.first().map_or(0.0, |f| f.gain - found.gain);
+        self.beside.push((found.keys(), on_top));
+        added < Thresholds::ADEQUATE
     }
 
-    /// The effects of a extended, all of them and nothing else.
-    fn named(extended: ExtendedTwin<'a>, left: Option<Remainder>) -> Self {
-        Self {
-            conclusion: Conclusion {
-                decision: Decision::Named,
-                accepted: extended.accepted.clone(),
-                class: extended.accepted.iter().map(Accepted::key).collect(),
-                unexplained: left.as_ref().map(|left| left.p_value),
-                catch_all: None,
-            },
-            extended: Some(extended),
-            best: None,
-            left,
-        }
+    /// What unknown functions add on top of a set, in nats; `None` where that was not asked.
+    pub fn left(&self, keys: &[String]) -> Option<f64> {
+        let (_, on_top) = self.beside.iter().find(|(k, _)| same(k, keys))?;
+        let own = self.gain(keys)?;
+        Some(on_top.first().map_or(0.0, |f| f.gain - own))
     }
-}
 
-/// Decides about a structural gap: the best single effect, more beside it where the data ask for them, or none.
-pub(in crate::diagnose) fn decide<'a>(
-    context: &Context<'a>,
-    model: &FittedTwin<'a>,
-    explanations: &[Explanation],
-    settings: &DiagnoseSettings,
-    noise: Noise,
-    stage: &Stage,
-) -> Result<Decided<'a>, DiagnoseError> {
-    let candidates = &model.dictionary.candidates;
-    let listed: Vec<&Explanation> = (explanations.iter())
-        .filter(|e| candidates[e.candidate].is_listed())
-        .collect();
-    let catch_all = explanations
-        .iter()
-        .find(|e| !candidates[e.candidate].is_listed());
-    let catch_score = catch_all.map_or(f64::NEG_INFINITY, Explanation::score);
-    let catch_name = catch_all.map(|e| candidates[e.candidate].target.clone());
-    // A noise is nothing but a disturbance without memory: it must do better without the memory's price.
-    let price = 0.5 * (model.problem.samples() as f64).ln();
-    let beaten = |score: f64, noisy: bool| score < catch_score + if noisy { price } else { 0.0 };
-    let nothing = |left: Option<Remainder>, extended| Decided {
-        conclusion: Conclusion {
-            decision: Decision::NoneOfThese,
-            accepted: vec![],
-            class: vec![],
-            unexplained: left.as_ref().map(|left| left.p_value),
-            catch_all: catch_name.clone(),
-        },
-        extended: None,
-        best: extended,
-        left,
-    };
-    let Some(&first) = listed.first() else {
-        return Ok(nothing(None, None));
-    };
-    let keys: Vec<(String, f64)> = (listed.iter())
-        .map(|e| (candidates[e.candidate].key(), e.score()))
-        .collect();
-    let chances = probabilities(explanations);
-    let chance = (explanations.iter().zip(&chances))
-        .find(|(e, _)| e.candidate == first.candidate)
-        .map_or(f64::NAN, |(_, chance)| *chance);
-    let Some(single) = extend(context, model, &[], first, chance)? else {
-        return Ok(nothing(None, None));
-    };
-    let tests = noise.child("unexplained");
-    let Some(left) = left_over(context, &single.model, settings, tests, stage)? else {
-        return Ok(nothing(None, None));
-    };
-    let passes = left.p_value > Thresholds::UNEXPLAINED
-        && !beaten(first.score(), candidates[first.candidate].is_noise());
-    // More than one, where one is not enough, or where a second one promises much.
-    if !passes || promises(&single, &left.statistics) {
-        let margin = if passes {
-            Thresholds::WORTH_BESIDE_SUFFICIENT
-        } else {
-            Thresholds::WORTH_ANOTHER
+    fn gain(&self, keys: &[String]) -> Option<f64> {
+        (self.listed.iter().chain(&self.several)).find(|f| same(&f.keys(), keys)).map(|f| f.gain)
+    }
+
+    /// Posterior probabilities of all hypotheses.
+    pub fn chances(&self) -> Chances {
+        let (listed, unknown) = (self.listed.len().max(1) as f64, self.unknown.len().max(1) as f64);
+        let each = Thresholds::LISTED / listed;
+        let every = (1.0 - Thresholds::LISTED) / unknown;
+        // (log weight, listed effects, with something unknown, places)
+        let mut all: Vec<(f64, Vec<String>, bool, Vec<String>)> = vec![];
+        let places = |found: &Found<'_>| -> Vec<String> {
+            found.terms.iter().map(|t| t.target.clone()).collect()
         };
-        let several = several(
-            context,
-            model,
-            &listed,
-            (&single, &left.statistics),
-            margin,
-            noise,
-            stage,
-        )?;
-        if let Some(extended) = several
-            && !beaten(
-                extended.score - Thresholds::SEVERAL_OVER_DISTURBANCE,
-                extended.accepted.iter().any(Accepted::is_noise),
-            )
+        for found in &self.listed {
+            all.push((each.ln() + found.gain, found.keys(), false, places(found)));
+        }
+        for found in &self.unknown {
+            all.push((every.ln() + found.gain, vec![], true, places(found)));
+        }
+        let pair = (0.5 * (listed - 1.0)).max(1.0).ln();
+        for found in &self.several {
+            let price = pair * (found.terms.len() - 1) as f64;
+            all.push((each.ln() + found.gain - price, found.keys(), false, places(found)));
+        }
+        for (keys, on_top) in &self.beside {
+            let price = pair * (keys.len() - 1) as f64;
+            for found in on_top {
+                let weight = each.ln() + every.ln() + Thresholds::SECOND.ln() + found.gain - price;
+                all.push((weight, keys.clone(), true, vec![found.last().target.clone()]));
+            }
+        }
+        let logs: Vec<f64> = all.iter().map(|(w, ..)| *w).collect();
+        let sum = log_mean(&logs) + (logs.len() as f64).ln();
+        let nothing = 1.0 / (1.0 + sum.exp());
+        let mut chances = Chances { nothing, log_odds: sum, ..Chances::default() };
+        let whole = sum.max(0.0) + (-sum.abs()).exp().ln_1p();
+        for (weight, keys, unknown, places) in all {
+            let p = (weight - whole).exp();
+            for key in &keys {
+                *chances.effects.entry(key.clone()).or_default() += p;
+            }
+            match (unknown, keys.is_empty()) {
+                (false, _) => chances.sets.push((keys, p)),
+                (true, true) => chances.unknown += p,
+                (true, false) => match chances.parts.iter_mut().find(|(k, _)| same(k, &keys)) {
+                    Some((_, all)) => *all += p,
+                    None => chances.parts.push((keys, p)),
+                },
+            }
+            for place in &places {
+                *chances.places.entry(place.clone()).or_default() += p / places.len() as f64;
+            }
+        }
+        chances.sets.sort_by(|a, b| b.1.total_cmp(&a.1));
+        chances.parts.sort_by(|a, b| b.1.total_cmp(&a.1));
+        chances
+    }
+}
+
+fn same(a: &[String], b: &[String]) -> bool {
+    a.len() == b.len() && a.iter().all(|key| b.contains(key))
+}
+
+/// The decision, the effects that the twin is given, and their rivals.
+#[derive(Debug, Clone, Default)]
+pub(in crate::diagnose) struct Conclusion {
+    pub decision: Option<Decision>,
+    pub accepted: Vec<String>,
+    pub class: Vec<String>,
+    /// Share of all nats that what remains beside the accepted takes.
+    pub remains: Option<(String, f64)>,
+}
+
+/// Decides about a gap.
+pub(in crate::diagnose) fn decide(findings: &Findings<'_>, most_effects: usize) -> Conclusion {
+    let best_unknown = findings.unknown.first().map_or(f64::NEG_INFINITY, |f| f.gain);
+    let listed = findings.listed.len().max(2) as f64;
+    let price = (0.5 * (listed - 1.0)).max(1.0).ln();
+    let top = findings.listed.first().map_or(f64::NEG_INFINITY, |f| f.gain);
+    // (keys, value with its price, what is left)
+    let singles = (findings.listed.iter()).filter(|f| f.gain > top - Thresholds::CANDIDATES);
+    let candidates: Vec<(Vec<String>, f64, f64)> = singles
+        .chain(&findings.several)
+        .filter_map(|f| {
+            let keys = f.keys();
+            let left = findings.left(&keys)?;
+            Some((keys, f.gain - price * (f.terms.len() - 1) as f64, left))
+        })
+        .collect();
+    let mut chosen: Option<&(Vec<String>, f64, f64)> = None;
+    for count in 1..=most_effects {
+        let best = (candidates.iter())
+            .filter(|c| c.0.len() == count && c.2 < Thresholds::ADEQUATE)
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some(best) = best
+            && chosen.is_none_or(|c| best.1 > c.1 + Thresholds::WORTH_ANOTHER)
         {
-            let tests = tests.child("several");
-            if let Some(rest) = left_over(context, &extended.model, settings, tests, stage)?
-                && (rest.p_value > Thresholds::UNEXPLAINED
-                    || (!passes && improves(context, (model, &[]), &extended, noise)?))
-            {
-                return Ok(Decided::among(&keys, extended, Some(rest)));
+            chosen = Some(best);
+        }
+    }
+    if chosen.is_some_and(|c| best_unknown > c.1) {
+        chosen = None;
+    }
+    if let Some((keys, _, _)) = chosen {
+        return named(findings, keys, Decision::Named, None);
+    }
+    // Listed effects that explain most, beside something unknown.
+    let chances = findings.chances();
+    let partial: f64 = chances.parts.iter().map(|(_, p)| p).sum();
+    let best = (candidates.iter())
+        .filter(|c| chances.parts.iter().any(|(keys, _)| same(keys, &c.0)))
+        .max_by(|a, b| a.1.total_cmp(&b.1));
+    if let Some((keys, own, left)) = best
+        && partial > chances.unknown
+        && *left < Thresholds::REST * (own + left)
+        && let Some((_, on_top)) = findings.beside.iter().find(|(k, _)| same(k, keys))
+        && let Some(rest) = on_top.first()
+    {
+        let place = rest.last().target.clone();
+        return named(findings, keys, Decision::Partial, Some((place, left / (own + left))));
+    }
+    Conclusion {
+        decision: Some(Decision::NoneOfThese),
+        ..Conclusion::default()
+    }
+}
+
+/// A set that is named, with single effects that the records cannot tell from it.
+fn named(
+    findings: &Findings<'_>,
+    keys: &[String],
+    decision: Decision,
+    remains: Option<(String, f64)>,
+) -> Conclusion {
+    let mut class = keys.to_vec();
+    if let [key] = keys {
+        let own = findings.gain(keys).unwrap_or(f64::NAN);
+        let rivals = (findings.listed.iter())
+            .filter(|f| f.gain > own - Thresholds::RIVALS && f.keys()[0] != *key)
+            .map(|f| f.keys()[0].clone());
+        class.extend(rivals);
+    } else {
+        // A partner that another effect could stand in for.
+        let own = findings.gain(keys).unwrap_or(f64::NAN);
+        for found in &findings.several {
+            let others = found.keys();
+            let shared = others.iter().filter(|k| keys.contains(k)).count();
+            if found.gain > own - Thresholds::RIVALS && others.len() == keys.len() && shared + 1 == keys.len() {
+                class.extend(others.into_iter().filter(|k| !keys.contains(k)));
             }
         }
     }
-    if passes {
-        return Ok(Decided::among(&keys, single, Some(left)));
+    class.dedup();
+    let decision = match decision {
+        Decision::Named if class.len() > keys.len() => Decision::Class,
+        other => other,
+    };
+    Conclusion {
+        decision: Some(decision),
+        accepted: keys.to_vec(),
+        class: if class.len() > keys.len() { class } else { vec![] },
+        remains,
     }
-    // A single effect that leaves something, but follows a record never seen much better.
-    if improves(context, (model, &[]), &single, noise)? {
-        return Ok(Decided::named(single, Some(left)));
-    }
-    Ok(nothing(Some(left), Some(single)))
-}
-
-/// The structural test of a twin with effects, on the records and, where nothing is left there, on these and the validation
-/// record together.
-fn left_over<'a>(
-    context: &Context<'a>,
-    model: &FittedTwin<'a>,
-    settings: &DiagnoseSettings,
-    noise: Noise,
-    stage: &Stage,
-) -> Result<Option<Remainder>, DiagnoseError> {
-    let count = settings.unexplained;
-    let Some(null) = model.null_distribution(
-        count,
-        Thresholds::UNEXPLAINED,
-        noise.child("records"),
-        stage,
-    )?
-    else {
-        return Ok(None);
-    };
-    let test = null.test();
-    let left = |also: f64| {
-        Some(Remainder {
-            p_value: test.p_value.min(also),
-            test: test.clone(),
-            statistics: null.own,
-        })
-    };
-    let Some(records) = context
-        .together
-        .filter(|_| test.p_value > Thresholds::UNEXPLAINED)
-    else {
-        return Ok(left(1.0));
-    };
-    let (there, start) = model.on(records);
-    let Some(fitted) = fit(&there, &[start], ITERATIONS)? else {
-        return Ok(left(1.0));
-    };
-    let seen = model.with_problem(there, fitted, |model| {
-        model.null_distribution(
-            count,
-            Thresholds::UNEXPLAINED,
-            noise.child("together"),
-            stage,
-        )
-    })?;
-    Ok(left(seen.map_or(1.0, |null| null.test().p_value)))
 }

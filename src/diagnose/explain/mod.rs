@@ -1,9 +1,7 @@
-//! Fits of the explanations, their order, and the decision.
+//! Which hypothesis explains the records: screened, refitted, weighed.
 
-pub(super) mod attribute;
-pub(super) mod decide;
-pub(super) mod evalue;
-pub(super) mod extended;
-pub(super) mod frequency;
-pub(super) mod several;
-pub(super) mod verdict;
+pub(in crate::diagnose) mod decide;
+pub(in crate::diagnose) mod explore;
+pub(in crate::diagnose) mod refit;
+pub(in crate::diagnose) mod scan;
+pub(in crate::diagnose) mod search;

@@ -1,11 +1,210 @@
-//! Explanations of a gap: listed effects and disturbances, as twins with magnitudes to fit.
+//! What could be missing: listed effects, and unknown functions of states, of the past, of time.
 
-pub(super) mod candidate;
-pub(super) mod choice;
-pub(super) mod dictionary;
-pub(super) mod disturbed_equations;
-pub(super) mod disturbed_signals;
-pub(super) mod entry;
-pub(super) mod plan;
-pub(super) mod scales;
-pub(super) mod variant;
+pub(in crate::diagnose) mod disturbed_equations;
+mod disturbed_signals;
+pub(in crate::diagnose) mod entry;
+pub(in crate::diagnose) mod frequencies;
+pub(in crate::diagnose) mod functions;
+pub(in crate::diagnose) mod listed;
+pub(in crate::diagnose) mod scales;
+pub(in crate::diagnose) mod term;
+
+use self::entry::Entry;
+use self::functions::{Of, PASTS, Variable, of_past, of_signal, of_state, wave};
+use self::listed::Library;
+use self::scales::Scales;
+use self::term::{Nature, Part, Start, Term};
+use crate::diagnose::error::DiagnoseError;
+use crate::effect::{EffectPattern, TargetKind};
+use crate::fit::axis::{Axis, EvidencePrior};
+use crate::math::quantile;
+use crate::study::Study;
+use crate::twin::{Interval, Parameter, Role, is_memory};
+
+/// Time constants of disturbances between three steps and a sixth of the record.
+const TIMES: usize = 3;
+/// Sizes of a disturbance, as shares of its largest.
+const SIZES: [f64; 5] = [0.01, 0.03, 0.1, 0.3, 1.0];
+/// Most states for which functions of any two are rivals; beyond, only those with the state's own value.
+const MOST_STATES: usize = 4;
+
+/// Every listed effect that the study lets a diagnosis name, in the units of the record.
+pub(in crate::diagnose) fn listed(
+    study: &Study,
+    without: &[EffectPattern],
+    library: &Library<'_>,
+    fitted_noise: &[String],
+) -> Result<Vec<Term>, DiagnoseError> {
+    if let Some(name) = without.iter().find(|name| !study.knows_effect(name)) {
+        return Err(DiagnoseError::Without(study.with_nearest_effect(name)));
+    }
+    let already = already(study);
+    let mut terms = vec![];
+    for effect in study.candidates() {
+        let key = effect.key().to_string();
+        if without.iter().any(|pattern| pattern.matches(effect.key())) || already.contains(&key) {
+            continue;
+        }
+        let own_noise = effect.law().is_noise() && !matches!(effect.law(), crate::effect::Law::Outliers(_));
+        if own_noise && fitted_noise.contains(&effect.target().to_owned()) {
+            // The level is fitted in every hypothesis.
+            continue;
+        }
+        terms.extend(library.terms(&effect)?);
+    }
+    Ok(terms)
+}
+
+/// Effects that the study has added to its twin.
+fn already(study: &Study) -> Vec<String> {
+    (study.file().effect.iter())
+        .map(|e| crate::effect::EffectKey::new(&e.id, &e.target).to_string())
+        .collect()
+}
+
+/// Effects that the twin may lack beside these and its own effects.
+pub(in crate::diagnose) fn not_tested(study: &Study, terms: &[Term]) -> Vec<String> {
+    let known: Vec<String> = terms.iter().map(Term::key).chain(already(study)).collect();
+    let mut keys: Vec<String> = (study.effects().iter())
+        .map(|e| e.key().to_string())
+        .filter(|key| !known.contains(key))
+        .collect();
+    keys.dedup();
+    keys
+}
+
+/// Unknown functions at every place of a twin; `seen` are states of models whose range the functions must cover.
+pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -> Vec<Term> {
+    let scales = library.scales;
+    let outline = &scales.outline;
+    let (inputs, outputs) = (outline.inputs.len(), outline.outputs.len());
+    let mut terms = vec![];
+    let range = |kind: TargetKind, i: usize| {
+        let mut ends = (f64::INFINITY, f64::NEG_INFINITY);
+        for scales in std::iter::once(scales).chain(seen) {
+            let values = scales.columns(kind, i);
+            for (p, end) in [(0.005, &mut ends.0), (0.995, &mut ends.1)] {
+                let value = quantile(&values, p).unwrap_or(f64::NAN);
+                *end = if p < 0.5 { end.min(value) } else { end.max(value) };
+            }
+        }
+        (ends.0 < ends.1).then_some(ends)
+    };
+    let variable = |kind: TargetKind, of: Of, i: usize, name: &str| {
+        let (low, high) = range(kind, i)?;
+        Some(Variable { name: name.to_owned(), of, low, high })
+    };
+    let has_equations = library.twin.equations().is_some();
+    let own: Vec<usize> = (0..outline.states.len())
+        .filter(|&i| has_equations && !is_memory(&outline.states[i].name))
+        .collect();
+    let of_states: Vec<(usize, Variable)> = (own.iter())
+        .filter_map(|&i| Some((i, variable(TargetKind::State, Of::State(i), i, &outline.states[i].name)?)))
+        .collect();
+    let of_inputs: Vec<Variable> = (0..inputs)
+        .filter_map(|i| variable(TargetKind::Actuator, Of::Input(i), i, &outline.inputs[i].name))
+        .collect();
+    let times = spread(3.0 * scales.dt(), scales.duration() / 6.0);
+    let frequency = |target: &str| {
+        let parameter = Parameter::new(target, "Hz", 0.1, 1.0);
+        library.frequency(&parameter)
+    };
+    for &i in own.iter().filter(|&&i| !scales.defined[i]) {
+        let (target, largest) = (&outline.states[i].name, scales.rates[i]);
+        if largest <= 0.0 {
+            continue;
+        }
+        for (_, one) in &of_states {
+            terms.push(of_state(target, std::slice::from_ref(one), largest));
+        }
+        for input in &of_inputs {
+            terms.push(of_state(target, std::slice::from_ref(input), largest));
+        }
+        for (a, (first, one)) in of_states.iter().enumerate() {
+            for (second, two) in &of_states[a + 1..] {
+                if own.len() <= MOST_STATES || *first == i || *second == i {
+                    terms.push(of_state(target, &[one.clone(), two.clone()], largest));
+                }
+            }
+            for input in of_inputs.iter().filter(|_| *first == i) {
+                terms.push(of_state(target, &[one.clone(), input.clone()], largest));
+            }
+        }
+        terms.extend(disturbances(target, Entry::State(i), largest, scales.dt(), times));
+    }
+    let past = spread_of::<PASTS>(1.5 * scales.dt(), scales.duration() / 8.0);
+    for (kind, count, is_sensor) in [(TargetKind::Sensor, outputs, true), (TargetKind::Actuator, inputs, false)] {
+        for j in 0..count {
+            let target = numbered(kind.name(), count, j);
+            let name = if is_sensor { &outline.outputs[j].name } else { &outline.inputs[j].name };
+            let Some(seen) = variable(kind, Of::Signal, j, name) else {
+                continue;
+            };
+            let size = scales.size(kind, j);
+            terms.push(of_signal(&target, is_sensor, &seen, size));
+            if has_equations {
+                terms.push(of_past(&target, is_sensor, name, past));
+            }
+            if is_sensor || !has_equations {
+                let entry = if is_sensor { Entry::Sensor(j) } else { Entry::Actuator(j) };
+                terms.extend(disturbances(&target, entry, size, scales.dt(), times));
+            }
+            terms.extend(periodic(kind.name(), &target, size, frequency(&target)));
+        }
+    }
+    for (i, parameter) in outline.parameters.iter().enumerate() {
+        if parameter.role == Role::Parameter && has_equations {
+            let target = &parameter.name;
+            terms.extend(disturbances(target, Entry::Parameter(i), 1.0, scales.dt(), times));
+            terms.extend(periodic("parameter", target, 1.0, frequency(target)));
+        }
+    }
+    terms
+}
+
+/// Name of a sensor or actuator: numbered where there are several.
+fn numbered(word: &str, count: usize, j: usize) -> String {
+    if count == 1 { word.to_owned() } else { format!("{word}{}", j + 1) }
+}
+
+fn periodic(kind: &str, target: &str, largest: f64, (grid, axis): (Vec<f64>, Axis)) -> Option<Term> {
+    let mut term = wave(kind, target, largest, axis);
+    term.starts = grid.into_iter().map(|f| Start { m: vec![0.0, 0.0, f], scales: false }).collect();
+    (!term.starts.is_empty()).then_some(term)
+}
+
+fn disturbances(target: &str, entry: Entry, largest: f64, dt: f64, times: [f64; TIMES]) -> Vec<Term> {
+    let (low, high) = (0.003 * largest, 2.0 * largest);
+    let mut parameter = Parameter::new("disturbance", "", low, high);
+    parameter.bounds = Interval::unchecked(low, high);
+    let axis = Axis {
+        counts: false,
+        deviation: 3.0,
+        longest: 0.7,
+        evidence: EvidencePrior::Uniform { low: low.ln(), high: high.ln() },
+        ..Axis::of(&parameter)
+    };
+    (times.iter())
+        .map(|time| Term {
+            id: "f(t)".into(),
+            target: target.into(),
+            nature: Nature::Time,
+            part: Part::Disturbance { entry, memory: (-dt / time).exp() },
+            axes: vec![axis.clone()],
+            family: None,
+            starts: SIZES.map(|s| Start { m: vec![s * largest], scales: false }).to_vec(),
+            variables: vec![],
+            mark: 0.0,
+        })
+        .collect()
+}
+
+fn spread(low: f64, high: f64) -> [f64; TIMES] {
+    spread_of::<TIMES>(low, high)
+}
+
+/// Values from low to high, evenly in their logarithm.
+fn spread_of<const N: usize>(low: f64, high: f64) -> [f64; N] {
+    let high = high.max(2.0 * low);
+    std::array::from_fn(|i| low * (high / low).powf(i as f64 / (N - 1) as f64))
+}

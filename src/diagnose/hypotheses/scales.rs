@@ -1,22 +1,37 @@
-//! Scales of a record: sizes of its signals and states.
+//! Sizes of a record's signals, states and rates: the units that hypotheses are looked for in.
 
 use crate::effect::TargetKind;
+use crate::math::deviation;
 use crate::record::{Record, Signal};
+use crate::twin::{Now, Outline, StateSpace, Twin};
 
-/// Records and states that the units of a dictionary are taken from.
+/// Records, the states that the twin has along them, and how fast these move.
 pub(in crate::diagnose) struct Scales<'a> {
     pub records: &'a [Record],
-    /// Filtered states of each record at θ̂.
-    pub states: &'a [Signal],
+    /// Filtered states of each record; a black box's predicted outputs.
+    pub states: Vec<Signal>,
+    pub outline: Outline,
+    /// Root mean square of each state's rate by the twin's equations; empty without equations.
+    pub rates: Vec<f64>,
+    /// States whose rate is another state, whatever θ: a position and its velocity.
+    pub defined: Vec<bool>,
 }
 
-impl Scales<'_> {
+impl<'a> Scales<'a> {
+    pub fn new(twin: &Twin, theta: &[f64], records: &'a [Record], states: Vec<Signal>, outline: Outline) -> Self {
+        let (rates, defined) = match twin.equations() {
+            Some(equations) => along(equations, theta, records, &states),
+            None => (vec![], vec![]),
+        };
+        Self { records, states, outline, rates, defined }
+    }
+
     /// Values of a sensor, actuator or state, of all records.
     pub fn columns(&self, kind: TargetKind, target: usize) -> Vec<f64> {
         let column = |signal: &Signal| -> Vec<f64> {
             if target < signal.ncols() {
                 let values = signal.column(target).into_iter().copied();
-                values.filter(|v| !v.is_nan()).collect()
+                values.filter(|v| v.is_finite()).collect()
             } else {
                 vec![]
             }
@@ -31,6 +46,14 @@ impl Scales<'_> {
         all.concat()
     }
 
+    /// Deviation of the values there; a share of the largest one where nothing moves.
+    pub fn size(&self, kind: TargetKind, target: usize) -> f64 {
+        let values = self.columns(kind, target);
+        let largest = values.iter().fold(0.0, |a: f64, v| a.max(v.abs()));
+        let size = deviation(&values).max(1e-3 * largest);
+        if size > 0.0 { size } else { 1.0 }
+    }
+
     /// Step in seconds; the median one where steps vary.
     pub fn dt(&self) -> f64 {
         self.records[0].drive().dt()
@@ -38,7 +61,36 @@ impl Scales<'_> {
 
     /// Length of the longest record in seconds.
     pub fn duration(&self) -> f64 {
-        let ends = self.records.iter().map(|r| r.drive().time(r.samples()));
+        let ends = self.records.iter().map(|r| r.drive().time(r.samples() - 1));
         ends.fold(0.0, f64::max)
     }
+}
+
+/// Root mean square of the rates along states, and the states whose rate is another state.
+fn along(twin: &dyn StateSpace, theta: &[f64], records: &[Record], states: &[Signal]) -> (Vec<f64>, Vec<bool>) {
+    let n = twin.outline().states.len();
+    let (mut squares, mut count) = (vec![0.0; n], 0.0);
+    let mut same = vec![vec![true; n]; n];
+    let bent: Vec<f64> = theta.iter().map(|v| 1.37 * v).collect();
+    for (record, states) in records.iter().zip(states) {
+        let drive = record.drive();
+        for k in 0..record.samples() {
+            let x = states.row(k).to_vec();
+            for (which, theta) in [theta, &bent[..]].into_iter().enumerate() {
+                let mut rate = vec![0.0; n];
+                twin.drift(&Now::new(drive.time(k), drive.step(k), drive.input(k), theta), &x, &mut rate);
+                for i in 0..n {
+                    for j in 0..n {
+                        same[i][j] &= i != j && rate[i] == x[j];
+                    }
+                    if which == 0 && rate[i].is_finite() {
+                        squares[i] += rate[i] * rate[i];
+                    }
+                }
+            }
+            count += 1.0;
+        }
+    }
+    let rates = squares.iter().map(|s: &f64| (s / count).sqrt()).collect();
+    (rates, same.iter().map(|row| row.contains(&true)).collect())
 }

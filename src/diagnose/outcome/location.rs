@@ -6,17 +6,17 @@ use serde::{Serialize, Serializer};
 /// Location of a gap.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Location {
-    /// Difference between the record and simulations of the refitted twin.
+    /// Residuals of the refitted twin, described.
     #[serde(flatten)]
     pub maps: Maps,
-    /// Onset of the gap.
+    /// Time of a change, where one is what explains the records.
     pub onset: Option<Onset>,
     /// The most probable place of a structural gap.
     pub target: Option<String>,
     /// All places, most probable first.
     pub targets: Vec<TargetShare>,
-    /// Equations and what each would have to gain or lose to follow the record, most probable first.
-    pub equations: Vec<Equation>,
+    /// What is missing, as functions of what it depends on: of the twin alone, and on top of the accepted effects; clearest first.
+    pub functions: Vec<MissingFunction>,
     /// The maps with the accepted effects, or else the best explanation, added.
     pub after: Option<Maps>,
 }
@@ -26,14 +26,12 @@ pub struct Location {
 pub struct TargetShare {
     /// State, `sensor`, `actuator` or parameter.
     pub target: String,
-    /// Family-wise over all candidates.
-    pub p_value: f64,
-    /// Probability of the explanations there.
-    pub share: f64,
+    /// Posterior probability of what explains the records there.
+    pub probability: f64,
 }
 
-/// Difference between innovations and those of simulations, cut in several ways. All p-values are corrected for all cells of all cuts
-/// together; shares add up to at most one in each list. Serialised are the cells that stand out.
+/// Innovations cut in several ways: a description, not a test. Shares add up to at most one in each list. Serialised are the cells that
+/// stand out.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Maps {
     /// Windows of time, clearest first.
@@ -53,17 +51,13 @@ pub struct Maps {
     pub bands: Vec<Band>,
 }
 
-/// The start of the first block of time that the twin, fitted to all before it, does not foresee.
+/// A change at one time.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Onset {
-    /// Index of the record, from 0.
-    pub record: usize,
     /// Time in seconds.
     pub time: f64,
-    /// Output.
-    pub channel: String,
-    /// p-value of the block that begins there, corrected for all blocks.
-    pub p_value: f64,
+    /// Parameter that changes.
+    pub parameter: String,
 }
 
 /// A stretch of time.
@@ -75,8 +69,8 @@ pub struct Window {
     pub end: f64,
     /// Output.
     pub channel: String,
-    /// Family-wise.
-    pub p_value: f64,
+    /// Standard deviations above what white noise shows.
+    pub score: f64,
     /// Share in what the best explanation gains.
     pub share: f64,
     /// Index of the record, from 0.
@@ -92,8 +86,8 @@ pub struct Region {
     pub low: f64,
     /// To.
     pub high: f64,
-    /// Family-wise.
-    pub p_value: f64,
+    /// Standard deviations above what white noise shows.
+    pub score: f64,
     /// Share in what the best explanation gains, over all regions of all variables.
     pub share: f64,
 }
@@ -103,8 +97,8 @@ pub struct Region {
 pub struct Channel {
     /// Output.
     pub channel: String,
-    /// Family-wise.
-    pub p_value: f64,
+    /// Standard deviations above what white noise shows.
+    pub score: f64,
     /// Share of its innovations in what stands out.
     pub share: f64,
 }
@@ -120,8 +114,8 @@ pub struct Lag {
     pub from: f64,
     /// Longest lag, in seconds.
     pub to: f64,
-    /// Family-wise.
-    pub p_value: f64,
+    /// Standard deviations above what white noise shows.
+    pub score: f64,
     /// Share in all squared correlations beyond what chance makes.
     pub share: f64,
 }
@@ -135,57 +129,48 @@ pub struct Band {
     pub low: f64,
     /// In Hz.
     pub high: f64,
-    /// Family-wise.
-    pub p_value: f64,
+    /// Standard deviations above what white noise shows.
+    pub score: f64,
     /// Share in all power beyond what chance makes.
     pub share: f64,
 }
 
-/// Missing term of an equation, as the smoothed disturbance there.
+/// An unknown function that was fitted together with θ and noise levels.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Equation {
-    /// The state whose rate, or the output whose value, the equation gives.
-    pub equation: String,
-    /// Family-wise, of the disturbance's scan.
-    pub p_value: f64,
-    /// Probability of a disturbance there among disturbances in all equations.
-    pub share: f64,
-    /// Mean of the missing term by ranges of states and inputs.
-    pub term: Vec<TermRange>,
-}
-
-/// The missing term where a variable is in a range.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TermRange {
-    /// State or input.
+pub struct MissingFunction {
+    /// State whose rate it joins, or sensor or actuator whose signal it bends.
+    pub place: String,
+    /// State, input or signal that it depends on.
     pub variable: String,
-    /// From.
-    pub low: f64,
-    /// To.
-    pub high: f64,
-    /// Mean of the missing term, in the unit of the equation.
-    pub mean: f64,
-    /// Standard deviation of that mean, the term's correlation in time counted.
-    pub std_error: f64,
+    /// True on top of the accepted effects; false beside the twin alone.
+    pub on_top: bool,
+    /// Nats over the model without it.
+    pub log_evidence: f64,
+    /// Values of the variable, over the range that the records show.
+    pub values: Vec<f64>,
+    /// The function there.
+    pub mean: Vec<f64>,
+    /// Its standard deviation, θ and noise levels uncertain.
+    pub std_error: Vec<f64>,
 }
 
 /// One cell of a map.
 pub(crate) trait Cell {
-    /// Family-wise p-value.
-    fn p_value(&self) -> f64;
+    /// Standard deviations above white noise.
+    fn score(&self) -> f64;
     /// Share of what the list divides.
     fn share(&self) -> f64;
-    /// Returns true where the cell stands out of simulations: p ≤ 0.1.
+    /// Returns true where the cell stands out.
     fn is_notable(&self) -> bool {
-        self.p_value() <= Thresholds::NOTABLE
+        self.score() >= Thresholds::NOTABLE
     }
 }
 
 macro_rules! cells {
     ($($name:ty),*) => {
         $(impl Cell for $name {
-            fn p_value(&self) -> f64 {
-                self.p_value
+            fn score(&self) -> f64 {
+                self.score
             }
             fn share(&self) -> f64 {
                 self.share

@@ -4,7 +4,7 @@ mod location;
 
 pub(crate) use location::Cell;
 pub use location::{
-    Band, Channel, Equation, Lag, Location, Maps, Onset, Region, TargetShare, TermRange, Window,
+    Band, Channel, Lag, Location, Maps, MissingFunction, Onset, Region, TargetShare, Window,
 };
 
 use crate::record::{Drive, Signal};
@@ -43,6 +43,8 @@ pub enum Decision {
     Named,
     /// Rivals that the data cannot tell apart.
     Class,
+    /// Listed effects explain most; something unknown remains.
+    Partial,
     /// No listed effect, nor a pair of them, explains the record.
     NoneOfThese,
     /// Parameters outside of the prior explain the record, and so does a listed effect with parameters inside.
@@ -57,6 +59,7 @@ impl Decision {
         match self {
             Self::Named => "named",
             Self::Class => "class",
+            Self::Partial => "partial",
             Self::NoneOfThese => "none-of-these",
             Self::Absorbed => "absorbed",
             Self::NotNeeded => "not-needed",
@@ -64,19 +67,20 @@ impl Decision {
     }
 }
 
-/// Structural test: can the refitted twin have made the record?
+/// Evidence for a gap: something is missing against nothing is.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Detection {
-    /// p-value of the structural test; with a validation record, of rank and e-value together.
-    pub p_value: f64,
-    /// Level of the test.
+    /// log of the odds that something is missing, in nats, prior odds even: a gap above 0.
+    pub log_evidence: f64,
+    /// Share of records simulated by the fitted twin with as much evidence; none unless asked for. Where no simulation has as much, an
+    /// upper bound: [`Detection::at_floor`].
+    pub p_value: Option<f64>,
+    /// Number of these records.
+    pub simulations: usize,
+    /// True where no simulation has as much evidence: p is below `p_value`.
+    pub at_floor: bool,
+    /// Level of the test whether θ left its prior.
     pub alpha: f64,
-    /// Distance of the record from simulations, in their standard deviations.
-    pub statistic: f64,
-    /// p-value by the record alone.
-    pub rank_p_value: f64,
-    /// log E of the validation record.
-    pub log_e: Option<f64>,
 }
 
 /// One parameter of the twin.
@@ -118,15 +122,13 @@ pub struct EffectFit {
     pub id: String,
     /// Its target.
     pub target: String,
-    /// Among listed effects and catch-alls.
+    /// Posterior probability that it is missing, alone or beside others.
     pub probability: f64,
     /// Names and values, those held at an infinite off value included.
     #[serde(serialize_with = "as_map")]
     pub magnitudes: Vec<(String, f64)>,
-    /// Nats over the twin, on the record and, if there is one, the validation record.
-    pub log_score_gain: f64,
-    /// Family-wise p-value of its scan.
-    pub p_value: Option<f64>,
+    /// log of the evidence over that of the twin, in nats; for the members of an accepted set, that of the set.
+    pub log_evidence: f64,
 }
 
 impl EffectFit {
@@ -147,12 +149,36 @@ pub struct Cause {
     pub accepted: Vec<String>,
     /// Rivals that the data cannot tell apart, the accepted among them.
     pub class: Vec<String>,
-    /// p-value of the structural test with the accepted, or else the best, effect added.
-    pub unexplained_p_value: Option<f64>,
+    /// Probabilities of the kinds of explanation.
+    pub probabilities: Probabilities,
+    /// What an unknown function adds on top of the accepted, or else the best, effects.
+    pub remains: Option<Remains>,
     /// A record that would split the class; none where there is no class, or no input splits it.
     pub next_input: Option<NextInput>,
-    /// The catch-all that beats every listed effect.
-    pub catch_all: Option<String>,
+}
+
+/// Posterior probabilities; they add up to one.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Probabilities {
+    /// Listed effects explain everything.
+    pub listed: f64,
+    /// Listed effects explain a part.
+    pub partial: f64,
+    /// Nothing listed is missing, but something is.
+    pub unknown: f64,
+    /// Nothing is missing.
+    pub nothing: f64,
+}
+
+/// Something unknown on top of effects.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Remains {
+    /// Its most probable place.
+    pub place: String,
+    /// Nats that it adds.
+    pub log_evidence: f64,
+    /// Its share of all nats.
+    pub share: f64,
 }
 
 /// A record to measure next, so that rivals are told apart.
@@ -174,28 +200,18 @@ pub struct NextInput {
     pub again: [u64; 2],
 }
 
-/// Regression of the missing term: exploratory, not a test.
+/// A sparse law for a missing function: exploratory, not a test.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Discovery {
-    /// The equation that lacks the term: a state or an output.
+    /// Place of the function.
     #[serde(flatten, serialize_with = "exploratory")]
     pub equation: String,
-    /// Terms by how often resampled records include them.
+    /// Variable of the function.
+    pub variable: String,
+    /// Terms by how often draws of the function include them.
     pub terms: Vec<Term>,
-    /// Share of the variance of the smoothed missing term that the terms explain.
+    /// Share of the function's variance that the terms explain.
     pub explained: f64,
-    /// Instants of the first record, in seconds.
-    #[serde(skip)]
-    pub times: Vec<f64>,
-    /// The smoothed missing term there.
-    #[serde(skip)]
-    pub missing: Vec<f64>,
-    /// Its standard deviation.
-    #[serde(skip)]
-    pub std_error: Vec<f64>,
-    /// The regression there.
-    #[serde(skip)]
-    pub fitted: Vec<f64>,
 }
 
 /// One term of a regression.
@@ -205,9 +221,9 @@ pub struct Term {
     pub name: String,
     /// Its factor, in the unit of the equation.
     pub coefficient: f64,
-    /// 90 % of the coefficients of resampled records that include it.
+    /// 90 % of the coefficients of draws that include it.
     pub interval: [f64; 2],
-    /// Share of resampled records that include it.
+    /// Share of draws that include it.
     pub inclusion: f64,
 }
 
@@ -259,11 +275,11 @@ pub struct Diagnosis {
     pub cause: Cause,
     /// Extent on held-out data, if there are any.
     pub shrinkage: Option<Shrinkage>,
-    /// Regression of the missing term, where no listed effect is accepted.
+    /// Sparse law for the missing function, where something unknown is missing.
     pub discovery: Option<Discovery>,
     /// Smallest visible magnitude of each listed effect.
     pub power: Vec<Visible>,
-    /// Number of explanations tested: listed effects and disturbances.
+    /// Number of explanations tested: listed effects and unknown functions.
     pub candidates: usize,
     /// Effects of this twin that were not tested, as `id@target`.
     pub not_tested: Vec<String>,

@@ -2,7 +2,7 @@
 
 use super::disturbed_equations::disturbed;
 use super::entry::Entry;
-use crate::evid::error::DiagnoseError;
+use crate::diagnose::error::DiagnoseError;
 use crate::effect::{Effect, EffectKey, augment_short};
 use crate::fit::axis::Axis;
 use crate::twin::{Twin, fix};
@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 /// Kind of hypothesis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::evid) enum Nature {
+pub(in crate::diagnose) enum Nature {
     /// An effect of the library.
     Listed,
     /// An unknown function of states, inputs or signals.
@@ -25,7 +25,7 @@ pub(in crate::evid) enum Nature {
 
 /// What is added to the twin.
 #[derive(Debug, Clone)]
-pub(in crate::evid) enum Part {
+pub(in crate::diagnose) enum Part {
     /// An effect, some magnitudes of which may be held at their off value; `kept` values of a delay's memory.
     Effect {
         effect: Effect,
@@ -38,7 +38,7 @@ pub(in crate::evid) enum Part {
 
 /// Values of a term's magnitudes at which a search looks.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::evid) struct Start {
+pub(in crate::diagnose) struct Start {
     pub m: Vec<f64>,
     /// True where the first magnitude is a size: a small value of it gives a direction, and the best multiple is the start.
     pub scales: bool,
@@ -46,7 +46,7 @@ pub(in crate::evid) struct Start {
 
 /// A term that a twin may lack.
 #[derive(Debug, Clone)]
-pub(in crate::evid) struct Term {
+pub(in crate::diagnose) struct Term {
     /// Id of the effect, or a word for the unknown.
     pub id: String,
     /// State, sensor, actuator or parameter.
@@ -95,7 +95,7 @@ impl Term {
 }
 
 /// The twin with terms: effects first, a disturbance last.
-pub(in crate::evid) fn with_terms<'t>(
+pub(in crate::diagnose) fn with_terms<'t>(
     base: &Twin,
     terms: impl Iterator<Item = &'t Term> + Clone,
 ) -> Result<Twin, DiagnoseError> {

@@ -15,7 +15,7 @@ const CREDIT: f64 = 1.5;
 
 /// A twin with terms, fitted.
 #[derive(Clone)]
-pub(in crate::evid) struct Model<'a> {
+pub(in crate::diagnose) struct Model<'a> {
     /// The twin without terms, its noise levels in θ.
     pub base: &'a Twin,
     pub terms: Vec<Arc<Term>>,
@@ -26,7 +26,7 @@ pub(in crate::evid) struct Model<'a> {
 }
 
 /// A model with one more term, not yet fitted.
-pub(in crate::evid) struct Extended<'a> {
+pub(in crate::diagnose) struct Extended<'a> {
     pub terms: Vec<Arc<Term>>,
     pub problem: Problem<'a>,
     /// Entries of the new term's magnitudes.
@@ -140,11 +140,11 @@ impl<'a> Extended<'a> {
 }
 
 /// Keys of terms, in their order.
-pub(in crate::evid) fn keys(terms: &[Arc<Term>]) -> Vec<String> {
+pub(in crate::diagnose) fn keys(terms: &[Arc<Term>]) -> Vec<String> {
     terms.iter().map(|t| t.key()).collect()
 }
 
 /// Records of a model.
-pub(in crate::evid) fn records<'a>(model: &Model<'a>) -> &'a [Record] {
+pub(in crate::diagnose) fn records<'a>(model: &Model<'a>) -> &'a [Record] {
     model.problem.records
 }

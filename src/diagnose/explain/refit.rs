@@ -1,8 +1,8 @@
 //! Fits of terms together with θ and noise levels.
 
 use super::scan::{Beginning, Linear, Promise};
-use crate::evid::error::DiagnoseError;
-use crate::evid::model::{Extended, Model};
+use crate::diagnose::error::DiagnoseError;
+use crate::diagnose::model::{Extended, Model};
 use crate::fit::climb::{Fitted, climb};
 use crate::fit::evidence::laplace;
 use crate::likelihood::kalman::recoverable;
@@ -13,7 +13,7 @@ const SHARES: [f64; 4] = [1.0, 0.5, 0.2, 0.0];
 
 /// Effort of a fit.
 #[derive(Clone, Copy)]
-pub(in crate::evid) struct Effort {
+pub(in crate::diagnose) struct Effort {
     /// Starts of the term.
     pub starts: usize,
     pub iterations: usize,
@@ -24,7 +24,7 @@ const HELD: usize = 6;
 const RELEASED: usize = 40;
 
 /// Fits a promise beside a model from its best starts, with θ as it answers them and with those given; `None` where it works at none.
-pub(in crate::evid) fn fit_promise<'a>(
+pub(in crate::diagnose) fn fit_promise<'a>(
     model: &Model<'a>,
     promise: &Promise,
     thetas: &[Vec<f64>],
@@ -49,7 +49,7 @@ pub(in crate::evid) fn fit_promise<'a>(
 
 /// The model with its noise held loud, θ fitted to that: predictions then hardly reach beyond a row, and the likelihood has no narrow
 /// valleys.
-pub(in crate::evid) fn loudly<'a>(model: &Model<'a>) -> Result<Option<Model<'a>>, DiagnoseError> {
+pub(in crate::diagnose) fn loudly<'a>(model: &Model<'a>) -> Result<Option<Model<'a>>, DiagnoseError> {
     let is_noise = |j: usize| model.problem.axes[j].begin.is_some();
     let problem = model.problem.holding(is_noise);
     let start = problem.begin(&model.fitted.theta);
@@ -61,7 +61,7 @@ pub(in crate::evid) fn loudly<'a>(model: &Model<'a>) -> Result<Option<Model<'a>>
 }
 
 /// Fits a promise beside the loud model, the noise let down in steps to that of the model and then free.
-pub(in crate::evid) fn fit_annealed<'a>(
+pub(in crate::diagnose) fn fit_annealed<'a>(
     model: &Model<'a>,
     loud: &Model<'a>,
     promise: &Promise,
@@ -122,7 +122,7 @@ fn begin(
 }
 
 /// Fits an unknown function's coefficients under the prior that is most probable, and once more if that moved.
-pub(in crate::evid) fn fit_function<'a>(
+pub(in crate::diagnose) fn fit_function<'a>(
     model: &Model<'a>,
     linear: Linear<'a>,
     iterations: usize,

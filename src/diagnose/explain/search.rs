@@ -2,9 +2,9 @@
 
 use super::refit::{Effort, fit_annealed, fit_function, fit_promise, loudly};
 use super::scan::{functions, scan};
-use crate::evid::error::DiagnoseError;
-use crate::evid::hypotheses::term::{Nature, Term};
-use crate::evid::model::Model;
+use crate::diagnose::error::DiagnoseError;
+use crate::diagnose::hypotheses::term::{Nature, Term};
+use crate::diagnose::model::Model;
 use crate::fit::evidence::log_mean;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -15,7 +15,7 @@ const PRICE_OF_FREQUENCY: f64 = 2.5;
 
 /// One explanation beside a model.
 #[derive(Clone)]
-pub(in crate::evid) struct Found<'a> {
+pub(in crate::diagnose) struct Found<'a> {
     pub terms: Vec<Arc<Term>>,
     /// log Z over that of the twin, in nats: one term's may be used in several ways, which share its prior.
     pub gain: f64,
@@ -37,10 +37,12 @@ impl Found<'_> {
 
 /// How many hypotheses are refitted.
 #[derive(Clone, Copy)]
-pub(in crate::evid) struct Breadth {
+pub(in crate::diagnose) struct Breadth {
     /// Listed effects in the first round.
     pub listed: usize,
-    /// Functions.
+    /// Listed effects that are fitted from loud noise.
+    pub annealed: usize,
+    /// Functions; of those of time, half as many.
     pub functions: usize,
     /// Nats that a screened hypothesis must promise.
     pub least: f64,
@@ -72,7 +74,7 @@ fn merged<'a>(all: Vec<Found<'a>>, ways: &BTreeMap<String, usize>) -> Vec<Found<
 }
 
 /// Best first.
-pub(in crate::evid) fn sort(all: &mut [Found<'_>]) {
+pub(in crate::diagnose) fn sort(all: &mut [Found<'_>]) {
     all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
 }
 
@@ -85,7 +87,7 @@ fn ways(terms: &[Arc<Term>]) -> BTreeMap<String, usize> {
 }
 
 /// Listed effects beside a model, refitted; best first. `origin` is log Z of the twin; `thetas` are further starts of the twin's own θ.
-pub(in crate::evid) fn listed<'a>(
+pub(in crate::diagnose) fn listed<'a>(
     model: &Model<'a>,
     terms: &[Arc<Term>],
     origin: f64,
@@ -115,6 +117,7 @@ pub(in crate::evid) fn listed<'a>(
         .collect::<Result<_, DiagnoseError>>()?;
     if let Some(loud) = &loud {
         let again: Vec<Option<Found<'a>>> = (louder.par_iter())
+            .take(breadth.annealed)
             .filter(|p| p.nats() > breadth.least)
             .map(|promise| Ok(fit_annealed(model, loud, promise, 2)?.map(found)))
             .collect::<Result<_, DiagnoseError>>()?;
@@ -194,14 +197,14 @@ fn refreshed<'a>(model: &Model<'a>, fitted: crate::fit::climb::Fitted) -> Option
 }
 
 /// θ of the twin without terms.
-pub(in crate::evid) fn own_theta(found: &Found<'_>) -> Option<Vec<f64>> {
+pub(in crate::diagnose) fn own_theta(found: &Found<'_>) -> Option<Vec<f64>> {
     let model = found.model.as_ref()?;
     let d = model.base.parameters().len();
     Some(model.theta()[..d].to_vec())
 }
 
 /// Unknown functions beside a model; best first.
-pub(in crate::evid) fn unknown<'a>(
+pub(in crate::diagnose) fn unknown<'a>(
     model: &Model<'a>,
     terms: &[Arc<Term>],
     origin: f64,
@@ -212,9 +215,10 @@ pub(in crate::evid) fn unknown<'a>(
         terms.iter().filter(|t| natures.contains(&t.nature)).cloned().collect()
     };
     let mut all: Vec<Found<'a>> = vec![];
-    for (natures, price) in [
-        (&[Nature::Function, Nature::Past][..], 0.0),
-        (&[Nature::Periodic], PRICE_OF_FREQUENCY),
+    let half = breadth.functions.div_ceil(2);
+    for (natures, price, most) in [
+        (&[Nature::Function, Nature::Past][..], 0.0, breadth.functions),
+        (&[Nature::Periodic], PRICE_OF_FREQUENCY, half),
     ] {
         let linear = functions(model, &of(natures))?;
         let fits: Vec<(Vec<Arc<Term>>, f64, Option<Model<'a>>)> = (linear.into_par_iter())
@@ -222,7 +226,7 @@ pub(in crate::evid) fn unknown<'a>(
             .map(|(i, linear)| {
                 let (terms, gain) = (linear.extended.terms.clone(), linear.gain - price);
                 let iterations = if gain > 10.0 { 6 } else { 4 };
-                let fitted = match i < breadth.functions && linear.gain > breadth.least {
+                let fitted = match i < most && linear.gain > breadth.least {
                     true => fit_function(model, linear, iterations)?,
                     false => None,
                 };
@@ -249,7 +253,7 @@ pub(in crate::evid) fn unknown<'a>(
     let fits: Vec<(usize, Option<Model<'a>>)> = (order.into_par_iter())
         .enumerate()
         .map(|(n, i)| {
-            let worth = n < breadth.functions && (rough[i] > 0.0 || promises[i].nats() > breadth.least);
+            let worth = n < half && (rough[i] > 0.0 || promises[i].nats() > breadth.least);
             let effort = Effort { starts: 2, iterations: 6 };
             let fitted = if worth { fit_promise(model, &promises[i], &[], effort)? } else { None };
             Ok((i, fitted))

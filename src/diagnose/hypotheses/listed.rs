@@ -2,8 +2,8 @@
 
 use super::scales::Scales;
 use super::term::{Nature, Part, Start, Term, with_terms};
-use crate::evid::error::DiagnoseError;
-use crate::evid::thresholds::Thresholds;
+use crate::diagnose::error::DiagnoseError;
+use crate::diagnose::thresholds::Thresholds;
 use crate::effect::{Effect, Law, Magnitude, Mark, TargetKind, targets};
 use crate::fit::axis::{Axis, EvidencePrior};
 use crate::fit::magnitude::{largest, shape_axis, size_axis};
@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Twin and record that effects are looked for in.
-pub(in crate::evid) struct Library<'a> {
+pub(in crate::diagnose) struct Library<'a> {
     pub twin: &'a Twin,
     /// The fitted θ of the first record.
     pub theta: &'a [f64],
@@ -114,7 +114,7 @@ impl Library<'_> {
         let mut grids: Vec<Vec<f64>> = vec![];
         let mut scales = false;
         for (i, (m, name)) in free.iter().zip(&names).enumerate() {
-            let j = space.position(name).map_err(crate::evid::error::DiagnoseError::from)?;
+            let j = space.position(name).map_err(crate::diagnose::error::DiagnoseError::from)?;
             let (grid, axis) = self.magnitude(m, effect.law(), values, register, (&twin, j, &space[j]));
             if matches!(axis.evidence, EvidencePrior::Magnitude { .. }) && i == 0 {
                 scales = true;

@@ -38,7 +38,7 @@ static NAMES: [&str; 21] = [
 
 /// A variable of a function and the range that it is seen in.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::evid) struct Variable {
+pub(in crate::diagnose) struct Variable {
     pub name: String,
     pub of: Of,
     pub low: f64,
@@ -47,7 +47,7 @@ pub(in crate::evid) struct Variable {
 
 /// Kind of a function's variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::evid) enum Of {
+pub(in crate::diagnose) enum Of {
     /// State of this index.
     State(usize),
     /// Input of this index.
@@ -122,7 +122,7 @@ fn sum_of_two(m: &[f64], values: [f64; 2], ends: [(f64, f64); 2]) -> f64 {
 }
 
 /// The value of a fitted function where its variable is `value`; of one variable.
-pub(in crate::evid) fn basis(value: f64, variable: &(String, f64, f64), count: usize) -> Vec<f64> {
+pub(in crate::diagnose) fn basis(value: f64, variable: &(String, f64, f64), count: usize) -> Vec<f64> {
     let mut phi = vec![0.0; count];
     sines(value, (variable.1, variable.2), &mut phi);
     phi

@@ -2,22 +2,29 @@
 
 use super::decide::Findings;
 use super::search::{Breadth, Found, listed, own_theta, sort, unknown};
-use crate::evid::error::DiagnoseError;
-use crate::evid::hypotheses::scales::Scales;
-use crate::evid::hypotheses::term::Term;
-use crate::evid::model::Model;
-use crate::evid::thresholds::Thresholds;
+use crate::diagnose::error::DiagnoseError;
+use crate::diagnose::hypotheses::scales::Scales;
+use crate::diagnose::hypotheses::term::Term;
+use crate::diagnose::model::Model;
+use crate::diagnose::thresholds::Thresholds;
 use std::sync::Arc;
 
+/// Functions that are refitted where the place of what is missing is known about.
+const FEW: usize = 3;
+/// Single effects that are looked at for something left.
+const SINGLES: usize = 3;
+/// Least share of the best single effect's evidence of a first of a pair.
+const FIRST: f64 = 1.0 / 3.0;
+
 /// Terms of a diagnosis.
-pub(in crate::evid) struct Terms<'t> {
+pub(in crate::diagnose) struct Terms<'t> {
     pub listed: &'t [Arc<Term>],
     /// Unknown functions whose range covers these models' states as well.
     pub unknown: &'t dyn Fn(&[Scales<'_>]) -> Vec<Arc<Term>>,
 }
 
 /// Finds out what explains the records beside the twin; stops early where nothing does.
-pub(in crate::evid) fn explore<'a>(
+pub(in crate::diagnose) fn explore<'a>(
     base: &Model<'a>,
     terms: &Terms<'_>,
     breadth: Breadth,
@@ -33,11 +40,11 @@ pub(in crate::evid) fn explore<'a>(
         singles = listed(base, terms.listed, origin, &[], Breadth { listed: usize::MAX, ..breadth })?;
     }
     let top = singles.first().map_or(0.0, |f| f.gain);
-    let mut findings = Findings { listed: vec![], unknown: vec![], several: vec![], beside: vec![] };
+    let few = Breadth { functions: FEW, ..breadth };
     if top > Thresholds::WIDER {
         // The twin that is misfitted may not go where the corrected one goes.
         let seen = scales(&singles[..singles.len().min(2)])?;
-        for found in unknown(base, &(terms.unknown)(&seen), origin, breadth)? {
+        for found in unknown(base, &(terms.unknown)(&seen), origin, few)? {
             match unknown_alone.iter_mut().find(|f| f.keys() == found.keys()) {
                 Some(old) if found.gain > old.gain => *old = found,
                 _ => {}
@@ -45,40 +52,43 @@ pub(in crate::evid) fn explore<'a>(
         }
         sort(&mut unknown_alone);
     }
-    findings.listed = singles;
-    findings.unknown = unknown_alone;
+    let mut findings = Findings {
+        listed: singles,
+        unknown: unknown_alone,
+        ..Findings::default()
+    };
     if findings.chances().log_odds <= 0.0 {
         return Ok(findings);
     }
-    let narrow = Breadth { functions: breadth.functions.div_ceil(2).max(2), ..breadth };
+    // What an unknown function alone explains better leaves something.
+    let best = findings.unknown.first().map_or(0.0, |f| f.gain);
+    let may_suffice = |found: &Found<'_>| found.gain > best - Thresholds::CANDIDATES;
     let mut enough = false;
-    for i in 0..findings.listed.len().min(3) {
+    for i in 0..findings.listed.len().min(SINGLES) {
         let found = findings.listed[i].clone();
-        if found.gain < top - Thresholds::CANDIDATES {
+        if found.gain < top - Thresholds::CANDIDATES || !may_suffice(&found) {
             break;
         }
-        let Some(left) = on_top(&found, terms, origin, narrow)? else { continue };
-        let added = left.first().map_or(0.0, |f| f.gain - found.gain);
-        findings.beside.push((found.keys(), left));
-        if added < Thresholds::ADEQUATE {
+        if findings.add(&found, on_top(&found, terms, origin, few)?) {
             enough = true;
             break;
         }
     }
     findings.several = pairs(&findings, terms, origin, breadth, enough)?;
-    let single = top;
     for i in 0..findings.several.len().min(2) {
         let found = findings.several[i].clone();
-        if found.gain < single + Thresholds::WORTH_ANOTHER {
+        let better = found.gain > top + Thresholds::WORTH_ANOTHER;
+        if !better || i > 0 && !may_suffice(&found) {
             break;
         }
-        if let Some(left) = on_top(&found, terms, origin, narrow)? {
-            let added = left.first().map_or(0.0, |f| f.gain - found.gain);
-            findings.beside.push((found.keys(), left));
-            if added < Thresholds::ADEQUATE {
-                break;
-            }
+        if findings.add(&found, on_top(&found, terms, origin, few)?) {
+            enough = true;
+            break;
         }
+    }
+    // What explains most may do so beside something unknown.
+    if !enough && let Some(found) = findings.listed.first().cloned() && findings.left(&found.keys()).is_none() {
+        findings.add(&found, on_top(&found, terms, origin, few)?);
     }
     Ok(findings)
 }
@@ -111,7 +121,10 @@ fn pairs<'a>(
             let adequate = |f: &&Found<'a>| findings.left(&f.keys()).is_some_and(|l| l < Thresholds::ADEQUATE);
             findings.listed.iter().find(adequate).cloned().into_iter().collect()
         }
-        None => findings.listed.iter().take(firsts).cloned().collect(),
+        None => (findings.listed.iter().take(firsts))
+            .filter(|f| f.gain > FIRST * findings.listed[0].gain)
+            .cloned()
+            .collect(),
     };
     for first in &sources {
         let Some(model) = &first.model else { continue };
@@ -119,7 +132,8 @@ fn pairs<'a>(
             .filter(|t| !first.terms.iter().any(|own| own.key() == t.key()))
             .cloned()
             .collect();
-        let seconds = Breadth { listed: if enough { 4 } else { 8 }, least: 3.0, ..breadth };
+        let count = if enough { 4 } else { 8 };
+        let seconds = Breadth { listed: count, annealed: count, least: 3.0, ..breadth };
         let found = listed(model, &others, origin, &thetas, seconds)?;
         for pair in found.into_iter().filter(|f| f.model.is_some()) {
             let keys = pair.keys();

@@ -3,9 +3,9 @@
 //! The innovations of the model with a little of the term give a direction; the gain along it, θ free to answer, is the promise of a
 //! listed effect. An unknown function's coefficients have a score each, so that its evidence has a closed form.
 
-use crate::evid::error::DiagnoseError;
-use crate::evid::hypotheses::term::{Start, Term};
-use crate::evid::model::{Extended, Model};
+use crate::diagnose::error::DiagnoseError;
+use crate::diagnose::hypotheses::term::{Start, Term};
+use crate::diagnose::model::{Extended, Model};
 use crate::fit::axis::EvidencePrior;
 use crate::fit::evidence::{Laplace, laplace};
 use crate::fit::reference::Reference;
@@ -18,7 +18,7 @@ use std::sync::Arc;
 const SMALL: f64 = 0.01;
 
 /// A term and its best starts.
-pub(in crate::evid) struct Promise {
+pub(in crate::diagnose) struct Promise {
     pub term: Arc<Term>,
     /// Best first.
     pub starts: Vec<Beginning>,
@@ -26,7 +26,7 @@ pub(in crate::evid) struct Promise {
 
 /// Where a fit of a term may begin.
 #[derive(Clone)]
-pub(in crate::evid) struct Beginning {
+pub(in crate::diagnose) struct Beginning {
     /// Gain to second order, in nats.
     pub nats: f64,
     /// Magnitudes.
@@ -45,7 +45,7 @@ impl Promise {
 }
 
 /// Promises of terms beside a model, best first; terms that nothing can be told of are left out.
-pub(in crate::evid) fn scan(
+pub(in crate::diagnose) fn scan(
     model: &Model<'_>,
     terms: &[Arc<Term>],
 ) -> Result<Vec<Promise>, DiagnoseError> {
@@ -116,7 +116,7 @@ fn promise(
 }
 
 /// Evidence of an unknown function to second order, before any refit.
-pub(in crate::evid) struct Linear<'a> {
+pub(in crate::diagnose) struct Linear<'a> {
     pub term: Arc<Term>,
     pub extended: Extended<'a>,
     /// Nats over the model.
@@ -126,7 +126,7 @@ pub(in crate::evid) struct Linear<'a> {
 }
 
 /// Unknown functions beside a model, best first.
-pub(in crate::evid) fn functions<'a>(
+pub(in crate::diagnose) fn functions<'a>(
     model: &Model<'a>,
     terms: &[Arc<Term>],
 ) -> Result<Vec<Linear<'a>>, DiagnoseError> {

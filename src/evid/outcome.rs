@@ -1,3 +1,0 @@
-//! x
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Decision { Named, Class, Partial, NoneOfThese, Absorbed, NotNeeded }
