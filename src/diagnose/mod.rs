@@ -2,7 +2,7 @@
 //!
 //! | room | question |
 //! |---|---|
-//! | `run.rs`, `base.rs` | order of the steps; the fitted twin that they begin with |
+//! | `run.rs`, `base.rs`, `summary.rs` | order of the steps; the fitted twin that they begin with; the summary of their results |
 //! | `model.rs` | a twin with terms, fitted |
 //! | `hypotheses/` | what could be missing: listed effects, unknown functions |
 //! | `explain/` | which of them: screened, refitted, weighed, decided |
@@ -25,9 +25,8 @@ mod quantify;
 mod residuals;
 mod run;
 mod settings;
+mod summary;
 mod thresholds;
-#[cfg(test)]
-mod dev;
 
 pub use error::{DiagnoseError, GivenRecord};
 pub(crate) use outcome::Cell;

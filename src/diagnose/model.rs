@@ -6,12 +6,12 @@ use crate::fit::axis::{EvidencePrior, Family};
 use crate::fit::climb::{Fitted, climb};
 use crate::fit::evidence::{Laplace, laplace};
 use crate::fit::problem::Problem;
-use crate::record::{Record, Signal};
+use crate::record::Signal;
 use crate::twin::Twin;
 use std::sync::Arc;
 
 /// What an unfinished fit of a hypothesis is credited with beyond where it ended, in nats.
-const CREDIT: f64 = 1.5;
+pub(in crate::diagnose) const CREDIT: f64 = 1.5;
 
 /// A twin with terms, fitted.
 #[derive(Clone)]
@@ -142,9 +142,4 @@ impl<'a> Extended<'a> {
 /// Keys of terms, in their order.
 pub(in crate::diagnose) fn keys(terms: &[Arc<Term>]) -> Vec<String> {
     terms.iter().map(|t| t.key()).collect()
-}
-
-/// Records of a model.
-pub(in crate::diagnose) fn records<'a>(model: &Model<'a>) -> &'a [Record] {
-    model.problem.records
 }

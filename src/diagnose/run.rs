@@ -1,39 +1,45 @@
 //! Entry of a diagnosis, and the order of its steps.
 
-use crate::diagnose::context::Context;
-use crate::diagnose::detect::{Detected, detect, explained};
-use crate::diagnose::error::{DiagnoseError, GivenRecord};
-use crate::diagnose::explain::attribute::Explanation;
-use crate::diagnose::explain::decide::{Conclusion, decide};
-use crate::diagnose::explain::extended::{Accepted, ExtendedTwin, additions};
-use crate::diagnose::explain::verdict::absorbing;
-use crate::diagnose::hypotheses::candidate::Addition;
-use crate::diagnose::locate::location::{locate, maps};
-use crate::diagnose::outcome::Maps;
-use crate::diagnose::outcome::*;
-use crate::diagnose::quantify::held_out::shrinkage;
-use crate::diagnose::quantify::next_input::next_input;
-use crate::diagnose::quantify::power::power;
-use crate::diagnose::settings::DiagnoseSettings;
-use crate::diagnose::summary::{fitted_parameters, reported};
-use crate::diagnose::test::fitted_twin::FittedTwin;
-use crate::diagnose::test::free_run::{Runner, free_runs};
-use crate::diagnose::thresholds::Thresholds;
-use crate::likelihood::ensemble::dithered;
-use crate::likelihood::ensemble::measured;
+use super::base::{Base, left_the_prior, verdict};
+use super::error::{DiagnoseError, GivenRecord};
+use super::explain::decide::{Chances, Conclusion, Findings, decide};
+use super::explain::explore::{Terms, absorbing, explore};
+use super::explain::search::Breadth;
+use super::hypotheses::listed::Library;
+use super::hypotheses::scales::Scales;
+use super::hypotheses::term::Term;
+use super::hypotheses::{listed, not_tested, unknown};
+use super::locate::discover::discover;
+use super::locate::functions::{curve, told};
+use super::locate::maps::maps;
+use super::model::{Model, keys};
+use super::outcome::*;
+use super::quantify::calibrate::calibrate;
+use super::quantify::free_run::{Runner, free_runs};
+use super::quantify::next_input::next_input;
+use super::quantify::power::power;
+use super::quantify::share::shrinkage;
+use super::settings::DiagnoseSettings;
+use super::summary::{effects, nuisance, onset, parameters, remains};
+use crate::likelihood::measured;
 use crate::math::six_digits;
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::setting::SettingError;
 use crate::study::Study;
 use crate::twin::Noise;
+use std::sync::Arc;
 use std::time::Instant;
+
+/// Most effects that are named together.
+const MOST_EFFECTS: usize = 2;
 
 /// Diagnoses the gap between a twin and records of one real system.
 ///
-/// All records share θ, but for unknown starts. A validation record is used for the test, the order of explanations, and
-/// the share closed. The likelihood of a twin without equations is an ensemble's instead of a filter's; only effects of its
-/// signals can then be named. The same seed gives the same bits on any number of threads.
+/// All records share θ, noise levels and effects; their starts may differ. A validation record is used for the share closed alone. Noise
+/// levels are fitted with θ unless the study says that they are known, and the first state is uncertain unless it is declared. The
+/// likelihood of a twin without equations is an ensemble's instead of a filter's; only effects of its signals can then be named. The same
+/// seed gives the same bits on any number of threads.
 ///
 /// ```
 /// use truetwin::diagnose::{DiagnoseSettings, Verdict, diagnose};
@@ -67,196 +73,229 @@ pub fn diagnose(
     let clock = Instant::now();
     check(study, records, validation, settings)?;
     let noise = Noise::new(settings.seed, "diagnose", 0);
-    let twin = measured(study.twin(), records)?;
-    let dithered = if twin.1 {
-        Some(dithered(records, noise)?)
-    } else {
-        None
+    let found = search(study, records, settings, noise, progress, |explored| {
+        report(explored, validation, settings, noise, progress)
+    })?;
+    Ok(Diagnosis {
+        seconds: clock.elapsed().as_secs_f64(),
+        ..found
+    })
+}
+
+/// Everything that is known once the search is over.
+struct Explored<'s, 'a> {
+    study: &'s Study,
+    base: &'s Base<'a>,
+    listed: &'s [Arc<Term>],
+    findings: Findings<'a>,
+    chances: Chances,
+    not_tested: Vec<String>,
+}
+
+/// Fits the twin, searches for what explains the records beside it, and hands it all on.
+fn search<R>(
+    study: &Study,
+    records: &[Record],
+    settings: &DiagnoseSettings,
+    noise: Noise,
+    progress: &Progress,
+    then: impl FnOnce(Explored<'_, '_>) -> Result<R, DiagnoseError>,
+) -> Result<R, DiagnoseError> {
+    let stage = progress.stage("fit", 1);
+    let measured = measured(study.twin(), records, &study.beliefs())?;
+    let base = Base::new(&measured, records, settings, noise)?;
+    stage.tick()?;
+    let library = Library {
+        twin: &measured.twin,
+        theta: &base.theta,
+        scales: &base.scales,
+        frequencies: &base.frequencies,
     };
-    let records = dithered.as_deref().unwrap_or(records);
-    let validation: Option<Vec<Record>> = validation.map(|v| vec![v.clone()]);
-    let validation = validation.as_deref();
-    let together = validation.map(|v| [records, v].concat());
-    let context = Context::new(study, &twin, records, validation, together.as_deref());
-    let mut detected = detect(&context, records, settings, noise, progress)?;
-    let Attributed {
-        conclusion,
-        extended,
-        after,
-        effects,
-        explanations,
-    } = if settings.detection_only {
-        Attributed::nothing()
-    } else {
-        attribute(&context, &mut detected, settings, noise, progress)?
+    let listed: Vec<Arc<Term>> = (listed(study, &settings.without, &library, &base.noisy)?.into_iter())
+        .map(Arc::new)
+        .collect();
+    let unlisted = |seen: &[Scales<'_>]| -> Vec<Arc<Term>> {
+        unknown(&library, seen).into_iter().map(Arc::new).collect()
     };
-    let Detected { model, null, .. } = &detected;
-    let structural = detected.verdict == Verdict::StructuralGap;
-    let (mut location, mut discovery, mut next) = Default::default();
-    let (mut visible, mut shrunk) = (vec![], None);
-    if !settings.detection_only {
-        if let Some(explanations) = explanations.as_deref().filter(|_| structural) {
-            let alpha = settings.alpha;
-            (location, discovery) = locate(
-                &context,
-                &detected,
-                explanations,
-                &conclusion,
-                alpha,
-                noise,
-                progress,
-            )?;
-            location.after = after;
-            if conclusion.decision == Decision::Class {
-                let stage = progress.stage("next input", 1);
-                next = next_input(model, explanations, &conclusion.class, noise.child("next"))?;
-                stage.tick()?;
+    let terms = Terms {
+        listed: &listed,
+        unknown: &unlisted,
+    };
+    let breadth = Breadth::of(&base.model);
+    let findings = explore(&base.model, &terms, breadth, !settings.detection_only, progress)?;
+    let names: Vec<Term> = listed.iter().map(|t| t.as_ref().clone()).collect();
+    then(Explored {
+        study,
+        chances: findings.chances(),
+        findings,
+        base: &base,
+        listed: &listed,
+        not_tested: not_tested(study, &names),
+    })
+}
+
+/// Decides, locates and measures.
+fn report(
+    explored: Explored<'_, '_>,
+    validation: Option<&Record>,
+    settings: &DiagnoseSettings,
+    noise: Noise,
+    progress: &Progress,
+) -> Result<Diagnosis, DiagnoseError> {
+    let Explored { study, base, listed, findings, chances, not_tested } = &explored;
+    let model = &base.model;
+    let records = model.problem.records;
+    let mut detection = Detection {
+        log_evidence: chances.log_odds,
+        p_value: None,
+        simulations: settings.calibrate,
+        at_floor: false,
+        alpha: settings.alpha,
+    };
+    if settings.calibrate > 0 {
+        let stage = progress.stage("calibrate", settings.calibrate);
+        let alone = DiagnoseSettings {
+            detection_only: true,
+            calibrate: 0,
+            ..settings.clone()
+        };
+        let log_odds = |records: &[Record]| {
+            let silent = Progress::silent();
+            search(study, records, &alone, noise, &silent, |found| Ok(found.chances.log_odds))
+        };
+        let own = chances.log_odds;
+        let p = calibrate(model, settings.calibrate, own, log_odds, noise.child("null"), &stage)?;
+        if let Some((p, at_floor)) = p {
+            (detection.p_value, detection.at_floor) = (Some(p), at_floor);
+        }
+    }
+    let (outside, within) = left_the_prior(model, settings.alpha)?;
+    let verdict = verdict(chances.log_odds, outside);
+    let mut conclusion = Conclusion::default();
+    let mut absorbed = vec![];
+    match (verdict, within) {
+        (Verdict::StructuralGap, _) => conclusion = decide(findings, MOST_EFFECTS),
+        (Verdict::ParameterGap, Some(within)) if !settings.detection_only => {
+            absorbed = absorbing(model, &within, listed)?;
+            if !absorbed.is_empty() {
+                conclusion.decision = Decision::Absorbed;
+                conclusion.class = absorbed.iter().map(|f| f.keys()[0].clone()).collect();
             }
         }
-        let stage = progress.stage("how far", 2);
-        visible = power(model, null, settings.alpha)?;
+        _ => {}
+    }
+    let accepted = findings.model(&conclusion.accepted);
+    let last = accepted.unwrap_or(model);
+    let stage = progress.stage("where and how far", 4);
+    let mut location = Location::default();
+    let (mut next, mut discovery, mut visible, mut shrunk) = (None, None, vec![], None);
+    if verdict == Verdict::StructuralGap {
+        location = located(findings, chances, &conclusion, model)?;
+        if !settings.detection_only {
+            location.after = accepted.map(|m| maps(m, None)).transpose()?;
+            discovery = discovered(findings, &conclusion, noise);
+        }
+    }
+    stage.tick()?;
+    if !settings.detection_only {
+        if conclusion.decision == Decision::Class && conclusion.accepted.len() == 1 {
+            let rivals: Vec<&Model<'_>> = (conclusion.class.iter())
+                .filter_map(|key| findings.model(std::slice::from_ref(key)))
+                .collect();
+            next = next_input(&rivals, noise.child("next"))?;
+        }
         stage.tick()?;
-        let explanations = explanations.as_deref();
-        shrunk = shrinkage(
-            &context,
-            model,
-            extended.as_ref(),
-            &conclusion,
-            explanations,
-            settings,
-            noise,
-        )?;
+        visible = power(model, listed)?;
+        stage.tick()?;
+        let validation = validation.map(std::slice::from_ref);
+        let initial = settings.initial.as_deref();
+        shrunk = shrinkage(model, accepted, &findings.listed, validation, initial, noise)?;
         stage.tick()?;
     }
-    let last = extended.as_ref().map_or(model, |extended| &extended.model);
-    let space = context.twin.parameters();
-    let (parameters, nuisance) =
-        fitted_parameters(&space.iter().collect::<Vec<_>>(), last, settings);
-    let runs = |record: &Record| beside(&context, model, last, &conclusion, record);
+    let runs = |records: &[Record]| -> Result<FreeRuns, DiagnoseError> {
+        let runner = |model: &Model<'_>| {
+            let problem = model.problem.on(records);
+            Runner::new(&problem, &problem.full(&model.theta()))
+        };
+        let (base, grown) = (runner(model)?, accepted.map(runner).transpose()?.flatten());
+        Ok(free_runs(&records[0], base.as_ref(), grown.as_ref()))
+    };
     Ok(Diagnosis {
         twin: study.name().into(),
-        verdict: detected.verdict,
-        parameters,
-        nuisance,
-        location,
+        verdict,
+        detection,
+        parameters: parameters(last, settings),
+        nuisance: nuisance(last)?,
+        location: Location {
+            onset: accepted.and_then(onset),
+            ..location
+        },
         cause: Cause {
             decision: conclusion.decision,
-            effects,
-            accepted: conclusion.accepted.iter().map(Accepted::key).collect(),
-            unexplained_p_value: conclusion.unexplained,
+            effects: match verdict {
+                Verdict::StructuralGap => effects(findings, chances, &conclusion),
+                _ => super::summary::absorbed(&absorbed),
+            },
+            probabilities: chances.kinds(),
+            remains: remains(findings, &conclusion),
             next_input: next,
-            class: conclusion.class.clone(),
-            catch_all: conclusion.catch_all.clone(),
+            class: conclusion.class,
+            accepted: conclusion.accepted,
         },
         shrinkage: shrunk,
         discovery,
         power: visible,
-        free_runs: runs(&records[0])?,
-        validation_runs: validation.map(|v| runs(&v[0])).transpose()?,
-        candidates: model.dictionary.candidates.len(),
-        detection: detected.detection,
-        not_tested: detected.not_tested,
-        seconds: clock.elapsed().as_secs_f64(),
+        free_runs: runs(&records[..1])?,
+        validation_runs: validation.map(|v| runs(std::slice::from_ref(v))).transpose()?,
+        candidates: findings.listed.len() + findings.unknown.len(),
+        not_tested: not_tested.clone(),
+        seconds: 0.0,
     })
 }
 
-/// Attribution, as far as the verdict asks for one.
-struct Attributed<'a> {
-    conclusion: Conclusion,
-    extended: Option<ExtendedTwin<'a>>,
-    /// Maps with what was accepted, or else came nearest, added.
-    after: Option<Maps>,
-    effects: Vec<EffectFit>,
-    explanations: Option<Vec<Explanation>>,
-}
-
-impl Attributed<'_> {
-    fn nothing() -> Self {
-        Self {
-            conclusion: Conclusion {
-                decision: Decision::NotNeeded,
-                accepted: vec![],
-                class: vec![],
-                unexplained: None,
-                catch_all: None,
-            },
-            extended: None,
-            after: None,
-            effects: vec![],
-            explanations: None,
-        }
-    }
-}
-
-fn attribute<'a>(
-    context: &Context<'a>,
-    detected: &mut Detected<'a>,
-    settings: &DiagnoseSettings,
-    noise: Noise,
-    progress: &Progress,
-) -> Result<Attributed<'a>, DiagnoseError> {
-    let (explanations, within) = (detected.explanations.take(), detected.within.take());
-    let Detected {
-        model, null, test, ..
-    } = &*detected;
-    let mut all = Attributed {
-        explanations,
-        ..Attributed::nothing()
-    };
-    match (detected.verdict, within) {
-        (Verdict::StructuralGap, _) => {
-            let list = match all.explanations.take() {
-                Some(list) => list,
-                None => explained(context, model, null, progress)?,
-            };
-            let stage = progress.stage("accept", 2 * settings.unexplained);
-            let decided = decide(context, model, &list, settings, noise, &stage)?;
-            stage.finish();
-            let added = decided.extended.as_ref().or(decided.best.as_ref());
-            if let (Some(added), Some(left)) = (added, &decided.left) {
-                all.after = Some(maps(&added.model, &left.test, None)?);
-            }
-            (all.conclusion, all.extended) = (decided.conclusion, decided.extended);
-            all.effects = reported(model, &list, test, &all.conclusion);
-            all.explanations = Some(list);
-        }
-        (Verdict::ParameterGap, Some(within)) => {
-            let stage = progress.stage("explain", model.dictionary.candidates.len());
-            let list = absorbing(model, &null.own, within, &stage)?;
-            stage.finish();
-            if !list.is_empty() {
-                all.conclusion.decision = Decision::Absorbed;
-                all.conclusion.class = (list.iter()).map(|e| model.candidate(e).key()).collect();
-            }
-            all.effects = reported(model, &list, test, &all.conclusion);
-        }
-        _ => {}
-    }
-    Ok(all)
-}
-
-/// Free runs beside a record: of the twin, and with the accepted effects.
-fn beside(
-    context: &Context<'_>,
-    model: &FittedTwin<'_>,
-    last: &FittedTwin<'_>,
+/// Places, missing functions and residuals of a structural gap.
+fn located(
+    findings: &Findings<'_>,
+    chances: &Chances,
     conclusion: &Conclusion,
-    record: &Record,
-) -> Result<FreeRuns, DiagnoseError> {
-    let runner = |model: &FittedTwin<'_>, additions: &[Addition]| {
-        let theta = model.theta();
-        Runner::new(context.twin, additions, theta)
-    };
-    let additions = additions(&conclusion.accepted);
-    let grown = if additions.is_empty() {
-        None
-    } else {
-        Some(runner(last, &additions)?)
-    };
-    Ok(free_runs(record, &runner(model, &[])?, grown.as_ref()))
+    model: &Model<'_>,
+) -> Result<Location, DiagnoseError> {
+    let mut targets: Vec<TargetShare> = (chances.places.iter())
+        .map(|(target, p)| TargetShare {
+            target: target.clone(),
+            probability: p / (1.0 - chances.nothing).max(f64::MIN_POSITIVE),
+        })
+        .collect();
+    targets.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    let accepted = conclusion.accepted.first().and_then(|key| Some(key.split_once('@')?.1.to_owned()));
+    let mut functions = told(&findings.unknown, false, 0.0);
+    if let Some((keys, on_top)) = findings.beside(&conclusion.accepted) {
+        let floor = findings.gain(keys).unwrap_or(0.0);
+        functions.extend(told(on_top, true, floor));
+    }
+    let best = findings.best();
+    Ok(Location {
+        maps: maps(model, best)?,
+        target: accepted.or_else(|| targets.first().map(|t| t.target.clone())),
+        targets,
+        functions,
+        ..Location::default()
+    })
 }
 
-pub(in crate::diagnose) fn check(
+/// A sparse law for what is missing, where nothing listed explains it all.
+fn discovered(findings: &Findings<'_>, conclusion: &Conclusion, noise: Noise) -> Option<Discovery> {
+    let all = match conclusion.decision {
+        Decision::NoneOfThese => &findings.unknown,
+        Decision::Partial => findings.beside(&conclusion.accepted)?.1,
+        _ => return None,
+    };
+    let (found, curve) = (all.iter()).find_map(|f| Some((f, curve(f.model.as_ref()?)?)))?;
+    let term = found.last();
+    discover((&term.target, &term.variables[0].0), &curve, noise.child("discover"))
+}
+
+fn check(
     study: &Study,
     records: &[Record],
     validation: Option<&Record>,
@@ -284,15 +323,16 @@ pub(in crate::diagnose) fn check(
             });
         }
         let samples = record.measured_rows();
-        if samples < Thresholds::LEAST_SAMPLES {
+        let least = study.twin().parameters().len() + 3;
+        if samples < least {
             return Err(DiagnoseError::TooShort {
                 record: which,
                 samples,
-                least: Thresholds::LEAST_SAMPLES,
+                least,
             });
         }
     }
-    let (alpha, replicates) = (settings.alpha, settings.replicates as f64);
+    let alpha = settings.alpha;
     SettingError::unless(
         alpha > 0.0 && alpha < 1.0,
         "alpha",
@@ -300,112 +340,13 @@ pub(in crate::diagnose) fn check(
         "choose a level between 0 and 1, such as 0.05",
     )?;
     SettingError::unless(
-        (replicates + 1.0) * alpha > 1.0,
-        "replicates",
-        replicates,
-        "take more than 1/alpha",
-    )?;
-    SettingError::unless(
-        settings.unexplained >= 50,
-        "unexplained",
-        settings.unexplained,
-        "take at least 50",
+        settings.calibrate <= MOST_SIMULATIONS,
+        "calibrate",
+        settings.calibrate,
+        format!("choose at most {MOST_SIMULATIONS}"),
     )?;
     Ok(())
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::record::{Drive, Signal, Signals};
-    use crate::study::RecordPlan;
-    use crate::twin::{DigitalTwin, ParameterSpace, SimulationError};
-    use crate::twins::VanDerPol;
-
-    /// An oscillator with a cubic spring, its extended given in milliseconds where seconds are expected: an conclusion or an error,
-    /// never a panic.
-    #[test]
-    fn a_record_in_milliseconds_does_not_panic() {
-        let (mut x, mut v) = (1.0f64, 0.0f64);
-        let outputs = Signal::from_shape_fn((200, 1), |_| {
-            for _ in 0..50 {
-                v += 1e-3 * (1.5 * (1.0 - x * x) * v - x - 0.028 * x.powi(3));
-                x += 1e-3 * v;
-            }
-            x
-        });
-        let record = Record::new(Drive::autonomous(50.0, 200).unwrap(), outputs).unwrap();
-        let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 200)).unwrap();
-        let settings = DiagnoseSettings::default();
-        let conclusion = diagnose(&study, &[record], None, &settings, &Progress::silent());
-        assert!(
-            matches!(conclusion, Err(DiagnoseError::NoSimulation)),
-            "{conclusion:?}"
-        );
-    }
-
-    /// Records with missing outputs and varying steps are diagnosed as others are: of the twin itself no gap, of a sensor
-    /// that is off one.
-    #[test]
-    fn records_come_with_gaps_and_varying_steps() {
-        let mut source = Noise::new(5, "gaps", 0).source("cells");
-        let mut times = vec![0.0];
-        for k in 1..400 {
-            times.push(times[k - 1] + 0.05 * (0.5 + source.uniform()));
-        }
-        let drive = Drive::with_times(&times, Signal::zeros((400, 0))).unwrap();
-        let clean = VanDerPol
-            .simulate(&[1.5], &drive, Noise::new(1, "gaps", 0))
-            .unwrap();
-        let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 400)).unwrap();
-        let mut verdict = |bend: &dyn Fn(f64) -> f64| {
-            let outputs = clean.mapv(|y| match source.uniform() < 0.15 {
-                true => f64::NAN,
-                false => bend(y),
-            });
-            let record = Record::new(drive.clone(), outputs).unwrap();
-            let settings = DiagnoseSettings::default();
-            let found = diagnose(&study, &[record], None, &settings, &Progress::silent()).unwrap();
-            assert!(found.detection.p_value > 0.0, "{:?}", found.detection);
-            let shrinkage = found.shrinkage.unwrap();
-            assert!(shrinkage.before.is_finite() && shrinkage.before > 0.0);
-            found.verdict
-        };
-        assert_eq!(verdict(&|y| y), Verdict::NoGap);
-        assert_ne!(verdict(&|y| y + 0.6 * y * y), Verdict::NoGap);
-    }
-
-    /// A black box is simulated with one step.
-    #[test]
-    fn a_black_box_needs_one_step() {
-        struct Boxed;
-        impl DigitalTwin for Boxed {
-            fn parameters(&self) -> ParameterSpace {
-                DigitalTwin::parameters(&VanDerPol)
-            }
-            fn signals(&self) -> Signals {
-                DigitalTwin::signals(&VanDerPol)
-            }
-            fn simulate(
-                &self,
-                theta: &[f64],
-                drive: &Drive,
-                noise: Noise,
-            ) -> Result<Signal, SimulationError> {
-                DigitalTwin::simulate(&VanDerPol, theta, drive, noise)
-            }
-        }
-        let times: Vec<f64> = (0..200).map(|k| f64::from(k * k)).collect();
-        let drive = Drive::with_times(&times, Signal::zeros((200, 0))).unwrap();
-        let record = Record::new(drive, Signal::ones((200, 1))).unwrap();
-        let study = Study::new("boxed", Boxed, RecordPlan::autonomous(0.05, 200)).unwrap();
-        let settings = DiagnoseSettings::default();
-        let error = diagnose(&study, &[record], None, &settings, &Progress::silent());
-        let message = error.unwrap_err().to_string();
-        assert!(message.contains("record 1 does not fit the twin: column t: the steps vary"));
-        assert!(
-            message.ends_with("resample the record to one step"),
-            "{message}"
-        );
-    }
-}
+/// Most simulations of a calibration.
+const MOST_SIMULATIONS: usize = 100_000;

@@ -19,6 +19,58 @@ impl Thresholds {
     pub const MARK_ABSENT: f64 = -5.0;
 }
 
+/// Records and reports.
+impl Thresholds {
+    /// Effects in the report: those below are of no weight.
+    pub const REPORTED: usize = 12;
+    /// Nats of likelihood within which a listed effect with θ inside the prior absorbs a parameter gap.
+    pub const ABSORBS: f64 = 2.0;
+}
+
+/// Maps of residuals: descriptions.
+impl Thresholds {
+    /// Standard deviations above white noise of a cell that stands out.
+    pub const NOTABLE: f64 = 4.0;
+    /// Samples below which a cut has no statistic.
+    pub const LEAST_IN_CUT: f64 = 5.0;
+    /// Lags of a whole output, in samples.
+    pub const LAGS: usize = 20;
+    /// Windows of a record in the map of time.
+    pub const WINDOWS: usize = 8;
+    /// Bins of a variable, with equal numbers of samples, in the map of values.
+    pub const BINS: usize = 5;
+    /// Ends of the bins of lags, in samples: octaves.
+    pub const LAG_BINS: [(usize, usize); 5] = [(1, 1), (2, 3), (4, 7), (8, 15), (16, 31)];
+    /// Ends of the bands, in cycles a sample: octaves.
+    pub const BANDS: [f64; 7] = [0.0, 1.0 / 64.0, 1.0 / 32.0, 1.0 / 16.0, 0.125, 0.25, 0.5];
+}
+
+/// Extent.
+impl Thresholds {
+    /// Level of all intervals.
+    pub const INTERVAL_LEVEL: f64 = 0.9;
+    /// Records simulated for the floor.
+    pub const FLOOR_RECORDS: u64 = 32;
+    /// Resamples of the free-run error.
+    pub const SHARE_RESAMPLES: u64 = 400;
+    /// Blocks of a record that are resampled.
+    pub const SHARE_BLOCKS: usize = 20;
+    /// Nats that a term must gain in likelihood to be seen: its share of the prior and what its size is averaged over.
+    pub const SEEN: f64 = 7.0;
+    /// Normal quantile of 80 %: the power that a visible magnitude has.
+    pub const POWER_QUANTILE: f64 = 0.8416;
+    /// Rivals that a next input is to tell apart.
+    pub const MOST_RIVALS: usize = 3;
+    /// Simulations of each proposal.
+    pub const PROOFS: u64 = 20;
+    /// Lengths of proposals, in multiples of the record.
+    pub const LENGTHS: [usize; 2] = [1, 3];
+    /// Parts of a record for which a level is held.
+    pub const HOLDS: [usize; 4] = [80, 27, 10, 4];
+    /// Levels of a staircase.
+    pub const STAIRS: usize = 8;
+}
+
 /// Decision, in nats.
 impl Thresholds {
     /// Prior share of listed effects among what could be missing; the rest belongs to unknown functions. At 0.4 or 0.8 evidence moves by 0.4.

@@ -5,6 +5,7 @@
 //! | `run.rs`, `outcome.rs` | a fit from beginning to end, and its result |
 //! | `magnitude.rs`, `effects.rs` | how large an effect may be, and where a search for it begins |
 //! | `problem.rs`, `axis.rs` | what is unknown, in which bounds, and what is known before |
+//! | `follow.rs` | how the fitted twin follows its records |
 //! | `starts.rs`, `growing.rs` | where does a search begin |
 //! | `climb.rs`, `slope.rs` | the most probable θ |
 //! | `certificate.rs` | has the search arrived, and what lies at a bound |
@@ -19,6 +20,7 @@ pub(crate) mod climb;
 mod effects;
 pub(crate) mod evidence;
 pub(crate) mod first_part;
+pub(crate) mod follow;
 pub(crate) mod growing;
 pub(crate) mod least_squares;
 pub(crate) mod magnitude;

@@ -7,18 +7,19 @@ use super::effects::begin;
 use super::evidence::evidence;
 use super::magnitude::{Kind, kinds, largest, shape_axis, size_axis};
 use super::outcome::{
-    Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedStart, FittedValue,
+    Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedValue,
     OutputErrors, Warning,
 };
 use super::posterior::posterior;
 use super::problem::Problem;
+use super::follow::{free_runs, smoothed, starts};
 use super::starts::{base_fit, polish, search};
 use crate::effect::Effect;
-use crate::likelihood::kalman::{FilterError, FilterSettings, Kalman, Smoothed};
+use crate::likelihood::kalman::FilterError;
 use crate::likelihood::{Beliefs, Level, measured};
 use crate::math::{deviation, quantile};
 use crate::record::{Record, Signal};
-use crate::twin::{Adaptation, Noise, Role, StartLevel, Twin, adapt};
+use crate::twin::{Noise, Role, Twin};
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::time::Instant;
 
@@ -95,8 +96,8 @@ pub(crate) fn run(
     };
     let spread = Spread::new(&problem, &fitted, &draws, settings.level);
     let (parameters, noise_levels) = values(&problem, &fitted, &certificate, &levels, &spread);
-    let smoothed = smoothed(&problem, &fitted)?;
-    let free_runs = free_runs(&problem, &fitted, &smoothed);
+    let smoothed = smoothed(&problem, &fitted.theta)?;
+    let free_runs = free_runs(&problem, &fitted.theta, &smoothed);
     let errors = errors(&problem, &fitted, &free_runs)?;
     let convergence = Convergence {
         converged: certificate.has_converged(),
@@ -232,71 +233,6 @@ fn values(
         });
     }
     (parameters, noise)
-}
-
-/// States of each record given all of it; empty for a black box.
-fn smoothed(problem: &Problem<'_>, fitted: &Fitted) -> Result<Vec<Smoothed>, FilterError> {
-    let Some(equations) = problem.twin.equations() else {
-        return Ok(vec![]);
-    };
-    let settings = FilterSettings::default();
-    (problem.records.iter().enumerate())
-        .map(|(r, record)| {
-            Kalman::new(equations, record, &settings)?.smooth(&problem.of_record(r, &fitted.theta))
-        })
-        .collect()
-}
-
-fn starts(problem: &Problem<'_>, smoothed: &[Smoothed]) -> Vec<FittedStart> {
-    let states = problem.outline().states;
-    (smoothed.iter().enumerate())
-        .flat_map(|(r, smoothed)| {
-            let deviations = smoothed.states.standard_deviations();
-            (states.iter().enumerate())
-                .filter(|(_, state)| !crate::twin::is_memory(&state.name))
-                .map(|(i, state)| FittedStart {
-                    record: r + 1,
-                    name: state.name.clone(),
-                    unit: state.unit.clone(),
-                    value: smoothed.states.means[[0, i]],
-                    std_error: deviations[[0, i]],
-                })
-                .collect::<Vec<_>>()
-        })
-        .collect()
-}
-
-/// Noise-free runs from the start given the record; none where a run diverges.
-fn free_runs(problem: &Problem<'_>, fitted: &Fitted, smoothed: &[Smoothed]) -> Vec<Option<Signal>> {
-    (problem.records.iter().enumerate())
-        .map(|(r, record)| {
-            let theta = problem.of_record(r, &fitted.theta);
-            let twin = match smoothed.get(r) {
-                Some(smoothed) => begun(&problem.twin, smoothed, record.drive().dt())?,
-                None => problem.twin.clone(),
-            };
-            let run = twin.free_run(&theta, record.drive()).ok()?;
-            run.iter().all(|v| v.is_finite()).then_some(run)
-        })
-        .collect()
-}
-
-/// The twin with the start that a record shows.
-fn begun(twin: &Twin, smoothed: &Smoothed, step: f64) -> Option<Twin> {
-    let outline = twin.outline()?;
-    let limits = twin.equations()?.limits();
-    let start = (outline.states.iter().zip(limits).enumerate())
-        .filter(|(_, (state, _))| !crate::twin::is_memory(&state.name))
-        .map(|(i, (state, limit))| {
-            let mean = limit.clamp(smoothed.states.means[[0, i]]);
-            (state.name.clone(), StartLevel::Declared { mean, std: 0.0 })
-        })
-        .collect();
-    let adaptation = Adaptation {
-        start,
-        ..Adaptation::default()
-    };
-    adapt(twin.clone(), &adaptation, step).ok()
 }
 
 fn errors(

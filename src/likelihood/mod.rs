@@ -5,5 +5,5 @@ pub mod kalman;
 mod measured;
 mod of_twin;
 
-pub(crate) use measured::{Beliefs, Level, measured};
+pub(crate) use measured::{Beliefs, Level, Measured, measured};
 pub(crate) use of_twin::{Likelihood, likelihood_of};

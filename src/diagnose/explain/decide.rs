@@ -7,7 +7,8 @@
 //! ```
 
 use super::search::Found;
-use crate::diagnose::outcome::Decision;
+use crate::diagnose::model::Model;
+use crate::diagnose::outcome::{Decision, Probabilities};
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::evidence::log_mean;
 use std::collections::BTreeMap;
@@ -60,7 +61,30 @@ impl<'a> Findings<'a> {
         Some(on_top.first().map_or(0.0, |f| f.gain - own))
     }
 
-    fn gain(&self, keys: &[String]) -> Option<f64> {
+    /// What unknown functions add on top of a set, best first.
+    pub fn beside(&self, keys: &[String]) -> Option<(&[String], &[Found<'a>])> {
+        let found = self.beside.iter().find(|(k, _)| same(k, keys))?;
+        Some((&found.0, &found.1))
+    }
+
+    /// The fitted model of a set.
+    pub fn model(&self, keys: &[String]) -> Option<&Model<'a>> {
+        (self.listed.iter().chain(&self.several))
+            .find(|f| same(&f.keys(), keys))
+            .and_then(|f| f.model.as_ref())
+    }
+
+    /// The model that explains most.
+    pub fn best(&self) -> Option<&Model<'a>> {
+        let on_top = self.beside.iter().flat_map(|(_, all)| all);
+        (self.listed.iter().chain(&self.several).chain(&self.unknown).chain(on_top))
+            .filter(|f| f.model.is_some())
+            .max_by(|a, b| a.gain.total_cmp(&b.gain))
+            .and_then(|f| f.model.as_ref())
+    }
+
+    /// log of the evidence of a set over that of the twin.
+    pub fn gain(&self, keys: &[String]) -> Option<f64> {
         (self.listed.iter().chain(&self.several)).find(|f| same(&f.keys(), keys)).map(|f| f.gain)
     }
 
@@ -125,13 +149,34 @@ fn same(a: &[String], b: &[String]) -> bool {
 }
 
 /// The decision, the effects that the twin is given, and their rivals.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(in crate::diagnose) struct Conclusion {
-    pub decision: Option<Decision>,
+    pub decision: Decision,
     pub accepted: Vec<String>,
+    /// The accepted ones and their rivals; empty without any.
     pub class: Vec<String>,
-    /// Share of all nats that what remains beside the accepted takes.
-    pub remains: Option<(String, f64)>,
+}
+
+impl Default for Conclusion {
+    fn default() -> Self {
+        Self {
+            decision: Decision::NotNeeded,
+            accepted: vec![],
+            class: vec![],
+        }
+    }
+}
+
+impl Chances {
+    /// Probabilities of the kinds of explanation.
+    pub fn kinds(&self) -> Probabilities {
+        Probabilities {
+            listed: self.sets.iter().map(|(_, p)| p).sum(),
+            partial: self.parts.iter().map(|(_, p)| p).sum(),
+            unknown: self.unknown,
+            nothing: self.nothing,
+        }
+    }
 }
 
 /// Decides about a gap.
@@ -165,7 +210,7 @@ pub(in crate::diagnose) fn decide(findings: &Findings<'_>, most_effects: usize) 
         chosen = None;
     }
     if let Some((keys, _, _)) = chosen {
-        return named(findings, keys, Decision::Named, None);
+        return named(findings, keys, Decision::Named);
     }
     // Listed effects that explain most, beside something unknown.
     let chances = findings.chances();
@@ -176,14 +221,11 @@ pub(in crate::diagnose) fn decide(findings: &Findings<'_>, most_effects: usize) 
     if let Some((keys, own, left)) = best
         && partial > chances.unknown
         && *left < Thresholds::REST * (own + left)
-        && let Some((_, on_top)) = findings.beside.iter().find(|(k, _)| same(k, keys))
-        && let Some(rest) = on_top.first()
     {
-        let place = rest.last().target.clone();
-        return named(findings, keys, Decision::Partial, Some((place, left / (own + left))));
+        return named(findings, keys, Decision::Partial);
     }
     Conclusion {
-        decision: Some(Decision::NoneOfThese),
+        decision: Decision::NoneOfThese,
         ..Conclusion::default()
     }
 }
@@ -193,35 +235,25 @@ fn named(
     findings: &Findings<'_>,
     keys: &[String],
     decision: Decision,
-    remains: Option<(String, f64)>,
 ) -> Conclusion {
+    let own = findings.gain(keys).unwrap_or(f64::NAN);
     let mut class = keys.to_vec();
-    if let [key] = keys {
-        let own = findings.gain(keys).unwrap_or(f64::NAN);
-        let rivals = (findings.listed.iter())
-            .filter(|f| f.gain > own - Thresholds::RIVALS && f.keys()[0] != *key)
-            .map(|f| f.keys()[0].clone());
-        class.extend(rivals);
-    } else {
-        // A partner that another effect could stand in for.
-        let own = findings.gain(keys).unwrap_or(f64::NAN);
-        for found in &findings.several {
-            let others = found.keys();
-            let shared = others.iter().filter(|k| keys.contains(k)).count();
-            if found.gain > own - Thresholds::RIVALS && others.len() == keys.len() && shared + 1 == keys.len() {
-                class.extend(others.into_iter().filter(|k| !keys.contains(k)));
+    for found in findings.listed.iter().chain(&findings.several) {
+        if found.gain > own - Thresholds::RIVALS && found.terms.len() == keys.len() {
+            for key in found.keys() {
+                if !class.contains(&key) {
+                    class.push(key);
+                }
             }
         }
     }
-    class.dedup();
     let decision = match decision {
         Decision::Named if class.len() > keys.len() => Decision::Class,
         other => other,
     };
     Conclusion {
-        decision: Some(decision),
+        decision,
         accepted: keys.to_vec(),
         class: if class.len() > keys.len() { class } else { vec![] },
-        remains,
     }
 }

@@ -7,10 +7,13 @@ use crate::diagnose::hypotheses::scales::Scales;
 use crate::diagnose::hypotheses::term::Term;
 use crate::diagnose::model::Model;
 use crate::diagnose::thresholds::Thresholds;
+use crate::progress::Progress;
 use std::sync::Arc;
 
 /// Functions that are refitted where the place of what is missing is known about.
 const FEW: usize = 3;
+/// Steps of the search that are reported: functions, effects, functions of the corrected twin, what is left, pairs.
+const STEPS: usize = 5;
 /// Single effects that are looked at for something left.
 const SINGLES: usize = 3;
 /// Least share of the best single effect's evidence of a first of a pair.
@@ -28,10 +31,14 @@ pub(in crate::diagnose) fn explore<'a>(
     base: &Model<'a>,
     terms: &Terms<'_>,
     breadth: Breadth,
+    explain: bool,
+    progress: &Progress,
 ) -> Result<Findings<'a>, DiagnoseError> {
+    let stage = progress.stage("explain", STEPS);
     let origin = base.log_evidence;
     let first = (terms.unknown)(&[]);
     let mut unknown_alone = unknown(base, &first, origin, breadth)?;
+    stage.tick()?;
     let best = unknown_alone.first().map_or(0.0, |f| f.gain);
     let breadth = Breadth { deep: best > Thresholds::DEEP, ..breadth };
     let mut singles = listed(base, terms.listed, origin, &[], Breadth { listed: if best > Thresholds::NULL_LIKE { usize::MAX } else { breadth.listed }, ..breadth })?;
@@ -40,7 +47,11 @@ pub(in crate::diagnose) fn explore<'a>(
         singles = listed(base, terms.listed, origin, &[], Breadth { listed: usize::MAX, ..breadth })?;
     }
     let top = singles.first().map_or(0.0, |f| f.gain);
-    let few = Breadth { functions: FEW, ..breadth };
+    stage.tick()?;
+    let few = Breadth {
+        functions: FEW.min(breadth.functions),
+        ..breadth
+    };
     if top > Thresholds::WIDER {
         // The twin that is misfitted may not go where the corrected one goes.
         let seen = scales(&singles[..singles.len().min(2)])?;
@@ -57,7 +68,8 @@ pub(in crate::diagnose) fn explore<'a>(
         unknown: unknown_alone,
         ..Findings::default()
     };
-    if findings.chances().log_odds <= 0.0 {
+    stage.tick()?;
+    if !explain || findings.chances().log_odds <= 0.0 {
         return Ok(findings);
     }
     // What an unknown function alone explains better leaves something.
@@ -74,6 +86,7 @@ pub(in crate::diagnose) fn explore<'a>(
             break;
         }
     }
+    stage.tick()?;
     findings.several = pairs(&findings, terms, origin, breadth, enough)?;
     for i in 0..findings.several.len().min(2) {
         let found = findings.several[i].clone();
@@ -86,6 +99,7 @@ pub(in crate::diagnose) fn explore<'a>(
             break;
         }
     }
+    stage.tick()?;
     // What explains most may do so beside something unknown.
     if !enough && let Some(found) = findings.listed.first().cloned() && findings.left(&found.keys()).is_none() {
         findings.add(&found, on_top(&found, terms, origin, few)?);
@@ -147,6 +161,22 @@ fn pairs<'a>(
     sort(&mut all);
     all.truncate(Thresholds::PAIRS);
     Ok(all)
+}
+
+/// Listed effects that explain a parameter gap with θ inside the prior, as well as θ outside does: best first.
+pub(in crate::diagnose) fn absorbing<'a>(
+    free: &Model<'a>,
+    within: &Model<'a>,
+    terms: &[Arc<Term>],
+) -> Result<Vec<Found<'a>>, DiagnoseError> {
+    let breadth = Breadth {
+        listed: usize::MAX,
+        ..Breadth::of(within)
+    };
+    let found = listed(within, terms, within.log_evidence, &[], breadth)?;
+    let best = free.fitted.log_likelihood - Thresholds::ABSORBS;
+    let explains = |f: &Found<'a>| f.model.as_ref().is_some_and(|m| m.fitted.log_likelihood >= best);
+    Ok(found.into_iter().filter(explains).collect())
 }
 
 /// Sizes of the states along fitted models.

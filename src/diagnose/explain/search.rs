@@ -50,6 +50,20 @@ pub(in crate::diagnose) struct Breadth {
     pub deep: bool,
 }
 
+impl Breadth {
+    /// What a twin's likelihood allows: that of a black box costs an ensemble.
+    pub fn of(model: &Model<'_>) -> Self {
+        let simulated = model.problem.is_simulated();
+        Self {
+            listed: 6,
+            annealed: usize::MAX,
+            functions: if simulated { 2 } else { 5 },
+            least: 2.5,
+            deep: false,
+        }
+    }
+}
+
 /// Of terms that are one hypothesis used in several ways, the best; its prior is shared among them.
 fn merged<'a>(all: Vec<Found<'a>>, ways: &BTreeMap<String, usize>) -> Vec<Found<'a>> {
     let mut best: BTreeMap<Vec<String>, Found<'a>> = BTreeMap::new();

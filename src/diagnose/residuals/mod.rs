@@ -1,7 +1,6 @@
-//! Statistics of innovations: whiteness, and maps in time, states, lags and frequency.
+//! Innovations cut by time, value, lag and frequency: maps in time, states, lags and frequency.
 
 pub(super) mod correlation;
 pub(super) mod cut;
 pub(super) mod local;
-pub(super) mod omnibus;
 pub(super) mod shares;

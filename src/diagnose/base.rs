@@ -1,0 +1,151 @@
+//! The twin as it is, fitted: where a diagnosis begins.
+
+use super::error::DiagnoseError;
+use super::hypotheses::frequencies::frequencies;
+use super::hypotheses::scales::Scales;
+use super::model::Model;
+use super::outcome::Verdict;
+use super::settings::DiagnoseSettings;
+use crate::fit::axis::Axis;
+use crate::fit::climb::{Fitted, fit};
+use crate::fit::problem::Problem;
+use crate::fit::starts::{base_fit, polish, search};
+use crate::likelihood::Measured;
+use crate::record::Record;
+use crate::twin::{Noise, Role};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+/// Iterations of a search: loud noise has a way to go.
+const ITERATIONS: usize = 80;
+/// Iterations of a fit inside the prior.
+const INSIDE: usize = 20;
+
+/// The fitted twin and the units of its records.
+pub(in crate::diagnose) struct Base<'a> {
+    pub model: Model<'a>,
+    pub theta: Vec<f64>,
+    pub scales: Scales<'a>,
+    pub frequencies: Vec<f64>,
+    /// Places whose noise level is fitted.
+    pub noisy: Vec<String>,
+}
+
+impl<'a> Base<'a> {
+    /// Fits the twin.
+    pub fn new(
+        measured: &'a Measured,
+        records: &'a [Record],
+        settings: &DiagnoseSettings,
+        noise: Noise,
+    ) -> Result<Self, DiagnoseError> {
+        let twin = &measured.twin;
+        let space = twin.parameters();
+        let own = space.len() - measured.levels.len();
+        let mut axes: Vec<Axis> = (space.iter().take(own).map(Axis::of))
+            .chain(measured.levels.iter().map(Axis::of_level))
+            .collect();
+        for (axis, parameter) in axes.iter_mut().zip(space.iter()) {
+            // The filter integrates over an uncertain start.
+            axis.held |= parameter.role == Role::Start && twin.equations().is_some();
+        }
+        let initial = settings.initial.as_ref().map(|initial| {
+            let levels = measured.levels.iter().map(|level| level.median);
+            let theta: Vec<f64> = initial.iter().copied().take(own).chain(levels).collect();
+            theta
+        });
+        let fitted = if twin.equations().is_some() {
+            let problem = Problem::new(twin.clone(), axes.clone(), records);
+            let initial: Vec<Vec<f64>> = initial.iter().map(|theta| problem.full(theta)).collect();
+            let found = polish(&problem, search(&problem, &initial, noise, ITERATIONS)?, ITERATIONS)?;
+            found.into_iter().next().map(|fitted| (problem, fitted))
+        } else {
+            let problem = Problem::of_twin(twin, records);
+            base_fit(&problem, initial.as_deref(), noise)?.map(|fitted| (problem, fitted))
+        };
+        let (problem, fitted) = fitted.ok_or(DiagnoseError::NoFit)?;
+        let model = Model::bare(twin, problem, fitted).ok_or(DiagnoseError::NoFit)?;
+        let theta = model.theta();
+        let outline = model.problem.outline();
+        let outputs = &outline.outputs;
+        let place = |name: &str| match outputs.iter().position(|o| o.name == name) {
+            Some(_) if outputs.len() == 1 => "sensor".to_owned(),
+            Some(j) => format!("sensor{}", j + 1),
+            None => name.to_owned(),
+        };
+        let noisy = (measured.levels.iter())
+            .map(|level| match level.is_process {
+                true => level.parameter.target().to_owned(),
+                false => place(level.parameter.target()),
+            })
+            .collect();
+        Ok(Self {
+            scales: Scales::new(twin, &theta, records, model.states()?, outline),
+            frequencies: frequencies(&model)?,
+            noisy,
+            theta,
+            model,
+        })
+    }
+}
+
+/// The kind of gap: structural where the evidence says so, otherwise by whether θ left its prior significantly.
+pub(in crate::diagnose) fn verdict(log_odds: f64, outside: bool) -> Verdict {
+    if log_odds > 0.0 {
+        Verdict::StructuralGap
+    } else if outside {
+        Verdict::ParameterGap
+    } else {
+        Verdict::NoGap
+    }
+}
+
+/// The problem with the twin's own parameters held within their prior box.
+fn inside<'a>(problem: &Problem<'a>) -> Problem<'a> {
+    let space = problem.twin.parameters();
+    let axes = (space.iter().zip(&problem.axes))
+        .map(|(p, axis)| match p.role {
+            Role::Parameter => axis.clone().inside(p.prior),
+            _ => axis.clone(),
+        })
+        .collect::<Vec<Axis>>();
+    Problem::new(problem.twin.clone(), axes, problem.records)
+}
+
+/// Tests whether θ lies outside its prior box: likelihood ratio of the best θ anywhere over the best inside. Returns the model inside as
+/// well.
+pub(in crate::diagnose) fn left_the_prior<'a>(
+    model: &Model<'a>,
+    alpha: f64,
+) -> Result<(bool, Option<Model<'a>>), DiagnoseError> {
+    let (problem, fitted) = (&model.problem, &model.fitted);
+    let space = problem.twin.parameters();
+    let theta = model.theta();
+    let own = || (space.iter().zip(&theta)).filter(|(p, _)| p.role == Role::Parameter);
+    let beyond = own().filter(|(p, v)| !p.prior.contains(**v)).count();
+    if beyond == 0 {
+        return Ok((false, None));
+    }
+    let boxed = inside(problem);
+    let starts = [fitted.theta.clone(), boxed.centre()];
+    let within: Option<Fitted> = fit(&boxed, &starts, INSIDE)?;
+    let ratio = within.as_ref().map_or(f64::INFINITY, |w| {
+        2.0 * (fitted.log_likelihood - w.log_likelihood)
+    });
+    // As many bounds as bind are what chance can gain from.
+    let limit =
+        ChiSquared::new(beyond as f64).map_or(f64::INFINITY, |c| c.inverse_cdf(1.0 - alpha));
+    let within = within.and_then(|w| Model::bare(model.base, boxed, w));
+    Ok((ratio > limit, within))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn evidence_comes_before_the_prior() {
+        assert_eq!(verdict(1.0, true), Verdict::StructuralGap);
+        assert_eq!(verdict(-1.0, true), Verdict::ParameterGap);
+        assert_eq!(verdict(-1.0, false), Verdict::NoGap);
+    }
+}

@@ -1,0 +1,74 @@
+//! Missing functions as they were fitted: values, errors, the range that the records show.
+
+use crate::diagnose::explain::search::Found;
+use crate::diagnose::hypotheses::functions::basis;
+use crate::diagnose::hypotheses::term::Nature;
+use crate::diagnose::model::Model;
+use crate::diagnose::outcome::MissingFunction;
+use nalgebra::{DMatrix, DVector};
+
+/// Points at which a function is told.
+const POINTS: usize = 33;
+/// Share of the range of a function at each end that the records do not show.
+const UNSEEN: f64 = 0.2 / 1.4;
+/// Functions that are told.
+const TOLD: usize = 3;
+
+/// Posterior of a fitted function of one variable: means and covariance of its values at points.
+pub(in crate::diagnose) struct Curve {
+    pub values: Vec<f64>,
+    pub mean: DVector<f64>,
+    pub covariance: DMatrix<f64>,
+}
+
+/// The curve of a model's last term; `None` for other terms than functions of one variable.
+pub(in crate::diagnose) fn curve(model: &Model<'_>) -> Option<Curve> {
+    let term = model.terms.last()?;
+    let [variable] = term.variables.as_slice() else {
+        return None;
+    };
+    let count = term.axes.len();
+    let d = model.problem.twin.parameters().len();
+    let theta = model.theta();
+    let covariance = model.fitted.information.clone().try_inverse()?;
+    let own = covariance.view((d - count, d - count), (count, count)).into_owned();
+    let (_, a, b) = variable;
+    let (low, high) = (a + UNSEEN * (b - a), b - UNSEEN * (b - a));
+    let values: Vec<f64> = (0..POINTS)
+        .map(|i| low + (high - low) * i as f64 / (POINTS - 1) as f64)
+        .collect();
+    let mut phi = DMatrix::zeros(POINTS, count);
+    for (i, value) in values.iter().enumerate() {
+        for (k, value) in basis(*value, variable, count).into_iter().enumerate() {
+            phi[(i, k)] = value;
+        }
+    }
+    let beta = DVector::from_row_slice(&theta[d - count..]);
+    Some(Curve {
+        values,
+        mean: &phi * beta,
+        covariance: &phi * own * phi.transpose(),
+    })
+}
+
+/// Fitted functions of one variable, clearest first; `floor` is the evidence of the model that they stand beside.
+pub(in crate::diagnose) fn told(all: &[Found<'_>], on_top: bool, floor: f64) -> Vec<MissingFunction> {
+    (all.iter())
+        .filter(|f| f.last().nature == Nature::Function && f.gain > floor)
+        .filter_map(|found| {
+            let model = found.model.as_ref()?;
+            let curve = curve(model)?;
+            let term = found.last();
+            Some(MissingFunction {
+                place: term.target.clone(),
+                variable: term.variables[0].0.clone(),
+                on_top,
+                log_evidence: found.gain - floor,
+                mean: curve.mean.iter().copied().collect(),
+                std_error: curve.covariance.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect(),
+                values: curve.values,
+            })
+        })
+        .take(TOLD)
+        .collect()
+}

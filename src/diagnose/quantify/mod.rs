@@ -1,0 +1,7 @@
+//! How far: share of the gap closed, smallest visible effect, next input, calibration.
+
+pub(in crate::diagnose) mod calibrate;
+pub(in crate::diagnose) mod free_run;
+pub(in crate::diagnose) mod next_input;
+pub(in crate::diagnose) mod power;
+pub(crate) mod share;

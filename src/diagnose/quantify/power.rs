@@ -1,0 +1,102 @@
+//! Power: the smallest magnitude of each listed effect that records like these reveal in 80 of 100 cases.
+//!
+//! Let d⊥ be the change of the innovations by an effect of magnitude m that θ and noise levels cannot imitate (`fit/reference.rs`). The
+//! root of twice the gain in likelihood is about |N(‖d⊥(m)‖, 1)|, and a gain of g nats is needed to be seen:
+//!
+//! ```text
+//! ‖d⊥(m₈₀)‖ = √(2g) + 0.84
+//! ```
+//!
+//! Sizes are linear in d⊥; of thresholds the values on the grid of the search are looked at, the mildest that shows.
+
+use crate::diagnose::error::DiagnoseError;
+use crate::diagnose::hypotheses::term::{Part, Term};
+use crate::diagnose::model::Model;
+use crate::diagnose::outcome::Visible;
+use crate::diagnose::thresholds::Thresholds;
+use crate::fit::axis::EvidencePrior;
+use crate::fit::reference::Reference;
+use crate::likelihood::kalman::recoverable;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Share of the largest size at which a direction is taken.
+const SMALL: f64 = 0.01;
+
+/// The smallest visible magnitude of each listed effect.
+pub(in crate::diagnose) fn power(model: &Model<'_>, terms: &[Arc<Term>]) -> Result<Vec<Visible>, DiagnoseError> {
+    let Some(reference) = recoverable(Reference::new(&model.problem, &model.fitted.theta))?.flatten() else {
+        return Ok(vec![]);
+    };
+    let need = (2.0 * Thresholds::SEEN).sqrt() + Thresholds::POWER_QUANTILE;
+    let each: Vec<(String, Visible, f64)> = (terms.par_iter())
+        .map(|term| {
+            let (value, distance) = smallest(model, &reference, term, need)?;
+            let visible = Visible {
+                id: term.id.clone(),
+                target: term.target.clone(),
+                magnitude: first_magnitude(term),
+                value,
+            };
+            Ok((term.key(), visible, distance))
+        })
+        .collect::<Result<_, DiagnoseError>>()?;
+    // Of several ways to use one effect, the one that shows best.
+    let mut best: BTreeMap<String, (Visible, f64)> = BTreeMap::new();
+    let mut order = vec![];
+    for (key, visible, distance) in each {
+        match best.get(&key) {
+            Some((_, old)) if *old <= distance => {}
+            Some(_) => {
+                best.insert(key, (visible, distance));
+            }
+            None => {
+                order.push(key.clone());
+                best.insert(key, (visible, distance));
+            }
+        }
+    }
+    Ok(order.iter().filter_map(|key| best.remove(key)).map(|(visible, _)| visible).collect())
+}
+
+fn first_magnitude(term: &Term) -> String {
+    match &term.part {
+        Part::Effect { effect, held, .. } => (effect.magnitudes().iter())
+            .find(|m| !held.contains_key(m.name))
+            .map_or_else(String::new, |m| m.name.to_owned()),
+        Part::Disturbance { .. } => String::new(),
+    }
+}
+
+/// The smallest first magnitude that shows, and ‖d⊥‖ there over what is needed; infinite where none does.
+fn smallest(
+    model: &Model<'_>,
+    reference: &Reference,
+    term: &Arc<Term>,
+    need: f64,
+) -> Result<(Option<f64>, f64), DiagnoseError> {
+    let extended = model.extend(term)?;
+    let axis = &extended.problem.axes[extended.entries[0]];
+    let mut best = (None, f64::INFINITY);
+    for start in &term.starts {
+        let mut m = start.m.clone();
+        if let (EvidencePrior::Magnitude { largest }, true) = (axis.evidence, start.scales) {
+            m[0] = if axis.bounds.contains(SMALL * largest) { SMALL * largest } else { -SMALL * largest };
+        }
+        let theta = model.beside(&extended, &m);
+        let Some(there) = recoverable(extended.problem.filtered(&theta))? else {
+            continue;
+        };
+        let own = reference.own(&reference.direction(&there)).sqrt();
+        let found = match start.scales {
+            true if own > 0.0 => (m[0].abs() * need / own, need / own * SMALL),
+            false if own >= need => (m[0], own / need),
+            _ => continue,
+        };
+        if found.1 < best.1 && axis.bounds.contains(found.0) {
+            best = (Some(found.0), found.1);
+        }
+    }
+    Ok(best)
+}

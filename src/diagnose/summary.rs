@@ -1,0 +1,172 @@
+//! Summary of fits for a report.
+
+use super::error::DiagnoseError;
+use super::explain::decide::{Chances, Conclusion, Findings};
+use super::explain::search::Found;
+use super::hypotheses::term::{Part, Term};
+use super::model::Model;
+use super::outcome::{Decision, EffectFit, FittedNuisance, FittedParameter, Onset, Remains};
+use super::settings::DiagnoseSettings;
+use super::thresholds::Thresholds;
+use crate::fit::follow::{smoothed, starts};
+use crate::likelihood::kalman::recoverable;
+use crate::twin::{PRIOR_DEVIATION, Role};
+
+/// Listed effects as they are reported: the accepted ones first, then by probability.
+pub(in crate::diagnose) fn effects(
+    findings: &Findings<'_>,
+    chances: &Chances,
+    conclusion: &Conclusion,
+) -> Vec<EffectFit> {
+    let mut all: Vec<EffectFit> = (findings.listed.iter())
+        .filter_map(|found| {
+            let model = found.model.as_ref()?;
+            let probability = chances.effects.get(&found.last().key()).copied().unwrap_or(0.0);
+            Some(fit_of(model, found.last(), probability, found.gain))
+        })
+        .collect();
+    all.sort_by(|a, b| {
+        (b.probability.total_cmp(&a.probability)).then(b.log_evidence.total_cmp(&a.log_evidence))
+    });
+    if let Some(model) = findings.model(&conclusion.accepted) {
+        let gain = findings.gain(&conclusion.accepted).unwrap_or(0.0);
+        let mut first: Vec<EffectFit> = (model.terms.iter())
+            .map(|term| {
+                let probability = chances.effects.get(&term.key()).copied().unwrap_or(0.0);
+                fit_of(model, term, probability, gain)
+            })
+            .collect();
+        all.retain(|e| !conclusion.accepted.contains(&e.key()));
+        first.append(&mut all);
+        all = first;
+    }
+    all.truncate(Thresholds::REPORTED);
+    all
+}
+
+/// Effects that absorb a parameter gap; each is as probable as the others.
+pub(in crate::diagnose) fn absorbed(found: &[Found<'_>]) -> Vec<EffectFit> {
+    let share = 1.0 / found.len().max(1) as f64;
+    (found.iter())
+        .filter_map(|f| Some(fit_of(f.model.as_ref()?, f.last(), share, f.gain)))
+        .take(Thresholds::REPORTED)
+        .collect()
+}
+
+/// One term of a fitted model.
+fn fit_of(model: &Model<'_>, term: &Term, probability: f64, log_evidence: f64) -> EffectFit {
+    let theta = model.theta();
+    let space = model.problem.twin.parameters();
+    let magnitudes = match &term.part {
+        Part::Effect { effect, held, .. } => (effect.magnitudes().iter())
+            .filter_map(|m| {
+                let value = match held.get(m.name) {
+                    Some(value) => *value,
+                    None => theta[space.position(&effect.key().magnitude(m.name)).ok()?],
+                };
+                Some((m.name.to_owned(), value))
+            })
+            .collect(),
+        Part::Disturbance { .. } => vec![],
+    };
+    EffectFit {
+        id: term.id.clone(),
+        target: term.target.clone(),
+        probability,
+        magnitudes,
+        log_evidence,
+    }
+}
+
+/// The twin's own parameters.
+pub(in crate::diagnose) fn parameters(
+    model: &Model<'_>,
+    settings: &DiagnoseSettings,
+) -> Vec<FittedParameter> {
+    let errors = model.fitted.std_errors(&model.problem);
+    let theta = model.theta();
+    let space = model.base.parameters();
+    (space.iter().enumerate())
+        .filter(|(_, p)| p.role == Role::Parameter)
+        .map(|(j, p)| FittedParameter {
+            name: p.name.clone(),
+            unit: p.unit.clone(),
+            initial: settings.initial.as_ref().and_then(|i| i.get(j).copied()),
+            refitted: theta[j],
+            std_error: errors[j],
+            identified: errors[j] < PRIOR_DEVIATION * p.prior.width(),
+            prior: p.prior,
+        })
+        .collect()
+}
+
+/// Noise levels, magnitudes of the study's own effects, and the first states given the records.
+pub(in crate::diagnose) fn nuisance(model: &Model<'_>) -> Result<Vec<FittedNuisance>, DiagnoseError> {
+    let errors = model.fitted.std_errors(&model.problem);
+    let theta = model.theta();
+    let space = model.base.parameters();
+    let mut all: Vec<FittedNuisance> = (space.iter().enumerate())
+        .filter_map(|(j, p)| {
+            let role = match p.role {
+                Role::Parameter | Role::Start => return None,
+                Role::Noise => "noise",
+                Role::Magnitude => "effect",
+            };
+            Some(FittedNuisance {
+                name: p.target().to_owned(),
+                role,
+                value: theta[j],
+                std_error: errors[j],
+            })
+        })
+        .collect();
+    let begun = recoverable(smoothed(&model.problem, &model.fitted.theta))?.unwrap_or_default();
+    all.extend(starts(&model.problem, &begun).into_iter().map(|start| FittedNuisance {
+        name: match start.record {
+            1 => start.name,
+            r => format!("{} (record {r})", start.name),
+        },
+        role: "start",
+        value: start.value,
+        std_error: start.std_error,
+    }));
+    Ok(all)
+}
+
+/// The time of a change that was accepted.
+pub(in crate::diagnose) fn onset(model: &Model<'_>) -> Option<Onset> {
+    let theta = model.theta();
+    let space = model.problem.twin.parameters();
+    model.terms.iter().find_map(|term| {
+        let Part::Effect { effect, .. } = &term.part else {
+            return None;
+        };
+        let change = effect.magnitudes().iter().find(|m| m.unit == "s" && m.off.is_none())?;
+        let j = space.position(&effect.key().magnitude(change.name)).ok()?;
+        Some(Onset {
+            time: theta[j],
+            parameter: term.target.clone(),
+        })
+    })
+}
+
+/// What an unknown function adds on top of the accepted effects, or else of the best single one.
+pub(in crate::diagnose) fn remains(findings: &Findings<'_>, conclusion: &Conclusion) -> Option<Remains> {
+    if conclusion.decision == Decision::NotNeeded {
+        return None;
+    }
+    let best = || findings.listed.first().map(Found::keys);
+    let keys = match conclusion.accepted.is_empty() {
+        true => best()?,
+        false => conclusion.accepted.clone(),
+    };
+    let (keys, on_top) = findings.beside(&keys)?;
+    let own = findings.gain(keys)?;
+    let rest = on_top.first()?;
+    let added = (rest.gain - own).max(0.0);
+    Some(Remains {
+        place: rest.last().target.clone(),
+        log_evidence: added,
+        share: added / rest.gain.max(f64::MIN_POSITIVE),
+    })
+}
