@@ -8,7 +8,7 @@ use super::kind::assign_kinds;
 use super::row::Row;
 use super::score::Setup;
 use super::steadiness::repeats;
-use super::truth::{Extra, TruthSampler};
+use super::truth::{Drawn, Extra, TruthSampler};
 use super::{Families, Kind, Scorecard};
 use crate::diagnose::DiagnoseSettings;
 use crate::evaluate::EvaluateError;
@@ -21,6 +21,7 @@ use crate::storage::files::sha256;
 use crate::storage::work::{Manifest, Piece, Pieces, Share};
 use crate::study::Study;
 use crate::twin::Noise;
+use rayon::prelude::*;
 use serde_json::json;
 use std::path::Path;
 
@@ -28,6 +29,8 @@ use std::path::Path;
 const LAYOUT: u32 = 5;
 /// Most trials of a folder; their keys are in memory.
 const MOST: usize = 1_000_000;
+/// Trials that are drawn before their records are written.
+const PART: usize = 64;
 
 /// Settings of sealed trials.
 ///
@@ -144,25 +147,37 @@ impl<'a> Withheld<'a> {
         let stage = progress.stage("seal", trials);
         let mut source = Noise::new(seed, "withheld kinds", 0).source("deal");
         let kinds = assign_kinds(&self.settings.kinds, trials, |n| index(&mut source, n));
+        let extra = |trial| Extra {
+            validation: self.settings.validation,
+            doubled: trial < self.settings.steadiness,
+        };
+        let numbered: Vec<(usize, Kind)> = kinds.into_iter().enumerate().collect();
         let mut keys = Vec::with_capacity(trials);
-        for (trial, kind) in kinds.into_iter().enumerate() {
-            let noise = Noise::new(seed, "withheld", trial as u64);
-            let extra = Extra {
-                validation: self.settings.validation,
-                doubled: trial < self.settings.steadiness,
+        // Part by part: the records of a million trials do not fit into memory.
+        for part in numbered.chunks(PART) {
+            let draw = |&(trial, kind): &(usize, Kind)| {
+                let noise = Noise::new(seed, "withheld", trial as u64);
+                let drawn = (self.sampler).draw(trial, kind, extra(trial), noise)?;
+                stage.tick()?;
+                Ok::<_, EvaluateError>(drawn)
             };
-            let drawn = (self.sampler).draw(trial, kind, extra, noise)?;
-            for (which, record) in [
-                (Which::Own, Some(&drawn.record)),
-                (Which::Validation, drawn.validation.as_ref()),
-                (Which::Doubled, drawn.doubled.as_ref()),
-            ] {
-                if let Some(record) = record {
-                    filling.record(trial, which, record)?;
+            let drawn = part.par_iter().map(draw).collect::<Result<Vec<_>, _>>()?;
+            for Drawn {
+                truth,
+                record,
+                validation,
+                doubled,
+            } in drawn
+            {
+                filling.record(truth.trial, Which::Own, &record)?;
+                for (which, record) in [(Which::Validation, validation), (Which::Doubled, doubled)]
+                {
+                    if let Some(record) = &record {
+                        filling.record(truth.trial, which, record)?;
+                    }
                 }
+                keys.push(truth);
             }
-            keys.push(drawn.truth);
-            stage.tick()?;
         }
         if self.settings.without {
             let effects: Vec<&Vec<String>> = keys.iter().map(|key| &key.effects).collect();

@@ -10,7 +10,7 @@ mod prior;
 mod sampler;
 mod sizing;
 
-pub(super) use sampler::{Extra, TruthSampler};
+pub(super) use sampler::{Drawn, Extra, TruthSampler};
 
 use super::Kind;
 use super::law::Departure;

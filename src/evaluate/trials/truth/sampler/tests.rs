@@ -5,7 +5,6 @@ use crate::evaluate::paper::reference_studies;
 use crate::evaluate::trials::information::Information;
 use crate::study::RecordPlan;
 use crate::twin::{Now, Outline, Parameter, StateSpace};
-use std::sync::Arc;
 
 /// Three states, two outputs, one input: a heater, a wall, a room.
 pub(super) struct Rooms;
@@ -221,7 +220,7 @@ impl crate::twin::DigitalTwin for Boxed {
 #[test]
 fn black_boxes_have_departures_of_signals_and_parameters() {
     let plan = RecordPlan::levels(0.1, 80, 0.0, 1.0, 10);
-    let study = Study::new("boxed", Arc::new(Boxed), plan);
+    let study = Study::new("boxed", Boxed, plan);
     let study = study.unwrap();
     let sampler = sampler(&study);
     assert!(sampler.is_silent && sampler.world.is_black_box());
