@@ -23,7 +23,13 @@ pub(super) fn correlated(study: &Study, record: &Record) -> Result<Option<String
     }
     let records = std::slice::from_ref(record);
     let centre = study.twin().parameters().centre();
-    let (problem, _) = problem(study.twin(), study, &centre, &Conditions::declared(), records)?;
+    let (problem, _) = problem(
+        study.twin(),
+        study,
+        &centre,
+        &Conditions::declared(),
+        records,
+    )?;
     let begin = problem.begin(&problem.centre());
     let Some(fitted) = climb(&problem, &begin, ITERATIONS)? else {
         return Ok(None);

@@ -58,12 +58,7 @@ pub(super) struct Filling<'a>(&'a NewWork<'a>);
 
 impl Filling<'_> {
     /// Adds a record.
-    pub fn record(
-        &self,
-        trial: usize,
-        which: Which,
-        record: &Record,
-    ) -> Result<(), StorageError> {
+    pub fn record(&self, trial: usize, which: Which, record: &Record) -> Result<(), StorageError> {
         let name = record_name(trial, which);
         self.0.write(&name, record_csv_text(record).as_bytes())
     }

@@ -41,7 +41,12 @@ pub(super) struct Information<'a> {
 }
 
 /// θ and noise levels as they are in a world.
-fn truth(twin: &Twin, own: &[f64], conditions: &Conditions, declared: &[(String, f64)]) -> Vec<f64> {
+fn truth(
+    twin: &Twin,
+    own: &[f64],
+    conditions: &Conditions,
+    declared: &[(String, f64)],
+) -> Vec<f64> {
     let outputs = twin.signals().outputs;
     let space = twin.parameters();
     (space.iter().enumerate())
@@ -140,8 +145,8 @@ impl<'a> Information<'a> {
         if a == 0.0 || b == 0.0 {
             return 1.0;
         }
-        let both = 0.5
-            * (self.product(&change.0[0], &by.0[1]) + self.product(&change.0[1], &by.0[0]));
+        let both =
+            0.5 * (self.product(&change.0[0], &by.0[1]) + self.product(&change.0[1], &by.0[0]));
         (1.0 - both * both / (a * b)).max(0.0)
     }
 

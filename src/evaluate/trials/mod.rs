@@ -51,6 +51,6 @@ pub use kind::Kind;
 pub(crate) use row::Row;
 pub use run::{Sealed, Settings, Withheld};
 pub use score::Scorecard;
-pub(crate) use score::{Baseline, Bin, Count};
 #[cfg(test)]
 pub(crate) use score::Setup;
+pub(crate) use score::{Baseline, Bin, Count};

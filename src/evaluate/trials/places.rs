@@ -1,8 +1,9 @@
 //! Names of places in a twin, as the library of effects names its targets.
 
+use super::draft::index;
 use super::law::Place;
 use crate::effect::{TargetKind, targets};
-use crate::twin::{Role, Twin, is_memory};
+use crate::twin::{Role, Source, Twin, is_memory};
 
 /// Places of a twin and their names.
 #[derive(Debug, Clone)]
@@ -58,6 +59,25 @@ impl Places {
         (self.named.iter())
             .find(|(known, _)| *known == place)
             .map_or("", |(_, name)| name)
+    }
+
+    /// Draws a kind of place, then a place: a twin of many parameters has sensors all the same.
+    pub fn draw(&self, source: &mut Source) -> Option<Place> {
+        let kinds: [fn(&Place) -> bool; 4] = [
+            |place| matches!(place, Place::Sensor(_)),
+            |place| matches!(place, Place::Actuator(_)),
+            |place| matches!(place, Place::State(_)),
+            |place| matches!(place, Place::Parameter(_)),
+        ];
+        let mut groups: Vec<Vec<Place>> = (kinds.iter())
+            .map(|is| self.all().filter(is).collect())
+            .collect();
+        groups.retain(|group| !group.is_empty());
+        if groups.is_empty() {
+            return None;
+        }
+        let group = &groups[index(source, groups.len())];
+        Some(group[index(source, group.len())])
     }
 
     /// All places.

@@ -244,6 +244,8 @@ impl Sealed<'_> {
             families: settings.families,
             without: settings.without,
             validation: settings.validation,
+            like: settings.like.is_some(),
+            detection_only: settings.detection_only,
             seal: self.seal().into(),
         };
         Ok(Scorecard::new(setup, rows))
@@ -285,8 +287,11 @@ impl Sealed<'_> {
         // A baseline that fails says nothing.
         answer.correlated = recoverable(correlated(study, &record))?.flatten();
         if trial < own.steadiness {
-            let doubled = self.folder.record(trial, Which::Doubled)?;
-            answer.repeats = repeats(study, given, &doubled, &settings, progress)?;
+            let is_even = (own.like.as_ref()).is_none_or(|like| like.drive().is_uniform());
+            let doubled = (is_even)
+                .then(|| self.folder.record(trial, Which::Doubled))
+                .transpose()?;
+            answer.repeats = repeats(study, given, doubled.as_ref(), &settings, progress)?;
         }
         Ok(answer)
     }

@@ -160,5 +160,7 @@ impl Scene {
 /// One row of a signal.
 fn row(signal: &Signal, k: usize) -> &[f64] {
     let columns = signal.ncols();
-    signal.as_slice().map_or(&[], |all| &all[k * columns..(k + 1) * columns])
+    signal
+        .as_slice()
+        .map_or(&[], |all| &all[k * columns..(k + 1) * columns])
 }

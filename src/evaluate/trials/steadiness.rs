@@ -15,7 +15,7 @@ const SEEDS: u64 = 4;
 pub(super) fn repeats(
     study: &Study,
     (record, validation): (&Record, Option<&Record>),
-    doubled: &Record,
+    doubled: Option<&Record>,
     settings: &DiagnoseSettings,
     progress: &Progress,
 ) -> Result<Vec<Repeat>, EvaluateError> {
@@ -39,12 +39,22 @@ pub(super) fn repeats(
         };
         again("seed", study, record, validation, &other)?;
     }
-    again("record twice as long", study, doubled, validation, settings)?;
+    if let Some(doubled) = doubled {
+        again("record twice as long", study, doubled, validation, settings)?;
+    }
     if let Some((study, record, validation)) = rescaled(study, record, validation)? {
         again("units", &study, &record, validation.as_ref(), settings)?;
     }
     let kinds: Vec<_> = study.catalogue().kinds().iter().rev().cloned().collect();
-    let reordered = study.clone().with_effects(kinds.iter().map(|kind| kind.as_ref().clone()));
-    again("order of the library", &reordered, record, validation, settings)?;
+    let reordered = study
+        .clone()
+        .with_effects(kinds.iter().map(|kind| kind.as_ref().clone()));
+    again(
+        "order of the library",
+        &reordered,
+        record,
+        validation,
+        settings,
+    )?;
     Ok(repeats)
 }

@@ -148,7 +148,11 @@ fn reliability(card: &Scorecard) -> String {
          happens; below it, too much is claimed.",
     ) + &folded(
         "Reliability in numbers",
-        &table("Answers of about the same stated probability.", &head, &rows),
+        &table(
+            "Answers of about the same stated probability.",
+            &head,
+            &rows,
+        ),
     )
 }
 

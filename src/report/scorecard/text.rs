@@ -24,24 +24,42 @@ pub fn scorecard_text(card: &Scorecard) -> String {
     }));
     let mut bins = vec![cells(&BIN_HEAD)];
     bins.extend(card.by_information.iter().map(bin_cells));
-    let mut baselines = vec![cells(&["answers of", "verdict right", "answer right", "place right"])];
+    let mut baselines = vec![cells(&[
+        "answers of",
+        "verdict right",
+        "answer right",
+        "place right",
+    ])];
     baselines.extend(card.baselines.iter().map(|b| {
         let place = b.place.map_or("–".into(), of);
         vec![b.name.into(), of(b.verdict), of(b.right), place]
     }));
     let mut tail = vec![];
     for (name, value, unit) in [
-        ("Mean log score of the truth", card.probabilities.log_score, "nats"),
+        (
+            "Mean log score of the truth",
+            card.probabilities.log_score,
+            "nats",
+        ),
         ("Mean Brier score", card.probabilities.brier, ""),
         ("Mean size of a class", card.mean_class_size, ""),
         ("Mean time of a diagnosis", card.seconds_per_record, "s"),
     ] {
         if let Some(value) = value {
-            tail.push(format!("{name}: {} {unit}", short(value)).trim_end().to_owned());
+            tail.push(
+                format!("{name}: {} {unit}", short(value))
+                    .trim_end()
+                    .to_owned(),
+            );
         }
     }
     tail.push(format!("Draws of truths given up: {}", card.redraws));
-    let parts = [table(&scores), table(&bins), table(&kinds), table(&baselines)];
+    let parts = [
+        table(&scores),
+        table(&bins),
+        table(&kinds),
+        table(&baselines),
+    ];
     format!("{head}{}\n{}\n", parts.join("\n"), tail.join("\n"))
 }
 
@@ -93,7 +111,10 @@ pub(super) fn of(count: Count) -> String {
 pub(super) fn named_scores(card: &Scorecard) -> Vec<(String, Count)> {
     let precision = &card.precision;
     let mut scores: Vec<(String, Count)> = vec![
-        ("nothing missing, called structural".into(), card.false_alarms),
+        (
+            "nothing missing, called structural".into(),
+            card.false_alarms,
+        ),
         (
             "nothing missing but a finer step, called structural".into(),
             card.coarse_called_structural,

@@ -41,7 +41,12 @@ pub(in crate::evaluate::trials) struct Family {
 impl Family {
     /// All families.
     pub fn all() -> Vec<Self> {
-        let shapes = [Shape::Smooth, Shape::Kinked, Shape::Hysteretic, Shape::Memory];
+        let shapes = [
+            Shape::Smooth,
+            Shape::Kinked,
+            Shape::Hysteretic,
+            Shape::Memory,
+        ];
         [Generator::Tree, Generator::Process]
             .into_iter()
             .flat_map(|generator| shapes.map(|shape| Self { generator, shape }))

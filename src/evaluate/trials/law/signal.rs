@@ -183,7 +183,10 @@ mod tests {
 
     #[test]
     fn memories_keep_within_their_limits() {
-        let limited = distorted(&SignalLaw::RateLimit { rate: 0.5, knee: 0.0 });
+        let limited = distorted(&SignalLaw::RateLimit {
+            rate: 0.5,
+            knee: 0.0,
+        });
         assert!((limited[199] - limited[99] - 5.0).abs() < 1e-9);
         let play = distorted(&SignalLaw::Play {
             width: 1.0,

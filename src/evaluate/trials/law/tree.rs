@@ -124,7 +124,9 @@ mod tests {
             let mut source = Noise::new(1, "trees", i).source("tree");
             let tree = Tree::draw(2, i % 2 == 0, &mut source);
             let grid = |f: &dyn Fn(f64) -> [f64; 2]| -> Vec<f64> {
-                (-20..=20).map(|k| tree.at(&f(0.1 * f64::from(k)))).collect()
+                (-20..=20)
+                    .map(|k| tree.at(&f(0.1 * f64::from(k))))
+                    .collect()
             };
             for values in [grid(&|z| [z, 0.7]), grid(&|z| [0.7, z])] {
                 assert!(values.iter().all(|v| v.is_finite()));

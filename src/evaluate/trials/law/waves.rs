@@ -35,12 +35,16 @@ impl Waves {
 
     /// The value at these arguments.
     pub fn at(&self, z: &[f64]) -> f64 {
-        (self.frequencies.iter().zip(&self.amplitudes).zip(&self.phases))
-            .map(|((w, a), b)| {
-                let angle: f64 = w.iter().zip(z).map(|(w, z)| w * z).sum();
-                a * (angle + b).cos()
-            })
-            .sum()
+        (self
+            .frequencies
+            .iter()
+            .zip(&self.amplitudes)
+            .zip(&self.phases))
+        .map(|((w, a), b)| {
+            let angle: f64 = w.iter().zip(z).map(|(w, z)| w * z).sum();
+            a * (angle + b).cos()
+        })
+        .sum()
     }
 }
 

@@ -46,7 +46,10 @@ pub(super) fn bins(rows: &[Row]) -> Vec<Bin> {
         };
         for (low, high) in NATS.iter().zip(&NATS[1..]) {
             let inside = |row: &Row| {
-                of_group(row) && row.information.is_some_and(|nats| *low <= nats && nats < *high)
+                of_group(row)
+                    && row
+                        .information
+                        .is_some_and(|nats| *low <= nats && nats < *high)
             };
             let fate = |fate: Fate| Count::over(rows, inside, |row| row.fate() == fate);
             let bin = Bin {

@@ -58,6 +58,10 @@ pub(crate) struct Setup {
     pub without: bool,
     /// True if each diagnosis had a validation record.
     pub validation: bool,
+    /// True if inputs, length, step and gaps are those of a measured record.
+    pub like: bool,
+    /// True if each diagnosis ended with its verdict: nothing is named then.
+    pub detection_only: bool,
     /// SHA-256 of the key file.
     pub seal: String,
 }

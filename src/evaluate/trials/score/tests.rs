@@ -73,6 +73,8 @@ fn card(rows: Vec<Row>) -> Scorecard {
         families: Families::Open,
         without: false,
         validation: false,
+        like: false,
+        detection_only: false,
         seal: "seal".into(),
     };
     Scorecard::new(setup, rows)
@@ -96,15 +98,33 @@ fn every_answer_has_one_fate() {
         (row(Kind::Outside, &[], &["a@s"], 0.9), Fate::FalseAlarm),
         (row(Kind::Listed, &["a@s"], &["a@s"], 0.9), Fate::Delivered),
         (row(Kind::Listed, &["a@s"], &["b@s"], 0.9), Fate::WrongName),
-        (row(Kind::Listed, &["a@s"], &["a@s", "b@s"], 0.9), Fate::WrongName),
+        (
+            row(Kind::Listed, &["a@s"], &["a@s", "b@s"], 0.9),
+            Fate::WrongName,
+        ),
         (row(Kind::Listed, &["a@s"], &[], 0.0), Fate::Missed),
-        (abstaining(row(Kind::Listed, &["a@s"], &[], 0.0)), Fate::Abstained),
+        (
+            abstaining(row(Kind::Listed, &["a@s"], &[], 0.0)),
+            Fate::Abstained,
+        ),
         (refused, Fate::Refused),
         (failed, Fate::Failed),
-        (abstaining(row(Kind::Random, &["odd@s"], &[], 0.0)), Fate::Delivered),
-        (row(Kind::Random, &["odd@s"], &["a@s"], 0.6), Fate::WrongName),
-        (row(Kind::Pair, &["a@s", "b@t"], &["b@t", "a@s"], 0.4), Fate::Delivered),
-        (row(Kind::Pair, &["a@s", "b@t"], &["b@t"], 0.4), Fate::Incomplete),
+        (
+            abstaining(row(Kind::Random, &["odd@s"], &[], 0.0)),
+            Fate::Delivered,
+        ),
+        (
+            row(Kind::Random, &["odd@s"], &["a@s"], 0.6),
+            Fate::WrongName,
+        ),
+        (
+            row(Kind::Pair, &["a@s", "b@t"], &["b@t", "a@s"], 0.4),
+            Fate::Delivered,
+        ),
+        (
+            row(Kind::Pair, &["a@s", "b@t"], &["b@t"], 0.4),
+            Fate::Incomplete,
+        ),
     ] {
         assert_eq!(row.fate(), fate, "{}: {}", row.truth, row.answer());
     }
@@ -158,8 +178,14 @@ fn counts_have_the_denominators_that_they_name() {
     };
     assert_eq!((listed.low, listed.high), (10.0, 30.0));
     assert_eq!(listed.delivered, count(2, 5));
-    assert_eq!((listed.wrong_name, listed.missed), (count(1, 5), count(1, 5)));
-    assert_eq!((random.delivered, random.wrong_name), (count(1, 2), count(1, 2)));
+    assert_eq!(
+        (listed.wrong_name, listed.missed),
+        (count(1, 5), count(1, 5))
+    );
+    assert_eq!(
+        (random.delivered, random.wrong_name),
+        (count(1, 2), count(1, 2))
+    );
     assert_eq!(card.coverage.nulls, count(1, 1));
     assert_eq!(card.coverage.delivered, count(2, 2));
     assert_eq!(card.steadiness[0].same, count(1, 2));
@@ -170,7 +196,10 @@ fn counts_have_the_denominators_that_they_name() {
     assert_eq!((most.verdict, most.right), (count(7, 9), count(4, 9)));
     let correlation = &card.baselines[1];
     assert_eq!(correlation.place, Some(count(1, 7)));
-    assert_eq!(card.reliability.iter().map(|bin| bin.right.of).sum::<u64>(), 6);
+    assert_eq!(
+        card.reliability.iter().map(|bin| bin.right.of).sum::<u64>(),
+        6
+    );
 }
 
 /// Of a truth of probability 0.6, its rival 0.3, and none of these 0.1: ln 0.6, and 0.16 + 0.09 + 0.01.

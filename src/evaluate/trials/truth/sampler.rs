@@ -28,7 +28,7 @@ pub(in crate::evaluate::trials) struct Drawn {
     pub truth: Truth,
     pub record: Record,
     pub validation: Option<Record>,
-    /// The same system, twice as long.
+    /// The same system, twice as long; none where steps vary.
     pub doubled: Option<Record>,
 }
 
@@ -169,7 +169,12 @@ impl<'a> TruthSampler<'a> {
             _ if first.is_none() => {
                 refused("[library] leaves no effect that trials can make; allow more effects")
             }
-            Kind::Pair if self.listed.iter().all(|l| Some(l.place) == first.map(|f| f.place)) => {
+            Kind::Pair
+                if self
+                    .listed
+                    .iter()
+                    .all(|l| Some(l.place) == first.map(|f| f.place)) =>
+            {
                 refused("[library] leaves effects at one place only; allow more effects")
             }
             _ => Ok(()),
@@ -293,7 +298,8 @@ impl<'a> TruthSampler<'a> {
         scene: &Scene,
     ) -> Result<Drawn, Reject> {
         let record = |drive: &Drive, noise: Noise| {
-            self.record(&truth, drive, noise, scene).ok_or(Reject::Diverged)
+            self.record(&truth, drive, noise, scene)
+                .ok_or(Reject::Diverged)
         };
         let own = record(drive, noise)?;
         let validation = match extra.validation {
@@ -306,7 +312,7 @@ impl<'a> TruthSampler<'a> {
         };
         let doubled = match extra.doubled {
             false => None,
-            true => Some(record(&doubled(drive).ok_or(Reject::Diverged)?, noise)?),
+            true => (doubled(drive).map(|drive| record(&drive, noise))).transpose()?,
         };
         Ok(Drawn {
             record: own,
@@ -346,8 +352,7 @@ impl<'a> TruthSampler<'a> {
                 vec![first, second]
             }
             Kind::Random => {
-                let places: Vec<Place> = self.places.all().collect();
-                let place = *places.get(index(source, places.len().max(1)))?;
+                let place = self.places.draw(source)?;
                 let families = self.families.at(place);
                 let family = families[index(source, families.len())];
                 vec![(Draft::random(family, place, scene, source)?, None)]

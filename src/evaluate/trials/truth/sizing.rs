@@ -107,7 +107,10 @@ impl Stage<'_> {
                     } else {
                         above = at;
                     }
-                    if best.as_ref().is_none_or(|b| distance(nats) < distance(b.nats)) {
+                    if best
+                        .as_ref()
+                        .is_none_or(|b| distance(nats) < distance(b.nats))
+                    {
                         best = Some(sized);
                     }
                     if distance(nats) < NEAR {

@@ -165,7 +165,9 @@ mod tests {
                 departures: &departures,
                 conditions: &conditions,
             };
-            run(&Static, system, &drive, Draws::of(Noise::OFF)).unwrap().outputs
+            run(&Static, system, &drive, Draws::of(Noise::OFF))
+                .unwrap()
+                .outputs
         };
         let bias = || {
             Law::Signal(SignalLaw::Bias {

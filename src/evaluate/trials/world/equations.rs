@@ -119,13 +119,7 @@ struct Plant<'w> {
 
 impl Plant<'_> {
     /// Sets the first state.
-    fn begin(
-        &self,
-        system: System<'_>,
-        drive: &Drive,
-        noise: Noise,
-        x: &mut [f64],
-    ) -> Option<()> {
+    fn begin(&self, system: System<'_>, drive: &Drive, noise: Noise, x: &mut [f64]) -> Option<()> {
         let now = Now::new(0.0, drive.step(0), drive.input(0), system.theta);
         (self.twin.check_parameters(system.theta, drive.dt())).ok()?;
         self.twin.start(&now, x);
@@ -353,7 +347,10 @@ mod tests {
         let tail: Vec<f64> = run.outputs.iter().copied().skip(500).collect();
         let variance = crate::math::deviation(&tail).powi(2);
         let expected = (0.02f64).powi(2) / (1.0 - (-0.14f64).exp());
-        assert!((variance / expected - 1.0).abs() < 0.15, "{variance} {expected}");
+        assert!(
+            (variance / expected - 1.0).abs() < 0.15,
+            "{variance} {expected}"
+        );
     }
 
     #[test]

@@ -67,7 +67,10 @@ fn holds(sampler: &TruthSampler<'_>, kind: Kind, trial: usize) {
         _ => 1,
     };
     assert_eq!(truth.departures.len(), departures, "{truth:?}");
-    assert_eq!((truth.right.len(), truth.targets.len()), (departures, departures));
+    assert_eq!(
+        (truth.right.len(), truth.targets.len()),
+        (departures, departures)
+    );
     assert_eq!(truth.information.is_some(), departures > 0);
     if let Some(nats) = truth.information {
         assert!((0.3..900.0).contains(&nats), "{nats}");
@@ -100,7 +103,11 @@ fn every_kind_can_be_drawn_of_a_twin_of_several_outputs() {
     let study = rooms();
     let sampler = sampler(&study);
     let keys: Vec<&str> = sampler.listed.iter().map(|l| l.key.as_str()).collect();
-    for key in ["sensor-bias@sensor2", "cross-coupling@wall", "parameter-step@loss"] {
+    for key in [
+        "sensor-bias@sensor2",
+        "cross-coupling@wall",
+        "parameter-step@loss",
+    ] {
         assert!(keys.contains(&key), "{keys:?}");
     }
     for kind in Kind::ALL {
@@ -161,12 +168,19 @@ fn information_is_that_of_theory() {
     let bias = 0.05 * scene.outputs[0].deviation;
     let records = stage.records(&[departure]).unwrap();
     let change = information.change(records).unwrap().unwrap();
-    let (nats, theory) = (information.nats(&change), 0.5 * 400.0 * (bias / 0.1).powi(2));
+    let (nats, theory) = (
+        information.nats(&change),
+        0.5 * 400.0 * (bias / 0.1).powi(2),
+    );
     assert!((nats / theory - 1.0).abs() < 0.15, "{nats} {theory}");
     // The gain of the actuator is what θ does; the bias is no gain.
     let gain = Draft::shapeless("actuator-gain", Place::Actuator(0), None).unwrap();
     let gain = stage.direction(&gain, &information).unwrap().unwrap();
-    assert!(information.nats(&gain) < 0.05 * nats, "{}", information.nats(&gain));
+    assert!(
+        information.nats(&gain) < 0.05 * nats,
+        "{}",
+        information.nats(&gain)
+    );
     let same = stage.direction(&draft, &information).unwrap().unwrap();
     assert!(information.unexplained(&change, &same) < 0.01);
 }
@@ -191,7 +205,10 @@ fn twins_without_departures_say_why() {
     let study = study.configure(&file).unwrap();
     let sampler = sampler(&study);
     let error = sampler.check(Kind::Listed).unwrap_err().to_string();
-    assert!(error.contains("kind listed") && error.contains("[library]"), "{error}");
+    assert!(
+        error.contains("kind listed") && error.contains("[library]"),
+        "{error}"
+    );
     assert!(sampler.check(Kind::Random).is_ok());
 }
 
@@ -241,11 +258,16 @@ fn records_are_like_a_measured_one() {
     for k in 20..40 {
         outputs[[k, 1]] = f64::NAN;
     }
-    let like = Record::new(drawn.drive().first(150), outputs.slice(ndarray::s![..150, ..]).to_owned());
+    let like = Record::new(
+        drawn.drive().first(150),
+        outputs.slice(ndarray::s![..150, ..]).to_owned(),
+    );
     let like = like.unwrap();
     let sampler = TruthSampler::new(&study, Families::Closed, Some(&like)).unwrap();
     let noise = Noise::new(9, "like", 0);
-    let made = sampler.draw(0, Kind::Listed, Extra::default(), noise).unwrap();
+    let made = sampler
+        .draw(0, Kind::Listed, Extra::default(), noise)
+        .unwrap();
     assert_eq!(made.record.samples(), 150);
     for k in 20..40 {
         assert!(made.record.outputs()[[k, 1]].is_nan());
