@@ -163,9 +163,8 @@ impl From<EvaluateError> for Failure {
         match error {
             EvaluateError::Diagnose(error) => error.into(),
             EvaluateError::Cancelled(_) => Self::internal(error),
-            EvaluateError::Changed(_)
-            | EvaluateError::NoEffect(_)
-            | EvaluateError::Runaway(_)
+            EvaluateError::NoDeparture { .. }
+            | EvaluateError::NoTruth { .. }
             | EvaluateError::Plan(_) => Self {
                 about_study: true,
                 ..Self::user(error)

@@ -36,37 +36,30 @@ pub enum EvaluateError {
     /// The estimator failed on every record.
     #[error("the estimator failed on every record; on the first: {0}")]
     Hopeless(String),
-    /// No simulator independent of the twin exists.
-    #[error("no reference simulator for {twin}; choose {known}")]
-    NoReference {
-        /// Name of the twin.
-        twin: String,
-        /// Twins that have one.
-        known: String,
-    },
-    /// The study changes a twin that trials take as it is.
-    #[error(
-        "trials cannot use a study that changes {0}; keep to [record], [prior], [bounds] and [library]"
-    )]
-    Changed(&'static str),
     /// No trials, or no kinds.
     #[error("no {0}; ask for at least one")]
     Nothing(&'static str),
-    /// A kind of trial needs effects, and the study has none.
+    /// A twin and its study allow no truth of a kind.
+    #[error("kind {kind}: {reason}, or choose other --kinds")]
+    NoDeparture {
+        /// Kind of truth.
+        kind: &'static str,
+        /// Reason and remedy.
+        reason: &'static str,
+    },
+    /// Every draw of a truth was given up.
     #[error(
-        "kind {0}: [library] leaves none of the effects that such trials need; allow more effects, or choose other --kinds"
+        "trial {trial}, kind {kind}: no truth in {of} draws: {reasons}; narrow [prior] and [bounds], or choose other --kinds"
     )]
-    NoEffect(&'static str),
-    /// Every draw of a truth diverged.
-    #[error("trial {0}: every simulated record diverged; narrow [prior] and [bounds]")]
-    Runaway(usize),
-    /// Keys were asked for before all answers were given.
-    #[error("{done} of {of} trials answered; finish the other shares first")]
-    Unanswered {
-        /// Answers.
-        done: usize,
-        /// Trials.
-        of: usize,
+    NoTruth {
+        /// Number of the trial.
+        trial: usize,
+        /// Kind of truth.
+        kind: &'static str,
+        /// Draws.
+        of: u64,
+        /// Counts and reasons.
+        reasons: String,
     },
     /// A file of the folder is not as this program wrote it.
     #[error("{}: cannot be used ({reason}); {remedy}", path.display())]

@@ -4,7 +4,8 @@ use crate::cli::args::{Subject, at_least_one};
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
-use crate::evaluate::trials::{self, Kind, Settings};
+use crate::evaluate::trials::{self, Families, Kind, Settings};
+use crate::record::read_record;
 use crate::report::{scorecard_html, scorecard_json, scorecard_text};
 use crate::setting::did_you_mean;
 use crate::storage::work::Share;
@@ -14,8 +15,8 @@ use std::process::ExitCode;
 
 /// Score `diagnose` on trials with sealed truth: false alarms, detection, effect, location, abstention.
 ///
-/// Records come from reference simulators that share no code with the twins. The SHA-256 of the key file is printed before
-/// the first diagnosis; keys are read after the last one. Scores: docs/withheld.md.
+/// Records come from your own twin, moved by another integrator, with departures that the diagnosis does not know. The SHA-256 of
+/// the key file is printed before the first diagnosis; keys are read after the last one. Scores: docs/withheld.md.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
         truetwin withheld --twin tanks --trials 100 --out trials\n\n\
@@ -33,6 +34,12 @@ pub(in crate::cli) struct Withheld {
     /// Kinds of truth [default: all].
     #[arg(long, value_name = "KIND,..", value_delimiter = ',', value_parser = kind)]
     kinds: Option<Vec<Kind>>,
+    /// Families of random laws: open to choose constants with, closed for reports.
+    #[arg(long, value_name = "HALF", default_value = "all", value_parser = families)]
+    families: Families,
+    /// Measured record whose inputs, length, step and gaps the trials have [default: the study's plan].
+    #[arg(long, value_name = "RECORD.csv")]
+    like: Option<PathBuf>,
     /// Remove the true effects from the library: the right answer is then to abstain.
     #[arg(long)]
     without: bool,
@@ -42,6 +49,9 @@ pub(in crate::cli) struct Withheld {
     /// Stop each diagnosis at its verdict: false alarms and detection only, in a third of the time.
     #[arg(long)]
     detection_only: bool,
+    /// Repeat the diagnosis of the first N trials with other seeds, twice the record, other units, another order of the library.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    steadiness: usize,
     /// Share i of n of the diagnoses, for job arrays; when all shares are done, rerun without --shard to merge.
     #[arg(long, value_name = "I/N")]
     shard: Option<Share>,
@@ -62,13 +72,17 @@ impl Verb for Withheld {
 
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         let study = context.study(&self.subject)?;
+        let like = self.like.as_deref().map(read_record).transpose()?;
         let settings = Settings {
             trials: self.trials,
             seed: context.seed,
             kinds: self.kinds.clone().unwrap_or(Kind::ALL.to_vec()),
+            families: self.families,
+            like,
             without: self.without,
             validation: self.validation,
             detection_only: self.detection_only,
+            steadiness: self.steadiness,
         };
         let sealed = trials::Withheld::new(&study, settings)?.seal(&self.out, context.progress)?;
         if context.ranks.is_root() {
@@ -80,8 +94,6 @@ impl Verb for Withheld {
         if self.shard.is_some() && answers < self.trials {
             return output::print_share(context, &self.out, "trials", answers, self.trials);
         }
-        context.ranks.wait();
-        sealed.open_keys(share, context.progress)?;
         context.ranks.wait();
         if !context.ranks.is_root() {
             return Ok(ExitCode::SUCCESS);
@@ -98,6 +110,11 @@ impl Verb for Withheld {
         }
         Ok(ExitCode::SUCCESS)
     }
+}
+
+/// Parses a half of the families.
+fn families(text: &str) -> Result<Families, String> {
+    text.parse()
 }
 
 /// Parses a kind of truth.

@@ -1,4 +1,4 @@
-//! Answer of the diagnoser to one trial, from the record alone.
+//! Answer of the diagnoser to one trial, from the record alone. Nothing else in the trials reads a diagnosis.
 
 use crate::diagnose::{Decision, DiagnoseError, DiagnoseSettings, Diagnosis, Verdict, diagnose};
 use crate::progress::Progress;
@@ -10,7 +10,7 @@ use std::time::Instant;
 /// The answer of a trial.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Answer {
+pub(crate) struct Answer {
     /// From 0.
     pub trial: usize,
     /// Result; none where the diagnosis failed.
@@ -19,16 +19,30 @@ pub struct Answer {
     pub failure: Option<String>,
     /// Wall-clock seconds.
     pub seconds: f64,
+    /// Place of the largest residual correlation, if it stands out.
+    pub correlated: Option<String>,
+    /// Answers to the same question, asked otherwise.
+    pub repeats: Vec<Repeat>,
+}
+
+/// Answer to the same system under another seed, in other units, …
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Repeat {
+    /// What was changed.
+    pub change: String,
+    /// None where the diagnosis failed.
+    pub outcome: Option<Outcome>,
 }
 
 /// A diagnosis, as far as it is scored.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Outcome {
+pub(crate) struct Outcome {
     /// Kind of gap.
     pub verdict: Verdict,
-    /// p-value of the structural test.
-    pub p_value: f64,
+    /// p-value of the structural test, where there is one.
+    pub p_value: Option<f64>,
     /// Answer about causes.
     pub decision: Decision,
     /// The place that it names.
@@ -39,75 +53,96 @@ pub struct Outcome {
     pub accepted: Vec<String>,
     /// Rivals that the data cannot tell apart.
     pub class: Vec<String>,
-    /// Free-run NRMSE of the refitted twin on held-out data; none where another metric is used.
-    pub before: Option<f64>,
-    /// Remainder under noise alone.
-    pub floor: Option<f64>,
-    /// The share of the gap that closes.
-    pub closed: Option<f64>,
-    /// 90 % interval of it.
-    pub interval: Option<[f64; 2]>,
+    /// The twin's parameters, refitted.
+    pub parameters: Vec<Refitted>,
 }
 
-/// An effect that was named.
+/// An effect with its probability.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Named {
+pub(crate) struct Named {
     /// `id@target`.
     pub key: String,
-    /// Among listed effects and catch-alls.
+    /// Among all explanations; what is left is that of none of these.
     pub probability: f64,
-    /// Nats over the twin.
-    pub gain: f64,
+}
+
+/// A refitted parameter.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Refitted {
+    pub name: String,
+    pub value: f64,
+    pub std_error: f64,
+}
+
+/// Diagnoses records. A diagnosis that fails is an answer, too; only a stop is an error.
+pub(super) fn ask(
+    study: &Study,
+    record: &Record,
+    validation: Option<&Record>,
+    settings: &DiagnoseSettings,
+    progress: &Progress,
+) -> Result<Result<Outcome, String>, DiagnoseError> {
+    let records = [record.clone()];
+    match diagnose(study, &records, validation, settings, &progress.unshown()) {
+        Ok(found) => Ok(Ok(Outcome::of(&found))),
+        Err(error @ DiagnoseError::Cancelled(_)) => Err(error),
+        Err(error) => Ok(Err(error.to_string())),
+    }
 }
 
 impl Answer {
-    /// Diagnoses a trial. A diagnosis that fails is an answer, too; only a stop is an error.
-    pub(super) fn of(
+    /// Diagnoses a trial.
+    pub fn of(
         trial: usize,
         study: &Study,
-        record: Record,
-        validation: Option<&Record>,
+        (record, validation): (&Record, Option<&Record>),
         settings: &DiagnoseSettings,
         progress: &Progress,
     ) -> Result<Self, DiagnoseError> {
         let clock = Instant::now();
-        let found = diagnose(study, &[record], validation, settings, &progress.unshown());
-        let (outcome, failure) = match found {
-            Ok(found) => (Some(Outcome::of(&found)), None),
-            Err(error @ DiagnoseError::Cancelled(_)) => return Err(error),
-            Err(error) => (None, Some(error.to_string())),
+        let answer = ask(study, record, validation, settings, progress)?;
+        let seconds = clock.elapsed().as_secs_f64();
+        let (outcome, failure) = match answer {
+            Ok(outcome) => (Some(outcome), None),
+            Err(failure) => (None, Some(failure)),
         };
         Ok(Self {
             trial,
             outcome,
             failure,
-            seconds: clock.elapsed().as_secs_f64(),
+            seconds,
+            correlated: None,
+            repeats: vec![],
         })
     }
 }
 
 impl Outcome {
+    /// Everything of a diagnosis that is scored.
     fn of(found: &Diagnosis) -> Self {
-        let free_run = (found.shrinkage.as_ref()).filter(|s| s.metric == "free-run NRMSE");
+        let keyed = |id: &str, target: &str| crate::effect::EffectKey::new(id, target).to_string();
         Self {
             verdict: found.verdict,
-            p_value: found.detection.p_value,
+            p_value: Some(found.detection.p_value),
             decision: found.cause.decision,
             target: found.location.target.clone(),
             effects: (found.cause.effects.iter())
                 .map(|e| Named {
-                    key: e.key(),
+                    key: keyed(&e.id, &e.target),
                     probability: e.probability,
-                    gain: e.log_score_gain,
                 })
                 .collect(),
             accepted: found.cause.accepted.clone(),
             class: found.cause.class.clone(),
-            before: free_run.map(|s| s.before),
-            floor: free_run.and_then(|s| s.floor),
-            closed: free_run.and_then(|s| s.closed),
-            interval: free_run.and_then(|s| s.interval),
+            parameters: (found.parameters.iter())
+                .map(|p| Refitted {
+                    name: p.name.clone(),
+                    value: p.refitted,
+                    std_error: p.std_error,
+                })
+                .collect(),
         }
     }
 
@@ -124,5 +159,26 @@ impl Outcome {
     /// The effect on top: of an accepted pair, the first.
     pub fn top(&self) -> Option<&Named> {
         self.effects.first()
+    }
+
+    /// Probability that is stated of what was accepted: of several effects, the least.
+    pub fn stated(&self) -> Option<f64> {
+        (self.effects.iter())
+            .filter(|e| self.accepted.contains(&e.key))
+            .map(|e| e.probability)
+            .reduce(f64::min)
+    }
+
+    /// Answer in one word or as `id@target`.
+    pub fn text(&self) -> String {
+        match self.accepted.is_empty() {
+            _ if !self.is_structural() => self.verdict.id().into(),
+            true => self.decision.id().into(),
+            false => {
+                let mut accepted = self.accepted.clone();
+                accepted.sort();
+                accepted.join(" + ")
+            }
+        }
     }
 }

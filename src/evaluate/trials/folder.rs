@@ -17,8 +17,6 @@ const LEFT_OUT: &str = "left-out.json";
 const RECORDS: &str = "records";
 /// Answers of the diagnoser.
 pub(super) const ANSWERS: &str = "answers";
-/// Additions of the opened keys.
-pub(super) const OPENED: &str = "opened";
 
 /// A folder of trials: what every [`WorkFolder`] has, and
 ///
@@ -27,9 +25,8 @@ pub(super) const OPENED: &str = "opened";
 /// | `keys.json` | the truth of every trial; not read again before every answer is there |
 /// | `seal.txt` | SHA-256 of `keys.json`, published before the first diagnosis |
 /// | `left-out.json` | the effects that each trial's library does without, where the call asks for that |
-/// | `records/0000.csv`, `records/0000-validation.csv` | what the diagnoser sees |
+/// | `records/0000.csv`, `records/0000-validation.csv`, `records/0000-doubled.csv` | what the diagnoser sees |
 /// | `answers/0000.json` | what it said |
-/// | `opened/0000.json` | what the true effect gains; made with the key |
 /// | `scorecard.json`, `scorecard.html` | made of all that |
 #[derive(Debug, Clone)]
 pub(super) struct Folder {
@@ -38,9 +35,21 @@ pub(super) struct Folder {
     pub seal: String,
 }
 
-/// One trial's records, by number.
-fn record_name(trial: usize, validation: bool) -> String {
-    let end = if validation { "-validation" } else { "" };
+/// Record of a trial.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Which {
+    Own,
+    Validation,
+    /// The same system, twice as long.
+    Doubled,
+}
+
+fn record_name(trial: usize, which: Which) -> String {
+    let end = match which {
+        Which::Own => "",
+        Which::Validation => "-validation",
+        Which::Doubled => "-doubled",
+    };
     format!("{RECORDS}/{trial:04}{end}.csv")
 }
 
@@ -49,13 +58,8 @@ pub(super) struct Filling<'a>(&'a NewWork<'a>);
 
 impl Filling<'_> {
     /// Adds a record.
-    pub fn record(
-        &self,
-        trial: usize,
-        validation: bool,
-        record: &Record,
-    ) -> Result<(), StorageError> {
-        let name = record_name(trial, validation);
+    pub fn record(&self, trial: usize, which: Which, record: &Record) -> Result<(), StorageError> {
+        let name = record_name(trial, which);
         self.0.write(&name, record_csv_text(record).as_bytes())
     }
 
@@ -87,16 +91,16 @@ impl Folder {
         manifest: &Manifest,
         fill: impl FnOnce(&Filling<'_>) -> Result<(), EvaluateError>,
     ) -> Result<Self, EvaluateError> {
-        let parts = [RECORDS, ANSWERS, OPENED];
+        let parts = [RECORDS, ANSWERS];
         let work = WorkFolder::open(path, manifest, &parts, |new| fill(&Filling(new)))?;
         let seal = work.read(SEAL)?.trim().into();
         Ok(Self { work, seal })
     }
 
     /// Reads a trial's record.
-    pub fn record(&self, trial: usize, validation: bool) -> Result<Record, EvaluateError> {
+    pub fn record(&self, trial: usize, which: Which) -> Result<Record, EvaluateError> {
         self.work.part(RECORDS)?;
-        let path = self.work.file(&record_name(trial, validation));
+        let path = self.work.file(&record_name(trial, which));
         check_file(&path).map_err(|error| StorageError::io(&path, error))?;
         Ok(read_record(&path)?)
     }

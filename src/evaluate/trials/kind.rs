@@ -12,31 +12,28 @@ pub enum Kind {
     None,
     /// Nothing, θ outside the prior: no structural gap.
     Outside,
-    /// An effect of the library: to be named.
+    /// A listed law: to be named.
     Listed,
-    /// An effect of the library, its physics written in other terms: to be named.
-    Parametrised,
-    /// Something that nobody listed: a structural gap, and none of the listed effects.
-    Unlisted,
-    /// Two effects of the library at different targets: both to be accepted.
+    /// A listed law, its physics written otherwise: to be named.
+    Otherwise,
+    /// A random law: a structural gap, and none of the listed effects.
+    Random,
+    /// Two listed laws at different places: both to be accepted.
     Pair,
-    /// An effect of the library that another one imitates: to be in the class.
-    Confounded,
-    /// An effect that some θ stands in for: no structural gap.
-    Absorbed,
+    /// θ outside the prior and a listed law: to be named.
+    Beside,
 }
 
 impl Kind {
     /// All, in the order of tables.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 7] = [
         Self::None,
         Self::Outside,
         Self::Listed,
-        Self::Parametrised,
-        Self::Unlisted,
+        Self::Otherwise,
+        Self::Random,
         Self::Pair,
-        Self::Confounded,
-        Self::Absorbed,
+        Self::Beside,
     ];
 
     /// As in calls and files.
@@ -45,11 +42,10 @@ impl Kind {
             Self::None => "none",
             Self::Outside => "outside",
             Self::Listed => "listed",
-            Self::Parametrised => "parametrised",
-            Self::Unlisted => "unlisted",
+            Self::Otherwise => "otherwise",
+            Self::Random => "random",
             Self::Pair => "pair",
-            Self::Confounded => "confounded",
-            Self::Absorbed => "absorbed",
+            Self::Beside => "beside",
         }
     }
 
@@ -60,15 +56,21 @@ impl Kind {
 
     /// Returns true if no θ explains the record.
     pub fn is_structural(self) -> bool {
-        !matches!(self, Self::None | Self::Outside | Self::Absorbed)
+        !matches!(self, Self::None | Self::Outside)
+    }
+
+    /// Returns true if θ lies outside the prior.
+    pub(super) fn is_outside(self) -> bool {
+        matches!(self, Self::Outside | Self::Beside)
     }
 
     /// Number of trials of this kind among twenty.
     fn weight(self) -> usize {
         match self {
-            Self::None | Self::Outside | Self::Listed => 4,
-            Self::Parametrised | Self::Unlisted | Self::Absorbed => 2,
-            Self::Pair | Self::Confounded => 1,
+            Self::None | Self::Listed | Self::Random => 4,
+            Self::Outside => 3,
+            Self::Otherwise | Self::Beside => 2,
+            Self::Pair => 1,
         }
     }
 }

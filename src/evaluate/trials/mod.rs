@@ -22,26 +22,35 @@
 //!
 //! // Diagnoses come from the records alone; then the keys are opened.
 //! let card: Scorecard = sealed.score(&Progress::silent())?;
-//! assert_eq!(card.false_alarms.of, 2);
+//! assert_eq!(card.trials, 2);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod answer;
+mod correlation;
+mod draft;
+mod families;
 mod folder;
+mod information;
 mod kind;
-mod listed;
-mod opened;
+mod law;
+mod places;
 mod row;
 mod run;
+mod scene;
 mod score;
+mod steadiness;
 mod truth;
-mod unlisted;
+mod units;
 mod world;
 
-pub(crate) use answer::Answer;
-pub use answer::{Named, Outcome};
+#[cfg(test)]
+pub(crate) use answer::{Named, Outcome, Refitted, Repeat};
+pub use families::Families;
 pub use kind::Kind;
-pub use row::Row;
+pub(crate) use row::Row;
 pub use run::{Sealed, Settings, Withheld};
 pub use score::Scorecard;
-pub(crate) use score::{Count, Range};
+#[cfg(test)]
+pub(crate) use score::Setup;
+pub(crate) use score::{Baseline, Bin, Count};

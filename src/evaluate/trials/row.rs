@@ -1,201 +1,215 @@
-//! One trial with its key opened: truth, answer, and the judgement of it.
+//! One trial: what was true, what was answered, what that is worth.
 
 use super::Kind;
-use super::answer::{Answer, Outcome};
-use super::opened::Opened;
+use super::answer::{Answer, Outcome, Repeat};
 use super::truth::Truth;
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
+use std::fmt;
 
-/// Nats from which on an effect is clear: it cannot be overlooked by chance.
-const CLEAR: f64 = 12.0;
+/// A twin whose own step shows by more nats than this is no null: its integrator is the gap.
+const COARSE: f64 = 1.0;
 
-/// Held-out nats within which a listed effect is as good as an unlisted law.
-const IMITATES: f64 = 6.0;
-
-/// One trial with its key opened.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Row {
-    /// From 0.
-    pub trial: usize,
-    /// Kind of truth.
-    pub kind: Kind,
-    /// Truth: `none`, `id@target`, two of them, or the name of something unlisted.
-    pub truth: String,
-    /// Listed effects that are right answers; none where the right answer is to abstain, or that nothing is wrong.
-    pub right: Vec<String>,
-    /// Effects that all have to be accepted.
-    pub effects: Vec<String>,
-    /// Places where the twin is wrong.
-    pub targets: Vec<String>,
-    /// From 0, hardly visible, to 1, obvious; of a pair, that of the weaker effect.
-    pub strength: Option<f64>,
-    /// Nats that the true effects gain when the diagnoser fits them.
-    pub gain: Option<f64>,
-    /// For a pair: nats that the weaker effect adds to the other one.
-    pub added: Option<f64>,
-    /// The share of the gap that the true system closes on the held-out data.
-    pub share: Option<f64>,
-    /// Held-out nats by which the best listed effect falls short of a law that is not listed.
-    pub shortfall: Option<f64>,
-    /// Result; none where the diagnosis failed.
-    pub outcome: Option<Outcome>,
-    /// Reason for a missing result.
-    pub failure: Option<String>,
-    /// Wall-clock seconds of the diagnosis.
-    pub seconds: f64,
+/// What an answer is worth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Fate {
+    /// Nothing is missing, and nothing was said to be.
+    Quiet,
+    /// Nothing is missing, but a structural gap was stated.
+    FalseAlarm,
+    /// The accepted answer is right, complete, and holds nothing false beside it; or nothing listed is right, and none was accepted.
+    Delivered,
+    /// Everything accepted is right, but one of two effects lacks.
+    Incomplete,
+    /// A false effect was accepted.
+    WrongName,
+    /// The effect on top is right and was not accepted.
+    Refused,
+    /// Nothing was accepted, although a listed effect is right.
+    Abstained,
+    /// No structural gap was stated.
+    Missed,
+    /// The diagnosis ended in an error.
+    Failed,
 }
 
-impl Serialize for Row {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let outcome = self.outcome.as_ref();
-        let top = outcome.and_then(Outcome::top);
-        let mut object = serializer.serialize_struct("Row", 19)?;
-        object.serialize_field("trial", &self.trial)?;
-        object.serialize_field("kind", &self.kind)?;
-        object.serialize_field("truth", &self.truth)?;
-        object.serialize_field("answer", &self.answer())?;
-        object.serialize_field("right", &self.is_right())?;
-        object.serialize_field("strength", &self.strength)?;
-        object.serialize_field("added", &self.added)?;
-        object.serialize_field("shortfall", &self.shortfall)?;
-        object.serialize_field("gain", &self.gain)?;
-        object.serialize_field("p_value", &outcome.map(|o| o.p_value))?;
-        object.serialize_field("where", &outcome.and_then(|o| o.target.as_ref()))?;
-        object.serialize_field("top", &top.map(|top| &top.key))?;
-        object.serialize_field("probability", &top.map(|top| top.probability))?;
-        object.serialize_field("class", &outcome.map(|o| &o.class))?;
-        object.serialize_field("closed", &outcome.and_then(|o| o.closed))?;
-        object.serialize_field("interval", &outcome.and_then(|o| o.interval))?;
-        object.serialize_field("true_share", &self.share)?;
-        object.serialize_field("failure", &self.failure)?;
-        object.serialize_field("seconds", &self.seconds)?;
-        object.end()
+impl fmt::Display for Fate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Quiet => "quiet",
+            Self::FalseAlarm => "false alarm",
+            Self::Delivered => "delivered",
+            Self::Incomplete => "incomplete",
+            Self::WrongName => "wrong name",
+            Self::Refused => "refused",
+            Self::Abstained => "abstained",
+            Self::Missed => "missed",
+            Self::Failed => "failed",
+        })
     }
+}
+
+/// One trial.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Row {
+    pub trial: usize,
+    pub kind: Kind,
+    /// Name of what is missing.
+    pub truth: String,
+    /// For each departure the effects of the trial's library that are a right answer.
+    pub right: Vec<Vec<String>>,
+    pub targets: Vec<String>,
+    /// Expected information in nats.
+    pub information: Option<f64>,
+    /// Nats by which the twin's own step shows.
+    pub step: f64,
+    /// Nuisance of the record.
+    pub nuisance: String,
+    /// Names and true values of the parameters.
+    pub theta: Vec<(String, f64)>,
+    /// Draws given up before this one.
+    pub redraws: u64,
+    pub outcome: Option<Outcome>,
+    pub failure: Option<String>,
+    pub seconds: f64,
+    pub correlated: Option<String>,
+    pub repeats: Vec<Repeat>,
 }
 
 impl Row {
-    /// Joins a truth, an answer and the additions of the key; `without`: the true effects were not in the library.
-    pub(super) fn new(truth: &Truth, answer: &Answer, opened: &Opened, without: bool) -> Self {
-        let right = match truth.kind.is_structural() {
-            true => (truth.right.iter())
-                .filter(|key| !(without && truth.effects.contains(key)))
-                .cloned()
-                .collect(),
-            false => vec![],
-        };
-        let named = match &truth.unlisted {
-            Some(name) => format!("{name}@{}", truth.targets.join(" + ")),
-            None => truth.effects.join(" + "),
-        };
+    /// Puts a truth beside its answer; `without`: the true effects were not in the trial's library.
+    pub(super) fn new(
+        truth: &Truth,
+        answer: &Answer,
+        parameters: &[String],
+        without: bool,
+    ) -> Self {
+        let left_out = |key: &String| without && truth.effects.contains(key);
+        let right = (truth.right.iter())
+            .map(|set| set.iter().filter(|key| !left_out(key)).cloned().collect())
+            .collect();
         Self {
             trial: truth.trial,
             kind: truth.kind,
-            truth: match named.is_empty() {
-                true => truth.kind.id().into(),
-                false => named,
+            truth: match truth.labels.is_empty() {
+                true => "nothing".into(),
+                false => truth.labels.join(" + "),
             },
             right,
-            effects: truth.effects.clone(),
             targets: truth.targets.clone(),
-            strength: truth.strength,
-            gain: opened.gain,
-            added: opened.added,
-            share: opened.share,
-            shortfall: opened.shortfall,
+            information: truth.information,
+            step: truth.step,
+            nuisance: truth.conditions.nuisance.to_string(),
+            theta: (parameters.iter().cloned())
+                .zip(truth.theta.iter().copied())
+                .collect(),
+            redraws: truth.redraws,
             outcome: answer.outcome.clone(),
             failure: answer.failure.clone(),
             seconds: answer.seconds,
+            correlated: answer.correlated.clone(),
+            repeats: answer.repeats.clone(),
         }
     }
 
-    /// Returns true if a structural gap was found.
+    /// Returns true if a structural gap was stated.
     pub fn called(&self) -> bool {
         self.outcome.as_ref().is_some_and(Outcome::is_structural)
     }
 
-    /// Returns true if a structural gap was found, and none of the listed effects.
-    pub fn abstained(&self) -> bool {
-        self.outcome.as_ref().is_some_and(Outcome::abstains)
+    /// Returns true if nothing is missing.
+    pub fn is_null(&self) -> bool {
+        !self.kind.is_structural()
     }
 
-    /// Returns true if the truth is a gap that no effect of the trial's library describes.
+    /// Returns true if nothing is missing but a finer integration step.
+    pub fn is_coarse(&self) -> bool {
+        self.is_null() && self.step > COARSE
+    }
+
+    /// Returns true if something is missing and nothing that the library lists is right.
     pub fn must_abstain(&self) -> bool {
-        self.kind.is_structural() && self.right.is_empty()
+        !self.is_null() && self.right.iter().all(Vec::is_empty)
     }
 
-    /// Returns true if the truth is such a gap, and no listed effect imitates it either.
-    pub fn nothing_fits(&self) -> bool {
-        self.must_abstain() && self.shortfall.is_some_and(|nats| nats > IMITATES)
+    /// Returns true if the key is a right answer to one of the departures.
+    pub fn is_right(&self, key: &str) -> bool {
+        self.right.iter().flatten().any(|right| right == key)
     }
 
-    /// Returns true if the truth is one effect that the trial's library has, and no double of it counts.
-    pub fn is_single(&self) -> bool {
-        matches!(self.kind, Kind::Listed | Kind::Parametrised) && !self.right.is_empty()
-    }
-
-    /// Returns true if the true effects gain more than chance could.
-    pub fn is_clear(&self) -> bool {
-        self.gain.is_some_and(|gain| gain > CLEAR)
-    }
-
-    /// Returns true if each effect of a pair gains more than chance could beside the other one.
-    pub fn is_clear_pair(&self) -> bool {
-        self.kind == Kind::Pair && self.added.is_some_and(|added| added > CLEAR)
-    }
-
-    /// Returns true if the effect on top is a true one.
-    pub fn top_is_right(&self) -> bool {
-        let top = self.outcome.as_ref().and_then(Outcome::top);
-        top.is_some_and(|top| self.right.contains(&top.key))
-    }
-
-    /// Returns true if the true effect is in the class.
-    pub fn class_is_right(&self) -> bool {
-        let class = self.outcome.as_ref().map(|o| &o.class);
-        class.is_some_and(|class| self.right.iter().any(|key| class.contains(key)))
-    }
-
-    /// Returns true if the place that is named is the true one.
+    /// Returns true if the place that is stated is a true one.
     pub fn place_is_right(&self) -> bool {
         let target = self.outcome.as_ref().and_then(|o| o.target.as_ref());
         target.is_some_and(|target| self.targets.contains(target))
     }
 
-    /// Returns true if every true effect, and nothing else, was accepted.
-    pub fn accepted_are_right(&self) -> bool {
-        let accepted = self.outcome.as_ref().map(|o| &o.accepted);
-        accepted.is_some_and(|accepted| {
-            accepted.len() == self.effects.len()
-                && self.effects.iter().all(|key| accepted.contains(key))
-        })
-    }
-
-    /// Returns true if the answer is right by the rule of its kind.
-    pub fn is_right(&self) -> bool {
-        match self.kind {
-            Kind::None | Kind::Outside | Kind::Absorbed => self.outcome.is_some() && !self.called(),
-            _ if self.must_abstain() => self.abstained(),
-            Kind::Pair => self.accepted_are_right(),
-            Kind::Confounded => self.class_is_right(),
-            _ => self.called() && !self.abstained() && self.top_is_right(),
+    /// What the answer is worth.
+    pub fn fate(&self) -> Fate {
+        match &self.outcome {
+            None => Fate::Failed,
+            Some(outcome) => self.fate_of(outcome.is_structural(), &outcome.accepted, || {
+                outcome.top().is_some_and(|top| self.is_right(&top.key))
+            }),
         }
     }
 
-    /// The share closed that the answer states with an interval, beside that of the true system, where the answer is right.
-    pub fn interval(&self) -> Option<([f64; 2], f64)> {
-        let interval = self.outcome.as_ref()?.interval?;
-        let named = self.is_right() && !self.must_abstain();
-        Some((interval, self.share.filter(|_| named)?))
+    /// What an answer is worth that states a gap or not, accepts these effects, and has a right one on top or not.
+    pub fn fate_of(
+        &self,
+        structural: bool,
+        accepted: &[String],
+        top_is_right: impl FnOnce() -> bool,
+    ) -> Fate {
+        match (self.is_null(), structural) {
+            (true, false) => return Fate::Quiet,
+            (true, true) => return Fate::FalseAlarm,
+            (false, false) => return Fate::Missed,
+            (false, true) => {}
+        }
+        if accepted.is_empty() {
+            return match self.must_abstain() {
+                true => Fate::Delivered,
+                false if top_is_right() => Fate::Refused,
+                false => Fate::Abstained,
+            };
+        }
+        if !accepted.iter().all(|key| self.is_right(key)) {
+            return Fate::WrongName;
+        }
+        let is_complete = (self.right.iter())
+            .all(|set| set.is_empty() || set.iter().any(|key| accepted.contains(key)));
+        match is_complete {
+            true => Fate::Delivered,
+            false => Fate::Incomplete,
+        }
     }
 
     /// Answer in one word or as `id@target`.
     pub fn answer(&self) -> String {
-        match &self.outcome {
-            None => "failed".into(),
-            Some(o) if !o.is_structural() => o.verdict.id().into(),
-            Some(o) if o.accepted.is_empty() => o.decision.id().into(),
-            Some(o) => o.accepted.join(" + "),
-        }
+        (self.outcome.as_ref()).map_or_else(|| "failed".into(), Outcome::text)
+    }
+}
+
+impl Serialize for Row {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut object = serializer.serialize_struct("Row", 15)?;
+        object.serialize_field("trial", &self.trial)?;
+        object.serialize_field("kind", &self.kind)?;
+        object.serialize_field("truth", &self.truth)?;
+        object.serialize_field("right", &self.right)?;
+        object.serialize_field("targets", &self.targets)?;
+        object.serialize_field("information", &self.information)?;
+        object.serialize_field("step_information", &self.step)?;
+        object.serialize_field("nuisance", &self.nuisance)?;
+        object.serialize_field("answer", &self.answer())?;
+        object.serialize_field("fate", &self.fate())?;
+        let outcome = self.outcome.as_ref();
+        object.serialize_field("stated", &outcome.and_then(Outcome::stated))?;
+        object.serialize_field("target", &outcome.and_then(|o| o.target.clone()))?;
+        object.serialize_field("failure", &self.failure)?;
+        object.serialize_field("redraws", &self.redraws)?;
+        object.serialize_field("seconds", &self.seconds)?;
+        object.end()
     }
 }

@@ -1,27 +1,36 @@
 //! The trials from end to end: sealed, diagnosed, opened, scored.
 
-use super::folder::{ANSWERS, Filling, Folder, OPENED};
+use super::answer::Answer;
+use super::correlation::correlated;
+use super::draft::index;
+use super::folder::{ANSWERS, Filling, Folder, Which};
 use super::kind::assign_kinds;
-use super::opened::Opened;
-use super::truth::TruthSampler;
-use super::unlisted::index;
-use super::{Answer, Kind, Row, Scorecard};
+use super::row::Row;
+use super::score::Setup;
+use super::steadiness::repeats;
+use super::truth::{Drawn, Extra, TruthSampler};
+use super::{Families, Kind, Scorecard};
 use crate::diagnose::DiagnoseSettings;
 use crate::evaluate::EvaluateError;
+use crate::likelihood::kalman::recoverable;
 use crate::progress::Progress;
-use crate::record::Record;
+use crate::record::{Record, record_csv_text};
 use crate::setting::SettingError;
 use crate::storage::StorageError;
+use crate::storage::files::sha256;
 use crate::storage::work::{Manifest, Piece, Pieces, Share};
 use crate::study::Study;
 use crate::twin::Noise;
+use rayon::prelude::*;
 use serde_json::json;
 use std::path::Path;
 
 /// Layout of the folder; raised when it changes.
-const LAYOUT: u32 = 4;
+const LAYOUT: u32 = 5;
 /// Most trials of a folder; their keys are in memory.
 const MOST: usize = 1_000_000;
+/// Trials that are drawn before their records are written.
+const PART: usize = 64;
 
 /// Settings of sealed trials.
 ///
@@ -30,9 +39,12 @@ const MOST: usize = 1_000_000;
 /// | `trials` | 100 | records |
 /// | `seed` | 1 | of truths, records and diagnoses |
 /// | `kinds` | all | kinds of truth, assigned in the proportions of docs/withheld.md |
+/// | `families` | all | half of the families that random laws come from |
+/// | `like` | no | a measured record whose inputs, length, step and gaps the trials have |
 /// | `without` | no | whether the true effects are taken out of the library: then every trial with one must abstain |
 /// | `validation` | no | whether each trial has a second record |
 /// | `detection_only` | no | whether a diagnosis ends with its verdict: for false alarms over many trials |
+/// | `steadiness` | 0 | first trials whose diagnosis is repeated with other seeds, a doubled record, other units, another order of the library |
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// Records.
@@ -41,12 +53,18 @@ pub struct Settings {
     pub seed: u64,
     /// Kinds of truth.
     pub kinds: Vec<Kind>,
+    /// Families of random laws.
+    pub families: Families,
+    /// Record whose inputs, length, step and gaps the trials have.
+    pub like: Option<Record>,
     /// True if the true effects are taken out of the library.
     pub without: bool,
     /// True if each trial has a validation record.
     pub validation: bool,
     /// True if a diagnosis ends with its verdict.
     pub detection_only: bool,
+    /// Number of first trials whose diagnosis is repeated.
+    pub steadiness: usize,
 }
 
 impl Default for Settings {
@@ -55,9 +73,12 @@ impl Default for Settings {
             trials: 100,
             seed: 1,
             kinds: Kind::ALL.to_vec(),
+            families: Families::default(),
+            like: None,
             without: false,
             validation: false,
             detection_only: false,
+            steadiness: 0,
         }
     }
 }
@@ -75,7 +96,7 @@ impl Default for Settings {
 /// let sealed = Withheld::new(study, settings)?.seal(&place.path().join("trials"), &Progress::silent())?;
 /// println!("sha256 {}", sealed.seal());
 /// let card = sealed.score(&Progress::silent())?;
-/// assert_eq!(card.false_alarms.of, 1);
+/// assert_eq!(card.trials, 1);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Withheld<'a> {
@@ -86,13 +107,12 @@ pub struct Withheld<'a> {
 debug_by_name!(Withheld<'_>);
 
 impl<'a> Withheld<'a> {
-    /// Trials of a study of a reference twin.
+    /// Creates trials over a study.
     ///
     /// # Errors
     ///
-    /// [`EvaluateError`]: a twin without a world, a study that changes the twin, kinds that cannot be drawn, no trials.
+    /// [`EvaluateError`]: kinds that cannot be drawn, no trials or too many, a record that does not fit the twin.
     pub fn new(study: &'a Study, settings: Settings) -> Result<Self, EvaluateError> {
-        let sampler = TruthSampler::new(study)?;
         if settings.trials == 0 {
             return Err(EvaluateError::Nothing("trials"));
         }
@@ -101,6 +121,7 @@ impl<'a> Withheld<'a> {
         if settings.kinds.is_empty() {
             return Err(EvaluateError::Nothing("kinds"));
         }
+        let sampler = TruthSampler::new(study, settings.families, settings.like.as_ref())?;
         for kind in &settings.kinds {
             sampler.check(*kind)?;
         }
@@ -126,16 +147,37 @@ impl<'a> Withheld<'a> {
         let stage = progress.stage("seal", trials);
         let mut source = Noise::new(seed, "withheld kinds", 0).source("deal");
         let kinds = assign_kinds(&self.settings.kinds, trials, |n| index(&mut source, n));
+        let extra = |trial| Extra {
+            validation: self.settings.validation,
+            doubled: trial < self.settings.steadiness,
+        };
+        let numbered: Vec<(usize, Kind)> = kinds.into_iter().enumerate().collect();
         let mut keys = Vec::with_capacity(trials);
-        for (trial, kind) in kinds.into_iter().enumerate() {
-            let noise = Noise::new(seed, "withheld", trial as u64);
-            let drawn = (self.sampler).draw(trial, kind, self.settings.validation, noise)?;
-            filling.record(trial, false, &drawn.record)?;
-            if let Some(validation) = &drawn.validation {
-                filling.record(trial, true, validation)?;
+        // Part by part: the records of a million trials do not fit into memory.
+        for part in numbered.chunks(PART) {
+            let draw = |&(trial, kind): &(usize, Kind)| {
+                let noise = Noise::new(seed, "withheld", trial as u64);
+                let drawn = (self.sampler).draw(trial, kind, extra(trial), noise)?;
+                stage.tick()?;
+                Ok::<_, EvaluateError>(drawn)
+            };
+            let drawn = part.par_iter().map(draw).collect::<Result<Vec<_>, _>>()?;
+            for Drawn {
+                truth,
+                record,
+                validation,
+                doubled,
+            } in drawn
+            {
+                filling.record(truth.trial, Which::Own, &record)?;
+                for (which, record) in [(Which::Validation, validation), (Which::Doubled, doubled)]
+                {
+                    if let Some(record) = &record {
+                        filling.record(truth.trial, which, record)?;
+                    }
+                }
+                keys.push(truth);
             }
-            keys.push(drawn.truth);
-            stage.tick()?;
         }
         if self.settings.without {
             let effects: Vec<&Vec<String>> = keys.iter().map(|key| &key.effects).collect();
@@ -149,14 +191,19 @@ impl<'a> Withheld<'a> {
         let study = self.sampler.study();
         let settings = &self.settings;
         let kinds: Vec<&str> = settings.kinds.iter().map(|kind| kind.id()).collect();
+        let like = settings.like.as_ref();
+        let like = like.map(|record| sha256(record_csv_text(record).as_bytes()));
         Ok(study
             .manifest("withheld", LAYOUT)?
             .with("trials", settings.trials)
             .with("seed", settings.seed)
             .with("kinds", json!(kinds))
             .with("without", settings.without)
+            .with("families", settings.families.to_string())
+            .with("like", like)
             .with("validation", settings.validation)
-            .with("detection_only", settings.detection_only))
+            .with("detection_only", settings.detection_only)
+            .with("steadiness", settings.steadiness))
     }
 }
 
@@ -183,16 +230,25 @@ impl Sealed<'_> {
     /// [`EvaluateError`]: files that cannot be read or written, keys that are not those that were sealed, a stop.
     pub fn score(&self, progress: &Progress) -> Result<Scorecard, EvaluateError> {
         let answers = self.answer(Share::WHOLE, progress)?;
-        let opened = self.open(Share::WHOLE, progress)?;
-        let keys = self.folder.keys(self.trials.settings.trials)?;
-        let without = self.trials.settings.without;
-        let rows: Vec<Row> = (keys.iter().zip(&answers).zip(&opened))
-            .map(|((truth, answer), opened)| Row::new(truth, answer, opened, without))
+        let settings = &self.trials.settings;
+        // Every answer is there: now, and not before, the keys.
+        let keys = self.folder.keys(settings.trials)?;
+        let sampler = &self.trials.sampler;
+        let parameters = sampler.parameters();
+        let rows = (keys.iter().zip(&answers))
+            .map(|(truth, answer)| Row::new(truth, answer, &parameters, settings.without))
             .collect();
-        let twin = self.trials.sampler.study().name();
-        let alpha = DiagnoseSettings::default().alpha;
-        let seed = self.trials.settings.seed;
-        Ok(Scorecard::new(twin, seed, alpha, self.seal(), rows))
+        let setup = Setup {
+            twin: sampler.study().name().into(),
+            seed: settings.seed,
+            families: settings.families,
+            without: settings.without,
+            validation: settings.validation,
+            like: settings.like.is_some(),
+            detection_only: settings.detection_only,
+            seal: self.seal().into(),
+        };
+        Ok(Scorecard::new(setup, rows))
     }
 
     /// Diagnoses the records of a share that have no answer yet; returns all answers that are there then.
@@ -209,63 +265,35 @@ impl Sealed<'_> {
         self.pieces(ANSWERS, share).all(
             &progress.stage("trials", self.trials.settings.trials),
             |_: &Answer| Ok(()),
-            |trial| {
-                let (record, validation) = self.records(trial)?;
-                let settings = self.diagnosis(trial, left_out[trial].clone());
-                let study = self.trials.sampler.study();
-                let answer = Answer::of(
-                    trial,
-                    study,
-                    record,
-                    validation.as_ref(),
-                    &settings,
-                    progress,
-                );
-                Ok::<_, EvaluateError>(answer?)
-            },
+            |trial| self.one(trial, left_out[trial].clone(), progress),
         )
     }
 
-    /// Works out what the opened keys of a share add, where that has not been done; how many trials are finished then.
-    ///
-    /// # Errors
-    ///
-    /// As [`score`](Self::score); [`EvaluateError::Unanswered`] before every answer is there, whatever the share.
-    pub(crate) fn open_keys(
+    /// Diagnoses one trial.
+    fn one(
         &self,
-        share: Share,
+        trial: usize,
+        left_out: Vec<String>,
         progress: &Progress,
-    ) -> Result<usize, EvaluateError> {
-        Ok(self.open(share, progress)?.len())
-    }
-
-    fn open(&self, share: Share, progress: &Progress) -> Result<Vec<Opened>, EvaluateError> {
-        let Settings { trials, seed, .. } = self.trials.settings;
-        let answers: Vec<Answer> = self.pieces(ANSWERS, share).kept(|_| Ok(()))?;
-        if answers.len() < trials {
-            return Err(EvaluateError::Unanswered {
-                done: answers.len(),
-                of: trials,
-            });
+    ) -> Result<Answer, EvaluateError> {
+        let (study, own) = (self.trials.sampler.study(), &self.trials.settings);
+        let record = self.folder.record(trial, Which::Own)?;
+        let validation = (own.validation)
+            .then(|| self.folder.record(trial, Which::Validation))
+            .transpose()?;
+        let settings = self.diagnosis(trial, left_out);
+        let given = (&record, validation.as_ref());
+        let mut answer = Answer::of(trial, study, given, &settings, progress)?;
+        // A baseline that fails says nothing.
+        answer.correlated = recoverable(correlated(study, &record))?.flatten();
+        if trial < own.steadiness {
+            let is_even = (own.like.as_ref()).is_none_or(|like| like.drive().is_uniform());
+            let doubled = (is_even)
+                .then(|| self.folder.record(trial, Which::Doubled))
+                .transpose()?;
+            answer.repeats = repeats(study, given, doubled.as_ref(), &settings, progress)?;
         }
-        // Every answer is there: now, and not before, the keys.
-        let keys = self.folder.keys(trials)?;
-        let left_out = self.left_out()?;
-        self.pieces(OPENED, share).all(
-            &progress.stage("open", trials),
-            |_: &Opened| Ok(()),
-            |trial| {
-                Opened::of(
-                    &self.trials.sampler,
-                    &keys[trial],
-                    answers[trial].outcome.as_ref(),
-                    self.records(trial)?,
-                    Noise::new(seed, "withheld", trial as u64),
-                    &self.diagnosis(trial, left_out[trial].clone()),
-                    progress,
-                )
-            },
-        )
+        Ok(answer)
     }
 
     /// Puts a result into the folder, in place of an earlier one.
@@ -294,12 +322,6 @@ impl Sealed<'_> {
         }
     }
 
-    fn records(&self, trial: usize) -> Result<(Record, Option<Record>), EvaluateError> {
-        let validation = self.trials.settings.validation;
-        let validation = validation.then(|| self.folder.record(trial, true));
-        Ok((self.folder.record(trial, false)?, validation.transpose()?))
-    }
-
     /// Settings of a trial's diagnosis.
     fn diagnosis(&self, trial: usize, without: Vec<String>) -> DiagnoseSettings {
         let noise = Noise::new(
@@ -317,12 +339,6 @@ impl Sealed<'_> {
 }
 
 impl Piece for Answer {
-    fn number(&self) -> usize {
-        self.trial
-    }
-}
-
-impl Piece for Opened {
     fn number(&self) -> usize {
         self.trial
     }

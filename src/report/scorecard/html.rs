@@ -1,30 +1,28 @@
 //! Scores of withheld trials as one page that needs nothing else.
 
-use super::figures::{gains_svg, nats, of, reliability_svg, strengths_svg};
-use super::text::{named_scores, rule};
-use crate::evaluate::trials::{Count, Row, Scorecard};
+use super::figures::{delivered_svg, reliability_svg};
+use super::text::{BIN_HEAD, bin_cells, named_scores, of, rule};
+use crate::evaluate::trials::{Baseline, Count, Row, Scorecard};
 use crate::report::chart::escaped;
-use crate::report::digits::{bare, percent, short};
+use crate::report::digits::{percent, short};
 use crate::report::page::Column::{Number, Text};
 use crate::report::page::{Section, Shade, figure, folded, matrix, page, paragraph, table};
 use std::collections::BTreeMap;
 
-/// The scorecard as a self-contained page: scores with intervals, kinds, detection against magnitude, reliability, the
-/// confusion matrix, every trial.
+/// The scorecard as a self-contained page: statements with intervals, answers by expected information, kinds, reliability,
+/// baselines, the confusion matrix, every trial.
 pub fn scorecard_html(card: &Scorecard) -> String {
     let sections = [
         Section::new("scores", "Scores", scores(card)),
+        Section::new("information", "Answers by expected information", bins(card)),
         Section::new("kinds", "Kinds of truth", kinds(card)),
-        Section::new("detection", "Detection against magnitude", detection(card)),
         Section::new("reliability", "Reliability", reliability(card)),
+        Section::new("baselines", "Baselines", baselines(card)),
         Section::new("named", "Which effect was named", confusion(card)),
         Section::new("trials", "Every trial", trials(card)),
     ];
-    page(
-        &format!("{}: withheld trials", card.twin),
-        &lead(card),
-        &sections,
-    )
+    let title = format!("{}: withheld trials", card.setup.twin);
+    page(&title, &lead(card), &sections)
 }
 
 /// Returns the head of the page.
@@ -34,25 +32,26 @@ fn lead(card: &Scorecard) -> String {
         _ => of(count),
     };
     let verdict = format!(
-        "False alarms: {}. Gaps detected: {}. Of single listed effects, the true one on top: {}.",
+        "False alarms: {}. Gaps detected: {}. Effects stated at 0.9 or more that are right: {}.",
         called(card.false_alarms),
         called(card.detected),
-        called(card.top1)
+        called(card.precision.stated_90)
     );
+    let setup = &card.setup;
     format!(
-        "<p class=\"verdict\">{}</p>\n<p>{} trials, seed {}, structural test at level {}. Truths were sealed before the first \
+        "<p class=\"verdict\">{}</p>\n<p>{} trials, seed {}, random laws of {} families. Truths were sealed before the first \
          diagnosis: sha256 of the key file <code>{}</code>.</p>\n",
         escaped(&verdict),
-        card.rows.len(),
-        card.seed,
-        card.alpha,
-        escaped(&card.seal)
+        card.trials,
+        setup.seed,
+        setup.families,
+        escaped(&setup.seal)
     )
 }
 
 fn scores(card: &Scorecard) -> String {
     let rows: Vec<Vec<String>> = (named_scores(card).into_iter())
-        .map(|(name, score)| counted(&[name], score))
+        .map(|(name, score)| counted(&[&name], score))
         .collect();
     let head = [
         ("score", Text),
@@ -60,18 +59,45 @@ fn scores(card: &Scorecard) -> String {
         ("share", Number),
         ("95 % interval", Number),
     ];
-    let size = card.mean_class_size.map_or("–".into(), short);
-    let seconds = card.seconds_per_record.map_or("–".into(), short);
-    let caption = "Clear: the true effect, fitted by the diagnoser, gains over 12 nats. Intervals are Clopper and Pearson’s.";
-    table(caption, &head, &rows)
-        + &paragraph(&format!(
-            "Mean size of a class {size}; mean time of a diagnosis {seconds} s."
-        ))
+    let dash = |value: Option<f64>| value.map_or("–".into(), short);
+    let caption = "Intervals are Clopper and Pearson’s.";
+    let rest = format!(
+        "Mean log score of the truth {} nats, mean Brier score {}, over {} gaps with stated probabilities. Mean size of a class \
+         {}. Mean time of a diagnosis {} s. Draws of truths given up: {}.",
+        dash(card.probabilities.log_score),
+        dash(card.probabilities.brier),
+        card.probabilities.trials,
+        dash(card.mean_class_size),
+        dash(card.seconds_per_record),
+        card.redraws
+    );
+    table(caption, &head, &rows) + &paragraph(&rest)
+}
+
+fn bins(card: &Scorecard) -> String {
+    let Some(svg) = delivered_svg(card) else {
+        return paragraph("No trial has a gap.");
+    };
+    let head: Vec<_> = (BIN_HEAD.iter().enumerate())
+        .map(|(i, name)| (*name, if i < 2 { Text } else { Number }))
+        .collect();
+    let rows: Vec<Vec<String>> = card.by_information.iter().map(bin_cells).collect();
+    figure(
+        &svg,
+        "Right and complete answers, by how much the best possible diagnoser could learn of the departure from such a record.",
+    ) + &table(
+        "Every trial with a gap, by its expected information. Missed and failed ones are the rest of the trials.",
+        &head,
+        &rows,
+    )
 }
 
 fn kinds(card: &Scorecard) -> String {
     let rows: Vec<Vec<String>> = (card.by_kind.iter())
-        .map(|k| counted(&[k.kind.id(), rule(k.kind), &of(k.structural)], k.right))
+        .map(|k| {
+            let cells = [k.kind.id(), rule(k.kind), &of(k.called_structural)];
+            counted(&cells, k.right)
+        })
         .collect();
     let head = [
         ("kind", Text),
@@ -103,41 +129,9 @@ fn percentages(count: Count) -> (String, String) {
     }
 }
 
-/// Detection over strength and over the gain of the true effect.
-fn detection(card: &Scorecard) -> String {
-    let mut body = match strengths_svg(card) {
-        Some(svg) => figure(
-            &svg,
-            "A point stands in the middle of its range; whiskers are 95 % intervals.",
-        ),
-        None => paragraph("No trials to draw."),
-    };
-    let Some(svg) = gains_svg(card) else {
-        return body;
-    };
-    body.push_str(&figure(
-        &svg,
-        "By what the true effects gain when the diagnoser fits them, in nats: what it could have seen at best.",
-    ));
-    let rows: Vec<Vec<String>> = (card.by_gain.iter())
-        .map(|r| counted(&[&nats(r)], r.detected))
-        .collect();
-    let head = [
-        ("gain of the true effect", Text),
-        ("detected", Number),
-        ("share", Number),
-        ("95 % interval", Number),
-    ];
-    body.push_str(&folded(
-        "Detection by gain in numbers",
-        &table("Detected, by gain.", &head, &rows),
-    ));
-    body
-}
-
 fn reliability(card: &Scorecard) -> String {
     let Some(svg) = reliability_svg(card) else {
-        return paragraph("No effect was accepted: nothing to draw.");
+        return paragraph("No effect was stated: nothing to draw.");
     };
     let rows: Vec<Vec<String>> = (card.reliability.iter())
         .map(|bin| counted(&[&format!("{:.2}", bin.stated)], bin.right))
@@ -150,8 +144,8 @@ fn reliability(card: &Scorecard) -> String {
     ];
     figure(
         &svg,
-        "Where an effect was accepted: its stated probability against how often it was a true one. On the diagonal, what is \
-         stated is what happens; below it, too much is claimed.",
+        "The effect on top: its stated probability against how often it is right. On the diagonal, what is stated is what \
+         happens; below it, too much is claimed.",
     ) + &folded(
         "Reliability in numbers",
         &table(
@@ -162,18 +156,35 @@ fn reliability(card: &Scorecard) -> String {
     )
 }
 
+fn baselines(card: &Scorecard) -> String {
+    let row = |b: &Baseline| -> Vec<String> {
+        let share = |count: Count| format!("{}, {}", of(count), percentages(count).0);
+        let place = b.place.map_or("–".into(), share);
+        vec![b.name.into(), share(b.verdict), share(b.right), place]
+    };
+    let rows: Vec<Vec<String>> = card.baselines.iter().map(row).collect();
+    let head = [
+        ("answers of", Text),
+        ("verdict right", Number),
+        ("answer right", Number),
+        ("place right", Number),
+    ];
+    table("The same trials, answered in simple ways.", &head, &rows)
+}
+
 /// Id of a key.
 fn id(key: &str) -> &str {
     key.split('@').next().unwrap_or(key)
 }
 
-/// Truths down, answers across, by id: single listed effects.
+/// Truths down, answers across, by id: trials with one listed effect.
 fn confusion(card: &Scorecard) -> String {
     let mut counts: BTreeMap<&str, BTreeMap<String, u64>> = BTreeMap::new();
-    for row in card.rows.iter().filter(|row| row.is_single()) {
+    let single = |row: &&Row| row.right.len() == 1 && !row.must_abstain();
+    for row in card.rows.iter().filter(single) {
         let answer = row.answer();
         let short = if answer.contains(" + ") {
-            "a pair".to_owned()
+            "several".to_owned()
         } else {
             id(&answer).to_owned()
         };
@@ -215,17 +226,13 @@ fn trials(card: &Scorecard) -> String {
         ("trial", Number),
         ("kind", Text),
         ("truth", Text),
+        ("nuisance", Text),
+        ("information, nats", Number),
         ("answer", Text),
-        ("right", Text),
-        ("strength", Number),
-        ("gain", Number),
-        ("p", Number),
+        ("stated", Number),
+        ("worth", Text),
     ];
-    let wrong = card.rows.iter().filter(|row| !row.is_right()).count();
-    paragraph(&format!(
-        "{wrong} of {} trials were not answered as the rule of their kind asks.",
-        card.rows.len()
-    )) + &folded(
+    folded(
         "Trials one by one",
         &table("In the order in which they were drawn.", &head, &rows),
     )
@@ -233,16 +240,16 @@ fn trials(card: &Scorecard) -> String {
 
 fn trial(row: &Row) -> Vec<String> {
     let or_dash = |value: Option<f64>| value.map_or("–".into(), short);
-    let p = row.outcome.as_ref().map_or("–".into(), |o| bare(o.p_value));
+    let stated = row.outcome.as_ref().and_then(|o| o.stated());
     vec![
         row.trial.to_string(),
         row.kind.id().into(),
         row.truth.clone(),
+        row.nuisance.clone(),
+        or_dash(row.information),
         row.answer(),
-        if row.is_right() { "yes" } else { "no" }.into(),
-        or_dash(row.strength),
-        or_dash(row.gain),
-        p,
+        stated.map_or("–".into(), |p| format!("{p:.2}")),
+        row.fate().to_string(),
     ]
 }
 
@@ -264,30 +271,24 @@ mod tests {
             );
         }
         let page = scorecard_html(&full);
-        assert_eq!(page.matches("<svg").count(), 3);
-        assert!(page.contains("<td class=\"right\"") && page.contains("1 of 2 trials were not"));
-        assert!(page.contains("<td>failed</td>"));
+        assert_eq!(page.matches("<svg").count(), 2);
+        assert!(page.contains("<td class=\"right\"") && page.contains("<td>failed</td>"));
+        assert!(scorecard_html(&empty).contains("No trial has a gap."));
     }
 
     #[test]
     fn many_trials_are_drawn_and_counted() {
         let page = scorecard_html(&made_scores::scorecard());
         for text in [
-            "False alarms: 0 of 30. Gaps detected: 72 of 90. Of single listed effects, the true one on top: 45 of 48.",
-            "<title>Called structural, by strength</title>",
-            "<title>Called structural, by gain</title>",
-            "<title>How often the effect on top is true</title>",
+            "False alarms: 0 of 30. Gaps detected: 72 of 90.",
+            "<title>Right answers, by expected information</title>",
+            "<title>How often the effect on top is right</title>",
             ">as stated<",
-            ">50 … 100 nats<",
-            "<td class=\"right\" style=\"background:rgb(0 114 178 / 0.50)\">12</td>",
-            "22 of 120 trials were not answered",
+            "above 30 nats",
+            "always no gap",
+            "wrong name",
         ] {
             assert!(page.contains(text), "{text}");
         }
-        assert_eq!(
-            page.matches("<circle").count(),
-            9 + 2,
-            "dots, and those of two legends"
-        );
     }
 }

@@ -1,68 +1,153 @@
 //! Scores of withheld trials on the terminal.
 
-use crate::evaluate::trials::{Count, Kind, Scorecard};
+use crate::evaluate::trials::{Bin, Count, Kind, Scorecard};
+use crate::report::digits::short;
 use crate::report::table::table;
 
-/// The scorecard: the scores, then each kind of truth.
+/// The scorecard: statements, fates by expected information, kinds of truth, baselines.
 pub fn scorecard_text(card: &Scorecard) -> String {
+    let setup = &card.setup;
     let head = format!(
-        "{}: {} withheld trials, seed {}; keys sealed as sha256 {}\n\n",
-        card.twin,
-        card.rows.len(),
-        card.seed,
-        card.seal
+        "{}: {} withheld trials, seed {}, families {}; keys sealed as sha256 {}\n\n",
+        setup.twin, card.trials, setup.seed, setup.families, setup.seal
     );
     let mut scores = vec![cells(&["", "count", "of", "95 % interval"])];
-    scores.extend(
-        named_scores(card)
-            .into_iter()
-            .map(|(name, score)| line(name, score)),
-    );
+    scores.extend((named_scores(card).into_iter()).map(|(name, score)| line(&name, score)));
     let mut kinds = vec![cells(&["kind", "trials", "called structural", "right"])];
     kinds.extend(card.by_kind.iter().map(|k| {
         vec![
             k.kind.to_string(),
             k.right.of.to_string(),
-            k.structural.count.to_string(),
+            k.called_structural.count.to_string(),
             k.right.count.to_string(),
         ]
     }));
-    let mut tail = String::new();
-    if let Some(size) = card.mean_class_size {
-        tail.push_str(&format!("Mean size of a class: {size:.2}.\n"));
+    let mut bins = vec![cells(&BIN_HEAD)];
+    bins.extend(card.by_information.iter().map(bin_cells));
+    let mut baselines = vec![cells(&[
+        "answers of",
+        "verdict right",
+        "answer right",
+        "place right",
+    ])];
+    baselines.extend(card.baselines.iter().map(|b| {
+        let place = b.place.map_or("–".into(), of);
+        vec![b.name.into(), of(b.verdict), of(b.right), place]
+    }));
+    let mut tail = vec![];
+    for (name, value, unit) in [
+        (
+            "Mean log score of the truth",
+            card.probabilities.log_score,
+            "nats",
+        ),
+        ("Mean Brier score", card.probabilities.brier, ""),
+        ("Mean size of a class", card.mean_class_size, ""),
+        ("Mean time of a diagnosis", card.seconds_per_record, "s"),
+    ] {
+        if let Some(value) = value {
+            tail.push(
+                format!("{name}: {} {unit}", short(value))
+                    .trim_end()
+                    .to_owned(),
+            );
+        }
     }
-    if let Some(seconds) = card.seconds_per_record {
-        tail.push_str(&format!("Mean time of a diagnosis: {seconds:.1} s.\n"));
-    }
-    format!("{head}{}\n{}\n{tail}", table(&scores), table(&kinds))
+    tail.push(format!("Draws of truths given up: {}", card.redraws));
+    let parts = [
+        table(&scores),
+        table(&bins),
+        table(&kinds),
+        table(&baselines),
+    ];
+    format!("{head}{}\n{}\n", parts.join("\n"), tail.join("\n"))
 }
 
-/// Every score with its name, in the order of reports.
-pub(super) fn named_scores(card: &Scorecard) -> Vec<(&'static str, Count)> {
-    vec![
-        ("false alarms", card.false_alarms),
+/// Columns of fates by expected information.
+pub(super) const BIN_HEAD: [&str; 10] = [
+    "truth",
+    "information",
+    "trials",
+    "called",
+    "delivered",
+    "incomplete",
+    "wrong name",
+    "refused",
+    "abstained",
+    "place right",
+];
+
+/// One bin as a row of [`BIN_HEAD`].
+pub(super) fn bin_cells(bin: &Bin) -> Vec<String> {
+    let counts = [
+        bin.called_structural,
+        bin.delivered,
+        bin.incomplete,
+        bin.wrong_name,
+        bin.refused,
+        bin.abstained,
+        bin.place,
+    ];
+    [bin.truths.into(), nats(bin), bin.delivered.of.to_string()]
+        .into_iter()
+        .chain(counts.map(|count| count.count.to_string()))
+        .collect()
+}
+
+/// Range of a bin.
+pub(super) fn nats(bin: &Bin) -> String {
+    match bin.high.is_finite() {
+        true => format!("{:.0} … {:.0} nats", bin.low, bin.high),
+        false => format!("above {:.0} nats", bin.low),
+    }
+}
+
+/// Returns `count of all`.
+pub(super) fn of(count: Count) -> String {
+    format!("{} of {}", count.count, count.of)
+}
+
+/// Every score that is one count, with its name, in the order of reports.
+pub(super) fn named_scores(card: &Scorecard) -> Vec<(String, Count)> {
+    let precision = &card.precision;
+    let mut scores: Vec<(String, Count)> = vec![
         (
-            "absorbed, called structural",
-            card.absorbed_called_structural,
+            "nothing missing, called structural".into(),
+            card.false_alarms,
         ),
-        ("detected", card.detected),
-        ("clear ones detected", card.clear_detected),
-        ("true effect on top", card.top1),
-        ("clear ones on top", card.clear_top1),
-        ("true effect in the class", card.in_class),
-        ("clear ones in the class", card.clear_in_class),
-        ("place right", card.place),
-        ("place of clear ones right", card.clear_place),
-        ("place of unlisted ones right", card.unlisted_place),
-        ("unlisted, abstained", card.abstained),
-        ("abstained, unlisted", card.abstained_rightly),
-        ("listed, abstained", card.wrongly_abstained),
-        ("pairs accepted", card.pairs_accepted),
-        ("clear pairs accepted", card.clear_pairs_accepted),
-        ("abstained where nothing fits", card.clear_abstained),
-        ("intervals that cover", card.interval_covers),
-        ("failed", card.failed),
-    ]
+        (
+            "nothing missing but a finer step, called structural".into(),
+            card.coarse_called_structural,
+        ),
+        ("gaps, called structural".into(), card.detected),
+        ("stated at 0.9 or more: right".into(), precision.stated_90),
+        ("stated at 0.7 or more: right".into(), precision.stated_70),
+        ("stated at 0.5 or more: right".into(), precision.stated_50),
+        ("\"none of these\": right".into(), precision.none_of_these),
+        ("\"no structural gap\": right".into(), precision.no_gap),
+        (
+            "\"no structural gap\": right, or below 3 nats".into(),
+            precision.no_gap_or_faint,
+        ),
+        ("place: right".into(), precision.place),
+        (
+            "90 % intervals of θ that hold it, nothing missing".into(),
+            card.coverage.nulls,
+        ),
+        (
+            "90 % intervals of θ that hold it, beside a right effect".into(),
+            card.coverage.delivered,
+        ),
+        ("diagnoses that failed".into(), card.failed),
+    ];
+    for score in &card.by_nuisance {
+        let name = format!("false alarms, nuisance {}", score.nuisance);
+        scores.push((name, score.false_alarms));
+    }
+    for score in &card.steadiness {
+        scores.push((format!("same answer, other {}", score.change), score.same));
+    }
+    scores
 }
 
 fn line(name: &str, score: Count) -> Vec<String> {
@@ -87,11 +172,11 @@ pub(super) fn rule(kind: Kind) -> &'static str {
     match kind {
         Kind::None => "no structural gap",
         Kind::Outside => "no structural gap; a parameter gap may be seen",
-        Kind::Listed | Kind::Parametrised => "structural, the true effect on top",
-        Kind::Unlisted => "structural, none of the listed effects",
-        Kind::Pair => "structural, both effects and nothing else accepted",
-        Kind::Confounded => "structural, the true effect or its double in the class",
-        Kind::Absorbed => "no structural gap: parameters stand in for it",
+        Kind::Listed | Kind::Otherwise | Kind::Beside => {
+            "structural, the true effect and nothing false accepted"
+        }
+        Kind::Random => "structural, none of the listed effects",
+        Kind::Pair => "structural, both effects and nothing false accepted",
     }
 }
 
@@ -104,8 +189,10 @@ mod tests {
     fn scores_stand_beside_their_intervals() {
         let [full, empty] = scorecards();
         let text = scorecard_text(&full);
-        assert!(text.contains("true effect on top"), "{text}");
+        assert!(text.contains("stated at 0.9 or more: right"), "{text}");
         assert!(text.contains("3 … 100 %"), "{text}");
+        assert!(text.contains("10 … 30 nats"), "{text}");
+        assert!(text.contains("always no gap"), "{text}");
         assert!(scorecard_text(&empty).contains("0 withheld trials"));
     }
 }

@@ -33,7 +33,7 @@ fn a_few_sealed_trials_are_scored_kept_and_refused_to_another_call() {
     let (first, other) = (call("5"), call("6"));
     let text = done(&words(&first));
     assert!(
-        text.contains("2 withheld trials") && text.contains("false alarms"),
+        text.contains("2 withheld trials") && text.contains("nothing missing, called structural"),
         "{text}"
     );
     let path = place.join("trials/scorecard.json");
@@ -48,8 +48,10 @@ fn a_few_sealed_trials_are_scored_kept_and_refused_to_another_call() {
         written,
         "kept trials give the same bytes"
     );
-    assert_eq!(printed["schema"], "truetwin.scorecard/1");
-    assert_eq!(printed["false_alarms"]["of"], 2);
+    assert_eq!(printed["schema"], "truetwin.scorecard/2");
+    // The oscillator takes a step so coarse that it shows.
+    assert_eq!(printed["coarse_called_structural"]["of"], 2);
+    assert_eq!(printed["families"], "all");
     let seal = fs::read_to_string(place.join("trials/seal.txt")).unwrap();
     assert_eq!(printed["seal"], seal.trim());
     assert!(place.join("trials/scorecard.html").exists());
@@ -69,6 +71,10 @@ fn a_few_sealed_trials_are_scored_kept_and_refused_to_another_call() {
     refused(
         &[&strange[..], &["--kinds", "odd"]].concat(),
         &["there are none, outside"],
+    );
+    refused(
+        &[&strange[..], &["--families", "odd"]].concat(),
+        &["none of open, closed, all"],
     );
     refused(
         &[

@@ -32,10 +32,10 @@ fn trials_are_gone_on_with_and_keys_stay_as_they_were_sealed() {
     let score = || sealed(&study, two(), &path)?.score(&Progress::silent());
     let first = score().unwrap();
     let keys = fs::read(path.join("keys.json")).unwrap();
-    assert_eq!(first.seal, sha256(&keys));
+    assert_eq!(first.setup.seal, sha256(&keys));
     assert_eq!(
         fs::read_to_string(path.join("seal.txt")).unwrap().trim(),
-        first.seal
+        first.setup.seal
     );
     // Kept answers give the same bytes; an answer that is missing is given again.
     assert_eq!(score().unwrap(), first);
@@ -62,17 +62,14 @@ fn trials_are_gone_on_with_and_keys_stay_as_they_were_sealed() {
 }
 
 #[test]
-fn keys_stay_sealed_until_every_share_has_answered() {
+fn shares_answer_apart_and_are_scored_together() {
     let study = oscillator();
     let place = tempfile::tempdir().unwrap();
     let sealed = sealed(&study, two(), &place.path().join("trials")).unwrap();
     let silent = Progress::silent();
     let [first, second] = ["1/2", "2/2"].map(|share| share.parse().unwrap());
     assert_eq!(sealed.answer(first, &silent).unwrap().len(), 1);
-    let error = sealed.open_keys(first, &silent).unwrap_err().to_string();
-    assert!(error.contains("1 of 2 trials answered"), "{error}");
     assert_eq!(sealed.answer(second, &silent).unwrap().len(), 2);
-    assert_eq!(sealed.open_keys(first, &silent).unwrap(), 1);
     assert_eq!(sealed.score(&silent).unwrap().rows.len(), 2);
 }
 
@@ -125,18 +122,30 @@ fn what_a_library_leaves_out_is_known_before_the_keys_are() {
 }
 
 #[test]
-fn studies_that_change_the_twin_or_leave_nothing_to_name_are_refused() {
-    let refused = |toml: &str| {
-        let text = format!("twin = 'van-der-pol'\n{toml}");
-        let file = StudyFile::parse(&text, Path::new("s.toml")).unwrap();
-        let study = oscillator().configure(&file).unwrap();
-        match Withheld::new(&study, Settings::default()) {
-            Ok(_) => panic!("{toml} was taken"),
-            Err(error) => error.to_string(),
-        }
+fn calls_that_cannot_be_made_are_refused_with_the_limit() {
+    let study = oscillator();
+    let refused = |settings: Settings| match Withheld::new(&study, settings) {
+        Ok(_) => panic!("taken"),
+        Err(error) => error.to_string(),
     };
-    assert!(refused("[noise]\ny = 0.1").contains("changes [noise]"));
-    assert!(refused("[library]\nonly = ['actuator-gain']").contains("kind listed"));
+    let many = Settings {
+        trials: 1_000_000_000_000,
+        ..two()
+    };
+    assert!(refused(many).contains("at most 1000000"));
+    let no_kinds = Settings {
+        kinds: vec![],
+        ..two()
+    };
+    assert!(refused(no_kinds).contains("no kinds"));
+    let text = "twin = 'van-der-pol'\n[library]\nonly = ['actuator-gain']";
+    let file = StudyFile::parse(text, Path::new("s.toml")).unwrap();
+    let study = oscillator().configure(&file).unwrap();
+    let error = match Withheld::new(&study, Settings::default()) {
+        Ok(_) => panic!("taken"),
+        Err(error) => error.to_string(),
+    };
+    assert!(error.contains("kind listed"), "{error}");
 }
 
 #[test]
@@ -145,25 +154,44 @@ fn a_verdict_alone_is_the_verdict_of_the_whole() {
     let place = tempfile::tempdir().unwrap();
     let card = |detection_only, name: &str| {
         let settings = Settings {
-            kinds: vec![Kind::Unlisted, Kind::Pair],
+            trials: 1,
+            kinds: vec![Kind::Random],
             detection_only,
-            ..two()
+            ..Settings::default()
         };
         let sealed = sealed(&study, settings, &place.path().join(name)).unwrap();
         sealed.score(&Progress::silent()).unwrap()
     };
-    let (whole, verdicts) = (card(false, "whole"), card(true, "verdicts"));
-    for (whole, alone) in whole.rows.iter().zip(&verdicts.rows) {
-        let (all, only) = (
-            whole.outcome.as_ref().unwrap(),
-            alone.outcome.as_ref().unwrap(),
-        );
-        assert_eq!((all.verdict, all.p_value), (only.verdict, only.p_value));
-        assert!(only.accepted.is_empty() && only.before.is_none());
-        // What the key adds is made of the records: the weaker effect of a pair, how far listed effects fall short.
-        match whole.kind {
-            Kind::Pair => assert!(whole.added.is_some() && whole.gain >= whole.added),
-            _ => assert!(whole.shortfall.is_some() && alone.shortfall.is_none()),
-        }
-    }
+    let (whole, alone) = (card(false, "whole"), card(true, "verdicts"));
+    let outcome = |card: &Scorecard| card.rows[0].outcome.clone().unwrap();
+    let (all, only) = (outcome(&whole), outcome(&alone));
+    assert_eq!((all.verdict, all.p_value), (only.verdict, only.p_value));
+    assert!(only.accepted.is_empty());
+    assert_eq!(whole.rows[0].information, alone.rows[0].information);
+}
+
+/// Every change of the question is asked, and counted.
+#[test]
+fn steadiness_asks_every_question_again() {
+    let study = oscillator();
+    let place = tempfile::tempdir().unwrap();
+    let settings = Settings {
+        steadiness: 1,
+        detection_only: true,
+        ..two()
+    };
+    let sealed = sealed(&study, settings, &place.path().join("t")).unwrap();
+    let card = sealed.score(&Progress::silent()).unwrap();
+    let asked: Vec<(&str, u64)> = (card.steadiness.iter())
+        .map(|s| (s.change.as_str(), s.same.of))
+        .collect();
+    assert_eq!(
+        asked,
+        [
+            ("order of the library", 1),
+            ("record twice as long", 1),
+            ("seed", 4),
+            ("units", 1)
+        ]
+    );
 }

@@ -1,31 +1,37 @@
 use super::*;
 use crate::diagnose::{Decision, Verdict};
-use crate::evaluate::trials::{Named, Outcome};
+use crate::evaluate::trials::row::{Fate, Row};
+use crate::evaluate::trials::{Families, Kind, Named, Outcome, Refitted, Repeat};
 
 /// A trial in which `truth` was there and these effects were accepted, the first with this probability.
 fn row(kind: Kind, truth: &[&str], accepted: &[&str], probability: f64) -> Row {
     let keys = |names: &[&str]| -> Vec<String> { names.iter().map(|n| (*n).into()).collect() };
     let called = !accepted.is_empty();
     let target = |key: &&str| key.split('@').nth(1).unwrap_or_default().to_owned();
-    let listed = kind.is_structural() && kind != Kind::Unlisted;
+    let right = |key: &&str| match kind {
+        Kind::Random => vec![],
+        _ => vec![(*key).to_owned()],
+    };
     Row {
         trial: 0,
         kind,
-        truth: truth.join(" + "),
-        right: if listed { keys(truth) } else { vec![] },
-        effects: if listed { keys(truth) } else { vec![] },
+        truth: match truth.is_empty() {
+            true => "nothing".into(),
+            false => truth.join(" + "),
+        },
+        right: truth.iter().map(right).collect(),
         targets: truth.iter().map(target).collect(),
-        strength: Some(0.5),
-        gain: listed.then_some(20.0),
-        added: None,
-        shortfall: None,
-        share: Some(0.8),
+        information: (!truth.is_empty()).then_some(20.0),
+        step: 0.1,
+        nuisance: "none".into(),
+        theta: vec![("k".into(), 1.0)],
+        redraws: 1,
         outcome: Some(Outcome {
             verdict: match called {
                 true => Verdict::StructuralGap,
                 false => Verdict::NoGap,
             },
-            p_value: 0.5,
+            p_value: Some(0.5),
             decision: match called {
                 true => Decision::Named,
                 false => Decision::NotNeeded,
@@ -35,18 +41,20 @@ fn row(kind: Kind, truth: &[&str], accepted: &[&str], probability: f64) -> Row {
                 .map(|key| Named {
                     key: (*key).into(),
                     probability,
-                    gain: 20.0,
                 })
                 .collect(),
             accepted: keys(accepted),
             class: keys(accepted),
-            before: Some(1.0),
-            floor: Some(0.1),
-            closed: Some(0.75),
-            interval: called.then_some([0.7, 0.79]),
+            parameters: vec![Refitted {
+                name: "k".into(),
+                value: 1.1,
+                std_error: 0.1,
+            }],
         }),
         failure: None,
         seconds: 2.0,
+        correlated: None,
+        repeats: vec![],
     }
 }
 
@@ -58,63 +66,162 @@ fn abstaining(mut row: Row) -> Row {
     row
 }
 
+fn card(rows: Vec<Row>) -> Scorecard {
+    let setup = Setup {
+        twin: "twin".into(),
+        seed: 1,
+        families: Families::Open,
+        without: false,
+        validation: false,
+        like: false,
+        detection_only: false,
+        seal: "seal".into(),
+    };
+    Scorecard::new(setup, rows)
+}
+
 fn count(count: u64, of: u64) -> Count {
     Count { count, of }
 }
 
 #[test]
-fn every_count_is_of_what_it_says() {
+fn every_answer_has_one_fate() {
+    let failed = Row {
+        outcome: None,
+        failure: Some("no fit".into()),
+        ..row(Kind::Listed, &["a@s"], &[], 0.0)
+    };
+    let mut refused = abstaining(row(Kind::Listed, &["a@s"], &["a@s"], 0.4));
+    refused.outcome.as_mut().unwrap().accepted.clear();
+    for (row, fate) in [
+        (row(Kind::None, &[], &[], 0.0), Fate::Quiet),
+        (row(Kind::Outside, &[], &["a@s"], 0.9), Fate::FalseAlarm),
+        (row(Kind::Listed, &["a@s"], &["a@s"], 0.9), Fate::Delivered),
+        (row(Kind::Listed, &["a@s"], &["b@s"], 0.9), Fate::WrongName),
+        (
+            row(Kind::Listed, &["a@s"], &["a@s", "b@s"], 0.9),
+            Fate::WrongName,
+        ),
+        (row(Kind::Listed, &["a@s"], &[], 0.0), Fate::Missed),
+        (
+            abstaining(row(Kind::Listed, &["a@s"], &[], 0.0)),
+            Fate::Abstained,
+        ),
+        (refused, Fate::Refused),
+        (failed, Fate::Failed),
+        (
+            abstaining(row(Kind::Random, &["odd@s"], &[], 0.0)),
+            Fate::Delivered,
+        ),
+        (
+            row(Kind::Random, &["odd@s"], &["a@s"], 0.6),
+            Fate::WrongName,
+        ),
+        (
+            row(Kind::Pair, &["a@s", "b@t"], &["b@t", "a@s"], 0.4),
+            Fate::Delivered,
+        ),
+        (
+            row(Kind::Pair, &["a@s", "b@t"], &["b@t"], 0.4),
+            Fate::Incomplete,
+        ),
+    ] {
+        assert_eq!(row.fate(), fate, "{}: {}", row.truth, row.answer());
+    }
+}
+
+#[test]
+fn counts_have_the_denominators_that_they_name() {
+    let coarse = Row {
+        step: 9.0,
+        ..row(Kind::None, &[], &["a@s"], 0.95)
+    };
+    let steady = Row {
+        repeats: vec![
+            Repeat {
+                change: "seed".into(),
+                outcome: row(Kind::Listed, &["a@s"], &["a@s"], 0.5).outcome,
+            },
+            Repeat {
+                change: "seed".into(),
+                outcome: None,
+            },
+        ],
+        correlated: Some("s".into()),
+        ..row(Kind::Listed, &["a@s"], &["a@s"], 0.95)
+    };
     let rows = vec![
         row(Kind::None, &[], &[], 0.0),
         row(Kind::Outside, &[], &["a@s"], 0.95),
-        row(Kind::Absorbed, &["a@s"], &[], 0.0),
-        row(Kind::Listed, &["a@s"], &["a@s"], 0.95),
+        coarse,
+        steady,
         row(Kind::Listed, &["a@s"], &["b@s"], 0.65),
-        row(Kind::Parametrised, &["a@s"], &[], 0.0),
+        row(Kind::Otherwise, &["a@s"], &[], 0.0),
         abstaining(row(Kind::Listed, &["a@s"], &[], 0.0)),
-        abstaining(row(Kind::Unlisted, &["odd@s"], &[], 0.0)),
-        row(Kind::Unlisted, &["odd@s"], &["a@s"], 0.62),
+        abstaining(row(Kind::Random, &["odd@s"], &[], 0.0)),
+        row(Kind::Random, &["odd@s"], &["a@s"], 0.75),
         row(Kind::Pair, &["a@s", "b@t"], &["b@t", "a@s"], 0.4),
     ];
-    let card = Scorecard::new("twin", 1, 0.05, "seal", rows);
+    let card = card(rows);
     assert_eq!(card.false_alarms, count(1, 2));
-    assert_eq!(card.absorbed_called_structural, count(0, 1));
+    assert_eq!(card.coarse_called_structural, count(1, 1));
     assert_eq!(card.detected, count(6, 7));
-    assert_eq!(card.clear_detected, count(4, 5));
-    assert_eq!(card.top1, count(1, 3));
-    assert_eq!(card.in_class, count(1, 3));
-    assert_eq!(card.place, count(2, 3));
-    assert_eq!(card.abstained, count(1, 2));
-    assert_eq!(card.abstained_rightly, count(1, 2));
-    assert_eq!(card.wrongly_abstained, count(1, 4));
-    assert_eq!(card.pairs_accepted, count(1, 1));
-    // Of the two right answers with an interval, which 0.8 lies outside of.
-    assert_eq!(card.interval_covers, count(0, 2));
-    assert_eq!(card.mean_class_size, Some(1.0));
-    assert_eq!(card.failed, count(0, 10));
-    let bins: Vec<Count> = card.reliability.iter().map(|bin| bin.right).collect();
-    assert_eq!(bins, [count(0, 2), count(1, 2)]);
-    assert!((card.reliability[0].stated - 0.635).abs() < 1e-12);
-    let right: u64 = card.by_kind.iter().map(|k| k.right.count).sum();
-    assert_eq!(right, 5);
-    assert_eq!(card.by_gain.len(), 1);
-    assert_eq!(card.by_gain[0].detected, count(4, 5));
+    let precision = card.precision;
+    assert_eq!(precision.stated_90, count(1, 3));
+    assert_eq!(precision.stated_70, count(1, 4));
+    assert_eq!(precision.stated_50, count(1, 5));
+    assert_eq!(precision.none_of_these, count(1, 2));
+    assert_eq!(precision.no_gap, count(1, 2));
+    assert_eq!(precision.place, count(4, 6));
+    let [listed, random] = &card.by_information[..] else {
+        panic!("{:?}", card.by_information)
+    };
+    assert_eq!((listed.low, listed.high), (10.0, 30.0));
+    assert_eq!(listed.delivered, count(2, 5));
+    assert_eq!(
+        (listed.wrong_name, listed.missed),
+        (count(1, 5), count(1, 5))
+    );
+    assert_eq!(
+        (random.delivered, random.wrong_name),
+        (count(1, 2), count(1, 2))
+    );
+    assert_eq!(card.coverage.nulls, count(1, 1));
+    assert_eq!(card.coverage.delivered, count(2, 2));
+    assert_eq!(card.steadiness[0].same, count(1, 2));
+    assert_eq!((card.failed, card.redraws), (count(0, 10), 10));
+    let quiet = &card.baselines[2];
+    assert_eq!((quiet.name, quiet.verdict), ("always no gap", count(2, 9)));
+    let most = &card.baselines[3];
+    assert_eq!((most.verdict, most.right), (count(7, 9), count(4, 9)));
+    let correlation = &card.baselines[1];
+    assert_eq!(correlation.place, Some(count(1, 7)));
+    assert_eq!(
+        card.reliability.iter().map(|bin| bin.right.of).sum::<u64>(),
+        6
+    );
+}
+
+/// Of a truth of probability 0.6, its rival 0.3, and none of these 0.1: ln 0.6, and 0.16 + 0.09 + 0.01.
+#[test]
+fn probabilities_have_known_scores() {
+    let mut row = row(Kind::Listed, &["a@s"], &["a@s"], 0.6);
+    row.outcome.as_mut().unwrap().effects.push(Named {
+        key: "b@s".into(),
+        probability: 0.3,
+    });
+    let scores = card(vec![row]).probabilities;
+    assert!((scores.log_score.unwrap() - 0.6f64.ln()).abs() < 1e-12);
+    assert!((scores.brier.unwrap() - 0.26).abs() < 1e-12);
 }
 
 /// Without its effect in the library, a trial is right when it abstains.
 #[test]
 fn what_is_left_out_is_abstained_from() {
     let mut left_out = abstaining(row(Kind::Listed, &["a@s"], &[], 0.0));
-    left_out.right.clear();
-    assert!(left_out.must_abstain() && left_out.is_right());
-    let card = Scorecard::new("twin", 1, 0.05, "seal", vec![left_out]);
-    assert_eq!((card.abstained, card.top1), (count(1, 1), count(0, 0)));
-}
-
-#[test]
-fn intervals_are_clopper_and_pearsons() {
-    let (low, high) = count(3, 10).interval();
-    assert!((low - 0.066_739_5).abs() < 1e-6 && (high - 0.652_452_9).abs() < 1e-6);
-    assert_eq!(count(0, 0).interval(), (0.0, 1.0));
-    assert_eq!(count(0, 0).share(), None);
+    left_out.right = vec![vec![]];
+    assert!(left_out.must_abstain());
+    let card = card(vec![left_out]);
+    assert_eq!(card.by_information[0].delivered, count(1, 1));
+    assert_eq!(card.precision.none_of_these, count(1, 1));
 }

@@ -1,21 +1,8 @@
-//! Forces that a world adds to the rate of a state.
+//! Terms in the rate of a state.
 
+use super::Moment;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
-
-/// Everything that a force may depend on.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Moment<'a> {
-    /// In seconds.
-    pub t: f64,
-    /// Step between the states of `past`, in seconds.
-    pub dt: f64,
-    pub x: [f64; 2],
-    /// 0 where there is no input.
-    pub u: f64,
-    /// States at the samples so far.
-    pub past: &'a [[f64; 2]],
-}
 
 /// The course of a periodic force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -59,41 +46,11 @@ pub(in crate::evaluate::trials) enum ForceLaw {
         phase: f64,
         wave: Wave,
     },
-    /// c·x₁·x₂.
-    Product { coefficient: f64 },
-    /// c·sin(w·x).
-    Sine {
-        coefficient: f64,
-        wavenumber: f64,
-        of: usize,
-    },
-    /// −c times the state's mean over the past, which fades over `memory` seconds.
-    Memory {
-        coefficient: f64,
-        memory: f64,
-        of: usize,
-    },
-    /// c·u·x.
-    InputTimesState { coefficient: f64, of: usize },
-    /// A stop on one side: −c·(x − at)² beyond.
-    Stop {
-        coefficient: f64,
-        at: f64,
-        of: usize,
-    },
-    /// A wave whose frequency rises by `sweep` Hz a second.
-    Chirp {
-        amplitude: f64,
-        frequency: f64,
-        sweep: f64,
-    },
-    /// Pushes at odd times, about `each` seconds apart.
-    Bursts { amplitude: f64, each: f64 },
 }
 
 impl ForceLaw {
     /// The term at a moment.
-    pub(super) fn at(&self, now: &Moment<'_>) -> f64 {
+    pub fn at(&self, now: &Moment<'_>) -> f64 {
         let x = |of: usize| now.x[of];
         match *self {
             Self::Constant { force, onset } if onset > 0.0 => force * (now.t / onset).min(1.0),
@@ -143,45 +100,6 @@ impl ForceLaw {
                         Wave::Swelling => angle.sin() * (1.0 + 0.2 * (0.13 * angle).sin()),
                     }
             }
-            Self::Product { coefficient } => coefficient * now.x[0] * now.x[1],
-            Self::Sine {
-                coefficient,
-                wavenumber,
-                of,
-            } => coefficient * (wavenumber * x(of)).sin(),
-            Self::Memory {
-                coefficient,
-                memory,
-                of,
-            } => {
-                let keep = (-now.dt / memory).exp();
-                let (mut sum, mut weight) = (0.0, 1.0);
-                for state in now.past.iter().rev() {
-                    sum += weight * state[of];
-                    weight *= keep;
-                    if weight < 1e-4 {
-                        break;
-                    }
-                }
-                -coefficient * (1.0 - keep) * sum
-            }
-            Self::InputTimesState { coefficient, of } => coefficient * now.u * x(of),
-            Self::Stop {
-                coefficient,
-                at,
-                of,
-            } => -coefficient * (x(of) - at).max(0.0).powi(2),
-            Self::Chirp {
-                amplitude,
-                frequency,
-                sweep,
-            } => amplitude * (TAU * (frequency + 0.5 * sweep * now.t) * now.t).sin(),
-            Self::Bursts { amplitude, each } => {
-                // Two waves without a common period: their peaks coincide at odd times.
-                let t = TAU * now.t / each;
-                let pushes = (1.46 * t).sin() > 0.85 || (0.82 * t).cos() > 0.95;
-                if pushes { amplitude } else { 0.0 }
-            }
         }
     }
 }
@@ -191,13 +109,11 @@ mod tests {
     use super::*;
 
     fn at(law: &ForceLaw, t: f64, x: [f64; 2]) -> f64 {
-        let past = vec![[1.0, 2.0]; 400];
         law.at(&Moment {
             t,
-            dt: 0.1,
-            x,
-            u: 2.0,
-            past: &past,
+            x: &x,
+            u: &[2.0],
+            own: 0.0,
         })
     }
 
@@ -218,13 +134,6 @@ mod tests {
             rounding: 0.0,
         };
         assert_eq!(at(&root, 0.0, [0.0, 0.0]), 0.0);
-        let memory = ForceLaw::Memory {
-            coefficient: 0.3,
-            memory: 2.0,
-            of: 1,
-        };
-        // A state that was always 2 is remembered as 2.
-        assert!((at(&memory, 0.0, [0.0, 2.0]) + 0.6).abs() < 1e-3);
         let triangle = ForceLaw::Periodic {
             amplitude: 2.0,
             frequency: 0.25,

@@ -1,0 +1,101 @@
+//! A baseline: the signal that the residuals of the twin correlate with most.
+
+use super::information::problem;
+use super::law::Place;
+use super::places::Places;
+use super::world::Conditions;
+use crate::fit::climb::climb;
+use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::record::Record;
+use crate::study::Study;
+use statrs::distribution::{ContinuousCDF, Normal};
+
+/// Iterations of the fit of the twin.
+const ITERATIONS: usize = 40;
+/// Probability of a correlation that stands out by chance, over all signals.
+const LEVEL: f64 = 0.05;
+
+/// Place of the signal that the next residual correlates with most; `None` where no correlation stands out, or for a black box.
+pub(super) fn correlated(study: &Study, record: &Record) -> Result<Option<String>, FilterError> {
+    let places = Places::new(study.twin());
+    if places.states.is_empty() {
+        return Ok(None);
+    }
+    let records = std::slice::from_ref(record);
+    let centre = study.twin().parameters().centre();
+    let (problem, _) = problem(
+        study.twin(),
+        study,
+        &centre,
+        &Conditions::declared(),
+        records,
+    )?;
+    let begin = problem.begin(&problem.centre());
+    let Some(fitted) = climb(&problem, &begin, ITERATIONS)? else {
+        return Ok(None);
+    };
+    let Some(seen) = recoverable(problem.states(&fitted.theta))? else {
+        return Ok(None);
+    };
+    let Some((filtered, states)) = seen.into_iter().next() else {
+        return Ok(None);
+    };
+    let inputs = record.drive().inputs();
+    let (rows, outputs) = filtered.standardised.dim();
+    let mut signals: Vec<(Place, Vec<f64>)> = Vec::new();
+    for place in places.all() {
+        match place {
+            Place::State(i) => signals.push((place, states.column(i).to_vec())),
+            Place::Actuator(j) => signals.push((place, inputs.column(j).to_vec())),
+            Place::Sensor(_) => signals.push((place, (0..rows).map(|k| k as f64).collect())),
+            Place::Parameter(_) => {}
+        }
+    }
+    let tests = (signals.len() * outputs).max(1) as f64;
+    let mut best: Option<(f64, Place)> = None;
+    for (place, signal) in &signals {
+        for j in 0..outputs {
+            if matches!(place, Place::Sensor(own) if *own != j) {
+                continue;
+            }
+            let pairs: Vec<(f64, f64)> = (1..rows)
+                .filter(|&k| !record.outputs()[[k, j]].is_nan())
+                .map(|k| (signal[k - 1], filtered.standardised[[k, j]]))
+                .collect();
+            let size = correlation(&pairs).abs() * (pairs.len() as f64).sqrt();
+            if best.is_none_or(|(most, _)| size > most) {
+                best = Some((size, *place));
+            }
+        }
+    }
+    let threshold = Normal::standard().inverse_cdf(1.0 - 0.5 * LEVEL / tests);
+    let best = best.filter(|(size, _)| *size > threshold);
+    Ok(best.map(|(_, place)| places.name(place).to_owned()))
+}
+
+/// Pearson's correlation; 0 where one of the two does not vary.
+fn correlation(pairs: &[(f64, f64)]) -> f64 {
+    let n = pairs.len().max(1) as f64;
+    let (a, b) = (pairs.iter()).fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
+    let (mut xx, mut yy, mut xy) = (0.0, 0.0, 0.0);
+    for (x, y) in pairs {
+        (xx, yy) = (xx + (x - a).powi(2), yy + (y - b).powi(2));
+        xy += (x - a) * (y - b);
+    }
+    if xx * yy > 0.0 {
+        xy / (xx * yy).sqrt()
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn known_correlations() {
+        assert_eq!(correlation(&[(1.0, 2.0), (2.0, 4.0), (3.0, 6.0)]), 1.0);
+        assert_eq!(correlation(&[(1.0, 2.0), (1.0, 4.0)]), 0.0);
+    }
+}

@@ -1,0 +1,172 @@
+//! Expected information of a departure: how much the best possible diagnoser could learn of it.
+//!
+//! With innovations e of the twin's own filter at the true θ and the true noise levels, and S = C·Cᵀ their covariance,
+//!
+//! ```text
+//! d = C⁻¹·(e of the record with the departure − e of the same record without)
+//! d⊥ = d less what a change of θ or of the noise levels does to C⁻¹e
+//! information = ½·‖d⊥‖²   in nats
+//! ```
+//!
+//! The two records share all noise. Two pairs with the same process noise and different measurement noise are made, and the square is
+//! taken across them: what only the noise decides, as the rounding of a sensor, then counts for nothing.
+
+use super::world::Conditions;
+use crate::fit::axis::Axis;
+use crate::fit::problem::Problem;
+use crate::fit::reference::{Reference, weak};
+use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::likelihood::measured;
+use crate::record::Record;
+use crate::study::Study;
+use crate::twin::{Role, Twin};
+use nalgebra::DVector;
+
+/// Part of the weak prior that is kept: just enough for parameters that no record tells apart.
+const KNOWN: f64 = 1e-4;
+/// Substeps that stand for an exact step of the twin.
+const FINE: usize = 20;
+/// Most substeps that a twin can have.
+const MOST: usize = 1000;
+
+/// Whitened change of the innovations of two records.
+pub(super) struct Change([DVector<f64>; 2]);
+
+/// Filter at the truth of one record without departures.
+pub(super) struct Information<'a> {
+    problem: Problem<'a>,
+    theta: Vec<f64>,
+    first: Reference,
+    again: Reference,
+}
+
+/// θ and noise levels as they are in a world.
+fn truth(
+    twin: &Twin,
+    own: &[f64],
+    conditions: &Conditions,
+    declared: &[(String, f64)],
+) -> Vec<f64> {
+    let outputs = twin.signals().outputs;
+    let space = twin.parameters();
+    (space.iter().enumerate())
+        .map(|(j, p)| match own.get(j) {
+            Some(value) => *value,
+            None if p.role == Role::Noise => {
+                let level = (declared.iter()).find(|(name, _)| *name == p.name);
+                let level = level.map_or(0.0, |(_, level)| *level);
+                let output = outputs.iter().position(|o| o.name == p.target());
+                let level = match output {
+                    Some(j) => {
+                        let added = conditions.added.get(j).copied().unwrap_or(0.0);
+                        conditions.measurement * level.hypot(added)
+                    }
+                    None => conditions.process * level,
+                };
+                p.bounds.clamp(level)
+            }
+            None => p.prior.centre(),
+        })
+        .collect()
+}
+
+/// The problem of a twin on these records, and the truth in it.
+pub(super) fn problem<'a>(
+    twin: &Twin,
+    study: &Study,
+    theta: &[f64],
+    conditions: &Conditions,
+    records: &'a [Record],
+) -> Result<(Problem<'a>, Vec<f64>), FilterError> {
+    let measured = measured(twin, records, &study.beliefs())?;
+    let (twin, levels) = (measured.twin, measured.levels);
+    let declared: Vec<(String, f64)> = (levels.iter())
+        .map(|level| (level.parameter.name.clone(), level.declared.unwrap_or(0.0)))
+        .collect();
+    let truth = truth(&twin, theta, conditions, &declared);
+    if levels.is_empty() {
+        return Ok((Problem::of_twin(&twin, records), truth));
+    }
+    let space = twin.parameters();
+    let own = space.len() - levels.len();
+    let axes = (space.iter().take(own).map(Axis::of))
+        .chain(levels.iter().map(Axis::of_level))
+        .collect();
+    Ok((Problem::new(twin, axes, records), truth))
+}
+
+impl<'a> Information<'a> {
+    /// Filters two records without departures, one each, that share their process noise; `None` where the filter fails.
+    pub fn new(
+        study: &Study,
+        theta: &[f64],
+        conditions: &Conditions,
+        [record, again]: [&'a [Record]; 2],
+    ) -> Result<Option<Self>, FilterError> {
+        let (problem, theta) = problem(study.twin(), study, theta, conditions, record)?;
+        let known = weak(&problem) * KNOWN;
+        let Some(first) = recoverable(Reference::knowing(&problem, &theta, &known))?.flatten()
+        else {
+            return Ok(None);
+        };
+        let Some(again) = recoverable(problem.on(again).filtered(&theta))? else {
+            return Ok(None);
+        };
+        Ok(Some(Self {
+            again: Reference::bare(again),
+            first,
+            problem,
+            theta,
+        }))
+    }
+
+    /// The change that departures make in the innovations, from the records with them; `None` where the filter fails.
+    pub fn change(&self, [record, again]: [Record; 2]) -> Result<Option<Change>, FilterError> {
+        let filtered =
+            |record: Record| recoverable(self.problem.on(&[record]).filtered(&self.theta));
+        let (Some(record), Some(again)) = (filtered(record)?, filtered(again)?) else {
+            return Ok(None);
+        };
+        Ok(Some(Change([
+            self.first.direction(&record),
+            self.again.direction(&again),
+        ])))
+    }
+
+    /// Expected information of a change, in nats.
+    pub fn nats(&self, change: &Change) -> f64 {
+        0.5 * self.product(&change.0[0], &change.0[1]).max(0.0)
+    }
+
+    /// Share of a change's information that no multiple of another one explains.
+    pub fn unexplained(&self, change: &Change, by: &Change) -> f64 {
+        let own = |a: &Change| self.product(&a.0[0], &a.0[1]).max(0.0);
+        let (a, b) = (own(change), own(by));
+        if a == 0.0 || b == 0.0 {
+            return 1.0;
+        }
+        let both =
+            0.5 * (self.product(&change.0[0], &by.0[1]) + self.product(&change.0[1], &by.0[0]));
+        (1.0 - both * both / (a * b)).max(0.0)
+    }
+
+    /// Product of two directions without what θ and noise levels imitate.
+    fn product(&self, a: &DVector<f64>, b: &DVector<f64>) -> f64 {
+        0.25 * (self.first.own(&(a + b)) - self.first.own(&(a - b)))
+    }
+
+    /// Nats by which the twin's own step shows: as a departure, against twenty times as many substeps. 0 for a black box.
+    pub fn step(&self, study: &Study, conditions: &Conditions) -> Result<f64, FilterError> {
+        let fine = (study.twin()).stepped(|to| to.substeps = (FINE * to.substeps).min(MOST));
+        let Some(fine) = fine else {
+            return Ok(0.0);
+        };
+        let own = &self.theta[..study.twin().parameters().len()];
+        let (problem, theta) = problem(&fine, study, own, conditions, self.problem.records)?;
+        let filtered = recoverable(problem.filtered(&theta))?;
+        Ok(filtered.map_or(0.0, |there| {
+            let direction = self.first.direction(&there);
+            0.5 * self.first.own(&direction)
+        }))
+    }
+}

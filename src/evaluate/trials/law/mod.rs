@@ -1,0 +1,101 @@
+//! Laws of departures, written once more: nothing here uses the library of effects.
+//!
+//! | file | laws |
+//! |---|---|
+//! | `signal.rs` | distortions of a signal on its way from a sensor or to an actuator |
+//! | `force.rs` | terms in the rate of a state |
+//! | `parameter.rs` | changes of a parameter over time |
+//! | `random.rs`, `tree.rs`, `waves.rs` | functions that are drawn anew for each trial |
+
+mod force;
+mod parameter;
+mod random;
+mod signal;
+mod tree;
+mod waves;
+
+pub(super) use force::{ForceLaw, Wave};
+pub(super) use parameter::ParameterLaw;
+pub(super) use random::{Argument, Family, RandomLaw, Variable};
+pub(super) use signal::SignalLaw;
+
+use serde::{Deserialize, Serialize};
+
+/// Place where a system differs from its twin; indices are those of the twin's outline.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Place {
+    State(usize),
+    Actuator(usize),
+    Sensor(usize),
+    Parameter(usize),
+}
+
+/// Law of a departure.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Law {
+    /// Distortion of a sensor's or an actuator's signal.
+    Signal(SignalLaw),
+    /// Term in the rate of a state.
+    Force(ForceLaw),
+    /// The excess of a state over a level is lost, but for a part that another state takes.
+    Ceiling {
+        level: f64,
+        spill: f64,
+        to: Option<usize>,
+        softness: f64,
+    },
+    /// Factor on a parameter.
+    Parameter(ParameterLaw),
+    /// Added function: of a rate, of a signal, or of the logarithm of a parameter.
+    Random(RandomLaw),
+}
+
+impl Law {
+    /// A signal behind a sensor's or actuator's law; `now.own` is the signal before it. Other laws leave it alone.
+    pub fn through(&self, now: &Moment<'_>, dt: f64, memory: &mut Vec<f64>) -> f64 {
+        match self {
+            Self::Signal(law) => law.at(now.t, dt, memory, now.own),
+            Self::Random(law) => {
+                law.remember(now, dt, memory);
+                now.own + law.at(now, memory)
+            }
+            Self::Force(_) | Self::Ceiling { .. } | Self::Parameter(_) => now.own,
+        }
+    }
+}
+
+/// One difference between the system and its twin.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Departure {
+    pub place: Place,
+    pub law: Law,
+}
+
+/// Values that a law may depend on at one instant.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Moment<'a> {
+    /// Time in seconds.
+    pub t: f64,
+    /// States; empty for a black box.
+    pub x: &'a [f64],
+    /// Inputs as commanded.
+    pub u: &'a [f64],
+    /// Signal at the place itself.
+    pub own: f64,
+}
+
+/// Part of `v` above zero; with a knee, rounded over about that width.
+pub(super) fn above(v: f64, knee: f64) -> f64 {
+    if knee > 0.0 {
+        // Far out, exp would overflow and the knee is not felt.
+        match v / knee {
+            z if z > 30.0 => v,
+            z => knee * z.exp().ln_1p(),
+        }
+    } else {
+        v.max(0.0)
+    }
+}

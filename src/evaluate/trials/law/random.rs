@@ -1,0 +1,264 @@
+//! Laws that nobody listed: a new function for each trial.
+
+use super::Moment;
+use super::tree::Tree;
+use super::waves::Waves;
+use crate::twin::Source;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Source of the functions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(in crate::evaluate::trials) enum Generator {
+    /// Small expression trees.
+    Tree,
+    /// Samples of Gaussian processes.
+    Process,
+}
+
+/// Shape of the functions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(in crate::evaluate::trials) enum Shape {
+    Smooth,
+    /// With corners.
+    Kinked,
+    /// Of an argument with play.
+    Hysteretic,
+    /// Of an argument's fading mean.
+    Memory,
+}
+
+/// Family of random functions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(in crate::evaluate::trials) struct Family {
+    pub generator: Generator,
+    pub shape: Shape,
+}
+
+impl Family {
+    /// All families.
+    pub fn all() -> Vec<Self> {
+        let shapes = [
+            Shape::Smooth,
+            Shape::Kinked,
+            Shape::Hysteretic,
+            Shape::Memory,
+        ];
+        [Generator::Tree, Generator::Process]
+            .into_iter()
+            .flat_map(|generator| shapes.map(|shape| Self { generator, shape }))
+            .collect()
+    }
+}
+
+impl fmt::Display for Family {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let shape = match self.shape {
+            Shape::Smooth => "smooth",
+            Shape::Kinked => "kinked",
+            Shape::Hysteretic => "hysteretic",
+            Shape::Memory => "memory",
+        };
+        let generator = match self.generator {
+            Generator::Tree => "tree",
+            Generator::Process => "process",
+        };
+        write!(f, "{shape}-{generator}")
+    }
+}
+
+/// Signal that a law depends on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(in crate::evaluate::trials) enum Variable {
+    State(usize),
+    Input(usize),
+    Time,
+    /// The signal at the place of the departure.
+    Own,
+}
+
+/// A signal, standardised to about −1 … 1.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(in crate::evaluate::trials) struct Argument {
+    pub variable: Variable,
+    pub centre: f64,
+    pub half_width: f64,
+}
+
+impl Argument {
+    fn at(&self, now: &Moment<'_>) -> f64 {
+        let value = match self.variable {
+            Variable::State(i) => now.x[i],
+            Variable::Input(j) => now.u[j],
+            Variable::Time => now.t,
+            Variable::Own => now.own,
+        };
+        (value - self.centre) / self.half_width
+    }
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Function {
+    Tree(Tree),
+    Process(Waves),
+    /// The larger of two samples: smooth but for a corner.
+    Larger(Waves, Waves),
+}
+
+/// A random function at a place, in units of the place.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(in crate::evaluate::trials) struct RandomLaw {
+    pub family: Family,
+    pub arguments: Vec<Argument>,
+    function: Function,
+    /// Play of the first argument, or time constant of its mean in seconds.
+    keeps: f64,
+    /// Mean and deviation of the function over a record of the twin.
+    mean: f64,
+    deviation: f64,
+    /// Root mean square of the law over that record.
+    pub amount: f64,
+}
+
+impl RandomLaw {
+    /// Draws a law of these arguments; `duration` is that of a record, in seconds.
+    pub fn draw(
+        family: Family,
+        arguments: Vec<Argument>,
+        duration: f64,
+        source: &mut Source,
+    ) -> Self {
+        let (n, kinked) = (arguments.len(), family.shape == Shape::Kinked);
+        let waves = |source: &mut Source| Waves::draw(n, 0.3 + 0.5 * source.uniform(), source);
+        let function = match family.generator {
+            Generator::Tree => Function::Tree(Tree::draw(n, kinked, source)),
+            Generator::Process if kinked => Function::Larger(waves(source), waves(source)),
+            Generator::Process => Function::Process(waves(source)),
+        };
+        let part = source.uniform();
+        Self {
+            family,
+            arguments,
+            function,
+            keeps: match family.shape {
+                Shape::Hysteretic => 0.3 + 0.5 * part,
+                Shape::Memory => duration * (0.02 + 0.1 * part),
+                Shape::Smooth | Shape::Kinked => 0.0,
+            },
+            mean: 0.0,
+            deviation: 1.0,
+            amount: 1.0,
+        }
+    }
+
+    /// Standardises the law over the moments of a record; `None` where it is constant there.
+    pub fn standardised(mut self, moments: &[Moment<'_>], dt: f64) -> Option<Self> {
+        let mut memory = vec![];
+        let values: Vec<f64> = (moments.iter())
+            .map(|now| {
+                self.remember(now, dt, &mut memory);
+                self.raw(now, &memory)
+            })
+            .collect();
+        let n = values.len() as f64;
+        self.mean = values.iter().sum::<f64>() / n;
+        let square: f64 = values.iter().map(|v| (v - self.mean).powi(2)).sum();
+        self.deviation = (square / n).sqrt();
+        (self.deviation > 1e-6 && self.deviation.is_finite()).then_some(self)
+    }
+
+    /// Moves the memory on, once a sample, before the law is asked.
+    pub fn remember(&self, now: &Moment<'_>, dt: f64, memory: &mut Vec<f64>) {
+        let z = self.arguments[0].at(now);
+        if memory.is_empty() {
+            memory.push(z);
+        }
+        match self.family.shape {
+            Shape::Hysteretic => memory[0] = memory[0].clamp(z - self.keeps, z + self.keeps),
+            Shape::Memory => memory[0] += (1.0 - (-dt / self.keeps).exp()) * (z - memory[0]),
+            Shape::Smooth | Shape::Kinked => {}
+        }
+    }
+
+    /// The law at a moment.
+    pub fn at(&self, now: &Moment<'_>, memory: &[f64]) -> f64 {
+        self.amount * (self.raw(now, memory) - self.mean) / self.deviation
+    }
+
+    fn raw(&self, now: &Moment<'_>, memory: &[f64]) -> f64 {
+        // Outside of what the record visits, functions stay where they are: squares would run away.
+        let mut z = [0.0; 3];
+        for (z, argument) in z.iter_mut().zip(&self.arguments) {
+            *z = argument.at(now).clamp(-2.0, 2.0);
+        }
+        if matches!(self.family.shape, Shape::Hysteretic | Shape::Memory) {
+            z[0] = memory.first().map_or(z[0], |m| m.clamp(-2.0, 2.0));
+        }
+        let z = &z[..self.arguments.len()];
+        match &self.function {
+            Function::Tree(tree) => tree.at(z),
+            Function::Process(waves) => waves.at(z),
+            Function::Larger(a, b) => a.at(z).max(b.at(z)),
+        }
+    }
+
+    /// Returns the expression of a tree, in standardised arguments z1, z2, …
+    pub fn formula(&self) -> Option<String> {
+        match &self.function {
+            Function::Tree(tree) => Some(tree.to_string()),
+            Function::Process(_) | Function::Larger(..) => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::twin::Noise;
+
+    #[test]
+    fn every_family_has_the_size_that_it_is_given() {
+        let states: Vec<[f64; 1]> = (0..300).map(|k| [(0.07 * f64::from(k)).sin()]).collect();
+        let moments: Vec<Moment<'_>> = (states.iter().enumerate())
+            .map(|(k, x)| Moment {
+                t: 0.1 * k as f64,
+                x,
+                u: &[],
+                own: 0.0,
+            })
+            .collect();
+        let argument = |variable, centre, half_width| Argument {
+            variable,
+            centre,
+            half_width,
+        };
+        for (i, family) in Family::all().into_iter().enumerate() {
+            let arguments = vec![
+                argument(Variable::State(0), 0.0, 1.0),
+                argument(Variable::Time, 15.0, 15.0),
+            ];
+            let mut source = Noise::new(3, "families", i as u64).source("law");
+            let law = RandomLaw::draw(family, arguments, 30.0, &mut source);
+            let mut law = law.standardised(&moments, 0.1).unwrap();
+            law.amount = 0.4;
+            let mut memory = vec![];
+            let squares: f64 = (moments.iter())
+                .map(|now| {
+                    law.remember(now, 0.1, &mut memory);
+                    law.at(now, &memory).powi(2)
+                })
+                .sum();
+            let size = (squares / 300.0).sqrt();
+            assert!((size - 0.4).abs() < 1e-9, "{family}: {size}");
+            let text = serde_json::to_string(&law).unwrap();
+            assert_eq!(serde_json::from_str::<RandomLaw>(&text).unwrap(), law);
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! Names of places in a twin, as the library of effects names its targets.
+
+use super::draft::index;
+use super::law::Place;
+use crate::effect::{TargetKind, targets};
+use crate::twin::{Role, Source, Twin, is_memory};
+
+/// Places of a twin and their names.
+#[derive(Debug, Clone)]
+pub(super) struct Places {
+    named: Vec<(Place, String)>,
+    /// Names of the states.
+    pub states: Vec<String>,
+}
+
+impl Places {
+    /// Sensors, actuators, states that are no memory, and parameters of a twin.
+    pub fn new(twin: &Twin) -> Self {
+        let (outline, signals) = (twin.outline(), twin.signals());
+        let states: Vec<String> = (outline.iter())
+            .flat_map(|o| o.states.iter().map(|s| s.name.clone()))
+            .collect();
+        let mut named = Vec::new();
+        let signals_of = |kind| targets(kind, None, &signals);
+        let mut add = |names: Vec<String>, place: fn(usize) -> Place| {
+            for (i, name) in names.into_iter().enumerate() {
+                if !is_memory(&name) {
+                    named.push((place(i), name));
+                }
+            }
+        };
+        add(signals_of(TargetKind::Sensor), Place::Sensor);
+        add(signals_of(TargetKind::Actuator), Place::Actuator);
+        add(states.clone(), Place::State);
+        let parameters = twin.parameters();
+        for (i, parameter) in parameters.iter().enumerate() {
+            if parameter.role == Role::Parameter {
+                named.push((Place::Parameter(i), parameter.name.clone()));
+            }
+        }
+        Self { named, states }
+    }
+
+    /// The place with this name that suits an effect of this id, whose first word is its kind of place.
+    pub fn find(&self, id: &str, target: &str) -> Option<Place> {
+        let suits = |place: &Place| match id.split('-').next() {
+            Some("sensor") => matches!(place, Place::Sensor(_)),
+            Some("actuator") => matches!(place, Place::Actuator(_)),
+            Some("parameter") => matches!(place, Place::Parameter(_)),
+            _ => matches!(place, Place::State(_)),
+        };
+        (self.named.iter())
+            .find(|(place, name)| suits(place) && name == target)
+            .map(|(place, _)| *place)
+    }
+
+    /// The name of a place.
+    pub fn name(&self, place: Place) -> &str {
+        (self.named.iter())
+            .find(|(known, _)| *known == place)
+            .map_or("", |(_, name)| name)
+    }
+
+    /// Draws a kind of place, then a place: a twin of many parameters has sensors all the same.
+    pub fn draw(&self, source: &mut Source) -> Option<Place> {
+        let kinds: [fn(&Place) -> bool; 4] = [
+            |place| matches!(place, Place::Sensor(_)),
+            |place| matches!(place, Place::Actuator(_)),
+            |place| matches!(place, Place::State(_)),
+            |place| matches!(place, Place::Parameter(_)),
+        ];
+        let mut groups: Vec<Vec<Place>> = (kinds.iter())
+            .map(|is| self.all().filter(is).collect())
+            .collect();
+        groups.retain(|group| !group.is_empty());
+        if groups.is_empty() {
+            return None;
+        }
+        let group = &groups[index(source, groups.len())];
+        Some(group[index(source, group.len())])
+    }
+
+    /// All places.
+    pub fn all(&self) -> impl Iterator<Item = Place> + '_ {
+        self.named.iter().map(|(place, _)| *place)
+    }
+}

@@ -1,0 +1,75 @@
+//! Fates by expected information.
+
+use super::count::Count;
+use crate::evaluate::trials::Kind;
+use crate::evaluate::trials::row::{Fate, Row};
+use serde::Serialize;
+
+/// Ends of the bins of expected information, in nats.
+const NATS: [f64; 5] = [0.0, 3.0, 10.0, 30.0, f64::INFINITY];
+
+/// Trials of about the same expected information; each count is of all of them.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(crate) struct Bin {
+    /// `listed`: a listed effect is there; `random`: a random law.
+    pub truths: &'static str,
+    /// From, in nats.
+    pub low: f64,
+    /// To, in nats; none for the last bin.
+    #[serde(serialize_with = "finite")]
+    pub high: f64,
+    pub called_structural: Count,
+    pub delivered: Count,
+    pub incomplete: Count,
+    pub wrong_name: Count,
+    pub refused: Count,
+    pub abstained: Count,
+    pub missed: Count,
+    pub failed: Count,
+    /// The place that is stated is a true one.
+    #[serde(rename = "where")]
+    pub place: Count,
+}
+
+fn finite<S: serde::Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    value.is_finite().then_some(*value).serialize(serializer)
+}
+
+/// Bins of listed truths, then of random ones; empty bins are left out.
+pub(super) fn bins(rows: &[Row]) -> Vec<Bin> {
+    let mut all = Vec::new();
+    for truths in ["listed", "random"] {
+        let of_group = |row: &Row| match row.kind {
+            Kind::None | Kind::Outside => false,
+            Kind::Random => truths == "random",
+            Kind::Listed | Kind::Otherwise | Kind::Pair | Kind::Beside => truths == "listed",
+        };
+        for (low, high) in NATS.iter().zip(&NATS[1..]) {
+            let inside = |row: &Row| {
+                of_group(row)
+                    && row
+                        .information
+                        .is_some_and(|nats| *low <= nats && nats < *high)
+            };
+            let fate = |fate: Fate| Count::over(rows, inside, |row| row.fate() == fate);
+            let bin = Bin {
+                truths,
+                low: *low,
+                high: *high,
+                called_structural: Count::over(rows, inside, Row::called),
+                delivered: fate(Fate::Delivered),
+                incomplete: fate(Fate::Incomplete),
+                wrong_name: fate(Fate::WrongName),
+                refused: fate(Fate::Refused),
+                abstained: fate(Fate::Abstained),
+                missed: fate(Fate::Missed),
+                failed: fate(Fate::Failed),
+                place: Count::over(rows, inside, |row| row.called() && row.place_is_right()),
+            };
+            if bin.delivered.of > 0 {
+                all.push(bin);
+            }
+        }
+    }
+    all
+}

@@ -1,0 +1,75 @@
+//! Counts with their intervals.
+
+use crate::evaluate::trials::row::Row;
+use crate::math::clopper_pearson;
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
+
+/// Level of the Clopper–Pearson intervals.
+pub(super) const LEVEL: f64 = 0.95;
+
+/// A count and the number of cases.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Count {
+    pub count: u64,
+    pub of: u64,
+}
+
+impl Serialize for Count {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut object = serializer.serialize_struct("Count", 3)?;
+        object.serialize_field("count", &self.count)?;
+        object.serialize_field("of", &self.of)?;
+        object.serialize_field("interval", &self.interval())?;
+        object.end()
+    }
+}
+
+impl Count {
+    /// Counts the rows in `of` that are in `count`, too.
+    pub fn over<'r>(
+        rows: impl IntoIterator<Item = &'r Row>,
+        of: impl Fn(&Row) -> bool,
+        count: impl Fn(&Row) -> bool,
+    ) -> Self {
+        let rows = rows.into_iter().filter(|row| of(row));
+        rows.map(count).collect()
+    }
+
+    /// The share; none of nothing.
+    pub fn share(self) -> Option<f64> {
+        (self.of > 0).then(|| self.count as f64 / self.of as f64)
+    }
+
+    /// Clopper–Pearson interval of the probability, at 95 %.
+    pub fn interval(self) -> (f64, f64) {
+        // A count is never more than what it is of.
+        clopper_pearson(self.count, self.of, LEVEL).unwrap_or((0.0, 1.0))
+    }
+}
+
+impl FromIterator<bool> for Count {
+    fn from_iter<I: IntoIterator<Item = bool>>(cases: I) -> Self {
+        let mut all = Self::default();
+        for case in cases {
+            all.of += 1;
+            all.count += u64::from(case);
+        }
+        all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn intervals_are_clopper_and_pearsons() {
+        let (low, high) = Count { count: 3, of: 10 }.interval();
+        assert!((low - 0.066_739_5).abs() < 1e-6 && (high - 0.652_452_9).abs() < 1e-6);
+        assert_eq!(Count::default().interval(), (0.0, 1.0));
+        assert_eq!(Count::default().share(), None);
+        let count: Count = [true, false, true].into_iter().collect();
+        assert_eq!(count, Count { count: 2, of: 3 });
+    }
+}

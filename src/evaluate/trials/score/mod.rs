@@ -1,0 +1,16 @@
+//! Scores of all trials.
+
+mod baselines;
+mod bins;
+mod card;
+mod count;
+mod said;
+
+pub(crate) use baselines::Baseline;
+pub(crate) use bins::Bin;
+pub use card::Scorecard;
+pub(crate) use card::Setup;
+pub(crate) use count::Count;
+
+#[cfg(test)]
+mod tests;

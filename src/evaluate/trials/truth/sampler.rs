@@ -1,0 +1,438 @@
+//! Draws truths and their records.
+
+use super::Truth;
+use super::prior::{conditions, has_room, nuisances, theta};
+use super::sizing::{Sized, Stage};
+use crate::evaluate::EvaluateError;
+use crate::evaluate::trials::draft::{Draft, Form, index};
+use crate::evaluate::trials::information::Information;
+use crate::evaluate::trials::law::Place;
+use crate::evaluate::trials::places::Places;
+use crate::evaluate::trials::scene::Scene;
+use crate::evaluate::trials::world::{Conditions, Draws, System, World};
+use crate::evaluate::trials::{Families, Kind};
+use crate::record::{Drive, Record, Signal};
+use crate::study::{DriveSource, Study};
+use crate::twin::{Noise, ParameterSpace, Source};
+use std::collections::BTreeMap;
+
+/// Draws before a trial is given up.
+const ATTEMPTS: u64 = 60;
+/// Least and largest expected information that is asked for, in nats.
+const INFORMATION: [f64; 2] = [1.0, 300.0];
+/// Another effect is a right answer too if it leaves less than this share of the information, and less than this in nats.
+const IMITATES: (f64, f64) = (0.02, 1.0);
+
+/// A truth with its records.
+pub(in crate::evaluate::trials) struct Drawn {
+    pub truth: Truth,
+    pub record: Record,
+    pub validation: Option<Record>,
+    /// The same system, twice as long; none where steps vary.
+    pub doubled: Option<Record>,
+}
+
+/// A listed effect that worlds can have.
+struct Listed {
+    key: String,
+    id: String,
+    place: Place,
+    other: Option<usize>,
+}
+
+/// Inputs and gaps of records.
+enum Plan {
+    Study(DriveSource),
+    /// Those of a measured record.
+    Like(Record),
+}
+
+/// Records that a trial has beside its own.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in crate::evaluate::trials) struct Extra {
+    pub validation: bool,
+    pub doubled: bool,
+}
+
+/// Why a draw was given up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Reject {
+    Diverged,
+    Still,
+    NoFilter,
+    NoLaw,
+    TooWeak,
+}
+
+impl Reject {
+    fn text(self) -> &'static str {
+        match self {
+            Self::Diverged => "diverged",
+            Self::Still => "had an output that never moves",
+            Self::NoFilter => "could not be filtered",
+            Self::NoLaw => "had no law that could be made",
+            Self::TooWeak => "did not show in the outputs, or diverged before they did",
+        }
+    }
+}
+
+/// Source of truths and their records.
+pub(in crate::evaluate::trials) struct TruthSampler<'a> {
+    study: &'a Study,
+    world: World,
+    places: Places,
+    space: ParameterSpace,
+    plan: Plan,
+    listed: Vec<Listed>,
+    families: Families,
+    is_silent: bool,
+}
+
+impl<'a> TruthSampler<'a> {
+    /// Creates a sampler over the study's own twin; inputs and gaps are those of `like`, or else the study's plan.
+    pub fn new(
+        study: &'a Study,
+        families: Families,
+        like: Option<&Record>,
+    ) -> Result<Self, EvaluateError> {
+        let twin = study.twin();
+        let places = Places::new(twin);
+        let state = |name: &str| places.states.iter().position(|s| s == name);
+        let listed = (study.candidates().iter())
+            .filter(|effect| Draft::knows(effect.id()))
+            .filter_map(|effect| {
+                Some(Listed {
+                    key: effect.key().to_string(),
+                    id: effect.id().into(),
+                    place: places.find(effect.id(), effect.target())?,
+                    other: effect.other().and_then(state),
+                })
+            })
+            .collect();
+        let plan = match like {
+            Some(record) => {
+                record.check_channels(&twin.signals())?;
+                Plan::Like(record.clone())
+            }
+            None => Plan::Study(study.drives()?),
+        };
+        let mut sampler = Self {
+            study,
+            world: World::new(twin),
+            space: twin.parameters(),
+            places,
+            plan,
+            listed,
+            families,
+            is_silent: false,
+        };
+        sampler.is_silent = sampler.finds_silence()?;
+        Ok(sampler)
+    }
+
+    /// Returns true if two records of different noise are the same.
+    fn finds_silence(&self) -> Result<bool, EvaluateError> {
+        let conditions = Conditions::declared();
+        let theta = self.space.centre();
+        let system = System {
+            theta: &theta,
+            departures: &[],
+            conditions: &conditions,
+        };
+        let noise = Noise::new(1, "silence", 0);
+        let drive = self.drive(noise)?;
+        let outputs = |i: u64| {
+            let run = self.world.run(system, &drive, Draws::of(noise.sample(i)));
+            run.map(|run| run.outputs)
+        };
+        Ok(matches!((outputs(0), outputs(1)), (Some(a), Some(b)) if a == b))
+    }
+
+    /// Checks that a truth of this kind can be drawn.
+    pub fn check(&self, kind: Kind) -> Result<(), EvaluateError> {
+        let refused = |reason| {
+            Err(EvaluateError::NoDeparture {
+                kind: kind.id(),
+                reason,
+            })
+        };
+        let first = self.listed.first();
+        if kind.is_outside() && !has_room(&self.space) {
+            return refused("[bounds] leave no room outside [prior]; widen them");
+        }
+        match kind {
+            Kind::None | Kind::Outside => Ok(()),
+            Kind::Random if self.places.all().next().is_none() => {
+                refused("the twin has no place for one")
+            }
+            Kind::Random => Ok(()),
+            _ if first.is_none() => {
+                refused("[library] leaves no effect that trials can make; allow more effects")
+            }
+            Kind::Pair
+                if self
+                    .listed
+                    .iter()
+                    .all(|l| Some(l.place) == first.map(|f| f.place)) =>
+            {
+                refused("[library] leaves effects at one place only; allow more effects")
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Draws trial number `trial`: the same for the same noise.
+    pub fn draw(
+        &self,
+        trial: usize,
+        kind: Kind,
+        extra: Extra,
+        noise: Noise,
+    ) -> Result<Drawn, EvaluateError> {
+        let mut rejected: BTreeMap<Reject, u64> = BTreeMap::new();
+        for redraws in 0..ATTEMPTS {
+            let noise = noise.child("attempt").sample(redraws);
+            match self.attempt(trial, kind, extra, noise)? {
+                Ok(mut drawn) => {
+                    drawn.truth.redraws = redraws;
+                    return Ok(drawn);
+                }
+                Err(reject) => *rejected.entry(reject).or_default() += 1,
+            }
+        }
+        let counts = (rejected.iter())
+            .map(|(reject, count)| format!("{count} {}", reject.text()))
+            .collect::<Vec<_>>();
+        Err(EvaluateError::NoTruth {
+            trial,
+            kind: kind.id(),
+            of: ATTEMPTS,
+            reasons: counts.join(", "),
+        })
+    }
+
+    fn attempt(
+        &self,
+        trial: usize,
+        kind: Kind,
+        extra: Extra,
+        noise: Noise,
+    ) -> Result<Result<Drawn, Reject>, EvaluateError> {
+        let source = &mut noise.source("truth");
+        let theta = theta(kind, &self.space, self.space.draw_prior(noise), source);
+        let drive = self.drive(noise)?;
+        let draws = Draws::of(noise);
+        let Some(scene) = Scene::new(&self.world, &theta, &drive, draws) else {
+            return Ok(Err(Reject::Diverged));
+        };
+        if scene.is_still() {
+            return Ok(Err(Reject::Still));
+        }
+        let is_noisy = self.is_silent || !self.world.is_black_box();
+        let allowed = nuisances(&scene, is_noisy);
+        let conditions = conditions(&scene, self.is_silent, &allowed, source);
+        let stage = Stage {
+            world: &self.world,
+            theta: &theta,
+            conditions: &conditions,
+            drive: &drive,
+            draws,
+            scene: &scene,
+        };
+        let Some([plain, again]) = stage.records(&[]) else {
+            return Ok(Err(Reject::Diverged));
+        };
+        let (plain, again) = ([plain], [again]);
+        let information = Information::new(self.study, &theta, &conditions, [&plain, &again])?;
+        let Some(information) = information else {
+            return Ok(Err(Reject::NoFilter));
+        };
+        let mut truth = Truth {
+            trial,
+            kind,
+            theta: theta.clone(),
+            conditions: conditions.clone(),
+            departures: vec![],
+            labels: vec![],
+            formulas: vec![],
+            effects: vec![],
+            right: vec![],
+            targets: vec![],
+            information: None,
+            step: information.step(self.study, &conditions)?,
+            redraws: 0,
+        };
+        for (draft, effect) in match self.drafts(kind, &scene, source) {
+            Some(drafts) => drafts,
+            None => return Ok(Err(Reject::NoLaw)),
+        } {
+            let [low, high] = INFORMATION;
+            let wanted = low * (high / low).powf(source.uniform());
+            let Some(sized) = stage.sized(&draft, wanted, &information)? else {
+                return Ok(Err(Reject::TooWeak));
+            };
+            let mut right = self.imitators(&stage, &sized, &information)?;
+            right.extend(effect.clone());
+            right.sort();
+            right.dedup();
+            let target = self.places.name(draft.place).to_owned();
+            truth.labels.push(draft.label(&target));
+            truth.formulas.extend(draft.formula());
+            truth.effects.extend(effect);
+            truth.right.push(right);
+            truth.targets.push(target);
+            let least = truth.information.map_or(sized.nats, |n| n.min(sized.nats));
+            truth.information = Some(least);
+            truth.departures.push(sized.departure);
+        }
+        Ok(self.drawn(truth, &drive, extra, noise, &scene))
+    }
+
+    /// The records of a truth.
+    fn drawn(
+        &self,
+        truth: Truth,
+        drive: &Drive,
+        extra: Extra,
+        noise: Noise,
+        scene: &Scene,
+    ) -> Result<Drawn, Reject> {
+        let record = |drive: &Drive, noise: Noise| {
+            self.record(&truth, drive, noise, scene)
+                .ok_or(Reject::Diverged)
+        };
+        let own = record(drive, noise)?;
+        let validation = match extra.validation {
+            false => None,
+            true => {
+                let noise = noise.child("validation");
+                let drive = self.drive(noise).map_err(|_| Reject::Diverged)?;
+                Some(record(&drive, noise)?)
+            }
+        };
+        let doubled = match extra.doubled {
+            false => None,
+            true => (doubled(drive).map(|drive| record(&drive, noise))).transpose()?,
+        };
+        Ok(Drawn {
+            record: own,
+            validation,
+            doubled,
+            truth,
+        })
+    }
+
+    /// Departures of a kind, not yet sized, with their keys in the library; `None` where none could be drawn.
+    fn drafts(
+        &self,
+        kind: Kind,
+        scene: &Scene,
+        source: &mut Source,
+    ) -> Option<Vec<(Draft, Option<String>)>> {
+        let form = match kind {
+            Kind::Otherwise => Form::Other,
+            _ => Form::Listed,
+        };
+        let listed = |among: &[&Listed], source: &mut Source| {
+            let chosen = *among.get(index(source, among.len().max(1)))?;
+            let draft = Draft::listed(&chosen.id, chosen.place, chosen.other, form, source)?;
+            draft.of_size(0.1, scene)?;
+            Some((draft, Some(chosen.key.clone())))
+        };
+        let all: Vec<&Listed> = self.listed.iter().collect();
+        Some(match kind {
+            Kind::None | Kind::Outside => vec![],
+            Kind::Listed | Kind::Otherwise | Kind::Beside => vec![listed(&all, source)?],
+            Kind::Pair => {
+                let first = listed(&all, source)?;
+                let others: Vec<&Listed> = (all.into_iter())
+                    .filter(|l| l.place != first.0.place)
+                    .collect();
+                let second = listed(&others, source)?;
+                vec![first, second]
+            }
+            Kind::Random => {
+                let place = self.places.draw(source)?;
+                let families = self.families.at(place);
+                let family = families[index(source, families.len())];
+                vec![(Draft::random(family, place, scene, source)?, None)]
+            }
+        })
+    }
+
+    /// Listed effects without shapes that no record of this length tells from a departure.
+    fn imitators(
+        &self,
+        stage: &Stage<'_>,
+        sized: &Sized,
+        information: &Information<'_>,
+    ) -> Result<Vec<String>, EvaluateError> {
+        let (share, nats) = IMITATES;
+        let mut keys = Vec::new();
+        // A simulator answers too slowly to be asked about every effect.
+        if self.world.is_black_box() {
+            return Ok(keys);
+        }
+        for effect in &self.listed {
+            let Some(draft) = Draft::shapeless(&effect.id, effect.place, effect.other) else {
+                continue;
+            };
+            let Some(direction) = stage.direction(&draft, information)? else {
+                continue;
+            };
+            let left = information.unexplained(&sized.change, &direction);
+            if left < share && left * sized.nats < nats {
+                keys.push(effect.key.clone());
+            }
+        }
+        Ok(keys)
+    }
+
+    /// The record of a truth under an input; `None` where it diverges.
+    fn record(&self, truth: &Truth, drive: &Drive, noise: Noise, scene: &Scene) -> Option<Record> {
+        let system = System {
+            theta: &truth.theta,
+            departures: &truth.departures,
+            conditions: &truth.conditions,
+        };
+        let run = self.world.run(system, drive, Draws::of(noise))?;
+        if !scene.is_near(&run) {
+            return None;
+        }
+        let outputs = match &self.plan {
+            Plan::Like(like) => like.with_gaps_in(run.outputs),
+            Plan::Study(_) => run.outputs,
+        };
+        Record::new(run.drive, outputs).ok()
+    }
+
+    fn drive(&self, noise: Noise) -> Result<Drive, EvaluateError> {
+        Ok(match &self.plan {
+            Plan::Study(drives) => drives.draw(noise)?,
+            Plan::Like(record) => record.drive().clone(),
+        })
+    }
+
+    /// The study that is diagnosed with.
+    pub fn study(&self) -> &Study {
+        self.study
+    }
+
+    /// Names of the twin's parameters.
+    pub fn parameters(&self) -> Vec<String> {
+        self.space.names().into_iter().map(Into::into).collect()
+    }
+}
+
+/// The same inputs twice, one after the other; `None` where steps vary.
+fn doubled(drive: &Drive) -> Option<Drive> {
+    if !drive.is_uniform() {
+        return None;
+    }
+    let (rows, columns) = drive.inputs().dim();
+    let inputs = Signal::from_shape_fn((2 * rows, columns), |(k, j)| drive.inputs()[[k % rows, j]]);
+    Drive::new(drive.dt(), inputs).ok()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,275 @@
+//! Truths of every kind can be drawn of any twin, and have the information that they are to have.
+
+use super::*;
+use crate::evaluate::paper::reference_studies;
+use crate::evaluate::trials::information::Information;
+use crate::study::RecordPlan;
+use crate::twin::{Now, Outline, Parameter, StateSpace};
+
+/// Three states, two outputs, one input: a heater, a wall, a room.
+pub(super) struct Rooms;
+
+impl StateSpace for Rooms {
+    fn outline(&self) -> Outline {
+        Outline::new()
+            .parameter(Parameter::new("gain", "K/s", 0.5, 1.5).within(0.1, 4.0))
+            .parameter(Parameter::new("loss", "1/s", 0.2, 0.6).within(0.05, 2.0))
+            .state("heater", "K")
+            .state("wall", "K")
+            .state("room", "K")
+            .input("power", "1")
+            .output("wall_sensor", "K")
+            .output("room_sensor", "K")
+    }
+    fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+        let (gain, loss) = (now.theta[0], now.theta[1]);
+        dx[0] = gain * now.u[0] - 0.5 * (x[0] - x[1]);
+        dx[1] = 0.3 * (x[0] - x[1]) - 0.2 * (x[1] - x[2]);
+        dx[2] = 0.2 * (x[1] - x[2]) - loss * x[2];
+    }
+    fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+        y.copy_from_slice(&x[1..]);
+    }
+    fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+        process.fill(0.005);
+        measurement.fill(0.01);
+    }
+}
+
+pub(super) fn rooms() -> Study {
+    let plan = RecordPlan::levels(0.1, 200, 0.0, 1.0, 25);
+    Study::new("rooms", Rooms, plan).unwrap()
+}
+
+fn sampler(study: &Study) -> TruthSampler<'_> {
+    TruthSampler::new(study, Families::All, None).unwrap()
+}
+
+fn draw(sampler: &TruthSampler<'_>, kind: Kind, trial: usize) -> Drawn {
+    let noise = Noise::new(5, "truth", trial as u64);
+    let extra = Extra {
+        validation: true,
+        doubled: true,
+    };
+    sampler.draw(trial, kind, extra, noise).unwrap()
+}
+
+fn holds(sampler: &TruthSampler<'_>, kind: Kind, trial: usize) {
+    let (drawn, again) = (draw(sampler, kind, trial), draw(sampler, kind, trial));
+    assert_eq!((&drawn.truth, &drawn.record), (&again.truth, &again.record));
+    let doubled = drawn.doubled.unwrap();
+    assert_eq!(doubled.samples(), 2 * drawn.record.samples());
+    assert_ne!(drawn.validation.unwrap(), drawn.record);
+    let truth = drawn.truth;
+    let departures = match kind {
+        Kind::None | Kind::Outside => 0,
+        Kind::Pair => 2,
+        _ => 1,
+    };
+    assert_eq!(truth.departures.len(), departures, "{truth:?}");
+    assert_eq!(
+        (truth.right.len(), truth.targets.len()),
+        (departures, departures)
+    );
+    assert_eq!(truth.information.is_some(), departures > 0);
+    if let Some(nats) = truth.information {
+        assert!((0.3..900.0).contains(&nats), "{nats}");
+    }
+    for effect in &truth.effects {
+        assert!(truth.right.iter().flatten().any(|key| key == effect));
+    }
+    let text = serde_json::to_string(&truth).unwrap();
+    let read: Truth = serde_json::from_str(&text).unwrap();
+    assert_eq!((read.kind, read.right), (truth.kind, truth.right));
+    let inside = |(p, v): (&crate::twin::Parameter, &f64)| p.prior.contains(*v);
+    let all_inside = sampler.space.iter().zip(&truth.theta).all(inside);
+    assert_eq!(all_inside, !kind.is_outside());
+    sampler.space.check_point(&truth.theta).unwrap();
+}
+
+#[test]
+fn every_kind_can_be_drawn_of_the_reference_twins_and_repeats() {
+    for study in reference_studies().unwrap() {
+        let sampler = sampler(&study);
+        for kind in Kind::ALL {
+            sampler.check(kind).unwrap();
+            holds(&sampler, kind, 1);
+        }
+    }
+}
+
+#[test]
+fn every_kind_can_be_drawn_of_a_twin_of_several_outputs() {
+    let study = rooms();
+    let sampler = sampler(&study);
+    let keys: Vec<&str> = sampler.listed.iter().map(|l| l.key.as_str()).collect();
+    for key in [
+        "sensor-bias@sensor2",
+        "cross-coupling@wall",
+        "parameter-step@loss",
+    ] {
+        assert!(keys.contains(&key), "{keys:?}");
+    }
+    for kind in Kind::ALL {
+        for trial in 0..3 {
+            holds(&sampler, kind, trial);
+        }
+    }
+}
+
+/// A bias of a sensor of N white samples with noise r has ½·N·(b/r)² nats, less what θ, the start and the noise level imitate.
+#[test]
+fn information_is_that_of_theory() {
+    struct Level;
+    impl StateSpace for Level {
+        fn outline(&self) -> Outline {
+            Outline::new()
+                .parameter(Parameter::new("gain", "1", 0.5, 1.5).within(0.1, 4.0))
+                .state("x", "m")
+                .input("u", "m")
+                .output("y", "m")
+        }
+        fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+            // Fast: x follows gain·u within a sample.
+            dx[0] = 20.0 * (now.theta[0] * now.u[0] - x[0]);
+        }
+        fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+            y[0] = x[0];
+        }
+        fn noise(&self, _: &Now<'_>, _: &mut [f64], measurement: &mut [f64]) {
+            measurement[0] = 0.1;
+        }
+        fn integrator(&self) -> crate::twin::Integrator {
+            crate::twin::Integrator::RungeKutta4
+        }
+    }
+    let study = Study::new("level", Level, RecordPlan::levels(0.1, 400, -1.0, 1.0, 5)).unwrap();
+    let world = World::new(study.twin());
+    let conditions = Conditions::declared();
+    let noise = Noise::new(1, "theory", 0);
+    let drive = study.drives().unwrap().draw(noise).unwrap();
+    let theta = [1.0];
+    let draws = Draws::of(noise);
+    let scene = Scene::new(&world, &theta, &drive, draws).unwrap();
+    let stage = Stage {
+        world: &world,
+        theta: &theta,
+        conditions: &conditions,
+        drive: &drive,
+        draws,
+        scene: &scene,
+    };
+    let [plain, again] = stage.records(&[]).unwrap();
+    let (plain, again) = ([plain], [again]);
+    let information = Information::new(&study, &theta, &conditions, [&plain, &again]);
+    let information = information.unwrap().unwrap();
+    let draft = Draft::shapeless("sensor-bias", Place::Sensor(0), None).unwrap();
+    let departure = draft.of_size(0.05, &scene).unwrap();
+    let bias = 0.05 * scene.outputs[0].deviation;
+    let records = stage.records(&[departure]).unwrap();
+    let change = information.change(records).unwrap().unwrap();
+    let (nats, theory) = (
+        information.nats(&change),
+        0.5 * 400.0 * (bias / 0.1).powi(2),
+    );
+    assert!((nats / theory - 1.0).abs() < 0.15, "{nats} {theory}");
+    // The gain of the actuator is what θ does; the bias is no gain.
+    let gain = Draft::shapeless("actuator-gain", Place::Actuator(0), None).unwrap();
+    let gain = stage.direction(&gain, &information).unwrap().unwrap();
+    assert!(
+        information.nats(&gain) < 0.05 * nats,
+        "{}",
+        information.nats(&gain)
+    );
+    let same = stage.direction(&draft, &information).unwrap().unwrap();
+    assert!(information.unexplained(&change, &same) < 0.01);
+}
+
+/// A step that is fine shows nothing, a coarse one shows.
+#[test]
+fn a_coarse_step_is_seen() {
+    let [oscillator, ..] = &reference_studies().unwrap()[..] else {
+        panic!("no study")
+    };
+    let coarse = draw(&sampler(oscillator), Kind::None, 0).truth.step;
+    assert!(coarse > 3.0, "{coarse}");
+    let fine = draw(&sampler(&rooms()), Kind::None, 0).truth.step;
+    assert!(fine < 3.0, "{fine}");
+}
+
+#[test]
+fn twins_without_departures_say_why() {
+    let study = rooms();
+    let text = "twin = 'rooms'\n[library]\nonly = ['sensor-noise']";
+    let file = crate::study::StudyFile::parse(text, "s.toml".as_ref()).unwrap();
+    let study = study.configure(&file).unwrap();
+    let sampler = sampler(&study);
+    let error = sampler.check(Kind::Listed).unwrap_err().to_string();
+    assert!(
+        error.contains("kind listed") && error.contains("[library]"),
+        "{error}"
+    );
+    assert!(sampler.check(Kind::Random).is_ok());
+}
+
+/// A black box: y = gain·u behind a lag.
+struct Boxed;
+impl crate::twin::DigitalTwin for Boxed {
+    fn parameters(&self) -> ParameterSpace {
+        ParameterSpace::new([Parameter::new("gain", "1", 0.5, 1.5).within(0.2, 3.0)])
+    }
+    fn simulate(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        _: Noise,
+    ) -> Result<Signal, crate::twin::SimulationError> {
+        let mut z = 0.0;
+        let rows = (0..drive.samples()).map(|k| {
+            z += 0.3 * (theta[0] * drive.input(k)[0] - z);
+            z
+        });
+        let rows: Vec<f64> = rows.collect();
+        Ok(Signal::from_shape_fn((rows.len(), 1), |(k, _)| rows[k]))
+    }
+}
+
+#[test]
+fn black_boxes_have_departures_of_signals_and_parameters() {
+    let plan = RecordPlan::levels(0.1, 80, 0.0, 1.0, 10);
+    let study = Study::new("boxed", Boxed, plan);
+    let study = study.unwrap();
+    let sampler = sampler(&study);
+    assert!(sampler.is_silent && sampler.world.is_black_box());
+    for kind in [Kind::None, Kind::Listed, Kind::Random] {
+        let drawn = sampler.draw(0, kind, Extra::default(), Noise::new(2, "box", 0));
+        let truth = drawn.unwrap().truth;
+        assert_eq!(truth.departures.is_empty(), kind == Kind::None);
+        assert_eq!(truth.conditions.added.len(), 1);
+    }
+}
+
+/// Records like a measured one have its inputs, its length and its gaps.
+#[test]
+fn records_are_like_a_measured_one() {
+    let study = rooms();
+    let drawn = draw(&sampler(&study), Kind::None, 3).record;
+    let mut outputs = drawn.outputs().clone();
+    for k in 20..40 {
+        outputs[[k, 1]] = f64::NAN;
+    }
+    let like = Record::new(
+        drawn.drive().first(150),
+        outputs.slice(ndarray::s![..150, ..]).to_owned(),
+    );
+    let like = like.unwrap();
+    let sampler = TruthSampler::new(&study, Families::Closed, Some(&like)).unwrap();
+    let noise = Noise::new(9, "like", 0);
+    let made = sampler
+        .draw(0, Kind::Listed, Extra::default(), noise)
+        .unwrap();
+    assert_eq!(made.record.samples(), 150);
+    for k in 20..40 {
+        assert!(made.record.outputs()[[k, 1]].is_nan());
+    }
+}

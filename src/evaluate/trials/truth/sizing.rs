@@ -1,0 +1,141 @@
+//! The size at which a departure has the expected information that it is to have.
+
+use crate::evaluate::EvaluateError;
+use crate::evaluate::trials::draft::Draft;
+use crate::evaluate::trials::information::{Change, Information};
+use crate::evaluate::trials::law::Departure;
+use crate::evaluate::trials::scene::Scene;
+use crate::evaluate::trials::world::{Conditions, Draws, System, World};
+use crate::record::{Drive, Record};
+
+/// First size that is tried, and tries in all.
+const FIRST: f64 = 0.03;
+const TRIES: usize = 10;
+/// A size is taken within this distance of the wanted information, as a logarithm.
+const NEAR: f64 = 0.15;
+/// Farthest that is taken where no nearer one was found.
+const FAR: f64 = 1.0;
+/// Less than this is no departure.
+const LEAST: f64 = 0.5;
+
+/// Everything of a trial but its departures.
+pub(super) struct Stage<'a> {
+    pub world: &'a World,
+    pub theta: &'a [f64],
+    pub conditions: &'a Conditions,
+    pub drive: &'a Drive,
+    pub draws: Draws,
+    pub scene: &'a Scene,
+}
+
+/// A departure with its information.
+pub(super) struct Sized {
+    pub departure: Departure,
+    pub nats: f64,
+    pub change: Change,
+}
+
+impl Stage<'_> {
+    /// Makes the record with these departures, and once more with other measurement noise; `None` where it diverges.
+    pub fn records(&self, departures: &[Departure]) -> Option<[Record; 2]> {
+        let record = |draws: Draws| {
+            let system = System {
+                theta: self.theta,
+                departures,
+                conditions: self.conditions,
+            };
+            let run = self.world.run(system, self.drive, draws)?;
+            if !self.scene.is_near(&run) {
+                return None;
+            }
+            Record::new(run.drive, run.outputs).ok()
+        };
+        Some([record(self.draws)?, record(self.draws.remeasured())?])
+    }
+
+    /// The departure of a size, and what it changes; `None` where it cannot be made or diverges.
+    fn of_size(
+        &self,
+        draft: &Draft,
+        size: f64,
+        information: &Information<'_>,
+    ) -> Result<Option<Sized>, EvaluateError> {
+        let Some(departure) = draft.of_size(size, self.scene) else {
+            return Ok(None);
+        };
+        let Some(records) = self.records(std::slice::from_ref(&departure)) else {
+            return Ok(None);
+        };
+        Ok(information.change(records)?.map(|change| Sized {
+            nats: information.nats(&change),
+            departure,
+            change,
+        }))
+    }
+
+    /// A departure of a small size: the direction in which it goes.
+    pub fn direction(
+        &self,
+        draft: &Draft,
+        information: &Information<'_>,
+    ) -> Result<Option<Change>, EvaluateError> {
+        let small = self.of_size(draft, FIRST, information)?;
+        Ok(small.map(|sized| sized.change))
+    }
+
+    /// Searches the size at which a departure has about `wanted` nats; `None` where none comes near.
+    pub fn sized(
+        &self,
+        draft: &Draft,
+        wanted: f64,
+        information: &Information<'_>,
+    ) -> Result<Option<Sized>, EvaluateError> {
+        let distance = |nats: f64| (nats / wanted).ln().abs();
+        let mut best: Option<Sized> = None;
+        // Logarithms of size and nats, below and above what is wanted.
+        let (mut below, mut above): (Option<[f64; 2]>, Option<[f64; 2]>) = (None, None);
+        let largest = draft.largest();
+        let mut size = FIRST;
+        for _ in 0..TRIES {
+            match self.of_size(draft, size, information)? {
+                None => above = Some([size.ln(), f64::INFINITY]),
+                Some(sized) => {
+                    let nats = sized.nats;
+                    let at = Some([size.ln(), nats.max(1e-9).ln()]);
+                    if nats < wanted {
+                        below = at;
+                    } else {
+                        above = at;
+                    }
+                    if best
+                        .as_ref()
+                        .is_none_or(|b| distance(nats) < distance(b.nats))
+                    {
+                        best = Some(sized);
+                    }
+                    if distance(nats) < NEAR {
+                        break;
+                    }
+                }
+            }
+            size = match (below, above) {
+                (Some(low), Some(high)) if high[1].is_finite() => {
+                    let share = (wanted.ln() - low[1]) / (high[1] - low[1]);
+                    (low[0] + share.clamp(0.1, 0.9) * (high[0] - low[0])).exp()
+                }
+                (Some(low), Some(high)) => (0.5 * (low[0] + high[0])).exp(),
+                (Some(_), None) if size >= largest => break,
+                (Some(low), None) => {
+                    let step = (0.5 * (wanted.ln() - low[1])).clamp(0.2, 3.0);
+                    (size * step.exp()).min(largest)
+                }
+                (None, Some(high)) => {
+                    let step = (0.5 * (high[1] - wanted.ln())).clamp(0.2, 3.0);
+                    size * (-step).exp()
+                }
+                (None, None) => break,
+            };
+        }
+        Ok(best.filter(|b| b.nats > LEAST && distance(b.nats) < FAR))
+    }
+}

@@ -1,0 +1,188 @@
+//! A world of a simulator: departures before its inputs, after its outputs, and of its parameters.
+
+use super::{Draws, Run, System};
+use crate::evaluate::trials::law::{Law, Moment, Place};
+use crate::record::{Drive, Signal};
+use crate::twin::DigitalTwin;
+
+/// Values of a parameter that a run is made for, where it changes with time.
+const VALUES: usize = 9;
+/// An output beyond this has diverged, in any unit.
+const BEYOND: f64 = 1e12;
+
+/// Makes a record; `None` where the simulator fails or diverges.
+pub(super) fn run(
+    twin: &dyn DigitalTwin,
+    system: System<'_>,
+    drive: &Drive,
+    draws: Draws,
+) -> Option<Run> {
+    let mut inputs = drive.inputs().clone();
+    for departure in system.departures {
+        if let Place::Actuator(j) = departure.place {
+            pass(&departure.law, j, drive, &mut inputs);
+        }
+    }
+    let driven = drive.with_inputs(inputs).ok()?;
+    let mut outputs = simulated(twin, system, &driven, draws)?;
+    let conditions = system.conditions;
+    let mut measurement: Vec<_> = (0..outputs.ncols())
+        .map(|j| conditions.noise(draws.measurement.source(&format!("world/sensor/{j}"))))
+        .collect();
+    for late in [false, true] {
+        for departure in system.departures {
+            if let Place::Sensor(j) = departure.place {
+                let is_late = matches!(&departure.law, Law::Signal(law) if law.is_of_readings());
+                if is_late == late {
+                    pass(&departure.law, j, drive, &mut outputs);
+                }
+            }
+        }
+        if late {
+            break;
+        }
+        for ((_, j), y) in outputs.indexed_iter_mut() {
+            let level = conditions.measurement * conditions.added.get(j).copied().unwrap_or(0.0);
+            *y += level * measurement[j].next();
+        }
+    }
+    if !outputs.iter().all(|y| y.abs() < BEYOND) {
+        return None;
+    }
+    conditions.empty(&mut outputs, draws.process);
+    let none = Signal::zeros((drive.samples(), 0));
+    Some(Run {
+        drive: drive.clone(),
+        outputs,
+        states: none.clone(),
+        rates: none,
+    })
+}
+
+/// Outputs of the simulator. Where a parameter changes, they follow the runs at fixed values: exact for a parameter that acts on
+/// the outputs at once, an approximation for others.
+fn simulated(
+    twin: &dyn DigitalTwin,
+    system: System<'_>,
+    drive: &Drive,
+    draws: Draws,
+) -> Option<Signal> {
+    let changing = (system.departures.iter()).find_map(|departure| match departure.place {
+        Place::Parameter(i) => Some((i, &departure.law)),
+        _ => None,
+    });
+    let one = |theta: &[f64]| twin.simulate(theta, drive, draws.process).ok();
+    let Some((i, law)) = changing else {
+        return one(system.theta);
+    };
+    let mut memory = vec![];
+    let values: Vec<f64> = (0..drive.samples())
+        .map(|k| {
+            let now = Moment {
+                t: drive.time(k),
+                x: &[],
+                u: drive.input(k),
+                own: system.theta[i],
+            };
+            let factor = match law {
+                Law::Parameter(law) => law.at(now.t),
+                Law::Random(law) => {
+                    law.remember(&now, drive.step(k), &mut memory);
+                    law.at(&now, &memory).clamp(-5.0, 5.0).exp()
+                }
+                _ => 1.0,
+            };
+            system.theta[i] * factor
+        })
+        .collect();
+    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if low == high {
+        return one(system.theta);
+    }
+    let step = (high - low) / (VALUES - 1) as f64;
+    let runs = (0..VALUES)
+        .map(|m| {
+            let mut theta = system.theta.to_vec();
+            theta[i] = low + step * m as f64;
+            one(&theta)
+        })
+        .collect::<Option<Vec<Signal>>>()?;
+    let (rows, columns) = runs[0].dim();
+    Some(Signal::from_shape_fn((rows, columns), |(k, j)| {
+        let place = ((values[k] - low) / step).clamp(0.0, (VALUES - 1) as f64);
+        let m = (place as usize).min(VALUES - 2);
+        let share = place - m as f64;
+        (1.0 - share) * runs[m][[k, j]] + share * runs[m + 1][[k, j]]
+    }))
+}
+
+/// Puts one channel of a signal through a law.
+fn pass(law: &Law, channel: usize, drive: &Drive, signal: &mut Signal) {
+    let mut memory = vec![];
+    for k in 0..drive.samples() {
+        let now = Moment {
+            t: drive.time(k),
+            x: &[],
+            u: drive.input(k),
+            own: signal[[k, channel]],
+        };
+        signal[[k, channel]] = law.through(&now, drive.step(k), &mut memory);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluate::trials::law::{Departure, ParameterLaw, SignalLaw};
+    use crate::evaluate::trials::world::Conditions;
+    use crate::twin::{Noise, Parameter, ParameterSpace, SimulationError};
+
+    /// y = gain·u.
+    struct Static;
+    impl DigitalTwin for Static {
+        fn parameters(&self) -> ParameterSpace {
+            ParameterSpace::new([Parameter::new("gain", "1", 0.5, 2.0)])
+        }
+        fn simulate(
+            &self,
+            theta: &[f64],
+            drive: &Drive,
+            _: Noise,
+        ) -> Result<Signal, SimulationError> {
+            Ok(drive.inputs() * theta[0])
+        }
+    }
+
+    #[test]
+    fn departures_of_signals_and_parameters_reach_the_outputs() {
+        let drive = Drive::new(1.0, Signal::from_elem((10, 1), 2.0)).unwrap();
+        let made = |place, law| {
+            let departures = [Departure { place, law }];
+            let conditions = Conditions::declared();
+            let system = System {
+                theta: &[1.0],
+                departures: &departures,
+                conditions: &conditions,
+            };
+            run(&Static, system, &drive, Draws::of(Noise::OFF))
+                .unwrap()
+                .outputs
+        };
+        let bias = || {
+            Law::Signal(SignalLaw::Bias {
+                offset: 0.5,
+                settling: 0.0,
+            })
+        };
+        assert_eq!(made(Place::Sensor(0), bias())[[4, 0]], 2.5);
+        assert_eq!(made(Place::Actuator(0), bias())[[4, 0]], 2.5);
+        let step = Law::Parameter(ParameterLaw::Step {
+            size: 0.5,
+            time: 5.0,
+            ramp: 0.0,
+        });
+        let stepped = made(Place::Parameter(0), step);
+        assert!((stepped[[4, 0]] - 2.0).abs() < 1e-9 && (stepped[[5, 0]] - 3.0).abs() < 1e-9);
+    }
+}

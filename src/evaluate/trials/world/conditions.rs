@@ -1,0 +1,202 @@
+//! Conditions of a record that are no gap of the twin: noise, start, feedback, missing samples.
+
+use crate::record::Signal;
+use crate::twin::{Noise, Source};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Mean length of a gap, in samples.
+const GAP: f64 = 4.0;
+
+/// Kind of condition that the twin does not describe.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(in crate::evaluate::trials) enum Nuisance {
+    /// Everything as declared.
+    None,
+    /// Noise levels other than those declared.
+    Level,
+    /// Autoregressive noise.
+    Coloured,
+    /// Noise with Student's t distribution.
+    HeavyTailed,
+    /// Another first state.
+    Start,
+    /// Inputs that depend on the outputs.
+    ClosedLoop,
+    /// Missing samples.
+    Gaps,
+}
+
+impl fmt::Display for Nuisance {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::None => "none",
+            Self::Level => "level",
+            Self::Coloured => "coloured",
+            Self::HeavyTailed => "heavy-tailed",
+            Self::Start => "start",
+            Self::ClosedLoop => "closed-loop",
+            Self::Gaps => "gaps",
+        })
+    }
+}
+
+/// Proportional feedback from the first output to the first input.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(in crate::evaluate::trials) struct Feedback {
+    pub gain: f64,
+    pub setpoint: f64,
+    pub low: f64,
+    pub high: f64,
+}
+
+/// Conditions of one record.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(in crate::evaluate::trials) struct Conditions {
+    pub nuisance: Nuisance,
+    /// Factors on the declared standard deviations.
+    pub process: f64,
+    pub measurement: f64,
+    /// Correlation of noise from one sample to the next.
+    pub colour: f64,
+    /// Degrees of freedom of Student's t; none for normal noise.
+    pub freedom: Option<u32>,
+    /// Shift of each state at the first sample.
+    pub start: Vec<f64>,
+    pub feedback: Option<Feedback>,
+    /// Share of samples that are missing.
+    pub gaps: f64,
+    /// Standard deviation of measurement noise added to each output of a twin that declares no noise.
+    pub added: Vec<f64>,
+}
+
+impl Conditions {
+    /// The conditions that the twin describes.
+    pub fn declared() -> Self {
+        Self {
+            nuisance: Nuisance::None,
+            process: 1.0,
+            measurement: 1.0,
+            colour: 0.0,
+            freedom: None,
+            start: vec![],
+            feedback: None,
+            gaps: 0.0,
+            added: vec![],
+        }
+    }
+
+    /// A source of noise of unit variance under these conditions.
+    pub(super) fn noise(&self, source: Source) -> UnitNoise {
+        UnitNoise {
+            source,
+            colour: self.colour,
+            freedom: self.freedom,
+            last: None,
+        }
+    }
+
+    /// Empties samples in blocks, never all of a channel.
+    pub(super) fn empty(&self, outputs: &mut Signal, noise: Noise) {
+        if self.gaps <= 0.0 {
+            return;
+        }
+        let begins = self.gaps / (GAP * (1.0 - self.gaps));
+        for (j, mut channel) in outputs.columns_mut().into_iter().enumerate() {
+            let mut source = noise.source(&format!("world/gaps/{j}"));
+            let mut inside = false;
+            // The first and the last few rows stay, so that a record always has a beginning.
+            let last = channel.len().saturating_sub(3);
+            for (k, value) in channel.iter_mut().enumerate() {
+                inside = match inside {
+                    true => !source.happens(1.0 / GAP),
+                    false => source.happens(begins),
+                };
+                if inside && (3..last).contains(&k) {
+                    *value = f64::NAN;
+                }
+            }
+        }
+    }
+}
+
+/// Noise of unit variance, coloured or heavy-tailed.
+pub(super) struct UnitNoise {
+    source: Source,
+    colour: f64,
+    freedom: Option<u32>,
+    last: Option<f64>,
+}
+
+impl UnitNoise {
+    pub fn next(&mut self) -> f64 {
+        let normal = self.source.normal();
+        let fresh = match self.freedom {
+            None => normal,
+            Some(freedom) => {
+                let squares: f64 = (0..freedom).map(|_| self.source.normal().powi(2)).sum();
+                let freedom = f64::from(freedom);
+                let scale = ((freedom - 2.0) / freedom).sqrt();
+                // Noise that is off has no squares.
+                if squares > 0.0 {
+                    scale * normal / (squares / freedom).sqrt()
+                } else {
+                    0.0
+                }
+            }
+        };
+        let next = match self.last {
+            None => fresh,
+            Some(last) => self.colour * last + (1.0 - self.colour.powi(2)).sqrt() * fresh,
+        };
+        self.last = Some(next);
+        next
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn drawn(conditions: &Conditions) -> Vec<f64> {
+        let mut noise = conditions.noise(Noise::new(1, "unit", 0).source("n"));
+        (0..20_000).map(|_| noise.next()).collect()
+    }
+
+    /// Every kind of noise has unit variance; coloured noise its correlation, heavy-tailed noise its tails.
+    #[test]
+    fn noise_is_as_it_is_called() {
+        let moment = |v: &[f64], lag: usize| -> f64 {
+            v.iter().skip(lag).zip(v).map(|(a, b)| a * b).sum::<f64>() / v.len() as f64
+        };
+        let coloured = drawn(&Conditions {
+            colour: 0.6,
+            ..Conditions::declared()
+        });
+        assert!((moment(&coloured, 0) - 1.0).abs() < 0.1);
+        assert!((moment(&coloured, 1) - 0.6).abs() < 0.06);
+        let tailed = drawn(&Conditions {
+            freedom: Some(5),
+            ..Conditions::declared()
+        });
+        assert!((moment(&tailed, 0) - 1.0).abs() < 0.1);
+        let far = |v: &[f64]| v.iter().filter(|v| v.abs() > 4.0).count();
+        assert!(far(&tailed) > 20 && far(&coloured) < 10);
+    }
+
+    #[test]
+    fn gaps_take_about_their_share_and_leave_both_ends() {
+        let conditions = Conditions {
+            gaps: 0.15,
+            ..Conditions::declared()
+        };
+        let mut outputs = Signal::zeros((4000, 2));
+        conditions.empty(&mut outputs, Noise::new(1, "gaps", 0));
+        let share = outputs.iter().filter(|v| v.is_nan()).count() as f64 / 8000.0;
+        assert!((share - 0.15).abs() < 0.03, "{share}");
+        assert!(!outputs[[0, 0]].is_nan() && !outputs[[3999, 1]].is_nan());
+    }
+}

@@ -1,0 +1,372 @@
+//! A world of equations: Runge–Kutta steps of its own, ten a sample.
+
+use super::{Draws, Run, System};
+use crate::evaluate::trials::law::{Departure, Law, Moment, Place, above};
+use crate::record::{Drive, Signal};
+use crate::twin::{Hold, Interval, Noise, Now, StateSpace};
+
+/// Steps of the integrator within a sample.
+const SUBSTEPS: usize = 10;
+/// A state beyond this has diverged, in any unit.
+const BEYOND: f64 = 1e12;
+
+/// Makes a record; `None` where a state diverges.
+pub(super) fn run(
+    twin: &dyn StateSpace,
+    system: System<'_>,
+    drive: &Drive,
+    draws: Draws,
+) -> Option<Run> {
+    let outline = twin.outline();
+    let (n, p) = (outline.states.len(), outline.outputs.len());
+    let conditions = system.conditions;
+    let mut plant = Plant {
+        twin,
+        departures: system.departures,
+        memories: vec![vec![]; system.departures.len()],
+        limits: twin.limits(),
+        stage: vec![0.0; n],
+        slopes: vec![vec![0.0; n]; 4],
+    };
+    let mut process: Vec<_> = (0..n)
+        .map(|i| conditions.noise(draws.process.source(&format!("world/state/{i}"))))
+        .collect();
+    let mut measurement: Vec<_> = (0..p)
+        .map(|j| conditions.noise(draws.measurement.source(&format!("world/sensor/{j}"))))
+        .collect();
+    let mut x = vec![0.0; n];
+    plant.begin(system, drive, draws.process, &mut x)?;
+    let samples = drive.samples();
+    let mut inputs = drive.inputs().clone();
+    let mut outputs = Signal::zeros((samples, p));
+    let (mut states, mut rates) = (Signal::zeros((samples, n)), Signal::zeros((samples, n)));
+    let (mut q, mut r) = (vec![0.0; n], vec![0.0; p]);
+    let (mut y, mut rate) = (vec![0.0; p], vec![0.0; n]);
+    for k in 0..samples {
+        let (t, dt) = (drive.time(k), drive.step(k));
+        let mut command = drive.input(k).to_vec();
+        if let Some(feedback) = &conditions.feedback
+            && k > 0
+        {
+            let wanted = command[0] + feedback.gain * (feedback.setpoint - outputs[[k - 1, 0]]);
+            command[0] = wanted.clamp(feedback.low, feedback.high);
+            inputs[[k, 0]] = command[0];
+        }
+        let u = plant.inputs(t, dt, &x, &command);
+        let theta = plant.theta(system.theta, t, dt, &x, &command);
+        let now = Now::new(t, dt, &u, &theta);
+        twin.observe(&now, &x, &mut y);
+        (q.fill(0.0), r.fill(0.0));
+        twin.noise(&now, &mut q, &mut r);
+        let own = &command;
+        plant.sense(t, dt, &x, own, false, &mut y);
+        for (j, y) in y.iter_mut().enumerate() {
+            let added = conditions.added.get(j).copied().unwrap_or(0.0);
+            let level = conditions.measurement * r[j].hypot(added);
+            *y += level * measurement[j].next();
+        }
+        plant.sense(t, dt, &x, own, true, &mut y);
+        twin.readout(&now, &mut y);
+        twin.drift(&now, &x, &mut rate);
+        for j in 0..p {
+            outputs[[k, j]] = y[j];
+        }
+        for i in 0..n {
+            (states[[k, i]], rates[[k, i]]) = (x[i], rate[i]);
+        }
+        twin.update(&now, &mut x);
+        // What lies between samples is on a line where the twin says so.
+        let next = match twin.stepping().hold {
+            Hold::Linear if k + 1 < samples => {
+                let (from, to) = (drive.input(k), drive.input(k + 1));
+                (u.iter().zip(from.iter().zip(to)))
+                    .map(|(u, (from, to))| u + to - from)
+                    .collect()
+            }
+            _ => u.clone(),
+        };
+        plant.advance(&now, &next, &command, &mut x);
+        for ((x, q), noise) in x.iter_mut().zip(&q).zip(&mut process) {
+            *x += conditions.process * q * noise.next();
+        }
+        twin.constrain(&now, &mut x);
+        plant.overflow(&mut x);
+        plant.limit(&mut x);
+        let finite = |v: &f64| v.abs() < BEYOND;
+        if !x.iter().all(finite) || !y.iter().all(finite) {
+            return None;
+        }
+    }
+    twin.corrupt_outputs(system.theta, draws.measurement, &mut outputs);
+    conditions.empty(&mut outputs, draws.process);
+    Some(Run {
+        drive: drive.with_inputs(inputs).ok()?,
+        outputs,
+        states,
+        rates,
+    })
+}
+
+/// Equations with departures, and the memories of these.
+struct Plant<'w> {
+    twin: &'w dyn StateSpace,
+    departures: &'w [Departure],
+    memories: Vec<Vec<f64>>,
+    limits: Vec<Interval>,
+    stage: Vec<f64>,
+    slopes: Vec<Vec<f64>>,
+}
+
+impl Plant<'_> {
+    /// Sets the first state.
+    fn begin(&self, system: System<'_>, drive: &Drive, noise: Noise, x: &mut [f64]) -> Option<()> {
+        let now = Now::new(0.0, drive.step(0), drive.input(0), system.theta);
+        (self.twin.check_parameters(system.theta, drive.dt())).ok()?;
+        self.twin.start(&now, x);
+        let mut deviation = vec![0.0; x.len()];
+        self.twin.start_deviation(&now, &mut deviation);
+        let mut source = noise.source("world/start");
+        for (i, x) in x.iter_mut().enumerate() {
+            let shift = system.conditions.start.get(i).copied().unwrap_or(0.0);
+            *x += shift + deviation[i] * source.normal();
+        }
+        self.limit(x);
+        self.twin.begin(&now, x);
+        Some(())
+    }
+
+    /// Inputs as they reach the system.
+    fn inputs(&mut self, t: f64, dt: f64, x: &[f64], command: &[f64]) -> Vec<f64> {
+        let mut u = command.to_vec();
+        for (departure, memory) in self.departures.iter().zip(&mut self.memories) {
+            if let Place::Actuator(j) = departure.place {
+                let now = Moment {
+                    t,
+                    x,
+                    u: command,
+                    own: u[j],
+                };
+                u[j] = departure.law.through(&now, dt, memory);
+            }
+        }
+        u
+    }
+
+    /// Parameters at this sample; memories of random forces are moved on, too.
+    fn theta(&mut self, own: &[f64], t: f64, dt: f64, x: &[f64], u: &[f64]) -> Vec<f64> {
+        let mut theta = own.to_vec();
+        for (departure, memory) in self.departures.iter().zip(&mut self.memories) {
+            match (departure.place, &departure.law) {
+                (Place::Parameter(i), Law::Parameter(law)) => theta[i] *= law.at(t),
+                (Place::Parameter(i), Law::Random(law)) => {
+                    let now = Moment {
+                        t,
+                        x,
+                        u,
+                        own: own[i],
+                    };
+                    law.remember(&now, dt, memory);
+                    theta[i] *= law.at(&now, memory).clamp(-5.0, 5.0).exp();
+                }
+                (Place::State(i), Law::Random(law)) => {
+                    let now = Moment { t, x, u, own: x[i] };
+                    law.remember(&now, dt, memory);
+                }
+                _ => {}
+            }
+        }
+        theta
+    }
+
+    /// Puts the outputs through the sensors' laws, before or after their noise.
+    fn sense(&mut self, t: f64, dt: f64, x: &[f64], u: &[f64], readings: bool, y: &mut [f64]) {
+        for (departure, memory) in self.departures.iter().zip(&mut self.memories) {
+            let Place::Sensor(j) = departure.place else {
+                continue;
+            };
+            let late = matches!(&departure.law, Law::Signal(law) if law.is_of_readings());
+            if late == readings {
+                let now = Moment { t, x, u, own: y[j] };
+                y[j] = departure.law.through(&now, dt, memory);
+            }
+        }
+    }
+
+    /// Carries the state to the next sample.
+    fn advance(&mut self, now: &Now<'_>, next: &[f64], command: &[f64], x: &mut [f64]) {
+        let h = now.dt / SUBSTEPS as f64;
+        let mut inputs = now.u.to_vec();
+        for step in 0..SUBSTEPS {
+            for (stage, part) in [0.0, 0.5, 0.5, 1.0].into_iter().enumerate() {
+                let share = (step as f64 + part) / SUBSTEPS as f64;
+                for ((u, from), to) in inputs.iter_mut().zip(now.u).zip(next) {
+                    *u = from + share * (to - from);
+                }
+                let at = Now::new(now.t + share * now.dt, h, &inputs, now.theta);
+                for (i, value) in self.stage.iter_mut().enumerate() {
+                    let before = stage.checked_sub(1).map_or(0.0, |s| self.slopes[s][i]);
+                    *value = x[i] + part * h * before;
+                }
+                self.twin.drift(&at, &self.stage, &mut self.slopes[stage]);
+                let moment = Moment {
+                    t: at.t,
+                    x: &self.stage,
+                    u: command,
+                    own: 0.0,
+                };
+                for (departure, memory) in self.departures.iter().zip(&self.memories) {
+                    if let Place::State(i) = departure.place {
+                        self.slopes[stage][i] += match &departure.law {
+                            Law::Force(law) => law.at(&moment),
+                            Law::Random(law) => law.at(&moment, memory),
+                            _ => 0.0,
+                        };
+                    }
+                }
+            }
+            for (i, x) in x.iter_mut().enumerate() {
+                let [a, b, c, d] = [0, 1, 2, 3].map(|s| self.slopes[s][i]);
+                *x += h / 6.0 * (a + 2.0 * b + 2.0 * c + d);
+            }
+            self.limit(x);
+        }
+    }
+
+    /// Cuts what exceeds a ceiling.
+    fn overflow(&self, x: &mut [f64]) {
+        for departure in self.departures {
+            if let (
+                Place::State(i),
+                Law::Ceiling {
+                    level,
+                    spill,
+                    to,
+                    softness,
+                },
+            ) = (departure.place, &departure.law)
+            {
+                let excess = above(x[i] - level, *softness);
+                x[i] -= excess;
+                if let Some(to) = to {
+                    x[*to] += spill * excess;
+                }
+            }
+        }
+    }
+
+    fn limit(&self, x: &mut [f64]) {
+        for (x, limit) in x.iter_mut().zip(&self.limits) {
+            *x = limit.clamp(*x);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluate::trials::law::ForceLaw;
+    use crate::evaluate::trials::world::Conditions;
+    use crate::twin::{DigitalTwin, Integrator, Outline, Parameter};
+
+    /// ẋ = −k·x + u, y = x, with noise.
+    struct Decay(f64);
+    impl StateSpace for Decay {
+        fn outline(&self) -> Outline {
+            Outline::new()
+                .parameter(Parameter::new("k", "1/s", 0.2, 2.0))
+                .state("x", "m")
+                .input("u", "m/s")
+                .output("y", "m")
+        }
+        fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+            dx[0] = now.u[0] - now.theta[0] * x[0];
+        }
+        fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+            y[0] = x[0];
+        }
+        fn start(&self, _: &Now<'_>, x: &mut [f64]) {
+            x[0] = 1.0;
+        }
+        fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+            (process[0], measurement[0]) = (self.0, self.0);
+        }
+        fn integrator(&self) -> Integrator {
+            Integrator::RungeKutta4
+        }
+    }
+
+    fn draws(noise: Noise) -> Draws {
+        Draws::of(noise)
+    }
+
+    fn made(noise: f64, departures: &[Departure], conditions: &Conditions) -> Run {
+        let drive = Drive::new(0.1, Signal::from_elem((200, 1), 0.5)).unwrap();
+        let system = System {
+            theta: &[0.7],
+            departures,
+            conditions,
+        };
+        run(&Decay(noise), system, &drive, draws(Noise::new(1, "w", 0))).unwrap()
+    }
+
+    /// Without noise and departures a world is its twin as far as the twin's integrator goes.
+    #[test]
+    fn a_world_without_departures_is_its_twin() {
+        let run = made(0.0, &[], &Conditions::declared());
+        let twin = DigitalTwin::free_run(&Decay(0.0), &[0.7], &run.drive).unwrap();
+        for (a, b) in run.outputs.iter().zip(&twin) {
+            assert!((a - b).abs() < 1e-6, "{a} {b}");
+        }
+        let force = Departure {
+            place: Place::State(0),
+            law: Law::Force(ForceLaw::Constant {
+                force: 0.2,
+                onset: 0.0,
+            }),
+        };
+        // At rest x = (u + force)/k.
+        let forced = made(0.0, &[force], &Conditions::declared());
+        assert!((forced.outputs[[199, 0]] - 1.0).abs() < 1e-3);
+    }
+
+    /// At rest the variance of the state is q²/(1 − a²), a = exp(−k·Δt), times the factor's square.
+    #[test]
+    fn noise_has_its_level_and_its_factor() {
+        let conditions = Conditions {
+            process: 2.0,
+            measurement: 0.0,
+            ..Conditions::declared()
+        };
+        let drive = Drive::new(0.1, Signal::from_elem((20_000, 1), 0.5)).unwrap();
+        let system = System {
+            theta: &[0.7],
+            departures: &[],
+            conditions: &conditions,
+        };
+        let run = run(&Decay(0.01), system, &drive, draws(Noise::new(1, "w", 0))).unwrap();
+        let tail: Vec<f64> = run.outputs.iter().copied().skip(500).collect();
+        let variance = crate::math::deviation(&tail).powi(2);
+        let expected = (0.02f64).powi(2) / (1.0 - (-0.14f64).exp());
+        assert!(
+            (variance / expected - 1.0).abs() < 0.15,
+            "{variance} {expected}"
+        );
+    }
+
+    #[test]
+    fn feedback_moves_the_input_within_its_ends() {
+        let conditions = Conditions {
+            feedback: Some(super::super::Feedback {
+                gain: 2.0,
+                setpoint: 0.9,
+                low: 0.0,
+                high: 0.8,
+            }),
+            ..Conditions::declared()
+        };
+        let run = made(0.01, &[], &conditions);
+        let inputs = run.drive.inputs();
+        assert!(inputs.iter().all(|u| (0.0..=0.8).contains(u)));
+        assert!(inputs.iter().any(|u| *u != 0.5));
+    }
+}
