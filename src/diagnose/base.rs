@@ -56,7 +56,11 @@ impl<'a> Base<'a> {
         let fitted = if twin.equations().is_some() {
             let problem = Problem::new(twin.clone(), axes.clone(), records);
             let initial: Vec<Vec<f64>> = initial.iter().map(|theta| problem.full(theta)).collect();
-            let found = polish(&problem, search(&problem, &initial, noise, ITERATIONS)?, ITERATIONS)?;
+            let found = polish(
+                &problem,
+                search(&problem, &initial, noise, ITERATIONS)?,
+                ITERATIONS,
+            )?;
             found.into_iter().next().map(|fitted| (problem, fitted))
         } else {
             let problem = Problem::of_twin(twin, records);

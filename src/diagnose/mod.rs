@@ -32,10 +32,10 @@ pub use error::{DiagnoseError, GivenRecord};
 pub(crate) use outcome::Cell;
 pub use outcome::{
     Band, Cause, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit, FittedNuisance,
-    FittedParameter, FreeRuns, Lag, Location, Maps, MissingFunction, NextInput, Onset, Probabilities,
-    Region, Remains, Shrinkage, TargetShare, Term, Verdict, Visible, Window,
+    FittedParameter, FreeRuns, Lag, Location, Maps, MissingFunction, NextInput, Onset,
+    Probabilities, Region, Remains, Shrinkage, TargetShare, Term, Verdict, Visible, Window,
 };
-pub(crate) use quantify::share::{SHORTEST_SPLIT, held_out_from};
+pub(crate) use quantify::share::SHORTEST_SPLIT;
 pub use run::diagnose;
 pub use settings::DiagnoseSettings;
 

@@ -12,7 +12,7 @@ use super::hypotheses::{listed, not_tested, unknown};
 use super::locate::discover::discover;
 use super::locate::functions::{curve, told};
 use super::locate::maps::maps;
-use super::model::{Model, keys};
+use super::model::Model;
 use super::outcome::*;
 use super::quantify::calibrate::calibrate;
 use super::quantify::free_run::{Runner, free_runs};
@@ -111,9 +111,10 @@ fn search<R>(
         scales: &base.scales,
         frequencies: &base.frequencies,
     };
-    let listed: Vec<Arc<Term>> = (listed(study, &settings.without, &library, &base.noisy)?.into_iter())
-        .map(Arc::new)
-        .collect();
+    let listed: Vec<Arc<Term>> = (listed(study, &settings.without, &library, &base.noisy)?
+        .into_iter())
+    .map(Arc::new)
+    .collect();
     let unlisted = |seen: &[Scales<'_>]| -> Vec<Arc<Term>> {
         unknown(&library, seen).into_iter().map(Arc::new).collect()
     };
@@ -122,7 +123,13 @@ fn search<R>(
         unknown: &unlisted,
     };
     let breadth = Breadth::of(&base.model);
-    let findings = explore(&base.model, &terms, breadth, !settings.detection_only, progress)?;
+    let findings = explore(
+        &base.model,
+        &terms,
+        breadth,
+        !settings.detection_only,
+        progress,
+    )?;
     let names: Vec<Term> = listed.iter().map(|t| t.as_ref().clone()).collect();
     then(Explored {
         study,
@@ -142,7 +149,14 @@ fn report(
     noise: Noise,
     progress: &Progress,
 ) -> Result<Diagnosis, DiagnoseError> {
-    let Explored { study, base, listed, findings, chances, not_tested } = &explored;
+    let Explored {
+        study,
+        base,
+        listed,
+        findings,
+        chances,
+        not_tested,
+    } = &explored;
     let model = &base.model;
     let records = model.problem.records;
     let mut detection = Detection {
@@ -161,10 +175,19 @@ fn report(
         };
         let log_odds = |records: &[Record]| {
             let silent = Progress::silent();
-            search(study, records, &alone, noise, &silent, |found| Ok(found.chances.log_odds))
+            search(study, records, &alone, noise, &silent, |found| {
+                Ok(found.chances.log_odds)
+            })
         };
         let own = chances.log_odds;
-        let p = calibrate(model, settings.calibrate, own, log_odds, noise.child("null"), &stage)?;
+        let p = calibrate(
+            model,
+            settings.calibrate,
+            own,
+            log_odds,
+            noise.child("null"),
+            &stage,
+        )?;
         if let Some((p, at_floor)) = p {
             (detection.p_value, detection.at_floor) = (Some(p), at_floor);
         }
@@ -209,7 +232,14 @@ fn report(
         stage.tick()?;
         let validation = validation.map(std::slice::from_ref);
         let initial = settings.initial.as_deref();
-        shrunk = shrinkage(model, accepted, &findings.listed, validation, initial, noise)?;
+        shrunk = shrinkage(
+            model,
+            accepted,
+            &findings.listed,
+            validation,
+            initial,
+            noise,
+        )?;
         stage.tick()?;
     }
     let runs = |records: &[Record]| -> Result<FreeRuns, DiagnoseError> {
@@ -246,7 +276,9 @@ fn report(
         discovery,
         power: visible,
         free_runs: runs(&records[..1])?,
-        validation_runs: validation.map(|v| runs(std::slice::from_ref(v))).transpose()?,
+        validation_runs: validation
+            .map(|v| runs(std::slice::from_ref(v)))
+            .transpose()?,
         candidates: findings.listed.len() + findings.unknown.len(),
         not_tested: not_tested.clone(),
         seconds: 0.0,
@@ -267,7 +299,10 @@ fn located(
         })
         .collect();
     targets.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    let accepted = conclusion.accepted.first().and_then(|key| Some(key.split_once('@')?.1.to_owned()));
+    let accepted = conclusion
+        .accepted
+        .first()
+        .and_then(|key| Some(key.split_once('@')?.1.to_owned()));
     let mut functions = told(&findings.unknown, false, 0.0);
     if let Some((keys, on_top)) = findings.beside(&conclusion.accepted) {
         let floor = findings.gain(keys).unwrap_or(0.0);
@@ -292,7 +327,11 @@ fn discovered(findings: &Findings<'_>, conclusion: &Conclusion, noise: Noise) ->
     };
     let (found, curve) = (all.iter()).find_map(|f| Some((f, curve(f.model.as_ref()?)?)))?;
     let term = found.last();
-    discover((&term.target, &term.variables[0].0), &curve, noise.child("discover"))
+    discover(
+        (&term.target, &term.variables[0].0),
+        &curve,
+        noise.child("discover"),
+    )
 }
 
 fn check(

@@ -21,7 +21,11 @@ pub(in crate::diagnose) fn effects(
     let mut all: Vec<EffectFit> = (findings.listed.iter())
         .filter_map(|found| {
             let model = found.model.as_ref()?;
-            let probability = chances.effects.get(&found.last().key()).copied().unwrap_or(0.0);
+            let probability = chances
+                .effects
+                .get(&found.last().key())
+                .copied()
+                .unwrap_or(0.0);
             Some(fit_of(model, found.last(), probability, found.gain))
         })
         .collect();
@@ -101,7 +105,9 @@ pub(in crate::diagnose) fn parameters(
 }
 
 /// Noise levels, magnitudes of the study's own effects, and the first states given the records.
-pub(in crate::diagnose) fn nuisance(model: &Model<'_>) -> Result<Vec<FittedNuisance>, DiagnoseError> {
+pub(in crate::diagnose) fn nuisance(
+    model: &Model<'_>,
+) -> Result<Vec<FittedNuisance>, DiagnoseError> {
     let errors = model.fitted.std_errors(&model.problem);
     let theta = model.theta();
     let space = model.base.parameters();
@@ -121,15 +127,19 @@ pub(in crate::diagnose) fn nuisance(model: &Model<'_>) -> Result<Vec<FittedNuisa
         })
         .collect();
     let begun = recoverable(smoothed(&model.problem, &model.fitted.theta))?.unwrap_or_default();
-    all.extend(starts(&model.problem, &begun).into_iter().map(|start| FittedNuisance {
-        name: match start.record {
-            1 => start.name,
-            r => format!("{} (record {r})", start.name),
-        },
-        role: "start",
-        value: start.value,
-        std_error: start.std_error,
-    }));
+    all.extend(
+        starts(&model.problem, &begun)
+            .into_iter()
+            .map(|start| FittedNuisance {
+                name: match start.record {
+                    1 => start.name,
+                    r => format!("{} (record {r})", start.name),
+                },
+                role: "start",
+                value: start.value,
+                std_error: start.std_error,
+            }),
+    );
     Ok(all)
 }
 
@@ -141,7 +151,10 @@ pub(in crate::diagnose) fn onset(model: &Model<'_>) -> Option<Onset> {
         let Part::Effect { effect, .. } = &term.part else {
             return None;
         };
-        let change = effect.magnitudes().iter().find(|m| m.unit == "s" && m.off.is_none())?;
+        let change = effect
+            .magnitudes()
+            .iter()
+            .find(|m| m.unit == "s" && m.off.is_none())?;
         let j = space.position(&effect.key().magnitude(change.name)).ok()?;
         Some(Onset {
             time: theta[j],
@@ -151,7 +164,10 @@ pub(in crate::diagnose) fn onset(model: &Model<'_>) -> Option<Onset> {
 }
 
 /// What an unknown function adds on top of the accepted effects, or else of the best single one.
-pub(in crate::diagnose) fn remains(findings: &Findings<'_>, conclusion: &Conclusion) -> Option<Remains> {
+pub(in crate::diagnose) fn remains(
+    findings: &Findings<'_>,
+    conclusion: &Conclusion,
+) -> Option<Remains> {
     if conclusion.decision == Decision::NotNeeded {
         return None;
     }

@@ -61,7 +61,6 @@ pub(crate) mod shards;
 
 pub use bank::Draws;
 pub use error::EstimatorError;
-pub(crate) use estimate::track;
 pub use estimate::{Estimate, EstimateOptions, Nuisance, Seconds, Tracking};
 pub use estimator::Estimator;
 pub use gate::{GateForm, GateOutcome, GateSettings};

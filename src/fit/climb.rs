@@ -14,8 +14,6 @@ pub(crate) struct Fitted {
     /// Full θ.
     pub theta: Vec<f64>,
     pub log_likelihood: f64,
-    /// Log-density of the priors that count in comparisons.
-    pub log_prior: f64,
     /// Objective of the fit: likelihood and all priors.
     pub objective: f64,
     /// Gradient of the objective in φ.
@@ -25,11 +23,6 @@ pub(crate) struct Fitted {
 }
 
 impl Fitted {
-    /// Value by which fits of different twins are compared.
-    pub fn value(&self) -> f64 {
-        self.log_likelihood + self.log_prior
-    }
-
     /// Standard deviations of θ from information and prior, first order.
     pub fn std_errors(&self, problem: &Problem<'_>) -> Vec<f64> {
         let slopes = problem.coordinates.slopes(&self.theta);
@@ -97,7 +90,6 @@ pub(crate) fn climb(
     }
     let theta = c.theta(phi.as_slice());
     Ok(Some(Fitted {
-        log_prior: problem.log_prior(&theta, false),
         log_likelihood: slope.log_likelihood,
         objective: slope.objective(),
         gradient: slope.gradient,

@@ -173,10 +173,13 @@ impl<'a> Expansion<'a> {
 
     /// Magnitudes among the free entries, with the sizes that count.
     fn blocks(&self) -> Vec<Block> {
-        let alone = (self.free.iter()).filter_map(|&entry| match self.problem.axes[entry].evidence {
-            EvidencePrior::Magnitude { largest } => Some((vec![entry], vec![vec![1.0]], largest)),
-            _ => None,
-        });
+        let alone =
+            (self.free.iter()).filter_map(|&entry| match self.problem.axes[entry].evidence {
+                EvidencePrior::Magnitude { largest } => {
+                    Some((vec![entry], vec![vec![1.0]], largest))
+                }
+                _ => None,
+            });
         let families = self.problem.families.iter().filter_map(|family| {
             let free: Vec<usize> = (0..family.entries.len())
                 .filter(|&a| self.free.contains(&family.entries[a]))
@@ -189,26 +192,28 @@ impl<'a> Expansion<'a> {
         });
         alone
             .chain(families)
-            .map(|(entries, weights, largest): (Vec<usize>, Vec<Vec<f64>>, f64)| {
-                let own = self.own_information(&entries);
-                let options = (weights.iter())
-                    .flat_map(|weights| {
-                        let roots: Vec<f64> = weights.iter().map(|w| w.sqrt()).collect();
-                        let scaled = DMatrix::from_fn(entries.len(), entries.len(), |a, b| {
-                            roots[a] * own[(a, b)] * roots[b]
-                        });
-                        let most = scaled.symmetric_eigenvalues().max().max(1e-300);
-                        let visible = 1.0 / most.sqrt();
-                        let largest = largest.max(2.0 * visible);
-                        let ratio = (largest / visible).ln() / (SIZES - 1) as f64;
-                        (0..SIZES).map(move |i| {
-                            let size = visible * (ratio * i as f64).exp();
-                            roots.iter().map(|root| size * root).collect()
+            .map(
+                |(entries, weights, largest): (Vec<usize>, Vec<Vec<f64>>, f64)| {
+                    let own = self.own_information(&entries);
+                    let options = (weights.iter())
+                        .flat_map(|weights| {
+                            let roots: Vec<f64> = weights.iter().map(|w| w.sqrt()).collect();
+                            let scaled = DMatrix::from_fn(entries.len(), entries.len(), |a, b| {
+                                roots[a] * own[(a, b)] * roots[b]
+                            });
+                            let most = scaled.symmetric_eigenvalues().max().max(1e-300);
+                            let visible = 1.0 / most.sqrt();
+                            let largest = largest.max(2.0 * visible);
+                            let ratio = (largest / visible).ln() / (SIZES - 1) as f64;
+                            (0..SIZES).map(move |i| {
+                                let size = visible * (ratio * i as f64).exp();
+                                roots.iter().map(|root| size * root).collect()
+                            })
                         })
-                    })
-                    .collect();
-                Block { entries, options }
-            })
+                        .collect();
+                    Block { entries, options }
+                },
+            )
             .collect()
     }
 
@@ -251,7 +256,8 @@ impl<'a> Expansion<'a> {
                     tried[b] = i;
                     at(&tried).map_or(f64::NEG_INFINITY, |l| l.log_evidence)
                 };
-                let best = (0..blocks[b].options.len()).max_by(|a, b| value(*a).total_cmp(&value(*b)));
+                let best =
+                    (0..blocks[b].options.len()).max_by(|a, b| value(*a).total_cmp(&value(*b)));
                 chosen[b] = best.unwrap_or(chosen[b]);
             }
         }
@@ -376,7 +382,11 @@ impl<'a> Expansion<'a> {
                     .map(|deviations| {
                         (block.entries.iter().zip(deviations))
                             .filter_map(|(j, d)| {
-                                let half = if self.problem.axes[*j].is_one_sided() { LN_2 } else { 0.0 };
+                                let half = if self.problem.axes[*j].is_one_sided() {
+                                    LN_2
+                                } else {
+                                    0.0
+                                };
                                 Some(normal(value(*j)?, 0.0, d.powi(-2)) + half)
                             })
                             .sum()

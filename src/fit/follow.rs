@@ -40,7 +40,11 @@ pub(crate) fn starts(problem: &Problem<'_>, smoothed: &[Smoothed]) -> Vec<Fitted
 }
 
 /// Noise-free runs from the start given the record; none where a run diverges.
-pub(crate) fn free_runs(problem: &Problem<'_>, theta: &[f64], smoothed: &[Smoothed]) -> Vec<Option<Signal>> {
+pub(crate) fn free_runs(
+    problem: &Problem<'_>,
+    theta: &[f64],
+    smoothed: &[Smoothed],
+) -> Vec<Option<Signal>> {
     (problem.records.iter().enumerate())
         .map(|(r, record)| {
             let own = problem.of_record(r, theta);

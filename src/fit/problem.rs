@@ -1,7 +1,7 @@
 //! A twin and the records that it is fitted to.
 
 use crate::fit::axis::{Axis, Family};
-use crate::likelihood::ensemble::{self, Predictor};
+
 use crate::likelihood::kalman::{Coordinates, FilterError, Filtered, Score};
 use crate::likelihood::{Likelihood, likelihood_of};
 use crate::record::{Record, Signal};
@@ -111,28 +111,9 @@ impl<'a> Problem<'a> {
         Problem::new(self.twin.clone(), self.axes[..d].to_vec(), records)
     }
 
-    /// The same problem with all but the unknown starts held.
-    pub fn starts_only(&self) -> Option<Self> {
-        let space = self.twin.parameters();
-        let d = space.len();
-        let free = |j: usize| j >= d || space[j].role == Role::Start;
-        let mut problem = self.clone();
-        for (j, axis) in problem.axes.iter_mut().enumerate() {
-            axis.held = !free(j);
-        }
-        (0..self.dimension()).any(free).then_some(problem)
-    }
-
     /// States, inputs and outputs; of a black box, its predicted outputs stand for states.
     pub fn outline(&self) -> Outline {
         self.likelihood.outline()
-    }
-
-    /// Returns the predictors of all records of a black box at θ.
-    pub fn predictors(&self, theta: &[f64]) -> Result<Vec<Predictor>, FilterError> {
-        (self.records.iter().enumerate())
-            .map(|(r, record)| ensemble::predictor(&self.twin, &self.of_record(r, theta), record))
-            .collect()
     }
 
     /// Number of samples of all records.

@@ -131,11 +131,6 @@ impl Reference {
         self.directions.column(j)
     }
 
-    /// The Gauss–Newton step of θ, the weak prior pulling as `pull` says.
-    pub fn step(&self, pull: &DVector<f64>) -> DVector<f64> {
-        (self.factor).solve(&(self.directions.tr_mul(&self.r) + pull))
-    }
-
     /// d from the innovations elsewhere.
     pub fn direction(&self, there: &[Filtered]) -> DVector<f64> {
         let p = self.channels;

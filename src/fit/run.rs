@@ -5,14 +5,13 @@ use super::certificate::{Certificate, Side};
 use super::climb::Fitted;
 use super::effects::begin;
 use super::evidence::evidence;
+use super::follow::{free_runs, smoothed, starts};
 use super::magnitude::{Kind, kinds, largest, shape_axis, size_axis};
 use super::outcome::{
-    Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedValue,
-    OutputErrors, Warning,
+    Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedValue, OutputErrors, Warning,
 };
 use super::posterior::posterior;
 use super::problem::Problem;
-use super::follow::{free_runs, smoothed, starts};
 use super::starts::{base_fit, polish, search};
 use crate::effect::Effect;
 use crate::likelihood::kalman::FilterError;

@@ -199,8 +199,14 @@ fn build(
     for (j, output) in outline.outputs.iter().enumerate() {
         let (guess, loud) = (SHARE * outputs[j], LOUD * outputs[j]);
         let unit = output.unit.clone();
-        let stops = records.iter().any(|r| stops(&r.outputs().column(j).to_vec()));
-        let floor = if stops { STOPPED * outputs[j] } else { f64::MIN_POSITIVE };
+        let stops = records
+            .iter()
+            .any(|r| stops(&r.outputs().column(j).to_vec()));
+        let floor = if stops {
+            STOPPED * outputs[j]
+        } else {
+            f64::MIN_POSITIVE
+        };
         if let Some(parameter) = add(&output.name, unit, floor, r[j], guess, loud) {
             noisy.measurement[j] = Source::Fitted {
                 parameter,

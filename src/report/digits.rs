@@ -63,17 +63,12 @@ impl Digits {
     }
 }
 
-/// A probability, three places.
+/// A p-value, three places.
 pub(super) fn probability(p: f64) -> String {
     match p {
         p if p < 0.0005 => "p < 0.001".into(),
         p => format!("p = {p:.3}"),
     }
-}
-
-/// A p-value in a column that says so.
-pub(super) fn bare(p: f64) -> String {
-    probability(p).replace("p = ", "").replace("p ", "")
 }
 
 /// A standard error, two significant digits.

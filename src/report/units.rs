@@ -1,6 +1,6 @@
 //! Units of everything that a diagnosis names, as far as the twin tells them.
 
-use super::digits::{short, unit_suffix};
+use super::digits::{named, short, unit_suffix};
 use crate::diagnose::EffectFit;
 use crate::effect::{Effect, TargetKind};
 use crate::record::Quantity;
@@ -43,9 +43,17 @@ impl Units {
         self.states.iter().any(|q| q.name == name)
     }
 
-    /// Returns the unit of the equation of a state or an output.
-    pub(super) fn equation_unit(&self, name: &str) -> String {
-        let unit = self.variable(name);
+    /// `h1 in V`.
+    pub(super) fn named(&self, variable: &str) -> String {
+        named(&Quantity::new(variable, self.variable(variable)))
+    }
+
+    /// Returns the unit of what joins a state's rate, or a signal.
+    pub(super) fn place_unit(&self, name: &str) -> String {
+        let unit = match self.signal(name) {
+            Some((_, signal)) => signal.unit.as_str(),
+            None => self.variable(name),
+        };
         match (self.is_state(name), unit) {
             (false, unit) => unit.into(),
             (true, "" | "-" | "1") => "1/s".into(),
@@ -54,21 +62,32 @@ impl Units {
         }
     }
 
-    /// `rate of h1`, or `output y`.
-    pub(super) fn equation_name(&self, name: &str) -> String {
-        if self.is_state(name) {
-            format!("rate of {name}")
-        } else {
-            format!("output {name}")
+    /// `rate of h1`, or `output y` of a sensor, or `input u` of an actuator.
+    pub(super) fn place_name(&self, name: &str) -> String {
+        match self.signal(name) {
+            Some((kind, signal)) => format!("{kind} {}", signal.name),
+            None if self.is_state(name) => format!("rate of {name}"),
+            None => name.into(),
         }
     }
 
     /// `rate of h1 in V/s`, or `output y in V`.
-    pub(super) fn equation(&self, name: &str) -> String {
-        let what = self.equation_name(name);
-        match unit_suffix(&self.equation_unit(name)) {
-            unit if unit.is_empty() => what,
-            unit => format!("{what} in{unit}"),
+    pub(super) fn place(&self, name: &str) -> String {
+        named(&Quantity::new(
+            &self.place_name(name),
+            &self.place_unit(name),
+        ))
+    }
+
+    /// Returns the signal of a sensor or an actuator, and its kind.
+    fn signal(&self, place: &str) -> Option<(&'static str, &Quantity)> {
+        if self.is_state(place) {
+            return None;
+        }
+        match place.trim_end_matches(|c: char| c.is_ascii_digit()) {
+            "sensor" => Some(("output", channel(&self.outputs, place)?)),
+            "actuator" => Some(("input", channel(&self.inputs, place)?)),
+            _ => None,
         }
     }
 
@@ -97,8 +116,8 @@ impl Units {
     /// bent, and of the other state.
     fn magnitude(&self, effect: &Effect, unit: &str) -> String {
         let bent = match effect.law().target() {
-            TargetKind::Sensor => channel(&self.outputs, effect.target()),
-            TargetKind::Actuator => channel(&self.inputs, effect.target()),
+            TargetKind::Sensor => unit_of(channel(&self.outputs, effect.target())),
+            TargetKind::Actuator => unit_of(channel(&self.inputs, effect.target())),
             TargetKind::State => self.variable(effect.target()),
             TargetKind::Parameter => "",
         };
@@ -118,11 +137,15 @@ impl Units {
     }
 }
 
-/// The unit of `sensor`, or of `sensor2`.
-fn channel<'a>(channels: &'a [Quantity], target: &str) -> &'a str {
+/// The channel of `sensor`, or of `sensor2`.
+fn channel<'a>(channels: &'a [Quantity], target: &str) -> Option<&'a Quantity> {
     let number = target.trim_start_matches(|c: char| !c.is_ascii_digit());
     let index = number.parse().unwrap_or(1_usize).saturating_sub(1);
-    channels.get(index).map_or("", |q| &q.unit)
+    channels.get(index)
+}
+
+fn unit_of(channel: Option<&Quantity>) -> &str {
+    channel.map_or("", |q| &q.unit)
 }
 
 #[cfg(test)]
@@ -136,8 +159,7 @@ mod tests {
             target: target.into(),
             probability: 1.0,
             magnitudes: magnitudes.iter().map(|(n, v)| ((*n).into(), *v)).collect(),
-            log_score_gain: 1.0,
-            p_value: None,
+            log_evidence: 1.0,
         }
     }
 
@@ -191,13 +213,16 @@ mod tests {
     }
 
     #[test]
-    fn equations_are_named_with_the_unit_of_what_they_give() {
+    fn places_are_named_with_the_unit_of_what_joins_them() {
         let studies = reference_studies().unwrap();
         let [oscillator, tanks] = [0, 1].map(|i| Units::of(&studies[i]));
-        assert_eq!(tanks.equation("h1"), "rate of h1 in V/s");
-        assert_eq!(tanks.equation("y"), "output y in V");
-        assert_eq!(oscillator.equation("x1"), "rate of x1 in 1/s");
-        assert_eq!(oscillator.equation("x2"), "rate of x2 in (1/s)/s");
+        assert_eq!(tanks.place("h1"), "rate of h1 in V/s");
+        assert_eq!(tanks.place("sensor"), "output y in V");
+        assert_eq!(tanks.place("actuator"), "input u in V");
+        assert_eq!(tanks.place("k1"), "k1");
+        assert_eq!(tanks.named("h2"), "h2 in V");
+        assert_eq!(oscillator.place("x1"), "rate of x1 in 1/s");
+        assert_eq!(oscillator.place("x2"), "rate of x2 in (1/s)/s");
         let level = tanks.of_magnitude("state-ceiling", "h1", "level");
         assert_eq!(level.as_deref(), Some("V"));
         assert_eq!(tanks.of_magnitude("state-ceiling", "h9", "level"), None);

@@ -84,8 +84,8 @@ impl Study {
             NoiseLevel::Declared { known, factor, .. } => Some((name.clone(), *known, *factor)),
             _ => None,
         });
-        let starts =
-            (self.file.start.iter()).filter(|(_, level)| matches!(level, StartLevel::Declared { .. }));
+        let starts = (self.file.start.iter())
+            .filter(|(_, level)| matches!(level, StartLevel::Declared { .. }));
         Beliefs {
             step: self.plan.step,
             known: (declared.clone().filter(|(_, known, _)| *known))

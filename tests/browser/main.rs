@@ -17,9 +17,9 @@ use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
 use truetwin::diagnose::{
-    Band, Cause, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit, Equation,
-    FittedNuisance, FittedParameter, FreeRuns, Lag, Location, Maps, NextInput, Onset, Region,
-    Shrinkage, TargetShare, Term, TermRange, Verdict, Visible, Window,
+    Band, Cause, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit, FittedNuisance,
+    FittedParameter, FreeRuns, Lag, Location, Maps, MissingFunction, NextInput, Onset,
+    Probabilities, Region, Remains, Shrinkage, TargetShare, Term, Verdict, Visible, Window,
 };
 use truetwin::evaluate::paper::reference_studies;
 use truetwin::evaluate::trials::{Kind, Named, Outcome, Row, Scorecard};
@@ -92,7 +92,7 @@ fn pages() -> Vec<(&'static str, String)> {
         ("class", gap_html(tanks, &made::tanks_class())),
         ("none", gap_html(oscillator, &made::oscillator_none())),
         ("no-gap", gap_html(oscillator, &made::oscillator_no_gap())),
-        ("pair", gap_html(&rig, &made::rig_pair())),
+        ("partial", gap_html(&rig, &made::rig_pair())),
         ("scorecard", scorecard_html(&made_scores::scorecard())),
     ]
 }

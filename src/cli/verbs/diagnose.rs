@@ -32,9 +32,12 @@ pub(in crate::cli) struct Diagnose {
     /// Estimator of the same twin; its estimate is one starting point of the fit.
     #[arg(long, value_name = "EST")]
     estimator: Option<PathBuf>,
-    /// Record that no fit uses: sharper test and ranking, share of the gap closed.
+    /// Record that no fit uses: the share of the gap closed is measured on it.
     #[arg(long, value_name = "V.csv")]
     validation: Option<PathBuf>,
+    /// Simulate N records of the fitted twin and diagnose them alike, for a p-value.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    calibrate: usize,
     /// Effects to exclude.
     #[arg(long, value_name = "ID[@TARGET],..", value_delimiter = ',')]
     without: Vec<EffectPattern>,
@@ -59,6 +62,7 @@ impl Verb for Diagnose {
         };
         let settings = DiagnoseSettings {
             seed: context.seed,
+            calibrate: self.calibrate,
             without: self.without.clone(),
             initial,
             ..DiagnoseSettings::default()

@@ -31,18 +31,20 @@ pub(in crate::diagnose) struct Findings<'a> {
 pub(in crate::diagnose) struct Chances {
     /// Nothing is missing.
     pub nothing: f64,
+    /// Listed effects explain everything.
+    pub listed: f64,
+    /// Listed effects explain a part.
+    pub partial: f64,
     /// Something unknown alone.
     pub unknown: f64,
-    /// Sets of listed effects beside something unknown.
-    pub parts: Vec<(Vec<String>, f64)>,
     /// Listed effects by their keys: alone, as part of a set, or beside something unknown.
     pub effects: BTreeMap<String, f64>,
-    /// Sets of listed effects that explain everything.
-    pub sets: Vec<(Vec<String>, f64)>,
     /// Places.
     pub places: BTreeMap<String, f64>,
     /// log of the odds of a gap against none, prior odds even.
     pub log_odds: f64,
+    /// Sets of listed effects, the probability of each alone, and its weight among them.
+    sets: Vec<(Vec<String>, f64, f64)>,
 }
 
 impl<'a> Findings<'a> {
@@ -77,71 +79,117 @@ impl<'a> Findings<'a> {
     /// The model that explains most.
     pub fn best(&self) -> Option<&Model<'a>> {
         let on_top = self.beside.iter().flat_map(|(_, all)| all);
-        (self.listed.iter().chain(&self.several).chain(&self.unknown).chain(on_top))
-            .filter(|f| f.model.is_some())
-            .max_by(|a, b| a.gain.total_cmp(&b.gain))
-            .and_then(|f| f.model.as_ref())
+        (self
+            .listed
+            .iter()
+            .chain(&self.several)
+            .chain(&self.unknown)
+            .chain(on_top))
+        .filter(|f| f.model.is_some())
+        .max_by(|a, b| a.gain.total_cmp(&b.gain))
+        .and_then(|f| f.model.as_ref())
     }
 
     /// log of the evidence of a set over that of the twin.
     pub fn gain(&self, keys: &[String]) -> Option<f64> {
-        (self.listed.iter().chain(&self.several)).find(|f| same(&f.keys(), keys)).map(|f| f.gain)
+        (self.listed.iter().chain(&self.several))
+            .find(|f| same(&f.keys(), keys))
+            .map(|f| f.gain)
     }
 
     /// Posterior probabilities of all hypotheses.
     pub fn chances(&self) -> Chances {
-        let (listed, unknown) = (self.listed.len().max(1) as f64, self.unknown.len().max(1) as f64);
+        let (listed, unknown) = (
+            self.listed.len().max(1) as f64,
+            self.unknown.len().max(1) as f64,
+        );
         let each = Thresholds::LISTED / listed;
         let every = (1.0 - Thresholds::LISTED) / unknown;
-        // (log weight, listed effects, with something unknown, places)
-        let mut all: Vec<(f64, Vec<String>, bool, Vec<String>)> = vec![];
+        let pair = (0.5 * (listed - 1.0)).max(1.0).ln();
+        let price = |count: usize| pair * (count - 1) as f64;
         let places = |found: &Found<'_>| -> Vec<String> {
             found.terms.iter().map(|t| t.target.clone()).collect()
         };
-        for found in &self.listed {
-            all.push((each.ln() + found.gain, found.keys(), false, places(found)));
+        let mut all: Vec<Weighed> = vec![];
+        for found in self.listed.iter().chain(&self.several) {
+            all.push(Weighed {
+                log_weight: each.ln() + found.gain - price(found.terms.len()),
+                kind: Kind::Listed(found.keys()),
+                places: places(found),
+            });
         }
         for found in &self.unknown {
-            all.push((every.ln() + found.gain, vec![], true, places(found)));
-        }
-        let pair = (0.5 * (listed - 1.0)).max(1.0).ln();
-        for found in &self.several {
-            let price = pair * (found.terms.len() - 1) as f64;
-            all.push((each.ln() + found.gain - price, found.keys(), false, places(found)));
+            all.push(Weighed {
+                log_weight: every.ln() + found.gain,
+                kind: Kind::Unknown,
+                places: places(found),
+            });
         }
         for (keys, on_top) in &self.beside {
-            let price = pair * (keys.len() - 1) as f64;
             for found in on_top {
-                let weight = each.ln() + every.ln() + Thresholds::SECOND.ln() + found.gain - price;
-                all.push((weight, keys.clone(), true, vec![found.last().target.clone()]));
+                let second = Thresholds::SECOND.ln() + every.ln() - price(keys.len());
+                all.push(Weighed {
+                    log_weight: each.ln() + second + found.gain,
+                    kind: Kind::Partial,
+                    places: places(found),
+                });
             }
         }
-        let logs: Vec<f64> = all.iter().map(|(w, ..)| *w).collect();
+        let logs: Vec<f64> = all.iter().map(|h| h.log_weight).collect();
         let sum = log_mean(&logs) + (logs.len() as f64).ln();
-        let nothing = 1.0 / (1.0 + sum.exp());
-        let mut chances = Chances { nothing, log_odds: sum, ..Chances::default() };
         let whole = sum.max(0.0) + (-sum.abs()).exp().ln_1p();
-        for (weight, keys, unknown, places) in all {
-            let p = (weight - whole).exp();
-            for key in &keys {
-                *chances.effects.entry(key.clone()).or_default() += p;
+        let mut chances = Chances {
+            nothing: 1.0 / (1.0 + sum.exp()),
+            log_odds: sum,
+            ..Chances::default()
+        };
+        // Which set explains a part, the sets' own evidence says: what is beside them is not known well enough to choose by.
+        let top = (all.iter())
+            .filter(|h| matches!(h.kind, Kind::Listed(_)))
+            .map(|h| h.log_weight)
+            .fold(f64::NEG_INFINITY, f64::max);
+        let mut shares = 0.0;
+        for hypothesis in all {
+            let p = (hypothesis.log_weight - whole).exp();
+            for place in &hypothesis.places {
+                *chances.places.entry(place.clone()).or_default() +=
+                    p / hypothesis.places.len() as f64;
             }
-            match (unknown, keys.is_empty()) {
-                (false, _) => chances.sets.push((keys, p)),
-                (true, true) => chances.unknown += p,
-                (true, false) => match chances.parts.iter_mut().find(|(k, _)| same(k, &keys)) {
-                    Some((_, all)) => *all += p,
-                    None => chances.parts.push((keys, p)),
-                },
-            }
-            for place in &places {
-                *chances.places.entry(place.clone()).or_default() += p / places.len() as f64;
+            match hypothesis.kind {
+                Kind::Unknown => chances.unknown += p,
+                Kind::Partial => chances.partial += p,
+                Kind::Listed(keys) => {
+                    chances.listed += p;
+                    let share = (hypothesis.log_weight - top).exp();
+                    shares += share;
+                    chances.sets.push((keys, p, share));
+                }
             }
         }
-        chances.sets.sort_by(|a, b| b.1.total_cmp(&a.1));
-        chances.parts.sort_by(|a, b| b.1.total_cmp(&a.1));
+        for (keys, p, share) in &chances.sets {
+            for key in keys {
+                *chances.effects.entry(key.clone()).or_default() +=
+                    p + chances.partial * share / shares;
+            }
+        }
         chances
     }
+}
+
+/// A hypothesis and the log of its weight times its evidence, over those of nothing.
+struct Weighed {
+    log_weight: f64,
+    kind: Kind,
+    places: Vec<String>,
+}
+
+enum Kind {
+    /// Listed effects alone.
+    Listed(Vec<String>),
+    /// Listed effects beside something unknown.
+    Partial,
+    /// Something unknown alone.
+    Unknown,
 }
 
 fn same(a: &[String], b: &[String]) -> bool {
@@ -153,7 +201,7 @@ fn same(a: &[String], b: &[String]) -> bool {
 pub(in crate::diagnose) struct Conclusion {
     pub decision: Decision,
     pub accepted: Vec<String>,
-    /// The accepted ones and their rivals; empty without any.
+    /// The accepted ones and their rivals.
     pub class: Vec<String>,
 }
 
@@ -171,8 +219,8 @@ impl Chances {
     /// Probabilities of the kinds of explanation.
     pub fn kinds(&self) -> Probabilities {
         Probabilities {
-            listed: self.sets.iter().map(|(_, p)| p).sum(),
-            partial: self.parts.iter().map(|(_, p)| p).sum(),
+            listed: self.listed,
+            partial: self.partial,
             unknown: self.unknown,
             nothing: self.nothing,
         }
@@ -181,10 +229,16 @@ impl Chances {
 
 /// Decides about a gap.
 pub(in crate::diagnose) fn decide(findings: &Findings<'_>, most_effects: usize) -> Conclusion {
-    let best_unknown = findings.unknown.first().map_or(f64::NEG_INFINITY, |f| f.gain);
+    let best_unknown = findings
+        .unknown
+        .first()
+        .map_or(f64::NEG_INFINITY, |f| f.gain);
     let listed = findings.listed.len().max(2) as f64;
     let price = (0.5 * (listed - 1.0)).max(1.0).ln();
-    let top = findings.listed.first().map_or(f64::NEG_INFINITY, |f| f.gain);
+    let top = findings
+        .listed
+        .first()
+        .map_or(f64::NEG_INFINITY, |f| f.gain);
     // (keys, value with its price, what is left)
     let singles = (findings.listed.iter()).filter(|f| f.gain > top - Thresholds::CANDIDATES);
     let candidates: Vec<(Vec<String>, f64, f64)> = singles
@@ -214,12 +268,9 @@ pub(in crate::diagnose) fn decide(findings: &Findings<'_>, most_effects: usize) 
     }
     // Listed effects that explain most, beside something unknown.
     let chances = findings.chances();
-    let partial: f64 = chances.parts.iter().map(|(_, p)| p).sum();
-    let best = (candidates.iter())
-        .filter(|c| chances.parts.iter().any(|(keys, _)| same(keys, &c.0)))
-        .max_by(|a, b| a.1.total_cmp(&b.1));
+    let best = (candidates.iter()).max_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((keys, own, left)) = best
-        && partial > chances.unknown
+        && chances.partial > chances.unknown
         && *left < Thresholds::REST * (own + left)
     {
         return named(findings, keys, Decision::Partial);
@@ -231,11 +282,7 @@ pub(in crate::diagnose) fn decide(findings: &Findings<'_>, most_effects: usize) 
 }
 
 /// A set that is named, with single effects that the records cannot tell from it.
-fn named(
-    findings: &Findings<'_>,
-    keys: &[String],
-    decision: Decision,
-) -> Conclusion {
+fn named(findings: &Findings<'_>, keys: &[String], decision: Decision) -> Conclusion {
     let own = findings.gain(keys).unwrap_or(f64::NAN);
     let mut class = keys.to_vec();
     for found in findings.listed.iter().chain(&findings.several) {
@@ -254,6 +301,6 @@ fn named(
     Conclusion {
         decision,
         accepted: keys.to_vec(),
-        class: if class.len() > keys.len() { class } else { vec![] },
+        class,
     }
 }

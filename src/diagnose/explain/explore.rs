@@ -40,11 +40,36 @@ pub(in crate::diagnose) fn explore<'a>(
     let mut unknown_alone = unknown(base, &first, origin, breadth)?;
     stage.tick()?;
     let best = unknown_alone.first().map_or(0.0, |f| f.gain);
-    let breadth = Breadth { deep: best > Thresholds::DEEP, ..breadth };
-    let mut singles = listed(base, terms.listed, origin, &[], Breadth { listed: if best > Thresholds::NULL_LIKE { usize::MAX } else { breadth.listed }, ..breadth })?;
+    let breadth = Breadth {
+        deep: best > Thresholds::DEEP,
+        ..breadth
+    };
+    let mut singles = listed(
+        base,
+        terms.listed,
+        origin,
+        &[],
+        Breadth {
+            listed: if best > Thresholds::NULL_LIKE {
+                usize::MAX
+            } else {
+                breadth.listed
+            },
+            ..breadth
+        },
+    )?;
     let top = singles.first().map_or(0.0, |f| f.gain);
     if best <= Thresholds::NULL_LIKE && top > Thresholds::NULL_LIKE {
-        singles = listed(base, terms.listed, origin, &[], Breadth { listed: usize::MAX, ..breadth })?;
+        singles = listed(
+            base,
+            terms.listed,
+            origin,
+            &[],
+            Breadth {
+                listed: usize::MAX,
+                ..breadth
+            },
+        )?;
     }
     let top = singles.first().map_or(0.0, |f| f.gain);
     stage.tick()?;
@@ -101,7 +126,10 @@ pub(in crate::diagnose) fn explore<'a>(
     }
     stage.tick()?;
     // What explains most may do so beside something unknown.
-    if !enough && let Some(found) = findings.listed.first().cloned() && findings.left(&found.keys()).is_none() {
+    if !enough
+        && let Some(found) = findings.listed.first().cloned()
+        && findings.left(&found.keys()).is_none()
+    {
         findings.add(&found, on_top(&found, terms, origin, few)?);
     }
     Ok(findings)
@@ -114,9 +142,16 @@ fn on_top<'a>(
     origin: f64,
     breadth: Breadth,
 ) -> Result<Option<Vec<Found<'a>>>, DiagnoseError> {
-    let Some(model) = &found.model else { return Ok(None) };
+    let Some(model) = &found.model else {
+        return Ok(None);
+    };
     let seen = scales(std::slice::from_ref(found))?;
-    Ok(Some(unknown(model, &(terms.unknown)(&seen), origin, breadth)?))
+    Ok(Some(unknown(
+        model,
+        &(terms.unknown)(&seen),
+        origin,
+        breadth,
+    )?))
 }
 
 /// Second effects on top of the best singles; thirds on top of the best pair where much is left.
@@ -128,12 +163,27 @@ fn pairs<'a>(
     enough: bool,
 ) -> Result<Vec<Found<'a>>, DiagnoseError> {
     let firsts = if enough { 1 } else { 3 };
-    let thetas: Vec<Vec<f64>> = findings.listed.iter().take(2).filter_map(own_theta).collect();
+    let thetas: Vec<Vec<f64>> = findings
+        .listed
+        .iter()
+        .take(2)
+        .filter_map(own_theta)
+        .collect();
     let mut all: Vec<Found<'a>> = vec![];
     let sources: Vec<Found<'a>> = match findings.beside.iter().find(|_| enough) {
         Some(_) => {
-            let adequate = |f: &&Found<'a>| findings.left(&f.keys()).is_some_and(|l| l < Thresholds::ADEQUATE);
-            findings.listed.iter().find(adequate).cloned().into_iter().collect()
+            let adequate = |f: &&Found<'a>| {
+                findings
+                    .left(&f.keys())
+                    .is_some_and(|l| l < Thresholds::ADEQUATE)
+            };
+            findings
+                .listed
+                .iter()
+                .find(adequate)
+                .cloned()
+                .into_iter()
+                .collect()
         }
         None => (findings.listed.iter().take(firsts))
             .filter(|f| f.gain > FIRST * findings.listed[0].gain)
@@ -147,11 +197,19 @@ fn pairs<'a>(
             .cloned()
             .collect();
         let count = if enough { 4 } else { 8 };
-        let seconds = Breadth { listed: count, annealed: count, least: 3.0, ..breadth };
+        let seconds = Breadth {
+            listed: count,
+            annealed: count,
+            least: 3.0,
+            ..breadth
+        };
         let found = listed(model, &others, origin, &thetas, seconds)?;
         for pair in found.into_iter().filter(|f| f.model.is_some()) {
             let keys = pair.keys();
-            match all.iter_mut().find(|p| p.keys().iter().all(|k| keys.contains(k))) {
+            match all
+                .iter_mut()
+                .find(|p| p.keys().iter().all(|k| keys.contains(k)))
+            {
                 Some(old) if old.gain >= pair.gain => {}
                 Some(old) => *old = pair,
                 None => all.push(pair),
@@ -175,7 +233,11 @@ pub(in crate::diagnose) fn absorbing<'a>(
     };
     let found = listed(within, terms, within.log_evidence, &[], breadth)?;
     let best = free.fitted.log_likelihood - Thresholds::ABSORBS;
-    let explains = |f: &Found<'a>| f.model.as_ref().is_some_and(|m| m.fitted.log_likelihood >= best);
+    let explains = |f: &Found<'a>| {
+        f.model
+            .as_ref()
+            .is_some_and(|m| m.fitted.log_likelihood >= best)
+    };
     Ok(found.into_iter().filter(explains).collect())
 }
 

@@ -42,14 +42,17 @@ pub(in crate::diagnose) fn fit_promise<'a>(
     let fits: Vec<Option<Fitted>> = (from.par_iter())
         .map(|start| climb(&extended.problem, start, effort.iterations))
         .collect::<Result<_, _>>()?;
-    let best = (fits.into_iter().flatten()).reduce(|a, b| if b.objective > a.objective { b } else { a });
+    let best =
+        (fits.into_iter().flatten()).reduce(|a, b| if b.objective > a.objective { b } else { a });
     let problem = extended.problem.clone();
     Ok(best.and_then(|fitted| extended.fitted(model.base, fitted, problem)))
 }
 
 /// The model with its noise held loud, θ fitted to that: predictions then hardly reach beyond a row, and the likelihood has no narrow
 /// valleys.
-pub(in crate::diagnose) fn loudly<'a>(model: &Model<'a>) -> Result<Option<Model<'a>>, DiagnoseError> {
+pub(in crate::diagnose) fn loudly<'a>(
+    model: &Model<'a>,
+) -> Result<Option<Model<'a>>, DiagnoseError> {
     let is_noise = |j: usize| model.problem.axes[j].begin.is_some();
     let problem = model.problem.holding(is_noise);
     let start = problem.begin(&model.fitted.theta);
@@ -74,7 +77,10 @@ pub(in crate::diagnose) fn fit_annealed<'a>(
             let mut theta = begin(loud, &held, start)?;
             for share in [0.0, 0.5] {
                 let c = &held.problem.coordinates;
-                let (mut phi, quiet) = (c.of(&theta), model.problem.coordinates.of(&model.fitted.theta));
+                let (mut phi, quiet) = (
+                    c.of(&theta),
+                    model.problem.coordinates.of(&model.fitted.theta),
+                );
                 let loudest = loud.problem.coordinates.of(&loud.fitted.theta);
                 for (j, axis) in loud.problem.axes.iter().enumerate() {
                     if axis.begin.is_some() {
@@ -89,7 +95,8 @@ pub(in crate::diagnose) fn fit_annealed<'a>(
             Ok(climb(&free.problem, &theta, RELEASED)?)
         })
         .collect::<Result<_, DiagnoseError>>()?;
-    let best = (fits.into_iter().flatten()).reduce(|a, b| if b.objective > a.objective { b } else { a });
+    let best =
+        (fits.into_iter().flatten()).reduce(|a, b| if b.objective > a.objective { b } else { a });
     let problem = free.problem.clone();
     Ok(best.and_then(|fitted| free.fitted(model.base, fitted, problem)))
 }
@@ -104,7 +111,11 @@ fn begin(
     let phi = c.of(&model.fitted.theta);
     let mut best: Option<(f64, Vec<f64>)> = None;
     for share in SHARES {
-        let moved: Vec<f64> = phi.iter().zip(&start.answer).map(|(phi, step)| phi + share * step).collect();
+        let moved: Vec<f64> = phi
+            .iter()
+            .zip(&start.answer)
+            .map(|(phi, step)| phi + share * step)
+            .collect();
         let theta = model.problem.clamp(&c.theta(&moved));
         let mut m = start.m.clone();
         if start.scales {
@@ -127,7 +138,12 @@ pub(in crate::diagnose) fn fit_function<'a>(
     linear: Linear<'a>,
     iterations: usize,
 ) -> Result<Option<Model<'a>>, DiagnoseError> {
-    let Linear { extended, found, theta, .. } = linear;
+    let Linear {
+        extended,
+        found,
+        theta,
+        ..
+    } = linear;
     let mut problem = extended.with_sizes(&found);
     // From the top of the quadratic, or nearer where that is too far.
     let c = &extended.problem.coordinates;

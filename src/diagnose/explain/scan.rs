@@ -49,7 +49,8 @@ pub(in crate::diagnose) fn scan(
     model: &Model<'_>,
     terms: &[Arc<Term>],
 ) -> Result<Vec<Promise>, DiagnoseError> {
-    let Some(reference) = recoverable(Reference::new(&model.problem, &model.fitted.theta))?.flatten()
+    let Some(reference) =
+        recoverable(Reference::new(&model.problem, &model.fitted.theta))?.flatten()
     else {
         return Ok(vec![]);
     };
@@ -63,7 +64,10 @@ pub(in crate::diagnose) fn scan(
                 .flatten()
                 .collect();
             starts.sort_by(|a, b| b.nats.total_cmp(&a.nats));
-            Ok(Promise { term: term.clone(), starts })
+            Ok(Promise {
+                term: term.clone(),
+                starts,
+            })
         })
         .collect::<Result<_, DiagnoseError>>()?;
     all.retain(|promise| !promise.starts.is_empty());
@@ -84,7 +88,11 @@ fn promise(
     let step = match first.evidence {
         EvidencePrior::Magnitude { largest } if start.scales => {
             let step = SMALL * largest;
-            m[0] = if first.bounds.contains(step) { step } else { -step };
+            m[0] = if first.bounds.contains(step) {
+                step
+            } else {
+                -step
+            };
             m[0]
         }
         _ => 1.0,
@@ -117,7 +125,6 @@ fn promise(
 
 /// Evidence of an unknown function to second order, before any refit.
 pub(in crate::diagnose) struct Linear<'a> {
-    pub term: Arc<Term>,
     pub extended: Extended<'a>,
     /// Nats over the model.
     pub gain: f64,
@@ -139,13 +146,19 @@ pub(in crate::diagnose) fn functions<'a>(
                 let Some(fitted) = extended.at(&theta)? else {
                     continue;
                 };
-                let Some((log_evidence, found)) = laplace(&extended.problem, &fitted, f64::INFINITY)
+                let Some((log_evidence, found)) =
+                    laplace(&extended.problem, &fitted, f64::INFINITY)
                 else {
                     continue;
                 };
                 let gain = log_evidence - model.log_evidence;
                 if best.as_ref().is_none_or(|b| gain > b.gain) {
-                    best = Some(Linear { term: term.clone(), extended, gain, found, theta });
+                    best = Some(Linear {
+                        extended,
+                        gain,
+                        found,
+                        theta,
+                    });
                 }
             }
             Ok(best)

@@ -125,7 +125,10 @@ pub(in crate::diagnose) fn listed<'a>(
     };
     let mut fits: Vec<Option<Found<'a>>> = (chosen.par_iter())
         .map(|promise| {
-            let effort = Effort { starts: 2, iterations: 6 };
+            let effort = Effort {
+                starts: 2,
+                iterations: 6,
+            };
             Ok(fit_promise(model, promise, thetas, effort)?.map(found))
         })
         .collect::<Result<_, DiagnoseError>>()?;
@@ -137,7 +140,12 @@ pub(in crate::diagnose) fn listed<'a>(
             .collect::<Result<_, DiagnoseError>>()?;
         for other in again.into_iter().flatten() {
             let own = |f: &Option<Found<'a>>| {
-                f.as_ref().is_some_and(|f| Arc::ptr_eq(&f.terms[f.terms.len() - 1], &other.terms[other.terms.len() - 1]))
+                f.as_ref().is_some_and(|f| {
+                    Arc::ptr_eq(
+                        &f.terms[f.terms.len() - 1],
+                        &other.terms[other.terms.len() - 1],
+                    )
+                })
             };
             match fits.iter_mut().find(|f| own(f)) {
                 Some(Some(old)) if old.gain >= other.gain => {}
@@ -160,9 +168,15 @@ pub(in crate::diagnose) fn listed<'a>(
             let found = &all[i];
             let term = &found.terms[found.terms.len() - 1];
             let promise = promises.iter().find(|p| Arc::ptr_eq(&p.term, term));
-            let thetas: Vec<Vec<f64>> =
-                best.iter().filter(|t| own_theta(found).as_ref() != Some(t)).cloned().collect();
-            let effort = Effort { starts: 3, iterations: 12 };
+            let thetas: Vec<Vec<f64>> = best
+                .iter()
+                .filter(|t| own_theta(found).as_ref() != Some(t))
+                .cloned()
+                .collect();
+            let effort = Effort {
+                starts: 3,
+                iterations: 12,
+            };
             let fitted = match promise {
                 Some(promise) => fit_promise(model, promise, &thetas, effort)?,
                 None => None,
@@ -175,10 +189,13 @@ pub(in crate::diagnose) fn listed<'a>(
                 (Some(m), Some(fitted)) => refreshed(m, fitted),
                 _ => None,
             };
-            let best = [fitted, carried]
-                .into_iter()
-                .flatten()
-                .reduce(|a, b| if b.fitted.objective > a.fitted.objective { b } else { a });
+            let best = [fitted, carried].into_iter().flatten().reduce(|a, b| {
+                if b.fitted.objective > a.fitted.objective {
+                    b
+                } else {
+                    a
+                }
+            });
             Ok(best.map(|m| Found {
                 terms: m.terms.clone(),
                 gain: m.log_evidence - origin,
@@ -195,9 +212,17 @@ pub(in crate::diagnose) fn listed<'a>(
     }
     // What was not refitted is no better than its promise.
     for promise in &promises {
-        if !all.iter().any(|f| Arc::ptr_eq(&f.terms[f.terms.len() - 1], &promise.term)) {
-            let terms: Vec<Arc<Term>> = model.terms.iter().chain([&promise.term]).cloned().collect();
-            all.push(Found { terms, gain: floor + promise.nats().min(0.0), model: None });
+        if !all
+            .iter()
+            .any(|f| Arc::ptr_eq(&f.terms[f.terms.len() - 1], &promise.term))
+        {
+            let terms: Vec<Arc<Term>> =
+                model.terms.iter().chain([&promise.term]).cloned().collect();
+            all.push(Found {
+                terms,
+                gain: floor + promise.nats().min(0.0),
+                model: None,
+            });
         }
     }
     Ok(merged(all, &ways(terms)))
@@ -207,7 +232,11 @@ pub(in crate::diagnose) fn listed<'a>(
 fn refreshed<'a>(model: &Model<'a>, fitted: crate::fit::climb::Fitted) -> Option<Model<'a>> {
     let mark: f64 = model.terms.iter().map(|t| t.mark).sum();
     let (log_evidence, _) = crate::fit::evidence::laplace(&model.problem, &fitted, 1.5)?;
-    Some(Model { fitted, log_evidence: log_evidence + mark, ..model.clone() })
+    Some(Model {
+        fitted,
+        log_evidence: log_evidence + mark,
+        ..model.clone()
+    })
 }
 
 /// θ of the twin without terms.
@@ -226,12 +255,20 @@ pub(in crate::diagnose) fn unknown<'a>(
 ) -> Result<Vec<Found<'a>>, DiagnoseError> {
     let floor = model.log_evidence - origin;
     let of = |natures: &[Nature]| -> Vec<Arc<Term>> {
-        terms.iter().filter(|t| natures.contains(&t.nature)).cloned().collect()
+        terms
+            .iter()
+            .filter(|t| natures.contains(&t.nature))
+            .cloned()
+            .collect()
     };
     let mut all: Vec<Found<'a>> = vec![];
     let half = breadth.functions.div_ceil(2);
     for (natures, price, most) in [
-        (&[Nature::Function, Nature::Past][..], 0.0, breadth.functions),
+        (
+            &[Nature::Function, Nature::Past][..],
+            0.0,
+            breadth.functions,
+        ),
         (&[Nature::Periodic], PRICE_OF_FREQUENCY, half),
     ] {
         let linear = functions(model, &of(natures))?;
@@ -268,18 +305,32 @@ pub(in crate::diagnose) fn unknown<'a>(
         .enumerate()
         .map(|(n, i)| {
             let worth = n < half && (rough[i] > 0.0 || promises[i].nats() > breadth.least);
-            let effort = Effort { starts: 2, iterations: 6 };
-            let fitted = if worth { fit_promise(model, &promises[i], &[], effort)? } else { None };
+            let effort = Effort {
+                starts: 2,
+                iterations: 6,
+            };
+            let fitted = if worth {
+                fit_promise(model, &promises[i], &[], effort)?
+            } else {
+                None
+            };
             Ok((i, fitted))
         })
         .collect::<Result<_, DiagnoseError>>()?;
     let best = (fits.iter())
         .filter_map(|(_, m)| Some(m.as_ref()?.log_evidence - model.log_evidence))
         .fold(breadth.least, f64::max);
-    all.extend(fits.into_iter().map(|(i, fitted)| Found {
-        terms: model.terms.iter().chain([&promises[i].term]).cloned().collect(),
-        gain: (fitted.as_ref()).map_or(floor + rough[i].min(best), |m| m.log_evidence - origin),
-        model: fitted,
+    all.extend(fits.into_iter().map(|(i, fitted)| {
+        Found {
+            terms: model
+                .terms
+                .iter()
+                .chain([&promises[i].term])
+                .cloned()
+                .collect(),
+            gain: (fitted.as_ref()).map_or(floor + rough[i].min(best), |m| m.log_evidence - origin),
+            model: fitted,
+        }
     }));
     Ok(merged(all, &ways(terms)))
 }

@@ -14,7 +14,8 @@ const PEAKS: usize = 3;
 /// their products with the answer to each entry of θ, for what is modulated. Up to half the sampling rate, two a cycle of the record,
 /// however long that is.
 pub(in crate::diagnose) fn frequencies(model: &Model<'_>) -> Result<Vec<f64>, DiagnoseError> {
-    let Some(reference) = recoverable(Reference::new(&model.problem, &model.fitted.theta))?.flatten()
+    let Some(reference) =
+        recoverable(Reference::new(&model.problem, &model.fitted.theta))?.flatten()
     else {
         return Ok(vec![]);
     };
@@ -22,13 +23,22 @@ pub(in crate::diagnose) fn frequencies(model: &Model<'_>) -> Result<Vec<f64>, Di
     let (samples, dt) = (record.samples(), record.drive().dt());
     let p = record.outputs().ncols();
     let residual = reference.residual();
-    let own = model.base.parameters().iter().filter(|q| q.role == crate::twin::Role::Parameter).count();
+    let own = model
+        .base
+        .parameters()
+        .iter()
+        .filter(|q| q.role == crate::twin::Role::Parameter)
+        .count();
     let mut series: Vec<Vec<f64>> = (0..p)
         .map(|i| (0..samples).map(|k| residual[2 * (k * p + i)]).collect())
         .collect();
     for j in 0..own {
         let column = reference.column(j);
-        let product = |k: usize| (0..2 * p).map(|a| residual[2 * k * p + a] * column[2 * k * p + a]).sum();
+        let product = |k: usize| {
+            (0..2 * p)
+                .map(|a| residual[2 * k * p + a] * column[2 * k * p + a])
+                .sum()
+        };
         series.push((0..samples).map(product).collect());
     }
     let mut found: Vec<f64> = vec![];
@@ -53,7 +63,9 @@ fn peaks(series: &[f64]) -> Vec<usize> {
         .map(|v| Complex::new(if v.is_finite() { v - mean } else { 0.0 }, 0.0))
         .collect();
     values.resize(2 * n, Complex::new(0.0, 0.0));
-    FftPlanner::new().plan_fft_forward(2 * n).process(&mut values);
+    FftPlanner::new()
+        .plan_fft_forward(2 * n)
+        .process(&mut values);
     let power: Vec<f64> = values[..n].iter().map(Complex::norm_sqr).collect();
     let mut tops: Vec<usize> = (3..n.saturating_sub(1))
         .filter(|&i| power[i] >= power[i - 1] && power[i] >= power[i + 1])

@@ -58,21 +58,28 @@ pub(in crate::diagnose) enum Of {
 
 impl Variable {
     fn ends(&self) -> (f64, f64) {
-        let span = (self.high - self.low).max(1e-12 * self.high.abs()).max(f64::MIN_POSITIVE);
+        let span = (self.high - self.low)
+            .max(1e-12 * self.high.abs())
+            .max(f64::MIN_POSITIVE);
         (self.low - MARGIN * span, self.high + MARGIN * span)
     }
 }
 
 /// Pairs of orders of a function of two variables.
 fn pairs() -> impl Iterator<Item = (usize, usize)> {
-    (1..=HIGHEST).flat_map(|i| (1..=HIGHEST).map(move |j| (i, j))).filter(|(i, j)| i + j <= ORDER)
+    (1..=HIGHEST)
+        .flat_map(|i| (1..=HIGHEST).map(move |j| (i, j)))
+        .filter(|(i, j)| i + j <= ORDER)
 }
 
 /// Weights of the coefficients for each length.
 fn weights(variables: usize) -> Vec<Vec<f64>> {
     let whole = 1.0 + 2.0 * MARGIN;
     let one = |squares: &dyn Fn(f64) -> Vec<f64>, length: f64| -> Vec<f64> {
-        let raw: Vec<f64> = squares(PI / whole).iter().map(|w| (-0.5 * w * length * length).exp()).collect();
+        let raw: Vec<f64> = squares(PI / whole)
+            .iter()
+            .map(|w| (-0.5 * w * length * length).exp())
+            .collect();
         let least = 1e-5 * raw.iter().copied().fold(0.0, f64::max);
         let raw: Vec<f64> = raw.into_iter().map(|w| w.max(least)).collect();
         let sum: f64 = raw.iter().sum();
@@ -81,13 +88,18 @@ fn weights(variables: usize) -> Vec<Vec<f64>> {
     match variables {
         1 => LENGTHS
             .map(|length| {
-                one(&|unit| (1..=TERMS).map(|k| (k as f64 * unit).powi(2)).collect(), length)
+                one(
+                    &|unit| (1..=TERMS).map(|k| (k as f64 * unit).powi(2)).collect(),
+                    length,
+                )
             })
             .to_vec(),
         _ => LENGTHS_OF_TWO
             .map(|length| {
                 let squares = |unit: f64| {
-                    pairs().map(|(i, j)| ((i * i + j * j) as f64) * unit * unit).collect()
+                    pairs()
+                        .map(|(i, j)| ((i * i + j * j) as f64) * unit * unit)
+                        .collect()
                 };
                 one(&squares, length)
             })
@@ -118,11 +130,17 @@ fn sum_of_two(m: &[f64], values: [f64; 2], ends: [(f64, f64); 2]) -> f64 {
     for ((phi, value), ends) in phi.iter_mut().zip(values).zip(ends) {
         sines(value, ends, phi);
     }
-    (pairs().zip(m)).map(|((i, j), m)| m * phi[0][i - 1] * phi[1][j - 1] * std::f64::consts::FRAC_1_SQRT_2).sum()
+    (pairs().zip(m))
+        .map(|((i, j), m)| m * phi[0][i - 1] * phi[1][j - 1] * std::f64::consts::FRAC_1_SQRT_2)
+        .sum()
 }
 
 /// The value of a fitted function where its variable is `value`; of one variable.
-pub(in crate::diagnose) fn basis(value: f64, variable: &(String, f64, f64), count: usize) -> Vec<f64> {
+pub(in crate::diagnose) fn basis(
+    value: f64,
+    variable: &(String, f64, f64),
+    count: usize,
+) -> Vec<f64> {
     let mut phi = vec![0.0; count];
     sines(value, (variable.1, variable.2), &mut phi);
     phi
@@ -145,8 +163,13 @@ fn term(
     variables: Vec<(String, f64, f64)>,
 ) -> Term {
     let effect = Effect::unlisted(kind, target);
-    let axes = (effect.magnitudes().iter()).map(|_| coefficient(largest)).collect();
-    let starts = vec![Start { m: vec![0.0; effect.magnitudes().len()], scales: false }];
+    let axes = (effect.magnitudes().iter())
+        .map(|_| coefficient(largest))
+        .collect();
+    let starts = vec![Start {
+        m: vec![0.0; effect.magnitudes().len()],
+        scales: false,
+    }];
     Term {
         id: effect.id().into(),
         target: target.into(),
@@ -156,7 +179,11 @@ fn term(
         starts,
         variables,
         mark: 0.0,
-        part: Part::Effect { effect, held: BTreeMap::new(), kept: None },
+        part: Part::Effect {
+            effect,
+            held: BTreeMap::new(),
+            kept: None,
+        },
     }
 }
 
@@ -188,7 +215,9 @@ pub(super) fn of_state(target: &str, variables: &[Variable], largest: f64) -> Te
     };
     let kind = match (of.as_slice(), ends.as_slice()) {
         (&[of], &[ends]) => with_coefficients(
-            EffectKind::force(&id, "ẋ + f", move |m, at| sum_of_one(m, value(of, at), ends)),
+            EffectKind::force(&id, "ẋ + f", move |m, at| {
+                sum_of_one(m, value(of, at), ends)
+            }),
             TERMS,
         ),
         (&[a, b], &[first, second]) => with_coefficients(
@@ -199,21 +228,40 @@ pub(super) fn of_state(target: &str, variables: &[Variable], largest: f64) -> Te
         ),
         _ => unreachable!("functions have one or two variables"),
     };
-    let seen = variables.iter().zip(ends).map(|(v, (a, b))| (v.name.clone(), a, b));
-    term(kind, target, Nature::Function, weights(variables.len()), largest, seen.collect())
+    let seen = variables
+        .iter()
+        .zip(ends)
+        .map(|(v, (a, b))| (v.name.clone(), a, b));
+    term(
+        kind,
+        target,
+        Nature::Function,
+        weights(variables.len()),
+        largest,
+        seen.collect(),
+    )
 }
 
 /// An unknown distortion f(s) of a signal.
 pub(super) fn of_signal(target: &str, is_sensor: bool, variable: &Variable, largest: f64) -> Term {
     let id = format!("f({})", variable.name);
     let ends = variable.ends();
-    let law = move |m: &[f64], _: crate::effect::Instant, _: &mut [f64], s: f64| s + sum_of_one(m, s, ends);
+    let law = move |m: &[f64], _: crate::effect::Instant, _: &mut [f64], s: f64| {
+        s + sum_of_one(m, s, ends)
+    };
     let kind = match is_sensor {
         true => EffectKind::sensor(&id, "s + f(s)", law),
         false => EffectKind::actuator(&id, "u + f(u)", law),
     };
     let seen = vec![(variable.name.clone(), ends.0, ends.1)];
-    term(with_coefficients(kind, TERMS), target, Nature::Function, weights(1), largest, seen)
+    term(
+        with_coefficients(kind, TERMS),
+        target,
+        Nature::Function,
+        weights(1),
+        largest,
+        seen,
+    )
 }
 
 /// An unknown answer of a signal to its past: s + Σ β_k·(s seen through a first-order lag of τ_k − s).
@@ -233,7 +281,14 @@ pub(super) fn of_past(target: &str, is_sensor: bool, name: &str, times: [f64; PA
         false => EffectKind::actuator(&id, "u + Σ b·(lagged u − u)", law),
     };
     let kind = with_coefficients(kind, PASTS).memory(PASTS);
-    term(kind, target, Nature::Past, vec![vec![1.0 / PASTS as f64; PASTS]], 2.0, vec![])
+    term(
+        kind,
+        target,
+        Nature::Past,
+        vec![vec![1.0 / PASTS as f64; PASTS]],
+        2.0,
+        vec![],
+    )
 }
 
 /// A wave of unknown size, phase and frequency: on a signal, a rate or, relative, a parameter.
@@ -254,7 +309,14 @@ pub(super) fn wave(kind: &str, target: &str, largest: f64, frequency: Axis) -> T
     };
     let effect = with_coefficients(effect, 2)
         .magnitude(Magnitude::positive("frequency", "Hz", &[0.1]).shape());
-    let mut term = term(effect, target, Nature::Periodic, vec![vec![0.5; 2]], largest, vec![]);
+    let mut term = term(
+        effect,
+        target,
+        Nature::Periodic,
+        vec![vec![0.5; 2]],
+        largest,
+        vec![],
+    );
     term.axes[2] = frequency;
     term
 }

@@ -25,7 +25,11 @@ pub(in crate::diagnose) struct Library<'a> {
 impl Library<'_> {
     /// Hypotheses of one effect: one for each way to use its magnitudes.
     pub fn terms(&self, effect: &Effect) -> Result<Vec<Term>, DiagnoseError> {
-        let known = targets(effect.law().target(), Some(&self.scales.outline), &self.twin.signals());
+        let known = targets(
+            effect.law().target(),
+            Some(&self.scales.outline),
+            &self.twin.signals(),
+        );
         let target = known.iter().position(|k| k == effect.target()).unwrap_or(0);
         let kind = effect.law().target();
         let values = self.scales.columns(kind, target);
@@ -59,16 +63,23 @@ impl Library<'_> {
         if let Mark::Present(m) = mark {
             return vec![((0..m.len()).filter(|&i| m[i].is_infinite()).collect(), None)];
         }
-        let thresholds: Vec<usize> =
-            (0..magnitudes.len()).filter(|&i| magnitudes[i].is_threshold()).collect();
+        let thresholds: Vec<usize> = (0..magnitudes.len())
+            .filter(|&i| magnitudes[i].is_threshold())
+            .collect();
         let (least, most) = effect.kind().memories();
         match thresholds.len() {
-            0 | 1 if self.twin.equations().is_some() && least < most => {
-                (0..Thresholds::REGISTERS.len()).map(|i| (vec![], Some(i))).collect()
-            }
+            0 | 1 if self.twin.equations().is_some() && least < most => (0..Thresholds::REGISTERS
+                .len())
+                .map(|i| (vec![], Some(i)))
+                .collect(),
             0 | 1 => vec![(vec![], None)],
             _ => (thresholds.iter())
-                .map(|i| (thresholds.iter().copied().filter(|j| j != i).collect(), None))
+                .map(|i| {
+                    (
+                        thresholds.iter().copied().filter(|j| j != i).collect(),
+                        None,
+                    )
+                })
                 .collect(),
         }
     }
@@ -83,9 +94,16 @@ impl Library<'_> {
     ) -> Result<Option<Term>, DiagnoseError> {
         let magnitudes = effect.magnitudes();
         let held: BTreeMap<String, f64> = (off.iter())
-            .map(|&i| (magnitudes[i].name.to_owned(), magnitudes[i].off.unwrap_or(0.0)))
+            .map(|&i| {
+                (
+                    magnitudes[i].name.to_owned(),
+                    magnitudes[i].off.unwrap_or(0.0),
+                )
+            })
             .collect();
-        let free: Vec<&Magnitude> = (magnitudes.iter()).filter(|m| !held.contains_key(m.name)).collect();
+        let free: Vec<&Magnitude> = (magnitudes.iter())
+            .filter(|m| !held.contains_key(m.name))
+            .collect();
         if free.is_empty() {
             return Ok(None);
         }
@@ -114,8 +132,11 @@ impl Library<'_> {
         let mut grids: Vec<Vec<f64>> = vec![];
         let mut scales = false;
         for (i, (m, name)) in free.iter().zip(&names).enumerate() {
-            let j = space.position(name).map_err(crate::diagnose::error::DiagnoseError::from)?;
-            let (grid, axis) = self.magnitude(m, effect.law(), values, register, (&twin, j, &space[j]));
+            let j = space
+                .position(name)
+                .map_err(crate::diagnose::error::DiagnoseError::from)?;
+            let (grid, axis) =
+                self.magnitude(m, effect.law(), values, register, (&twin, j, &space[j]));
             if matches!(axis.evidence, EvidencePrior::Magnitude { .. }) && i == 0 {
                 scales = true;
             }
@@ -129,7 +150,9 @@ impl Library<'_> {
             term.axes.iter_mut().for_each(|axis| axis.held = true);
             scales = false;
         }
-        term.starts = (product(&grids).into_iter()).map(|m| Start { m, scales }).collect();
+        term.starts = (product(&grids).into_iter())
+            .map(|m| Start { m, scales })
+            .collect();
         Ok((term.axes.iter().all(|a| a.bounds.low() <= a.bounds.high())).then_some(term))
     }
 
@@ -143,7 +166,11 @@ impl Library<'_> {
         (twin, j, parameter): (&Twin, usize, &Parameter),
     ) -> (Vec<f64>, Axis) {
         let (dt, duration) = (self.scales.dt(), self.scales.duration());
-        let (low, high) = if values.is_empty() { (0.0, 1.0) } else { ends(values) };
+        let (low, high) = if values.is_empty() {
+            (0.0, 1.0)
+        } else {
+            ends(values)
+        };
         let span = (high - low).max(1e-9);
         let size = {
             let s = crate::math::deviation(values).max(1e-3 * low.abs().max(high.abs()));
@@ -158,7 +185,10 @@ impl Library<'_> {
                 longest: 0.7,
                 deviation: 3.0,
                 centre: (low * high).sqrt(),
-                evidence: EvidencePrior::Uniform { low: low.ln(), high: high.ln() },
+                evidence: EvidencePrior::Uniform {
+                    low: low.ln(),
+                    high: high.ln(),
+                },
                 ..Axis::of(&parameter)
             };
             (grid.into_iter().map(|v| v.clamp(low, high)).collect(), axis)
@@ -186,7 +216,11 @@ impl Library<'_> {
             };
         }
         if law.is_noise() {
-            return logarithmic(1e-4 * size, 2.0 * size, vec![3e-3 * size, 0.02 * size, 0.1 * size]);
+            return logarithmic(
+                1e-4 * size,
+                2.0 * size,
+                vec![3e-3 * size, 0.02 * size, 0.1 * size],
+            );
         }
         if m.is_threshold() && m.unit == "signal/s" {
             let grid = [0.05, 0.2].map(|v| v * size / dt).to_vec();
@@ -203,16 +237,30 @@ impl Library<'_> {
             ("s", Some(_)) if register.is_some() => {
                 let register = register.unwrap_or(0);
                 let reach = (Thresholds::REGISTERS[register] - 1) as f64 * dt;
-                linear(0.0, reach, Thresholds::DELAYS[register].iter().map(|v| v * dt).collect())
+                linear(
+                    0.0,
+                    reach,
+                    Thresholds::DELAYS[register]
+                        .iter()
+                        .map(|v| v * dt)
+                        .collect(),
+                )
             }
             ("s", Some(_)) => {
                 let grid = [1.0, 4.0, 12.0, 40.0].map(|steps| steps * dt).to_vec();
                 logarithmic(0.3 * dt, (duration / 8.0).max(0.6 * dt), grid)
             }
             ("s", None) => {
-                let times = (1..=Thresholds::TIMES).map(|i| duration * i as f64 / (Thresholds::TIMES + 1) as f64);
+                let times = (1..=Thresholds::TIMES)
+                    .map(|i| duration * i as f64 / (Thresholds::TIMES + 1) as f64);
                 let (grid, axis) = linear(0.0, duration, times.collect());
-                (grid, Axis { held: false, ..axis })
+                (
+                    grid,
+                    Axis {
+                        held: false,
+                        ..axis
+                    },
+                )
             }
             ("Hz", _) => self.frequency(parameter),
             ("rad", _) => {
@@ -235,7 +283,13 @@ impl Library<'_> {
                         *value = if k == j { 0.0 } else { p.prior.centre() };
                     }
                     let states = self.padded(equations.outline().states.len());
-                    largest(equations, &theta, (j, parameter), self.scales.records, &states)
+                    largest(
+                        equations,
+                        &theta,
+                        (j, parameter),
+                        self.scales.records,
+                        &states,
+                    )
                 });
                 let found = found.unwrap_or_else(|| match m.unit {
                     "1" => 0.5,
@@ -244,14 +298,20 @@ impl Library<'_> {
                     "1/s" => 1.0 / duration,
                     _ => size,
                 });
-                let axis = Axis { counts: false, ..size_axis(parameter, found) };
+                let axis = Axis {
+                    counts: false,
+                    ..size_axis(parameter, found)
+                };
                 (vec![0.0], axis)
             }
             _ => {
                 let (first, last) = ends(m.starts);
                 let (low, high) = match m.limits.is_finite() {
                     true => (m.limits.low(), m.limits.high()),
-                    false => (m.limits.low().max(first - 3.0 * (last - first)), m.limits.high().min(last + 3.0 * (last - first))),
+                    false => (
+                        m.limits.low().max(first - 3.0 * (last - first)),
+                        m.limits.high().min(last + 3.0 * (last - first)),
+                    ),
                 };
                 let grid = match m.limits.is_finite() {
                     true => [0.1, 0.3, 0.6].map(|s| low + s * (high - low)).to_vec(),
@@ -267,7 +327,11 @@ impl Library<'_> {
         (self.scales.states.iter())
             .map(|states| {
                 crate::record::Signal::from_shape_fn((states.nrows(), count), |(k, i)| {
-                    if i < states.ncols() { states[[k, i]] } else { 0.0 }
+                    if i < states.ncols() {
+                        states[[k, i]]
+                    } else {
+                        0.0
+                    }
                 })
             })
             .collect()
@@ -284,7 +348,10 @@ impl Library<'_> {
             // A search must stay at its peak of the spectrum.
             longest: 0.02,
             deviation: 10.0,
-            evidence: EvidencePrior::Uniform { low: low.ln(), high: high.ln() },
+            evidence: EvidencePrior::Uniform {
+                low: low.ln(),
+                high: high.ln(),
+            },
             ..Axis::of(&parameter)
         };
         (self.frequencies.to_vec(), axis)

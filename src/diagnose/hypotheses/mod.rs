@@ -45,7 +45,8 @@ pub(in crate::diagnose) fn listed(
         if without.iter().any(|pattern| pattern.matches(effect.key())) || already.contains(&key) {
             continue;
         }
-        let own_noise = effect.law().is_noise() && !matches!(effect.law(), crate::effect::Law::Outliers(_));
+        let own_noise =
+            effect.law().is_noise() && !matches!(effect.law(), crate::effect::Law::Outliers(_));
         if own_noise && fitted_noise.contains(&effect.target().to_owned()) {
             // The level is fitted in every hypothesis.
             continue;
@@ -85,24 +86,45 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
             let values = scales.columns(kind, i);
             for (p, end) in [(0.005, &mut ends.0), (0.995, &mut ends.1)] {
                 let value = quantile(&values, p).unwrap_or(f64::NAN);
-                *end = if p < 0.5 { end.min(value) } else { end.max(value) };
+                *end = if p < 0.5 {
+                    end.min(value)
+                } else {
+                    end.max(value)
+                };
             }
         }
         (ends.0 < ends.1).then_some(ends)
     };
     let variable = |kind: TargetKind, of: Of, i: usize, name: &str| {
         let (low, high) = range(kind, i)?;
-        Some(Variable { name: name.to_owned(), of, low, high })
+        Some(Variable {
+            name: name.to_owned(),
+            of,
+            low,
+            high,
+        })
     };
     let has_equations = library.twin.equations().is_some();
     let own: Vec<usize> = (0..outline.states.len())
         .filter(|&i| has_equations && !is_memory(&outline.states[i].name))
         .collect();
     let of_states: Vec<(usize, Variable)> = (own.iter())
-        .filter_map(|&i| Some((i, variable(TargetKind::State, Of::State(i), i, &outline.states[i].name)?)))
+        .filter_map(|&i| {
+            Some((
+                i,
+                variable(TargetKind::State, Of::State(i), i, &outline.states[i].name)?,
+            ))
+        })
         .collect();
     let of_inputs: Vec<Variable> = (0..inputs)
-        .filter_map(|i| variable(TargetKind::Actuator, Of::Input(i), i, &outline.inputs[i].name))
+        .filter_map(|i| {
+            variable(
+                TargetKind::Actuator,
+                Of::Input(i),
+                i,
+                &outline.inputs[i].name,
+            )
+        })
         .collect();
     let times = spread(3.0 * scales.dt(), scales.duration() / 6.0);
     let frequency = |target: &str| {
@@ -130,13 +152,26 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
                 terms.push(of_state(target, &[one.clone(), input.clone()], largest));
             }
         }
-        terms.extend(disturbances(target, Entry::State(i), largest, scales.dt(), times));
+        terms.extend(disturbances(
+            target,
+            Entry::State(i),
+            largest,
+            scales.dt(),
+            times,
+        ));
     }
     let past = spread_of::<PASTS>(1.5 * scales.dt(), scales.duration() / 8.0);
-    for (kind, count, is_sensor) in [(TargetKind::Sensor, outputs, true), (TargetKind::Actuator, inputs, false)] {
+    for (kind, count, is_sensor) in [
+        (TargetKind::Sensor, outputs, true),
+        (TargetKind::Actuator, inputs, false),
+    ] {
         for j in 0..count {
             let target = numbered(kind.name(), count, j);
-            let name = if is_sensor { &outline.outputs[j].name } else { &outline.inputs[j].name };
+            let name = if is_sensor {
+                &outline.outputs[j].name
+            } else {
+                &outline.inputs[j].name
+            };
             let Some(seen) = variable(kind, Of::Signal, j, name) else {
                 continue;
             };
@@ -146,7 +181,11 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
                 terms.push(of_past(&target, is_sensor, name, past));
             }
             if is_sensor || !has_equations {
-                let entry = if is_sensor { Entry::Sensor(j) } else { Entry::Actuator(j) };
+                let entry = if is_sensor {
+                    Entry::Sensor(j)
+                } else {
+                    Entry::Actuator(j)
+                };
                 terms.extend(disturbances(&target, entry, size, scales.dt(), times));
             }
             terms.extend(periodic(kind.name(), &target, size, frequency(&target)));
@@ -155,7 +194,13 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
     for (i, parameter) in outline.parameters.iter().enumerate() {
         if parameter.role == Role::Parameter && has_equations {
             let target = &parameter.name;
-            terms.extend(disturbances(target, Entry::Parameter(i), 1.0, scales.dt(), times));
+            terms.extend(disturbances(
+                target,
+                Entry::Parameter(i),
+                1.0,
+                scales.dt(),
+                times,
+            ));
             terms.extend(periodic("parameter", target, 1.0, frequency(target)));
         }
     }
@@ -164,16 +209,37 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
 
 /// Name of a sensor or actuator: numbered where there are several.
 fn numbered(word: &str, count: usize, j: usize) -> String {
-    if count == 1 { word.to_owned() } else { format!("{word}{}", j + 1) }
+    if count == 1 {
+        word.to_owned()
+    } else {
+        format!("{word}{}", j + 1)
+    }
 }
 
-fn periodic(kind: &str, target: &str, largest: f64, (grid, axis): (Vec<f64>, Axis)) -> Option<Term> {
+fn periodic(
+    kind: &str,
+    target: &str,
+    largest: f64,
+    (grid, axis): (Vec<f64>, Axis),
+) -> Option<Term> {
     let mut term = wave(kind, target, largest, axis);
-    term.starts = grid.into_iter().map(|f| Start { m: vec![0.0, 0.0, f], scales: false }).collect();
+    term.starts = grid
+        .into_iter()
+        .map(|f| Start {
+            m: vec![0.0, 0.0, f],
+            scales: false,
+        })
+        .collect();
     (!term.starts.is_empty()).then_some(term)
 }
 
-fn disturbances(target: &str, entry: Entry, largest: f64, dt: f64, times: [f64; TIMES]) -> Vec<Term> {
+fn disturbances(
+    target: &str,
+    entry: Entry,
+    largest: f64,
+    dt: f64,
+    times: [f64; TIMES],
+) -> Vec<Term> {
     let (low, high) = (0.003 * largest, 2.0 * largest);
     let mut parameter = Parameter::new("disturbance", "", low, high);
     parameter.bounds = Interval::unchecked(low, high);
@@ -181,7 +247,10 @@ fn disturbances(target: &str, entry: Entry, largest: f64, dt: f64, times: [f64; 
         counts: false,
         deviation: 3.0,
         longest: 0.7,
-        evidence: EvidencePrior::Uniform { low: low.ln(), high: high.ln() },
+        evidence: EvidencePrior::Uniform {
+            low: low.ln(),
+            high: high.ln(),
+        },
         ..Axis::of(&parameter)
     };
     (times.iter())
@@ -189,10 +258,18 @@ fn disturbances(target: &str, entry: Entry, largest: f64, dt: f64, times: [f64; 
             id: "f(t)".into(),
             target: target.into(),
             nature: Nature::Time,
-            part: Part::Disturbance { entry, memory: (-dt / time).exp() },
+            part: Part::Disturbance {
+                entry,
+                memory: (-dt / time).exp(),
+            },
             axes: vec![axis.clone()],
             family: None,
-            starts: SIZES.map(|s| Start { m: vec![s * largest], scales: false }).to_vec(),
+            starts: SIZES
+                .map(|s| Start {
+                    m: vec![s * largest],
+                    scales: false,
+                })
+                .to_vec(),
             variables: vec![],
             mark: 0.0,
         })

@@ -18,12 +18,24 @@ pub(in crate::diagnose) struct Scales<'a> {
 }
 
 impl<'a> Scales<'a> {
-    pub fn new(twin: &Twin, theta: &[f64], records: &'a [Record], states: Vec<Signal>, outline: Outline) -> Self {
+    pub fn new(
+        twin: &Twin,
+        theta: &[f64],
+        records: &'a [Record],
+        states: Vec<Signal>,
+        outline: Outline,
+    ) -> Self {
         let (rates, defined) = match twin.equations() {
             Some(equations) => along(equations, theta, records, &states),
             None => (vec![], vec![]),
         };
-        Self { records, states, outline, rates, defined }
+        Self {
+            records,
+            states,
+            outline,
+            rates,
+            defined,
+        }
     }
 
     /// Values of a sensor, actuator or state, of all records.
@@ -67,7 +79,12 @@ impl<'a> Scales<'a> {
 }
 
 /// Root mean square of the rates along states, and the states whose rate is another state.
-fn along(twin: &dyn StateSpace, theta: &[f64], records: &[Record], states: &[Signal]) -> (Vec<f64>, Vec<bool>) {
+fn along(
+    twin: &dyn StateSpace,
+    theta: &[f64],
+    records: &[Record],
+    states: &[Signal],
+) -> (Vec<f64>, Vec<bool>) {
     let n = twin.outline().states.len();
     let (mut squares, mut count) = (vec![0.0; n], 0.0);
     let mut same = vec![vec![true; n]; n];
@@ -78,7 +95,11 @@ fn along(twin: &dyn StateSpace, theta: &[f64], records: &[Record], states: &[Sig
             let x = states.row(k).to_vec();
             for (which, theta) in [theta, &bent[..]].into_iter().enumerate() {
                 let mut rate = vec![0.0; n];
-                twin.drift(&Now::new(drive.time(k), drive.step(k), drive.input(k), theta), &x, &mut rate);
+                twin.drift(
+                    &Now::new(drive.time(k), drive.step(k), drive.input(k), theta),
+                    &x,
+                    &mut rate,
+                );
                 for i in 0..n {
                     for j in 0..n {
                         same[i][j] &= i != j && rate[i] == x[j];

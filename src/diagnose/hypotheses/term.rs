@@ -70,10 +70,6 @@ impl Term {
         EffectKey::new(&self.id, &self.target).to_string()
     }
 
-    pub fn is_listed(&self) -> bool {
-        self.nature == Nature::Listed
-    }
-
     /// Returns whether only noise changes, so that no free run moves.
     pub fn is_noise(&self) -> bool {
         match &self.part {

@@ -23,7 +23,10 @@ fn terms(x: &str) -> [(String, fn(f64) -> f64); 7] {
         (format!("{x}²"), |x| x * x),
         (format!("{x}³"), |x| x * x * x),
         (format!("|{x}|·{x}"), |x| x.abs() * x),
-        (format!("sign {x}"), |x| if x == 0.0 { 0.0 } else { x.signum() }),
+        (
+            format!("sign {x}"),
+            |x| if x == 0.0 { 0.0 } else { x.signum() },
+        ),
         (format!("√|{x}|"), |x| x.abs().sqrt()),
     ]
 }
@@ -84,7 +87,11 @@ pub(in crate::diagnose) fn discover(
     // What the two most frequent ones explain of the function itself.
     let subset: Vec<usize> = found.iter().take(2).map(|(k, _)| *k).collect();
     let chosen = columns.select_columns(&subset);
-    let factors = chosen.clone().svd(true, true).solve(&curve.mean, 1e-12).ok()?;
+    let factors = chosen
+        .clone()
+        .svd(true, true)
+        .solve(&curve.mean, 1e-12)
+        .ok()?;
     let rest = &curve.mean - chosen * factors;
     let mean = curve.mean.mean();
     let whole = curve.mean.map(|v| v - mean).norm_squared().max(1e-300);
@@ -108,7 +115,11 @@ mod tests {
         let covariance = DMatrix::from_fn(33, 33, |i, j| {
             0.01 * (-0.5 * ((values[i] - values[j]) / 0.5).powi(2)).exp()
         });
-        let curve = Curve { values, mean, covariance };
+        let curve = Curve {
+            values,
+            mean,
+            covariance,
+        };
         let found = discover(("x2", "x1"), &curve, Noise::new(1, "t", 0)).unwrap();
         assert_eq!(found.terms[0].name, "x1³", "{found:?}");
         assert!((found.terms[0].coefficient + 0.3).abs() < 0.05 && found.explained > 0.99);

@@ -31,7 +31,9 @@ pub(in crate::diagnose) fn curve(model: &Model<'_>) -> Option<Curve> {
     let d = model.problem.twin.parameters().len();
     let theta = model.theta();
     let covariance = model.fitted.information.clone().try_inverse()?;
-    let own = covariance.view((d - count, d - count), (count, count)).into_owned();
+    let own = covariance
+        .view((d - count, d - count), (count, count))
+        .into_owned();
     let (_, a, b) = variable;
     let (low, high) = (a + UNSEEN * (b - a), b - UNSEEN * (b - a));
     let values: Vec<f64> = (0..POINTS)
@@ -52,7 +54,11 @@ pub(in crate::diagnose) fn curve(model: &Model<'_>) -> Option<Curve> {
 }
 
 /// Fitted functions of one variable, clearest first; `floor` is the evidence of the model that they stand beside.
-pub(in crate::diagnose) fn told(all: &[Found<'_>], on_top: bool, floor: f64) -> Vec<MissingFunction> {
+pub(in crate::diagnose) fn told(
+    all: &[Found<'_>],
+    on_top: bool,
+    floor: f64,
+) -> Vec<MissingFunction> {
     (all.iter())
         .filter(|f| f.last().nature == Nature::Function && f.gain > floor)
         .filter_map(|found| {
@@ -65,7 +71,12 @@ pub(in crate::diagnose) fn told(all: &[Found<'_>], on_top: bool, floor: f64) -> 
                 on_top,
                 log_evidence: found.gain - floor,
                 mean: curve.mean.iter().copied().collect(),
-                std_error: curve.covariance.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect(),
+                std_error: curve
+                    .covariance
+                    .diagonal()
+                    .iter()
+                    .map(|v| v.max(0.0).sqrt())
+                    .collect(),
                 values: curve.values,
             })
         })

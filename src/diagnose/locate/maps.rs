@@ -8,9 +8,14 @@ use crate::diagnose::residuals::local::excess;
 use crate::diagnose::residuals::shares::shares;
 
 /// Describes the innovations of a model. `best` divides the shares by where it helps.
-pub(in crate::diagnose) fn maps(model: &Model<'_>, best: Option<&Model<'_>>) -> Result<Maps, DiagnoseError> {
+pub(in crate::diagnose) fn maps(
+    model: &Model<'_>,
+    best: Option<&Model<'_>>,
+) -> Result<Maps, DiagnoseError> {
     let states = model.problem.states(&model.fitted.theta)?;
-    let after = best.map(|best| best.problem.filtered(&best.fitted.theta)).transpose()?;
+    let after = best
+        .map(|best| best.problem.filtered(&best.fitted.theta))
+        .transpose()?;
     let records = model.problem.records;
     let bins = Bins::new(&model.problem.outline(), &states, records);
     let shares = shares(&bins, &states, records, after.as_deref());
@@ -23,7 +28,12 @@ pub(in crate::diagnose) fn maps(model: &Model<'_>, best: Option<&Model<'_>>) -> 
     let mut maps = Maps::default();
     for ((cut, score), share) in bins.cuts.iter().zip(scores).zip(shares) {
         match *cut {
-            Cut::Window { record, channel, from, to } => maps.windows.push(Window {
+            Cut::Window {
+                record,
+                channel,
+                from,
+                to,
+            } => maps.windows.push(Window {
                 record,
                 start: records[record].drive().time(from),
                 end: records[record].drive().time(to - 1),
@@ -31,7 +41,11 @@ pub(in crate::diagnose) fn maps(model: &Model<'_>, best: Option<&Model<'_>>) -> 
                 score,
                 share,
             }),
-            Cut::Region { variable, low, high } => maps.regions.push(Region {
+            Cut::Region {
+                variable,
+                low,
+                high,
+            } => maps.regions.push(Region {
                 variable: bins.variables[variable].clone(),
                 low,
                 high,
@@ -43,7 +57,12 @@ pub(in crate::diagnose) fn maps(model: &Model<'_>, best: Option<&Model<'_>>) -> 
                 score,
                 share,
             }),
-            Cut::Lag { channel, past, from, to } => maps.lags.push(Lag {
+            Cut::Lag {
+                channel,
+                past,
+                from,
+                to,
+            } => maps.lags.push(Lag {
                 channel: output(channel),
                 signal: match past {
                     Past::Output(j) => output(j),

@@ -23,13 +23,22 @@ pub(in crate::diagnose) fn calibrate(
         .map(|i| {
             let mut records = vec![];
             for (r, record) in problem.records.iter().enumerate() {
-                let noise = noise.child("record").sample(i * problem.records.len() as u64 + r as u64);
-                let outputs = match problem.twin.simulate(&problem.of_record(r, theta), record.drive(), noise) {
-                    Ok(outputs) => outputs,
-                    Err(error) if error.costs_one_run() => return Ok(None),
-                    Err(error) => return Err(error.into()),
-                };
-                records.push(Record::new(record.drive().clone(), record.with_gaps_in(outputs))?);
+                let noise = noise
+                    .child("record")
+                    .sample(i * problem.records.len() as u64 + r as u64);
+                let outputs =
+                    match problem
+                        .twin
+                        .simulate(&problem.of_record(r, theta), record.drive(), noise)
+                    {
+                        Ok(outputs) => outputs,
+                        Err(error) if error.costs_one_run() => return Ok(None),
+                        Err(error) => return Err(error.into()),
+                    };
+                records.push(Record::new(
+                    record.drive().clone(),
+                    record.with_gaps_in(outputs),
+                )?);
             }
             let value = match log_odds(&records) {
                 Ok(value) => Some(value),

@@ -52,7 +52,10 @@ impl Runner {
         let errors: Vec<f64> = (0..Thresholds::FLOOR_RECORDS)
             .into_par_iter()
             .filter_map(|i| {
-                let run = self.twin.simulate(&self.theta, record.drive(), noise.sample(i)).ok()?;
+                let run = self
+                    .twin
+                    .simulate(&self.theta, record.drive(), noise.sample(i))
+                    .ok()?;
                 // In units of the measured record, as the other errors are.
                 let errors = record.with_gaps_in(run - &free);
                 Some(root(&scaled(&errors, &scale, from)))

@@ -25,8 +25,13 @@ use std::sync::Arc;
 const SMALL: f64 = 0.01;
 
 /// The smallest visible magnitude of each listed effect.
-pub(in crate::diagnose) fn power(model: &Model<'_>, terms: &[Arc<Term>]) -> Result<Vec<Visible>, DiagnoseError> {
-    let Some(reference) = recoverable(Reference::new(&model.problem, &model.fitted.theta))?.flatten() else {
+pub(in crate::diagnose) fn power(
+    model: &Model<'_>,
+    terms: &[Arc<Term>],
+) -> Result<Vec<Visible>, DiagnoseError> {
+    let Some(reference) =
+        recoverable(Reference::new(&model.problem, &model.fitted.theta))?.flatten()
+    else {
         return Ok(vec![]);
     };
     let need = (2.0 * Thresholds::SEEN).sqrt() + Thresholds::POWER_QUANTILE;
@@ -57,7 +62,11 @@ pub(in crate::diagnose) fn power(model: &Model<'_>, terms: &[Arc<Term>]) -> Resu
             }
         }
     }
-    Ok(order.iter().filter_map(|key| best.remove(key)).map(|(visible, _)| visible).collect())
+    Ok(order
+        .iter()
+        .filter_map(|key| best.remove(key))
+        .map(|(visible, _)| visible)
+        .collect())
 }
 
 fn first_magnitude(term: &Term) -> String {
@@ -82,7 +91,11 @@ fn smallest(
     for start in &term.starts {
         let mut m = start.m.clone();
         if let (EvidencePrior::Magnitude { largest }, true) = (axis.evidence, start.scales) {
-            m[0] = if axis.bounds.contains(SMALL * largest) { SMALL * largest } else { -SMALL * largest };
+            m[0] = if axis.bounds.contains(SMALL * largest) {
+                SMALL * largest
+            } else {
+                -SMALL * largest
+            };
         }
         let theta = model.beside(&extended, &m);
         let Some(there) = recoverable(extended.problem.filtered(&theta))? else {

@@ -101,14 +101,19 @@ pub(in crate::diagnose) fn shrinkage(
     let Some(runner) = held_out.runner(base, &theta)? else {
         return Ok(None);
     };
-    let Some(before) = runner.errors(record, from).filter(|errors| !errors.is_empty()) else {
+    let Some(before) = runner
+        .errors(record, from)
+        .filter(|errors| !errors.is_empty())
+    else {
         return Ok(None);
     };
     let mut unfitted = base.problem.of_record(0, &base.problem.centre());
     for (value, initial) in unfitted.iter_mut().zip(initial.into_iter().flatten()) {
         *value = *initial;
     }
-    let unfitted = held_out.runner(base, &unfitted)?.and_then(|runner| runner.errors(record, from));
+    let unfitted = held_out
+        .runner(base, &unfitted)?
+        .and_then(|runner| runner.errors(record, from));
     let mut result = Shrinkage {
         metric: Shrinkage::FREE_RUN,
         before: root(&before),
@@ -157,9 +162,17 @@ pub(in crate::diagnose) fn shrinkage(
         (result.closed, result.interval) = closed(&before, after, floor, noise.child("bootstrap"));
     }
     if let (Some(closed), Some(floor)) = (result.closed, result.floor) {
-        let draws = posterior(&accepted.problem, &accepted.fitted, noise.child("posterior"))?;
+        let draws = posterior(
+            &accepted.problem,
+            &accepted.fitted,
+            noise.child("posterior"),
+        )?;
         let afters: Vec<f64> = (draws.into_par_iter().take(DRAWS))
-            .map(|theta| Ok(held_out.runner(accepted, &theta)?.and_then(|r| r.errors(record, from))))
+            .map(|theta| {
+                Ok(held_out
+                    .runner(accepted, &theta)?
+                    .and_then(|r| r.errors(record, from)))
+            })
             .collect::<Result<Vec<_>, DiagnoseError>>()?
             .into_iter()
             .flatten()

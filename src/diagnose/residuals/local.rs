@@ -25,16 +25,6 @@ pub(in crate::diagnose) struct Excess {
 /// | output | the same, and Σ n·ρ_l² over twenty lags |
 /// | lags | Σ n·ρ_l² with the past of the signal |
 /// | band | m·(mean of m periodogram ordinates − 1)² |
-pub(in crate::diagnose) fn local(
-    states: &[(Filtered, Signal)],
-    records: &[Record],
-    bins: &Bins,
-) -> Vec<f64> {
-    (excess(states, records, bins).iter())
-        .map(|e| e.square.sqrt())
-        .collect()
-}
-
 pub(in crate::diagnose) fn excess(
     states: &[(Filtered, Signal)],
     records: &[Record],

@@ -125,7 +125,7 @@ impl Outcome {
         let keyed = |id: &str, target: &str| crate::effect::EffectKey::new(id, target).to_string();
         Self {
             verdict: found.verdict,
-            p_value: Some(found.detection.p_value),
+            p_value: found.detection.p_value,
             decision: found.cause.decision,
             target: found.location.target.clone(),
             effects: (found.cause.effects.iter())

@@ -16,8 +16,8 @@ mod runs;
 mod silent;
 mod tail;
 
-pub(crate) use predictor::{Predictor, standardised};
-pub(crate) use silent::{dithered, measured};
+pub(crate) use predictor::Predictor;
+pub(crate) use silent::measured;
 
 use crate::likelihood::kalman::FilterError;
 use crate::record::Record;

@@ -5,7 +5,7 @@
 
 use super::runs::run;
 use crate::math::{deviation, largest};
-use crate::record::{Drive, Record, RecordError, Signal, Signals};
+use crate::record::{Drive, Record, Signal, Signals};
 use crate::twin::{
     DigitalTwin, Interval, Noise, Parameter, ParameterSpace, Role, SimulationError, Twin,
 };
@@ -40,31 +40,6 @@ pub(crate) fn measured(twin: &Twin, records: &[Record]) -> Result<(Twin, bool), 
         runs: Mutex::default(),
     };
     Ok((Twin::BlackBox(Arc::new(silent)), true))
-}
-
-/// The records with noise too small to matter, so that one without any is as noisy as simulations are. Values that stand there
-/// twice stay: a clipped or rounded signal is to remain one.
-pub(crate) fn dithered(records: &[Record], noise: Noise) -> Result<Vec<Record>, RecordError> {
-    (records.iter().enumerate())
-        .map(|(r, record)| {
-            let mut outputs = record.outputs().clone();
-            for (j, mut column) in outputs.columns_mut().into_iter().enumerate() {
-                let least = LEAST * size(&column.to_vec());
-                let mut count: HashMap<u64, usize> = HashMap::new();
-                for v in &column {
-                    *count.entry(v.to_bits()).or_default() += 1;
-                }
-                let mut source = noise.sample(r as u64).source(&format!("dither/{j}"));
-                for v in &mut column {
-                    let draw = source.normal();
-                    if count[&v.to_bits()] == 1 {
-                        *v += least * draw;
-                    }
-                }
-            }
-            Record::new(record.drive().clone(), outputs)
-        })
-        .collect()
 }
 
 /// Deviation, or what is left of it where nothing moves; missing values are left out.

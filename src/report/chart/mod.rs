@@ -1,4 +1,4 @@
-//! Line charts, bars, heat maps and small multiples as SVG.
+//! Line charts, bars and heat maps as SVG.
 //!
 //! Drawn here, in as few bytes as a page of a dozen pictures needs: text in the reader's own font, colours that colour-blind
 //! people can tell apart (Okabe & Ito), dashes beside colours, a scale that follows the width of the page, words for screen
@@ -11,7 +11,6 @@ mod frame;
 mod heat;
 mod layers;
 mod lines;
-mod multiples;
 mod panel;
 mod picture;
 mod strip;
@@ -24,9 +23,8 @@ mod ticks;
 pub use bars::{Bar, BarChart, BarGroup};
 pub use heat::{HeatGroup, HeatMap, HeatRow};
 pub use layers::{Area, Dot, Dots, Mark};
-pub use lines::Chart;
-pub use multiples::{Facet, FacetRow, Multiples, Step};
+pub use lines::{Chart, Curves};
 pub use panel::{Panel, Series, roomy};
-pub use strip::{Edge, Span};
+pub use strip::Span;
 pub use style::Style;
 pub(super) use text::escaped;

@@ -11,17 +11,6 @@ const GAP: f64 = 5.0;
 /// Opacity of a stretch of full weight: text on it must stay legible.
 const DENSEST: f64 = 0.55;
 
-/// Frame of a stretch; it carries the same information as the colour.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Edge {
-    /// An unbroken frame, and bold text.
-    Unbroken,
-    /// A dashed frame.
-    Dashed,
-    /// No frame.
-    Bare,
-}
-
 /// A stretch of the x axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Span {
@@ -33,8 +22,8 @@ pub struct Span {
     pub label: String,
     /// Darkness, 0 to 1.
     pub weight: f64,
-    /// Frame.
-    pub edge: Edge,
+    /// Framed, with bold text; otherwise bare.
+    pub clear: bool,
 }
 
 impl Span {
@@ -42,21 +31,18 @@ impl Span {
     pub(super) fn draw(&self, out: &mut String, frame: &Frame, top: f64, height: f64) {
         let (from, to) = (frame.x(self.from) + 1.0, frame.x(self.to) - 1.0);
         let opacity = DENSEST * self.weight.clamp(0.0, 1.0);
-        let stroke = match self.edge {
-            Edge::Unbroken => r##" stroke="#222222""##,
-            Edge::Dashed => r##" stroke="#222222" stroke-dasharray="3 3""##,
-            Edge::Bare => "",
+        let (stroke, bold) = match self.clear {
+            true => (r##" stroke="#222222""##, BOLD),
+            false => ("", 1.0),
         };
         let _ = writeln!(
             out,
             r##"<rect x="{from:.1}" y="{top:.1}" width="{:.1}" height="{height}" fill="#d55e00" fill-opacity="{opacity:.2}"{stroke}/>"##,
             (to - from).max(0.0)
         );
-        let clear = self.edge == Edge::Unbroken;
-        let bold = if clear { BOLD } else { 1.0 };
         if width(&self.label, TEXT * bold) <= to - from {
             let at = (0.5 * (from + to), top + 0.5 * height + 0.35 * TEXT);
-            text(out, at, "middle", TEXT, clear, &self.label);
+            text(out, at, "middle", TEXT, self.clear, &self.label);
         }
     }
 }

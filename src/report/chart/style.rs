@@ -18,6 +18,8 @@ impl Style {
     pub const BEFORE: Self = Self::new("#d55e00", 1.5, "6 4");
     /// The new state.
     pub const AFTER: Self = Self::new("#0072b2", 1.5, "");
+    /// The line that marks zero.
+    pub const ZERO: Self = Self::new("#555555", 1.0, "");
     /// For anything else, in this order.
     pub const OTHERS: [Self; 5] = [
         Self::AFTER,

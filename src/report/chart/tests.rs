@@ -56,6 +56,9 @@ fn everything_is_inside_the_picture() {
     assert_inside(&wide.svg());
 }
 
+/// The frame of a stretch of full weight 0.4.
+const FRAMED: &str = "fill-opacity=\"0.22\" stroke=\"#222222\"";
+
 /// Two stretches, the second too narrow for its label.
 fn spans() -> Vec<Span> {
     let span = |from: f64, to: f64, clear: bool| Span {
@@ -63,10 +66,7 @@ fn spans() -> Vec<Span> {
         to,
         label: "40 %".into(),
         weight: 0.4,
-        edge: match clear {
-            true => Edge::Unbroken,
-            false => Edge::Dashed,
-        },
+        clear,
     };
     vec![span(0.0, 2.0, true), span(2.0, 2.1, false)]
 }
@@ -78,7 +78,7 @@ fn stretches_are_told_apart_by_their_frames() {
     marked.panels[0].spans = spans();
     let svg = marked.svg();
     assert_eq!(svg.matches("fill-opacity").count(), 2);
-    assert_eq!(svg.matches(r#"stroke-dasharray="3 3""#).count(), 1);
+    assert_eq!(svg.matches(FRAMED).count(), 1);
     assert_eq!(
         svg.matches(">40 %<").count(),
         1,
@@ -196,7 +196,7 @@ fn bands_points_and_marks_stay_inside_and_are_named() {
 fn a_heat_map_tells_cells_apart_by_their_frames() {
     let mut cells = spans();
     cells.push(Span {
-        edge: Edge::Bare,
+        clear: false,
         from: 2.1,
         to: 4.0,
         ..cells[0].clone()
@@ -220,38 +220,39 @@ fn a_heat_map_tells_cells_apart_by_their_frames() {
     };
     let svg = map.svg();
     assert_inside(&svg);
-    assert_eq!(svg.matches(r#"stroke-dasharray="3 3""#).count(), 1);
+    assert_eq!(svg.matches(FRAMED).count(), 1);
     assert_eq!(svg.matches("font-weight=\"600\">40 %<").count(), 1);
     assert!(svg.contains(">40 %<") && svg.contains(">onset<"));
 }
 
 #[test]
-fn small_multiples_have_a_zero_line_and_bold_what_is_clear() {
-    let step = |low: f64, mean: f64| Step {
-        low,
-        high: low + 1.0,
-        mean,
-        error: 0.1,
+fn curves_have_an_axis_each() {
+    let panel = |x: &str, scale: f64| {
+        let points = (0..30).map(|k| (scale * k as f64, (k as f64 * 0.2).sin()));
+        let line = Series::new("a line with a label that is long", Style::AFTER, points);
+        (
+            x.to_owned(),
+            Panel::new("rate of h in V/s", vec![line]).area(Area {
+                label: "± 1 standard error".into(),
+                points: vec![(0.0, -1.0, 1.0), (scale * 29.0, f64::NAN, 2.0)],
+            }),
+        )
     };
-    let facet = |x: &str| Facet {
-        x: x.into(),
-        steps: vec![step(0.0, 0.05), step(1.0, -1.0), step(2.0, f64::NAN)],
-    };
-    let picture = Multiples {
-        title: "Missing".into(),
-        description: "a term".into(),
-        rows: vec![FacetRow {
-            label: "rate of h".into(),
-            clear: true,
-            facets: ["a in V", "b", "c", "a fourth one with a long name"]
-                .map(facet)
-                .to_vec(),
-        }],
+    let long = "a variable with a name so long that it takes more than the width of the picture";
+    let picture = Curves {
+        title: "Missing functions".into(),
+        description: "two".into(),
+        panels: vec![panel("h in V", 0.1), panel(long, 1e6)],
     };
     let svg = picture.svg();
     assert_inside(&svg);
     assert!(!svg.contains("NaN"));
-    assert_eq!(svg.matches("stroke-width=\"4\"").count(), 4);
-    assert_eq!(svg.matches("stroke-width=\"1.5\"").count(), 4);
-    assert!(svg.contains("font-weight=\"600\">rate of h<"));
+    for text in [">h in V<", ">2.5<", ">2e7<"] {
+        assert!(svg.contains(text), "{text}: {svg}");
+    }
+    let none = Curves {
+        panels: vec![],
+        ..picture
+    };
+    assert!(none.svg().ends_with("</svg>\n"));
 }

@@ -10,15 +10,14 @@ pub const NEXT_INPUT: &str = "next-input.csv";
 ///
 /// | key | holds |
 /// |---|---|
-/// | `verdict`, `detection` | which kind of gap, and the structural test after the refit |
+/// | `verdict`, `detection` | which kind of gap, and the evidence for it |
 /// | `parameters`, `nuisance` | θ beside accepted effects; what else was estimated |
-/// | `where` | the broken law, windows of time, ranges of states and inputs |
-/// | `which` | effects best first, what was accepted, rivals |
+/// | `where` | places by probability, missing functions, maps of the residuals |
+/// | `which` | effects best first, what was accepted, rivals, what remains |
 /// | `shrinkage` | free-run errors on held-out data |
 ///
-/// Beyond the contract: `detection.rank_p_value` and `.log_e`, `which.catch_all`, `parameters[].prior`, of `where` all but
-/// target, targets, windows and regions, `windows[].record`, `shrinkage.controls`, `discovery`, `power`, `candidates`,
-/// `not_tested`, `seconds`.
+/// Beyond the contract: `parameters[].prior`, of `where` all but target, targets, windows and regions, `windows[].record`,
+/// `shrinkage.controls`, `discovery`, `power`, `candidates`, `not_tested`, `seconds`.
 ///
 /// All keys are always there; what was skipped is null, and so are numbers that are not finite.
 pub fn gap_json(diagnosis: &Diagnosis) -> Value {
@@ -33,16 +32,21 @@ mod tests {
 
     #[test]
     fn every_verdict_keeps_to_the_contract() {
-        let by_hand = [made::tanks_class(), made::oscillator_none()];
+        let by_hand = [
+            made::tanks_class(),
+            made::oscillator_none(),
+            made::oscillator_no_gap(),
+            made::rig_pair(),
+        ];
         for diagnosis in diagnoses().iter().chain(&by_hand) {
             let read: Value = serde_json::from_str(&gap_json(diagnosis).to_string()).unwrap();
             let complaints: Vec<String> = (validator("gap").iter_errors(&read))
                 .map(|error| format!("{}: {error}", error.instance_path))
                 .collect();
             assert!(complaints.is_empty(), "{complaints:?}");
-            for list in ["targets", "windows"] {
+            for (list, key) in [("targets", "probability"), ("windows", "share")] {
                 let shares = read["where"][list].as_array().unwrap().iter();
-                let sum: f64 = shares.map(|s| s["share"].as_f64().unwrap()).sum();
+                let sum: f64 = shares.map(|s| s[key].as_f64().unwrap()).sum();
                 assert!(sum <= 1.0 + 1e-9, "{list}: {sum}");
             }
         }

@@ -2,35 +2,22 @@
 
 use super::json::NEXT_INPUT;
 use crate::diagnose::{
-    Decision, Diagnosis, Discovery, EffectFit, NextInput, SHORTEST_SPLIT, Shrinkage, Verdict,
+    Cause, Decision, Detection, Diagnosis, Discovery, EffectFit, Location, NextInput,
+    SHORTEST_SPLIT, Shrinkage, Verdict,
 };
-use crate::report::digits::{chance, error, percent, probability, short, unit_suffix};
+use crate::report::digits::{Digits, chance, error, percent, probability, short, unit_suffix};
 
 /// Limit of lines.
 const LINES: usize = 15;
 /// Number of explanations shown.
 const SHOWN: usize = 4;
-/// Number of terms shown of a missing law.
+/// Number of terms shown of a missing function.
 const TERMS: usize = 3;
 
-/// Returns the diagnosis in at most fifteen lines: verdict, test, parameters, location, explanations, extent, next record.
+/// Returns the diagnosis in at most fifteen lines: verdict, evidence, parameters, location, explanations, what remains, extent, next
+/// record.
 pub fn gap_text(diagnosis: &Diagnosis) -> String {
-    let mut lines = vec![verdict_sentence(diagnosis)];
-    let d = &diagnosis.detection;
-    let mut test = format!(
-        "Structural test of {}, refitted: {} (level {}).",
-        diagnosis.twin,
-        probability(d.p_value),
-        d.alpha
-    );
-    if let Some(log_e) = d.log_e {
-        test = test.trim_end_matches('.').to_owned();
-        test.push_str(&format!(
-            "; log E on the validation record {}.",
-            short(log_e)
-        ));
-    }
-    lines.push(test);
+    let mut lines = vec![verdict_sentence(diagnosis), evidence_sentence(diagnosis)];
     let parameters: Vec<String> = (diagnosis.parameters.iter())
         .map(|p| {
             let known = if p.identified {
@@ -48,43 +35,19 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
         })
         .collect();
     lines.push(parameters.join(", "));
-    if let Some(target) = &diagnosis.location.target {
-        let maps = diagnosis.location.maps.notable();
-        let windows = maps.windows.iter().take(2);
-        let when: Vec<String> = windows
-            .map(|w| format!("{} to {} s", short(w.start), short(w.end)))
-            .collect();
-        let regions: Vec<String> = (maps.regions.iter().take(2))
-            .map(|r| format!("{} in {} … {}", r.variable, short(r.low), short(r.high)))
-            .collect();
-        let mut line = format!("Where: {target}");
-        if let Some(onset) = diagnosis.location.onset.as_ref().filter(|o| o.time > 0.0) {
-            line.push_str(&format!("; from {} s on", short(onset.time)));
-        }
-        for (what, list) in [("clearest", when), ("at", regions)] {
-            if !list.is_empty() {
-                line.push_str(&format!("; {what} {}", list.join(", ")));
-            }
-        }
-        lines.push(line + ".");
-    }
+    lines.extend(place(&diagnosis.location));
     if !diagnosis.cause.effects.is_empty() {
-        lines.push("  probability   gain   effect".into());
+        lines.push("  probability   nats   effect".into());
         for effect in diagnosis.cause.effects.iter().take(SHOWN) {
             lines.push(format!(
                 "  {:>11} {:>6}   {}",
                 chance(effect.probability),
-                short(effect.log_score_gain),
+                short(effect.log_evidence),
                 with_magnitudes(effect)
             ));
         }
     }
-    if let Some(p) = diagnosis.cause.unexplained_p_value {
-        lines.push(format!(
-            "Residual test with the best explanation added: {}.",
-            probability(p)
-        ));
-    }
+    lines.extend(remains_sentence(&diagnosis.cause));
     lines.extend(diagnosis.discovery.as_ref().map(explored));
     lines.push(match &diagnosis.shrinkage {
         Some(s) => closed_sentence(s),
@@ -123,8 +86,16 @@ pub fn verdict_sentence(diagnosis: &Diagnosis) -> String {
         (_, Decision::Class) => format!(
             "Structural gap: the twin lacks {}, or a rival that this record cannot separate from it ({}).",
             listed(&diagnosis.cause.accepted),
-            diagnosis.cause.class[1..].join(", ")
+            rivals(&diagnosis.cause).join(", ")
         ),
+        (_, Decision::Partial) => {
+            let place = match &diagnosis.cause.remains {
+                Some(remains) => format!("something remains at {}", remains.place),
+                None => "something remains".into(),
+            };
+            let lacks = listed(&diagnosis.cause.accepted);
+            format!("Structural gap: the twin lacks {lacks}; {place}.")
+        }
         _ => match &diagnosis.location.target {
             Some(target) => format!(
                 "Structural gap outside the library: no listed effect explains it; the missing law acts on {target}."
@@ -132,6 +103,86 @@ pub fn verdict_sentence(diagnosis: &Diagnosis) -> String {
             None => "Structural gap outside the library: no listed effect explains it.".into(),
         },
     }
+}
+
+/// Returns the evidence behind the verdict.
+pub(super) fn evidence_sentence(diagnosis: &Diagnosis) -> String {
+    let calibrated = match calibration(&diagnosis.detection) {
+        Some(p) => format!("; {p}"),
+        None => String::new(),
+    };
+    format!(
+        "Evidence for a gap: {} nats; probability that nothing is missing: {}{calibrated}.",
+        short(diagnosis.detection.log_evidence),
+        chance(diagnosis.cause.probabilities.nothing)
+    )
+}
+
+/// Returns the p-value by simulation; none where it was not asked for.
+pub(super) fn calibration(d: &Detection) -> Option<String> {
+    let p = d.p_value?;
+    let p = match d.at_floor {
+        true => format!("p < {}", Digits::significant(p, 2).write(p)),
+        false => probability(p),
+    };
+    Some(format!("{p} ({} simulations)", d.simulations))
+}
+
+/// Returns the members of the class that are not accepted.
+pub(super) fn rivals(cause: &Cause) -> Vec<&str> {
+    let others = cause
+        .class
+        .iter()
+        .filter(|key| !cause.accepted.contains(key));
+    others.map(String::as_str).collect()
+}
+
+/// Returns the place of the gap, in the twin, in time and by values; none where it is not known.
+fn place(location: &Location) -> Option<String> {
+    let target = location.target.as_ref()?;
+    let mut line = format!("Where: {target}");
+    if let Some(share) = location.targets.iter().find(|t| t.target == *target) {
+        line.push_str(&format!(" (probability {})", chance(share.probability)));
+    }
+    if let Some(onset) = &location.onset {
+        line.push_str(&format!(
+            "; {} changes at {} s",
+            onset.parameter,
+            short(onset.time)
+        ));
+    }
+    let maps = location.maps.notable();
+    let when: Vec<String> = (maps.windows.iter().take(2))
+        .map(|w| format!("{} to {} s", short(w.start), short(w.end)))
+        .collect();
+    let regions: Vec<String> = (maps.regions.iter().take(2))
+        .map(|r| format!("{} in {} … {}", r.variable, short(r.low), short(r.high)))
+        .collect();
+    for (what, list) in [("clearest", when), ("at", regions)] {
+        if !list.is_empty() {
+            line.push_str(&format!("; {what} {}", list.join(", ")));
+        }
+    }
+    Some(line + ".")
+}
+
+/// Returns what an unknown function adds to effects; none where that was not asked.
+pub(super) fn remains_sentence(cause: &Cause) -> Option<String> {
+    let remains = cause.remains.as_ref()?;
+    let effects = match cause.accepted.as_slice() {
+        [] => "the best listed effect".into(),
+        accepted => accepted.join(" and "),
+    };
+    Some(if remains.log_evidence > 0.0 {
+        format!(
+            "What remains: beside {effects}, an unknown function at {} adds {} nats ({} of all).",
+            remains.place,
+            short(remains.log_evidence),
+            percent(remains.share)
+        )
+    } else {
+        format!("What remains: beside {effects}, no unknown function adds evidence.")
+    })
 }
 
 /// Returns errors on held-out data before and after, and the share of the gap closed.
@@ -160,7 +211,7 @@ pub(super) fn no_share(diagnosis: &Diagnosis) -> String {
     "No share of the gap closed: the free run on the held-out data diverges.".into()
 }
 
-/// Returns the first terms of the missing law.
+/// Returns the first terms of the missing function.
 fn explored(discovery: &Discovery) -> String {
     let terms: Vec<String> = (discovery.terms.iter().take(TERMS))
         .map(|t| {
@@ -178,7 +229,8 @@ fn explored(discovery: &Discovery) -> String {
         terms.join(", ")
     };
     format!(
-        "Exploratory, missing term of {}: {terms}; {} of its variance explained.",
+        "Exploratory, missing function of {} at {}: {terms}; {} of its variance explained.",
+        discovery.variable,
         discovery.equation,
         percent(discovery.explained)
     )
@@ -222,28 +274,48 @@ mod tests {
     }
 
     #[test]
-    fn onset_exploration_and_what_to_measure_are_said() {
+    fn evidence_change_exploration_and_what_to_measure_are_said() {
         let class = gap_text(&made::tanks_class());
-        assert!(
-            class.contains("Where: h1; from 612 s on; clearest"),
-            "{class}"
-        );
-        let next = "separates the rivals in 18 of 20 simulations, the present inputs in 6 of 20";
-        assert!(
-            class.contains(next) && class.contains(NEXT_INPUT),
-            "{class}"
-        );
+        for text in [
+            "the twin lacks state-ceiling@h1, or a rival that this record cannot separate from it (power-law@h1, quadratic-drag@h1).",
+            "Evidence for a gap: 43.9 nats; probability that nothing is missing: < 0.01; p < 0.0099 (100 simulations).",
+            "Where: h1 (probability 0.93); k1 changes at 612 s; clearest",
+            "         0.61   38.5   state-ceiling@h1 (level 4.80, spill 0.500)",
+            "What remains: beside state-ceiling@h1, an unknown function at h2 adds 1.20 nats (3 % of all).",
+            "separates the rivals in 18 of 20 simulations, the present inputs in 6 of 20",
+            NEXT_INPUT,
+        ] {
+            assert!(class.contains(text), "{text}: {class}");
+        }
         let none = gap_text(&made::oscillator_none());
-        let terms = "Exploratory, missing term of x2: −0.620 · |x1|·x2 (98 %), ";
+        let terms = "Exploratory, missing function of x1 at x2: −0.620 · x1 (98 %), ";
         assert!(
             none.contains(terms) && none.contains("83 % of its variance explained"),
             "{none}"
         );
-        let mut all = made::oscillator_none();
-        all.cause.next_input = made::tanks_class().cause.next_input;
-        for text in [class, none, gap_text(&all)] {
+        let partial = gap_text(&made::rig_pair());
+        let lacks = "lacks state-ceiling@a_state_with_a_name_that_is_long and sensor-quantization@sensor2; something remains at enthalpy.";
+        assert!(partial.contains(lacks), "{partial}");
+        let no_gap = gap_text(&made::oscillator_no_gap());
+        let evidence = "Evidence for a gap: −2.30 nats; probability that nothing is missing: 0.91; p = 0.440 (100 simulations).";
+        assert!(no_gap.contains(evidence), "{no_gap}");
+        let mut all = made::rig_pair();
+        all.discovery = made::oscillator_none().discovery;
+        for text in [class, none, partial, gap_text(&all)] {
             assert!(text.lines().count() <= LINES, "{text}");
             assert!(text.ends_with("explanations, 5.20 s.\n"), "{text}");
         }
+    }
+
+    #[test]
+    fn what_was_not_asked_is_not_said() {
+        let mut diagnosis = made::tanks_class();
+        diagnosis.detection.p_value = None;
+        diagnosis.cause.remains = None;
+        let text = gap_text(&diagnosis);
+        assert!(
+            !text.contains("simulations).") && !text.contains("What remains"),
+            "{text}"
+        );
     }
 }

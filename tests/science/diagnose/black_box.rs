@@ -24,7 +24,9 @@ fn affected(name: &str, effect: &str, theta: &[f64], noise: Noise) -> (Study, Re
 /// Checks rules that every answer obeys.
 fn sound(found: &Diagnosis) {
     let shares = |all: &mut dyn Iterator<Item = f64>| all.sum::<f64>() <= 1.0 + 1e-9;
-    assert!(shares(&mut found.location.targets.iter().map(|t| t.share)));
+    assert!(shares(
+        &mut found.location.targets.iter().map(|t| t.probability)
+    ));
     assert!(shares(
         &mut found.location.maps.windows.iter().map(|w| w.share)
     ));
@@ -286,8 +288,6 @@ fn threads_change_no_bit_of_a_box() {
         let pool = pool.num_threads(threads).build().unwrap();
         let settings = DiagnoseSettings {
             seed,
-            replicates: 25,
-            unexplained: 50,
             ..DiagnoseSettings::default()
         };
         let records = std::slice::from_ref(&record);

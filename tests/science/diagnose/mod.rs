@@ -60,7 +60,7 @@ fn clear_effects_are_found_and_named() {
             found.cause.class
         );
         assert_eq!(found.location.target.as_deref(), key.split('@').nth(1));
-        let shares: f64 = found.location.targets.iter().map(|t| t.share).sum();
+        let shares: f64 = found.location.targets.iter().map(|t| t.probability).sum();
         assert!(shares <= 1.0 + 1e-9);
     }
 }
@@ -98,7 +98,7 @@ fn an_unlisted_push_is_named_by_nobody() {
     assert!(found.cause.accepted.is_empty());
 }
 
-/// The same seed gives the same bits on one thread and on three; another seed does not.
+/// The same seed gives the same bits on one thread and on three; another seed the same answer.
 #[test]
 fn threads_change_no_bit() {
     let study = study("van-der-pol");
@@ -113,8 +113,6 @@ fn threads_change_no_bit() {
             .unwrap();
         let settings = DiagnoseSettings {
             seed,
-            replicates: 25,
-            unexplained: 50,
             ..DiagnoseSettings::default()
         };
         let mut found = pool.install(|| {
@@ -128,10 +126,13 @@ fn threads_change_no_bit() {
             .unwrap()
         });
         found.seconds = 0.0;
-        format!("{found:?}")
+        found
     };
-    assert_eq!(run(1, 1), run(3, 1));
-    assert_ne!(run(1, 1), run(1, 2));
+    let one = run(1, 1);
+    assert_eq!(format!("{one:?}"), format!("{:?}", run(3, 1)));
+    let other = run(1, 2);
+    assert_eq!(one.cause.accepted, other.cause.accepted);
+    assert!((one.detection.log_evidence - other.detection.log_evidence).abs() < 0.5);
 }
 
 struct Stop;
@@ -154,8 +155,8 @@ fn what_cannot_be_diagnosed_is_refused_in_one_line() {
     };
     let (usual, silent) = (DiagnoseSettings::default(), Progress::silent());
     assert!(run(&[], &usual, &silent).contains("at least one"));
-    let short = Record::new(Drive::autonomous(0.05, 20).unwrap(), Signal::zeros((20, 1))).unwrap();
-    assert!(run(&[short], &usual, &silent).contains("at least 50"));
+    let short = Record::new(Drive::autonomous(0.05, 3).unwrap(), Signal::zeros((3, 1))).unwrap();
+    assert!(run(&[short], &usual, &silent).contains("at least 4"));
     let unknown = DiagnoseSettings {
         without: vec!["sensor-lags@sensor".into()],
         ..usual.clone()

@@ -320,25 +320,22 @@ pub fn line(truth: &str, found: &Diagnosis) -> String {
     let top: Vec<String> = (which.effects.iter().take(2))
         .map(|e| {
             format!(
-                "{} {:.2} gain {:.1}",
+                "{} {:.2} ({:.1} nats)",
                 e.key(),
                 e.probability,
-                e.log_score_gain
+                e.log_evidence
             )
         })
         .collect();
     format!(
-        "{truth:28} {:14} p {:.3} (rank {:.3} logE {:5.1}) {:13} acc {:?} class {:?} top {:?} unexpl {:?} catch {:?} where {:?} shrink {:?} {:.1} s",
+        "{truth:28} {:14} {:6.1} nats {:13} acc {:?} class {:?} top {:?} remains {:?} where {:?} shrink {:?} {:.1} s",
         found.verdict.id(),
-        found.detection.p_value,
-        found.detection.rank_p_value,
-        found.detection.log_e.unwrap_or(f64::NAN),
+        found.detection.log_evidence,
         which.decision.id(),
         which.accepted,
         which.class,
         top,
-        which.unexplained_p_value,
-        which.catch_all,
+        which.remains.as_ref().map(|r| (&r.place, r.log_evidence)),
         found.location.target,
         found
             .shrinkage

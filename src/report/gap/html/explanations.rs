@@ -1,9 +1,9 @@
 //! Section on causes: explanations by probability, with magnitudes.
 
 use crate::diagnose::{Decision, Diagnosis, EffectFit, RIVALS, Verdict};
-use crate::report::digits::bare;
-use crate::report::digits::{chance, probability, short};
+use crate::report::digits::{chance, short};
 use crate::report::gap::pictures;
+use crate::report::gap::text::{remains_sentence, rivals};
 use crate::report::page::Column::{Number, Text};
 use crate::report::page::{Section, figure, paragraph, table};
 use crate::report::units::Units;
@@ -18,11 +18,11 @@ fn body(units: &Units, diagnosis: &Diagnosis) -> String {
     if let Some(svg) = pictures::explanations(diagnosis) {
         let caption = match which.decision {
             Decision::Absorbed => {
-                "Probability among these effects, and gain in log density over the twin with parameters inside the prior."
+                "Posterior probability of each effect, and its evidence over the twin with parameters inside the prior."
             }
             _ => {
-                "Probability among all listed effects and unlisted disturbances, and gain in log density over the twin alone. \
-                 Filled bar and bold name: accepted."
+                "Posterior probability that an effect is missing, alone or beside others, and its evidence over the twin alone. Filled \
+                 bar and bold name: accepted. Last: what is missing, all in all; these four add up to 1."
             }
         };
         body.push_str(&figure(&svg, caption));
@@ -36,20 +36,16 @@ fn body(units: &Units, diagnosis: &Diagnosis) -> String {
             ("standing", Text),
             ("magnitudes", Text),
             ("probability", Number),
-            ("gain in nats", Number),
-            ("p", Number),
+            ("nats", Number),
         ];
         body.push_str(&table(
-            "Best first. p: the effect's own scan, corrected for all candidates.",
+            "Best first. Nats: evidence over the twin alone; for effects that are accepted together, of all of them.",
             &head,
             &rows,
         ));
     }
-    if let Some(p) = which.unexplained_p_value {
-        body.push_str(&paragraph(&format!(
-            "Residual test with the best explanation added: {}.",
-            probability(p)
-        )));
+    if let Some(remains) = remains_sentence(which) {
+        body.push_str(&paragraph(&remains));
     }
     body
 }
@@ -59,19 +55,19 @@ fn decision(diagnosis: &Diagnosis) -> String {
     let which = &diagnosis.cause;
     match which.decision {
         Decision::Named if which.accepted.len() > 1 => format!(
-            "{} effects are accepted together. Each probability compares an effect with all that were tried in its place; each \
-             gain is what the effect adds to those above it.",
+            "{} effects are accepted together; no single one explains as much.",
             which.accepted.len()
         ),
         Decision::Named => "One effect is accepted; no other one comes near it.".into(),
         Decision::Class => format!(
-            "The best explanation is accepted; this record cannot separate {} effects within {RIVALS} nats of it.",
-            which.class.len()
+            "The best explanation is accepted; the record cannot separate it from {} within {RIVALS} nats.",
+            rivals(which).join(", ")
         ),
-        Decision::NoneOfThese => match &which.catch_all {
-            Some(place) => format!("No listed effect is accepted: a disturbance of {place} explains the record better."),
-            None => "No listed effect is accepted: with each of them, the residual test still fails.".into(),
-        },
+        Decision::Partial => format!(
+            "{} explains most of the gap; something unknown remains.",
+            which.accepted.join(" and ")
+        ),
+        Decision::NoneOfThese => "No listed effect is accepted: with each of them, something unknown remains.".into(),
         Decision::Absorbed => {
             "Parameters outside the prior explain the record; so do these effects with parameters inside the prior.".into()
         }
@@ -97,7 +93,6 @@ fn row(units: &Units, diagnosis: &Diagnosis, effect: &EffectFit) -> Vec<String> 
         standing.into(),
         units.magnitudes(effect),
         chance(effect.probability),
-        short(effect.log_score_gain),
-        effect.p_value.map_or("–".into(), bare),
+        short(effect.log_evidence),
     ]
 }

@@ -1,7 +1,8 @@
 //! Section on evidence and limits of the answer.
 
-use crate::diagnose::{Diagnosis, Visible};
-use crate::report::digits::{percent, probability, short, unit_suffix};
+use crate::diagnose::{Diagnosis, Maps, Visible};
+use crate::report::digits::{short, unit_suffix};
+use crate::report::gap::text::calibration;
 use crate::report::page::Column::{Number, Text};
 use crate::report::page::{Section, folded, list, paragraph, table};
 use crate::report::units::Units;
@@ -16,29 +17,29 @@ pub(super) fn section_of(units: &Units, diagnosis: &Diagnosis) -> Section {
     Section::new("limits", "How sure, and what was not tested", body)
 }
 
-/// Returns the evidence.
+/// Returns the meaning of the evidence.
 fn sure(diagnosis: &Diagnosis) -> Vec<String> {
-    let d = &diagnosis.detection;
-    let mut items = vec![format!(
-        "The test simulates records of the refitted twin, analyses them like the measured record, and ranks the measured record \
-         among them ({}). False-alarm rate about {}.",
-        probability(d.rank_p_value),
-        percent(d.alpha)
-    )];
-    items.push(match d.log_e {
-        Some(log_e) => format!(
-            "Evidence from the validation record alone: log E {}; above {} it suffices without the rank.",
-            short(log_e),
-            short((2.0 / d.alpha).ln())
+    let mut items = vec![
+        "Evidence: log odds that something is missing against that nothing is, prior odds even. The likelihood is averaged over \
+         parameters, noise levels and magnitudes."
+            .to_owned(),
+    ];
+    items.push(match calibration(&diagnosis.detection) {
+        Some(p) => format!(
+            "Calibration: the share of records simulated by the fitted twin with as much evidence is {p}."
         ),
-        None => "No validation record was given: an explanation that fits this record by chance is not detected.".into(),
+        None => "The evidence was not calibrated on simulated records; --calibrate does that.".into(),
     });
     if !diagnosis.cause.effects.is_empty() {
         items.push(
-            "Probabilities compare the effects that were tested; 5 % are reserved for unlisted laws that a listed effect imitates. \
-             Sealed trials measure how often they are right (docs/diagnosing-a-gap.md). p-values of effects are corrected for all \
-             candidates."
+            "Probabilities hold for the explanations that were tested; unknown functions stand for laws outside the list. Sealed \
+             trials measure how often they are right (docs/diagnosing-a-gap.md)."
                 .into(),
+        );
+    }
+    if diagnosis.location.maps != Maps::default() {
+        items.push(
+            "Windows, ranges, lags and bands describe the residuals; they test nothing.".into(),
         );
     }
     items
@@ -47,7 +48,7 @@ fn sure(diagnosis: &Diagnosis) -> Vec<String> {
 /// Returns the effects that were not tested.
 fn untested(diagnosis: &Diagnosis) -> Vec<String> {
     let mut items = vec![format!(
-        "{} explanations were tested, and combinations of up to three effects; laws outside the list only as disturbances.",
+        "{} explanations were tested: listed effects and unknown functions; then combinations of the best.",
         diagnosis.candidates
     )];
     if !diagnosis.not_tested.is_empty() {
@@ -79,7 +80,7 @@ fn power(units: &Units, diagnosis: &Diagnosis) -> String {
         ("smallest detectable", Number),
     ];
     let numbers = table(
-        "The smallest magnitude that the test detects in 80 of 100 such records; smaller ones may be present.",
+        "The smallest magnitude that is detected in 80 of 100 such records; smaller ones may be present.",
         &head,
         &rows,
     );

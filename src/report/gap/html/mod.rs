@@ -9,9 +9,8 @@ mod place;
 mod steps;
 
 use crate::diagnose::{Diagnosis, Verdict};
-use crate::report::digits::{probability, short};
 use crate::report::gap::pictures;
-use crate::report::gap::text::verdict_sentence;
+use crate::report::gap::text::{evidence_sentence, verdict_sentence};
 use crate::report::page::{Section, escaped, figure, page, paragraph};
 use crate::report::units::Units;
 use crate::study::Study;
@@ -25,7 +24,7 @@ pub fn gap_html(study: &Study, diagnosis: &Diagnosis) -> String {
     let verdict = escaped(&verdict_sentence(diagnosis));
     let lead = format!(
         "<p class=\"verdict\">{verdict}</p>\n{}",
-        paragraph(&test(diagnosis))
+        paragraph(&evidence(diagnosis))
     );
     let mut sections = vec![runs(study, diagnosis), place::section_of(study, diagnosis)];
     sections.push(explanations::section_of(&units, diagnosis));
@@ -48,33 +47,20 @@ pub fn gap_html(study: &Study, diagnosis: &Diagnosis) -> String {
     )
 }
 
-/// The test behind the verdict.
-fn test(diagnosis: &Diagnosis) -> String {
-    let d = &diagnosis.detection;
-    let validation = match d.log_e {
-        Some(log_e) => format!(
-            ", from simulations and from the validation record together (log E {})",
-            short(log_e)
-        ),
-        None => ", from simulations".into(),
-    };
+/// The evidence behind the verdict.
+fn evidence(diagnosis: &Diagnosis) -> String {
     format!(
-        "Structural test of the twin with its parameters refitted: {} at level {}{validation}.",
-        probability(d.p_value),
-        d.alpha
+        "{} Nats are natural logarithms of odds: above 0, something is missing.",
+        evidence_sentence(diagnosis)
     )
 }
 
 /// Measured and twin.
 fn runs(study: &Study, diagnosis: &Diagnosis) -> Section {
     let marked = if diagnosis.location.maps.notable().windows.is_empty() {
-        String::new()
+        ""
     } else {
-        format!(
-            " The strip below the axis marks windows where the twin deviates, with their shares of the gap: unbroken \
-             frame and bold text p < {}, dashed frame p ≤ 0.1.",
-            diagnosis.detection.alpha
-        )
+        " The strip below the axis marks windows that stand out from white noise, with their shares of the gap."
     };
     let caption = format!(
         "The twin runs from the inputs alone, without noise. Its parameters are fitted to this record.{marked}"

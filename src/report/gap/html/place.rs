@@ -1,12 +1,15 @@
-//! Section on the location of a gap: in the twin, in time, in the equations, at values, lags and frequencies.
+//! Section on the location of a gap: in the twin, in time, missing functions, at values, lags and frequencies.
 
 use crate::diagnose::{Diagnosis, Location, Maps, Verdict, Window};
-use crate::report::digits::{bare, error, percent, probability, short, unit_suffix};
+use crate::report::digits::{chance, percent, short, unit_suffix};
 use crate::report::gap::pictures;
 use crate::report::page::Column::{self, Number, Text};
 use crate::report::page::{Section, figure, folded, paragraph, subheading, table};
 use crate::report::units::Units;
 use crate::study::Study;
+
+/// Meaning of the score of a cell.
+const SCORE: &str = "Score: standard deviations above white noise.";
 
 pub(super) fn section_of(study: &Study, diagnosis: &Diagnosis) -> Section {
     let body = match diagnosis.verdict {
@@ -21,25 +24,21 @@ fn body(study: &Study, diagnosis: &Diagnosis) -> String {
         Some(target) => paragraph(&format!("The missing law acts on {target}.")),
         None => String::new(),
     };
-    let filled = format!(
-        "Filled bars and bold names: p < {}.",
-        diagnosis.detection.alpha
-    );
-    body.push_str(&targets(diagnosis, &filled));
+    body.push_str(&targets(diagnosis));
     body.push_str(&time(diagnosis));
-    body.push_str(&equations(study, diagnosis));
+    body.push_str(&functions(study, diagnosis));
     if let Some(svg) = pictures::regions(study, diagnosis) {
-        let caption = format!(
+        body.push_str(&figure(
+            &svg,
             "Shares of the best explanation's gain, by the filtered state or the input one step before, and by the predicted output; \
-             all ranges of all variables add up to 100 %. Only significant ranges (p ≤ 0.1). {filled}"
-        );
-        body.push_str(&figure(&svg, &caption));
+             all ranges of all variables add up to 100 %. Only ranges that stand out from white noise.",
+        ));
         body.push_str(&ranges(study, diagnosis));
     }
     let further: String = [
         (
             pictures::channels(study, diagnosis),
-            "Share of each output in the significant misfit.",
+            "Share of each output in the misfit that stands out from white noise.",
         ),
         (
             pictures::lags(diagnosis),
@@ -52,7 +51,7 @@ fn body(study: &Study, diagnosis: &Diagnosis) -> String {
         ),
     ]
     .into_iter()
-    .filter_map(|(svg, caption)| Some(figure(&svg?, &format!("{caption} {filled}"))))
+    .filter_map(|(svg, caption)| Some(figure(&svg?, caption)))
     .collect();
     if !further.is_empty() {
         body.push_str(&folded("By output, lag and frequency", &further));
@@ -61,23 +60,20 @@ fn body(study: &Study, diagnosis: &Diagnosis) -> String {
 }
 
 /// Places in the twin.
-fn targets(diagnosis: &Diagnosis, filled: &str) -> String {
+fn targets(diagnosis: &Diagnosis) -> String {
     let Some(svg) = pictures::targets(diagnosis) else {
         return String::new();
     };
     let place = &diagnosis.location;
-    let alone = match (place.targets.first(), &place.target) {
-        (Some(first), Some(target)) if first.target != *target => {
-            format!(" Shares compare single explanations; the accepted effects act on {target}.")
-        }
-        _ => String::new(),
+    let named = match &place.target {
+        Some(target) => format!(" Filled bar and bold name: {target}."),
+        None => String::new(),
     };
-    let caption =
-        format!("Probability that the cause of the gap is at this place.{alone} {filled}");
+    let caption = format!("Posterior probability of each place, given a gap.{named}");
     let rows: Vec<Vec<String>> = (place.targets.iter())
-        .map(|t| vec![t.target.clone(), percent(t.share), bare(t.p_value)])
+        .map(|t| vec![t.target.clone(), chance(t.probability)])
         .collect();
-    let head = [("place", Text), ("share", Number), ("p", Number)];
+    let head = [("place", Text), ("probability", Number)];
     let numbers = table("All tested places.", &head, &rows);
     figure(&svg, &caption) + &folded("Places in numbers", &numbers)
 }
@@ -92,7 +88,7 @@ fn ranges(study: &Study, diagnosis: &Diagnosis) -> String {
                 r.variable.clone(),
                 format!("{} … {}{unit}", short(r.low), short(r.high)),
                 percent(r.share),
-                bare(r.p_value),
+                short(r.score),
             ]
         })
         .collect();
@@ -100,9 +96,10 @@ fn ranges(study: &Study, diagnosis: &Diagnosis) -> String {
         ("variable", Text),
         ("range", Number),
         ("share", Number),
-        ("p", Number),
+        ("score", Number),
     ];
-    let numbers = table("Significant ranges, clearest first.", &head, &rows);
+    let caption = format!("Ranges that stand out, clearest first. {SCORE}");
+    let numbers = table(&caption, &head, &rows);
     folded("Ranges in numbers", &numbers)
 }
 
@@ -112,22 +109,15 @@ fn time(diagnosis: &Diagnosis) -> String {
     let Some(svg) = pictures::time(diagnosis) else {
         return String::new();
     };
-    let alpha = diagnosis.detection.alpha;
     let mut lead = match &place.onset {
-        Some(o) if o.time <= 0.0 => format!(
-            "The twin fails to predict {} from the start on ({}).",
-            channel(&o.channel, o.record),
-            probability(o.p_value)
-        ),
         Some(o) => format!(
-            "Fitted to all earlier samples, the twin predicts each stretch until {} s; from there on {} deviates ({}).",
-            short(o.time),
-            channel(&o.channel, o.record),
-            probability(o.p_value)
+            "A change of {} at {} s explains the record best. ",
+            o.parameter,
+            short(o.time)
         ),
-        None => "No onset is significant.".into(),
+        None => String::new(),
     };
-    lead.push_str(&format!(" {}.", standing(&place.maps)));
+    lead.push_str(&format!("{}.", standing(&place.maps)));
     if let Some(after) = &place.after {
         let added = match diagnosis.cause.accepted.as_slice() {
             [] => "the best explanation".into(),
@@ -138,25 +128,26 @@ fn time(diagnosis: &Diagnosis) -> String {
             standing(after).to_lowercase()
         ));
     }
-    let caption = format!(
-        "Shares of the gap by window and output. Unbroken frame and bold text: p < {alpha}; dashed frame: p ≤ 0.1; no frame: as in \
-         simulations of the twin. p is corrected for all cells of all maps."
+    let caption = "Shares of the gap by window and output. Frame and bold text: the window stands out; no frame: like white noise.";
+    let numbers = table(
+        &format!("Windows in order of time. {SCORE}"),
+        &head(place),
+        &rows(place),
     );
-    let numbers = table("Windows in order of time.", &head(place), &rows(place));
     [
         subheading("In time"),
         paragraph(&lead),
-        figure(&svg, &caption),
+        figure(&svg, caption),
         folded("Windows in numbers", &numbers),
     ]
     .concat()
 }
 
-/// Returns the number of significant windows.
+/// Returns the number of windows that stand out.
 fn standing(maps: &Maps) -> String {
     match (maps.notable().windows.len(), maps.windows.len()) {
-        (0, _) => "No window is significant".into(),
-        (some, all) => format!("{some} of {all} windows are significant"),
+        (0, _) => "No window stands out from white noise".into(),
+        (some, all) => format!("{some} of {all} windows stand out from white noise"),
     }
 }
 
@@ -174,10 +165,10 @@ fn head(place: &Location) -> Vec<(&'static str, Column)> {
         ("from, s", Number),
         ("to, s", Number),
         ("share", Number),
-        ("p", Number),
+        ("score", Number),
     ];
     if place.after.is_some() {
-        head.extend([("share with the effect", Number), ("p with it", Number)]);
+        head.extend([("share with the effect", Number), ("score with it", Number)]);
     }
     head
 }
@@ -195,73 +186,64 @@ fn rows(place: &Location) -> Vec<Vec<String>> {
             short(w.start),
             short(w.end),
             percent(w.share),
-            bare(w.p_value),
+            short(w.score),
         ];
         if let Some(after) = &place.after {
             let same =
                 |o: &&Window| (o.record, &o.channel, o.start) == (w.record, &w.channel, w.start);
-            let [share, p] = match after.windows.iter().find(same) {
-                Some(o) => [percent(o.share), bare(o.p_value)],
+            let [share, score] = match after.windows.iter().find(same) {
+                Some(o) => [percent(o.share), short(o.score)],
                 None => ["–", "–"].map(String::from),
             };
-            cells.extend([share, p]);
+            cells.extend([share, score]);
         }
         cells
     };
     windows.into_iter().map(row).collect()
 }
 
-/// Returns the terms that the equations lack.
-fn equations(study: &Study, diagnosis: &Diagnosis) -> String {
-    let Some(svg) = pictures::equations(study, diagnosis) else {
+/// Returns the functions that the twin lacks.
+fn functions(study: &Study, diagnosis: &Diagnosis) -> String {
+    let Some(svg) = pictures::functions(study, diagnosis) else {
         return String::new();
     };
     let units = Units::of(study);
-    let equations = &diagnosis.location.equations;
-    let lead = match equations.first() {
-        Some(first) => format!(
-            "A disturbance in the {} explains the record best ({} among all equations, {}).",
-            units.equation_name(&first.equation),
-            percent(first.share),
-            probability(first.p_value)
-        ),
-        None => String::new(),
-    };
-    // All others stand in report.json.
-    let clear = |i: usize, p: f64| i == 0 || p < diagnosis.detection.alpha;
-    let rows: Vec<Vec<String>> = (equations.iter().enumerate())
-        .filter(|(i, e)| clear(*i, e.p_value))
-        .map(|(_, e)| e)
-        .flat_map(|e| e.term.iter().map(move |t| (e, t)))
-        .map(|(e, t)| {
+    let rows: Vec<Vec<String>> = (diagnosis.location.functions.iter())
+        .map(|f| {
+            let beside = match f.on_top {
+                true => "on top of the accepted effects",
+                false => "beside the twin alone",
+            };
             vec![
-                units.equation_name(&e.equation),
-                t.variable.clone(),
-                format!("{} … {}", short(t.low), short(t.high)),
-                short(t.mean),
-                error(t.std_error),
-                units.equation_unit(&e.equation),
+                units.place(&f.place),
+                units.named(&f.variable),
+                beside.into(),
+                short(f.log_evidence),
             ]
         })
         .collect();
     let head = [
-        ("equation", Text),
-        ("variable", Text),
-        ("range", Number),
-        ("mean missing term", Number),
-        ("std. error", Number),
-        ("unit", Text),
+        ("joins the", Text),
+        ("depends on", Text),
+        ("fitted", Text),
+        ("nats", Number),
     ];
-    let numbers = table("Significant equations, by ranges.", &head, &rows);
+    let numbers = table(
+        "Fitted functions, clearest first; their values stand in report.json.",
+        &head,
+        &rows,
+    );
     [
-        subheading("In the equations"),
-        paragraph(&lead),
+        subheading("Missing functions"),
+        paragraph(
+            "Each unknown function is fitted together with parameters and noise levels. Above zero, the twin gives too little; below, too much.",
+        ),
         figure(
             &svg,
-            "Term that each equation lacks: means by ranges of each variable. Boxes: ± one standard error; thick lines: more than two \
-             from zero. Bold heading: the equation is significant.",
+            "Mean and band of ± 1 standard error over the range that the records show. A function on top of the accepted effects shows \
+             what they do not explain: it should stay near zero.",
         ),
-        folded("Equations in numbers", &numbers),
+        folded("Functions in numbers", &numbers),
     ]
     .concat()
 }

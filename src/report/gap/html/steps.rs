@@ -86,13 +86,12 @@ fn steps(diagnosis: &Diagnosis) -> Vec<String> {
              explains how to separate neighbours.",
             which.class.join(", ")
         )),
-        _ => steps.extend(none_of_these(diagnosis)),
-    }
-    let left = which
-        .unexplained_p_value
-        .is_some_and(|p| p < diagnosis.detection.alpha);
-    if left && which.decision == Decision::Named {
-        steps.push("The residual test still fails: add the accepted effects to the study and diagnose again.".into());
+        (_, Decision::Partial) => {
+            steps.push(format!("Add {} to the twin.", which.accepted.join(" and ")));
+            let remains = which.remains.as_ref().map(|r| r.place.as_str());
+            steps.extend(unlisted(diagnosis, remains));
+        }
+        _ => steps.extend(unlisted(diagnosis, diagnosis.location.target.as_deref())),
     }
     let vague: Vec<&str> = (diagnosis.parameters.iter())
         .filter(|p| !p.identified)
@@ -111,10 +110,15 @@ fn steps(diagnosis: &Diagnosis) -> Vec<String> {
     steps
 }
 
-/// Returns hints for an unlisted law.
-fn none_of_these(diagnosis: &Diagnosis) -> Vec<String> {
-    let (place, maps) = (&diagnosis.location, diagnosis.location.maps.notable());
-    let mut look = match &place.target {
+/// Returns hints for an unlisted law at a place: the maps that it leaves, and the exploration.
+fn unlisted(diagnosis: &Diagnosis, place: Option<&str>) -> Vec<String> {
+    let location = &diagnosis.location;
+    let left = match diagnosis.cause.decision {
+        Decision::Partial => location.after.as_ref(),
+        _ => None,
+    };
+    let maps = left.unwrap_or(&location.maps).notable();
+    let mut look = match place {
         Some(target) => format!("Look at {target}"),
         None => "Look at the twin".into(),
     };

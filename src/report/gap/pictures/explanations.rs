@@ -3,42 +3,49 @@
 use crate::diagnose::{Decision, Diagnosis, EffectFit};
 use crate::report::chart::{Bar, BarChart, BarGroup};
 use crate::report::digits::{chance, short};
+use crate::report::gap::text::rivals;
 
 /// Explanations that are drawn.
 const SHOWN: usize = 8;
 
-/// Listed effects by probability, then everything else together; `None` where none was fitted.
+/// Listed effects by probability, then the kinds of explanation; `None` where no effect was fitted.
 pub fn explanations(diagnosis: &Diagnosis) -> Option<String> {
     let which = &diagnosis.cause;
     let first = which.effects.first()?;
     let bar = |effect: &EffectFit| {
-        let (key, gain) = (effect.key(), short(effect.log_score_gain));
+        let (key, gain) = (effect.key(), short(effect.log_evidence));
         let note = format!("{}, {gain} nats", chance(effect.probability));
         Bar::new(&key, effect.probability, &note).clear(which.accepted.contains(&key))
     };
     let shown = || which.effects.iter().take(SHOWN);
-    let is_rival =
-        |e: &&EffectFit| which.decision == Decision::Class && which.class.contains(&e.key());
-    let rivals: Vec<Bar> = shown().filter(is_rival).map(bar).collect();
-    let mut others: Vec<Bar> = shown().filter(|e| !is_rival(e)).map(bar).collect();
-    // Effects that absorb a parameter gap are compared with no others.
-    if which.decision != Decision::Absorbed {
-        let listed: f64 = shown().map(|e| e.probability).sum();
-        let rest = (1.0 - listed).max(0.0);
-        others.push(Bar::new(
-            "all others, including unlisted",
-            rest,
-            &chance(rest),
-        ));
-    }
-    let groups = if rivals.is_empty() {
-        vec![BarGroup::new("", Some(1.0), others)]
-    } else {
-        vec![
-            BarGroup::new("One class: not separated by this record", Some(1.0), rivals),
-            BarGroup::new("Outside the class", Some(1.0), others),
-        ]
+    let has_class = which.decision != Decision::Absorbed && !rivals(which).is_empty();
+    let is_inside = |e: &&EffectFit| has_class && which.class.contains(&e.key());
+    let inside: Vec<Bar> = shown().filter(is_inside).map(bar).collect();
+    let others: Vec<Bar> = shown().filter(|e| !is_inside(e)).map(bar).collect();
+    let p = &which.probabilities;
+    let kinds = [
+        ("listed effects only", p.listed),
+        ("listed and unlisted", p.partial),
+        ("unlisted only", p.unknown),
+        ("nothing", p.nothing),
+    ];
+    let kinds = kinds.map(|(label, p)| Bar::new(label, p, &chance(p)));
+    let (first_label, second_label) = match has_class {
+        true => (
+            "One class: not separated by this record",
+            "Outside the class",
+        ),
+        false => ("", "Effects"),
     };
+    let groups = [
+        (first_label, inside),
+        (second_label, others),
+        ("Missing, all in all", kinds.to_vec()),
+    ];
+    let groups = (groups.into_iter())
+        .filter(|(_, bars)| !bars.is_empty())
+        .map(|(label, bars)| BarGroup::new(label, Some(1.0), bars))
+        .collect();
     let chart = BarChart {
         title: "Explanations by probability".into(),
         description: format!(

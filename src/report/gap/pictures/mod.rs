@@ -1,19 +1,19 @@
 //! The pictures of a diagnosis.
 
 mod discovery;
-mod equations;
 mod explanations;
 mod extent;
+mod functions;
 mod next;
 mod places;
 mod runs;
 mod time;
 mod windows;
 
-pub(super) use discovery::{missing, terms};
-pub(super) use equations::equations;
+pub(super) use discovery::terms;
 pub(super) use explanations::explanations;
 pub(super) use extent::extent;
+pub(super) use functions::functions;
 pub(super) use next::next_input;
 pub(super) use places::{bands, channels, lags, regions, targets};
 pub(super) use runs::runs;
@@ -24,14 +24,14 @@ use crate::study::Study;
 
 /// Returns the pictures of a diagnosis as SVG, each with its name; what has nothing to show is left out.
 ///
-/// Names: `record`, `validation`, `time`, `equations`, `targets`, `regions`, `channels`, `lags`, `bands`, `which`,
-/// `extent`, `terms`, `missing`, `next-input`.
+/// Names: `record`, `validation`, `time`, `functions`, `targets`, `regions`, `channels`, `lags`, `bands`, `which`,
+/// `extent`, `terms`, `next-input`.
 pub fn gap_pictures(study: &Study, diagnosis: &Diagnosis) -> Vec<(&'static str, String)> {
     let all = [
         ("record", runs(study, diagnosis, false)),
         ("validation", runs(study, diagnosis, true)),
         ("time", time(diagnosis)),
-        ("equations", equations(study, diagnosis)),
+        ("functions", functions(study, diagnosis)),
         ("targets", targets(diagnosis)),
         ("regions", regions(study, diagnosis)),
         ("channels", channels(study, diagnosis)),
@@ -40,7 +40,6 @@ pub fn gap_pictures(study: &Study, diagnosis: &Diagnosis) -> Vec<(&'static str, 
         ("which", explanations(diagnosis)),
         ("extent", extent(diagnosis)),
         ("terms", terms(study, diagnosis)),
-        ("missing", missing(study, diagnosis)),
         ("next-input", next_input(study, diagnosis)),
     ];
     (all.into_iter())

@@ -2,7 +2,7 @@
 
 use crate::diagnose::{Band, Cell, Diagnosis, Lag, Region};
 use crate::report::chart::{Bar, BarChart, BarGroup};
-use crate::report::digits::{percent, probability, short, unit_suffix};
+use crate::report::digits::{chance, percent, short, unit_suffix};
 use crate::report::units::Units;
 use crate::study::Study;
 
@@ -10,9 +10,8 @@ use crate::study::Study;
 const VISIBLE: f64 = 0.005;
 
 /// A cell as a bar.
-fn bar(diagnosis: &Diagnosis, label: &str, cell: &impl Cell) -> Bar {
-    let note = format!("{}, {}", percent(cell.share()), probability(cell.p_value()));
-    Bar::new(label, cell.share(), &note).clear(cell.p_value() < diagnosis.detection.alpha)
+fn bar(label: &str, cell: &impl Cell) -> Bar {
+    Bar::new(label, cell.share(), &percent(cell.share()))
 }
 
 /// Cells by what they are of, in the order of their first ones' names.
@@ -27,15 +26,15 @@ fn grouped<'c, C, K: Ord + Copy>(
     groups.into_iter()
 }
 
-/// Places in the twin by the probability of what explains the gap there; `None` where nothing was looked for.
+/// Places in the twin by the probability of what explains the records there; `None` where nothing was looked for.
 pub fn targets(diagnosis: &Diagnosis) -> Option<String> {
     let targets = &diagnosis.location.targets;
     let first = targets.first()?;
     let bars = (targets.iter())
-        .filter(|t| t.share >= VISIBLE)
+        .filter(|t| t.probability >= VISIBLE)
         .map(|t| {
-            let note = format!("{}, {}", percent(t.share), probability(t.p_value));
-            Bar::new(&t.target, t.share, &note).clear(t.p_value < diagnosis.detection.alpha)
+            let is_answer = diagnosis.location.target.as_ref() == Some(&t.target);
+            Bar::new(&t.target, t.probability, &chance(t.probability)).clear(is_answer)
         })
         .collect();
     let chart = BarChart {
@@ -44,7 +43,7 @@ pub fn targets(diagnosis: &Diagnosis) -> Option<String> {
             "Bars of {} places; the first is {} with {}.",
             targets.len(),
             first.target,
-            percent(first.share)
+            chance(first.probability)
         ),
         groups: vec![BarGroup::new("", Some(1.0), bars)],
     };
@@ -63,7 +62,7 @@ pub fn regions(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
             own.sort_by(|a, b| a.low.total_cmp(&b.low));
             let bar = |r: &&Region| {
                 let label = format!("{} … {}{unit}", short(r.low), short(r.high));
-                bar(diagnosis, &label, *r)
+                bar(&label, *r)
             };
             BarGroup::new(variable, None, own.iter().map(bar).collect())
         })
@@ -89,9 +88,7 @@ pub fn channels(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
     if Units::of(study).outputs.len() < 2 {
         return None;
     }
-    let bars = (channels.iter())
-        .map(|c| bar(diagnosis, &c.channel, c))
-        .collect();
+    let bars = (channels.iter()).map(|c| bar(&c.channel, c)).collect();
     let chart = BarChart {
         title: "In which outputs".into(),
         description: format!(
@@ -119,10 +116,7 @@ pub fn lags(diagnosis: &Diagnosis) -> Option<String> {
     let groups = grouped(&lags, |l| (l.channel.as_str(), l.signal.as_str()))
         .map(|((channel, signal), mut own)| {
             own.sort_by(|a, b| a.from.total_cmp(&b.from));
-            let bars = own
-                .iter()
-                .map(|l| bar(diagnosis, &between(l), *l))
-                .collect();
+            let bars = own.iter().map(|l| bar(&between(l), *l)).collect();
             BarGroup::new(&past(channel, signal), None, bars)
         })
         .collect();
@@ -156,10 +150,7 @@ pub fn bands(diagnosis: &Diagnosis) -> Option<String> {
     let groups = grouped(&bands, |b| b.channel.as_str())
         .map(|(channel, mut own)| {
             own.sort_by(|a, b| a.low.total_cmp(&b.low));
-            let bars = own
-                .iter()
-                .map(|b| bar(diagnosis, &between(b), *b))
-                .collect();
+            let bars = own.iter().map(|b| bar(&between(b), *b)).collect();
             BarGroup::new(channel, None, bars)
         })
         .collect();

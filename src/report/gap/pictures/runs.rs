@@ -1,6 +1,6 @@
 //! Measured outputs and the twin.
 
-use super::windows::{onset, windows};
+use super::windows::{mark, windows};
 use crate::diagnose::{Diagnosis, FreeRuns};
 use crate::report::chart::{Chart, Panel, Series, Style, roomy};
 use crate::report::digits::{named, short};
@@ -24,11 +24,8 @@ pub fn runs(study: &Study, diagnosis: &Diagnosis, validation: bool) -> Option<St
             if validation {
                 panel
             } else {
-                (panel.spans(windows(diagnosis, &output.name))).marks(
-                    onset(diagnosis.location.onset.as_ref(), 0, &output.name)
-                        .into_iter()
-                        .collect(),
-                )
+                let change = diagnosis.location.onset.as_ref().map(mark);
+                (panel.spans(windows(diagnosis, &output.name))).marks(change.into_iter().collect())
             }
         })
         .collect();

@@ -1,6 +1,6 @@
 //! Windows of time of all outputs, before and after the accepted effects.
 
-use super::windows::{largest, onset, spans};
+use super::windows::{largest, mark, spans};
 use crate::diagnose::{Diagnosis, Maps, Onset};
 use crate::report::chart::{HeatGroup, HeatMap, HeatRow};
 use crate::report::digits::{percent, short};
@@ -13,34 +13,19 @@ pub fn time(diagnosis: &Diagnosis) -> Option<String> {
     let clearest = maps.windows.first()?;
     let after = (diagnosis.location.after.as_ref()).filter(|m| !m.windows.is_empty());
     let full = largest(maps).max(after.map_or(0.0, largest));
-    let alpha = diagnosis.detection.alpha;
-    let mut groups = of_records(
-        "twin, refitted",
-        maps,
-        diagnosis.location.onset.as_ref(),
-        alpha,
-        full,
-    );
+    let onset = diagnosis.location.onset.as_ref();
+    let mut groups = of_records("twin, refitted", maps, onset, full);
     if let Some(after) = after {
-        groups.extend(of_records(
-            &with_effects(diagnosis),
-            after,
-            None,
-            alpha,
-            full,
-        ));
+        groups.extend(of_records(&with_effects(diagnosis), after, None, full));
     }
     let windows = |maps: &Maps| maps.notable().windows.len();
     let after = after.map_or(String::new(), |after| {
-        format!(
-            "; with the effect added, {} are significant",
-            windows(after)
-        )
+        format!("; with the effect added, {} stand out", windows(after))
     });
     let map = HeatMap {
         title: "Windows of time".into(),
         description: format!(
-            "{} of {} windows are significant, the clearest in {} from {} to {} s with {} of the gap{after}.",
+            "{} of {} windows stand out, the clearest in {} from {} to {} s with {} of the gap{after}.",
             windows(maps),
             maps.windows.len(),
             clearest.channel,
@@ -62,14 +47,8 @@ fn with_effects(diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// A group a record, a row an output.
-fn of_records(
-    label: &str,
-    maps: &Maps,
-    begin: Option<&Onset>,
-    alpha: f64,
-    full: f64,
-) -> Vec<HeatGroup> {
+/// A group a record, a row an output; the change is marked above the first row.
+fn of_records(label: &str, maps: &Maps, change: Option<&Onset>, full: f64) -> Vec<HeatGroup> {
     let last = (maps.windows.iter().map(|w| w.record)).max().unwrap_or(0);
     (0..=last)
         .map(|record| {
@@ -85,11 +64,11 @@ fn of_records(
                     0 => label.into(),
                     _ => format!("record {}: {label}", record + 1),
                 },
-                rows: (channels.into_iter())
-                    .map(|channel| HeatRow {
+                rows: (channels.into_iter().enumerate())
+                    .map(|(i, channel)| HeatRow {
                         label: channel.into(),
-                        cells: spans(maps, alpha, full, (record, channel)),
-                        mark: onset(begin, record, channel),
+                        cells: spans(maps, full, (record, channel)),
+                        mark: change.filter(|_| i == 0).map(mark),
                     })
                     .collect(),
             }

@@ -1,14 +1,14 @@
 //! Windows of time and the onset, as marks of a picture.
 
 use crate::diagnose::{Cell, Diagnosis, Maps, Onset};
-use crate::report::chart::{Edge, Mark, Span};
+use crate::report::chart::{Mark, Span};
 use crate::report::digits::{percent, short};
 
 /// Windows of the first record that stand out.
 pub(super) fn windows(diagnosis: &Diagnosis, channel: &str) -> Vec<Span> {
     let notable = diagnosis.location.maps.notable();
     let full = largest(&notable);
-    spans(&notable, diagnosis.detection.alpha, full, (0, channel))
+    spans(&notable, full, (0, channel))
 }
 
 /// The largest share of a window: as dark as it gets.
@@ -17,12 +17,7 @@ pub(super) fn largest(maps: &Maps) -> f64 {
 }
 
 /// Windows of one record and output, by time; a share of `full` is as dark as it gets.
-pub(super) fn spans(
-    maps: &Maps,
-    alpha: f64,
-    full: f64,
-    (record, channel): (usize, &str),
-) -> Vec<Span> {
+pub(super) fn spans(maps: &Maps, full: f64, (record, channel): (usize, &str)) -> Vec<Span> {
     let own = (maps.windows.iter()).filter(|w| w.record == record && w.channel == channel);
     let mut spans: Vec<Span> = own
         .map(|w| Span {
@@ -30,27 +25,17 @@ pub(super) fn spans(
             to: w.end,
             label: percent(w.share),
             weight: w.share / full,
-            edge: edge(w, alpha),
+            clear: w.is_notable(),
         })
         .collect();
     spans.sort_by(|a, b| a.from.total_cmp(&b.from));
     spans
 }
 
-/// The frame that says how much a cell stands out.
-fn edge(cell: &impl Cell, alpha: f64) -> Edge {
-    match cell {
-        cell if cell.p_value() < alpha => Edge::Unbroken,
-        cell if cell.is_notable() => Edge::Dashed,
-        _ => Edge::Bare,
-    }
-}
-
-/// The onset, where it is in this record and output.
-pub(super) fn onset(onset: Option<&Onset>, record: usize, channel: &str) -> Option<Mark> {
-    let onset = onset?;
-    (onset.record == record && onset.channel == channel).then(|| Mark {
+/// The time of a change.
+pub(super) fn mark(onset: &Onset) -> Mark {
+    Mark {
         x: onset.time,
-        label: format!("onset {} s", short(onset.time)),
-    })
+        label: format!("change at {} s", short(onset.time)),
+    }
 }
