@@ -8,8 +8,6 @@
 mod devtools;
 #[path = "../../src/report/fixture/made.rs"]
 mod made;
-#[path = "../../src/report/fixture/made_scores.rs"]
-mod made_scores;
 mod pictures;
 
 use devtools::{Browser, chromium};
@@ -22,9 +20,8 @@ use truetwin::diagnose::{
     Probabilities, Region, Remains, Shrinkage, TargetShare, Term, Verdict, Visible, Window,
 };
 use truetwin::evaluate::paper::reference_studies;
-use truetwin::evaluate::trials::{Kind, Named, Outcome, Row, Scorecard};
 use truetwin::record::{Drive, Quantity, Signal};
-use truetwin::report::{gap_html, scorecard_html};
+use truetwin::report::gap_html;
 use truetwin::study::{RecordPlan, Study};
 use truetwin::twin::{Interval, Now, Outline, Parameter, ParameterSpace, StateSpace};
 
@@ -81,7 +78,7 @@ impl StateSpace for Rig {
     }
 }
 
-/// Every kind of page.
+/// Every kind of page of a diagnosis.
 fn pages() -> Vec<(&'static str, String)> {
     let studies = reference_studies().unwrap();
     let [oscillator, tanks] = studies.as_slice() else {
@@ -93,7 +90,6 @@ fn pages() -> Vec<(&'static str, String)> {
         ("none", gap_html(oscillator, &made::oscillator_none())),
         ("no-gap", gap_html(oscillator, &made::oscillator_no_gap())),
         ("partial", gap_html(&rig, &made::rig_pair())),
-        ("scorecard", scorecard_html(&made_scores::scorecard())),
     ]
 }
 

@@ -1,7 +1,7 @@
 //! Line charts: panels above each other along one x axis, or each along its own.
 
 use super::axes::Axes;
-use super::frame::{EDGE, Frame, LINE, POINTS, ROOM, TEXT, WIDTH, widest};
+use super::frame::{EDGE, Frame, LINE, POINTS, TEXT, WIDTH, widest};
 use super::panel::Panel;
 use super::picture::Picture;
 use super::text::{clipped, text};
@@ -77,7 +77,8 @@ fn draw(out: &mut String, x_axis: &str, panels: &[Panel], top: f64) -> f64 {
     }
     y += 2.0 * LINE - 2.0;
     let middle = 0.5 * (frame.left + frame.right);
-    let label = clipped(x_axis, TEXT, ROOM);
+    let room = 2.0 * (WIDTH - EDGE - middle).min(middle - EDGE);
+    let label = clipped(x_axis, TEXT, room);
     text(out, (middle, y), "middle", TEXT, false, &label);
     y
 }
