@@ -340,26 +340,3 @@ fn hostile_names_are_text_on_the_page() {
         assert!(page.contains("&lt;script&gt;"));
     }
 }
-
-#[test]
-fn zz_dump() {
-    let rig = oscillator();
-    let all = [
-        ("class", tanks(), made::tanks_class()),
-        ("none", oscillator(), made::oscillator_none()),
-        ("nogap", oscillator(), made::oscillator_no_gap()),
-        ("partial", rig, made::rig_pair()),
-        ("real0", oscillator(), diagnoses()[0].clone()),
-        ("real1", oscillator(), diagnoses()[1].clone()),
-        ("real2", oscillator(), diagnoses()[2].clone()),
-    ];
-    for (name, study, d) in all {
-        std::fs::create_dir_all("/tmp/rep").unwrap();
-        std::fs::write(format!("/tmp/rep/{name}.html"), gap_html(&study, &d)).unwrap();
-        std::fs::write(format!("/tmp/rep/{name}.txt"), crate::report::gap_text(&d)).unwrap();
-        std::fs::write(format!("/tmp/rep/{name}.json"), gap_json(&d).to_string()).unwrap();
-        for (p, svg) in crate::report::gap_pictures(&study, &d) {
-            std::fs::write(format!("/tmp/rep/{name}-{p}.svg"), svg).unwrap();
-        }
-    }
-}
