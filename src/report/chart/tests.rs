@@ -247,7 +247,7 @@ fn curves_have_an_axis_each() {
     let svg = picture.svg();
     assert_inside(&svg);
     assert!(!svg.contains("NaN"));
-    for text in [">h in V<", ">2.5<", ">2e7<"] {
+    for text in [">h in V<", ">2.5<", ">2.5e7<"] {
         assert!(svg.contains(text), "{text}: {svg}");
     }
     let none = Curves {
