@@ -1,11 +1,12 @@
 //! The twin as it is, fitted: where a diagnosis begins.
 
 use super::error::DiagnoseError;
-use super::hypotheses::frequencies::frequencies;
 use super::hypotheses::scales::Scales;
 use super::model::Model;
 use super::outcome::Verdict;
+use super::residuals::frequencies::frequencies;
 use super::settings::DiagnoseSettings;
+use super::thresholds::Thresholds;
 use crate::fit::axis::Axis;
 use crate::fit::climb::{Fitted, fit};
 use crate::fit::problem::Problem;
@@ -94,7 +95,7 @@ impl<'a> Base<'a> {
 
 /// The kind of gap: structural where the evidence says so, otherwise by whether θ left its prior significantly.
 pub(in crate::diagnose) fn verdict(log_odds: f64, outside: bool) -> Verdict {
-    if log_odds > 0.0 {
+    if log_odds > Thresholds::GAP {
         Verdict::StructuralGap
     } else if outside {
         Verdict::ParameterGap
@@ -148,7 +149,7 @@ mod tests {
 
     #[test]
     fn evidence_comes_before_the_prior() {
-        assert_eq!(verdict(1.0, true), Verdict::StructuralGap);
+        assert_eq!(verdict(2.0, true), Verdict::StructuralGap);
         assert_eq!(verdict(-1.0, true), Verdict::ParameterGap);
         assert_eq!(verdict(-1.0, false), Verdict::NoGap);
     }

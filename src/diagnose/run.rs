@@ -197,7 +197,9 @@ fn report(
     let mut conclusion = Conclusion::default();
     let mut absorbed = vec![];
     match (verdict, within) {
-        (Verdict::StructuralGap, _) => conclusion = decide(findings, MOST_EFFECTS),
+        (Verdict::StructuralGap, _) => {
+            conclusion = decide(findings, MOST_EFFECTS, model.base.equations().is_some())
+        }
         (Verdict::ParameterGap, Some(within)) if !settings.detection_only => {
             absorbed = absorbing(model, &within, listed)?;
             if !absorbed.is_empty() {

@@ -126,6 +126,31 @@ pub(in crate::diagnose) fn nuisance(
             })
         })
         .collect();
+    if model.base.equations().is_none() {
+        let mut begun = vec![];
+        // A black box has its own parameters for unknown starts, one set a record.
+        for r in 0..model.problem.records.len() {
+            let own = model.problem.of_record(r, &model.fitted.theta);
+            let full = model.problem.of_record(r, &errors);
+            for (j, p) in space
+                .iter()
+                .enumerate()
+                .filter(|(_, p)| p.role == Role::Start)
+            {
+                begun.push(FittedNuisance {
+                    name: match r {
+                        0 => p.target().to_owned(),
+                        r => format!("{} (record {})", p.target(), r + 1),
+                    },
+                    role: "start",
+                    value: own[j],
+                    std_error: full[j],
+                });
+            }
+        }
+        begun.extend(all);
+        return Ok(begun);
+    }
     let begun = recoverable(smoothed(&model.problem, &model.fitted.theta))?.unwrap_or_default();
     all.extend(
         starts(&model.problem, &begun)

@@ -73,10 +73,14 @@ impl Thresholds {
 
 /// Decision, in nats.
 impl Thresholds {
+    /// log of the odds that something is missing from which a gap is told: 2.7 to 1. docs/withheld.md has the rate of false alarms.
+    pub const GAP: f64 = 1.0;
     /// Prior share of listed effects among what could be missing; the rest belongs to unknown functions. At 0.4 or 0.8 evidence moves by 0.4.
     pub const LISTED: f64 = 0.6;
     /// Most that an unknown function may add on top of effects that explain everything.
     pub const ADEQUATE: f64 = 4.0;
+    /// Share of the whole evidence that may be left as well: integrators and discretisation differ by as much.
+    pub const FINE_PRINT: f64 = 0.02;
     /// Distance to the best within which a single effect may still be the explanation.
     pub const CANDIDATES: f64 = 6.0;
     /// What a larger set of effects must be ahead of a smaller one, its price paid.

@@ -53,7 +53,7 @@ impl<'a> Findings<'a> {
         let Some(on_top) = on_top else { return false };
         let added = on_top.first().map_or(0.0, |f| f.gain - found.gain);
         self.beside.push((found.keys(), on_top));
-        added < Thresholds::ADEQUATE
+        leaves_nothing(found.gain, added)
     }
 
     /// What unknown functions add on top of a set, in nats; `None` where that was not asked.
@@ -192,6 +192,11 @@ enum Kind {
     Unknown,
 }
 
+/// Returns whether what an unknown function adds on top of a gain is no more than chance, or than a law's fine print.
+pub(in crate::diagnose) fn leaves_nothing(gain: f64, added: f64) -> bool {
+    added < Thresholds::ADEQUATE.max(Thresholds::FINE_PRINT * gain)
+}
+
 fn same(a: &[String], b: &[String]) -> bool {
     a.len() == b.len() && a.iter().all(|key| b.contains(key))
 }
@@ -228,7 +233,11 @@ impl Chances {
 }
 
 /// Decides about a gap.
-pub(in crate::diagnose) fn decide(findings: &Findings<'_>, most_effects: usize) -> Conclusion {
+pub(in crate::diagnose) fn decide(
+    findings: &Findings<'_>,
+    most_effects: usize,
+    has_equations: bool,
+) -> Conclusion {
     let best_unknown = findings
         .unknown
         .first()
@@ -252,7 +261,7 @@ pub(in crate::diagnose) fn decide(findings: &Findings<'_>, most_effects: usize) 
     let mut chosen: Option<&(Vec<String>, f64, f64)> = None;
     for count in 1..=most_effects {
         let best = (candidates.iter())
-            .filter(|c| c.0.len() == count && c.2 < Thresholds::ADEQUATE)
+            .filter(|c| c.0.len() == count && leaves_nothing(c.1, c.2))
             .max_by(|a, b| a.1.total_cmp(&b.1));
         if let Some(best) = best
             && chosen.is_none_or(|c| best.1 > c.1 + Thresholds::WORTH_ANOTHER)
@@ -266,10 +275,11 @@ pub(in crate::diagnose) fn decide(findings: &Findings<'_>, most_effects: usize) 
     if let Some((keys, _, _)) = chosen {
         return named(findings, keys, Decision::Named);
     }
-    // Listed effects that explain most, beside something unknown.
+    // Listed effects that explain most, beside something unknown. What is inside a black box has no functions to stand for it.
     let chances = findings.chances();
     let best = (candidates.iter()).max_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((keys, own, left)) = best
+        && has_equations
         && chances.partial > chances.unknown
         && *left < Thresholds::REST * (own + left)
     {

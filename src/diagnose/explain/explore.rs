@@ -1,6 +1,6 @@
 //! The order of the search: single explanations, what they leave, pairs, triples.
 
-use super::decide::Findings;
+use super::decide::{Findings, leaves_nothing};
 use super::search::{Breadth, Found, listed, own_theta, sort, unknown};
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::scales::Scales;
@@ -94,7 +94,7 @@ pub(in crate::diagnose) fn explore<'a>(
         ..Findings::default()
     };
     stage.tick()?;
-    if !explain || findings.chances().log_odds <= 0.0 {
+    if !explain || findings.chances().log_odds <= Thresholds::GAP {
         return Ok(findings);
     }
     // What an unknown function alone explains better leaves something.
@@ -175,7 +175,7 @@ fn pairs<'a>(
             let adequate = |f: &&Found<'a>| {
                 findings
                     .left(&f.keys())
-                    .is_some_and(|l| l < Thresholds::ADEQUATE)
+                    .is_some_and(|l| leaves_nothing(f.gain, l))
             };
             findings
                 .listed

@@ -10,6 +10,8 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+/// Nats that averaging over its size takes off an effect that nothing speaks for.
+const AVERAGED: f64 = 2.0;
 /// Nats that the best of all frequencies is worth less than it looks, before a refit says how sharp it is.
 const PRICE_OF_FREQUENCY: f64 = 2.5;
 
@@ -220,7 +222,7 @@ pub(in crate::diagnose) fn listed<'a>(
                 model.terms.iter().chain([&promise.term]).cloned().collect();
             all.push(Found {
                 terms,
-                gain: floor + promise.nats().min(0.0),
+                gain: floor + (promise.nats() - AVERAGED).min(-0.5),
                 model: None,
             });
         }

@@ -3,7 +3,6 @@
 pub(in crate::diagnose) mod disturbed_equations;
 mod disturbed_signals;
 pub(in crate::diagnose) mod entry;
-pub(in crate::diagnose) mod frequencies;
 pub(in crate::diagnose) mod functions;
 pub(in crate::diagnose) mod listed;
 pub(in crate::diagnose) mod scales;

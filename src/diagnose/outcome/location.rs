@@ -11,7 +11,7 @@ pub struct Location {
     pub maps: Maps,
     /// Time of a change, where one is what explains the records.
     pub onset: Option<Onset>,
-    /// The most probable place of a structural gap.
+    /// Place of the first accepted effect, or else the most probable one.
     pub target: Option<String>,
     /// All places, most probable first.
     pub targets: Vec<TargetShare>,
@@ -26,7 +26,7 @@ pub struct Location {
 pub struct TargetShare {
     /// State, `sensor`, `actuator` or parameter.
     pub target: String,
-    /// Posterior probability of what explains the records there.
+    /// Posterior probability of what explains the records there, given a gap.
     pub probability: f64,
 }
 

@@ -70,7 +70,7 @@ impl Decision {
 /// Evidence for a gap: something is missing against nothing is.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Detection {
-    /// log of the odds that something is missing, in nats, prior odds even: a gap above 0.
+    /// log of the odds that something is missing, in nats, prior odds even: a gap above 1.
     pub log_evidence: f64,
     /// Share of records simulated by the fitted twin with as much evidence; none unless asked for. Where no simulation has as much, an
     /// upper bound: [`Detection::at_floor`].

@@ -1,7 +1,7 @@
-//! A simulator without noise of its own is given what every measurement has: white noise, of a level that is fitted.
+//! A simulator is given what every measurement has: white noise, of a level that is fitted, on top of any noise of its own.
 //!
-//! Nothing measured follows such a simulator to the last bit, so that without it any record would be a gap. What is left may then
-//! be white noise of any size, but not of any colour.
+//! Nothing measured follows a simulator without noise to the last bit, and the noise of one that has some is never quite the
+//! measured one. What is left may then be white noise of any size, but not of any colour.
 
 use super::runs::run;
 use crate::math::{deviation, largest};
@@ -17,8 +17,8 @@ const LEAST: f64 = 1e-3;
 /// Values of runs that are kept.
 const KEPT: usize = 2_000_000;
 
-/// The twin as records show it: itself, or, where two runs are alike to the bit, with measurement noise. Also whether that
-/// was so.
+/// The twin as records show it: with measurement noise of a level that is fitted, on top of any noise of its own. Also whether it has
+/// none of its own, so that two runs are alike to the bit.
 pub(crate) fn measured(twin: &Twin, records: &[Record]) -> Result<(Twin, bool), SimulationError> {
     let (Twin::BlackBox(base), Some(record)) = (twin, records.first()) else {
         return Ok((twin.clone(), false));
@@ -28,18 +28,17 @@ pub(crate) fn measured(twin: &Twin, records: &[Record]) -> Result<(Twin, bool), 
         let noise = Noise::new(0, "silent", sample);
         run(twin, &theta, record.drive(), noise)
     };
-    let (Some(first), Some(second)) = (one(0)?, one(1)?) else {
-        return Ok((twin.clone(), false));
+    let is_silent = match (one(0)?, one(1)?) {
+        (Some(first), Some(second)) => first == second,
+        _ => false,
     };
-    if first != second {
-        return Ok((twin.clone(), false));
-    }
-    let silent = Silent {
+    let measured = MeasuredBox {
         base: base.clone(),
         levels: levels(twin, record),
+        is_silent,
         runs: Mutex::default(),
     };
-    Ok((Twin::BlackBox(Arc::new(silent)), true))
+    Ok((Twin::BlackBox(Arc::new(measured)), is_silent))
 }
 
 /// Deviation, or what is left of it where nothing moves; missing values are left out.
@@ -51,7 +50,9 @@ fn size(values: &[f64]) -> f64 {
 }
 
 fn levels(twin: &dyn DigitalTwin, record: &Record) -> Vec<Parameter> {
+    let space = twin.parameters();
     (twin.signals().outputs.iter().enumerate())
+        .filter(|(_, output)| space.position(&Role::Noise.name(&output.name)).is_err())
         .map(|(j, output)| {
             let size = size(&record.outputs().column(j).to_vec());
             Parameter {
@@ -68,15 +69,24 @@ fn levels(twin: &dyn DigitalTwin, record: &Record) -> Vec<Parameter> {
 /// Runs by θ and drive, and how many values they hold.
 type Kept = (HashMap<Vec<u64>, Arc<Signal>>, usize);
 
-/// A simulator and the noise of its sensors. One run serves a whole ensemble.
-struct Silent {
+/// A simulator and the noise of its sensors. One run of a simulator without noise serves a whole ensemble.
+struct MeasuredBox {
     base: Arc<dyn DigitalTwin>,
     levels: Vec<Parameter>,
+    is_silent: bool,
     runs: Mutex<Kept>,
 }
 
-impl Silent {
-    fn run(&self, theta: &[f64], drive: &Drive) -> Result<Arc<Signal>, SimulationError> {
+impl MeasuredBox {
+    fn run(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Arc<Signal>, SimulationError> {
+        if !self.is_silent {
+            return Ok(Arc::new(self.base.simulate(theta, drive, noise)?));
+        }
         let dt = drive.dt();
         let numbers = theta.iter().chain([&dt]).chain(drive.inputs());
         let key: Vec<u64> = numbers
@@ -98,7 +108,7 @@ impl Silent {
     }
 }
 
-impl DigitalTwin for Silent {
+impl DigitalTwin for MeasuredBox {
     fn parameters(&self) -> ParameterSpace {
         ParameterSpace::new(self.base.parameters().iter().chain(&self.levels).cloned())
     }
@@ -112,9 +122,12 @@ impl DigitalTwin for Silent {
         noise: Noise,
     ) -> Result<Signal, SimulationError> {
         let (own, levels) = theta.split_at(theta.len() - self.levels.len());
-        let mut outputs = self.run(own, drive)?.as_ref().clone();
-        for (j, (mut column, level)) in outputs.columns_mut().into_iter().zip(levels).enumerate() {
-            let mut source = noise.source(&format!("measured/{j}"));
+        let mut outputs = self.run(own, drive, noise)?.as_ref().clone();
+        let channels = self.signals().outputs;
+        for (parameter, level) in self.levels.iter().zip(levels) {
+            let channel = channels.iter().position(|o| o.name == parameter.target());
+            let mut column = outputs.column_mut(channel.unwrap_or(0));
+            let mut source = noise.source(&format!("measured/{}", parameter.name));
             column
                 .iter_mut()
                 .for_each(|v| *v += level * source.normal());
