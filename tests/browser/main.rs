@@ -8,8 +8,6 @@
 mod devtools;
 #[path = "../../src/report/fixture/made.rs"]
 mod made;
-#[path = "../../src/report/fixture/made_scores.rs"]
-mod made_scores;
 mod pictures;
 
 use devtools::{Browser, chromium};
@@ -22,7 +20,8 @@ use truetwin::diagnose::{
     Shrinkage, TargetShare, Term, TermRange, Verdict, Visible, Window,
 };
 use truetwin::evaluate::paper::reference_studies;
-use truetwin::evaluate::trials::{Kind, Named, Outcome, Row, Scorecard};
+use truetwin::evaluate::trials::{Scorecard, Settings, Withheld};
+use truetwin::progress::Progress;
 use truetwin::record::{Drive, Quantity, Signal};
 use truetwin::report::{gap_html, scorecard_html};
 use truetwin::study::{RecordPlan, Study};
@@ -81,6 +80,18 @@ impl StateSpace for Rig {
     }
 }
 
+/// Scores of a few trials.
+fn scorecard(study: &Study) -> Scorecard {
+    let settings = Settings {
+        trials: 8,
+        ..Settings::default()
+    };
+    let place = tempfile::tempdir().unwrap();
+    let (trials, silent) = (place.path().join("trials"), Progress::silent());
+    let sealed = Withheld::new(study, settings).and_then(|t| t.seal(&trials, &silent));
+    sealed.and_then(|sealed| sealed.score(&silent)).unwrap()
+}
+
 /// Every kind of page.
 fn pages() -> Vec<(&'static str, String)> {
     let studies = reference_studies().unwrap();
@@ -93,7 +104,7 @@ fn pages() -> Vec<(&'static str, String)> {
         ("none", gap_html(oscillator, &made::oscillator_none())),
         ("no-gap", gap_html(oscillator, &made::oscillator_no_gap())),
         ("pair", gap_html(&rig, &made::rig_pair())),
-        ("scorecard", scorecard_html(&made_scores::scorecard())),
+        ("scorecard", scorecard_html(&scorecard(oscillator))),
     ]
 }
 

@@ -17,7 +17,6 @@ struct Rescaled(Arc<dyn StateSpace>);
 
 /// The study and its records with outputs in other units; `None` for a black box, or where the study declares noise or starts in
 /// the old ones.
-#[allow(clippy::type_complexity)]
 pub(super) fn rescaled(
     study: &Study,
     record: &Record,
