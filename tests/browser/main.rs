@@ -20,8 +20,10 @@ use truetwin::diagnose::{
     Probabilities, Region, Remains, Shrinkage, TargetShare, Term, Verdict, Visible, Window,
 };
 use truetwin::evaluate::paper::reference_studies;
+use truetwin::evaluate::trials::{Scorecard, Settings, Withheld};
+use truetwin::progress::Progress;
 use truetwin::record::{Drive, Quantity, Signal};
-use truetwin::report::gap_html;
+use truetwin::report::{gap_html, scorecard_html};
 use truetwin::study::{RecordPlan, Study};
 use truetwin::twin::{Interval, Now, Outline, Parameter, ParameterSpace, StateSpace};
 
@@ -78,7 +80,19 @@ impl StateSpace for Rig {
     }
 }
 
-/// Every kind of page of a diagnosis.
+/// Scores of a few trials.
+fn scorecard(study: &Study) -> Scorecard {
+    let settings = Settings {
+        trials: 8,
+        ..Settings::default()
+    };
+    let place = tempfile::tempdir().unwrap();
+    let (trials, silent) = (place.path().join("trials"), Progress::silent());
+    let sealed = Withheld::new(study, settings).and_then(|t| t.seal(&trials, &silent));
+    sealed.and_then(|sealed| sealed.score(&silent)).unwrap()
+}
+
+/// Every kind of page.
 fn pages() -> Vec<(&'static str, String)> {
     let studies = reference_studies().unwrap();
     let [oscillator, tanks] = studies.as_slice() else {
@@ -90,6 +104,7 @@ fn pages() -> Vec<(&'static str, String)> {
         ("none", gap_html(oscillator, &made::oscillator_none())),
         ("no-gap", gap_html(oscillator, &made::oscillator_no_gap())),
         ("partial", gap_html(&rig, &made::rig_pair())),
+        ("scorecard", scorecard_html(&scorecard(oscillator))),
     ]
 }
 

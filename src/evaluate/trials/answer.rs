@@ -29,7 +29,7 @@ pub(crate) struct Answer {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Repeat {
-    /// What was changed.
+    /// The change of the question.
     pub change: String,
     /// None where the diagnosis failed.
     pub outcome: Option<Outcome>,

@@ -10,7 +10,7 @@ use std::fmt;
 /// A twin whose own step shows by more nats than this is no null: its integrator is the gap.
 const COARSE: f64 = 1.0;
 
-/// What an answer is worth.
+/// Worth of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Fate {
@@ -144,7 +144,7 @@ impl Row {
         target.is_some_and(|target| self.targets.contains(target))
     }
 
-    /// What the answer is worth.
+    /// Returns the worth of the answer.
     pub fn fate(&self) -> Fate {
         match &self.outcome {
             None => Fate::Failed,
@@ -154,7 +154,7 @@ impl Row {
         }
     }
 
-    /// What an answer is worth that states a gap or not, accepts these effects, and has a right one on top or not.
+    /// Returns the worth of an answer that states a gap or not, accepts these effects, and has a right one on top or not.
     pub fn fate_of(
         &self,
         structural: bool,

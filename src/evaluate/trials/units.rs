@@ -1,11 +1,11 @@
 //! A study in other units of its outputs.
 
+use super::world::World;
 use crate::evaluate::EvaluateError;
 use crate::record::{Drive, Record, Signal};
 use crate::study::{Study, StudyFile};
 use crate::twin::{
     Integrator, Interval, Noise, Now, Outliers, Outline, SimulationError, StateSpace, Stepping,
-    Twin,
 };
 use std::sync::Arc;
 
@@ -17,14 +17,13 @@ struct Rescaled(Arc<dyn StateSpace>);
 
 /// The study and its records with outputs in other units; `None` for a black box, or where the study declares noise or starts in
 /// the old ones.
-#[allow(clippy::type_complexity)]
 pub(super) fn rescaled(
     study: &Study,
     record: &Record,
     validation: Option<&Record>,
 ) -> Result<Option<(Study, Record, Option<Record>)>, EvaluateError> {
     let file = study.file();
-    let Twin::Equations(twin) = study.twin() else {
+    let World::Equations(twin) = World::new(study.twin()) else {
         return Ok(None);
     };
     if !file.noise.is_empty() || !file.start.is_empty() || !file.effect.is_empty() {
@@ -35,7 +34,7 @@ pub(super) fn rescaled(
         library: file.library.clone(),
         ..StudyFile::default()
     };
-    let new = Study::new(study.name(), Rescaled(twin.clone()), study.plan().clone())?;
+    let new = Study::new(study.name(), Rescaled(twin), study.plan().clone())?;
     let kinds = study.catalogue().kinds().iter();
     let new = new.with_effects(kinds.map(|kind| kind.as_ref().clone()));
     let scaled = |record: &Record| Record::new(record.drive().clone(), record.outputs() * FACTOR);

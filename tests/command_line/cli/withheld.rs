@@ -90,3 +90,56 @@ fn a_few_sealed_trials_are_scored_kept_and_refused_to_another_call() {
     );
     fs::remove_dir_all(place).unwrap();
 }
+
+/// Trials like a measured record have its length, and no other record's.
+#[test]
+fn trials_can_be_like_a_measured_record() {
+    let name = format!("withheld-like-{}", std::process::id());
+    let place = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    fs::create_dir_all(&place).unwrap();
+    let [record, out] = ["r.csv", "trials"].map(|name| place.join(name).display().to_string());
+    let simulate = [
+        "simulate",
+        "--twin",
+        "tanks",
+        "--theta",
+        "k1=0.6,k2=0.6,k3=0.6,k4=1.0",
+    ];
+    done(&[&simulate[..], &["--out", &record]].concat());
+    let lines: Vec<String> = (fs::read_to_string(&record).unwrap().lines())
+        .take(121)
+        .map(str::to_owned)
+        .collect();
+    fs::write(&record, lines.join("\n") + "\n").unwrap();
+    let call = [
+        "withheld", "--twin", "tanks", "--trials", "1", "--kinds", "listed",
+    ];
+    let like = [
+        "--detection-only",
+        "--families",
+        "closed",
+        "--like",
+        &record,
+        "--out",
+        &out,
+    ];
+    let card = json(&[&call[..], &like, &["--json"]].concat());
+    assert_eq!(card["like"], true);
+    assert!(card["list"][0]["information"].as_f64().unwrap() > 0.0);
+    let made = fs::read_to_string(place.join("trials/records/0000.csv")).unwrap();
+    assert_eq!(made.lines().count(), 121);
+    let other = [
+        "withheld",
+        "--twin",
+        "van-der-pol",
+        "--trials",
+        "1",
+        "--like",
+        &record,
+    ];
+    refused(
+        &[&other[..], &["--out", &format!("{out}-2")]].concat(),
+        &["inputs"],
+    );
+    fs::remove_dir_all(place).unwrap();
+}

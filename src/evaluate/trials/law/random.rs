@@ -24,9 +24,9 @@ pub(in crate::evaluate::trials) enum Shape {
     Smooth,
     /// With corners.
     Kinked,
-    /// Of an argument with play.
+    /// Depends on an argument with play.
     Hysteretic,
-    /// Of an argument's fading mean.
+    /// Depends on an argument's fading mean.
     Memory,
 }
 

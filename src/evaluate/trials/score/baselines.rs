@@ -1,6 +1,7 @@
 //! Simple answers to the same trials.
 
 use super::count::Count;
+use crate::effect::EffectKey;
 use crate::evaluate::trials::row::{Fate, Row};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -34,7 +35,7 @@ pub(super) fn baselines(rows: &[Row]) -> Vec<Baseline> {
     };
     let commonest = commonest(rows);
     let accepted: Vec<String> = (commonest.iter())
-        .filter(|truth| truth.contains('@'))
+        .filter(|truth| truth.parse::<EffectKey>().is_ok())
         .cloned()
         .collect();
     let is_gap = commonest.as_deref().is_some_and(|truth| truth != "nothing");

@@ -47,7 +47,7 @@ pub(crate) struct Confusion {
     pub count: u64,
 }
 
-/// What trials were asked for.
+/// Settings of trials, as far as the scorecard states them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Setup {
     pub twin: String,

@@ -1,4 +1,4 @@
-//! How far statements can be trusted: precision, probabilities, intervals of θ.
+//! Trust in statements: precision, probabilities, intervals of θ.
 
 use super::count::Count;
 use crate::evaluate::trials::Kind;

@@ -4,7 +4,7 @@ use crate::evaluate::trials::Kind;
 use crate::evaluate::trials::draft::index;
 use crate::evaluate::trials::scene::Scene;
 use crate::evaluate::trials::world::{Conditions, Feedback, Nuisance};
-use crate::twin::{Parameter, ParameterSpace, Source};
+use crate::twin::{Parameter, ParameterSpace, Role, Source};
 
 /// Probability that a trial has a nuisance.
 const NUISANCE: f64 = 0.5;
@@ -19,8 +19,11 @@ fn between(source: &mut Source, low: f64, high: f64) -> f64 {
     low + (high - low) * source.uniform()
 }
 
-/// Room of a parameter below and above its prior, inside the bounds.
+/// Room of a parameter below and above its prior, inside the bounds; none for unknown starts, levels and magnitudes.
 fn room(p: &Parameter) -> [f64; 2] {
+    if p.role != Role::Parameter {
+        return [0.0; 2];
+    }
     [
         p.prior.low() - p.bounds.low(),
         p.bounds.high() - p.prior.high(),

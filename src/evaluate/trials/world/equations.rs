@@ -56,7 +56,8 @@ pub(super) fn run(
         let theta = plant.theta(system.theta, t, dt, &x, &command);
         let now = Now::new(t, dt, &u, &theta);
         twin.observe(&now, &x, &mut y);
-        (q.fill(0.0), r.fill(0.0));
+        q.fill(0.0);
+        r.fill(0.0);
         twin.noise(&now, &mut q, &mut r);
         let own = &command;
         plant.sense(t, dt, &x, own, false, &mut y);

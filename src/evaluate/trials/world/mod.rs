@@ -21,7 +21,7 @@ pub(super) enum World {
     BlackBox(Arc<dyn DigitalTwin>),
 }
 
-/// What is true in one record.
+/// The truth of one record.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct System<'s> {
     pub theta: &'s [f64],
