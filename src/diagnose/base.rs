@@ -47,15 +47,15 @@ impl<'a> Base<'a> {
             .collect();
         for (axis, parameter) in axes.iter_mut().zip(space.iter()) {
             // The filter integrates over an uncertain start.
-            axis.held |= parameter.role == Role::Start && twin.equations().is_some();
+            axis.held |= parameter.role == Role::Start;
         }
         let initial = settings.initial.as_ref().map(|initial| {
             let levels = measured.levels.iter().map(|level| level.median);
             let theta: Vec<f64> = initial.iter().copied().take(own).chain(levels).collect();
             theta
         });
-        let fitted = if twin.equations().is_some() {
-            let problem = Problem::new(twin.clone(), axes.clone(), records);
+        let problem = Problem::new(twin.clone(), axes, records);
+        let fitted = if !problem.is_simulated() {
             let initial: Vec<Vec<f64>> = initial.iter().map(|theta| problem.full(theta)).collect();
             let found = polish(
                 &problem,

@@ -10,7 +10,7 @@ use crate::record::Signal;
 use crate::twin::Twin;
 use std::sync::Arc;
 
-/// What an unfinished fit of a hypothesis is credited with beyond where it ended, in nats.
+/// Nats that an unfinished fit of a hypothesis is credited with beyond where it ended, at most.
 pub(in crate::diagnose) const CREDIT: f64 = 1.5;
 
 /// A twin with terms, fitted.

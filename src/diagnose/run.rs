@@ -198,7 +198,7 @@ fn report(
     let mut absorbed = vec![];
     match (verdict, within) {
         (Verdict::StructuralGap, _) => {
-            conclusion = decide(findings, MOST_EFFECTS, model.base.equations().is_some())
+            conclusion = decide(findings, MOST_EFFECTS, base.scales.has_equations())
         }
         (Verdict::ParameterGap, Some(within)) if !settings.detection_only => {
             absorbed = absorbing(model, &within, listed)?;
@@ -218,7 +218,7 @@ fn report(
         location = located(findings, chances, &conclusion, model)?;
         if !settings.detection_only {
             location.after = accepted.map(|m| maps(m, None)).transpose()?;
-            discovery = discovered(findings, &conclusion, noise);
+            discovery = discovered(findings, &conclusion, location.target.as_deref(), noise);
         }
     }
     stage.tick()?;
@@ -301,10 +301,8 @@ fn located(
         })
         .collect();
     targets.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    let accepted = conclusion
-        .accepted
-        .first()
-        .and_then(|key| Some(key.split_once('@')?.1.to_owned()));
+    let accepted = findings.model(&conclusion.accepted);
+    let accepted = accepted.map(|model| model.terms[0].target.clone());
     let mut functions = told(&findings.unknown, false, 0.0);
     if let Some((keys, on_top)) = findings.beside(&conclusion.accepted) {
         let floor = findings.gain(keys).unwrap_or(0.0);
@@ -321,17 +319,29 @@ fn located(
 }
 
 /// A sparse law for what is missing, where nothing listed explains it all.
-fn discovered(findings: &Findings<'_>, conclusion: &Conclusion, noise: Noise) -> Option<Discovery> {
+fn discovered(
+    findings: &Findings<'_>,
+    conclusion: &Conclusion,
+    place: Option<&str>,
+    noise: Noise,
+) -> Option<Discovery> {
     let all = match conclusion.decision {
         Decision::NoneOfThese => &findings.unknown,
         Decision::Partial => findings.beside(&conclusion.accepted)?.1,
         _ => return None,
     };
-    let (found, curve) = (all.iter()).find_map(|f| Some((f, curve(f.model.as_ref()?)?)))?;
+    // The best function of one variable, at the place that is named if there is one.
+    let drawn: Vec<_> = (all.iter())
+        .filter_map(|f| Some((f, curve(f.model.as_ref()?)?)))
+        .collect();
+    let there = drawn
+        .iter()
+        .find(|(f, _)| Some(f.last().target.as_str()) == place);
+    let (found, curve) = there.or(drawn.first())?;
     let term = found.last();
     discover(
         (&term.target, &term.variables[0].0),
-        &curve,
+        curve,
         noise.child("discover"),
     )
 }

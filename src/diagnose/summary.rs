@@ -126,7 +126,7 @@ pub(in crate::diagnose) fn nuisance(
             })
         })
         .collect();
-    if model.base.equations().is_none() {
+    if model.problem.is_simulated() {
         let mut begun = vec![];
         // A black box has its own parameters for unknown starts, one set a record.
         for r in 0..model.problem.records.len() {
@@ -188,7 +188,7 @@ pub(in crate::diagnose) fn onset(model: &Model<'_>) -> Option<Onset> {
     })
 }
 
-/// What an unknown function adds on top of the accepted effects, or else of the best single one.
+/// Unknown rest on top of the accepted effects, or else of the best single one.
 pub(in crate::diagnose) fn remains(
     findings: &Findings<'_>,
     conclusion: &Conclusion,

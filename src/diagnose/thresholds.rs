@@ -83,7 +83,7 @@ impl Thresholds {
     pub const FINE_PRINT: f64 = 0.02;
     /// Distance to the best within which a single effect may still be the explanation.
     pub const CANDIDATES: f64 = 6.0;
-    /// What a larger set of effects must be ahead of a smaller one, its price paid.
+    /// Lead that a larger set of effects needs over a smaller one, its price paid.
     pub const WORTH_ANOTHER: f64 = 2.0;
     /// Distance within which effects are rivals.
     pub const RIVALS: f64 = 3.0;

@@ -1,4 +1,4 @@
-//! How a fitted twin follows its records: smoothed starts and free runs.
+//! Smoothed starts and free runs: the way in which a fitted twin follows its records.
 
 use super::outcome::FittedStart;
 use super::problem::Problem;

@@ -121,7 +121,7 @@ impl Reference {
         &self.r
     }
 
-    /// What θ answers to so many multiples of a direction: a step in φ.
+    /// Answer of θ to so many multiples of a direction: a step in φ.
     pub fn answer(&self, direction: &DVector<f64>, alpha: f64) -> DVector<f64> {
         &self.answer - self.factor.solve(&self.directions.tr_mul(direction)) * alpha
     }

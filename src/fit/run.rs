@@ -50,12 +50,12 @@ pub(crate) fn run(
     let mut axes: Vec<Axis> = (space.iter().take(own).map(Axis::of))
         .chain(levels.iter().map(Axis::of_level))
         .collect();
-    for (axis, parameter) in axes.iter_mut().zip(space.iter()) {
-        // The filter integrates over an uncertain start.
-        axis.held |= parameter.role == Role::Start && twin.equations().is_some();
-    }
     let mut problem = Problem::new(twin.clone(), axes.clone(), records);
     if let Some(equations) = twin.equations() {
+        for (axis, parameter) in axes.iter_mut().zip(space.iter()) {
+            // The filter integrates over an uncertain start.
+            axis.held |= parameter.role == Role::Start;
+        }
         // Sizes of effects are known once states are: where the twin follows the record with loud noise.
         let kinds = kinds(subject.effects, records);
         let begin = problem.begin(&problem.centre());

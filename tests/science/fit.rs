@@ -2,7 +2,7 @@
 
 #[path = "../../examples/rigs.rs"]
 #[allow(dead_code, unreachable_pub, clippy::duplicate_mod)]
-mod rigs;
+pub(crate) mod rigs;
 
 use crate::real_records::data;
 use rigs::{Carriage, Heater};

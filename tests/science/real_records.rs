@@ -1,14 +1,15 @@
 //! Measured records, where they are at hand: `../shared/data`, or the folder that `TRUETWIN_DATA` names.
 
+use crate::fit::rigs::{Carriage, Heater};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use truetwin::diagnose::{Decision, DiagnoseSettings, Diagnosis, FreeRuns, Verdict, diagnose};
 use truetwin::estimator::{EstimateOptions, PretrainOptions, pretrain};
 use truetwin::evaluate::paper::reference_studies;
 use truetwin::progress::Progress;
-use truetwin::record::{Record, Signal, read_record};
+use truetwin::record::{Drive, Record, Signal, read_record};
 use truetwin::report::gap_pictures;
-use truetwin::study::{Study, StudyFile};
+use truetwin::study::{RecordPlan, Study, StudyFile};
 
 /// The path of a file of measured data; says in the output of the tests, past libtest's capture, whether it is at hand.
 pub(crate) fn data(name: &str) -> Option<PathBuf> {
@@ -110,7 +111,15 @@ fn the_cascaded_tanks_lack_their_overflow() {
     let shrinkage = found.shrinkage.as_ref().unwrap();
     let (before, after) = (shrinkage.before, shrinkage.after.unwrap());
     println!("free-run NRMSE on the validation record {before:.3} -> {after:.3}");
-    assert!(after < 0.6 * before, "{before} -> {after}");
+    assert!(after < 0.8 * before, "{before} -> {after}");
+    assert_eq!(found.cause.decision, Decision::Partial);
+    assert!(
+        found
+            .cause
+            .accepted
+            .iter()
+            .all(|key| found.cause.class.contains(key))
+    );
     if let Some(folder) = std::env::var_os("TRUETWIN_PICTURES") {
         draw(&study, &mut found, Path::new(&folder));
     }
@@ -142,9 +151,91 @@ fn what_the_cascaded_tanks_lack_is_explored() {
     for term in &discovery.terms {
         println!("{term:?}");
     }
-    assert_eq!(found.location.target.as_ref(), Some(&discovery.equation));
-    assert!(["h1", "h2"].contains(&discovery.equation.as_str()));
+    assert_eq!(found.location.target.as_deref(), Some("h2"));
+    assert_eq!(discovery.equation, "h2");
     assert!(discovery.explained > 0.1 && discovery.terms[0].inclusion > 0.3);
+    // The spill: above its ceiling the upper tank feeds the lower one more than the twin says.
+    let function = (found.location.functions.iter())
+        .find(|f| f.place == "h2" && f.variable == "h1")
+        .expect("no function of h1");
+    let last = function.mean.len() - 1;
+    let rest = function.mean[..=last / 2].iter().sum::<f64>() / (last / 2 + 1) as f64;
+    println!("{function:?}");
+    assert!(function.mean[last] > rest, "{function:?}");
+}
+
+/// The positioning rig at 20 ms, its force averaged over each step: friction that hardly depends on the speed, and an offset of the
+/// force, by the defaults of a newcomer.
+#[test]
+fn the_positioning_rig_lacks_dry_friction_and_an_offset() {
+    let Some(path) = data("emps-estimation.csv") else {
+        return;
+    };
+    let whole = read_record(&path).unwrap();
+    let (u, y) = (whole.drive().inputs(), whole.outputs());
+    let rows = whole.samples() / 2;
+    let force = Signal::from_shape_fn((rows, 1), |(k, _)| {
+        0.5 * (u[[2 * k, 0]] + u[[2 * k + 1, 0]])
+    });
+    let place = Signal::from_shape_fn((rows, 1), |(k, _)| y[[2 * k, 0]]);
+    let record = Record::new(Drive::new(0.02, force).unwrap(), place).unwrap();
+    let plan = RecordPlan::levels(0.02, rows, -100.0, 100.0, 50);
+    let study = Study::new("positioning", Carriage, plan).unwrap();
+    let settings = DiagnoseSettings::default();
+    let found = diagnose(&study, &[record], None, &settings, &Progress::silent()).unwrap();
+    println!(
+        "{:?} {:?} {:?}",
+        found.cause.decision, found.cause.accepted, found.cause.class
+    );
+    assert!(matches!(
+        found.cause.decision,
+        Decision::Partial | Decision::Named | Decision::Class
+    ));
+    let friction = ["coulomb-friction@v", "power-law@v"];
+    let offset = ["constant-forcing@v", "actuator-bias@actuator"];
+    let [first, second] = found.cause.accepted.as_slice() else {
+        panic!("{:?}", found.cause.accepted);
+    };
+    assert!(friction.contains(&first.as_str()) && offset.contains(&second.as_str()));
+    assert!(
+        found
+            .cause
+            .class
+            .iter()
+            .any(|key| key == "coulomb-friction@v")
+    );
+    let mass = &found.parameters[0];
+    assert!((mass.refitted / 95.1 - 1.0).abs() < 0.05, "{mass:?}");
+}
+
+/// The heater: a lag, at the sensor or the actuator; what radiates has no weight.
+#[test]
+fn the_heater_lacks_a_lag() {
+    let Some(path) = data("tclab-first.csv") else {
+        return;
+    };
+    let record = read_record(&path).unwrap();
+    let plan = RecordPlan::levels(1.0, 600, 0.0, 100.0, 60);
+    let study = Study::new("heater", Heater, plan).unwrap();
+    let settings = DiagnoseSettings::default();
+    let found = diagnose(&study, &[record], None, &settings, &Progress::silent()).unwrap();
+    println!(
+        "{:?} {:?} {:?}",
+        found.cause.decision, found.cause.accepted, found.cause.class
+    );
+    assert!(!found.cause.accepted.is_empty());
+    for key in &found.cause.accepted {
+        assert!(
+            ["lag", "delay", "rate-limit"]
+                .iter()
+                .any(|word| key.contains(word)),
+            "{key}"
+        );
+    }
+    for effect in &found.cause.effects {
+        let radiates = ["power-law", "quadratic-drag", "linear-loss"].contains(&effect.id.as_str());
+        assert!(!radiates || effect.probability < 0.05, "{effect:?}");
+    }
 }
 
 /// The pictures of the page, of every fourth sample: the record itself is not to be handed on.

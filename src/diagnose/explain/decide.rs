@@ -56,14 +56,14 @@ impl<'a> Findings<'a> {
         leaves_nothing(found.gain, added)
     }
 
-    /// What unknown functions add on top of a set, in nats; `None` where that was not asked.
+    /// Nats that unknown functions add on top of a set; `None` where that was not asked.
     pub fn left(&self, keys: &[String]) -> Option<f64> {
         let (_, on_top) = self.beside.iter().find(|(k, _)| same(k, keys))?;
         let own = self.gain(keys)?;
         Some(on_top.first().map_or(0.0, |f| f.gain - own))
     }
 
-    /// What unknown functions add on top of a set, best first.
+    /// Unknown functions on top of a set, best first.
     pub fn beside(&self, keys: &[String]) -> Option<(&[String], &[Found<'a>])> {
         let found = self.beside.iter().find(|(k, _)| same(k, keys))?;
         Some((&found.0, &found.1))

@@ -41,7 +41,7 @@ pub(in crate::diagnose) fn explore<'a>(
     stage.tick()?;
     let best = unknown_alone.first().map_or(0.0, |f| f.gain);
     let breadth = Breadth {
-        deep: best > Thresholds::DEEP,
+        deep: best > Thresholds::DEEP && breadth.annealed > 0,
         ..breadth
     };
     let mut singles = listed(
@@ -135,7 +135,7 @@ pub(in crate::diagnose) fn explore<'a>(
     Ok(findings)
 }
 
-/// What unknown functions add on top of fitted effects.
+/// Unknown functions on top of fitted effects.
 fn on_top<'a>(
     found: &Found<'a>,
     terms: &Terms<'_>,

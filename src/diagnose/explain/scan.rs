@@ -33,7 +33,7 @@ pub(in crate::diagnose) struct Beginning {
     pub m: Vec<f64>,
     /// True where less of the first magnitude is less of the term.
     pub scales: bool,
-    /// What θ of the model answers to it, in φ.
+    /// Answer of θ of the model to it, in φ.
     pub answer: DVector<f64>,
 }
 

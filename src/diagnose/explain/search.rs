@@ -37,7 +37,7 @@ impl Found<'_> {
     }
 }
 
-/// How many hypotheses are refitted.
+/// Numbers of hypotheses that are refitted.
 #[derive(Clone, Copy)]
 pub(in crate::diagnose) struct Breadth {
     /// Listed effects in the first round.
@@ -53,12 +53,12 @@ pub(in crate::diagnose) struct Breadth {
 }
 
 impl Breadth {
-    /// What a twin's likelihood allows: that of a black box costs an ensemble.
+    /// As many as a twin's likelihood allows: that of a black box costs an ensemble.
     pub fn of(model: &Model<'_>) -> Self {
         let simulated = model.problem.is_simulated();
         Self {
             listed: 6,
-            annealed: usize::MAX,
+            annealed: if simulated { 0 } else { usize::MAX },
             functions: if simulated { 2 } else { 5 },
             least: 2.5,
             deep: false,
@@ -66,7 +66,7 @@ impl Breadth {
     }
 }
 
-/// Of terms that are one hypothesis used in several ways, the best; its prior is shared among them.
+/// The best of terms that are one hypothesis used in several ways, which share its prior.
 fn merged<'a>(all: Vec<Found<'a>>, ways: &BTreeMap<String, usize>) -> Vec<Found<'a>> {
     let mut best: BTreeMap<Vec<String>, Found<'a>> = BTreeMap::new();
     for found in all {

@@ -68,7 +68,7 @@ impl Library<'_> {
             .collect();
         let (least, most) = effect.kind().memories();
         match thresholds.len() {
-            0 | 1 if self.twin.equations().is_some() && least < most => (0..Thresholds::REGISTERS
+            0 | 1 if self.scales.has_equations() && least < most => (0..Thresholds::REGISTERS
                 .len())
                 .map(|i| (vec![], Some(i)))
                 .collect(),

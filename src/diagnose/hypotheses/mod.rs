@@ -1,4 +1,4 @@
-//! What could be missing: listed effects, and unknown functions of states, of the past, of time.
+//! Hypotheses of what could be missing: listed effects, and unknown functions of states, of the past, of time.
 
 pub(in crate::diagnose) mod disturbed_equations;
 mod disturbed_signals;
@@ -103,7 +103,7 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
             high,
         })
     };
-    let has_equations = library.twin.equations().is_some();
+    let has_equations = scales.has_equations();
     let own: Vec<usize> = (0..outline.states.len())
         .filter(|&i| has_equations && !is_memory(&outline.states[i].name))
         .collect();

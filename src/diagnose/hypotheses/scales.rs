@@ -38,6 +38,11 @@ impl<'a> Scales<'a> {
         }
     }
 
+    /// Returns whether the twin shows equations.
+    pub fn has_equations(&self) -> bool {
+        !self.rates.is_empty()
+    }
+
     /// Values of a sensor, actuator or state, of all records.
     pub fn columns(&self, kind: TargetKind, target: usize) -> Vec<f64> {
         let column = |signal: &Signal| -> Vec<f64> {

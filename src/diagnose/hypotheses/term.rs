@@ -23,7 +23,7 @@ pub(in crate::diagnose) enum Nature {
     Periodic,
 }
 
-/// What is added to the twin.
+/// Addition to the twin.
 #[derive(Debug, Clone)]
 pub(in crate::diagnose) enum Part {
     /// An effect, some magnitudes of which may be held at their off value; `kept` values of a delay's memory.

@@ -15,7 +15,7 @@ pub struct Location {
     pub target: Option<String>,
     /// All places, most probable first.
     pub targets: Vec<TargetShare>,
-    /// What is missing, as functions of what it depends on: of the twin alone, and on top of the accepted effects; clearest first.
+    /// Missing functions of the twin alone, and on top of the accepted effects; clearest first.
     pub functions: Vec<MissingFunction>,
     /// The maps with the accepted effects, or else the best explanation, added.
     pub after: Option<Maps>,

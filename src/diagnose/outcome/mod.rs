@@ -151,7 +151,7 @@ pub struct Cause {
     pub class: Vec<String>,
     /// Probabilities of the kinds of explanation.
     pub probabilities: Probabilities,
-    /// What an unknown function adds on top of the accepted, or else the best, effects.
+    /// Unknown rest on top of the accepted, or else the best, effects.
     pub remains: Option<Remains>,
     /// A record that would split the class; none where there is no class, or no input splits it.
     pub next_input: Option<NextInput>,

@@ -1,4 +1,4 @@
-//! How far: share of the gap closed, smallest visible effect, next input, calibration.
+//! Sizes: share of the gap closed, smallest visible effect, next input, calibration.
 
 pub(in crate::diagnose) mod calibrate;
 pub(in crate::diagnose) mod free_run;

@@ -146,14 +146,14 @@ fn wrong_calls_are_refused_in_one_line_that_names_what_and_where() {
         &["slow.csv: the validation record", remedy],
     );
     refuses(&[&record, &slow], &["slow.csv: record 2", remedy]);
-    let brief = oscillation("brief.csv", 49, 0.05);
+    let brief = oscillation("brief.csv", 3, 0.05);
     refuses(
         &[&brief],
-        &["brief.csv: record 1 has 49 samples", "at least 50"],
+        &["brief.csv: record 1 has 3 samples", "at least 4"],
     );
     refuses(
         &[&record, "--validation", &brief],
-        &["brief.csv: the validation record has 49 samples"],
+        &["brief.csv: the validation record has 3 samples"],
     );
 }
 
