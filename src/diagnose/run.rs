@@ -197,7 +197,7 @@ fn report(
     let mut conclusion = Conclusion::default();
     let mut absorbed = vec![];
     match (verdict, within) {
-        (Verdict::StructuralGap, _) => {
+        (Verdict::StructuralGap, _) if !settings.detection_only => {
             conclusion = decide(findings, MOST_EFFECTS, base.scales.has_equations())
         }
         (Verdict::ParameterGap, Some(within)) if !settings.detection_only => {
@@ -214,12 +214,10 @@ fn report(
     let stage = progress.stage("where and how far", 4);
     let mut location = Location::default();
     let (mut next, mut discovery, mut visible, mut shrunk) = (None, None, vec![], None);
-    if verdict == Verdict::StructuralGap {
+    if verdict == Verdict::StructuralGap && !settings.detection_only {
         location = located(findings, chances, &conclusion, model)?;
-        if !settings.detection_only {
-            location.after = accepted.map(|m| maps(m, None)).transpose()?;
-            discovery = discovered(findings, &conclusion, location.target.as_deref(), noise);
-        }
+        location.after = accepted.map(|m| maps(m, None)).transpose()?;
+        discovery = discovered(findings, &conclusion, location.target.as_deref(), noise);
     }
     stage.tick()?;
     if !settings.detection_only {
@@ -265,7 +263,9 @@ fn report(
         cause: Cause {
             decision: conclusion.decision,
             effects: match verdict {
-                Verdict::StructuralGap => effects(findings, chances, &conclusion),
+                Verdict::StructuralGap if !settings.detection_only => {
+                    effects(findings, chances, &conclusion)
+                }
                 _ => super::summary::absorbed(&absorbed),
             },
             probabilities: chances.kinds(),

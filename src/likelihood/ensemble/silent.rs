@@ -14,6 +14,8 @@ use std::sync::{Arc, Mutex};
 
 /// Least noise of such a twin, as a share of an output's deviation: differences and fits are not good to many more digits.
 const LEAST: f64 = 1e-3;
+/// The same where the simulator has noise of its own: nothing.
+const NONE: f64 = 1e-6;
 /// Values of runs that are kept.
 const KEPT: usize = 2_000_000;
 
@@ -34,7 +36,7 @@ pub(crate) fn measured(twin: &Twin, records: &[Record]) -> Result<(Twin, bool), 
     };
     let measured = MeasuredBox {
         base: base.clone(),
-        levels: levels(twin, record),
+        levels: levels(twin, record, if is_silent { LEAST } else { NONE }),
         is_silent,
         runs: Mutex::default(),
     };
@@ -49,7 +51,7 @@ fn size(values: &[f64]) -> f64 {
     deviation(values).max(least)
 }
 
-fn levels(twin: &dyn DigitalTwin, record: &Record) -> Vec<Parameter> {
+fn levels(twin: &dyn DigitalTwin, record: &Record, least: f64) -> Vec<Parameter> {
     let space = twin.parameters();
     (twin.signals().outputs.iter().enumerate())
         .filter(|(_, output)| space.position(&Role::Noise.name(&output.name)).is_err())
@@ -59,7 +61,7 @@ fn levels(twin: &dyn DigitalTwin, record: &Record) -> Vec<Parameter> {
                 name: Role::Noise.name(&output.name),
                 unit: output.unit.clone(),
                 prior: Interval::unchecked(LEAST * size, size),
-                bounds: Interval::unchecked(LEAST * size, 10.0 * size),
+                bounds: Interval::unchecked(least * size, 10.0 * size),
                 role: Role::Noise,
             }
         })
