@@ -15,8 +15,11 @@ const DRAWS: usize = 200;
 /// Share of draws below which a term is not told.
 const RARE: f64 = 0.1;
 
+/// Name and function of a term.
+type Candidate = (String, fn(f64) -> f64);
+
 /// Terms of a law in one variable.
-fn terms(x: &str) -> [(String, fn(f64) -> f64); 7] {
+fn terms(x: &str) -> [Candidate; 7] {
     [
         ("1".to_owned(), |_| 1.0),
         (x.to_owned(), |x| x),

@@ -45,10 +45,17 @@ impl WorkFolder {
             if !folder(path).is_dir() {
                 return Err(StorageError::NoParent { path: path.into() }.into());
             }
-            let new = NewWork::new(path, parts)?;
-            fill(&new)?;
-            new.write(MANIFEST, manifest.text().as_bytes())?;
-            new.finish()?;
+            let made = || -> Result<(), E> {
+                let new = NewWork::new(path, parts)?;
+                fill(&new)?;
+                new.write(MANIFEST, manifest.text().as_bytes())?;
+                Ok(new.finish()?)
+            };
+            if let Err(error) = made()
+                && !appears(path)
+            {
+                return Err(error);
+            }
         }
         let opened = Self::resume(path, manifest)?;
         opened.sweep();
@@ -200,6 +207,18 @@ fn read_manifest(path: &Path, verb: &'static str) -> Result<Manifest, String> {
         _ => format!("its manifest.json: {error}"),
     })?;
     Manifest::parse(verb, &text)
+}
+
+/// Returns whether another process makes the folder within a moment: it may have swept this one's unfinished folder away, which had
+/// not yet been locked.
+fn appears(path: &Path) -> bool {
+    (0..20).any(|_| {
+        let there = path.symlink_metadata().is_ok();
+        if !there {
+            std::thread::sleep(std::time::Duration::from_millis(50));
+        }
+        there
+    })
 }
 
 #[cfg(test)]
