@@ -15,12 +15,13 @@ use super::locate::maps::maps;
 use super::model::Model;
 use super::outcome::*;
 use super::quantify::calibrate::calibrate;
-use super::quantify::free_run::{Runner, free_runs};
+use super::quantify::free_run::{Runner, free_runs, root};
 use super::quantify::next_input::next_input;
 use super::quantify::power::power;
 use super::quantify::share::shrinkage;
 use super::settings::DiagnoseSettings;
 use super::summary::{effects, nuisance, onset, parameters, remains};
+use super::thresholds::Thresholds;
 use crate::likelihood::measured;
 use crate::math::six_digits;
 use crate::progress::Progress;
@@ -209,6 +210,9 @@ fn report(
         }
         _ => {}
     }
+    if !base.scales.has_equations() && !is_nearer(findings.model(&conclusion.accepted), model)? {
+        conclusion = Conclusion::none_of_these();
+    }
     let accepted = findings.model(&conclusion.accepted);
     let last = accepted.unwrap_or(model);
     let stage = progress.stage("where and how far", 4);
@@ -285,6 +289,18 @@ fn report(
         not_tested: not_tested.clone(),
         seconds: 0.0,
     })
+}
+
+/// Returns whether the free run of a black box's model is nearer to the record than that of the twin. Their likelihood is linearised about
+/// their runs, and says nothing where these are in another phase.
+fn is_nearer(model: Option<&Model<'_>>, twin: &Model<'_>) -> Result<bool, DiagnoseError> {
+    let Some(model) = model else { return Ok(true) };
+    let error = |model: &Model<'_>| -> Result<f64, DiagnoseError> {
+        let runner = Runner::new(&model.problem, &model.fitted.theta)?;
+        let errors = runner.and_then(|runner| runner.errors(&model.problem.records[0], 0));
+        Ok(errors.map_or(f64::INFINITY, |errors| root(&errors)))
+    };
+    Ok(error(model)? < Thresholds::NEARER * error(twin)?)
 }
 
 /// Places, missing functions and residuals of a structural gap.

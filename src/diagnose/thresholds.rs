@@ -85,6 +85,8 @@ impl Thresholds {
     pub const CANDIDATES: f64 = 6.0;
     /// Lead that a larger set of effects needs over a smaller one, its price paid.
     pub const WORTH_ANOTHER: f64 = 2.0;
+    /// Most of the twin's free-run error that may be left with an effect of a black box's signals.
+    pub const NEARER: f64 = 0.95;
     /// Distance within which effects are rivals.
     pub const RIVALS: f64 = 3.0;
     /// Prior probability that something unknown is missing beside what a listed effect explains.

@@ -220,6 +220,16 @@ impl Default for Conclusion {
     }
 }
 
+impl Conclusion {
+    /// Nothing listed explains the records.
+    pub fn none_of_these() -> Self {
+        Self {
+            decision: Decision::NoneOfThese,
+            ..Self::default()
+        }
+    }
+}
+
 impl Chances {
     /// Probabilities of the kinds of explanation.
     pub fn kinds(&self) -> Probabilities {
@@ -285,10 +295,7 @@ pub(in crate::diagnose) fn decide(
     {
         return named(findings, keys, Decision::Partial);
     }
-    Conclusion {
-        decision: Decision::NoneOfThese,
-        ..Conclusion::default()
-    }
+    Conclusion::none_of_these()
 }
 
 /// A set that is named, with single effects that the records cannot tell from it.

@@ -59,10 +59,10 @@ fn few(alarms: u64, records: u64) {
 
 #[test]
 fn a_perfect_oscillator_in_a_box_is_rarely_accused() {
-    let alarms = alarms("van-der-pol", 40, |study, i, noise| {
+    let alarms = alarms("van-der-pol", 16, |study, i, noise| {
         theta(study, i % 2 == 1, noise)
     });
-    few(alarms, 40);
+    few(alarms, 16);
 }
 
 #[test]
