@@ -87,6 +87,8 @@ impl Thresholds {
     pub const WORTH_ANOTHER: f64 = 2.0;
     /// Most of the twin's free-run error that may be left with an effect of a black box's signals.
     pub const NEARER: f64 = 0.95;
+    /// Least probability of a name together with its rivals.
+    pub const SAID: f64 = 0.5;
     /// Distance within which effects are rivals.
     pub const RIVALS: f64 = 3.0;
     /// Prior probability that something unknown is missing beside what a listed effect explains.

@@ -311,6 +311,15 @@ fn named(findings: &Findings<'_>, keys: &[String], decision: Decision) -> Conclu
             }
         }
     }
+    // No name is worth saying that is, with all its rivals, less probable than not.
+    let chances = findings.chances();
+    let together: f64 = class
+        .iter()
+        .filter_map(|key| chances.effects.get(key))
+        .sum();
+    if together < Thresholds::SAID * keys.len() as f64 {
+        return Conclusion::none_of_these();
+    }
     let decision = match decision {
         Decision::Named if class.len() > keys.len() => Decision::Class,
         other => other,
