@@ -7,6 +7,7 @@ use super::outcome::Verdict;
 use super::residuals::frequencies::frequencies;
 use super::settings::DiagnoseSettings;
 use super::thresholds::Thresholds;
+use crate::effect::{TargetKind, targets};
 use crate::fit::axis::Axis;
 use crate::fit::climb::{Fitted, fit};
 use crate::fit::problem::Problem;
@@ -42,19 +43,12 @@ impl<'a> Base<'a> {
         let twin = &measured.twin;
         let space = twin.parameters();
         let own = space.len() - measured.levels.len();
-        let mut axes: Vec<Axis> = (space.iter().take(own).map(Axis::of))
-            .chain(measured.levels.iter().map(Axis::of_level))
-            .collect();
-        for (axis, parameter) in axes.iter_mut().zip(space.iter()) {
-            // The filter integrates over an uncertain start.
-            axis.held |= parameter.role == Role::Start;
-        }
         let initial = settings.initial.as_ref().map(|initial| {
             let levels = measured.levels.iter().map(|level| level.median);
             let theta: Vec<f64> = initial.iter().copied().take(own).chain(levels).collect();
             theta
         });
-        let problem = Problem::new(twin.clone(), axes, records);
+        let problem = Problem::of_measured(measured, records);
         let fitted = if !problem.is_simulated() {
             let initial: Vec<Vec<f64>> = initial.iter().map(|theta| problem.full(theta)).collect();
             let found = polish(
@@ -72,9 +66,9 @@ impl<'a> Base<'a> {
         let theta = model.theta();
         let outline = model.problem.outline();
         let outputs = &outline.outputs;
+        let sensors = targets(TargetKind::Sensor, None, &twin.signals());
         let place = |name: &str| match outputs.iter().position(|o| o.name == name) {
-            Some(_) if outputs.len() == 1 => "sensor".to_owned(),
-            Some(j) => format!("sensor{}", j + 1),
+            Some(j) => sensors[j].clone(),
             None => name.to_owned(),
         };
         let noisy = (measured.levels.iter())

@@ -4,14 +4,11 @@ use super::error::DiagnoseError;
 use super::hypotheses::term::{Term, with_terms};
 use crate::fit::axis::{EvidencePrior, Family};
 use crate::fit::climb::{Fitted, climb};
-use crate::fit::evidence::{Laplace, laplace};
+use crate::fit::evidence::{CREDIT, Laplace, laplace};
 use crate::fit::problem::Problem;
 use crate::record::Signal;
 use crate::twin::Twin;
 use std::sync::Arc;
-
-/// Nats that an unfinished fit of a hypothesis is credited with beyond where it ended, at most.
-pub(in crate::diagnose) const CREDIT: f64 = 1.5;
 
 /// A twin with terms, fitted.
 #[derive(Clone)]
@@ -36,14 +33,30 @@ pub(in crate::diagnose) struct Extended<'a> {
 impl<'a> Model<'a> {
     /// The twin alone; `None` where its evidence cannot be told.
     pub fn bare(base: &'a Twin, problem: Problem<'a>, fitted: Fitted) -> Option<Self> {
+        Self::new(base, vec![], problem, fitted)
+    }
+
+    /// The twin with terms; `None` where its evidence cannot be told.
+    fn new(
+        base: &'a Twin,
+        terms: Vec<Arc<Term>>,
+        problem: Problem<'a>,
+        fitted: Fitted,
+    ) -> Option<Self> {
         let (log_evidence, _) = laplace(&problem, &fitted, CREDIT)?;
-        Some(Self {
+        let mark: f64 = terms.iter().map(|t| t.mark).sum();
+        log_evidence.is_finite().then_some(Self {
             base,
-            terms: vec![],
+            terms,
             problem,
             fitted,
-            log_evidence,
+            log_evidence: log_evidence + mark,
         })
+    }
+
+    /// The same model, carried on to another fit.
+    pub fn refitted(&self, fitted: Fitted) -> Option<Self> {
+        Self::new(self.base, self.terms.clone(), self.problem.clone(), fitted)
     }
 
     /// θ of the first record.
@@ -127,15 +140,7 @@ impl<'a> Extended<'a> {
 
     /// The fitted model.
     pub fn fitted(self, base: &'a Twin, fitted: Fitted, problem: Problem<'a>) -> Option<Model<'a>> {
-        let (log_evidence, _) = laplace(&problem, &fitted, CREDIT)?;
-        let mark: f64 = self.terms.iter().map(|t| t.mark).sum();
-        log_evidence.is_finite().then_some(Model {
-            base,
-            terms: self.terms,
-            problem,
-            fitted,
-            log_evidence: log_evidence + mark,
-        })
+        Model::new(base, self.terms, problem, fitted)
     }
 }
 

@@ -131,14 +131,13 @@ fn search<R>(
         !settings.detection_only,
         progress,
     )?;
-    let names: Vec<Term> = listed.iter().map(|t| t.as_ref().clone()).collect();
     then(Explored {
         study,
         chances: findings.chances(),
         findings,
         base: &base,
         listed: &listed,
-        not_tested: not_tested(study, &names),
+        not_tested: not_tested(study, &listed),
     })
 }
 
@@ -199,7 +198,7 @@ fn report(
     let mut absorbed = vec![];
     match (verdict, within) {
         (Verdict::StructuralGap, _) if !settings.detection_only => {
-            conclusion = decide(findings, MOST_EFFECTS, base.scales.has_equations())
+            conclusion = decide(findings, chances, MOST_EFFECTS, base.scales.has_equations())
         }
         (Verdict::ParameterGap, Some(within)) if !settings.detection_only => {
             absorbed = absorbing(model, &within, listed)?;
@@ -272,7 +271,7 @@ fn report(
                 }
                 _ => super::summary::absorbed(&absorbed),
             },
-            probabilities: chances.kinds(),
+            probabilities: chances.kinds,
             remains: remains(findings, &conclusion),
             next_input: next,
             class: conclusion.class,
@@ -313,7 +312,7 @@ fn located(
     let mut targets: Vec<TargetShare> = (chances.places.iter())
         .map(|(target, p)| TargetShare {
             target: target.clone(),
-            probability: p / (1.0 - chances.nothing).max(f64::MIN_POSITIVE),
+            probability: p / (1.0 - chances.kinds.nothing).max(f64::MIN_POSITIVE),
         })
         .collect();
     targets.sort_by(|a, b| b.probability.total_cmp(&a.probability));

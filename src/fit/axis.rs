@@ -5,6 +5,8 @@ use crate::twin::{Interval, Parameter};
 
 /// Standard deviation of the weak log-prior of a positive parameter.
 const LOG_DEVIATION: f64 = 0.6;
+/// Size at which a direction is taken, as a share of the largest one.
+pub(crate) const SMALL: f64 = 0.01;
 /// Longest step of a fit in a logarithm; otherwise, as a share of the width.
 const LONGEST: f64 = 0.5;
 /// The same for the logarithm of a noise level, which has a way to go from loud noise.
@@ -110,6 +112,19 @@ impl Axis {
     /// Returns whether φ is the logarithm.
     pub fn is_log(&self) -> bool {
         self.bounds.low() > 0.0
+    }
+
+    /// A size at which its direction is taken: a hundredth of the largest, on the side that the bounds allow; `None` for other entries.
+    pub fn small_size(&self) -> Option<f64> {
+        let EvidencePrior::Magnitude { largest } = self.evidence else {
+            return None;
+        };
+        let step = SMALL * largest;
+        Some(if self.bounds.contains(step) {
+            step
+        } else {
+            -step
+        })
     }
 
     /// Returns whether a size can only be added: half of a normal prior lies within the bounds.

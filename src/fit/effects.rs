@@ -3,7 +3,7 @@
 //! At the fit of the twin without effects, each effect is tried over a grid of its shapes: the change of innovations that a small
 //! size makes is a direction, and the gain along it, θ free to answer, says how large the effect wants to be.
 
-use super::axis::EvidencePrior;
+use super::axis::{EvidencePrior, SMALL};
 use super::magnitude::duration;
 use super::problem::Problem;
 use super::reference::Reference;
@@ -14,8 +14,6 @@ use crate::record::Record;
 use rayon::prelude::*;
 use std::f64::consts::FRAC_PI_2;
 
-/// Size of the step that a direction is taken with, as a share of the largest size.
-const SMALL: f64 = 0.01;
 /// Frequencies in 1/T: half a cycle apart, since a gain falls off within one; up to a fifth of the sampling rate.
 const FREQUENCIES_PER_CYCLE: f64 = 2.0;
 const HIGHEST: f64 = 0.2;

@@ -27,7 +27,7 @@ use std::f64::consts::{LN_2, TAU};
 /// Values of τ.
 const SIZES: usize = 6;
 /// Largest gain that is credited beyond where a fit ended, in nats.
-const CREDIT: f64 = 1.5;
+pub(crate) const CREDIT: f64 = 1.5;
 /// Samples that are filtered for the correction, and draws that makes at least and at most.
 const SAMPLES: usize = 400_000;
 const LEAST_DRAWS: usize = 200;

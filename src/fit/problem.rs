@@ -3,7 +3,7 @@
 use crate::fit::axis::{Axis, Family};
 
 use crate::likelihood::kalman::{Coordinates, FilterError, Filtered, Score};
-use crate::likelihood::{Likelihood, likelihood_of};
+use crate::likelihood::{Likelihood, Measured, likelihood_of};
 use crate::record::{Record, Signal};
 use crate::twin::{Outline, Parameter, ParameterSpace, Role, Twin};
 use std::sync::Arc;
@@ -82,6 +82,20 @@ impl<'a> Problem<'a> {
             twin,
             records,
         }
+    }
+
+    /// A twin with noise levels in θ and the weak priors of its parameters. Unknown starts of equations are held: the filter integrates
+    /// over the first state.
+    pub fn of_measured(measured: &Measured, records: &'a [Record]) -> Self {
+        let space = measured.twin.parameters();
+        let own = space.len() - measured.levels.len();
+        let axes: Vec<Axis> = (space.iter().take(own).map(Axis::of))
+            .chain(measured.levels.iter().map(Axis::of_level))
+            .collect();
+        let problem = Self::new(measured.twin.clone(), axes, records);
+        let is_simulated = problem.is_simulated();
+        let d = space.len();
+        problem.holding(|j| j < d && !is_simulated && space[j].role == Role::Start)
     }
 
     /// A twin with the weak priors of its own parameters.

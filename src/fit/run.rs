@@ -1,6 +1,5 @@
 //! Fit of a twin to records, with fitted noise and uncertain starts.
 
-use super::axis::Axis;
 use super::certificate::{Certificate, Side};
 use super::climb::Fitted;
 use super::effects::begin;
@@ -44,23 +43,17 @@ pub(crate) fn run(
     let clock = Instant::now();
     let noise = Noise::new(settings.seed, "fit", 0);
     let measured = measured(subject.twin, records, subject.beliefs)?;
+    let mut problem = Problem::of_measured(&measured, records);
     let (twin, levels) = (measured.twin, measured.levels);
     let space = twin.parameters();
     let own = space.len() - levels.len();
-    let mut axes: Vec<Axis> = (space.iter().take(own).map(Axis::of))
-        .chain(levels.iter().map(Axis::of_level))
-        .collect();
-    let mut problem = Problem::new(twin.clone(), axes.clone(), records);
     if let Some(equations) = twin.equations() {
-        for (axis, parameter) in axes.iter_mut().zip(space.iter()) {
-            // The filter integrates over an uncertain start.
-            axis.held |= parameter.role == Role::Start;
-        }
         // Sizes of effects are known once states are: where the twin follows the record with loud noise.
         let kinds = kinds(subject.effects, records);
         let begin = problem.begin(&problem.centre());
         let states = problem.states(&begin);
         if let Ok(states) = states {
+            let mut axes = problem.axes[..space.len()].to_vec();
             let states: Vec<Signal> = states.into_iter().map(|(_, states)| states).collect();
             for (j, parameter) in space.iter().enumerate().take(own) {
                 match kinds.get(&parameter.name) {

@@ -1,7 +1,7 @@
 //! Decision by posterior odds.
 //!
 //! ```text
-//! D     = log Σ w_h·Z_h − log Z_0                     w: 0.6 shared by listed effects, 0.4 by unknown functions;  a gap if D > 0
+//! D     = log Σ w_h·Z_h − log Z_0                     w: 0.6 shared by listed effects, 0.4 by unknown functions;  a gap if D > 1
 //! r(E)  = max_U log Z(E + U) − log Z(E)               E leaves nothing to explain if r < 4
 //! named : the largest log Z of what leaves nothing;  a larger set must be 2 nats better, an unknown function alone must not be better
 //! ```
@@ -20,7 +20,7 @@ pub(in crate::diagnose) struct Findings<'a> {
     pub listed: Vec<Found<'a>>,
     /// Unknown functions alone, best first.
     pub unknown: Vec<Found<'a>>,
-    /// Pairs and triples of listed effects, best first.
+    /// Pairs of listed effects, best first.
     pub several: Vec<Found<'a>>,
     /// Sets of listed effects with what unknown functions add on top, best first.
     pub beside: Vec<(Vec<String>, Vec<Found<'a>>)>,
@@ -29,22 +29,14 @@ pub(in crate::diagnose) struct Findings<'a> {
 /// Posterior probabilities.
 #[derive(Debug, Clone, Default)]
 pub(in crate::diagnose) struct Chances {
-    /// Nothing is missing.
-    pub nothing: f64,
-    /// Listed effects explain everything.
-    pub listed: f64,
-    /// Listed effects explain a part.
-    pub partial: f64,
-    /// Something unknown alone.
-    pub unknown: f64,
+    /// Kinds of explanation.
+    pub kinds: Probabilities,
     /// Listed effects by their keys: alone, as part of a set, or beside something unknown.
     pub effects: BTreeMap<String, f64>,
     /// Places.
     pub places: BTreeMap<String, f64>,
     /// log of the odds of a gap against none, prior odds even.
     pub log_odds: f64,
-    /// Sets of listed effects, the probability of each alone, and its weight among them.
-    sets: Vec<(Vec<String>, f64, f64)>,
 }
 
 impl<'a> Findings<'a> {
@@ -58,7 +50,7 @@ impl<'a> Findings<'a> {
 
     /// Nats that unknown functions add on top of a set; `None` where that was not asked.
     pub fn left(&self, keys: &[String]) -> Option<f64> {
-        let (_, on_top) = self.beside.iter().find(|(k, _)| same(k, keys))?;
+        let (_, on_top) = self.beside(keys)?;
         let own = self.gain(keys)?;
         Some(on_top.first().map_or(0.0, |f| f.gain - own))
     }
@@ -69,11 +61,14 @@ impl<'a> Findings<'a> {
         Some((&found.0, &found.1))
     }
 
+    /// A set of listed effects.
+    fn set(&self, keys: &[String]) -> Option<&Found<'a>> {
+        (self.listed.iter().chain(&self.several)).find(|f| same(&f.keys(), keys))
+    }
+
     /// The fitted model of a set.
     pub fn model(&self, keys: &[String]) -> Option<&Model<'a>> {
-        (self.listed.iter().chain(&self.several))
-            .find(|f| same(&f.keys(), keys))
-            .and_then(|f| f.model.as_ref())
+        self.set(keys)?.model.as_ref()
     }
 
     /// The model that explains most.
@@ -92,9 +87,13 @@ impl<'a> Findings<'a> {
 
     /// log of the evidence of a set over that of the twin.
     pub fn gain(&self, keys: &[String]) -> Option<f64> {
-        (self.listed.iter().chain(&self.several))
-            .find(|f| same(&f.keys(), keys))
-            .map(|f| f.gain)
+        self.set(keys).map(|f| f.gain)
+    }
+
+    /// Nats that so many effects together cost: one of all that could stand beside the first, in either order.
+    fn price(&self, count: usize) -> f64 {
+        let pairs = 0.5 * (self.listed.len() as f64 - 1.0);
+        pairs.max(1.0).ln() * (count - 1) as f64
     }
 
     /// Posterior probabilities of all hypotheses.
@@ -105,15 +104,13 @@ impl<'a> Findings<'a> {
         );
         let each = Thresholds::LISTED / listed;
         let every = (1.0 - Thresholds::LISTED) / unknown;
-        let pair = (0.5 * (listed - 1.0)).max(1.0).ln();
-        let price = |count: usize| pair * (count - 1) as f64;
         let places = |found: &Found<'_>| -> Vec<String> {
             found.terms.iter().map(|t| t.target.clone()).collect()
         };
         let mut all: Vec<Weighed> = vec![];
         for found in self.listed.iter().chain(&self.several) {
             all.push(Weighed {
-                log_weight: each.ln() + found.gain - price(found.terms.len()),
+                log_weight: each.ln() + found.gain - self.price(found.terms.len()),
                 kind: Kind::Listed(found.keys()),
                 places: places(found),
             });
@@ -127,7 +124,7 @@ impl<'a> Findings<'a> {
         }
         for (keys, on_top) in &self.beside {
             for found in on_top {
-                let second = Thresholds::SECOND.ln() + every.ln() - price(keys.len());
+                let second = Thresholds::SECOND.ln() + every.ln() - self.price(keys.len());
                 all.push(Weighed {
                     log_weight: each.ln() + second + found.gain,
                     kind: Kind::Partial,
@@ -139,7 +136,10 @@ impl<'a> Findings<'a> {
         let sum = log_mean(&logs) + (logs.len() as f64).ln();
         let whole = sum.max(0.0) + (-sum.abs()).exp().ln_1p();
         let mut chances = Chances {
-            nothing: 1.0 / (1.0 + sum.exp()),
+            kinds: Probabilities {
+                nothing: 1.0 / (1.0 + sum.exp()),
+                ..Probabilities::default()
+            },
             log_odds: sum,
             ..Chances::default()
         };
@@ -148,7 +148,9 @@ impl<'a> Findings<'a> {
             .filter(|h| matches!(h.kind, Kind::Listed(_)))
             .map(|h| h.log_weight)
             .fold(f64::NEG_INFINITY, f64::max);
-        let mut shares = 0.0;
+        // Each set, its probability alone, and its weight among them.
+        let mut sets: Vec<(Vec<String>, f64, f64)> = vec![];
+        let kinds = &mut chances.kinds;
         for hypothesis in all {
             let p = (hypothesis.log_weight - whole).exp();
             for place in &hypothesis.places {
@@ -156,20 +158,18 @@ impl<'a> Findings<'a> {
                     p / hypothesis.places.len() as f64;
             }
             match hypothesis.kind {
-                Kind::Unknown => chances.unknown += p,
-                Kind::Partial => chances.partial += p,
+                Kind::Unknown => kinds.unknown += p,
+                Kind::Partial => kinds.partial += p,
                 Kind::Listed(keys) => {
-                    chances.listed += p;
-                    let share = (hypothesis.log_weight - top).exp();
-                    shares += share;
-                    chances.sets.push((keys, p, share));
+                    kinds.listed += p;
+                    sets.push((keys, p, (hypothesis.log_weight - top).exp()));
                 }
             }
         }
-        for (keys, p, share) in &chances.sets {
+        let shares: f64 = sets.iter().map(|(.., share)| share).sum();
+        for (keys, p, share) in sets {
             for key in keys {
-                *chances.effects.entry(key.clone()).or_default() +=
-                    p + chances.partial * share / shares;
+                *chances.effects.entry(key).or_default() += p + kinds.partial * share / shares;
             }
         }
         chances
@@ -230,21 +230,10 @@ impl Conclusion {
     }
 }
 
-impl Chances {
-    /// Probabilities of the kinds of explanation.
-    pub fn kinds(&self) -> Probabilities {
-        Probabilities {
-            listed: self.listed,
-            partial: self.partial,
-            unknown: self.unknown,
-            nothing: self.nothing,
-        }
-    }
-}
-
 /// Decides about a gap.
 pub(in crate::diagnose) fn decide(
     findings: &Findings<'_>,
+    chances: &Chances,
     most_effects: usize,
     has_equations: bool,
 ) -> Conclusion {
@@ -252,8 +241,6 @@ pub(in crate::diagnose) fn decide(
         .unknown
         .first()
         .map_or(f64::NEG_INFINITY, |f| f.gain);
-    let listed = findings.listed.len().max(2) as f64;
-    let price = (0.5 * (listed - 1.0)).max(1.0).ln();
     let top = findings
         .listed
         .first()
@@ -265,7 +252,7 @@ pub(in crate::diagnose) fn decide(
         .filter_map(|f| {
             let keys = f.keys();
             let left = findings.left(&keys)?;
-            Some((keys, f.gain - price * (f.terms.len() - 1) as f64, left))
+            Some((keys, f.gain - findings.price(f.terms.len()), left))
         })
         .collect();
     let mut chosen: Option<&(Vec<String>, f64, f64)> = None;
@@ -283,23 +270,27 @@ pub(in crate::diagnose) fn decide(
         chosen = None;
     }
     if let Some((keys, _, _)) = chosen {
-        return named(findings, keys, Decision::Named);
+        return named(findings, chances, keys, Decision::Named);
     }
     // Listed effects that explain most, beside something unknown. What is inside a black box has no functions to stand for it.
-    let chances = findings.chances();
     let best = (candidates.iter()).max_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((keys, own, left)) = best
         && has_equations
-        && chances.partial > chances.unknown
+        && chances.kinds.partial > chances.kinds.unknown
         && *left < Thresholds::REST * (own + left)
     {
-        return named(findings, keys, Decision::Partial);
+        return named(findings, chances, keys, Decision::Partial);
     }
     Conclusion::none_of_these()
 }
 
 /// A set that is named, with single effects that the records cannot tell from it.
-fn named(findings: &Findings<'_>, keys: &[String], decision: Decision) -> Conclusion {
+fn named(
+    findings: &Findings<'_>,
+    chances: &Chances,
+    keys: &[String],
+    decision: Decision,
+) -> Conclusion {
     let own = findings.gain(keys).unwrap_or(f64::NAN);
     let mut class = keys.to_vec();
     for found in findings.listed.iter().chain(&findings.several) {
@@ -312,7 +303,6 @@ fn named(findings: &Findings<'_>, keys: &[String], decision: Decision) -> Conclu
         }
     }
     // No name is worth saying that is, with all its rivals, less probable than not.
-    let chances = findings.chances();
     let together: f64 = class
         .iter()
         .filter_map(|key| chances.effects.get(key))

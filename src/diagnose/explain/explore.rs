@@ -1,4 +1,4 @@
-//! The order of the search: single explanations, what they leave, pairs, triples.
+//! The order of the search: single explanations, what they leave, pairs.
 
 use super::decide::{Findings, leaves_nothing};
 use super::search::{Breadth, Found, listed, own_theta, sort, unknown};
@@ -154,7 +154,7 @@ fn on_top<'a>(
     )?))
 }
 
-/// Second effects on top of the best singles; thirds on top of the best pair where much is left.
+/// Second effects on top of the best singles.
 fn pairs<'a>(
     findings: &Findings<'a>,
     terms: &Terms<'_>,

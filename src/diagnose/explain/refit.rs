@@ -3,9 +3,10 @@
 use super::scan::{Beginning, Linear, Promise};
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::model::{Extended, Model};
-use crate::fit::climb::{Fitted, climb};
-use crate::fit::evidence::laplace;
-use crate::likelihood::kalman::recoverable;
+use crate::fit::climb::{Fitted, climb, fit};
+use crate::fit::evidence::{CREDIT, laplace};
+use crate::fit::problem::Problem;
+use crate::likelihood::kalman::{FilterError, recoverable};
 use rayon::prelude::*;
 
 /// Shares of the step to the top of the quadratic that a function's fit may begin at.
@@ -39,11 +40,7 @@ pub(in crate::diagnose) fn fit_promise<'a>(
         let first = model.beside(&extended, &first.m);
         from.extend(thetas.iter().map(|own| extended.from(own, first.clone())));
     }
-    let fits: Vec<Option<Fitted>> = (from.par_iter())
-        .map(|start| climb(&extended.problem, start, effort.iterations))
-        .collect::<Result<_, _>>()?;
-    let best =
-        (fits.into_iter().flatten()).reduce(|a, b| if b.objective > a.objective { b } else { a });
+    let best = fit(&extended.problem, &from, effort.iterations)?;
     let problem = extended.problem.clone();
     Ok(best.and_then(|fitted| extended.fitted(model.base, fitted, problem)))
 }
@@ -109,8 +106,7 @@ fn begin(
 ) -> Result<Vec<f64>, DiagnoseError> {
     let c = &model.problem.coordinates;
     let phi = c.of(&model.fitted.theta);
-    let mut best: Option<(f64, Vec<f64>)> = None;
-    for share in SHARES {
+    let points = SHARES.map(|share| {
         let moved: Vec<f64> = phi
             .iter()
             .zip(&start.answer)
@@ -121,15 +117,27 @@ fn begin(
         if start.scales {
             m[0] *= share.max(SHARES[SHARES.len() - 2]);
         }
-        let full = model.beside_at(extended, &theta, &m);
-        if let Some(value) = recoverable(extended.problem.log_likelihood(&full))? {
-            let value = value + extended.problem.log_prior(&full, true);
+        model.beside_at(extended, &theta, &m)
+    });
+    let best = likeliest(&extended.problem, points)?;
+    Ok(best.unwrap_or_else(|| model.beside(extended, &start.m)))
+}
+
+/// The point of the largest objective, the first of equal ones; `None` where the filter works at none.
+fn likeliest(
+    problem: &Problem<'_>,
+    points: [Vec<f64>; SHARES.len()],
+) -> Result<Option<Vec<f64>>, FilterError> {
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    for theta in points {
+        if let Some(value) = recoverable(problem.log_likelihood(&theta))? {
+            let value = value + problem.log_prior(&theta, true);
             if best.as_ref().is_none_or(|(b, _)| value > *b) {
-                best = Some((value, full));
+                best = Some((value, theta));
             }
         }
     }
-    Ok(best.map_or_else(|| model.beside(extended, &start.m), |(_, theta)| theta))
+    Ok(best.map(|(_, theta)| theta))
 }
 
 /// Fits an unknown function's coefficients under the prior that is most probable, and once more if that moved.
@@ -148,21 +156,14 @@ pub(in crate::diagnose) fn fit_function<'a>(
     // From the top of the quadratic, or nearer where that is too far.
     let c = &extended.problem.coordinates;
     let phi = c.of(&theta);
-    let mut best: Option<(f64, Vec<f64>)> = None;
-    for share in SHARES {
+    let points = SHARES.map(|share| {
         let mut moved = phi.clone();
         for (a, &j) in found.free.iter().enumerate() {
             moved[j] += share * (found.centre[a] - phi[j]);
         }
-        let theta = problem.clamp(&c.theta(&moved));
-        if let Some(value) = recoverable(problem.log_likelihood(&theta))? {
-            let value = value + problem.log_prior(&theta, true);
-            if best.as_ref().is_none_or(|(b, _)| value > *b) {
-                best = Some((value, theta));
-            }
-        }
-    }
-    let Some((_, mut start)) = best else {
+        problem.clamp(&c.theta(&moved))
+    });
+    let Some(mut start) = likeliest(&problem, points)? else {
         return Ok(None);
     };
     let mut kept: Option<(f64, Fitted, _)> = None;
@@ -170,7 +171,7 @@ pub(in crate::diagnose) fn fit_function<'a>(
         let Some(fitted) = climb(&problem, &start, iterations)? else {
             break;
         };
-        let Some((value, found)) = laplace(&problem, &fitted, 1.5) else {
+        let Some((value, found)) = laplace(&problem, &fitted, CREDIT) else {
             break;
         };
         if kept.as_ref().is_some_and(|(k, ..)| value <= *k + 0.1) {

@@ -6,16 +6,12 @@
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::term::{Start, Term};
 use crate::diagnose::model::{Extended, Model};
-use crate::fit::axis::EvidencePrior;
 use crate::fit::evidence::{Laplace, laplace};
 use crate::fit::reference::Reference;
 use crate::likelihood::kalman::recoverable;
 use nalgebra::DVector;
 use rayon::prelude::*;
 use std::sync::Arc;
-
-/// Size at which a direction is taken, as a share of the largest one.
-const SMALL: f64 = 0.01;
 
 /// A term and its best starts.
 pub(in crate::diagnose) struct Promise {
@@ -85,17 +81,12 @@ fn promise(
     let problem = &extended.problem;
     let first = &problem.axes[extended.entries[0]];
     let mut m = start.m.clone();
-    let step = match first.evidence {
-        EvidencePrior::Magnitude { largest } if start.scales => {
-            let step = SMALL * largest;
-            m[0] = if first.bounds.contains(step) {
-                step
-            } else {
-                -step
-            };
-            m[0]
+    let step = match first.small_size().filter(|_| start.scales) {
+        Some(step) => {
+            m[0] = step;
+            step
         }
-        _ => 1.0,
+        None => 1.0,
     };
     let theta = model.beside(extended, &m);
     let Some(filtered) = recoverable(problem.filtered(&theta))? else {
@@ -139,9 +130,9 @@ pub(in crate::diagnose) fn functions<'a>(
 ) -> Result<Vec<Linear<'a>>, DiagnoseError> {
     let mut all: Vec<Linear<'a>> = (terms.par_iter())
         .map(|term| {
-            let mut best: Option<Linear<'a>> = None;
+            let extended = model.extend(term)?;
+            let mut best: Option<(f64, Laplace, Vec<f64>)> = None;
             for start in &term.starts {
-                let extended = model.extend(term)?;
                 let theta = model.beside(&extended, &start.m);
                 let Some(fitted) = extended.at(&theta)? else {
                     continue;
@@ -152,16 +143,16 @@ pub(in crate::diagnose) fn functions<'a>(
                     continue;
                 };
                 let gain = log_evidence - model.log_evidence;
-                if best.as_ref().is_none_or(|b| gain > b.gain) {
-                    best = Some(Linear {
-                        extended,
-                        gain,
-                        found,
-                        theta,
-                    });
+                if best.as_ref().is_none_or(|(b, ..)| gain > *b) {
+                    best = Some((gain, found, theta));
                 }
             }
-            Ok(best)
+            Ok(best.map(|(gain, found, theta)| Linear {
+                extended,
+                gain,
+                found,
+                theta,
+            }))
         })
         .collect::<Result<Vec<_>, DiagnoseError>>()?
         .into_iter()

@@ -188,7 +188,7 @@ pub(in crate::diagnose) fn listed<'a>(
                 None => None,
             };
             let carried = match (&found.model, on) {
-                (Some(m), Some(fitted)) => refreshed(m, fitted),
+                (Some(m), Some(fitted)) => m.refitted(fitted),
                 _ => None,
             };
             let best = [fitted, carried].into_iter().flatten().reduce(|a, b| {
@@ -228,17 +228,6 @@ pub(in crate::diagnose) fn listed<'a>(
         }
     }
     Ok(merged(all, &ways(terms)))
-}
-
-/// The model at another fit.
-fn refreshed<'a>(model: &Model<'a>, fitted: crate::fit::climb::Fitted) -> Option<Model<'a>> {
-    let mark: f64 = model.terms.iter().map(|t| t.mark).sum();
-    let (log_evidence, _) = crate::fit::evidence::laplace(&model.problem, &fitted, 1.5)?;
-    Some(Model {
-        fitted,
-        log_evidence: log_evidence + mark,
-        ..model.clone()
-    })
 }
 
 /// θ of the twin without terms.

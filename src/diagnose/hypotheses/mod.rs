@@ -14,11 +14,12 @@ use self::listed::Library;
 use self::scales::Scales;
 use self::term::{Nature, Part, Start, Term};
 use crate::diagnose::error::DiagnoseError;
-use crate::effect::{EffectPattern, TargetKind};
+use crate::effect::{EffectPattern, TargetKind, targets};
 use crate::fit::axis::{Axis, EvidencePrior};
 use crate::math::quantile;
 use crate::study::Study;
 use crate::twin::{Interval, Parameter, Role, is_memory};
+use std::sync::Arc;
 
 /// Time constants of disturbances between three steps and a sixth of the record.
 const TIMES: usize = 3;
@@ -63,8 +64,10 @@ fn already(study: &Study) -> Vec<String> {
 }
 
 /// Effects that the twin may lack beside these and its own effects.
-pub(in crate::diagnose) fn not_tested(study: &Study, terms: &[Term]) -> Vec<String> {
-    let known: Vec<String> = terms.iter().map(Term::key).chain(already(study)).collect();
+pub(in crate::diagnose) fn not_tested(study: &Study, terms: &[Arc<Term>]) -> Vec<String> {
+    let known: Vec<String> = (terms.iter().map(|t| t.key()))
+        .chain(already(study))
+        .collect();
     let mut keys: Vec<String> = (study.effects().iter())
         .map(|e| e.key().to_string())
         .filter(|key| !known.contains(key))
@@ -77,7 +80,6 @@ pub(in crate::diagnose) fn not_tested(study: &Study, terms: &[Term]) -> Vec<Stri
 pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -> Vec<Term> {
     let scales = library.scales;
     let outline = &scales.outline;
-    let (inputs, outputs) = (outline.inputs.len(), outline.outputs.len());
     let mut terms = vec![];
     let range = |kind: TargetKind, i: usize| {
         let mut ends = (f64::INFINITY, f64::NEG_INFINITY);
@@ -115,7 +117,7 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
             ))
         })
         .collect();
-    let of_inputs: Vec<Variable> = (0..inputs)
+    let of_inputs: Vec<Variable> = (0..outline.inputs.len())
         .filter_map(|i| {
             variable(
                 TargetKind::Actuator,
@@ -125,7 +127,7 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
             )
         })
         .collect();
-    let times = spread(3.0 * scales.dt(), scales.duration() / 6.0);
+    let times: [f64; TIMES] = spread(3.0 * scales.dt(), scales.duration() / 6.0);
     let frequency = |target: &str| {
         let parameter = Parameter::new(target, "Hz", 0.1, 1.0);
         library.frequency(&parameter)
@@ -159,13 +161,10 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
             times,
         ));
     }
-    let past = spread_of::<PASTS>(1.5 * scales.dt(), scales.duration() / 8.0);
-    for (kind, count, is_sensor) in [
-        (TargetKind::Sensor, outputs, true),
-        (TargetKind::Actuator, inputs, false),
-    ] {
-        for j in 0..count {
-            let target = numbered(kind.name(), count, j);
+    let past: [f64; PASTS] = spread(1.5 * scales.dt(), scales.duration() / 8.0);
+    let signals = library.twin.signals();
+    for (kind, is_sensor) in [(TargetKind::Sensor, true), (TargetKind::Actuator, false)] {
+        for (j, target) in targets(kind, None, &signals).into_iter().enumerate() {
             let name = if is_sensor {
                 &outline.outputs[j].name
             } else {
@@ -204,15 +203,6 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
         }
     }
     terms
-}
-
-/// Name of a sensor or actuator: numbered where there are several.
-fn numbered(word: &str, count: usize, j: usize) -> String {
-    if count == 1 {
-        word.to_owned()
-    } else {
-        format!("{word}{}", j + 1)
-    }
 }
 
 fn periodic(
@@ -275,12 +265,8 @@ fn disturbances(
         .collect()
 }
 
-fn spread(low: f64, high: f64) -> [f64; TIMES] {
-    spread_of::<TIMES>(low, high)
-}
-
 /// Values from low to high, evenly in their logarithm.
-fn spread_of<const N: usize>(low: f64, high: f64) -> [f64; N] {
+fn spread<const N: usize>(low: f64, high: f64) -> [f64; N] {
     let high = high.max(2.0 * low);
     std::array::from_fn(|i| low * (high / low).powf(i as f64 / (N - 1) as f64))
 }

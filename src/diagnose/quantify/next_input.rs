@@ -8,11 +8,11 @@
 //! Source of the criterion: Hunter & Reiner, "Designs for discriminating between two rival models" (1965).
 
 use crate::diagnose::error::DiagnoseError;
-use crate::diagnose::model::{CREDIT, Model, keys};
+use crate::diagnose::model::{Model, keys};
 use crate::diagnose::outcome::NextInput;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::climb::climb;
-use crate::fit::evidence::laplace;
+use crate::fit::evidence::{CREDIT, laplace};
 use crate::fit::problem::Problem;
 use crate::fit::reference::Reference;
 use crate::likelihood::kalman::recoverable;

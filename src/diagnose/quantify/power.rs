@@ -14,15 +14,12 @@ use crate::diagnose::hypotheses::term::{Part, Term};
 use crate::diagnose::model::Model;
 use crate::diagnose::outcome::Visible;
 use crate::diagnose::thresholds::Thresholds;
-use crate::fit::axis::EvidencePrior;
+use crate::fit::axis::SMALL;
 use crate::fit::reference::Reference;
 use crate::likelihood::kalman::recoverable;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// Share of the largest size at which a direction is taken.
-const SMALL: f64 = 0.01;
 
 /// The smallest visible magnitude of each listed effect.
 pub(in crate::diagnose) fn power(
@@ -90,12 +87,8 @@ fn smallest(
     let mut best = (None, f64::INFINITY);
     for start in &term.starts {
         let mut m = start.m.clone();
-        if let (EvidencePrior::Magnitude { largest }, true) = (axis.evidence, start.scales) {
-            m[0] = if axis.bounds.contains(SMALL * largest) {
-                SMALL * largest
-            } else {
-                -SMALL * largest
-            };
+        if let Some(step) = axis.small_size().filter(|_| start.scales) {
+            m[0] = step;
         }
         let theta = model.beside(&extended, &m);
         let Some(there) = recoverable(extended.problem.filtered(&theta))? else {

@@ -202,7 +202,7 @@ fn counts_have_the_denominators_that_they_name() {
     );
 }
 
-/// Of a truth of probability 0.6, its rival 0.3, and none of these 0.1: ln 0.6, and 0.16 + 0.09 + 0.01.
+/// A truth of probability 0.6, its rival 0.3, and none of these 0.1: ln 0.6, and 0.16 + 0.09 + 0.01.
 #[test]
 fn probabilities_have_known_scores() {
     let mut row = row(Kind::Listed, &["a@s"], &["a@s"], 0.6);

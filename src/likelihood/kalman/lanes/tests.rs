@@ -130,7 +130,7 @@ fn scores_by_lanes_are_those_of_single_passes() {
     }
 }
 
-/// What lanes do not hold goes the scalar way, errors included.
+/// Twins that lanes do not hold go the scalar way, errors included.
 #[test]
 fn what_lanes_do_not_hold_is_run_one_by_one() {
     let settings = FilterSettings::default();
