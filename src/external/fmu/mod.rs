@@ -1,6 +1,6 @@
 //! A twin from an FMU, as Modelica tools, Simulink and many others export them (cargo feature `fmi`).
 //!
-//! FMI 2.0 and 3.0, co-simulation. `docs/fmu.md` says what becomes of the model description.
+//! FMI 2.0 and 3.0, co-simulation. `docs/external-programs.md` says what becomes of the model description.
 
 mod archive;
 mod description;
