@@ -1,5 +1,5 @@
 //! Times of the parts that take long: `cargo bench --bench speed`, with `-- bank` those whose names hold a word. Run them with
-//! `RAYON_NUM_THREADS=1` for the figures of docs/performance.md.
+//! `RAYON_NUM_THREADS=1` for the figures of docs/scaling.md.
 
 mod bank;
 mod estimate;
