@@ -12,8 +12,6 @@ macro_rules! pages {
 pages! {
     Readme "../README.md",
     AddATwin "../docs/add-a-twin.md",
-    AddAFeatureMap "../docs/add-a-feature-map.md",
-    AddAnArchitecture "../docs/add-an-architecture.md",
-    AddAnEffect "../docs/add-an-effect.md",
-    HowToChoose "../docs/how-to-choose.md",
+    Estimating "../docs/estimating.md",
+    Extending "../docs/extending.md",
 }
