@@ -87,7 +87,7 @@ fn links_lead_somewhere() {
 
 #[test]
 fn a_broken_link_is_seen() {
-    let page = root().join("docs/concepts.md");
+    let page = root().join("docs/introduction.md");
     assert!(check(&page, "method.md#3-gate").is_ok());
     assert!(check(&page, "method.md#3-gat").is_err());
     assert!(check(&page, "methods.md").is_err());

@@ -19,6 +19,16 @@ fn every_page_is_listed() {
     assert_eq!(once, there.iter().map(String::as_str).collect());
 }
 
+/// The book stays short: few pages, few terms.
+#[test]
+fn the_book_is_short() {
+    let book = pages().len() - 2; // without README and SUMMARY
+    assert!(book <= 18, "{book} pages");
+    let glossary = read(&root().join("docs/glossary.md"));
+    let terms = glossary.lines().filter(|line| line.starts_with("| **"));
+    assert!(terms.count() <= 40);
+}
+
 /// Rust of the pages is compiled: as a doctest, or as the example that the page includes.
 #[test]
 fn code_is_compiled() {
