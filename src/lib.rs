@@ -7,7 +7,7 @@
 //! record ─ features ─▶ estimator ─▶ θ_init ─▶ gate ─ consistent ─▶ θ̂      estimate, each record
 //!                                              │ not
 //!                        Gauss–Newton ─▶ cloud of simulations ─▶ tuned heads ─▶ θ̂ ─▶ gate again
-//! records ─▶ fit ─▶ test by simulation ─ a gap ─▶ where, which effect, how far      diagnose, no training
+//! records ─▶ fit ─▶ effects and unknown functions weighed ─▶ which, where, how far      diagnose, no training
 //! ```
 //!
 //! ```

@@ -2,6 +2,7 @@
 
 use super::error::DiagnoseError;
 use super::hypotheses::scales::Scales;
+use super::hypotheses::term::Term;
 use super::model::Model;
 use super::outcome::Verdict;
 use super::residuals::frequencies::frequencies;
@@ -14,8 +15,9 @@ use crate::fit::problem::Problem;
 use crate::fit::starts::{base_fit, polish, search};
 use crate::likelihood::Measured;
 use crate::record::Record;
-use crate::twin::{Noise, Role};
+use crate::twin::{Noise, Role, Twin};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
+use std::sync::Arc;
 
 /// Iterations of a search: loud noise has a way to go.
 const ITERATIONS: usize = 80;
@@ -30,6 +32,8 @@ pub(in crate::diagnose) struct Base<'a> {
     pub frequencies: Vec<f64>,
     /// Places whose noise level is fitted.
     pub noisy: Vec<String>,
+    /// Kinds of noise that the records asked for.
+    pub noises: Vec<Arc<Term>>,
 }
 
 impl<'a> Base<'a> {
@@ -63,7 +67,6 @@ impl<'a> Base<'a> {
         };
         let (problem, fitted) = fitted.ok_or(DiagnoseError::NoFit)?;
         let model = Model::bare(twin, problem, fitted).ok_or(DiagnoseError::NoFit)?;
-        let theta = model.theta();
         let outline = model.problem.outline();
         let outputs = &outline.outputs;
         let sensors = targets(TargetKind::Sensor, None, &twin.signals());
@@ -77,10 +80,37 @@ impl<'a> Base<'a> {
                 false => place(level.parameter.target()),
             })
             .collect();
+        Self::of(model, noisy, vec![])
+    }
+
+    /// The twin with another kind of noise, fitted; `twin` is that of the model.
+    pub fn with_noise<'b>(
+        &self,
+        found: &Model<'a>,
+        twin: &'b Twin,
+    ) -> Result<Option<Base<'b>>, DiagnoseError>
+    where
+        'a: 'b,
+    {
+        let Some(model) = Model::bare(twin, found.problem.clone(), found.fitted.clone()) else {
+            return Ok(None);
+        };
+        let noises = self.noises.iter().chain(&found.terms).cloned().collect();
+        Base::of(model, self.noisy.clone(), noises).map(Some)
+    }
+
+    fn of(
+        model: Model<'a>,
+        noisy: Vec<String>,
+        noises: Vec<Arc<Term>>,
+    ) -> Result<Self, DiagnoseError> {
+        let (theta, outline) = (model.theta(), model.problem.outline());
+        let records = model.problem.records;
         Ok(Self {
-            scales: Scales::new(twin, &theta, records, model.states()?, outline),
+            scales: Scales::new(model.base, &theta, records, model.states()?, outline),
             frequencies: frequencies(&model)?,
             noisy,
+            noises,
             theta,
             model,
         })
@@ -143,7 +173,7 @@ mod tests {
 
     #[test]
     fn evidence_comes_before_the_prior() {
-        assert_eq!(verdict(2.0, true), Verdict::StructuralGap);
+        assert_eq!(verdict(3.0, true), Verdict::StructuralGap);
         assert_eq!(verdict(-1.0, true), Verdict::ParameterGap);
         assert_eq!(verdict(-1.0, false), Verdict::NoGap);
     }

@@ -6,6 +6,7 @@ use super::explain::decide::{Chances, Conclusion, Findings, decide};
 use super::explain::explore::{Terms, absorbing, explore};
 use super::explain::search::Breadth;
 use super::hypotheses::listed::Library;
+use super::hypotheses::noise::kinds;
 use super::hypotheses::scales::Scales;
 use super::hypotheses::term::Term;
 use super::hypotheses::{listed, not_tested, unknown};
@@ -34,6 +35,8 @@ use std::time::Instant;
 
 /// Most effects that are named together.
 const MOST_EFFECTS: usize = 2;
+/// Most kinds of noise that are added to the twin's own.
+const ROUNDS: usize = 2;
 
 /// Diagnoses the gap between a twin and records of one real system.
 ///
@@ -106,21 +109,36 @@ fn search<R>(
     let measured = measured(study.twin(), records, &study.beliefs())?;
     let base = Base::new(&measured, records, settings, noise)?;
     stage.tick()?;
+    explored(study, base, settings, ROUNDS, progress, then)
+}
+
+/// Searches for what explains the records beside a fitted twin; anew where they ask for another kind of noise.
+fn explored<R>(
+    study: &Study,
+    base: Base<'_>,
+    settings: &DiagnoseSettings,
+    rounds: usize,
+    progress: &Progress,
+    then: impl FnOnce(Explored<'_, '_>) -> Result<R, DiagnoseError>,
+) -> Result<R, DiagnoseError> {
     let library = Library {
-        twin: &measured.twin,
+        twin: base.model.base,
         theta: &base.theta,
         scales: &base.scales,
         frequencies: &base.frequencies,
     };
-    let listed: Vec<Arc<Term>> = (listed(study, &settings.without, &library, &base.noisy)?
-        .into_iter())
-    .map(Arc::new)
-    .collect();
-    let unlisted = |seen: &[Scales<'_>]| -> Vec<Arc<Term>> {
-        unknown(&library, seen).into_iter().map(Arc::new).collect()
+    let without = &settings.without;
+    let shared = |terms: Vec<Term>| -> Vec<Arc<Term>> { terms.into_iter().map(Arc::new).collect() };
+    let listed = shared(listed(study, without, &library, &base.noisy)?);
+    let mut noise = match rounds {
+        0 => vec![],
+        _ => shared(kinds(study, without, &library, &base.noisy)?),
     };
+    noise.retain(|term| !base.noises.iter().any(|own| own.key() == term.key()));
+    let unlisted = |seen: &[Scales<'_>]| shared(unknown(&library, seen));
     let terms = Terms {
         listed: &listed,
+        noise: &noise,
         unknown: &unlisted,
     };
     let breadth = Breadth::of(&base.model);
@@ -131,6 +149,12 @@ fn search<R>(
         !settings.detection_only,
         progress,
     )?;
+    if let Some(model) = findings.asks_for_noise().and_then(|f| f.model.as_ref()) {
+        let twin = model.problem.twin.clone();
+        if let Some(noisier) = base.with_noise(model, &twin)? {
+            return explored(study, noisier, settings, rounds - 1, progress, then);
+        }
+    }
     then(Explored {
         study,
         chances: findings.chances(),
@@ -258,7 +282,7 @@ fn report(
         verdict,
         detection,
         parameters: parameters(last, settings),
-        nuisance: nuisance(last)?,
+        nuisance: nuisance(last, &base.noises)?,
         location: Location {
             onset: accepted.and_then(onset),
             ..location

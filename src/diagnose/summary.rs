@@ -11,6 +11,7 @@ use super::thresholds::Thresholds;
 use crate::fit::follow::{smoothed, starts};
 use crate::likelihood::kalman::recoverable;
 use crate::twin::{PRIOR_DEVIATION, Role};
+use std::sync::Arc;
 
 /// Listed effects as they are reported: the accepted ones first, then by probability.
 pub(in crate::diagnose) fn effects(
@@ -104,22 +105,27 @@ pub(in crate::diagnose) fn parameters(
         .collect()
 }
 
-/// Noise levels, magnitudes of the study's own effects, and the first states given the records.
+/// Noise levels, magnitudes of the study's own effects, and the first states given the records; `noises` are the last parameters.
 pub(in crate::diagnose) fn nuisance(
     model: &Model<'_>,
+    noises: &[Arc<Term>],
 ) -> Result<Vec<FittedNuisance>, DiagnoseError> {
     let errors = model.fitted.std_errors(&model.problem);
     let theta = model.theta();
     let space = model.base.parameters();
+    let kinds: Vec<String> = noises.iter().flat_map(|term| noise_names(term)).collect();
+    let own = space.len() - kinds.len();
     let mut all: Vec<FittedNuisance> = (space.iter().enumerate())
         .filter_map(|(j, p)| {
             let role = match p.role {
                 Role::Parameter | Role::Start => return None,
                 Role::Noise => "noise",
+                Role::Magnitude if j >= own => "noise",
                 Role::Magnitude => "effect",
             };
+            let name = (j.checked_sub(own)).map_or_else(|| p.target(), |n| &kinds[n]);
             Some(FittedNuisance {
-                name: p.target().to_owned(),
+                name: name.to_owned(),
                 role,
                 value: theta[j],
                 std_error: errors[j],
@@ -166,6 +172,14 @@ pub(in crate::diagnose) fn nuisance(
             }),
     );
     Ok(all)
+}
+
+/// Names of the magnitudes of a kind of noise.
+fn noise_names(term: &Term) -> Vec<String> {
+    match &term.part {
+        Part::Effect { .. } => term.names(),
+        Part::Disturbance { .. } => vec![term.key()],
+    }
 }
 
 /// The time of a change that was accepted.

@@ -15,8 +15,6 @@ impl Thresholds {
     pub const TIMES: usize = 9;
     /// Nats for a mark that outputs bear, such as repeated values of a quantiser.
     pub const MARK_PRESENT: f64 = 12.0;
-    /// Nats for an effect whose mark is absent; small, since other sensors have noise behind them.
-    pub const MARK_ABSENT: f64 = -5.0;
 }
 
 /// Records and reports.
@@ -73,8 +71,11 @@ impl Thresholds {
 
 /// Decision, in nats.
 impl Thresholds {
-    /// log of the odds that something is missing from which a gap is told: 2.7 to 1. docs/withheld.md has the rate of false alarms.
-    pub const GAP: f64 = 1.0;
+    /// log of the odds that something is missing from which a gap is told: 7 to 1. At 1, two of 21 open trials without a gap are called
+    /// instead of one; at 4, a weak gap in ten is lost.
+    pub const GAP: f64 = 2.0;
+    /// Evidence from which noise of another kind becomes the noise of the twin: 20 to 1.
+    pub const NOISE: f64 = 3.0;
     /// Prior share of listed effects among what could be missing; the rest belongs to unknown functions. At 0.4 or 0.8 evidence moves by 0.4.
     pub const LISTED: f64 = 0.6;
     /// Most that an unknown function may add on top of effects that explain everything.

@@ -242,14 +242,7 @@ fn the_heater_lacks_a_lag() {
 fn draw(study: &Study, found: &mut Diagnosis, folder: &Path) {
     thin(&mut found.free_runs);
     found.validation_runs.as_mut().map(thin);
-    let shown = [
-        "record",
-        "validation",
-        "targets",
-        "regions",
-        "which",
-        "extent",
-    ];
+    let shown = ["validation", "which"];
     let pictures = gap_pictures(study, found);
     for name in shown {
         let (_, svg) = pictures.iter().find(|(n, _)| *n == name).unwrap();

@@ -1,7 +1,8 @@
 //! Decision by posterior odds.
 //!
 //! ```text
-//! D     = log Σ w_h·Z_h − log Z_0                     w: 0.6 shared by listed effects, 0.4 by unknown functions;  a gap if D > 1
+//! D     = log Σ w_h·Z_h − log Z_nothing               w: 0.6 shared by listed effects, 0.4 by unknown functions;  a gap if D > 2
+//! Z_nothing = Z_0 + mean_N Z_0(N)                     N: other kinds of noise, correlated or with outliers
 //! r(E)  = max_U log Z(E + U) − log Z(E)               E leaves nothing to explain if r < 4
 //! named : the largest log Z of what leaves nothing;  a larger set must be 2 nats better, an unknown function alone must not be better
 //! ```
@@ -12,6 +13,7 @@ use crate::diagnose::outcome::{Decision, Probabilities};
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::evidence::log_mean;
 use std::collections::BTreeMap;
+use std::f64::consts::LN_2;
 
 /// Everything that was found.
 #[derive(Default)]
@@ -24,6 +26,10 @@ pub(in crate::diagnose) struct Findings<'a> {
     pub several: Vec<Found<'a>>,
     /// Sets of listed effects with what unknown functions add on top, best first.
     pub beside: Vec<(Vec<String>, Vec<Found<'a>>)>,
+    /// Other kinds of noise alone, best first.
+    pub noise: Vec<Found<'a>>,
+    /// Another kind of noise beside the best listed effect, which makes it likelier by these nats.
+    pub noise_beside: Option<(String, f64)>,
 }
 
 /// Posterior probabilities.
@@ -91,9 +97,32 @@ impl<'a> Findings<'a> {
     }
 
     /// Nats that so many effects together cost: one of all that could stand beside the first, in either order.
-    fn price(&self, count: usize) -> f64 {
+    pub fn price(&self, count: usize) -> f64 {
         let pairs = 0.5 * (self.listed.len() as f64 - 1.0);
         pairs.max(1.0).ln() * (count - 1) as f64
+    }
+
+    /// The kind of noise that the records ask for: where something is missing beside it, where nothing is without it.
+    pub fn asks_for_noise(&self) -> Option<&Found<'a>> {
+        let key = match &self.noise_beside {
+            Some((key, nats)) if *nats > Thresholds::NOISE => key.clone(),
+            _ => {
+                let best = self.noise.first()?;
+                let explains = best.gain > Thresholds::NOISE;
+                let enough = self.chances().log_odds <= Thresholds::GAP;
+                (explains && enough).then(|| best.last().key())?
+            }
+        };
+        (self.noise.iter()).find(|f| f.model.is_some() && f.last().key() == key)
+    }
+
+    /// log of the evidence of nothing missing, whatever the noise, over that of the twin.
+    fn nothing(&self) -> f64 {
+        let gains: Vec<f64> = self.noise.iter().map(|f| f.gain).collect();
+        match gains.is_empty() {
+            true => 0.0,
+            false => log_mean(&[0.0, log_mean(&gains)]) + LN_2,
+        }
     }
 
     /// Posterior probabilities of all hypotheses.
@@ -134,13 +163,15 @@ impl<'a> Findings<'a> {
         }
         let logs: Vec<f64> = all.iter().map(|h| h.log_weight).collect();
         let sum = log_mean(&logs) + (logs.len() as f64).ln();
-        let whole = sum.max(0.0) + (-sum.abs()).exp().ln_1p();
+        let nothing = self.nothing();
+        let log_odds = sum - nothing;
+        let whole = sum.max(nothing) + (-log_odds.abs()).exp().ln_1p();
         let mut chances = Chances {
             kinds: Probabilities {
-                nothing: 1.0 / (1.0 + sum.exp()),
+                nothing: (nothing - whole).exp(),
                 ..Probabilities::default()
             },
-            log_odds: sum,
+            log_odds,
             ..Chances::default()
         };
         // Which set explains a part, the sets' own evidence says: what is beside them is not known well enough to choose by.

@@ -4,7 +4,7 @@ use super::decide::{Findings, leaves_nothing};
 use super::search::{Breadth, Found, listed, own_theta, sort, unknown};
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::scales::Scales;
-use crate::diagnose::hypotheses::term::Term;
+use crate::diagnose::hypotheses::term::{Part, Term};
 use crate::diagnose::model::Model;
 use crate::diagnose::thresholds::Thresholds;
 use crate::progress::Progress;
@@ -22,6 +22,8 @@ const FIRST: f64 = 1.0 / 3.0;
 /// Terms of a diagnosis.
 pub(in crate::diagnose) struct Terms<'t> {
     pub listed: &'t [Arc<Term>],
+    /// Kinds of noise other than the twin's.
+    pub noise: &'t [Arc<Term>],
     /// Unknown functions whose range covers these models' states as well.
     pub unknown: &'t dyn Fn(&[Scales<'_>]) -> Vec<Arc<Term>>,
 }
@@ -88,13 +90,20 @@ pub(in crate::diagnose) fn explore<'a>(
         }
         sort(&mut unknown_alone);
     }
+    let every = Breadth {
+        listed: usize::MAX,
+        ..breadth
+    };
     let mut findings = Findings {
+        noise: listed(base, terms.noise, origin, &[], every)?,
+        noise_beside: noise_beside(&singles, terms.noise, origin, every)?,
         listed: singles,
         unknown: unknown_alone,
         ..Findings::default()
     };
     stage.tick()?;
-    if !explain || findings.chances().log_odds <= Thresholds::GAP {
+    let is_null = findings.chances().log_odds <= Thresholds::GAP;
+    if !explain || is_null || findings.asks_for_noise().is_some() {
         return Ok(findings);
     }
     // What an unknown function alone explains better leaves something.
@@ -133,6 +142,26 @@ pub(in crate::diagnose) fn explore<'a>(
         findings.add(&found, on_top(&found, terms, origin, few)?);
     }
     Ok(findings)
+}
+
+/// The outliers that are likeliest beside the best listed effect. Coloured noise is not asked for here: it would pass for what an
+/// effect leaves.
+fn noise_beside<'a>(
+    singles: &[Found<'a>],
+    noise: &[Arc<Term>],
+    origin: f64,
+    breadth: Breadth,
+) -> Result<Option<(String, f64)>, DiagnoseError> {
+    let outliers: Vec<Arc<Term>> = (noise.iter())
+        .filter(|term| matches!(term.part, Part::Effect { .. }))
+        .cloned()
+        .collect();
+    let best = singles.first().filter(|f| f.gain > Thresholds::WIDER);
+    let Some((best, model)) = best.and_then(|f| Some((f, f.model.as_ref()?))) else {
+        return Ok(None);
+    };
+    let found = listed(model, &outliers, origin, &[], breadth)?;
+    Ok((found.first()).map(|f| (f.last().key(), f.gain - best.gain)))
 }
 
 /// Unknown functions on top of fitted effects.
@@ -190,6 +219,22 @@ fn pairs<'a>(
             .cloned()
             .collect(),
     };
+    let mut keep = |found: Vec<Found<'a>>| {
+        for pair in found.into_iter().filter(|f| f.model.is_some()) {
+            let keys = pair.keys();
+            match all
+                .iter_mut()
+                .find(|p| p.keys().iter().all(|k| keys.contains(k)))
+            {
+                Some(old) if old.gain >= pair.gain => {}
+                Some(old) => *old = pair,
+                None => all.push(pair),
+            }
+        }
+        sort(&mut all);
+        all.first().cloned()
+    };
+    let mut best = None;
     for first in &sources {
         let Some(model) = &first.model else { continue };
         let others: Vec<Arc<Term>> = (terms.listed.iter())
@@ -203,20 +248,19 @@ fn pairs<'a>(
             least: 3.0,
             ..breadth
         };
-        let found = listed(model, &others, origin, &thetas, seconds)?;
-        for pair in found.into_iter().filter(|f| f.model.is_some()) {
-            let keys = pair.keys();
-            match all
-                .iter_mut()
-                .find(|p| p.keys().iter().all(|k| keys.contains(k)))
-            {
-                Some(old) if old.gain >= pair.gain => {}
-                Some(old) => *old = pair,
-                None => all.push(pair),
-            }
+        best = keep(listed(model, &others, origin, &thetas, seconds)?);
+    }
+    // A pair that wins has rivals: the second effect beside the rivals of the first.
+    let top = findings.listed.first().map_or(0.0, |f| f.gain);
+    if let Some(pair) = best.filter(|pair| pair.gain - findings.price(2) > top) {
+        let second = &pair.terms[pair.terms.len() - 1..];
+        let (keys, first) = (pair.keys(), findings.gain(&pair.keys()[..1]).unwrap_or(top));
+        let rivals = (findings.listed.iter())
+            .filter(|f| f.gain > first - Thresholds::RIVALS && !keys.contains(&f.last().key()));
+        for model in rivals.filter_map(|f| f.model.as_ref()).take(SINGLES) {
+            keep(listed(model, second, origin, &thetas, breadth)?);
         }
     }
-    sort(&mut all);
     all.truncate(Thresholds::PAIRS);
     Ok(all)
 }

@@ -22,8 +22,10 @@ pub(in crate::diagnose) fn disturbed(base: Twin, entry: Entry, memory: f64) -> T
         Twin::BlackBox(base) => return disturbed_signals::disturbed(base, entry, memory),
     };
     let mut outline = base.outline();
-    outline.states.push(Quantity::new("disturbance/0", ""));
-    let sigma = Parameter::new("disturbance", "", 0.01, 1.0).with_role(Role::Magnitude);
+    // Noise may be coloured where something else is disturbed.
+    let name = format!("disturbance/{}", outline.states.len());
+    outline.states.push(Quantity::new(&name, ""));
+    let sigma = Parameter::new(&name, "", 0.01, 1.0).with_role(Role::Magnitude);
     outline.parameters = ParameterSpace::new(outline.parameters.iter().cloned().chain([sigma]));
     Twin::Equations(Arc::new(Modified(Disturbed {
         base,

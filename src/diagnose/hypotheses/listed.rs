@@ -44,8 +44,8 @@ impl Library<'_> {
             Law::Sensor(_) => effect.kind().marks(&values),
             _ => Mark::Unmarked,
         };
-        if mark == Mark::Absent && effect.magnitudes().iter().all(|m| !m.is_threshold()) {
-            // The record refutes it: no value repeats.
+        if mark == Mark::Absent {
+            // The record refutes it: no value repeats, at an end or anywhere.
             return Ok(vec![]);
         }
         let mut terms = vec![];
@@ -121,8 +121,7 @@ impl Library<'_> {
             starts: vec![],
             variables: vec![],
             mark: match mark {
-                Mark::Unmarked => 0.0,
-                Mark::Absent => Thresholds::MARK_ABSENT,
+                Mark::Unmarked | Mark::Absent => 0.0,
                 Mark::Present(_) => Thresholds::MARK_PRESENT,
             },
         };

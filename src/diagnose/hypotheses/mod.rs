@@ -5,6 +5,7 @@ mod disturbed_signals;
 pub(in crate::diagnose) mod entry;
 pub(in crate::diagnose) mod functions;
 pub(in crate::diagnose) mod listed;
+pub(in crate::diagnose) mod noise;
 pub(in crate::diagnose) mod scales;
 pub(in crate::diagnose) mod term;
 
@@ -45,10 +46,8 @@ pub(in crate::diagnose) fn listed(
         if without.iter().any(|pattern| pattern.matches(effect.key())) || already.contains(&key) {
             continue;
         }
-        let own_noise =
-            effect.law().is_noise() && !matches!(effect.law(), crate::effect::Law::Outliers(_));
-        if own_noise && fitted_noise.contains(&effect.target().to_owned()) {
-            // The level is fitted in every hypothesis.
+        if effect.law().is_noise() && fitted_noise.contains(&effect.target().to_owned()) {
+            // Levels are fitted in every hypothesis; outliers are a kind of noise.
             continue;
         }
         terms.extend(library.terms(&effect)?);
@@ -227,7 +226,7 @@ fn disturbances(
     entry: Entry,
     largest: f64,
     dt: f64,
-    times: [f64; TIMES],
+    times: impl IntoIterator<Item = f64>,
 ) -> Vec<Term> {
     let (low, high) = (0.003 * largest, 2.0 * largest);
     let mut parameter = Parameter::new("disturbance", "", low, high);
@@ -242,7 +241,7 @@ fn disturbances(
         },
         ..Axis::of(&parameter)
     };
-    (times.iter())
+    (times.into_iter())
         .map(|time| Term {
             id: "f(t)".into(),
             target: target.into(),

@@ -21,6 +21,8 @@ pub(in crate::diagnose) enum Nature {
     Time,
     /// An unknown function of time that repeats.
     Periodic,
+    /// Another kind of noise than independent normal one: no gap.
+    Noise,
 }
 
 /// Addition to the twin.
@@ -78,14 +80,14 @@ impl Term {
         }
     }
 
-    /// Names of the free magnitudes in θ, in the order of the axes.
+    /// Names of an effect's free magnitudes in θ, in the order of the axes.
     pub fn names(&self) -> Vec<String> {
         match &self.part {
             Part::Effect { effect, held, .. } => (effect.magnitudes().iter())
                 .filter(|m| !held.contains_key(m.name))
                 .map(|m| effect.key().magnitude(m.name))
                 .collect(),
-            Part::Disturbance { .. } => vec!["disturbance".into()],
+            Part::Disturbance { .. } => vec![],
         }
     }
 }

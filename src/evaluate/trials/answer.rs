@@ -120,6 +120,14 @@ impl Answer {
 }
 
 impl Outcome {
+    /// The class that a single accepted effect is stated to be of; empty where there is none.
+    pub fn rivals(&self) -> &[String] {
+        match self.decision == Decision::Class && self.accepted.len() == 1 {
+            true => &self.class,
+            false => &[],
+        }
+    }
+
     /// Everything of a diagnosis that is scored.
     fn of(found: &Diagnosis) -> Self {
         let keyed = |id: &str, target: &str| crate::effect::EffectKey::new(id, target).to_string();

@@ -22,6 +22,8 @@ pub(crate) enum Fate {
     Delivered,
     /// Everything accepted is right, but one of two effects lacks.
     Incomplete,
+    /// A false effect was accepted, one of a class of rivals; the class that was stated holds a right one.
+    InClass,
     /// A false effect was accepted.
     WrongName,
     /// The effect on top is right and was not accepted.
@@ -41,6 +43,7 @@ impl fmt::Display for Fate {
             Self::FalseAlarm => "false alarm",
             Self::Delivered => "delivered",
             Self::Incomplete => "incomplete",
+            Self::InClass => "in class",
             Self::WrongName => "wrong name",
             Self::Refused => "refused",
             Self::Abstained => "abstained",
@@ -148,9 +151,16 @@ impl Row {
     pub fn fate(&self) -> Fate {
         match &self.outcome {
             None => Fate::Failed,
-            Some(outcome) => self.fate_of(outcome.is_structural(), &outcome.accepted, || {
-                outcome.top().is_some_and(|top| self.is_right(&top.key))
-            }),
+            Some(outcome) => {
+                let fate = self.fate_of(outcome.is_structural(), &outcome.accepted, || {
+                    outcome.top().is_some_and(|top| self.is_right(&top.key))
+                });
+                let holds = outcome.rivals().iter().any(|key| self.is_right(key));
+                match fate {
+                    Fate::WrongName if holds => Fate::InClass,
+                    fate => fate,
+                }
+            }
         }
     }
 

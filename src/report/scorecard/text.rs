@@ -64,13 +64,14 @@ pub fn scorecard_text(card: &Scorecard) -> String {
 }
 
 /// Columns of fates by expected information.
-pub(super) const BIN_HEAD: [&str; 10] = [
+pub(super) const BIN_HEAD: [&str; 11] = [
     "truth",
     "information",
     "trials",
     "called",
     "delivered",
     "incomplete",
+    "in class",
     "wrong name",
     "refused",
     "abstained",
@@ -83,6 +84,7 @@ pub(super) fn bin_cells(bin: &Bin) -> Vec<String> {
         bin.called_structural,
         bin.delivered,
         bin.incomplete,
+        bin.in_class,
         bin.wrong_name,
         bin.refused,
         bin.abstained,

@@ -93,7 +93,12 @@ fn every_answer_has_one_fate() {
     };
     let mut refused = abstaining(row(Kind::Listed, &["a@s"], &["a@s"], 0.4));
     refused.outcome.as_mut().unwrap().accepted.clear();
+    let mut class = row(Kind::Listed, &["a@s"], &["b@s"], 0.4);
+    let outcome = class.outcome.as_mut().unwrap();
+    outcome.decision = Decision::Class;
+    outcome.class.push("a@s".into());
     for (row, fate) in [
+        (class, Fate::InClass),
         (row(Kind::None, &[], &[], 0.0), Fate::Quiet),
         (row(Kind::Outside, &[], &["a@s"], 0.9), Fate::FalseAlarm),
         (row(Kind::Listed, &["a@s"], &["a@s"], 0.9), Fate::Delivered),

@@ -33,7 +33,7 @@ fn sure(diagnosis: &Diagnosis) -> Vec<String> {
     if !diagnosis.cause.effects.is_empty() {
         items.push(
             "Probabilities hold for the explanations that were tested; unknown functions stand for laws outside the list. Sealed \
-             trials measure how often they are right (docs/diagnosing-a-gap.md)."
+             trials measure how often they are right (docs/withheld.md)."
                 .into(),
         );
     }

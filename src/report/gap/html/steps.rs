@@ -82,7 +82,7 @@ fn steps(diagnosis: &Diagnosis) -> Vec<String> {
             which.class.join(", ")
         )),
         (_, Decision::Class) => steps.push(format!(
-            "Separate the rivals ({}): give a validation record, or a record with a wider or faster input; docs/choosing-effects.md \
+            "Separate the rivals ({}): give another record, with a wider or faster input; docs/choosing-effects.md \
              explains how to separate neighbours.",
             which.class.join(", ")
         )),

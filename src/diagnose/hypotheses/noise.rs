@@ -1,0 +1,59 @@
+//! Kinds of noise that are no gap: with outliers, or coloured.
+
+use super::disturbances;
+use super::entry::Entry;
+use super::listed::Library;
+use super::term::{Nature, Term};
+use crate::diagnose::error::DiagnoseError;
+use crate::effect::{EffectPattern, Law, TargetKind, targets};
+use crate::study::Study;
+use crate::twin::is_memory;
+
+/// Steps over which coloured noise forgets itself: correlations of 0.37 and 0.85 from a sample to the next. What lasts longer is a
+/// disturbance that a twin may lack.
+const COLOURS: [f64; 2] = [1.0, 6.0];
+/// Word for coloured noise.
+const COLOURED: &str = "coloured-noise";
+
+/// Kinds of noise that the records may have at the places whose level is fitted, beside independent normal noise.
+pub(in crate::diagnose) fn kinds(
+    study: &Study,
+    without: &[EffectPattern],
+    library: &Library<'_>,
+    fitted_noise: &[String],
+) -> Result<Vec<Term>, DiagnoseError> {
+    let scales = library.scales;
+    let is_fitted = |target: &str| fitted_noise.iter().any(|place| place == target);
+    let mut terms = vec![];
+    if !scales.has_equations() {
+        return Ok(terms);
+    }
+    for effect in study.candidates() {
+        let excluded = without.iter().any(|p| p.matches(effect.key()));
+        if matches!(effect.law(), Law::Outliers(_)) && is_fitted(effect.target()) && !excluded {
+            terms.extend(library.terms(&effect)?);
+        }
+    }
+    let dt = scales.dt();
+    let mut coloured = |target: &str, entry: Entry, largest: f64| {
+        if is_fitted(target) && largest > 0.0 {
+            let times = COLOURS.map(|steps| steps * dt);
+            terms.extend(disturbances(target, entry, largest, dt, times));
+        }
+    };
+    let states = scales.outline.states.iter().enumerate();
+    for (i, state) in states.filter(|(_, state)| !is_memory(&state.name)) {
+        coloured(&state.name, Entry::State(i), scales.rates[i]);
+    }
+    let sensors = targets(TargetKind::Sensor, None, &library.twin.signals());
+    for (j, target) in sensors.iter().enumerate() {
+        coloured(target, Entry::Sensor(j), scales.size(TargetKind::Sensor, j));
+    }
+    for term in &mut terms {
+        if term.nature == Nature::Time {
+            term.id = COLOURED.into();
+        }
+        term.nature = Nature::Noise;
+    }
+    Ok(terms)
+}
