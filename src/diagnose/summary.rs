@@ -5,9 +5,10 @@ use super::explain::decide::{Chances, Conclusion, Findings};
 use super::explain::search::Found;
 use super::hypotheses::term::{Part, Term};
 use super::model::Model;
-use super::outcome::{Decision, EffectFit, FittedNuisance, FittedParameter, Onset, Remains};
+use super::outcome::{Decision, EffectFit, FittedParameter, Onset, Remains};
 use super::settings::DiagnoseSettings;
 use super::thresholds::Thresholds;
+use crate::fit::Nuisance;
 use crate::fit::follow::{smoothed, starts};
 use crate::likelihood::kalman::recoverable;
 use crate::twin::{PRIOR_DEVIATION, Role};
@@ -105,20 +106,15 @@ pub(in crate::diagnose) fn parameters(
 }
 
 /// Noise levels, magnitudes of the study's own effects, and the first states given the records.
-pub(in crate::diagnose) fn nuisance(
-    model: &Model<'_>,
-) -> Result<Vec<FittedNuisance>, DiagnoseError> {
+pub(in crate::diagnose) fn nuisance(model: &Model<'_>) -> Result<Vec<Nuisance>, DiagnoseError> {
     let errors = model.fitted.std_errors(&model.problem);
     let theta = model.theta();
     let space = model.base.parameters();
-    let mut all: Vec<FittedNuisance> = (space.iter().enumerate())
+    let mut all: Vec<Nuisance> = (space.iter().enumerate())
         .filter_map(|(j, p)| {
-            let role = match p.role {
-                Role::Parameter | Role::Start => return None,
-                Role::Noise => "noise",
-                Role::Magnitude => "effect",
-            };
-            Some(FittedNuisance {
+            // Starts follow from the records, below.
+            let role = p.role.nuisance().filter(|_| p.role != Role::Start)?;
+            Some(Nuisance {
                 name: p.target().to_owned(),
                 role,
                 value: theta[j],
@@ -137,7 +133,7 @@ pub(in crate::diagnose) fn nuisance(
                 .enumerate()
                 .filter(|(_, p)| p.role == Role::Start)
             {
-                begun.push(FittedNuisance {
+                begun.push(Nuisance {
                     name: match r {
                         0 => p.target().to_owned(),
                         r => format!("{} (record {})", p.target(), r + 1),
@@ -155,7 +151,7 @@ pub(in crate::diagnose) fn nuisance(
     all.extend(
         starts(&model.problem, &begun)
             .into_iter()
-            .map(|start| FittedNuisance {
+            .map(|start| Nuisance {
                 name: match start.record {
                     1 => start.name,
                     r => format!("{} (record {r})", start.name),
