@@ -9,7 +9,7 @@ use super::outcome::{Decision, EffectFit, FittedParameter, Onset, Remains};
 use super::settings::DiagnoseSettings;
 use super::thresholds::Thresholds;
 use crate::fit::Nuisance;
-use crate::fit::follow::{smoothed, starts};
+use crate::fit::follow::starts;
 use crate::likelihood::kalman::recoverable;
 use crate::twin::{PRIOR_DEVIATION, Role};
 
@@ -147,7 +147,7 @@ pub(in crate::diagnose) fn nuisance(model: &Model<'_>) -> Result<Vec<Nuisance>, 
         begun.extend(all);
         return Ok(begun);
     }
-    let begun = recoverable(smoothed(&model.problem, &model.fitted.theta))?.unwrap_or_default();
+    let begun = recoverable(model.problem.smoothed(&model.fitted.theta))?.unwrap_or_default();
     all.extend(
         starts(&model.problem, &begun)
             .into_iter()
