@@ -1,13 +1,6 @@
 //! Studies over many records, and the paper's settings of the reference twins.
 //!
-//! | to … | look at |
-//! |---|---|
-//! | run the estimator and the baselines on many simulated records | [`MonteCarlo::run_in`], [`Run`] |
-//! | turn the runs into errors and coverage | [`score`], [`Scores`] |
-//! | choose where true parameters come from | [`Scenario`] |
-//! | have a twin's test points, invariants, published figures | [`Benchmark`] |
-//!
-//! The verb `reproduce` runs them ([docs/reproducing.md](../../../../docs/reproducing.md)). An embedding crate takes the twins:
+//! The verb `reproduce` runs them ([docs/reproducing.md](../../../../../docs/reproducing.md)). An embedding crate takes the twins:
 //!
 //! ```
 //! use truetwin::evaluate::paper::reference_studies;
