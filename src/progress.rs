@@ -1,27 +1,29 @@
 //! One handle for progress and cancellation, silent by default.
 //!
-//! Long work takes a [`Progress`], opens a [`Stage`] for each part, and ticks it. Whoever embeds the crate
-//! listens by implementing [`Listener`]; the library itself never prints.
+//! Long work takes a [`Progress`] and shows its stages to it. Whoever embeds the crate listens by implementing
+//! [`Listener`]; the library itself never prints.
 //!
 //! ```
-//! use std::sync::atomic::{AtomicU64, Ordering};
-//! use truetwin::progress::{Listener, Progress};
+//! use std::sync::Arc;
+//! use std::sync::atomic::{AtomicBool, Ordering};
+//! use truetwin::progress::{Cancelled, Listener, Progress};
 //!
 //! #[derive(Default)]
-//! struct Count(AtomicU64);
-//! impl Listener for Count {
-//!     fn advanced(&self, _stage: &str, done: u64, _total: u64) {
-//!         self.0.store(done, Ordering::Relaxed);
+//! struct Button(AtomicBool);
+//! impl Listener for Button {
+//!     fn advanced(&self, stage: &str, done: u64, total: u64) {
+//!         println!("{stage}: {done} of {total}");
+//!     }
+//!     fn cancelled(&self) -> bool {
+//!         self.0.load(Ordering::Relaxed)
 //!     }
 //! }
 //!
-//! let listener = std::sync::Arc::new(Count::default());
-//! let progress = Progress::new(listener.clone());
-//! let stage = progress.stage("bank", 2);
-//! stage.tick()?;
-//! stage.tick()?;
-//! assert_eq!(listener.0.load(Ordering::Relaxed), 2);
-//! # Ok::<(), truetwin::progress::Cancelled>(())
+//! let button = Arc::new(Button::default());
+//! let progress = Progress::new(button.clone()); // for `pretrain`, `estimate`, `diagnose` …
+//! assert_eq!(progress.checkpoint(), Ok(()));
+//! button.0.store(true, Ordering::Relaxed);
+//! assert_eq!(progress.checkpoint(), Err(Cancelled));
 //! ```
 
 use std::fmt;
@@ -62,7 +64,7 @@ impl Progress {
     }
 
     /// Opens a stage of `total` units.
-    pub fn stage(&self, name: &'static str, total: usize) -> Stage {
+    pub(crate) fn stage(&self, name: &'static str, total: usize) -> Stage {
         if let Some(listener) = &self.0 {
             listener.advanced(name, 0, total as u64);
         }
@@ -75,7 +77,7 @@ impl Progress {
     }
 
     /// A stage that is not shown, but ends when the listener asks to stop.
-    pub fn unseen(&self) -> Stage {
+    pub(crate) fn unseen(&self) -> Stage {
         Stage {
             progress: self.clone(),
             name: "",
@@ -85,7 +87,7 @@ impl Progress {
     }
 
     /// For parts of a piece of work that is itself one unit: shows nothing, but ends when the listener asks to stop.
-    pub fn unshown(&self) -> Self {
+    pub(crate) fn unshown(&self) -> Self {
         Self::new(Arc::new(Unshown(self.clone())))
     }
 
@@ -120,7 +122,7 @@ impl Listener for Unshown {
 
 /// One part of long work; shared by threads.
 #[derive(Debug)]
-pub struct Stage {
+pub(crate) struct Stage {
     progress: Progress,
     name: &'static str,
     done: AtomicU64,

@@ -6,7 +6,8 @@
 use crate::Clock;
 use ndarray::Array2;
 use std::hint::black_box;
-use truetwin::network::{Deep, Training, architecture, layers::*};
+use truetwin::network::untyped::architecture;
+use truetwin::network::{Deep, Training, layers::*};
 use truetwin::progress::Progress;
 
 /// [`Deep`], written in plain dfdx layers.

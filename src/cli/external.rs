@@ -3,7 +3,7 @@
 use super::args::External;
 use super::failure::Failure;
 use crate::estimator::Project;
-use crate::external::program::{ProgramCommand, ProgramSettings, ProgramTwin};
+use crate::external::program::{ProgramSettings, ProgramTwin};
 use crate::setting::number;
 use crate::study::Study;
 use std::path::Path;
@@ -68,16 +68,17 @@ fn program(options: &External, line: &str) -> Result<Study, Failure> {
             ))
         })?;
     }
-    Ok(ProgramTwin::start(command(line)?, settings)?.into_study()?)
+    let (program, arguments) = command(line)?;
+    Ok(ProgramTwin::start(&program, arguments, settings)?.into_study()?)
 }
 
 /// Splits a line into program and arguments at spaces; quotes and backslashes keep words together, as in a shell.
-fn command(line: &str) -> Result<ProgramCommand, Failure> {
+fn command(line: &str) -> Result<(String, Vec<String>), Failure> {
     let wrong = |problem: &str| Failure::user(format!("--program \"{line}\": {problem}"));
     let words = shell_words::split(line).map_err(|_| wrong("a quote is not closed; close it"))?;
     match words.split_first() {
         Some((program, arguments)) if !program.is_empty() => {
-            Ok(ProgramCommand::new(program, arguments.iter().cloned()))
+            Ok((program.clone(), arguments.to_vec()))
         }
         _ => Err(wrong("no program is named; write 'python3 model.py'")),
     }

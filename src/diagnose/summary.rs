@@ -5,10 +5,11 @@ use super::explain::decide::{Chances, Conclusion, Findings};
 use super::explain::search::Found;
 use super::hypotheses::term::{Part, Term};
 use super::model::Model;
-use super::outcome::{Decision, EffectFit, FittedNuisance, FittedParameter, Onset, Remains};
+use super::outcome::{Decision, EffectFit, FittedParameter, Onset, Remains};
 use super::settings::DiagnoseSettings;
 use super::thresholds::Thresholds;
-use crate::fit::follow::{smoothed, starts};
+use crate::fit::Nuisance;
+use crate::fit::follow::starts;
 use crate::likelihood::kalman::recoverable;
 use crate::twin::{PRIOR_DEVIATION, Role};
 use std::sync::Arc;
@@ -109,23 +110,22 @@ pub(in crate::diagnose) fn parameters(
 pub(in crate::diagnose) fn nuisance(
     model: &Model<'_>,
     noises: &[Arc<Term>],
-) -> Result<Vec<FittedNuisance>, DiagnoseError> {
+) -> Result<Vec<Nuisance>, DiagnoseError> {
     let errors = model.fitted.std_errors(&model.problem);
     let theta = model.theta();
     let space = model.base.parameters();
     let kinds: Vec<String> = noises.iter().flat_map(|term| noise_names(term)).collect();
     let own = space.len() - kinds.len();
-    let mut all: Vec<FittedNuisance> = (space.iter().enumerate())
+    let mut all: Vec<Nuisance> = (space.iter().enumerate())
         .filter_map(|(j, p)| {
-            let role = match p.role {
-                Role::Parameter | Role::Start => return None,
-                Role::Noise => "noise",
-                Role::Magnitude if j >= own => "noise",
-                Role::Magnitude => "effect",
+            let kind = j.checked_sub(own).map(|n| &kinds[n]);
+            // Starts follow from the records, below.
+            let role = match kind {
+                Some(_) => Role::Noise.nuisance()?,
+                None => p.role.nuisance().filter(|_| p.role != Role::Start)?,
             };
-            let name = (j.checked_sub(own)).map_or_else(|| p.target(), |n| &kinds[n]);
-            Some(FittedNuisance {
-                name: name.to_owned(),
+            Some(Nuisance {
+                name: kind.map_or(p.target(), String::as_str).to_owned(),
                 role,
                 value: theta[j],
                 std_error: errors[j],
@@ -143,7 +143,7 @@ pub(in crate::diagnose) fn nuisance(
                 .enumerate()
                 .filter(|(_, p)| p.role == Role::Start)
             {
-                begun.push(FittedNuisance {
+                begun.push(Nuisance {
                     name: match r {
                         0 => p.target().to_owned(),
                         r => format!("{} (record {})", p.target(), r + 1),
@@ -157,11 +157,11 @@ pub(in crate::diagnose) fn nuisance(
         begun.extend(all);
         return Ok(begun);
     }
-    let begun = recoverable(smoothed(&model.problem, &model.fitted.theta))?.unwrap_or_default();
+    let begun = recoverable(model.problem.smoothed(&model.fitted.theta))?.unwrap_or_default();
     all.extend(
         starts(&model.problem, &begun)
             .into_iter()
-            .map(|start| FittedNuisance {
+            .map(|start| Nuisance {
                 name: match start.record {
                     1 => start.name,
                     r => format!("{} (record {r})", start.name),

@@ -85,7 +85,7 @@ fn check_place(
     }
     // A twin of a single state has no other one: there, what a limit takes is lost.
     let alone = known.iter().filter(|name| !is_memory(name)).count() == 1;
-    let lost = matches!(law, Law::Limit(_)) && alone;
+    let lost = matches!(law, Law::Limit) && alone;
     if effect.other() == Some(effect.target()) && !lost {
         let target = effect.target().to_owned();
         return Err(EffectError::Itself { id, target });
@@ -95,9 +95,9 @@ fn check_place(
 
 fn check_given(effect: &Effect) -> Result<(), EffectError> {
     let declared = effect.magnitudes();
-    for (name, value) in effect.given().iter() {
+    for (name, &value) in effect.all_given() {
         let id = effect.id().to_owned();
-        let Some(magnitude) = declared.iter().find(|m| m.name == name) else {
+        let Some(magnitude) = declared.iter().find(|m| m.name == name.as_str()) else {
             let known: Vec<_> = declared.iter().map(|m| m.name).collect();
             return Err(EffectError::Magnitude {
                 id,

@@ -90,8 +90,7 @@ impl EffectKind {
         formula: &str,
         law: impl Fn(&[f64], &ForcePoint<'_>) -> f64 + Send + Sync + 'static,
     ) -> Self {
-        let law = Arc::new(law);
-        Self::new(id, formula, Law::Force(law.clone())).batch(Batch::Force(law))
+        Self::new(id, formula, Law::Force).batch(Batch::Force(Arc::new(law)))
     }
 
     /// Creates an effect on a state after each step: `law(m, x, other)` changes both.
@@ -100,8 +99,7 @@ impl EffectKind {
         formula: &str,
         law: impl Fn(&[f64], &mut f64, Option<&mut f64>) + Send + Sync + 'static,
     ) -> Self {
-        let law = Arc::new(law);
-        Self::new(id, formula, Law::Limit(law.clone())).batch(Batch::Limit(law))
+        Self::new(id, formula, Law::Limit).batch(Batch::Limit(Arc::new(law)))
     }
 
     /// Creates an effect on a parameter: `law(m, t, value)` returns its value at time t.

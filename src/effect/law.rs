@@ -35,10 +35,6 @@ pub struct ForcePoint<'a> {
 
 /// A signal after the effect, from magnitudes, time, memory and the signal before it. The memory may change, once a sample.
 pub(crate) type SignalLaw = dyn Fn(&[f64], Instant, &mut [f64], f64) -> f64 + Send + Sync;
-/// A term of the target's rate.
-pub(crate) type ForceLaw = dyn Fn(&[f64], &ForcePoint<'_>) -> f64 + Send + Sync;
-/// Bends the target and the other state after a step.
-pub(crate) type LimitLaw = dyn Fn(&[f64], &mut f64, Option<&mut f64>) + Send + Sync;
 /// A parameter at a time, from magnitudes, time and the value without the effect.
 pub(crate) type ParameterLaw = dyn Fn(&[f64], f64, f64) -> f64 + Send + Sync;
 /// A standard deviation that joins the twin's own in quadrature.
@@ -46,7 +42,8 @@ pub(crate) type NoiseLaw = dyn Fn(&[f64]) -> f64 + Send + Sync;
 /// Frequency and size of rare large errors.
 pub(crate) type OutlierLaw = dyn Fn(&[f64]) -> Outliers + Send + Sync;
 
-/// The law that an effect bends, with its function. The first argument of each function holds the magnitudes.
+/// The law of an effect, with its function, whose first argument holds the magnitudes. Forces and limits are called over several
+/// points ([`Batch`](super::batch::Batch)).
 #[derive(Clone)]
 #[non_exhaustive]
 pub enum Law {
@@ -55,9 +52,9 @@ pub enum Law {
     /// An input signal.
     Actuator(Arc<SignalLaw>),
     /// The rate of a state.
-    Force(Arc<ForceLaw>),
+    Force,
     /// A limit on a state, after each step.
-    Limit(Arc<LimitLaw>),
+    Limit,
     /// A parameter over time.
     Parameter(Arc<ParameterLaw>),
     /// The noise of an output.
@@ -74,7 +71,7 @@ impl Law {
         match self {
             Self::Sensor(_) | Self::MeasurementNoise(_) | Self::Outliers(_) => TargetKind::Sensor,
             Self::Actuator(_) => TargetKind::Actuator,
-            Self::Force(_) | Self::Limit(_) | Self::ProcessNoise(_) => TargetKind::State,
+            Self::Force | Self::Limit | Self::ProcessNoise(_) => TargetKind::State,
             Self::Parameter(_) => TargetKind::Parameter,
         }
     }
@@ -93,8 +90,8 @@ impl fmt::Debug for Law {
         f.write_str(match self {
             Self::Sensor(_) => "Sensor",
             Self::Actuator(_) => "Actuator",
-            Self::Force(_) => "Force",
-            Self::Limit(_) => "Limit",
+            Self::Force => "Force",
+            Self::Limit => "Limit",
             Self::Parameter(_) => "Parameter",
             Self::MeasurementNoise(_) => "MeasurementNoise",
             Self::ProcessNoise(_) => "ProcessNoise",

@@ -1,34 +1,6 @@
 //! Numbers of an effect's law.
 
 use crate::twin::Interval;
-use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
-
-/// Magnitudes as a file gives them: `magnitudes = { tau = 2.5 }`. What is not given is free, a part of θ.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct Given(BTreeMap<String, f64>);
-
-impl Given {
-    /// Creates it from pairs of name and value.
-    pub fn new<'a>(values: impl IntoIterator<Item = (&'a str, f64)>) -> Self {
-        Self(values.into_iter().map(|(n, v)| (n.into(), v)).collect())
-    }
-
-    /// Returns the value of one magnitude, if it is given.
-    pub fn get(&self, name: &str) -> Option<f64> {
-        self.0.get(name).copied()
-    }
-
-    pub(super) fn insert(&mut self, name: &str, value: f64) {
-        self.0.insert(name.into(), value);
-    }
-
-    /// Iterates over names and values.
-    pub(crate) fn iter(&self) -> impl Iterator<Item = (&str, f64)> {
-        self.0.iter().map(|(name, value)| (name.as_str(), *value))
-    }
-}
 
 /// One number of an effect's law.
 #[derive(Debug, Clone, PartialEq)]

@@ -36,7 +36,7 @@ pub use key::{EffectKey, EffectPattern};
 pub use kind::{EffectKind, OtherState};
 pub use law::{ForcePoint, Instant};
 pub(crate) use law::{Law, TargetKind};
-pub use magnitude::{Given, Magnitude};
+pub use magnitude::Magnitude;
 pub(crate) use marks::{Mark, stops};
 pub use placed::Effect;
 pub(crate) use placed::EffectEntry;

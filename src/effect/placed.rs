@@ -4,8 +4,9 @@ use super::error::EffectError;
 use super::key::EffectKey;
 use super::kind::EffectKind;
 use super::law::Law;
-use super::magnitude::{Given, Magnitude};
+use super::magnitude::Magnitude;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
@@ -16,14 +17,14 @@ use std::sync::Arc;
 ///
 /// let lag = Catalogue::default().effect("sensor-lag", "sensor")?.hold("tau", 2.5);
 /// assert_eq!(lag.key().to_string(), "sensor-lag@sensor");
-/// assert_eq!(lag.given().get("tau"), Some(2.5));
+/// assert_eq!(lag.given("tau"), Some(2.5));
 /// # Ok::<(), truetwin::effect::EffectError>(())
 /// ```
 #[derive(Clone)]
 pub struct Effect {
     key: EffectKey,
     other: Option<String>,
-    given: Given,
+    given: BTreeMap<String, f64>,
     kind: Arc<EffectKind>,
 }
 
@@ -32,7 +33,7 @@ impl Effect {
         Self {
             key: EffectKey::new(kind.id(), target),
             other: other.map(Into::into),
-            given: Given::default(),
+            given: BTreeMap::new(),
             kind,
         }
     }
@@ -77,7 +78,7 @@ impl Effect {
     /// Holds a magnitude at a value.
     #[must_use]
     pub fn hold(mut self, magnitude: &str, value: f64) -> Self {
-        self.given.insert(magnitude, value);
+        self.given.insert(magnitude.into(), value);
         self
     }
 
@@ -108,8 +109,13 @@ impl Effect {
         self.other.as_deref()
     }
 
+    /// Returns the value of a magnitude, if it is given; what is not given is free, a part of θ.
+    pub fn given(&self, magnitude: &str) -> Option<f64> {
+        self.given.get(magnitude).copied()
+    }
+
     /// Returns the magnitudes that are given.
-    pub fn given(&self) -> &Given {
+    pub(super) fn all_given(&self) -> &BTreeMap<String, f64> {
         &self.given
     }
 
@@ -119,7 +125,7 @@ impl Effect {
     }
 
     /// Returns the law.
-    pub fn law(&self) -> &Law {
+    pub(crate) fn law(&self) -> &Law {
         self.kind.law()
     }
 
@@ -170,5 +176,5 @@ pub struct EffectEntry {
     pub to: Option<String>,
     /// Magnitudes held at a value; the others are free.
     #[serde(default)]
-    pub magnitudes: Given,
+    pub magnitudes: BTreeMap<String, f64>,
 }

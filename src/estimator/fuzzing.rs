@@ -5,6 +5,7 @@ use super::shards::{BankPlan, ShardedBank, merge, merge_into_file};
 use super::{EstimatorError, PresetName, Project};
 use crate::progress::Progress;
 use crate::storage::work::Share;
+use ndarray::Array2;
 use std::path::{Path, PathBuf};
 
 /// Most parts of a folder that are read.
@@ -16,8 +17,18 @@ pub fn read(path: &Path, names: &[&str]) -> Result<(), EstimatorError> {
 }
 
 /// Writes a bank into one file.
-pub fn write(path: &Path, draws: &Draws, names: &[&str]) -> Result<(), EstimatorError> {
-    file::write(path, draws, names)
+pub fn write(
+    path: &Path,
+    theta: Array2<f64>,
+    features: Array2<f64>,
+    names: &[&str],
+) -> Result<(), EstimatorError> {
+    let draws = Draws {
+        theta,
+        features,
+        redrawn: 0,
+    };
+    file::write(path, &draws, names)
 }
 
 /// Fills a folder with a bank of the default preset.

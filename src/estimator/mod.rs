@@ -34,8 +34,7 @@
 //! assert_eq!(tracking.outputs.dim(), (200, 1));
 //! let seconds: &Seconds = &estimate.seconds;
 //! assert!(seconds.total >= seconds.predict);
-//! let unknown_starts_and_noise: Vec<Nuisance> = estimate.nuisance();
-//! assert!(unknown_starts_and_noise.is_empty());
+//! assert!(estimate.nuisance().is_empty()); // no unknown starts, no unknown noise
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -59,16 +58,16 @@ pub(crate) mod refine;
 pub(crate) mod sample;
 pub(crate) mod shards;
 
-pub use bank::Draws;
 pub use error::EstimatorError;
-pub use estimate::{Estimate, EstimateOptions, Nuisance, Seconds, Tracking};
+pub use estimate::{Estimate, EstimateOptions, Seconds, Tracking};
 pub use estimator::Estimator;
 pub use gate::{GateForm, GateOutcome, GateSettings};
 pub(crate) use pretrain::GivenBank;
 pub use pretrain::{PretrainOptions, Pretraining, pretrain};
 pub use project::Project;
 pub(crate) use readout::INTERVAL_LEVEL;
-pub use recipe::{PresetName, Recipe};
-pub use refine::{Direction, Information, RefineSettings};
+pub use recipe::PresetName;
+pub(crate) use recipe::Recipe;
+pub use refine::RefineSettings;
 pub use sample::CloudSampler;
 pub use settings::{CloudSettings, Inputs, Settings};

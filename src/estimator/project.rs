@@ -11,10 +11,10 @@ use crate::twin::conformance::{Finding, Severity};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A [`Study`] with a [`Recipe`] for each preset. A study alone becomes a project with the standard recipes.
+/// A [`Study`] with features, network and settings for each preset. A study alone becomes a project with the standard recipes.
 ///
 /// ```
-/// use truetwin::estimator::{PresetName, Project};
+/// use truetwin::estimator::Project;
 /// use truetwin::feature::Ar;
 /// use truetwin::network::Compact;
 /// use truetwin::study::{RecordPlan, Study};
@@ -22,7 +22,7 @@ use std::sync::Arc;
 ///
 /// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 300))?;
 /// let project = Project::from(study).with_features(Ar { order: 4 }).with_architecture::<Compact>();
-/// assert_eq!(project.recipe(PresetName::Default).architecture.id(), "compact");
+/// assert_eq!(project.study().name(), "oscillator");
 /// # Ok::<(), truetwin::study::StudyError>(())
 /// ```
 #[derive(Debug, Clone)]
@@ -56,7 +56,7 @@ impl From<&Project> for Project {
 impl Project {
     /// Replaces the recipe of a preset.
     #[must_use]
-    pub fn with_recipe(mut self, name: PresetName, recipe: Recipe) -> Self {
+    pub(crate) fn with_recipe(mut self, name: PresetName, recipe: Recipe) -> Self {
         self.recipes.insert(name, recipe);
         self
     }
@@ -112,7 +112,7 @@ impl Project {
     }
 
     /// The recipe of a preset.
-    pub fn recipe(&self, name: PresetName) -> &Recipe {
+    pub(crate) fn recipe(&self, name: PresetName) -> &Recipe {
         &self.recipes[&name]
     }
 

@@ -2,6 +2,7 @@
 
 use crate::estimator::settings::Settings;
 use crate::feature::{Ar, Arx, FeatureRecipe, Score};
+use crate::likelihood::likelihood_of;
 use crate::network::{Architecture, Deep, architecture};
 use crate::study::Study;
 use serde::{Deserialize, Serialize};
@@ -29,25 +30,6 @@ impl std::fmt::Display for PresetName {
 }
 
 /// Features, network and settings of an estimator.
-///
-/// ```
-/// use std::sync::Arc;
-/// use truetwin::estimator::{PresetName, Project, Recipe, Settings};
-/// use truetwin::feature::Ar;
-/// use truetwin::network::{Compact, architecture};
-/// use truetwin::study::{RecordPlan, Study};
-/// use truetwin::twins::VanDerPol;
-///
-/// let recipe = Recipe {
-///     features: Arc::new(Ar { order: 5 }),
-///     architecture: architecture::<Compact>(),
-///     settings: Settings { bank_size: 2000, ..Settings::default() },
-/// };
-/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 300))?;
-/// let project = Project::from(study).with_recipe(PresetName::Default, recipe);
-/// assert_eq!(project.recipe(PresetName::Default).settings.bank_size, 2000);
-/// # Ok::<(), truetwin::study::StudyError>(())
-/// ```
 #[derive(Debug, Clone)]
 pub struct Recipe {
     /// Stage 1: record to features.
@@ -61,9 +43,9 @@ pub struct Recipe {
 impl Recipe {
     /// Returns the default recipe: the [`Score`] of a twin with equations (AR(5) or ARX(8, 8) of a black box), and [`Deep`].
     pub(super) fn standard(study: &Study) -> Self {
-        let features: Arc<dyn FeatureRecipe> = match study.twin().equations() {
-            Some(_) => Arc::new(Score::default()),
-            None => regression(study),
+        let features: Arc<dyn FeatureRecipe> = match likelihood_of(study.twin()).is_simulated() {
+            false => Arc::new(Score::default()),
+            true => regression(study),
         };
         Self {
             features,

@@ -7,6 +7,8 @@
 
 pub(crate) mod baseline;
 mod error;
+#[doc(hidden)]
+pub mod fuzzing;
 pub mod paper;
 pub mod trials;
 

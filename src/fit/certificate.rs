@@ -2,7 +2,6 @@
 
 use super::climb::Fitted;
 use super::problem::Problem;
-use nalgebra::{DMatrix, DVector};
 
 /// Distance from the top that counts as arrived, in standard deviations: what is left to gain is its square's half, 0.02 nats.
 const ARRIVED: f64 = 0.2;
@@ -57,9 +56,8 @@ impl Certificate {
         let free: Vec<usize> = (0..phi.len())
             .filter(|&j| at_bound[j].is_none() && !problem.axes[j].held)
             .collect();
-        let n = free.len();
-        let matrix = DMatrix::from_fn(n, n, |a, b| best.information[(free[a], free[b])]);
-        let gradient = DVector::from_fn(n, |a, _| best.gradient[free[a]]);
+        let matrix = best.information.select_rows(&free).select_columns(&free);
+        let gradient = best.gradient.select_rows(&free);
         let distance = (matrix.cholesky()).map_or(f64::INFINITY, |f| {
             gradient.dot(&f.solve(&gradient)).max(0.0).sqrt()
         });

@@ -1,23 +1,10 @@
-//! Smoothed starts and free runs: the way in which a fitted twin follows its records.
+//! Starts and free runs: the way in which a fitted twin follows its records.
 
 use super::outcome::FittedStart;
 use super::problem::Problem;
-use crate::likelihood::kalman::{FilterError, FilterSettings, Kalman, Smoothed};
+use crate::likelihood::kalman::Smoothed;
 use crate::record::Signal;
-use crate::twin::{Adaptation, StartLevel, Twin, adapt};
-
-/// States of each record given all of it; empty for a black box.
-pub(crate) fn smoothed(problem: &Problem<'_>, theta: &[f64]) -> Result<Vec<Smoothed>, FilterError> {
-    let Some(equations) = problem.twin.equations() else {
-        return Ok(vec![]);
-    };
-    let settings = FilterSettings::default();
-    (problem.records.iter().enumerate())
-        .map(|(r, record)| {
-            Kalman::new(equations, record, &settings)?.smooth(&problem.of_record(r, theta))
-        })
-        .collect()
-}
+use crate::twin::begun;
 
 /// States at the first sample of each record, given the whole record.
 pub(crate) fn starts(problem: &Problem<'_>, smoothed: &[Smoothed]) -> Vec<FittedStart> {
@@ -49,29 +36,11 @@ pub(crate) fn free_runs(
         .map(|(r, record)| {
             let own = problem.of_record(r, theta);
             let twin = match smoothed.get(r) {
-                Some(smoothed) => begun(&problem.twin, smoothed, record.drive().dt())?,
+                Some(smoothed) => begun(&problem.twin, &smoothed.first(), record.drive().dt())?,
                 None => problem.twin.clone(),
             };
             let run = twin.free_run(&own, record.drive()).ok()?;
             run.iter().all(|v| v.is_finite()).then_some(run)
         })
         .collect()
-}
-
-/// The twin with the start that a record shows.
-pub(crate) fn begun(twin: &Twin, smoothed: &Smoothed, step: f64) -> Option<Twin> {
-    let outline = twin.outline()?;
-    let limits = twin.equations()?.limits();
-    let start = (outline.states.iter().zip(limits).enumerate())
-        .filter(|(_, (state, _))| !crate::twin::is_memory(&state.name))
-        .map(|(i, (state, limit))| {
-            let mean = limit.clamp(smoothed.states.means[[0, i]]);
-            (state.name.clone(), StartLevel::Declared { mean, std: 0.0 })
-        })
-        .collect();
-    let adaptation = Adaptation {
-        start,
-        ..Adaptation::default()
-    };
-    adapt(twin.clone(), &adaptation, step).ok()
 }

@@ -3,7 +3,7 @@
 use super::axis::{Axis, EvidencePrior};
 use crate::effect::{Effect, Magnitude};
 use crate::record::{Record, Signal};
-use crate::twin::{Now, Parameter, StateSpace};
+use crate::twin::{Now, Parameter, Twin};
 use std::collections::BTreeMap;
 
 /// Change of a magnitude whose consequences are looked at, as a share of where fits start.
@@ -56,15 +56,16 @@ pub(super) fn duration(records: &[Record]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// The size of entry `j` of θ at which rates or outputs change as much as they vary themselves, along filtered states; none where
+/// The size of entry `j` of the θ of equations at which rates or outputs change as much as they vary themselves, along filtered states; none where
 /// nothing changes.
 pub(crate) fn largest(
-    twin: &dyn StateSpace,
+    twin: &Twin,
     theta: &[f64],
     (j, parameter): (usize, &Parameter),
     records: &[Record],
     states: &[Signal],
 ) -> Option<f64> {
+    let twin = twin.equations()?;
     let outline = twin.outline();
     let (n, p) = (outline.states.len(), outline.outputs.len());
     let step = SHARE

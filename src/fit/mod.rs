@@ -34,7 +34,7 @@ pub(crate) mod starts;
 
 pub use certificate::Side;
 pub use outcome::{
-    Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedStart, FittedValue,
+    Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedStart, FittedValue, Nuisance,
     OutputErrors, Warning,
 };
 pub(crate) use run::{Subject, run};

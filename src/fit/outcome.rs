@@ -91,6 +91,19 @@ pub struct FittedNoise {
     pub declared: Option<f64>,
 }
 
+/// An unknown start, noise level or magnitude that a study estimates beside the twin's parameters.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Nuisance {
+    /// State, output, or magnitude of an effect.
+    pub name: String,
+    /// `start`, `noise` or `effect`.
+    pub role: &'static str,
+    /// Estimate.
+    pub value: f64,
+    /// Standard error.
+    pub std_error: f64,
+}
+
 /// A state at the first sample of a record.
 #[derive(Debug, Clone, Serialize)]
 #[non_exhaustive]

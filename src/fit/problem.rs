@@ -2,7 +2,7 @@
 
 use crate::fit::axis::{Axis, Family};
 
-use crate::likelihood::kalman::{Coordinates, FilterError, Filtered, Score};
+use crate::likelihood::kalman::{Coordinates, FilterError, Filtered, Score, Smoothed};
 use crate::likelihood::{Likelihood, Measured, likelihood_of};
 use crate::record::{Record, Signal};
 use crate::twin::{Outline, Parameter, ParameterSpace, Role, Twin};
@@ -269,6 +269,14 @@ impl<'a> Problem<'a> {
     pub fn states(&self, theta: &[f64]) -> Result<Vec<(Filtered, Signal)>, FilterError> {
         (self.records.iter().enumerate())
             .map(|(r, record)| self.likelihood.states(&self.of_record(r, theta), record))
+            .collect()
+    }
+
+    /// States of each record given all of it; empty for a black box.
+    pub fn smoothed(&self, theta: &[f64]) -> Result<Vec<Smoothed>, FilterError> {
+        (self.records.iter().enumerate())
+            .map(|(r, record)| self.likelihood.smoothed(&self.of_record(r, theta), record))
+            .filter_map(Result::transpose)
             .collect()
     }
 

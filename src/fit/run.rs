@@ -4,7 +4,7 @@ use super::certificate::{Certificate, Side};
 use super::climb::Fitted;
 use super::effects::begin;
 use super::evidence::evidence;
-use super::follow::{free_runs, smoothed, starts};
+use super::follow::{free_runs, starts};
 use super::magnitude::{Kind, kinds, largest, shape_axis, size_axis};
 use super::outcome::{
     Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedValue, OutputErrors, Warning,
@@ -47,7 +47,7 @@ pub(crate) fn run(
     let (twin, levels) = (measured.twin, measured.levels);
     let space = twin.parameters();
     let own = space.len() - levels.len();
-    if let Some(equations) = twin.equations() {
+    if !problem.is_simulated() {
         // Sizes of effects are known once states are: where the twin follows the record with loud noise.
         let kinds = kinds(subject.effects, records);
         let begin = problem.begin(&problem.centre());
@@ -61,7 +61,7 @@ pub(crate) fn run(
                         let mut theta = begin.clone();
                         theta[j] = *off;
                         let entry = (j, parameter);
-                        if let Some(size) = largest(equations, &theta, entry, records, &states) {
+                        if let Some(size) = largest(&twin, &theta, entry, records, &states) {
                             axes[j] = size_axis(parameter, size);
                         }
                     }
@@ -88,7 +88,7 @@ pub(crate) fn run(
     };
     let spread = Spread::new(&problem, &fitted, &draws, settings.level);
     let (parameters, noise_levels) = values(&problem, &fitted, &certificate, &levels, &spread);
-    let smoothed = smoothed(&problem, &fitted.theta)?;
+    let smoothed = problem.smoothed(&fitted.theta)?;
     let free_runs = free_runs(&problem, &fitted.theta, &smoothed);
     let errors = errors(&problem, &fitted, &free_runs)?;
     let convergence = Convergence {

@@ -1,7 +1,7 @@
 //! Likelihood of a record under a twin of either kind, chosen once.
 
 use super::ensemble;
-use super::kalman::{Coordinates, FilterError, FilterSettings, Filtered, Kalman, Score};
+use super::kalman::{Coordinates, FilterError, FilterSettings, Filtered, Kalman, Score, Smoothed};
 use crate::record::{Record, Signal};
 use crate::twin::{DigitalTwin, Outline, StateSpace, Twin};
 use std::sync::Arc;
@@ -14,6 +14,8 @@ pub(crate) trait Likelihood: Send + Sync {
     fn filtered(&self, theta: &[f64], record: &Record) -> Result<Filtered, FilterError>;
     /// Innovations with the filtered states.
     fn states(&self, theta: &[f64], record: &Record) -> Result<(Filtered, Signal), FilterError>;
+    /// States given the whole record; `None` where there are none.
+    fn smoothed(&self, theta: &[f64], record: &Record) -> Result<Option<Smoothed>, FilterError>;
     /// Log-likelihood, with the innovations where they come at no extra cost.
     fn log_likelihood(
         &self,
@@ -57,6 +59,11 @@ impl Likelihood for Filter {
         let states = (filtered.states.take()).map_or_else(|| Signal::zeros((0, 0)), |s| s.means);
         Ok((filtered, states))
     }
+    fn smoothed(&self, theta: &[f64], record: &Record) -> Result<Option<Smoothed>, FilterError> {
+        Kalman::new(self.0.as_ref(), record, &self.1)?
+            .smooth(theta)
+            .map(Some)
+    }
     fn log_likelihood(
         &self,
         theta: &[f64],
@@ -99,6 +106,9 @@ impl Likelihood for Ensemble {
         let filtered = self.filtered(theta, record)?;
         let predicted = filtered.held_predictions(record.outputs());
         Ok((filtered, predicted))
+    }
+    fn smoothed(&self, _: &[f64], _: &Record) -> Result<Option<Smoothed>, FilterError> {
+        Ok(None)
     }
     fn log_likelihood(
         &self,

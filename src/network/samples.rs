@@ -10,37 +10,6 @@ pub type Part<'a> = (Cow<'a, Array2<f64>>, Cow<'a, Array2<f64>>);
 /// Rows of features and targets, both standardised, that need not fit into memory at once: they come in parts.
 ///
 /// Rows are independent of each other and alike, so that any parts are a sample of the whole.
-///
-/// ```
-/// use ndarray::Array2;
-/// use std::borrow::Cow;
-/// use std::error::Error;
-/// use truetwin::network::{Checkpoints, Compact, Part, Samples, Training, architecture};
-/// use truetwin::progress::Progress;
-///
-/// /// Four parts of 50 rows, made when asked for: y = x₁ − x₂.
-/// struct Made;
-/// impl Samples for Made {
-///     fn features(&self) -> usize {
-///         2
-///     }
-///     fn targets(&self) -> usize {
-///         1
-///     }
-///     fn parts(&self) -> Vec<usize> {
-///         vec![50; 4]
-///     }
-///     fn part(&self, index: usize) -> Result<Part<'_>, Box<dyn Error + Send + Sync>> {
-///         let x = Array2::from_shape_fn((50, 2), |(i, j)| ((i + 50 * index) as f64 * (j + 1) as f64).sin());
-///         let y = x.dot(&ndarray::array![[1.0], [-1.0]]);
-///         Ok((Cow::Owned(x), Cow::Owned(y)))
-///     }
-/// }
-/// let quick = Training { epochs: 2, ..Training::default() };
-/// let (network, _) = architecture::<Compact>().train_on(&Made, &quick, 1, &Checkpoints::none(), &Progress::silent())?;
-/// assert_eq!(network.inputs(), 2);
-/// # Ok::<(), truetwin::network::NetworkError>(())
-/// ```
 pub trait Samples: Sync {
     /// Features of a row, n.
     fn features(&self) -> usize;

@@ -16,8 +16,7 @@ pub enum Schedule {
     Cosine,
 }
 
-/// Settings of [`Architecture::train`](super::Architecture::train) and
-/// [`Network::tune_heads`](super::Network::tune_heads).
+/// Settings of a training, of trunk and heads or of heads alone.
 ///
 /// The loss of a mini-batch B, with predictions ŷ, targets y and first head weights U_j, is
 ///

@@ -3,8 +3,11 @@
 mod training;
 
 use super::layers::*;
+use super::samples::Matrices;
 use super::*;
-use ndarray::{Axis, concatenate, s};
+use crate::progress::Progress;
+use ndarray::{Array2, Axis, concatenate, s};
+use std::sync::Arc;
 
 /// Small, and with each kind of layer and dropout.
 struct Mixed;

@@ -19,7 +19,7 @@ use serde_json::{Value, json};
 /// | `errors` | of each output: root mean square of one-step and free-run errors, deviation of the record |
 /// | `warnings` | `code`, `what`, `remedy` |
 /// | `samples`, `seconds` | size of the records, time that it took |
-pub fn fit_json(study: &Study, fit: &Fit) -> Value {
+pub(super) fn fit_json(study: &Study, fit: &Fit) -> Value {
     let mut value = json!({ "schema": "truetwin.fit/1", "twin": study.name() });
     if let (Some(all), Ok(Value::Object(own))) = (value.as_object_mut(), serde_json::to_value(fit))
     {
@@ -29,7 +29,7 @@ pub fn fit_json(study: &Study, fit: &Fit) -> Value {
 }
 
 /// The fit as text: parameters, noise, starts, errors, warnings.
-pub fn fit_text(study: &Study, fit: &Fit) -> String {
+pub(super) fn fit_text(study: &Study, fit: &Fit) -> String {
     let level = format!("{:.0} % interval", 100.0 * fit.level);
     let mut parameters = vec![row([
         "parameter",

@@ -2,15 +2,15 @@
 //!
 //! | result of | JSON | text | pictures and pages |
 //! |---|---|---|---|
-//! | `estimate` | [`estimate_json`] | [`estimate_text`] | [`overlay_svg`] |
-//! | `fit` | [`fit_json`] | [`fit_text`] | [`overlay_svg`] |
-//! | `diagnose` | [`gap_json`] | [`gap_text`] | [`gap_html`], [`gap_pictures`] |
+//! | `estimate` | [`Report::json`] | [`Report::text`] | [`overlay_svg`] |
+//! | `fit` | [`Report::json`] | [`Report::text`] | [`overlay_svg`] |
+//! | `diagnose` | [`Report::json`] | [`Report::text`] | [`gap_html`], [`gap_pictures`] |
 //! | `withheld` | | | [`scorecard_html`] |
 //!
 //! ```
 //! use truetwin::diagnose::{DiagnoseSettings, diagnose};
 //! use truetwin::prelude::*;
-//! use truetwin::report::{gap_html, gap_json, gap_pictures, gap_text};
+//! use truetwin::report::{Report, gap_html, gap_pictures};
 //! use truetwin::twins::VanDerPol;
 //!
 //! let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 200))?;
@@ -20,8 +20,8 @@
 //! let settings = DiagnoseSettings { detection_only: true, ..DiagnoseSettings::default() };
 //! let diagnosis = diagnose(&study, &[record], None, &settings, &Progress::silent())?;
 //!
-//! assert_eq!(gap_json(&diagnosis)["schema"], "truetwin.gap/1");
-//! assert!(gap_text(&diagnosis).starts_with("No gap"));
+//! assert_eq!(diagnosis.json(&study)["schema"], "truetwin.gap/1");
+//! assert!(diagnosis.text(&study).starts_with("No gap"));
 //! assert!(gap_html(&study, &diagnosis).starts_with("<!doctype html>"));
 //! assert!(gap_pictures(&study, &diagnosis).iter().all(|(_, svg)| svg.starts_with("<svg")));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -40,11 +40,53 @@ mod scorecard;
 mod table;
 mod units;
 
+pub use estimate::overlay_svg;
 pub(crate) use estimate::trajectories_csv;
-pub use estimate::{estimate_json, estimate_text, overlay_svg};
-pub use fit::{fit_json, fit_text};
 pub(crate) use gap::NEXT_INPUT;
-pub use gap::{gap_html, gap_json, gap_pictures, gap_text};
+pub use gap::{gap_html, gap_pictures};
 pub(crate) use reproduce::{first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
 pub use scorecard::scorecard_html;
 pub(crate) use scorecard::{scorecard_json, scorecard_text};
+
+use crate::diagnose::Diagnosis;
+use crate::estimator::Estimate;
+use crate::fit::Fit;
+use crate::study::Study;
+use serde_json::Value;
+
+/// A result of a study that programs read as JSON and people as text; the [module](self) has an example.
+///
+/// `tests/contract` has schemas of the JSON. All keys are always there.
+pub trait Report {
+    /// One JSON object, named by its `schema`; what was skipped or is not finite is null.
+    fn json(&self, study: &Study) -> Value;
+    /// Lines for the terminal.
+    fn text(&self, study: &Study) -> String;
+}
+
+impl Report for Estimate {
+    fn json(&self, study: &Study) -> Value {
+        estimate::estimate_json(study, self)
+    }
+    fn text(&self, study: &Study) -> String {
+        estimate::estimate_text(study, self)
+    }
+}
+
+impl Report for Fit {
+    fn json(&self, study: &Study) -> Value {
+        fit::fit_json(study, self)
+    }
+    fn text(&self, study: &Study) -> String {
+        fit::fit_text(study, self)
+    }
+}
+
+impl Report for Diagnosis {
+    fn json(&self, _: &Study) -> Value {
+        gap::gap_json(self)
+    }
+    fn text(&self, _: &Study) -> String {
+        gap::gap_text(self)
+    }
+}

@@ -28,7 +28,7 @@ mod points;
 mod simulation;
 mod state_space;
 
-pub(crate) use adapt::{Adaptation, NoiseLevel, StartLevel, adapt};
+pub(crate) use adapt::{Adaptation, NoiseLevel, StartLevel, adapt, begun};
 pub use digital_twin::DigitalTwin;
 pub(crate) use direction::{combination, oriented};
 pub use error::{SimulationError, TwinError};

@@ -36,6 +36,16 @@ impl Role {
         name.strip_prefix(self.prefix()).unwrap_or(name)
     }
 
+    /// The word of results for what is estimated beside the twin's own parameters; none for these.
+    pub(crate) fn nuisance(self) -> Option<&'static str> {
+        match self {
+            Self::Parameter => None,
+            Self::Start => Some("start"),
+            Self::Noise => Some("noise"),
+            Self::Magnitude => Some("effect"),
+        }
+    }
+
     /// The beginning of the names of parameters of this role.
     fn prefix(self) -> &'static str {
         match self {

@@ -15,12 +15,13 @@ use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
 use truetwin::diagnose::{
-    Band, Cause, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit, FittedNuisance,
-    FittedParameter, FreeRuns, Lag, Location, Maps, MissingFunction, NextInput, Onset,
-    Probabilities, Region, Remains, Shrinkage, TargetShare, Term, Verdict, Visible, Window,
+    Band, Cause, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit, FittedParameter,
+    FreeRuns, Lag, Location, Maps, MissingFunction, NextInput, Onset, Probabilities, Region,
+    Remains, Shrinkage, TargetShare, Term, Verdict, Visible, Window,
 };
 use truetwin::evaluate::paper::reference_studies;
 use truetwin::evaluate::trials::{Scorecard, Settings, Withheld};
+use truetwin::fit::Nuisance;
 use truetwin::progress::Progress;
 use truetwin::record::{Drive, Quantity, Signal};
 use truetwin::report::{gap_html, scorecard_html};

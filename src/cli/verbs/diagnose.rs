@@ -8,7 +8,7 @@ use crate::diagnose::{DiagnoseSettings, GivenRecord, diagnose};
 use crate::effect::EffectPattern;
 use crate::estimator::Estimator;
 use crate::record::{Record, drive_csv_text};
-use crate::report::{NEXT_INPUT, gap_html, gap_json, gap_text};
+use crate::report::{NEXT_INPUT, Report, gap_html};
 use crate::study::Study;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -86,7 +86,7 @@ impl Verb for Diagnose {
                 None => failure,
             }
         })?;
-        let json = gap_json(&found);
+        let json = found.json(&study);
         if let Some(folder) = folder {
             let text = serde_json::to_string_pretty(&json).map_err(Failure::internal)?;
             folder.write("report.json", &text)?;
@@ -99,7 +99,7 @@ impl Verb for Diagnose {
         if context.json {
             output::print_json(&json)?;
         } else {
-            output::print(&gap_text(&found))?;
+            output::print(&found.text(&study))?;
         }
         Ok(ExitCode::SUCCESS)
     }

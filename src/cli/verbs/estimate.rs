@@ -7,7 +7,7 @@ use crate::cli::{output, records};
 use crate::estimator::bank::file;
 use crate::estimator::{self, EstimateOptions, Estimator};
 use crate::record::Record;
-use crate::report::{estimate_json, estimate_text, overlay_svg, trajectories_csv};
+use crate::report::{Report, overlay_svg, trajectories_csv};
 use crate::study::Study;
 use clap::Args;
 use std::path::PathBuf;
@@ -76,9 +76,9 @@ pub(super) fn show(
     estimate: &estimator::Estimate,
 ) -> Result<(), Failure> {
     if context.json {
-        output::print_json(&estimate_json(study, estimate))
+        output::print_json(&estimate.json(study))
     } else {
-        output::print(&estimate_text(study, estimate))
+        output::print(&estimate.text(study))
     }
 }
 
@@ -89,7 +89,7 @@ pub(super) fn write_results(
     record: &Record,
     estimate: &estimator::Estimate,
 ) -> Result<(), Failure> {
-    let json = serde_json::to_string_pretty(&estimate_json(study, estimate));
+    let json = serde_json::to_string_pretty(&estimate.json(study));
     folder.write("estimate.json", &json.map_err(Failure::internal)?)?;
     if let Some(cloud) = &estimate.cloud {
         let names: Vec<&str> = estimate.names.iter().map(String::as_str).collect();

@@ -5,7 +5,7 @@ use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::{output, records};
 use crate::fit::FitSettings;
-use crate::report::{fit_json, fit_text, overlay_svg};
+use crate::report::{Report, overlay_svg};
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -46,7 +46,7 @@ impl Verb for Fit {
         };
         let fit = study.fit(&records, &settings, context.progress)?;
         if let Some(folder) = folder {
-            let json = serde_json::to_string_pretty(&fit_json(&study, &fit));
+            let json = serde_json::to_string_pretty(&fit.json(&study));
             folder.write("fit.json", &json.map_err(Failure::internal)?)?;
             for (r, (record, run)) in records.iter().zip(&fit.free_runs).enumerate() {
                 let Some(run) = run else { continue };
@@ -59,9 +59,9 @@ impl Verb for Fit {
             folder.finish()?;
         }
         if context.json {
-            output::print_json(&fit_json(&study, &fit))?;
+            output::print_json(&fit.json(&study))?;
         } else {
-            output::print(&fit_text(&study, &fit))?;
+            output::print(&fit.text(&study))?;
         }
         Ok(ExitCode::SUCCESS)
     }

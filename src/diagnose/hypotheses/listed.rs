@@ -273,7 +273,7 @@ impl Library<'_> {
                 linear(0.0, 2.0 * size, vec![0.2 * size, 0.6 * size])
             }
             (_, Some(_)) => {
-                let found = twin.equations().and_then(|equations| {
+                let found = twin.outline().and_then(|outline| {
                     let mut theta = self.theta.to_vec();
                     theta.resize(twin.parameters().len(), 0.0);
                     for (k, value) in theta.iter_mut().enumerate().skip(self.theta.len()) {
@@ -281,14 +281,8 @@ impl Library<'_> {
                         let p = &twin.parameters()[k];
                         *value = if k == j { 0.0 } else { p.prior.centre() };
                     }
-                    let states = self.padded(equations.outline().states.len());
-                    largest(
-                        equations,
-                        &theta,
-                        (j, parameter),
-                        self.scales.records,
-                        &states,
-                    )
+                    let states = self.padded(outline.states.len());
+                    largest(twin, &theta, (j, parameter), self.scales.records, &states)
                 });
                 let found = found.unwrap_or_else(|| match m.unit {
                     "1" => 0.5,

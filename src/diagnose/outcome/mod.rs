@@ -7,6 +7,7 @@ pub use location::{
     Band, Channel, Lag, Location, Maps, MissingFunction, Onset, Region, TargetShare, Window,
 };
 
+use crate::fit::Nuisance;
 use crate::record::{Drive, Signal};
 use crate::twin::Interval;
 use serde::ser::{SerializeStruct, Serializer};
@@ -100,19 +101,6 @@ pub struct FittedParameter {
     pub identified: bool,
     /// The prior box.
     pub prior: Interval,
-}
-
-/// An unknown start, noise level or magnitude that the study itself estimates.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct FittedNuisance {
-    /// State, output or magnitude.
-    pub name: String,
-    /// `start`, `noise` or `effect`.
-    pub role: &'static str,
-    /// Value.
-    pub value: f64,
-    /// Standard deviation.
-    pub std_error: f64,
 }
 
 /// One listed effect, fitted.
@@ -266,7 +254,7 @@ pub struct Diagnosis {
     /// The twin's own parameters.
     pub parameters: Vec<FittedParameter>,
     /// All other estimates.
-    pub nuisance: Vec<FittedNuisance>,
+    pub nuisance: Vec<Nuisance>,
     /// Location of the gap.
     #[serde(rename = "where")]
     pub location: Location,

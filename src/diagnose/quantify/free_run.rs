@@ -3,12 +3,11 @@
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::outcome::FreeRuns;
 use crate::diagnose::thresholds::Thresholds;
-use crate::fit::follow::{begun, smoothed};
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::recoverable;
 use crate::math::{median, quantile};
 use crate::record::{Record, Signal};
-use crate::twin::{Noise, Twin};
+use crate::twin::{Noise, Twin, begun};
 use ndarray::Array1;
 use rayon::prelude::*;
 
@@ -21,10 +20,14 @@ pub(in crate::diagnose) struct Runner {
 impl Runner {
     /// The twin of a problem at θ, begun as a record shows; `None` where its first state cannot be told.
     pub fn new(problem: &Problem<'_>, theta: &[f64]) -> Result<Option<Self>, DiagnoseError> {
-        let twin = match recoverable(smoothed(problem, theta))? {
+        let twin = match recoverable(problem.smoothed(theta))? {
             None => return Ok(None),
             Some(smoothed) => match smoothed.first() {
-                Some(first) => begun(&problem.twin, first, problem.records[0].drive().dt()),
+                Some(first) => begun(
+                    &problem.twin,
+                    &first.first(),
+                    problem.records[0].drive().dt(),
+                ),
                 None => Some(problem.twin.clone()),
             },
         };

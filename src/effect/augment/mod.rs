@@ -76,7 +76,7 @@ pub(crate) fn augment_short(
 pub fn given_magnitudes(effects: &[Effect]) -> BTreeMap<String, f64> {
     let named = effects.iter().flat_map(|effect| {
         effect.magnitudes().iter().filter_map(move |m| {
-            let value = effect.given().get(m.name)?;
+            let value = effect.given(m.name)?;
             Some((effect.key().magnitude(m.name), value))
         })
     });
@@ -204,7 +204,7 @@ fn magnitude_parameters(effect: &Effect) -> Vec<Parameter> {
             let low = finite(m.limits.low(), -WIDE * reach);
             let high = finite(m.limits.high(), WIDE * reach);
             // What a file holds is within bounds, however far from the starts.
-            let given = effect.given().get(m.name).filter(|v| v.is_finite());
+            let given = effect.given(m.name).filter(|v| v.is_finite());
             let bounds = Interval::unchecked(
                 given.map_or(low, |v| low.min(v)),
                 given.map_or(high, |v| high.max(v)),

@@ -5,7 +5,7 @@ mod outcome;
 mod tracking;
 mod tune;
 
-pub use outcome::{Estimate, EstimateOptions, Nuisance, Seconds};
+pub use outcome::{Estimate, EstimateOptions, Seconds};
 pub use tracking::{Tracking, track};
 
 use crate::estimator::bank::{Draws, FeatureSimulator};

@@ -5,6 +5,7 @@ use crate::estimator::bank::Draws;
 use crate::estimator::gate::GateOutcome;
 use crate::estimator::recipe::PresetName;
 use crate::estimator::refine::Information;
+use crate::fit::Nuisance;
 use crate::record::Record;
 use crate::twin::Role;
 use serde::Serialize;
@@ -48,7 +49,7 @@ pub struct Estimate {
     /// Upper ends.
     pub high: Vec<f64>,
     /// Information and directions at Gauss–Newton's estimate, or at the network's where the gate kept it.
-    pub information: Option<Information>,
+    pub(crate) information: Option<Information>,
     /// The test after the refit; `None` where no degree of freedom is left.
     pub after: Option<GateOutcome>,
     /// `true` if a refit was made at all.
@@ -62,7 +63,7 @@ pub struct Estimate {
     /// Simulator calls.
     pub simulations: usize,
     /// The cloud that the heads were tuned on, and measured on: its last rows they never saw.
-    pub cloud: Option<Draws>,
+    pub(crate) cloud: Option<Draws>,
     /// Wall-clock times.
     pub seconds: Seconds,
 }
@@ -85,34 +86,14 @@ pub struct Seconds {
     pub total: f64,
 }
 
-/// A parameter that is estimated without being asked for.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[non_exhaustive]
-pub struct Nuisance {
-    /// State, output, or `id@target.magnitude`.
-    pub name: String,
-    /// "start", "noise" or "effect".
-    pub role: &'static str,
-    /// Estimate.
-    pub value: f64,
-    /// Standard error.
-    pub std_error: f64,
-}
-
 impl Estimate {
     /// Start states, noise levels and magnitudes among θ.
     pub fn nuisance(&self) -> Vec<Nuisance> {
         (0..self.names.len())
             .filter_map(|j| {
-                let role = match self.roles[j] {
-                    Role::Parameter => return None,
-                    Role::Start => "start",
-                    Role::Noise => "noise",
-                    Role::Magnitude => "effect",
-                };
                 Some(Nuisance {
                     name: self.roles[j].target(&self.names[j]).into(),
-                    role,
+                    role: self.roles[j].nuisance()?,
                     value: self.theta[j],
                     std_error: self.std_error[j],
                 })

@@ -68,7 +68,7 @@ pub fn pretrain(
 /// the training.
 ///
 /// A bank of at most 64 MiB as 32-bit numbers gives, row for row, the estimator of [`pretrain`]; of a larger one, no more than
-/// that is in memory at a time ([`Architecture::train_on`](crate::network::Architecture::train_on)).
+/// that is in memory at a time.
 ///
 /// # Errors
 ///

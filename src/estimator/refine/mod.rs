@@ -17,7 +17,9 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
-pub use information::{Direction, Information};
+#[cfg(test)]
+pub(crate) use information::Direction;
+pub(crate) use information::Information;
 pub use settings::RefineSettings;
 
 use crate::estimator::bank::FeatureSimulator;

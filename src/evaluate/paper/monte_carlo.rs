@@ -6,7 +6,6 @@ use super::{Benchmark, Run, Scenario};
 use crate::estimator::Estimator;
 use crate::evaluate::EvaluateError;
 use crate::progress::Progress;
-use crate::record::Record;
 use crate::setting::SettingError;
 use crate::storage::work::{Piece, Pieces, Share, WorkFolder};
 use crate::study::Study;
@@ -43,11 +42,12 @@ impl MonteCarlo {
     }
 
     /// True parameters and record number `run`, from 0.
-    ///
-    /// # Errors
-    ///
-    /// A study without this scenario, a twin that diverges there.
-    pub fn record(&self, study: &Study, run: usize) -> Result<(Vec<f64>, Record), EvaluateError> {
+    #[cfg(test)]
+    pub fn record(
+        &self,
+        study: &Study,
+        run: usize,
+    ) -> Result<(Vec<f64>, crate::record::Record), EvaluateError> {
         let simulated = simulated(study, &self.draws(study)?, self.seed, run)?;
         Ok((simulated.truth, simulated.record))
     }
@@ -58,15 +58,6 @@ impl MonteCarlo {
     /// With a `folder`, each run is kept there as soon as it is done, and what is there already is not run again.
     ///
     /// Records run in parallel, each on its share of the current threads.
-    pub fn run(
-        &self,
-        estimator: &Estimator,
-        progress: &Progress,
-    ) -> Result<Vec<Run>, EvaluateError> {
-        self.run_in(estimator, None, progress)
-    }
-
-    /// As [`run`](Self::run); keeps runs in a folder and takes those that it has.
     pub(crate) fn run_in(
         &self,
         estimator: &Estimator,
@@ -176,7 +167,10 @@ mod tests {
         let plan = plan(Scenario::Uniform, 3);
         let on = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            let runs = || plan.run(oscillator(), &Progress::silent()).unwrap();
+            let runs = || {
+                plan.run_in(oscillator(), None, &Progress::silent())
+                    .unwrap()
+            };
             answers(pool.unwrap().install(runs))
         };
         let one = on(1);
@@ -229,13 +223,15 @@ mod tests {
         assert_eq!(share("2/2"), [0, 2]);
         assert_eq!(share("1/2"), [0, 1, 2]);
         let runs = plan.run_in(oscillator(), Some(&folder), &Progress::silent());
-        let alone = plan.run(oscillator(), &Progress::silent());
+        let alone = plan.run_in(oscillator(), None, &Progress::silent());
         assert_eq!(answers(runs.unwrap()), answers(alone.unwrap()));
     }
 
     /// The same study without a folder, with the times of `timed`.
     fn plan_again(plan: &MonteCarlo, timed: &[Run]) -> Vec<Run> {
-        let mut runs = plan.run(oscillator(), &Progress::silent()).unwrap();
+        let mut runs = plan
+            .run_in(oscillator(), None, &Progress::silent())
+            .unwrap();
         for (run, timed) in runs.iter_mut().zip(timed) {
             for (answer, timed) in run.answers.iter_mut().zip(&timed.answers) {
                 answer.ms = timed.ms;
@@ -304,7 +300,7 @@ mod tests {
             benchmark: Benchmark::of(&study),
             ..plan(Scenario::Uniform, 6)
         };
-        let runs = plan.run(&estimator, &Progress::silent()).unwrap();
+        let runs = plan.run_in(&estimator, None, &Progress::silent()).unwrap();
         assert!(runs.iter().all(|run| run.truth[0] <= 3.0), "{runs:?}");
         let scores = score(&study, &plan, &runs);
         let failed: Vec<usize> = scores.methods.iter().map(|s| s.failed).collect();

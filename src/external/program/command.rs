@@ -4,7 +4,7 @@ use std::process::Command;
 
 /// A program and its arguments. No shell is run: `*`, `|`, `$` and the like mean themselves.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ProgramCommand {
+pub(super) struct ProgramCommand {
     program: String,
     arguments: Vec<String>,
 }
@@ -16,16 +16,6 @@ impl ProgramCommand {
             program: program.into(),
             arguments: arguments.into_iter().map(Into::into).collect(),
         }
-    }
-
-    /// The program.
-    pub fn program(&self) -> &str {
-        &self.program
-    }
-
-    /// Its arguments.
-    pub fn arguments(&self) -> &[String] {
-        &self.arguments
     }
 
     pub(super) fn command(&self) -> Command {

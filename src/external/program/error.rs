@@ -1,6 +1,6 @@
 //! Messages of programs that cannot be used as twins.
 
-use super::ProgramCommand;
+use super::command::ProgramCommand;
 use crate::storage::files::with_remedy;
 use crate::study::StudyError;
 

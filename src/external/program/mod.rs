@@ -30,12 +30,12 @@ mod settings;
 mod text;
 mod worker;
 
-pub use command::ProgramCommand;
 pub use settings::ProgramSettings;
 
 use crate::record::{Drive, Signal, Signals};
 use crate::study::{RecordPlan, Study, StudyError};
 use crate::twin::{DigitalTwin, Noise, ParameterSpace, SimulationError};
+use command::ProgramCommand;
 use description::Description;
 use health::Health;
 use pool::{Pool, introduce};
@@ -79,13 +79,18 @@ impl std::fmt::Debug for ProgramTwin {
 }
 
 impl ProgramTwin {
-    /// Starts a first copy of the program and asks what it is.
+    /// Starts a first copy of the program and asks what it is. No shell is run: `*`, `|`, `$` and the like mean themselves.
     ///
     /// # Errors
     ///
     /// Settings out of range; a program that cannot be started, ends, is late, or does not describe a twin. The message
     /// has the end of its standard error.
-    pub fn start(command: ProgramCommand, settings: ProgramSettings) -> Result<Self, StudyError> {
+    pub fn start<S: Into<String>>(
+        program: &str,
+        arguments: impl IntoIterator<Item = S>,
+        settings: ProgramSettings,
+    ) -> Result<Self, StudyError> {
+        let command = ProgramCommand::new(program, arguments);
         settings.check()?;
         let most = (settings.workers).unwrap_or_else(rayon::current_num_threads);
         let introduced = introduce(&command, settings.timeout);

@@ -23,6 +23,13 @@ pub struct Smoothed {
     pub states: States,
 }
 
+impl Smoothed {
+    /// Means of the states at the first sample.
+    pub(crate) fn first(&self) -> Vec<f64> {
+        self.states.means.row(0).to_vec()
+    }
+}
+
 struct Tape {
     filtered: Vec<Gaussian>,
     carried: Vec<(Gaussian, Vec<f64>)>,

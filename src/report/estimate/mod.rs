@@ -5,7 +5,7 @@ mod overlay;
 mod text;
 mod trajectories;
 
-pub use json::estimate_json;
+pub(super) use json::estimate_json;
 pub use overlay::overlay_svg;
-pub use text::estimate_text;
+pub(super) use text::estimate_text;
 pub use trajectories::trajectories_csv;

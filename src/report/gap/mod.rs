@@ -7,6 +7,6 @@ mod text;
 
 pub use html::gap_html;
 pub(crate) use json::NEXT_INPUT;
-pub use json::gap_json;
+pub(super) use json::gap_json;
 pub use pictures::gap_pictures;
-pub use text::gap_text;
+pub(super) use text::gap_text;

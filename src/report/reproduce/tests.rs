@@ -37,7 +37,7 @@ fn made() -> &'static Made {
             runs: 2,
             seed: 1,
         };
-        let runs = plan.run(&estimator, &Progress::silent()).unwrap();
+        let runs = plan.run_in(&estimator, None, &Progress::silent()).unwrap();
         let scores = score(&study, &plan, &runs);
         Made {
             study,

@@ -8,7 +8,7 @@ use super::fix::{Held, HeldBlackBox};
 use crate::record::Quantity;
 use crate::twin::{
     DigitalTwin, Interval, Modified, Modify, Now, Outline, Parameter, ParameterSpace, Role,
-    StateSpace, Twin, TwinError,
+    StateSpace, Twin, TwinError, is_memory,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -41,6 +41,26 @@ pub(crate) fn adapt(base: Twin, adaptation: &Adaptation, step: f64) -> Result<Tw
         Twin::Equations(base) => adapt_equations(base, adaptation, step),
         Twin::BlackBox(base) => adapt_black_box(base, adaptation),
     }
+}
+
+/// The twin begun at known states, each within its limits; `None` for a black box.
+pub(crate) fn begun(twin: &Twin, states: &[f64], step: f64) -> Option<Twin> {
+    let Twin::Equations(base) = twin else {
+        return None;
+    };
+    let names = base.outline().states.into_iter().map(|state| state.name);
+    let start = (names.zip(base.limits()).zip(states))
+        .filter(|((name, _), _)| !is_memory(name))
+        .map(|((name, limit), state)| {
+            let mean = limit.clamp(*state);
+            (name, StartLevel::Declared { mean, std: 0.0 })
+        })
+        .collect();
+    let adaptation = Adaptation {
+        start,
+        ..Adaptation::default()
+    };
+    adapt(twin.clone(), &adaptation, step).ok()
 }
 
 fn adapt_black_box(base: Arc<dyn DigitalTwin>, adaptation: &Adaptation) -> Result<Twin, TwinError> {

@@ -4,7 +4,7 @@ use super::{drive, lag, place, python, run, started, twin};
 use rayon::prelude::*;
 use std::fs;
 use std::time::Duration;
-use truetwin::external::program::{ProgramCommand, ProgramSettings, ProgramTwin};
+use truetwin::external::program::{ProgramSettings, ProgramTwin};
 use truetwin::record::Signal;
 use truetwin::twin::conformance::{Severity, check};
 use truetwin::twin::{DigitalTwin, Noise};
@@ -35,8 +35,7 @@ fn many(twin: &ProgramTwin) -> Vec<Signal> {
 fn the_example_is_a_sound_twin() {
     let Some(python) = python() else { return };
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/pendulum.py");
-    let command = ProgramCommand::new(python, [script]);
-    let study = ProgramTwin::start(command, workers(2))
+    let study = ProgramTwin::start(python, [script], workers(2))
         .unwrap()
         .into_study()
         .unwrap();

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::process::Command;
 use std::sync::OnceLock;
 use std::time::Duration;
-use truetwin::external::program::{ProgramCommand, ProgramSettings, ProgramTwin};
+use truetwin::external::program::{ProgramSettings, ProgramTwin};
 use truetwin::record::{Drive, Signal};
 use truetwin::study::StudyError;
 use truetwin::twin::{DigitalTwin, Noise, SimulationError};
@@ -86,7 +86,7 @@ fn file(name: &str, text: &str) -> String {
 /// The twin of a Python program.
 fn started(name: &str, text: &str, settings: ProgramSettings) -> Result<ProgramTwin, StudyError> {
     let script = file(name, text);
-    ProgramTwin::start(ProgramCommand::new(python().unwrap(), [script]), settings)
+    ProgramTwin::start(python().unwrap(), [script], settings)
 }
 
 fn twin(name: &str, before: &str, settings: ProgramSettings) -> ProgramTwin {

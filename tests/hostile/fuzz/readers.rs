@@ -12,8 +12,9 @@ use std::sync::OnceLock;
 use truetwin::effect::{Catalogue, augment};
 use truetwin::estimator::Estimator;
 use truetwin::estimator::Project;
-use truetwin::estimator::{Draws, fuzzing as banks};
-use truetwin::evaluate::paper::{Run, reference_projects};
+use truetwin::estimator::fuzzing as banks;
+use truetwin::evaluate::fuzzing as runs;
+use truetwin::evaluate::paper::reference_projects;
 use truetwin::external::program::fuzzing as program;
 use truetwin::network::HeadArchitecture;
 use truetwin::network::layers::*;
@@ -210,7 +211,7 @@ pub fn piece(data: &[u8]) -> Result<(), String> {
         fs::write(folder.join("manifest.json"), manifest).map_err(text)?;
     }
     fs::write(folder.join("runs/0000.json"), data).map_err(text)?;
-    work::piece::<Run>(&folder, "reproduce", "runs").map_err(text)
+    runs::run(&folder).map_err(text)
 }
 
 /// A bank in one file: an archive, an array that is put into one, or a table.
@@ -248,12 +249,9 @@ pub fn npy(numbers: [f64; 4]) -> Vec<u8> {
 /// Writes a small bank, for a seed.
 #[allow(dead_code)]
 pub fn write_bank(path: &Path) {
-    let draws = Draws {
-        theta: array![[1.0, 2.0], [3.0, 4.0]],
-        features: array![[0.5, 0.25, 1.0], [1e-9, -3.0, 7.0]],
-        redrawn: 0,
-    };
-    banks::write(path, &draws, &["a", "b"]).expect("a new file");
+    let theta = array![[1.0, 2.0], [3.0, 4.0]];
+    let features = array![[0.5, 0.25, 1.0], [1e-9, -3.0, 7.0]];
+    banks::write(path, theta, features, &["a", "b"]).expect("a new file");
 }
 
 /// A line, as a worker hands it on.

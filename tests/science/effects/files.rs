@@ -113,9 +113,9 @@ fn files_hold_off_values_and_survive_a_round_trip() {
         "[[effect]]\nid = \"actuator-saturation\"\ntarget = \"actuator\"\nmagnitudes = { low = -inf, high = 2 }\n\
          [[effect]]\nid = \"state-ceiling\"\ntarget = \"h1\"\nto = \"h2\"\nmagnitudes = { level = inf }\n",
     );
-    assert_eq!(effects[0].given().get("low"), Some(f64::NEG_INFINITY));
-    assert_eq!(effects[0].given().get("high"), Some(2.0));
-    assert_eq!(effects[1].given().get("spill"), None);
+    assert_eq!(effects[0].given("low"), Some(f64::NEG_INFINITY));
+    assert_eq!(effects[0].given("high"), Some(2.0));
+    assert_eq!(effects[1].given("spill"), None);
     assert!(augment(Twin::new(CascadedTanks), effects.clone()).is_ok());
     let file: BTreeMap<_, Vec<_>> =
         [("effect", effects.iter().map(Effect::entry).collect())].into();

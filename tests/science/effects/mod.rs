@@ -73,10 +73,9 @@ fn twins() -> Vec<Case> {
 
 /// θ of a twin with these effects at what their files hold; nothing may be left free.
 fn held(theta: &[f64], effects: &[Effect]) -> Vec<f64> {
-    let magnitudes = effects.iter().flat_map(|effect| {
-        let given = effect.given().clone();
-        (effect.magnitudes().iter()).map(move |m| given.get(m.name).unwrap())
-    });
+    let magnitudes = effects
+        .iter()
+        .flat_map(|effect| (effect.magnitudes().iter()).map(|m| effect.given(m.name).unwrap()));
     theta.iter().copied().chain(magnitudes).collect()
 }
 

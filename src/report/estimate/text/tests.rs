@@ -1,5 +1,6 @@
 use super::*;
-use crate::estimator::{Direction, GateOutcome};
+use crate::estimator::GateOutcome;
+use crate::estimator::refine::Direction;
 use crate::record::{Drive, Signal};
 use crate::report::fixture::estimates;
 use crate::study::RecordPlan;

@@ -1,7 +1,7 @@
 use super::*;
 use crate::diagnose::{Decision, EffectFit, Verdict};
 use crate::report::fixture::{diagnoses, made, oscillator, tanks};
-use crate::report::gap_json;
+use crate::report::gap::gap_json;
 
 /// Elements that have no end tag.
 const VOID: [&str; 1] = ["meta"];

@@ -11,60 +11,19 @@
 //! # Ok::<(), truetwin::record::RecordError>(())
 //! ```
 
-use crate::math::deviation;
+mod finding;
+mod step;
+#[cfg(test)]
+mod tests;
+
+pub use finding::{Finding, Severity};
+pub(crate) use step::check_step;
+
 use crate::record::{Drive, Signal};
 use crate::twin::{
-    DigitalTwin, MOST_SUBSTEPS, Noise, Now, PRIOR_DEVIATION, Parameter, ParameterSpace,
-    SimulationError, StateSpace, Twin, combination,
+    DigitalTwin, Noise, PRIOR_DEVIATION, Parameter, ParameterSpace, SimulationError, combination,
 };
 use nalgebra::DMatrix;
-use serde::Serialize;
-
-/// Severity of a finding.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Severity {
-    /// The check passed.
-    Pass,
-    /// Worth knowing; the twin can be used.
-    Warning,
-    /// The twin breaks a rule that estimation relies on.
-    Failure,
-}
-
-/// The outcome of one check.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[non_exhaustive]
-pub struct Finding {
-    /// Short name of the check.
-    pub check: &'static str,
-    /// Severity.
-    pub severity: Severity,
-    /// The result, and the remedy where there is one.
-    pub message: String,
-}
-
-impl Finding {
-    fn pass(check: &'static str, message: impl Into<String>) -> Self {
-        Self::new(check, Severity::Pass, message)
-    }
-
-    fn failure(check: &'static str, message: impl Into<String>) -> Self {
-        Self::new(check, Severity::Failure, message)
-    }
-
-    fn warning(check: &'static str, message: impl Into<String>) -> Self {
-        Self::new(check, Severity::Warning, message)
-    }
-
-    fn new(check: &'static str, severity: Severity, message: impl Into<String>) -> Self {
-        Self {
-            check,
-            severity,
-            message: message.into(),
-        }
-    }
-}
 
 /// Relative size under which a singular value counts as zero: this direction does not move the free run.
 const FLAT: f64 = 1e-6;
@@ -127,90 +86,6 @@ pub fn check(twin: &dyn DigitalTwin, drive: &Drive, seed: u64) -> Vec<Finding> {
     findings.push(setting.paired(&first, spread));
     findings.push(setting.identifiable(spread));
     findings
-}
-
-/// Largest error of the step where no measurement noise is declared, as a share of an output's deviation.
-const STEP_SHARE: f64 = 0.01;
-
-/// Differences of the noise-free outputs at θ between one step and half of it, rms by output; none for a black box.
-pub(crate) fn step_error(
-    twin: &Twin,
-    theta: &[f64],
-    drive: &Drive,
-) -> Result<Vec<(String, f64)>, SimulationError> {
-    let Some(finer) = twin.stepped(|stepping| stepping.substeps *= 2) else {
-        return Ok(vec![]);
-    };
-    let difference = twin.free_run(theta, drive)? - finer.free_run(theta, drive)?;
-    let squares = difference.mapv(|d| d * d);
-    Ok((twin.signals().outputs.into_iter().zip(squares.columns()))
-        .map(|(output, squares)| (output.name, squares.mean().unwrap_or(0.0).sqrt()))
-        .collect())
-}
-
-/// Compares the [`step_error`] at θ with the measurement noise of each output; `None` for a black box.
-pub(crate) fn check_step(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<Finding> {
-    const CHECK: &str = "step";
-    let equations = twin.equations()?;
-    let errors = match step_error(twin, theta, drive) {
-        Ok(errors) => errors,
-        Err(error) => return Some(Finding::warning(CHECK, format!("not known: {error}"))),
-    };
-    let levels = match step_levels(equations, theta, drive) {
-        Ok(levels) => levels,
-        Err(error) => return Some(Finding::warning(CHECK, format!("not known: {error}"))),
-    };
-    let units = twin.signals().outputs.into_iter().map(|output| output.unit);
-    let coarse: Vec<String> = (errors.iter().zip(&levels).zip(units))
-        .filter(|((error, (level, _)), _)| error.1 > *level)
-        .map(|(((name, error), (level, source)), unit)| {
-            let (error, level) = (short(*error), short(*level));
-            format!("{name} moves by {error} {unit} rms, {source} is {level} {unit}")
-        })
-        .collect();
-    if coarse.is_empty() {
-        return Some(Finding::pass(
-            CHECK,
-            "half the step moves no output by more than its noise",
-        ));
-    }
-    let substeps = (4 * equations.stepping().substeps).min(MOST_SUBSTEPS);
-    Some(Finding::warning(
-        CHECK,
-        format!(
-            "too long: with half the step, {}; set [record] substeps = {substeps} in a study file, or use another integrator",
-            coarse.join("; ")
-        ),
-    ))
-}
-
-/// Limit of each output's move, and the limit's name.
-fn step_levels(
-    twin: &dyn StateSpace,
-    theta: &[f64],
-    drive: &Drive,
-) -> Result<Vec<(f64, &'static str)>, SimulationError> {
-    let outline = twin.outline();
-    let mut process = vec![0.0; outline.states.len()];
-    let mut measurement = vec![0.0; outline.outputs.len()];
-    let now = Now::new(0.0, drive.step(0), drive.input(0), theta);
-    twin.noise(&now, &mut process, &mut measurement);
-    let run = twin.run(theta, drive, Noise::OFF)?;
-    let levels = measurement.iter().zip(run.columns());
-    Ok(levels
-        .map(|(noise, column)| match noise.abs() {
-            noise if noise > 0.0 => (noise, "its noise"),
-            _ => (
-                STEP_SHARE * deviation(&column.to_vec()),
-                "1 % of its deviation",
-            ),
-        })
-        .collect())
-}
-
-/// A number to three digits.
-fn short(value: f64) -> f64 {
-    format!("{value:.2e}").parse().unwrap_or(value)
 }
 
 /// A twin and the run that it is checked by.
@@ -382,151 +257,4 @@ fn noisy(spread: f64) -> Finding {
 /// Root mean square of a difference.
 fn rms(a: &Signal, b: &Signal) -> f64 {
     ((a - b).mapv(|d| d * d).mean().unwrap_or(0.0)).sqrt()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::record::{Quantity, Signals};
-    use crate::twin::Outline;
-    use std::sync::Arc;
-    use std::sync::atomic::{AtomicU64, Ordering};
-
-    /// y = a·b·k/10 + noise, with a flaw.
-    struct Flawed(Flaw, AtomicU64);
-    #[derive(PartialEq)]
-    enum Flaw {
-        None,
-        KeepsState,
-        DrawsDependOnTheta,
-        Diverges,
-        Product,
-    }
-    impl DigitalTwin for Flawed {
-        fn parameters(&self) -> ParameterSpace {
-            ParameterSpace::new(["a", "b"].map(|n| Parameter::new(n, "", 1.0, 2.0)))
-        }
-        fn signals(&self) -> Signals {
-            Signals {
-                inputs: vec![],
-                outputs: vec![Quantity::new("y", "")],
-            }
-        }
-        fn simulate(
-            &self,
-            theta: &[f64],
-            drive: &Drive,
-            noise: Noise,
-        ) -> Result<Signal, SimulationError> {
-            let (a, b) = (theta[0], theta[1]);
-            let mut source = noise.source("v");
-            if self.0 == Flaw::DrawsDependOnTheta {
-                source = noise.source(&format!("{a}"));
-            }
-            if self.0 == Flaw::Diverges && a * b > 3.9 {
-                return Err(SimulationError::Diverged { at: 1.0 });
-            }
-            let calls = self.1.fetch_add(1, Ordering::Relaxed) as f64;
-            let shift = if self.0 == Flaw::KeepsState {
-                calls
-            } else {
-                0.0
-            };
-            Ok(Signal::from_shape_fn((drive.samples(), 1), |(k, _)| {
-                let k = k as f64 / 10.0;
-                let trend = 30.0
-                    * if self.0 == Flaw::Product {
-                        a * b * k
-                    } else {
-                        a * k + b * k * k
-                    };
-                trend + shift + source.normal()
-            }))
-        }
-    }
-
-    fn worst(flaw: Flaw) -> Vec<(&'static str, Severity)> {
-        let drive = Drive::autonomous(0.1, 30).unwrap();
-        check(&Flawed(flaw, AtomicU64::new(0)), &drive, 1)
-            .into_iter()
-            .filter(|f| f.severity > Severity::Pass)
-            .map(|f| (f.check, f.severity))
-            .collect()
-    }
-
-    #[test]
-    fn each_flaw_is_found_and_a_good_twin_passes() {
-        assert_eq!(worst(Flaw::None), []);
-        assert!(worst(Flaw::KeepsState).contains(&("repeatable", Severity::Failure)));
-        assert_eq!(
-            worst(Flaw::DrawsDependOnTheta)[0],
-            ("paired", Severity::Failure)
-        );
-        assert_eq!(worst(Flaw::Diverges), [("finite", Severity::Warning)]);
-    }
-
-    /// ẋ = −k·(x − u) from 0, y₁ = x with noise, y₂ = x without.
-    struct Lag;
-    impl StateSpace for Lag {
-        fn outline(&self) -> Outline {
-            Outline::new()
-                .parameter(Parameter::new("k", "1/s", 0.1, 20.0))
-                .state("x", "V")
-                .input("u", "V")
-                .output("y1", "V")
-                .output("y2", "V")
-        }
-        fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
-            dx[0] = now.theta[0] * (now.u[0] - x[0]);
-        }
-        fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
-            y.fill(x[0]);
-        }
-        fn noise(&self, _: &Now<'_>, _: &mut [f64], measurement: &mut [f64]) {
-            measurement[0] = 0.05;
-        }
-    }
-
-    #[test]
-    fn a_step_that_is_too_long_is_named_by_output() {
-        let inputs = Signal::from_shape_fn((100, 1), |(k, _)| (k / 20 % 2) as f64);
-        let drive = Drive::new(0.1, inputs).unwrap();
-        let twin = Twin::new(Lag);
-        let slow = check_step(&twin, &[0.1], &drive).unwrap();
-        assert_eq!(slow.severity, Severity::Pass, "{}", slow.message);
-        let stiff = check_step(&twin, &[15.0], &drive).unwrap();
-        assert_eq!(stiff.severity, Severity::Warning);
-        for part in [
-            "y1 moves by",
-            "its noise is 0.05 V",
-            "y2 moves by",
-            "1 % of its deviation is",
-            "substeps = 4",
-        ] {
-            assert!(stiff.message.contains(part), "{}", stiff.message);
-        }
-        let errors = step_error(&twin, &[15.0], &drive).unwrap();
-        assert_eq!(errors[1].0, "y2");
-        assert!(errors[1].1 > 0.05, "{errors:?}");
-        // What it advises helps.
-        let finer = twin.stepped(|stepping| stepping.substeps = 64).unwrap();
-        let fine = check_step(&finer, &[15.0], &drive).unwrap();
-        assert_eq!(fine.severity, Severity::Pass, "{}", fine.message);
-        let boxed: Arc<dyn DigitalTwin> = Arc::new(Flawed(Flaw::None, AtomicU64::new(0)));
-        assert!(check_step(&Twin::from(boxed), &[1.0, 1.0], &drive).is_none());
-    }
-
-    /// A black box's mean over seeds cannot be flat to 1e-6, but a product's direction is: draws are paired.
-    #[test]
-    fn an_unidentifiable_product_is_named() {
-        let drive = Drive::autonomous(0.1, 30).unwrap();
-        let twin = Flawed(Flaw::Product, AtomicU64::new(0));
-        let finding = check(&twin, &drive, 1).pop().unwrap();
-        assert_eq!(finding.severity, Severity::Warning);
-        assert!(
-            finding.message.contains("0.71·a − 0.71·b"),
-            "{}",
-            finding.message
-        );
-    }
 }

@@ -1,0 +1,166 @@
+//! Fitted noise levels: what is declared, or guessed from the records.
+
+use super::equations::{MeasuredEquations, Source};
+use crate::effect::stops;
+use crate::record::Record;
+use crate::twin::{Interval, Modified, Now, Outline, Parameter, Role, StateSpace, Twin, is_memory};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// Standard deviation of the logarithm of a level that nothing is declared of: within a factor of 50 at two of them. Half of it ties
+/// rigs to this file's guesses of size; twice costs a nat a level, for all explanations alike.
+const UNDECLARED: f64 = 2.0;
+/// Guess of an undeclared process noise: over the record, a random walk of this share of the state's own motion.
+const WANDER: f64 = 0.1;
+/// Guess of an undeclared measurement noise, as a share of the output's deviation.
+pub(super) const SHARE: f64 = 0.03;
+/// Loud noise, from which fits begin: a step of this share of the state's own motion. Predictions then hardly reach beyond a row,
+/// and the likelihood has no narrow valleys.
+const LOUD: f64 = 0.1;
+/// Range of a fitted level, as powers of e around its guess: rounding at one end, nonsense at the other.
+const RANGE: f64 = 12.0;
+
+/// Least measurement noise of outputs that stop at an end of their range, as a share of their motion: where the twin stops there, too,
+/// noise that vanishes would make those samples infinitely likely.
+const STOPPED: f64 = 1e-3;
+
+/// A study's word on noise levels and starts.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Beliefs {
+    /// Step of the study, in seconds: declared levels of states are those of an increment in it.
+    pub step: f64,
+    /// States and outputs whose noise is known.
+    pub known: BTreeSet<String>,
+    /// Factors that one standard deviation of a declared level is; e where none is given.
+    pub factors: BTreeMap<String, f64>,
+    /// States whose start is declared.
+    pub starts: BTreeSet<String>,
+}
+
+/// A fitted noise level.
+#[derive(Debug, Clone)]
+pub(crate) struct Level {
+    pub parameter: Parameter,
+    /// `true` for a state's.
+    pub is_process: bool,
+    /// Level that is declared, in the parameter's unit.
+    pub declared: Option<f64>,
+    /// Median before the record is seen.
+    pub median: f64,
+    /// Standard deviation of its logarithm.
+    pub deviation: f64,
+    /// Where fits begin.
+    pub loud: f64,
+}
+
+/// A twin with noise levels in θ, behind its own parameters.
+#[derive(Clone)]
+pub(crate) struct Measured {
+    pub twin: Twin,
+    pub levels: Vec<Level>,
+}
+
+/// The twin with these sizes of states and outputs.
+pub(super) fn build(
+    base: &Arc<dyn StateSpace>,
+    outline: &Outline,
+    records: &[Record],
+    beliefs: &Beliefs,
+    theta: &[f64],
+    sizes: &[f64],
+    outputs: &[f64],
+) -> Measured {
+    let (n, p) = (outline.states.len(), outline.outputs.len());
+    let mut noisy = MeasuredEquations {
+        base: base.clone(),
+        outline: outline.clone(),
+        own: outline.parameters.len(),
+        step: beliefs.step,
+        process: vec![Source::Declared; n],
+        measurement: vec![Source::Declared; p],
+        starts: vec![None; n],
+    };
+    let now = Now::new(0.0, beliefs.step, records[0].drive().input(0), theta);
+    let (mut q, mut r) = (vec![0.0; n], vec![0.0; p]);
+    base.noise(&now, &mut q, &mut r);
+    let step = records[0].drive().dt();
+    let longest = records.iter().map(Record::samples).max().unwrap_or(1) as f64 * step;
+    let mut levels = Vec::new();
+    let mut add = |name: &str, unit: String, floor: f64, declared: f64, guess: f64, loud: f64| {
+        let is_process = floor == 0.0;
+        let role_name = Role::Noise.name(name);
+        if beliefs.known.contains(name) || outline.parameters.position(&role_name).is_ok() {
+            return None;
+        }
+        let (median, deviation) = if declared > 0.0 {
+            (declared, beliefs.factors.get(name).map_or(1.0, |f| f.ln()))
+        } else {
+            (guess, UNDECLARED)
+        };
+        let reach = RANGE.exp();
+        let bounds = Interval::unchecked((median / reach).max(floor), median * reach);
+        let parameter = Parameter {
+            name: role_name,
+            unit,
+            prior: Interval::unchecked(median / deviation.exp(), median * deviation.exp()),
+            bounds,
+            role: Role::Noise,
+        };
+        levels.push(Level {
+            parameter,
+            is_process,
+            declared: (declared > 0.0).then_some(declared),
+            median,
+            deviation,
+            loud: bounds.clamp(loud.max(median)),
+        });
+        Some(outline.parameters.len() + levels.len() - 1)
+    };
+    for (i, state) in outline.states.iter().enumerate() {
+        if is_memory(&state.name) {
+            continue;
+        }
+        let unit = if state.unit.is_empty() {
+            "1/√s".to_owned()
+        } else {
+            format!("{}/√s", state.unit)
+        };
+        let declared = q[i] / beliefs.step.sqrt();
+        let guess = WANDER * sizes[i] / longest.sqrt();
+        let loud = LOUD * sizes[i] / step.sqrt();
+        if let Some(parameter) = add(&state.name, unit, 0.0, declared, guess, loud) {
+            noisy.process[i] = Source::Fitted {
+                parameter,
+                declared,
+            };
+        }
+        if !beliefs.starts.contains(&state.name) {
+            noisy.starts[i] = Some(sizes[i]);
+        }
+    }
+    for (j, output) in outline.outputs.iter().enumerate() {
+        let (guess, loud) = (SHARE * outputs[j], LOUD * outputs[j]);
+        let unit = output.unit.clone();
+        let stops = records
+            .iter()
+            .any(|r| stops(&r.outputs().column(j).to_vec()));
+        let floor = if stops {
+            STOPPED * outputs[j]
+        } else {
+            f64::MIN_POSITIVE
+        };
+        if let Some(parameter) = add(&output.name, unit, floor, r[j], guess, loud) {
+            noisy.measurement[j] = Source::Fitted {
+                parameter,
+                declared: r[j],
+            };
+        }
+    }
+    for level in &levels {
+        noisy.outline.parameters.push(level.parameter.clone());
+    }
+    Measured {
+        twin: Twin::Equations(Arc::new(Modified(noisy))),
+        levels,
+    }
+}

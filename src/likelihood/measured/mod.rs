@@ -1,0 +1,71 @@
+//! A twin as measured records show it: noise levels that are fitted with θ, a start that is not quite known.
+//!
+//! Noise of a real rig is never known. A level that is held fixed makes everything that the twin lacks look like a gap of a fixed
+//! size, or hides it; a level that is fitted lets the record say how well the twin predicts.
+//!
+//! ```text
+//! state i   increment in Δt:  N(0, σ_i²·Δt)       σ_i in units of the state per √s
+//! output j  error of a row:   N(0, r_j²)
+//! ln σ ~ N(ln σ_0, s²)                             σ_0 declared: s = ln factor;  nothing declared: from the record, s = 2
+//! x(0) ~ N(start, d²)                              d declared, or the size of the state's own motion
+//! ```
+
+mod equations;
+mod level;
+mod motion;
+#[cfg(test)]
+mod tests;
+
+pub(crate) use level::{Beliefs, Level, Measured};
+
+use super::ensemble;
+use super::kalman::FilterError;
+use crate::record::Record;
+use crate::twin::{StateSpace, Twin};
+use level::build;
+use motion::{followed_motion, free_motion, size};
+use std::sync::Arc;
+
+/// The twin as these records show it. A black box has noise of its own, or is given that of a sensor.
+pub(crate) fn measured(
+    twin: &Twin,
+    records: &[Record],
+    beliefs: &Beliefs,
+) -> Result<Measured, FilterError> {
+    match twin {
+        Twin::Equations(base) => measured_equations(base, records, beliefs),
+        Twin::BlackBox(_) => Ok(Measured {
+            twin: ensemble::measured(twin, records)?.0,
+            levels: vec![],
+        }),
+    }
+}
+
+fn measured_equations(
+    base: &Arc<dyn StateSpace>,
+    records: &[Record],
+    beliefs: &Beliefs,
+) -> Result<Measured, FilterError> {
+    let outline = base.outline();
+    let theta = outline.parameters.centre();
+    let size_of = |column: &dyn Fn(&Record) -> Vec<f64>| -> f64 {
+        records.iter().map(|r| size(&column(r))).fold(0.0, f64::max)
+    };
+    let outputs: Vec<f64> = (0..outline.outputs.len())
+        .map(|j| size_of(&|r| r.outputs().column(j).to_vec()))
+        .collect();
+    let fallback = outputs.iter().copied().fold(0.0, f64::max);
+    let mut sizes = free_motion(base.as_ref(), records, &theta, fallback);
+    // States that follow the record tell their size better than a run that may drift away from it.
+    let loud = build(base, &outline, records, beliefs, &theta, &sizes, &outputs);
+    if let Some(followed) = followed_motion(&loud, records, &theta)? {
+        for (size, followed) in sizes.iter_mut().zip(followed) {
+            if followed > 0.0 && followed.is_finite() {
+                *size = followed;
+            }
+        }
+    }
+    Ok(build(
+        base, &outline, records, beliefs, &theta, &sizes, &outputs,
+    ))
+}

@@ -1,0 +1,114 @@
+//! Noise levels of the reference twins.
+
+use super::level::SHARE;
+use super::*;
+use crate::likelihood::kalman::{FilterSettings, Kalman};
+use crate::math::deviation;
+use crate::record::{Drive, Signal};
+use crate::twin::{DigitalTwin, Noise, Now};
+use crate::twins::{CascadedTanks, VanDerPol};
+
+fn record(twin: &dyn DigitalTwin, theta: &[f64], drive: Drive) -> Record {
+    let outputs = twin
+        .simulate(theta, &drive, Noise::new(1, "measured", 0))
+        .unwrap();
+    Record::new(drive, outputs).unwrap()
+}
+
+fn tanks() -> (Arc<dyn StateSpace>, Record) {
+    let inputs = Signal::from_shape_fn((200, 1), |(k, _)| [2.6, 0.4, 2.0, 1.2][k / 30 % 4]);
+    let drive = Drive::new(0.5, inputs).unwrap();
+    let record = record(&CascadedTanks, &[0.6, 0.5, 0.55, 1.0], drive);
+    (Arc::new(CascadedTanks), record)
+}
+
+fn medians(measured: &Measured) -> impl Iterator<Item = f64> {
+    measured.levels.iter().map(|level| level.median)
+}
+
+fn beliefs(step: f64) -> Beliefs {
+    Beliefs {
+        step,
+        ..Beliefs::default()
+    }
+}
+
+/// Declared levels are medians, in units per √s; at them the filter sees the twin's own noise.
+#[test]
+fn declared_levels_are_the_twins_own() {
+    let (twin, record) = tanks();
+    let measured = measured_equations(&twin, std::slice::from_ref(&record), &beliefs(0.5)).unwrap();
+    let names: Vec<&str> = (measured.levels.iter())
+        .map(|l| l.parameter.name.as_str())
+        .collect();
+    assert_eq!(names, ["noise.h1", "noise.h2", "noise.y"]);
+    assert!((measured.levels[0].median - 0.1 / 0.5f64.sqrt()).abs() < 1e-12);
+    assert_eq!(measured.levels[2].median, 0.15);
+    let theta: Vec<f64> = [0.6, 0.5, 0.55, 1.0]
+        .into_iter()
+        .chain(medians(&measured))
+        .collect();
+    let (mut q, mut r) = ([0.0; 2], [0.0; 1]);
+    for (dt, level) in [(0.5, 0.1), (2.0, 0.2)] {
+        let now = Now::new(0.0, dt, &[1.0], &theta);
+        measured
+            .twin
+            .equations()
+            .unwrap()
+            .noise(&now, &mut q, &mut r);
+        assert!((q[0] - level).abs() < 1e-12 && (r[0] - 0.15).abs() < 1e-12);
+    }
+}
+
+/// Levels that nothing is declared of are guessed from the record; known levels and declared starts stay.
+#[test]
+fn undeclared_levels_come_from_the_record() {
+    let record = record(&VanDerPol, &[1.5], Drive::autonomous(0.05, 300).unwrap());
+    let twin: Arc<dyn StateSpace> = Arc::new(VanDerPol);
+    let held = Beliefs {
+        known: ["x2".to_owned()].into(),
+        starts: ["x1".to_owned()].into(),
+        ..beliefs(0.05)
+    };
+    let measured = measured_equations(&twin, std::slice::from_ref(&record), &held).unwrap();
+    let names: Vec<&str> = (measured.levels.iter())
+        .map(|l| l.parameter.name.as_str())
+        .collect();
+    assert_eq!(names, ["noise.x1", "noise.y"]);
+    let y = deviation(&record.outputs().column(0).to_vec());
+    assert!((measured.levels[1].median - SHARE * y).abs() < 1e-12);
+    let theta: Vec<f64> = [1.5].into_iter().chain(medians(&measured)).collect();
+    let now = Now::new(0.0, 0.05, &[], &theta);
+    let mut std = [0.0; 2];
+    measured
+        .twin
+        .equations()
+        .unwrap()
+        .start_deviation(&now, &mut std);
+    assert!(std[0] == 0.0 && std[1] > 0.5, "{std:?}");
+}
+
+/// A start that is wide forgets what the twin said: the likelihood of a record that began elsewhere is finite and near that of the
+/// right start.
+#[test]
+fn a_wide_start_is_integrated() {
+    let (twin, _) = tanks();
+    let inputs = Signal::from_elem((200, 1), 1.5);
+    let drive = Drive::new(0.5, inputs).unwrap();
+    let theta = [0.6, 0.5, 0.55, 1.0];
+    let begun = Signal::from_shape_fn((200, 1), |(k, _)| if k < 5 { 6.0 } else { 4.5 });
+    let record = Record::new(drive, begun).unwrap();
+    let wide = measured_equations(&twin, std::slice::from_ref(&record), &beliefs(0.5)).unwrap();
+    let held = Beliefs {
+        starts: ["h1".to_owned(), "h2".to_owned()].into(),
+        ..beliefs(0.5)
+    };
+    let known = measured_equations(&twin, std::slice::from_ref(&record), &held).unwrap();
+    let settings = FilterSettings::default();
+    let log_likelihood = |m: &Measured| {
+        let theta: Vec<f64> = theta.iter().copied().chain(medians(m)).collect();
+        let kalman = Kalman::new(m.twin.equations().unwrap(), &record, &settings).unwrap();
+        kalman.log_likelihood(&theta).unwrap()
+    };
+    assert!(log_likelihood(&wide) > log_likelihood(&known) + 100.0);
+}
