@@ -45,15 +45,15 @@ pub struct Finding {
 }
 
 impl Finding {
-    fn pass(check: &'static str, message: impl Into<String>) -> Self {
+    pub(crate) fn pass(check: &'static str, message: impl Into<String>) -> Self {
         Self::new(check, Severity::Pass, message)
     }
 
-    fn failure(check: &'static str, message: impl Into<String>) -> Self {
+    pub(crate) fn failure(check: &'static str, message: impl Into<String>) -> Self {
         Self::new(check, Severity::Failure, message)
     }
 
-    fn warning(check: &'static str, message: impl Into<String>) -> Self {
+    pub(crate) fn warning(check: &'static str, message: impl Into<String>) -> Self {
         Self::new(check, Severity::Warning, message)
     }
 
@@ -209,7 +209,7 @@ fn step_levels(
 }
 
 /// A number to three digits.
-fn short(value: f64) -> f64 {
+pub(crate) fn short(value: f64) -> f64 {
     format!("{value:.2e}").parse().unwrap_or(value)
 }
 

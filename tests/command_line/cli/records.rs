@@ -93,7 +93,10 @@ fn the_same_record_is_read_from_any_dialect() {
         "--columns",
         "y=note",
     ];
-    refused(&note, &["german.csv: column t is missing", "--columns t=NAME"]);
+    refused(
+        &note,
+        &["german.csv: column t is missing", "--columns t=NAME"],
+    );
     let note = [&note[..5], &["t=time (s),u=pump,y=note"]].concat();
     refused(&note, &["german.csv, row 2, column note", "\"ok\""]);
 }
@@ -220,4 +223,53 @@ fn gaps_and_varying_steps_are_resampled() {
             &[part],
         );
     }
+}
+
+/// Findings about a record end with 0, one line each; only a file that cannot be read ends with 2.
+#[test]
+fn a_record_is_checked_against_a_twin() {
+    let place = Place::new();
+    let record = place.at("r.csv");
+    let call = ["check", &record, "--twin", "tanks"];
+    let text = done(&call);
+    assert!(
+        text.lines().all(|line| line.starts_with("pass")) && text.contains("expected errors"),
+        "{text}"
+    );
+    let value = json(&[&call[..], &["--json"]].concat());
+    assert_eq!(value["schema"], "truetwin.suitability/1");
+    assert_eq!(value["suits"], true);
+    assert_eq!(value["parameters"][0]["name"], "k1");
+    let rows = place.rows();
+    let lines: Vec<String> = (rows.iter())
+        .map(|row| {
+            format!(
+                "{};{};{}",
+                1e3 * row[0].parse::<f64>().unwrap(),
+                row[1],
+                row[2]
+            )
+        })
+        .collect();
+    let slow = place.write("ms.csv", format!("ms;u;y\n{}\n", lines.join("\n")));
+    let columns = ["check", &slow, "--twin", "tanks", "--columns", "t=ms"];
+    let text = done(&columns);
+    let first = text
+        .lines()
+        .find(|line| line.starts_with("warning"))
+        .unwrap();
+    assert!(
+        first.contains("t seems to be in milliseconds; divide it by 1000"),
+        "{text}"
+    );
+    let value = json(&[&columns[..], &["--json"]].concat());
+    assert_eq!(value["suits"], false);
+    let other = done(&["check", &record, "--twin", "van-der-pol"]);
+    assert!(
+        other.starts_with("failure  channels") && other.contains("1 inputs, the twin has 0"),
+        "{other}"
+    );
+    let one = place.write("one.csv", "t,u,y\n0,1,2\n");
+    refused(&["check", &one, "--twin", "tanks"], &["1 rows of data"]);
+    refused(&["check", &record], &["no twin given"]);
 }
