@@ -131,7 +131,10 @@ pub(super) fn check_outputs(
         if let Some(factor) = nearest {
             findings.push(Finding::warning(
                 "scale",
-                format!("{given}; {} if the unit differs", conversion(factor)),
+                format!(
+                    "{given}; {} if the unit differs, or else widen [prior]",
+                    conversion(factor)
+                ),
             ));
             factors[j] = factor;
         } else if beyond(own, UNLIKE) {
