@@ -1,6 +1,8 @@
 //! Options that several verbs share.
 
 use crate::estimator::PresetName;
+use crate::record::{Columns, RecordReader};
+use crate::study::Study;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -36,6 +38,29 @@ pub(super) struct Subject {
     /// Study file (TOML): twin, step, prior, noise, limits, start, features.
     #[arg(long, value_name = "S.toml")]
     pub study: Option<PathBuf>,
+}
+
+/// Names of the columns of record files.
+#[derive(Debug, Clone, Args)]
+pub(super) struct FileColumns {
+    /// Column of the record file for each name in the twin, as in t=time,u=pump,y=level [default: t, u or u1,u2,…, y or y1,y2,…,
+    /// or [record] columns of the study].
+    #[arg(long, value_name = "NAME=COLUMN,..")]
+    columns: Option<Columns>,
+}
+
+impl FileColumns {
+    /// Creates a reader of the records of a study.
+    pub fn reader(&self, study: &Study) -> RecordReader {
+        let columns = self.columns.clone();
+        let columns = columns.unwrap_or_else(|| study.file().record.columns.clone());
+        RecordReader::new(columns, Some(study.twin().signals()))
+    }
+
+    /// Creates a reader of records without a twin.
+    pub fn reader_without_twin(&self) -> RecordReader {
+        RecordReader::new(self.columns.clone().unwrap_or_default(), None)
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

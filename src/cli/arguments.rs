@@ -13,7 +13,7 @@ use clap::{Command, CommandFactory, Parser};
         The main job:   truetwin pretrain --twin tanks --out tanks.est\n                \
         truetwin estimate record.csv --estimator tanks.est --out result\n\
         Your simulator: truetwin check --program 'python3 model.py'   (docs/external-programs.md)\n\n\
-        Records are CSV: t (seconds), inputs u or u1,u2,…, outputs y or y1,y2,…"
+        Records are CSV: t (seconds or time stamps), inputs u or u1,u2,…, outputs y or y1,y2,…; --columns for other names"
 )]
 pub(super) struct Arguments {
     #[command(subcommand)]

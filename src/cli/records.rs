@@ -2,7 +2,7 @@
 
 use super::failure::Failure;
 use super::output;
-use crate::record::{Record, read_record};
+use crate::record::{Record, RecordReader};
 use std::path::{Path, PathBuf};
 
 /// A value is an outlier if it exceeds this multiple of nearly all magnitudes of its channel.
@@ -12,13 +12,14 @@ const NEARLY_ALL: f64 = 0.95;
 
 /// Reads measured records and a validation record; warns of repeated records and outlying values.
 pub(super) fn read(
+    mut reader: RecordReader,
     paths: &[PathBuf],
     validation: Option<&Path>,
 ) -> Result<(Vec<Record>, Option<Record>), Failure> {
     let records: Vec<Record> = (paths.iter())
-        .map(|path| read_record(path))
+        .map(|path| reader.record(path))
         .collect::<Result<_, _>>()?;
-    let second = validation.map(read_record).transpose()?;
+    let second = (validation.map(|path| reader.record(path))).transpose()?;
     let measured = || paths.iter().map(PathBuf::as_path).zip(&records);
     for (j, (path, record)) in measured().enumerate() {
         warn_of_outlier(path, record);

@@ -80,7 +80,8 @@ impl Thresholds {
     pub const LISTED: f64 = 0.6;
     /// Most that an unknown function may add on top of effects that explain everything.
     pub const ADEQUATE: f64 = 4.0;
-    /// Share of the whole evidence that may be left as well: integrators and discretisation differ by as much.
+    /// Share of the whole evidence that may be left as well, and that is not worth another effect: integrators and discretisation differ
+    /// by as much.
     pub const FINE_PRINT: f64 = 0.02;
     /// Distance to the best within which a single effect may still be the explanation.
     pub const CANDIDATES: f64 = 6.0;

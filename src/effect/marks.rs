@@ -43,7 +43,7 @@ fn distinct(outputs: &[f64]) -> Vec<(f64, usize)> {
 }
 
 /// Mark of a limited range, as (low, high): many samples exactly at the least or the greatest value.
-pub(super) fn clipped(outputs: &[f64]) -> Mark {
+pub(crate) fn clipped(outputs: &[f64]) -> Mark {
     let values = distinct(outputs);
     if values.len() < 3 {
         return Mark::Absent;
@@ -68,7 +68,7 @@ pub(crate) fn stops(outputs: &[f64]) -> bool {
 
 /// Mark of rounding, as its step: all distances are multiples of the least one, and there are few values or the step is none of
 /// digits.
-pub(super) fn rounded(outputs: &[f64]) -> Mark {
+pub(crate) fn rounded(outputs: &[f64]) -> Mark {
     let values = distinct(outputs);
     if values.len() < 2 {
         return Mark::Absent;

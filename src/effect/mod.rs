@@ -37,6 +37,6 @@ pub use kind::{EffectKind, OtherState};
 pub use law::{ForcePoint, Instant};
 pub(crate) use law::{Law, TargetKind};
 pub use magnitude::Magnitude;
-pub(crate) use marks::{Mark, stops};
+pub(crate) use marks::{Mark, clipped, rounded, stops};
 pub use placed::Effect;
 pub(crate) use placed::EffectEntry;

@@ -4,6 +4,8 @@ pub(crate) mod ensemble;
 pub mod kalman;
 mod measured;
 mod of_twin;
+mod time_constants;
 
 pub(crate) use measured::{Beliefs, Level, Measured, measured};
 pub(crate) use of_twin::{Likelihood, likelihood_of};
+pub(crate) use time_constants::time_constants;

@@ -1,12 +1,16 @@
 //! Records and inputs as CSV files; or as Parquet files with the same columns, in a build with the feature `parquet`.
 //!
-//! A header, then one row a sample: `t` in seconds, increasing; inputs `u` or `u1,u2,…`; outputs `y` or `y1,y2,…`. An output
-//! that was not measured is an empty cell, `nan` or `NA`. Steps that are the same to 1e-3 count as one. Rows are counted as an
-//! editor counts lines: the header is row 1.
+//! A header, then one row a sample: `t` in seconds or as time stamps, increasing; inputs `u` or `u1,u2,…`; outputs `y` or
+//! `y1,y2,…`; other names by [`Columns`]. Columns are separated by commas, semicolons or tabs. An output that was not
+//! measured is an empty cell, `nan` or `NA`. Steps that are the same to 1e-3 count as one. Rows are counted as an editor counts
+//! lines: the header is row 1.
 
+use super::columns::Columns;
 use super::parquet;
 use super::table::Table;
-use crate::record::{Drive, Record, RecordError};
+use super::text::Text;
+use crate::record::{Drive, Record, RecordError, Signals};
+use crate::storage::untrusted::MOST_NUMBERS;
 use std::path::Path;
 
 /// Reads a measured record.
@@ -22,25 +26,75 @@ use std::path::Path;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn read_record(path: &Path) -> Result<Record, RecordError> {
-    read(path)?.record(path)
+    RecordReader::default().record(path)
 }
 
 /// Reads time and inputs to simulate with; a file with outputs is refused.
 pub fn read_drive(path: &Path) -> Result<Drive, RecordError> {
-    read(path)?.drive(path)
+    RecordReader::default().drive(path)
 }
 
 /// Parses the text of a record that stands in the program itself; `path` is for messages.
 pub fn parse_record(text: &str, path: &Path) -> Result<Record, RecordError> {
-    Table::parse(text.as_bytes(), path)?.record(path)
+    let mut left = MOST_NUMBERS;
+    let text = Text::own(text.as_bytes());
+    Table::parse(text, path, &Columns::default(), None, &mut left)?.record(path)
 }
 
-fn read(path: &Path) -> Result<Table, RecordError> {
-    if path.extension().is_some_and(|e| e == "parquet") {
-        return parquet::with_rows(path, |rows| Table::parse(rows, path));
+/// Reads the files of one call: their columns have the same names, and all of them together have a limit.
+pub struct RecordReader {
+    columns: Columns,
+    signals: Option<Signals>,
+    /// Numbers that may be read yet.
+    left: usize,
+}
+
+impl Default for RecordReader {
+    fn default() -> Self {
+        Self {
+            columns: Columns::default(),
+            signals: None,
+            left: MOST_NUMBERS,
+        }
     }
-    let file = std::fs::File::open(path).map_err(|error| RecordError::io(path, error))?;
-    Table::parse(file, path)
+}
+
+impl RecordReader {
+    /// Creates a reader of files with these columns, for a twin with these channels.
+    pub fn new(columns: Columns, signals: Option<Signals>) -> Self {
+        Self {
+            columns,
+            signals,
+            ..Self::default()
+        }
+    }
+
+    /// Reads a measured record.
+    pub fn record(&mut self, path: &Path) -> Result<Record, RecordError> {
+        let columns = self.columns.clone();
+        self.read(path, &columns)?.record(path)
+    }
+
+    /// Reads time and inputs; columns of outputs are refused.
+    pub fn drive(&mut self, path: &Path) -> Result<Drive, RecordError> {
+        let columns = self.columns.without_outputs(self.signals.as_ref());
+        self.read(path, &columns)?.drive(path)
+    }
+
+    fn read(&mut self, path: &Path, columns: &Columns) -> Result<Table, RecordError> {
+        let signals = self.signals.as_ref();
+        let left = &mut self.left;
+        if path.extension().is_some_and(|e| e == "parquet") {
+            return parquet::with_rows(path, |rows| {
+                Table::parse(Text::own(rows), path, columns, signals, left)
+            });
+        }
+        let wrong = |error| RecordError::io(path, error);
+        let file = std::fs::File::open(path).map_err(wrong)?;
+        let text = Text::open(file).map_err(wrong)?;
+        let text = text.map_err(|problem| RecordError::file(path, problem))?;
+        Table::parse(text, path, columns, signals, left)
+    }
 }
 
 #[cfg(test)]
@@ -57,6 +111,22 @@ mod tests {
 
     fn message(text: &str) -> String {
         written(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_limit_holds_for_all_records_together() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("r.csv");
+        std::fs::write(&path, "t,u,y\n0,1,2\n1,1,2\n").unwrap();
+        let mut reader = RecordReader {
+            left: 17,
+            ..RecordReader::default()
+        };
+        for _ in 0..2 {
+            reader.record(&path).unwrap();
+        }
+        let error = reader.record(&path).unwrap_err().to_string();
+        assert!(error.contains("in all records together; cut"), "{error}");
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use crate::setting::number;
 use crate::storage::files::with_remedy;
+use crate::storage::untrusted::excerpt;
 use std::path::{Path, PathBuf};
 
 /// A fault in a drive, a record or its file.
@@ -54,7 +55,7 @@ pub enum RecordError {
     },
     /// A missing output where every one is needed.
     #[error(
-        "row {row}, column {column} is missing; features need every output: fill it in, or use `truetwin fit` or `truetwin diagnose`, which take such records"
+        "row {row}, column {column} is missing; features need every output: fill it in (`truetwin resample R.csv --step s --out R2.csv`), or use `truetwin fit` or `truetwin diagnose`, which take such records"
     )]
     Incomplete {
         /// Row of the file; the header is row 1.
@@ -64,8 +65,9 @@ pub enum RecordError {
     },
     /// A step that differs from the others where all need to be the same.
     #[error(
-        "row {row}, column t: a step of {} s where {} s is usual; features need one step: resample the record, or use `truetwin fit` or `truetwin diagnose`, which take such records",
+        "row {row}, column t: a step of {} s where {} s is usual; features need one step: resample the record (`truetwin resample R.csv --step {} --out R2.csv`), or use `truetwin fit` or `truetwin diagnose`, which take such records",
         number(*given),
+        number(*expected),
         number(*expected)
     )]
     Uneven {
@@ -78,9 +80,12 @@ pub enum RecordError {
     },
     /// Steps that vary where a twin takes one.
     #[error(
-        "column t: the steps vary, and a black-box twin is simulated with one step; resample the record to one step"
+        "column t: the steps vary, and a black-box twin is simulated with one step; resample the record (`truetwin resample R.csv --step s --out R2.csv`)"
     )]
     OneStep,
+    /// A step that a record cannot be resampled to.
+    #[error("{0}")]
+    Resample(String),
     /// Too few rows with an output.
     #[error("{0} rows with a measured output; at least 2 are needed")]
     TooFewValues(usize),
@@ -144,7 +149,7 @@ impl RecordError {
     pub(super) fn cell(path: &Path, row: usize, column: &str, problem: String) -> Self {
         Self::File {
             path: path.into(),
-            problem: format!(", row {row}, column {column}: {problem}"),
+            problem: format!(", row {row}, column {}: {problem}", excerpt(column)),
         }
     }
 

@@ -7,19 +7,25 @@
 //! | read and write CSV, read Parquet | [`read_record`], [`write_record`], [`read_drive`] |
 
 mod channels;
+mod columns;
 mod csv;
 mod drive;
 mod error;
 mod measured;
 mod parquet;
+mod resample;
+mod stamp;
 mod table;
+mod text;
 mod write;
 
 pub use channels::{Quantity, Signals};
-pub(crate) use csv::parse_record;
+pub(crate) use columns::Columns;
+pub(crate) use csv::{RecordReader, parse_record};
 pub use csv::{read_drive, read_record};
 pub use drive::{Drive, Signal};
 pub use error::RecordError;
 pub use measured::Record;
+pub(crate) use resample::{InputRule, resample};
 pub use write::write_record;
 pub(crate) use write::{drive_csv_text, record_csv_text};

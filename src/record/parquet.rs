@@ -36,6 +36,9 @@ pub(super) fn with_rows<T>(
         .iter()
         .map(|column| column.name())
         .collect();
+    let names: Vec<String> = (names.iter())
+        .map(|name| format!("\"{}\"", name.replace('"', "\"\"")))
+        .collect();
     let header = names.join(",") + "\n";
     let rows = reader.get_row_iter(None).map_err(wrong)?;
     let mut text = Text {

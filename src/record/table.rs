@@ -1,14 +1,16 @@
 //! The numbers of a record file, checked cell by cell.
 
-use super::channels::column_names;
+use super::channels::{Signals, column_names};
+use super::columns::Columns;
+use super::stamp::Stamp;
+use super::text::{Decimals, Text, separator_name};
 use crate::record::{Drive, Record, RecordError, Signal};
 use crate::setting::number;
 use crate::storage::untrusted::{MOST_NUMBERS, Rows, excerpt, quoted};
-use std::io::{Cursor, Read};
 use std::path::Path;
 
 /// Longest record: a sample a millisecond for half a day.
-const MOST_SAMPLES: usize = 50_000_000;
+pub(super) const MOST_SAMPLES: usize = 50_000_000;
 /// Most columns: t and a thousand inputs and outputs each.
 const MOST_COLUMNS: usize = 2001;
 /// Largest measured value: squares and sums of squares of a record must stay finite.
@@ -44,13 +46,18 @@ impl Table {
             .map_err(|error| RecordError::file(path, error))
     }
 
-    pub fn parse(mut text: impl Read, path: &Path) -> Result<Self, RecordError> {
-        let mut start = Vec::new();
-        (text.by_ref().take(START).read_to_end(&mut start))
-            .map_err(|error| RecordError::io(path, error))?;
-        check_encoding(&start).map_err(|problem| RecordError::file(path, problem))?;
-        let mut reader = Rows::new(Cursor::new(start).chain(text));
-        let header = reader.header().map_err(|e| csv_error(path, e))?;
+    /// Parses a table; `left` is how many numbers may be read yet, in this file and those that follow.
+    pub fn parse(
+        text: Text<'_>,
+        path: &Path,
+        columns: &Columns,
+        signals: Option<&Signals>,
+        left: &mut usize,
+    ) -> Result<Self, RecordError> {
+        let separator = text.separator;
+        let mut reader = Rows::separated(text.text, separator);
+        let csv_error = |error| csv_error(path, separator, error);
+        let header = reader.header().map_err(csv_error)?;
         let large = |problem: String| {
             let remedy = "cut the record into shorter ones, or resample it";
             RecordError::file(path, format!("{problem}; {remedy}"))
@@ -61,27 +68,42 @@ impl Table {
                 "{given} columns, at most {MOST_COLUMNS} are read"
             )));
         }
-        let (inputs, outputs) =
-            channels(&header).map_err(|problem| RecordError::file(path, problem))?;
-        let columns = 1 + inputs + outputs;
-        // Index of column j of the file in a row ordered t, u1, u2, …, y1, y2, ….
-        let places: Vec<usize> = header.iter().map(|name| place(name, inputs)).collect();
+        let header: Vec<&str> = header.iter().collect();
+        let usual = columns.usual_names(&header, signals);
+        let (usual, inputs, outputs) = usual
+            .and_then(|usual| {
+                let names: Vec<&str> = usual.iter().flatten().map(String::as_str).collect();
+                let (inputs, outputs) = channels(&names, columns)?;
+                Ok((usual, inputs, outputs))
+            })
+            .map_err(|problem| RecordError::file(path, problem))?;
+        let width = 1 + inputs + outputs;
+        // Index of column j of the file in a row ordered t, u1, u2, …, y1, y2, …; none for one that is left out.
+        let places: Vec<Option<usize>> = (usual.iter())
+            .map(|name| name.as_ref().map(|name| place(name, inputs)))
+            .collect();
+        let time = (places.iter().position(|place| *place == Some(0))).map_or("t", |j| header[j]);
         // Numbers alone are kept, and each once: a record may fill half of the memory.
         let (mut t, mut u, mut y) = (Vec::new(), Vec::new(), Vec::new());
-        let mut row = vec![0.0; columns];
+        let mut row = vec![0.0; width];
         let mut cells = csv::StringRecord::new();
-        while reader.read(&mut cells).map_err(|e| csv_error(path, e))? {
+        let mut parser = CellParser::new(separator, inputs);
+        while reader.read(&mut cells).map_err(csv_error)? {
             if t.len() == MOST_SAMPLES {
                 return Err(large(format!("more than {MOST_SAMPLES} samples")));
             }
-            if (t.len() + 1) * columns > MOST_NUMBERS {
-                return Err(large(format!("more than {MOST_NUMBERS} numbers")));
+            if width > *left {
+                return Err(large(format!(
+                    "more than {MOST_NUMBERS} numbers in all records together"
+                )));
             }
-            for ((cell, &place), name) in cells.iter().zip(&places).zip(&header) {
-                row[place] = cell_value(cell, name).map_err(|problem| {
-                    let row = cells.position().map_or(t.len() + 2, |p| p.line() as usize);
-                    RecordError::cell(path, row, name, problem)
-                })?;
+            *left -= width;
+            let number = cells.position().map_or(t.len() + 2, |p| p.line() as usize);
+            for ((cell, place), name) in cells.iter().zip(&places).zip(&header) {
+                if let Some(place) = *place {
+                    row[place] = (parser.parse(cell, place, number))
+                        .map_err(|problem| RecordError::cell(path, number, name, problem))?;
+                }
             }
             t.push(row[0]);
             u.extend_from_slice(&row[1..=inputs]);
@@ -92,7 +114,7 @@ impl Table {
             let problem = format!("{rows} rows of data; at least 2 are needed to know the step");
             return Err(RecordError::file(path, problem));
         }
-        check_order(path, &t)?;
+        check_order(path, time, &t)?;
         let signal = |width: usize, values: Vec<f64>| {
             Signal::from_shape_vec((rows, width), values)
                 .map_err(|error| RecordError::file(path, error))
@@ -105,56 +127,118 @@ impl Table {
     }
 }
 
-/// Bytes of a file that tell its encoding.
-const START: u64 = 64;
-
-/// Refuses text that is not UTF-8 by its first bytes.
-fn check_encoding(start: &[u8]) -> Result<(), String> {
-    let utf16 = start.starts_with(b"\xff\xfe") || start.starts_with(b"\xfe\xff");
-    if utf16 || start.contains(&0) {
-        let encoding = if utf16 { "UTF-16" } else { "UTF-16 or binary" };
-        return Err(format!("the file is {encoding}; save it as UTF-8 text"));
-    }
-    Ok(())
+/// Parses cells of one file.
+struct CellParser {
+    separator: u8,
+    inputs: usize,
+    decimals: Decimals,
+    /// First time stamp; none where times are numbers.
+    first: Option<Stamp>,
+    /// `true` once a time was a number.
+    has_seconds: bool,
 }
 
-/// Parses a cell of a column. An output may be missing, which is NaN here.
-fn cell_value(cell: &str, column: &str) -> Result<f64, String> {
-    let missing = cell.is_empty() || cell == "NA" || cell.eq_ignore_ascii_case("nan");
-    match column.as_bytes().first() {
-        _ if !missing => parse_number(cell),
-        Some(b'y') => Ok(f64::NAN),
-        Some(b'u') => Err(
-            "no value; an input is needed in each row: give the one that acted, or remove the row"
-                .into(),
-        ),
-        _ => Err("no value; each row needs its time: give it, or remove the row".into()),
+impl CellParser {
+    fn new(separator: u8, inputs: usize) -> Self {
+        Self {
+            separator,
+            inputs,
+            decimals: Decimals::default(),
+            first: None,
+            has_seconds: false,
+        }
+    }
+
+    /// Parses a cell at `place` in a row ordered t, u1, …, y1, …. An output may be missing, which is NaN here.
+    fn parse(&mut self, cell: &str, place: usize, row: usize) -> Result<f64, String> {
+        let missing = cell.is_empty() || cell == "NA" || cell.eq_ignore_ascii_case("nan");
+        match place {
+            0 if missing => Err("no value; each row needs its time: give it, or remove the row".into()),
+            0 => self.time(cell, row),
+            _ if !missing => self.number(cell, row),
+            input if input <= self.inputs => Err(
+                "no value; an input is needed in each row: give the one that acted, or remove the row"
+                    .into(),
+            ),
+            _ => Ok(f64::NAN),
+        }
+    }
+
+    /// Parses a time: seconds, or a stamp, whose seconds count from the first one.
+    fn time(&mut self, cell: &str, row: usize) -> Result<f64, String> {
+        match (Stamp::parse(cell), self.first) {
+            (Some(_), _) if self.has_seconds => Err(format!(
+                "\"{}\" is a time stamp, earlier times are seconds; write one kind",
+                quoted(cell)
+            )),
+            (Some(stamp), first) => stamp.since(*self.first.insert(first.unwrap_or(stamp))),
+            (None, Some(_)) => Err(not_a_stamp(cell)),
+            (None, None) => {
+                self.has_seconds = true;
+                self.number(cell, row)
+                    .map_err(|problem| match Stamp::is_meant(cell) {
+                        true => not_a_stamp(cell),
+                        false => problem,
+                    })
+            }
+        }
+    }
+
+    /// Parses a number, with a decimal comma if commas do not separate the columns.
+    fn number(&mut self, cell: &str, row: usize) -> Result<f64, String> {
+        if self.separator != b','
+            && let Some(value) = self.decimals.parse(cell, row)?
+        {
+            return check_size(value, cell);
+        }
+        parse_number(cell)
     }
 }
 
-/// Parses a number.
-fn parse_number(cell: &str) -> Result<f64, String> {
-    match cell.parse::<f64>() {
-        Ok(value) if value.is_finite() && value.abs() > LARGEST => Err(format!(
+fn not_a_stamp(cell: &str) -> String {
+    format!(
+        "\"{}\" is no time stamp of ISO 8601; write 2024-03-31T14:00:00.5, with Z or +02:00 if it has a zone, or seconds",
+        quoted(cell)
+    )
+}
+
+/// Refuses values that cannot be computed with.
+fn check_size(value: f64, cell: &str) -> Result<f64, String> {
+    if value.is_finite() && value.abs() > LARGEST {
+        return Err(format!(
             "{} is beyond ±{LARGEST:e}, the largest value of a record; correct or remove the row",
             excerpt(cell)
-        )),
-        Ok(value) if value.is_finite() => Ok(value),
+        ));
+    }
+    match value.is_finite() {
+        true => Ok(value),
+        false => Err(not_finite(cell)),
+    }
+}
+
+fn not_finite(cell: &str) -> String {
+    format!(
+        "\"{}\" is no finite number; correct it, or leave the cell of an output empty if it was not measured",
+        quoted(cell)
+    )
+}
+
+/// Parses a number with a decimal point.
+fn parse_number(cell: &str) -> Result<f64, String> {
+    match cell.parse::<f64>() {
+        Ok(value) => check_size(value, cell),
         _ if cell.contains(',') && cell.replacen(',', ".", 1).parse::<f64>().is_ok() => {
             Err(format!(
-                "\"{}\" has a decimal comma; write decimal points",
+                "\"{}\" has a decimal comma; write decimal points, or separate the columns by semicolons",
                 quoted(cell)
             ))
         }
-        _ => Err(format!(
-            "\"{}\" is no finite number; correct it, or leave the cell of an output empty if it was not measured",
-            quoted(cell)
-        )),
+        _ => Err(not_finite(cell)),
     }
 }
 
 /// The parser's error, by row.
-fn csv_error(path: &Path, error: csv::Error) -> RecordError {
+fn csv_error(path: &Path, separator: u8, error: csv::Error) -> RecordError {
     let row = |position: Option<csv::Position>| position.map_or(0, |p| p.line());
     let problem = match error.into_kind() {
         csv::ErrorKind::Io(error) => return RecordError::io(path, error),
@@ -163,14 +247,15 @@ fn csv_error(path: &Path, error: csv::Error) -> RecordError {
             expected_len,
             len,
         } => {
-            let comma = if len > expected_len {
+            let comma = if len > expected_len && separator == b',' {
                 "; write decimal points, not commas"
             } else {
                 ""
             };
             format!(
-                "row {} has {len} cells, the header has {expected_len}{comma}",
-                row(pos)
+                "row {} has {len} cells, the header has {expected_len}, separated by {}{comma}",
+                row(pos),
+                separator_name(separator)
             )
         }
         csv::ErrorKind::Utf8 { pos, err } => format!("row {}: {err}", row(pos)),
@@ -181,18 +266,10 @@ fn csv_error(path: &Path, error: csv::Error) -> RecordError {
 }
 
 /// Number of inputs and outputs that a header names: each of t, u…, y… once and without gaps.
-fn channels(header: &csv::StringRecord) -> Result<(usize, usize), String> {
-    if header.iter().all(str::is_empty) {
+fn channels(names: &[&str], columns: &Columns) -> Result<(usize, usize), String> {
+    if columns.is_empty() && names.iter().all(|name| name.is_empty()) {
         return Err("the file is empty; a record needs a header t,u,y and rows".into());
     }
-    for (separator, name) in [(';', "semicolons"), ('\t', "tabs")] {
-        if header.len() == 1 && header[0].contains(separator) {
-            return Err(format!(
-                "columns are separated by {name}; separate them by commas, and write decimal points"
-            ));
-        }
-    }
-    let names: Vec<&str> = header.iter().collect();
     let count = |letter: char| names.iter().filter(|n| n.starts_with(letter)).count();
     let (inputs, outputs) = (count('u'), count('y'));
     let mut expected = vec!["t".to_owned()];
@@ -210,7 +287,7 @@ fn channels(header: &csv::StringRecord) -> Result<(usize, usize), String> {
         |name: &str| name.starts_with(['u', 'y']) && name[1..].chars().all(|c| c.is_ascii_digit());
     if let Some(name) = names.iter().find(|name| **name != "t" && !channel(name)) {
         return Err(format!(
-            "column \"{}\" is not part of a record; name the columns t, u or u1,u2,…, y or y1,y2,… and remove others",
+            "column \"{}\" is not part of a record; name the columns t, u or u1,u2,…, y or y1,y2,… and remove others, or give --columns t=NAME,u=NAME,y=NAME",
             quoted(name)
         ));
     }
@@ -227,7 +304,10 @@ fn channels(header: &csv::StringRecord) -> Result<(usize, usize), String> {
         ));
     }
     if !names.contains(&"t") {
-        return Err("column t is missing; add the time of each row in seconds".into());
+        return Err(
+            "column t is missing; add the time of each row in seconds, or give --columns t=NAME"
+                .into(),
+        );
     }
     Ok((inputs, outputs))
 }
@@ -243,7 +323,7 @@ fn place(name: &str, inputs: usize) -> usize {
 }
 
 /// Checks that time increases from row to row, by steps that can be computed with.
-fn check_order(path: &Path, t: &[f64]) -> Result<(), RecordError> {
+fn check_order(path: &Path, time: &str, t: &[f64]) -> Result<(), RecordError> {
     for (k, pair) in t.windows(2).enumerate() {
         let step = pair[1] - pair[0];
         if step <= 0.0 {
@@ -252,11 +332,12 @@ fn check_order(path: &Path, t: &[f64]) -> Result<(), RecordError> {
                 number(pair[1]),
                 number(pair[0])
             );
-            return Err(RecordError::cell(path, k + 3, "t", problem));
+            return Err(RecordError::cell(path, k + 3, time, problem));
         }
         if !step.is_normal() {
             let problem = format!(
-                "column t: a step of {} s is too small to compute with; write t in seconds",
+                "column {}: a step of {} s is too small to compute with; write t in seconds",
+                quoted(time),
                 number(step)
             );
             return Err(RecordError::file(path, problem));

@@ -2,7 +2,7 @@
 
 use crate::effect::{EffectEntry, EffectError, EffectPattern};
 use crate::feature::FeatureRecipe;
-use crate::record::read_drive;
+use crate::record::{Columns, read_drive};
 use crate::setting::number;
 use crate::storage::files::folder;
 use crate::storage::untrusted::{MESSAGE, check_names, one_line, read_text};
@@ -28,6 +28,7 @@ const MOST: u64 = 1 << 20;
 /// input = { levels = [0.5, 6.0], hold = 25 }   # or a file: "U.csv"
 /// hold = "linear"   # inputs on the line between samples; "zero" holds them
 /// substeps = 4      # steps of the integrator within a sample
+/// columns = { t = "time", u = "pump", y = "level" }   # of measured records
 /// [prior]
 /// k1 = [0.01, 0.1]
 /// start.h1 = [0.0, 10.0]
@@ -119,6 +120,9 @@ pub struct RecordTable {
     /// Steps of the integrator within a sample, also of measured records.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub substeps: Option<usize>,
+    /// Columns of measured records that do not have the usual names.
+    #[serde(skip_serializing_if = "Columns::is_empty")]
+    pub columns: Columns,
 }
 
 impl RecordTable {
@@ -257,6 +261,7 @@ mod tests {
             input = { levels = [0.5, 6.0], hold = 25 }
             hold = "linear"
             substeps = 4
+            columns = { t = "time (s)", y = "level" }
             [prior]
             k1 = [0.01, 0.1]
             start.h1 = [0, 10]
@@ -290,7 +295,7 @@ mod tests {
         let written = toml::to_string(&file).unwrap();
         let again = parse(&written).unwrap();
         assert_eq!(written, toml::to_string(&again).unwrap());
-        for part in ["start.h1", "inf", "sensor-lag", "arx"] {
+        for part in ["start.h1", "inf", "sensor-lag", "arx", "time (s)"] {
             assert!(written.contains(part), "{written}");
         }
     }

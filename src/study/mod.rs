@@ -6,6 +6,7 @@ mod fit;
 mod lines;
 mod manifest;
 mod plan;
+mod suitability;
 
 pub use error::StudyError;
 pub use file::StudyFile;

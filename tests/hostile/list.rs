@@ -56,12 +56,51 @@ fn odd_record_files_are_named_as_such() {
     let place = tempfile::tempdir().unwrap();
     let utf16 = "t,y\n0,1\n".encode_utf16().flat_map(u16::to_le_bytes);
     let utf16: Vec<u8> = [0xff, 0xfe].into_iter().chain(utf16).collect();
-    let cases: [(&[u8], &[&str]); 14] = [
-        (b"t;u;y\n0;1;2\n", &["semicolons", "by commas"]),
-        (b"t\tu\ty\n0\t1\t2\n", &["tabs", "by commas"]),
+    let stamp = "2024-03-31T00:00:00";
+    let zones = format!("t,y\n{stamp}Z,1\n{stamp},2\n");
+    let order = format!("t,y\n{stamp}+01:00,1\n{stamp}+02:00,2\n");
+    let no_stamp = format!("t,y\n{stamp},1\n31.03.2024 00:01,2\n");
+    let kinds = format!("t,y\n0,1\n{stamp},2\n");
+    let cases: [(&[u8], &[&str]); 24] = [
+        (b"", &["the file is empty"]),
+        (b"t,u,y\n0,1,2\n", &["1 rows of data", "at least 2"]),
+        (
+            b"t;u;y\n0,1,2\n",
+            &["row 2 has 1 cells", "separated by semicolons"],
+        ),
+        (
+            b"t\tu\ty\n0\t1\t2\t3\n",
+            &["row 2 has 4 cells", "separated by tabs"],
+        ),
+        (
+            b"t;y\n0;1,5\n1;1.5\n",
+            &["row 3, column y", "decimal point, row 2 a decimal comma"],
+        ),
+        (
+            b"t;y\n0;1.000,5\n",
+            &["row 2, column y", "no finite number"],
+        ),
+        (
+            b"t,u,y\n0,\"1,5\",2\n",
+            &["decimal comma", "columns by semicolons"],
+        ),
+        (zones.as_bytes(), &["row 3, column t", "has no time zone"]),
+        (
+            order.as_bytes(),
+            &["row 3, column t", "-3600 s follows 0 s", "must increase"],
+        ),
+        (
+            no_stamp.as_bytes(),
+            &["row 3, column t", "2024-03-31T14:00:00.5"],
+        ),
+        (
+            kinds.as_bytes(),
+            &["row 3, column t", "earlier times are seconds"],
+        ),
+        (b"t,y\n01.03.2024,1\n", &["row 2, column t", "ISO 8601"]),
         (b"t,y\n0,1,5\n", &["row 2 has 3 cells", "decimal points"]),
         (b"t,y\n0,\"1,5\"\n", &["row 2, column y", "decimal comma"]),
-        (&utf16, &["UTF-16", "UTF-8"]),
+        (&utf16, &["1 rows of data"]),
         (b"t\0,\0y\0", &["UTF-16", "UTF-8"]),
         (b"t,u,y,y\n0,1,2,3\n", &["\"y\" appears twice", "t,u,y1,y2"]),
         (b"t,t,y\n0,0,2\n", &["t appears twice"]),

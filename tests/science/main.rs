@@ -16,6 +16,7 @@ mod filter;
 mod fit;
 mod numbers;
 mod real_records;
+mod suitability;
 
 /// Counts that `trials` of this probability give with at least `level`; each tail outside has at most (1 − level)/2.
 fn binomial_bounds(trials: u64, probability: f64, level: f64) -> std::ops::RangeInclusive<u64> {

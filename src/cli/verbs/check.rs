@@ -1,26 +1,35 @@
-//! `check`: tests a twin before training.
+//! `check`: tests a twin before training, or a record before a fit.
 
-use crate::cli::args::Subject;
+use crate::cli::args::{FileColumns, Subject};
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
 use crate::estimator::PresetName;
-use crate::twin::conformance::{Severity, check, check_step};
+use crate::study::Study;
+use crate::twin::conformance::{Finding, Severity, check, check_step};
 use crate::twin::{Noise, SimulationError, Twin};
 use clap::Args;
 use serde_json::json;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 
-/// Check a twin before training: repeatable, paired noise, finite outputs, identifiable parameters.
+/// Check a twin before training (repeatable, paired noise, finite outputs, identifiable parameters), or whether a record suits it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
         truetwin check --twin tanks\n  \
-        truetwin check --program 'python3 model.py'\n\
-        Failures end with exit code 1. Next: truetwin pretrain with the same twin")]
+        truetwin check --program 'python3 model.py'\n  \
+        truetwin check R.csv --twin tanks\n\
+        Failures of a twin end with exit code 1; findings about a record end with 0.\n\
+        Next: truetwin pretrain with the same twin, or truetwin fit R.csv")]
 pub(in crate::cli) struct Check {
+    /// Measured record: checks units, sampling, damaged channels, inputs, and which parameters it can tell.
+    #[arg(value_name = "R.csv")]
+    record: Option<PathBuf>,
     #[command(flatten)]
     subject: Subject,
+    #[command(flatten)]
+    columns: FileColumns,
 }
 
 impl Verb for Check {
@@ -31,6 +40,9 @@ impl Verb for Check {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         let project = context.project(&self.subject)?;
         let study = project.study();
+        if let Some(path) = &self.record {
+            return self.check_record(context, study, path);
+        }
         let drive = study
             .drives()?
             .draw(Noise::new(context.seed, "check input", 0))?;
@@ -47,21 +59,13 @@ impl Verb for Check {
         if findings.iter().all(|f| f.severity < Severity::Failure) {
             findings.push(project.check_features(PresetName::Default, &drive, context.seed)?);
         }
-        let word = |severity| match severity {
-            Severity::Pass => "pass",
-            Severity::Warning => "warning",
-            Severity::Failure => "failure",
-        };
         let failed = findings.iter().any(|f| f.severity == Severity::Failure);
         if context.json {
             output::print_json(&json!({
                 "schema": "truetwin.check/1", "twin": study.name(), "passed": !failed, "findings": findings,
             }))?;
         } else {
-            let lines: Vec<String> = (findings.iter())
-                .map(|f| format!("{:<8} {:<13} {}", word(f.severity), f.check, f.message))
-                .collect();
-            output::print(&lines.join("\n"))?;
+            output::print(&lines(&findings))?;
         }
         Ok(if failed {
             ExitCode::FAILURE
@@ -69,6 +73,41 @@ impl Verb for Check {
             ExitCode::SUCCESS
         })
     }
+}
+
+impl Check {
+    /// Checks whether a record suits the twin.
+    fn check_record(
+        &self,
+        context: &Context<'_>,
+        study: &Study,
+        path: &Path,
+    ) -> Result<ExitCode, Failure> {
+        let record = self.columns.reader(study).record(path)?;
+        let result = study.suitability(&record, context.seed, context.progress)?;
+        if context.json {
+            output::print_json(&json!({
+                "schema": "truetwin.suitability/1", "twin": study.name(), "record": path, "suits": result.suits(),
+                "findings": result.findings, "parameters": result.parameters,
+            }))?;
+        } else {
+            output::print(&lines(&result.findings))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// One line a finding.
+fn lines(findings: &[Finding]) -> String {
+    let word = |severity| match severity {
+        Severity::Pass => "pass",
+        Severity::Warning => "warning",
+        Severity::Failure => "failure",
+    };
+    let lines: Vec<String> = (findings.iter())
+        .map(|f| format!("{:<8} {:<13} {}", word(f.severity), f.check, f.message))
+        .collect();
+    lines.join("\n")
 }
 
 /// Estimates the number of runs: corners of the prior, differences for each parameter; a black box's free run is the mean

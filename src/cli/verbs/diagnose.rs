@@ -1,6 +1,6 @@
 //! `diagnose`: tests whether the twin explains the record, and finds what it lacks.
 
-use crate::cli::args::Subject;
+use crate::cli::args::{FileColumns, Subject};
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::{output, records};
@@ -29,6 +29,8 @@ pub(in crate::cli) struct Diagnose {
     records: Vec<PathBuf>,
     #[command(flatten)]
     subject: Subject,
+    #[command(flatten)]
+    columns: FileColumns,
     /// Estimator of the same twin; its estimate is one starting point of the fit.
     #[arg(long, value_name = "EST")]
     estimator: Option<PathBuf>,
@@ -55,7 +57,9 @@ impl Verb for Diagnose {
         let folder = self.out.as_deref().map(output::NewFolder::new);
         let folder = folder.transpose()?;
         let study = context.study(&self.subject)?;
-        let (records, validation) = records::read(&self.records, self.validation.as_deref())?;
+        let reader = self.columns.reader(&study);
+        let (records, validation) =
+            records::read(reader, &self.records, self.validation.as_deref())?;
         let initial = match &self.estimator {
             Some(path) => Some(first_estimate(context, &study, path, &records[0])?),
             None => None,

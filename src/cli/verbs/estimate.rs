@@ -1,6 +1,6 @@
 //! `estimate`: estimates the parameters behind a record.
 
-use crate::cli::args::PresetArgument;
+use crate::cli::args::{FileColumns, PresetArgument};
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::{output, records};
@@ -25,6 +25,8 @@ pub(in crate::cli) struct Estimate {
     /// Estimator from `truetwin pretrain`.
     #[arg(long, value_name = "EST")]
     estimator: PathBuf,
+    #[command(flatten)]
+    columns: FileColumns,
     /// Second record of the same system, to score the calibrated twin.
     #[arg(long, value_name = "V.csv")]
     validation: Option<PathBuf>,
@@ -45,7 +47,8 @@ impl Verb for Estimate {
         let folder = folder.transpose()?;
         let estimator = Estimator::load(&self.estimator, context.projects)?;
         let paths = std::slice::from_ref(&self.record);
-        let (mut records, validation) = records::read(paths, self.validation.as_deref())?;
+        let reader = self.columns.reader(estimator.study());
+        let (mut records, validation) = records::read(reader, paths, self.validation.as_deref())?;
         let record = records.remove(0);
         let settings = EstimateOptions {
             seed: context.seed,

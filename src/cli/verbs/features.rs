@@ -1,11 +1,10 @@
 //! `features`: compresses records to features.
 
-use crate::cli::args::{PresetArgument, Subject};
+use crate::cli::args::{FileColumns, PresetArgument, Subject};
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
 use crate::estimator::bank::file;
-use crate::record::read_record;
 use clap::Args;
 use ndarray::Array2;
 use serde_json::json;
@@ -22,6 +21,8 @@ pub(in crate::cli) struct Features {
     records: Vec<PathBuf>,
     #[command(flatten)]
     subject: Subject,
+    #[command(flatten)]
+    columns: FileColumns,
     /// Recipe of the features.
     #[arg(long, value_enum, default_value = "default")]
     preset: PresetArgument,
@@ -46,7 +47,7 @@ impl Verb for Features {
         let stage = context.progress.stage("records", self.records.len());
         for path in &self.records {
             let at = |failure: Failure| failure.within(path);
-            let record = read_record(path)?;
+            let record = self.columns.reader(study).record(path)?;
             study
                 .check_record(&record)
                 .map_err(|error| at(error.into()))?;

@@ -1,6 +1,6 @@
 //! `fit`: finds the most probable parameters of a twin, given records.
 
-use crate::cli::args::Subject;
+use crate::cli::args::{FileColumns, Subject};
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::{output, records};
@@ -21,6 +21,8 @@ pub(in crate::cli) struct Fit {
     records: Vec<PathBuf>,
     #[command(flatten)]
     subject: Subject,
+    #[command(flatten)]
+    columns: FileColumns,
     /// New folder for fit.json and a picture of each record (overlay.svg, overlay-2.svg, …).
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -35,7 +37,7 @@ impl Verb for Fit {
         let folder = self.out.as_deref().map(output::NewFolder::new);
         let folder = folder.transpose()?;
         let study = context.study(&self.subject)?;
-        let (records, _) = records::read(&self.records, None)?;
+        let (records, _) = records::read(self.columns.reader(&study), &self.records, None)?;
         for (record, path) in records.iter().zip(&self.records) {
             (record.check_channels(&study.twin().signals()))
                 .map_err(|error| Failure::from(error).within(path))?;

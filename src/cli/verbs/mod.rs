@@ -11,6 +11,7 @@ mod fit;
 mod merge;
 mod pretrain;
 mod reproduce;
+mod resample;
 mod shell;
 mod simulate;
 mod twins;
@@ -25,6 +26,7 @@ pub(super) enum Command {
     Twins(twins::Twins),
     Effects(effects::Effects),
     Check(check::Check),
+    Resample(resample::Resample),
     Simulate(simulate::Simulate),
     Bank(bank::Bank),
     Features(features::Features),
@@ -47,6 +49,7 @@ impl Command {
             Self::Twins(verb) => verb,
             Self::Effects(verb) => verb,
             Self::Check(verb) => verb,
+            Self::Resample(verb) => verb,
             Self::Simulate(verb) => verb,
             Self::Bank(verb) => verb,
             Self::Features(verb) => verb,

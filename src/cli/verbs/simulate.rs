@@ -1,11 +1,11 @@
 //! `simulate`: simulates a record.
 
-use crate::cli::args::Subject;
+use crate::cli::args::{FileColumns, Subject};
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
 use crate::effect::{augment, given_magnitudes};
-use crate::record::{Drive, Record, read_drive, record_csv_text, write_record};
+use crate::record::{Drive, Record, record_csv_text, write_record};
 use crate::setting::{did_you_mean, number};
 use crate::twin::{Noise, ParameterSpace, Role, Twin};
 use clap::Args;
@@ -23,6 +23,8 @@ use std::process::ExitCode;
 pub(in crate::cli) struct Simulate {
     #[command(flatten)]
     subject: Subject,
+    #[command(flatten)]
+    columns: FileColumns,
     /// Parameters as name=value, separated by commas; estimated starts and noise levels may be omitted.
     #[arg(long, value_name = "a=..,b=..")]
     theta: String,
@@ -61,7 +63,7 @@ impl Verb for Simulate {
         let theta = complete(&twin.parameters(), &given, &magnitudes)?;
         let noise = Noise::new(context.seed, "simulate", 0);
         let drive = match &self.input {
-            Some(path) => read_drive(path)?,
+            Some(path) => self.columns.reader(&study).drive(path)?,
             None => study.drives()?.draw(noise)?,
         };
         check_inputs(&twin, &drive, self)?;

@@ -1,11 +1,10 @@
 //! `withheld`: scores `diagnose` on trials with sealed truth.
 
-use crate::cli::args::{Subject, at_least_one};
+use crate::cli::args::{FileColumns, Subject, at_least_one};
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
 use crate::evaluate::trials::{self, Families, Kind, Settings};
-use crate::record::read_record;
 use crate::report::{scorecard_html, scorecard_json, scorecard_text};
 use crate::setting::did_you_mean;
 use crate::storage::work::Share;
@@ -40,6 +39,8 @@ pub(in crate::cli) struct Withheld {
     /// Measured record whose inputs, length, step and gaps the trials have [default: the study's plan].
     #[arg(long, value_name = "RECORD.csv")]
     like: Option<PathBuf>,
+    #[command(flatten)]
+    columns: FileColumns,
     /// Remove the true effects from the library: the right answer is then to abstain.
     #[arg(long)]
     without: bool,
@@ -72,7 +73,8 @@ impl Verb for Withheld {
 
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         let study = context.study(&self.subject)?;
-        let like = self.like.as_deref().map(read_record).transpose()?;
+        let like = (self.like.as_deref()).map(|path| self.columns.reader(&study).record(path));
+        let like = like.transpose()?;
         let settings = Settings {
             trials: self.trials,
             seed: context.seed,

@@ -1,6 +1,6 @@
 //! The order of the search: single explanations, what they leave, pairs.
 
-use super::decide::{Findings, leaves_nothing};
+use super::decide::{Findings, leaves_nothing, worth_another};
 use super::search::{Breadth, Found, listed, own_theta, sort, unknown};
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::scales::Scales;
@@ -124,7 +124,7 @@ pub(in crate::diagnose) fn explore<'a>(
     findings.several = pairs(&findings, terms, origin, breadth, enough)?;
     for i in 0..findings.several.len().min(2) {
         let found = findings.several[i].clone();
-        let better = found.gain > top + Thresholds::WORTH_ANOTHER;
+        let better = found.gain > top + worth_another(top);
         if !better || i > 0 && !may_suffice(&found) {
             break;
         }
@@ -144,22 +144,23 @@ pub(in crate::diagnose) fn explore<'a>(
     Ok(findings)
 }
 
-/// The outliers that are likeliest beside the best listed effect. Coloured noise is not asked for here: it would pass for what an
-/// effect leaves.
+/// The outliers that are likeliest beside the best listed effect, at other sensors than its own. Correlated noise is not asked for here:
+/// it would pass for what an effect leaves.
 fn noise_beside<'a>(
     singles: &[Found<'a>],
     noise: &[Arc<Term>],
     origin: f64,
     breadth: Breadth,
 ) -> Result<Option<(String, f64)>, DiagnoseError> {
-    let outliers: Vec<Arc<Term>> = (noise.iter())
-        .filter(|term| matches!(term.part, Part::Effect { .. }))
-        .cloned()
-        .collect();
     let best = singles.first().filter(|f| f.gain > Thresholds::WIDER);
     let Some((best, model)) = best.and_then(|f| Some((f, f.model.as_ref()?))) else {
         return Ok(None);
     };
+    let outliers: Vec<Arc<Term>> = (noise.iter())
+        .filter(|term| matches!(term.part, Part::Effect { .. }))
+        .filter(|term| term.target != best.last().target)
+        .cloned()
+        .collect();
     let found = listed(model, &outliers, origin, &[], breadth)?;
     Ok((found.first()).map(|f| (f.last().key(), f.gain - best.gain)))
 }

@@ -34,8 +34,13 @@ impl<R: Read> Read for Bounded<R> {
 }
 
 impl<R: Read> Rows<R> {
-    /// Reads a text with a header.
+    /// Reads a text with a header, columns separated by commas.
     pub fn new(from: R) -> Self {
+        Self::separated(from, b',')
+    }
+
+    /// Reads a text with a header, columns separated by another byte.
+    pub fn separated(from: R, separator: u8) -> Self {
         let row = Rc::new(Cell::new(0));
         let bounded = Bounded {
             from,
@@ -44,6 +49,7 @@ impl<R: Read> Rows<R> {
         };
         let reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
+            .delimiter(separator)
             .from_reader(bounded);
         Self { reader, row }
     }

@@ -27,15 +27,15 @@ pub struct Finding {
 }
 
 impl Finding {
-    pub(super) fn pass(check: &'static str, message: impl Into<String>) -> Self {
+    pub(crate) fn pass(check: &'static str, message: impl Into<String>) -> Self {
         Self::new(check, Severity::Pass, message)
     }
 
-    pub(super) fn failure(check: &'static str, message: impl Into<String>) -> Self {
+    pub(crate) fn failure(check: &'static str, message: impl Into<String>) -> Self {
         Self::new(check, Severity::Failure, message)
     }
 
-    pub(super) fn warning(check: &'static str, message: impl Into<String>) -> Self {
+    pub(crate) fn warning(check: &'static str, message: impl Into<String>) -> Self {
         Self::new(check, Severity::Warning, message)
     }
 

@@ -85,6 +85,6 @@ fn step_levels(
 }
 
 /// A number to three digits.
-fn short(value: f64) -> f64 {
+pub(crate) fn short(value: f64) -> f64 {
     format!("{value:.2e}").parse().unwrap_or(value)
 }

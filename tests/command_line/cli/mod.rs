@@ -2,6 +2,7 @@
 
 mod diagnose;
 mod fit;
+mod records;
 mod reproduce;
 mod shell;
 mod withheld;

@@ -83,19 +83,20 @@ fn what_parameters_absorb_is_no_structural_gap() {
     );
 }
 
-/// A disturbance that nobody listed is detected, and no effect is named for it.
+/// A force that nobody listed is detected, and no effect is named for it.
 #[test]
-fn an_unlisted_push_is_named_by_nobody() {
+fn an_unlisted_force_is_named_by_nobody() {
     let study = study("van-der-pol");
     let noise = Noise::new(34, "unlisted", 0);
     let base = study.twin().clone();
-    let twin = Twin::new(Unlisted { base, kind: 2 });
+    let twin = Twin::new(Unlisted { base, kind: 3 });
     let record = record(&twin, "", &[1.5], drive(&study, noise), noise);
     let found = found(&study, record, None);
     println!("{}", line("unlisted", &found));
     assert_eq!(found.verdict, Verdict::StructuralGap);
     assert_eq!(found.cause.decision, Decision::NoneOfThese);
     assert!(found.cause.accepted.is_empty());
+    assert_eq!(found.location.target.as_deref(), Some("x2"));
 }
 
 /// The same seed gives the same bits on one thread and on three; another seed the same answer.

@@ -1,0 +1,119 @@
+//! `resample`: puts a record on a time grid of one step.
+
+use crate::cli::args::FileColumns;
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::output;
+use crate::record::{InputRule, Record, resample, write_record};
+use crate::setting::number;
+use clap::{Args, ValueEnum};
+use serde_json::json;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Resample a record to one step: inputs averaged or held, outputs interpolated linearly, long gaps left empty.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+        truetwin resample R.csv --step 0.5 --out R2.csv\n  \
+        truetwin resample log.csv --columns t=time,u=pump,y=level --step 1 --inputs hold --out R.csv\n\
+        Next: truetwin check R2.csv --twin NAME")]
+pub(in crate::cli) struct Resample {
+    /// Measured record.
+    #[arg(value_name = "R.csv")]
+    record: PathBuf,
+    #[command(flatten)]
+    columns: FileColumns,
+    /// New step in seconds.
+    #[arg(long, value_name = "SECONDS")]
+    step: f64,
+    /// Inputs of a step: the mean of those that act during it, or the one that acts when it begins.
+    #[arg(long, value_enum, default_value = "mean")]
+    inputs: Inputs,
+    /// New file of the resampled record.
+    #[arg(long, value_name = "R2.csv")]
+    out: PathBuf,
+}
+
+/// Rule for the inputs of a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Inputs {
+    /// Mean over the step.
+    Mean,
+    /// Held from the begin of the step.
+    Hold,
+}
+
+impl Verb for Resample {
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        output::check_new(&self.out)?;
+        let record = self.columns.reader_without_twin().record(&self.record)?;
+        let rule = match self.inputs {
+            Inputs::Mean => InputRule::Mean,
+            Inputs::Hold => InputRule::Hold,
+        };
+        let new = resample(&record, self.step, rule)
+            .map_err(|error| Failure::from(error).within(&self.record))?;
+        write_record(&self.out, &new.record)?;
+        if context.json {
+            let grid = |record: &Record| {
+                let (shortest, longest) = steps(record);
+                json!({
+                    "samples": record.samples(), "missing": record.missing(),
+                    "shortest_step": shortest, "longest_step": longest,
+                })
+            };
+            output::print_json(&json!({
+                "schema": "truetwin.resample/1", "record": self.out,
+                "inputs": match self.inputs { Inputs::Mean => "mean", Inputs::Hold => "hold" },
+                "before": grid(&record), "after": grid(&new.record),
+                "interpolated": new.interpolated, "longest_gap": new.longest_gap,
+            }))?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        let mut lines = vec![
+            grid_line(&self.record.display().to_string(), &record),
+            grid_line(&self.out.display().to_string(), &new.record),
+        ];
+        if record.drive().inputs().ncols() > 0 {
+            lines.push(match self.inputs {
+                Inputs::Mean => "inputs: mean over each step".into(),
+                Inputs::Hold => "inputs: held from the begin of each step".into(),
+            });
+        }
+        lines.push(format!(
+            "outputs: {} interpolated, {} left empty (gaps longer than {} s)",
+            new.interpolated,
+            new.record.missing(),
+            short(new.longest_gap)
+        ));
+        output::print(&lines.join("\n"))?;
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Returns the shortest and the longest step of a record, in seconds.
+fn steps(record: &Record) -> (f64, f64) {
+    let drive = record.drive();
+    let steps = (1..record.samples()).map(|k| drive.step(k - 1));
+    steps.fold((f64::INFINITY, 0.0), |(low, high), step| {
+        (step.min(low), step.max(high))
+    })
+}
+
+fn grid_line(name: &str, record: &Record) -> String {
+    let (low, high) = steps(record);
+    let steps = match record.drive().is_uniform() {
+        true => format!("a step of {} s", short(record.drive().dt())),
+        false => format!("steps of {} to {} s", short(low), short(high)),
+    };
+    let missing = record.missing();
+    format!(
+        "{name}: {} samples, {steps}, {missing} missing outputs",
+        record.samples()
+    )
+}
+
+/// A number to six digits.
+fn short(value: f64) -> String {
+    number(format!("{value:.5e}").parse().unwrap_or(value))
+}

@@ -1,0 +1,196 @@
+//! Damaged channels: constant, clipped, quantised, with outliers.
+
+use super::{or_pass, present, text, with_unit};
+use crate::effect::{Mark, clipped, rounded};
+use crate::math::{ends, median, quantile};
+use crate::record::{Drive, Record, Signal};
+use crate::study::Study;
+use crate::twin::conformance::Finding;
+
+/// Values that differ by less than this share of their size are one.
+const SAME: f64 = 1e-9;
+/// Levels within the range of a channel below which rounding shapes it: with 50, rounding adds 2 % of the range to each row, as much as
+/// the noise of a common sensor.
+const FEW_LEVELS: f64 = 50.0;
+/// Distance from the neighbours, in deviations of the noise, that noise does not reach: 36 right records of the reference twins and of
+/// two tanks have none, an outlier of 6 V in two tanks lies at 30.
+const OUTLYING: f64 = 7.0;
+/// Least deviation of the noise, as a share of the channel's own: curvature of a smooth signal.
+const SMOOTH: f64 = 0.02;
+/// Neighbours on each side: one outlier more than it may come in a row.
+const SIDE: usize = 2;
+/// Fewest values that outliers are looked for among.
+const FEWEST: usize = 50;
+/// Interquartile range of a normal distribution, in standard deviations.
+const QUARTILES: f64 = 1.349;
+/// Standard deviation of a normal distribution, in median absolute deviations.
+const MEDIANS: f64 = 1.4826;
+/// Rows that a message names.
+const NAMED: usize = 5;
+
+/// Checks each channel; what the twin's own run shows, too, is no fault.
+pub(super) fn check(
+    study: &Study,
+    record: &Record,
+    planned: Option<&Drive>,
+    run: Option<&Signal>,
+) -> Vec<Finding> {
+    let signals = study.twin().signals();
+    let mut findings = vec![];
+    for (j, input) in signals.inputs.iter().enumerate() {
+        let (_, values) = present(record.drive().inputs(), j);
+        let moves = planned.is_none_or(|plan| !is_constant(&present(plan.inputs(), j).1));
+        if moves && is_constant(&values) {
+            let name = &input.name;
+            let value = with_unit(values[0], &input.unit);
+            findings.push(Finding::warning(
+                "constant",
+                format!("input {name} is {value} in every row: it cannot tell what {name} does; record with an input that moves, or fix its parameters in [fixed]"),
+            ));
+        }
+    }
+    for (j, output) in signals.outputs.iter().enumerate() {
+        let (rows, values) = present(record.outputs(), j);
+        let own = run.map(|run| present(run, j).1);
+        let name = &output.name;
+        let mut warn = |check, message| findings.push(Finding::warning(check, message));
+        if is_constant(&values) {
+            if !own.is_some_and(|own| is_constant(&own)) {
+                let value = with_unit(values[0], &output.unit);
+                warn(
+                    "constant",
+                    format!(
+                        "output {name} is {value} in every row: the sensor does not work, or the column is another; take the right column, or leave the output out of the twin"
+                    ),
+                );
+            }
+            continue;
+        }
+        let both =
+            |check: &dyn Fn(&[f64]) -> bool| check(&values) && !own.as_deref().is_some_and(check);
+        if both(&|values| clipped_ends(values).is_some())
+            && let Some((end, value, count)) = clipped_ends(&values)
+        {
+            let value = with_unit(value, &output.unit);
+            warn(
+                "clipped",
+                format!(
+                    "output {name} is at its {end} value {value} in {count} rows: the sensor's range ends there; empty those cells, or add the effect sensor-saturation"
+                ),
+            );
+        }
+        if both(&|values| coarse_step(values).is_some())
+            && let Some(step) = coarse_step(&values)
+        {
+            let step = with_unit(step, &output.unit);
+            warn(
+                "quantised",
+                format!(
+                    "output {name} moves in steps of {step}, fewer than {FEW_LEVELS} in its range; log more digits, or add the effect sensor-quantization"
+                ),
+            );
+        }
+        let outliers = outliers(&values);
+        let usual = own.map_or(0, |own| self::outliers(&own).len());
+        if outliers.len() > 2 * usual {
+            let largest = outliers.iter().map(|(_, z)| *z).fold(0.0, f64::max);
+            let named: Vec<String> = (outliers.iter().take(NAMED))
+                .map(|(at, _)| (rows[*at] + 2).to_string())
+                .collect();
+            let more = if outliers.len() > NAMED { ", …" } else { "" };
+            warn(
+                "outliers",
+                format!(
+                    "output {name} has outlying values in rows {}{more}: {} of them, up to {} deviations of the noise from their neighbours; empty those cells, or add the effect sensor-outliers",
+                    named.join(", "),
+                    outliers.len(),
+                    text(largest)
+                ),
+            );
+        }
+    }
+    or_pass(
+        findings,
+        "values",
+        "no channel is constant, clipped, coarse or has outliers",
+    )
+}
+
+/// Returns `true` if all values are the same.
+pub(super) fn is_constant(values: &[f64]) -> bool {
+    let (low, high) = ends(values);
+    high - low <= SAME * low.abs().max(high.abs())
+}
+
+/// The end that values pile up at, and how many of them.
+fn clipped_ends(values: &[f64]) -> Option<(&'static str, f64, usize)> {
+    let Mark::Present(limits) = clipped(values) else {
+        return None;
+    };
+    let (low, high) = ends(values);
+    let at = |end: f64| {
+        values
+            .iter()
+            .filter(move |v| (**v - end).abs() <= SAME * (high - low))
+    };
+    match limits[1].is_finite() {
+        true => Some(("largest", high, at(high).count())),
+        false => Some(("least", low, at(low).count())),
+    }
+}
+
+/// The step of values that are few.
+fn coarse_step(values: &[f64]) -> Option<f64> {
+    let Mark::Present(steps) = rounded(values) else {
+        return None;
+    };
+    let (low, high) = ends(values);
+    (high - low < FEW_LEVELS * steps[0]).then_some(steps[0])
+}
+
+/// Values far outside their neighbours, with the distance in deviations of the noise. Two neighbours on each side, without the least
+/// and the greatest, span the range, so that edges are no outliers; the ends of the record have too few.
+fn outliers(values: &[f64]) -> Vec<(usize, f64)> {
+    if values.len() < FEWEST {
+        return vec![];
+    }
+    // Values that stand still, as at an end of the range, tell nothing of noise.
+    let moves: Vec<f64> = (values.windows(2))
+        .map(|pair| (pair[1] - pair[0]).abs())
+        .filter(|distance| *distance > 0.0)
+        .collect();
+    let quartile = |p: f64| quantile(values, p).unwrap_or(0.0);
+    let least = SMOOTH * (quartile(0.75) - quartile(0.25)) / QUARTILES;
+    let noise = least.max(MEDIANS * median(&moves).unwrap_or(0.0) / 2f64.sqrt());
+    (values.windows(2 * SIDE + 1).zip(SIDE..))
+        .map(|(near, k)| {
+            let mut others = [near[0], near[1], near[3], near[4]];
+            others.sort_unstable_by(f64::total_cmp);
+            let outside = (near[SIDE] - others[2]).max(others[1] - near[SIDE]);
+            (k, outside / noise)
+        })
+        .filter(|(_, z)| *z > OUTLYING)
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outliers_are_seen_on_smooth_and_on_noisy_signals() {
+        let smooth: Vec<f64> = (0..300)
+            .map(|k| (f64::from(k) * 0.1).sin().powi(3))
+            .collect();
+        let edges: Vec<f64> = (0..300).map(|k| f64::from(k / 50 % 2)).collect();
+        assert_eq!(outliers(&smooth), []);
+        assert_eq!(outliers(&edges), []);
+        assert_eq!(outliers(&smooth[..49]), []);
+        let mut damaged = smooth;
+        damaged[60] = 3.0;
+        damaged[61] = 2.9;
+        damaged[120] -= 2.0;
+        let rows: Vec<usize> = outliers(&damaged).iter().map(|(k, _)| *k).collect();
+        assert_eq!(rows, [60, 61, 120]);
+    }
+}

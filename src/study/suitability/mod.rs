@@ -1,0 +1,225 @@
+//! Suitability of a record for a twin: faults of the record that would pass for faults of the twin, before any fit.
+//!
+//! | file | question |
+//! |---|---|
+//! | `time.rs` | is time in seconds, is the record sampled and long enough |
+//! | `channels.rs` | is a channel constant, clipped, coarse, with outliers |
+//! | `size.rs` | are inputs those of the plan, is a unit off by a power of ten |
+//! | `swapped.rs` | are two outputs swapped |
+//! | `information.rs` | how well the record can tell each parameter |
+//!
+//! Outputs are compared with runs of the twin under the record's own inputs, at points of the prior: what the twin does, too, is no
+//! fault of the record.
+
+mod channels;
+mod information;
+mod size;
+mod swapped;
+mod time;
+
+pub(crate) use information::Knowable;
+
+use super::{Study, StudyError};
+use crate::likelihood::{measured, time_constants};
+use crate::progress::Progress;
+use crate::record::{Drive, Record, Signal};
+use crate::setting::number;
+use crate::twin::Noise;
+use crate::twin::conformance::{Finding, Severity, short};
+use ndarray::s;
+
+/// Runs of the twin at draws of its prior, beside the one at the centre: one of them is near enough to any point of the prior for a
+/// comparison of sizes and shapes, and a slow simulator still answers within a minute or so.
+const DRAWS: u64 = 24;
+/// Samples that are looked at, at most: statistics of longer records say nothing new, and runs of the twin take time.
+const LOOKED_AT: usize = 20_000;
+
+/// Findings about a record and a twin.
+#[derive(Debug)]
+pub(crate) struct Suitability {
+    /// Results of the checks, those that passed too.
+    pub findings: Vec<Finding>,
+    /// Expected errors of the parameters; empty where they cannot be told.
+    pub parameters: Vec<Knowable>,
+}
+
+/// Runs of the twin under the inputs of a record.
+struct Runs {
+    /// With noise, at the centre of the prior.
+    centre: Option<Signal>,
+    /// With noise, at draws of the prior and at its centre; those that diverge are left out.
+    all: Vec<Signal>,
+}
+
+impl Study {
+    /// Checks whether a record suits this study's twin: units of time and channels, sampling, swapped or damaged channels, inputs
+    /// outside the plan, and parameters that the record cannot tell. A finding that is no pass names the remedy.
+    ///
+    /// # Errors
+    ///
+    /// [`StudyError`]: a plan whose input file cannot be read, cancellation.
+    pub fn check_suitability(
+        &self,
+        record: &Record,
+        seed: u64,
+        progress: &Progress,
+    ) -> Result<Vec<Finding>, StudyError> {
+        Ok(self.suitability(record, seed, progress)?.findings)
+    }
+
+    /// As [`check_suitability`](Self::check_suitability), with the expected errors of the parameters.
+    pub(crate) fn suitability(
+        &self,
+        record: &Record,
+        seed: u64,
+        progress: &Progress,
+    ) -> Result<Suitability, StudyError> {
+        let noise = Noise::new(seed, "suitability", 0);
+        let mut findings = Vec::new();
+        if let Err(error) = record.check_channels(&self.twin.signals()) {
+            findings.push(Finding::failure("channels", error.to_string()));
+            return Ok(Suitability {
+                findings,
+                parameters: vec![],
+            });
+        }
+        findings.push(Finding::pass("channels", self.described(record)));
+        let record = &beginning(record)?;
+        let stage = progress.stage("runs", DRAWS as usize + 4);
+        // A plan without inputs is no fault of the record.
+        let planned = (self.drives().ok()).and_then(|drives| drives.draw(noise).ok());
+        let reference = planned.and_then(|drive| self.planned(drive, noise));
+        stage.tick()?;
+        let constants = reference.as_ref().and_then(|r| self.time_constants(r));
+        let (mut found, unit) = time::check(self, record, constants);
+        findings.append(&mut found);
+        let drive = reference.as_ref().map(Record::drive);
+        let (mut found, factors) = size::check_inputs(self, record, drive);
+        findings.append(&mut found);
+        // Further checks are not to repeat what is known: they see the record in the right units.
+        let mut record = time::in_seconds(record, unit)?;
+        record = size::divided(&record, &factors, size::Side::Inputs)?;
+        let mut runs = Runs {
+            centre: None,
+            all: vec![],
+        };
+        let space = self.twin.parameters();
+        for draw in 0..=DRAWS {
+            let noise = noise.sample(draw);
+            let theta = match draw {
+                0 => space.centre(),
+                _ => space.draw_prior(noise),
+            };
+            let run = self.twin.simulate(&theta, record.drive(), noise);
+            if let Some(run) = run.ok().filter(|run| run.iter().all(|v| v.is_finite())) {
+                if draw == 0 {
+                    runs.centre = Some(run.clone());
+                }
+                runs.all.push(run);
+            }
+            stage.tick()?;
+        }
+        findings.append(&mut channels::check(
+            self,
+            &record,
+            drive,
+            runs.centre.as_ref(),
+        ));
+        let (mut found, order) = swapped::check(self, &record, &runs.all);
+        findings.append(&mut found);
+        record = swapped::in_order(&record, &order)?;
+        let (mut found, factors) = size::check_outputs(self, &record, &runs.all);
+        findings.append(&mut found);
+        record = size::divided(&record, &factors, size::Side::Outputs)?;
+        stage.tick()?;
+        let (finding, parameters) = information::check(self, &record, reference.as_ref());
+        findings.push(finding);
+        stage.tick()?;
+        Ok(Suitability {
+            findings,
+            parameters,
+        })
+    }
+
+    /// A record as the plan has them, simulated at the centre of the prior.
+    fn planned(&self, drive: Drive, noise: Noise) -> Option<Record> {
+        let drive = drive.first(LOOKED_AT);
+        let theta = self.twin.parameters().centre();
+        let outputs = self.twin.simulate(&theta, &drive, noise).ok()?;
+        Record::complete(drive, outputs).ok()
+    }
+
+    /// Fastest and slowest time constant along a planned record.
+    fn time_constants(&self, planned: &Record) -> Option<(f64, f64)> {
+        let records = std::slice::from_ref(planned);
+        let measured = measured(&self.twin, records, &self.beliefs()).ok()?;
+        let problem = crate::fit::problem::Problem::of_measured(&measured, records);
+        let theta = problem.centre();
+        let (_, states) = problem.states(&theta).ok()?.pop()?;
+        time_constants(&measured.twin, &theta, planned.drive(), &states)
+    }
+
+    /// Length, step and gaps of a record.
+    fn described(&self, record: &Record) -> String {
+        let drive = record.drive();
+        let gaps = match record.missing() {
+            0 => String::new(),
+            n => format!(
+                "; {n} outputs are missing: `fit` and `diagnose` leave them out, `estimate` needs `truetwin resample R.csv --step s --out R2.csv`"
+            ),
+        };
+        format!(
+            "{} inputs, {} outputs, {} samples at {} s{gaps}",
+            drive.inputs().ncols(),
+            record.outputs().ncols(),
+            record.samples(),
+            text(drive.dt())
+        )
+    }
+}
+
+/// The first samples of a long record.
+fn beginning(record: &Record) -> Result<Record, StudyError> {
+    if record.samples() <= LOOKED_AT {
+        return Ok(record.clone());
+    }
+    let outputs = record.outputs().slice(s![..LOOKED_AT, ..]).to_owned();
+    // A channel may have no value there; the whole record has one.
+    let begin = Record::new(record.drive().first(LOOKED_AT), outputs);
+    Ok(begin.unwrap_or_else(|_| record.clone()))
+}
+
+/// The findings, or one that says that there are none.
+fn or_pass(findings: Vec<Finding>, check: &'static str, message: &str) -> Vec<Finding> {
+    match findings.is_empty() {
+        true => vec![Finding::pass(check, message)],
+        false => findings,
+    }
+}
+
+/// A number to three digits.
+fn text(value: f64) -> String {
+    number(short(value))
+}
+
+/// A number to three digits with its unit.
+fn with_unit(value: f64, unit: &str) -> String {
+    match unit {
+        "" | "-" => text(value),
+        unit => format!("{} {unit}", text(value)),
+    }
+}
+
+/// Values of a channel that are not missing, with their samples.
+fn present(signal: &Signal, channel: usize) -> (Vec<usize>, Vec<f64>) {
+    let column = signal.column(channel);
+    let values = column.iter().copied().enumerate();
+    values.filter(|(_, value)| value.is_finite()).unzip()
+}
+
+impl Suitability {
+    /// Returns `true` if every check passed.
+    pub fn suits(&self) -> bool {
+        (self.findings.iter()).all(|finding| finding.severity == Severity::Pass)
+    }
+}

@@ -1,0 +1,79 @@
+//! Swapped outputs.
+
+use crate::record::{Record, RecordError, Signal};
+use crate::study::Study;
+use crate::twin::conformance::Finding;
+
+/// Correlation with another output's run that a swapped output has at least.
+const ALIKE: f64 = 0.5;
+/// Times that what is left unexplained, 1 − r, must be smaller for two outputs in the other order, as a geometric mean. In 30 simulated
+/// records of two tanks the right order was better by 3.5 to 27; at 4, swapped ones are missed.
+const BETTER: f64 = 2.0;
+
+/// Checks whether two outputs look more like each other's runs; also returns the order that they seem to have.
+pub(super) fn check(study: &Study, record: &Record, runs: &[Signal]) -> (Vec<Finding>, Vec<usize>) {
+    let outputs = study.twin().signals().outputs;
+    let mut order: Vec<usize> = (0..outputs.len()).collect();
+    // The parameters are unknown: the run that is most alike counts.
+    let alike = |i: usize, j: usize| {
+        let runs = runs
+            .iter()
+            .map(|run| correlation(record.outputs(), i, run, j));
+        runs.fold(f64::NEG_INFINITY, f64::max)
+    };
+    let mut findings = vec![];
+    for i in 0..outputs.len() {
+        for j in i + 1..outputs.len() {
+            if order[i] != i || order[j] != j {
+                continue;
+            }
+            let (own, other) = ([alike(i, i), alike(j, j)], [alike(i, j), alike(j, i)]);
+            let left =
+                |r: [f64; 2]| (1.0 - r[0]).max(f64::EPSILON) * (1.0 - r[1]).max(f64::EPSILON);
+            if other.iter().all(|r| *r > ALIKE) && left(other) * BETTER.powi(2) < left(own) {
+                let (a, b) = (&outputs[i].name, &outputs[j].name);
+                findings.push(Finding::warning(
+                    "swapped",
+                    format!(
+                        "output {a} looks like {b} and {b} like {a}: correlations with the twin's runs {:.2} and {:.2}, as given {:.2} and {:.2}; swap the columns, as in --columns {a}=B,{b}=A",
+                        other[0], other[1], own[0], own[1]
+                    ),
+                ));
+                order.swap(i, j);
+            }
+        }
+    }
+    if outputs.len() > 1 && findings.is_empty() {
+        findings.push(Finding::pass(
+            "swapped",
+            "each output looks like its own run",
+        ));
+    }
+    (findings, order)
+}
+
+/// The record with its outputs in another order.
+pub(super) fn in_order(record: &Record, order: &[usize]) -> Result<Record, RecordError> {
+    let outputs = record.outputs().select(ndarray::Axis(1), order);
+    Record::new(record.drive().clone(), outputs)
+}
+
+/// Correlation of an output with an output of a run, over the rows that have a value; 0 where one of them does not move.
+fn correlation(record: &Signal, i: usize, run: &Signal, j: usize) -> f64 {
+    let pairs: Vec<(f64, f64)> = (record.column(i).iter().copied())
+        .zip(run.column(j).iter().copied())
+        .filter(|(a, _)| a.is_finite())
+        .collect();
+    let n = pairs.len().max(1) as f64;
+    let (a, b) = pairs
+        .iter()
+        .fold((0.0, 0.0), |(a, b), p| (a + p.0 / n, b + p.1 / n));
+    let mut sums = [0.0; 3];
+    for (x, y) in &pairs {
+        sums[0] += (x - a) * (x - a);
+        sums[1] += (y - b) * (y - b);
+        sums[2] += (x - a) * (y - b);
+    }
+    let scale = (sums[0] * sums[1]).sqrt();
+    if scale > 0.0 { sums[2] / scale } else { 0.0 }
+}

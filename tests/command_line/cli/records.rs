@@ -1,0 +1,275 @@
+//! Records as data loggers write them: other names, separators, encodings, time stamps, steps.
+
+use super::{done, json, refused};
+use std::fs;
+use tempfile::TempDir;
+
+struct Place(TempDir);
+
+impl Place {
+    /// A folder with a record of the tanks.
+    fn new() -> Self {
+        let place = Self(tempfile::tempdir().unwrap());
+        let theta = "k1=0.6,k2=0.5,k3=0.55,k4=1";
+        let out = place.at("r.csv");
+        done(&[
+            "simulate", "--twin", "tanks", "--theta", theta, "--out", &out,
+        ]);
+        place
+    }
+
+    fn at(&self, name: &str) -> String {
+        self.0.path().join(name).display().to_string()
+    }
+
+    fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> String {
+        fs::write(self.0.path().join(name), bytes).unwrap();
+        self.at(name)
+    }
+
+    /// Rows of the record, the header left out.
+    fn rows(&self) -> Vec<Vec<String>> {
+        let text = fs::read_to_string(self.at("r.csv")).unwrap();
+        let rows = text.lines().skip(1);
+        rows.map(|row| row.split(',').map(str::to_owned).collect())
+            .collect()
+    }
+}
+
+const COLUMNS: [&str; 2] = ["--columns", "t=time (s),u=pump,y=level"];
+
+#[test]
+fn the_same_record_is_read_from_any_dialect() {
+    let place = Place::new();
+    let expected = done(&["features", &place.at("r.csv"), "--twin", "tanks"]);
+    let with = |separator: &str, header: &[&str], cell: &dyn Fn(&str) -> String| {
+        let mut lines = vec![header.join(separator)];
+        for row in place.rows() {
+            let cells: Vec<String> = row.iter().map(|value| cell(value)).collect();
+            let [t, u, y] = &cells[..] else {
+                panic!("{row:?}")
+            };
+            let all = [y, "ok", t, u];
+            lines.push(all.join(separator));
+        }
+        lines.join("\n") + "\n"
+    };
+    let same = |value: &str| value.to_owned();
+    let comma = |value: &str| value.replace('.', ",");
+    let header = ["level", "note", "time (s)", "pump"];
+    let german = with(";", &header, &comma);
+    let utf16: Vec<u8> = "\u{feff}"
+        .chars()
+        .chain(german.chars())
+        .flat_map(|c| {
+            let mut units = [0; 2];
+            c.encode_utf16(&mut units)
+                .iter()
+                .flat_map(|u| u.to_le_bytes())
+                .collect::<Vec<_>>()
+        })
+        .collect();
+    for (name, bytes) in [
+        ("german.csv", german.clone().into_bytes()),
+        ("tabs.txt", with("\t", &header, &same).into_bytes()),
+        ("mark.csv", [b"\xef\xbb\xbf", german.as_bytes()].concat()),
+        ("utf16.csv", utf16),
+        ("plain.csv", with(",", &header, &same).into_bytes()),
+    ] {
+        let file = place.write(name, bytes);
+        let call = ["features", &file, "--twin", "tanks"];
+        assert_eq!(done(&[&call[..], &COLUMNS].concat()), expected, "{name}");
+    }
+    // The columns of a study, and those of the call before them.
+    let study = "twin = 'tanks'\n[record.columns]\nt = 'time (s)'\nu = 'pump'\ny = 'level'\n";
+    let study = place.write("s.toml", study);
+    let german = place.at("german.csv");
+    assert_eq!(done(&["features", &german, "--study", &study]), expected);
+    let note = [
+        "features",
+        &german,
+        "--study",
+        &study,
+        "--columns",
+        "y=note",
+    ];
+    refused(
+        &note,
+        &["german.csv: column t is missing", "--columns t=NAME"],
+    );
+    let note = [&note[..5], &["t=time (s),u=pump,y=note"]].concat();
+    refused(&note, &["german.csv, row 2, column note", "\"ok\""]);
+}
+
+#[test]
+fn time_stamps_are_seconds_from_the_first() {
+    let place = Place::new();
+    let expected = done(&["features", &place.at("r.csv"), "--twin", "tanks"]);
+    let mut text = String::from("time;u;y\n");
+    for (k, row) in place.rows().iter().enumerate() {
+        // The hour at which clocks go forward, every other row in another zone.
+        let (half, seconds) = (k % 2 * 5, k / 2);
+        let (hour, zone) = if k % 3 == 0 {
+            (1, "+01:00")
+        } else {
+            (2, "+02:00")
+        };
+        let (minute, second) = (seconds / 60, seconds % 60);
+        text += &format!(
+            "2024-03-31T{hour:02}:{minute:02}:{second:02},{half}{zone};{};{}\n",
+            row[1], row[2]
+        );
+    }
+    let file = place.write("stamps.csv", text);
+    let call = ["features", &file, "--twin", "tanks", "--columns", "t=time"];
+    assert_eq!(done(&call), expected);
+}
+
+#[test]
+fn wrong_columns_are_refused_in_one_line() {
+    let place = Place::new();
+    let record = place.at("r.csv");
+    let call = |columns: &str, parts: &[&str]| {
+        refused(
+            &["fit", &record, "--twin", "tanks", "--columns", columns],
+            parts,
+        );
+    };
+    call(
+        "t=time",
+        &[
+            "r.csv: no column is called \"time\"",
+            "the columns are t, u, y",
+        ],
+    );
+    call(
+        "t=t,u=t",
+        &["r.csv: column \"t\" is to be both", "own column"],
+    );
+    call("y2=y", &["r.csv: no column is given for y1"]);
+    call(
+        "level=y",
+        &["no channel is called \"level\"", "there are t, u, y"],
+    );
+    call("t", &["\"t\" is not name=column"]);
+    call("t=t,t=t", &["t is given twice"]);
+    let study = place.write("s.toml", "twin = 'tanks'\n[record]\ncolumns = { t = 3 }\n");
+    refused(&["fit", &record, "--study", &study], &["s.toml, line 3"]);
+}
+
+/// Features need one step and all outputs; the message offers the verb that makes such a record.
+#[test]
+fn gaps_and_varying_steps_are_resampled() {
+    let place = Place::new();
+    let mut rows = place.rows();
+    rows.remove(200);
+    rows[100][2].clear();
+    let lines: Vec<String> = rows.iter().map(|row| row.join(",")).collect();
+    let gaps = place.write("gaps.csv", format!("t,u,y\n{}\n", lines.join("\n")));
+    let features = |record: &str| {
+        [
+            "features".into(),
+            record.into(),
+            "--twin".into(),
+            "tanks".into(),
+        ]
+    };
+    let call: [String; 4] = features(&gaps);
+    let call: Vec<&str> = call.iter().map(String::as_str).collect();
+    refused(
+        &call,
+        &[
+            "row 102, column y",
+            "`truetwin resample R.csv --step s --out R2.csv`",
+        ],
+    );
+    let out = place.at("even.csv");
+    let text = done(&["resample", &gaps, "--step", "0.5", "--out", &out]);
+    for part in [
+        "gaps.csv: 399 samples, steps of 0.5 to 1 s, 1 missing outputs",
+        "even.csv: 400 samples, a step of 0.5 s, 2 missing outputs",
+        "inputs: mean over each step",
+        "outputs: 0 interpolated, 2 left empty (gaps longer than 0.5005 s)",
+    ] {
+        assert!(text.contains(part), "{text}");
+    }
+    let out = place.at("coarse.csv");
+    let call = [
+        "resample", &gaps, "--step", "1", "--inputs", "hold", "--out", &out, "--json",
+    ];
+    let value = json(&call);
+    assert_eq!(value["schema"], "truetwin.resample/1");
+    assert_eq!(value["after"]["samples"], 200);
+    assert_eq!(value["after"]["missing"], 0);
+    refused(&call, &["coarse.csv exists already"]);
+    let study = place.write("s.toml", "twin = 'tanks'\n[record]\nstep = 1\n");
+    done(&["features", &out, "--study", &study]);
+    let slow = ["features", &out, "--twin", "tanks"];
+    refused(
+        &slow,
+        &[
+            "step is 1 s, the study's 0.5 s",
+            "truetwin resample R.csv --step 0.5",
+        ],
+    );
+    let other = place.at("x.csv");
+    for (step, part) in [
+        ("0", "step = 0 s"),
+        ("1e9", "leaves 1 sample"),
+        ("1e-9", "longer step"),
+    ] {
+        refused(
+            &["resample", &gaps, "--step", step, "--out", &other],
+            &[part],
+        );
+    }
+}
+
+/// Findings about a record end with 0, one line each; only a file that cannot be read ends with 2.
+#[test]
+fn a_record_is_checked_against_a_twin() {
+    let place = Place::new();
+    let record = place.at("r.csv");
+    let call = ["check", &record, "--twin", "tanks"];
+    let text = done(&call);
+    assert!(
+        text.lines().all(|line| line.starts_with("pass")) && text.contains("expected errors"),
+        "{text}"
+    );
+    let value = json(&[&call[..], &["--json"]].concat());
+    assert_eq!(value["schema"], "truetwin.suitability/1");
+    assert_eq!(value["suits"], true);
+    assert_eq!(value["parameters"][0]["name"], "k1");
+    let rows = place.rows();
+    let lines: Vec<String> = (rows.iter())
+        .map(|row| {
+            format!(
+                "{};{};{}",
+                1e3 * row[0].parse::<f64>().unwrap(),
+                row[1],
+                row[2]
+            )
+        })
+        .collect();
+    let slow = place.write("ms.csv", format!("ms;u;y\n{}\n", lines.join("\n")));
+    let columns = ["check", &slow, "--twin", "tanks", "--columns", "t=ms"];
+    let text = done(&columns);
+    let first = text
+        .lines()
+        .find(|line| line.starts_with("warning"))
+        .unwrap();
+    assert!(
+        first.contains("t seems to be in milliseconds; divide it by 1000"),
+        "{text}"
+    );
+    let value = json(&[&columns[..], &["--json"]].concat());
+    assert_eq!(value["suits"], false);
+    let other = done(&["check", &record, "--twin", "van-der-pol"]);
+    assert!(
+        other.starts_with("failure  channels") && other.contains("1 inputs, the twin has 0"),
+        "{other}"
+    );
+    let one = place.write("one.csv", "t,u,y\n0,1,2\n");
+    refused(&["check", &one, "--twin", "tanks"], &["1 rows of data"]);
+    refused(&["check", &record], &["no twin given"]);
+}
