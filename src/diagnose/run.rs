@@ -23,6 +23,7 @@ use super::quantify::share::shrinkage;
 use super::settings::DiagnoseSettings;
 use super::summary::{effects, nuisance, onset, parameters, remains};
 use super::thresholds::Thresholds;
+use crate::fit::climb::climb;
 use crate::likelihood::measured;
 use crate::math::six_digits;
 use crate::progress::Progress;
@@ -35,6 +36,8 @@ use std::time::Instant;
 
 /// Most effects that are named together.
 const MOST_EFFECTS: usize = 2;
+/// Most iterations of the last fit of what is accepted.
+const FINISH: usize = 80;
 /// Most kinds of noise that are added to the twin's own.
 const ROUNDS: usize = 2;
 
@@ -236,7 +239,8 @@ fn report(
     if !base.scales.has_equations() && !is_nearer(findings.model(&conclusion.accepted), model)? {
         conclusion = Conclusion::none_of_these();
     }
-    let accepted = findings.model(&conclusion.accepted);
+    let finished = finished(findings.model(&conclusion.accepted))?;
+    let accepted = finished.as_ref();
     let last = accepted.unwrap_or(model);
     let stage = progress.stage("where and how far", 4);
     let mut location = Location::default();
@@ -291,7 +295,7 @@ fn report(
             decision: conclusion.decision,
             effects: match verdict {
                 Verdict::StructuralGap if !settings.detection_only => {
-                    effects(findings, chances, &conclusion)
+                    effects(findings, chances, &conclusion, accepted)
                 }
                 _ => super::summary::absorbed(&absorbed),
             },
@@ -312,6 +316,16 @@ fn report(
         not_tested: not_tested.clone(),
         seconds: 0.0,
     })
+}
+
+/// The accepted model, its fit carried on to its end: the search stops where a hypothesis is known well enough to be compared.
+fn finished<'a>(accepted: Option<&Model<'a>>) -> Result<Option<Model<'a>>, DiagnoseError> {
+    let Some(model) = accepted else {
+        return Ok(None);
+    };
+    let fitted = climb(&model.problem, &model.fitted.theta, FINISH)?;
+    let finished = fitted.and_then(|fitted| model.refitted(fitted));
+    Ok(finished.or_else(|| Some(model.clone())))
 }
 
 /// Returns whether the free run of a black box's model is nearer to the record than that of the twin. Their likelihood is linearised about

@@ -19,6 +19,7 @@ pub(in crate::diagnose) fn effects(
     findings: &Findings<'_>,
     chances: &Chances,
     conclusion: &Conclusion,
+    accepted: Option<&Model<'_>>,
 ) -> Vec<EffectFit> {
     let mut all: Vec<EffectFit> = (findings.listed.iter())
         .filter_map(|found| {
@@ -34,7 +35,7 @@ pub(in crate::diagnose) fn effects(
     all.sort_by(|a, b| {
         (b.probability.total_cmp(&a.probability)).then(b.log_evidence.total_cmp(&a.log_evidence))
     });
-    if let Some(model) = findings.model(&conclusion.accepted) {
+    if let Some(model) = accepted {
         let gain = findings.gain(&conclusion.accepted).unwrap_or(0.0);
         let mut first: Vec<EffectFit> = (model.terms.iter())
             .map(|term| {

