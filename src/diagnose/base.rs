@@ -53,11 +53,13 @@ impl<'a> Base<'a> {
             theta
         });
         let problem = Problem::of_measured(measured, records);
+        // The same starts whatever the seed: which optimum is found must not depend on it.
+        let starts = Noise::new(0, "diagnose/starts", 0);
         let fitted = if !problem.is_simulated() {
             let initial: Vec<Vec<f64>> = initial.iter().map(|theta| problem.full(theta)).collect();
             let found = polish(
                 &problem,
-                search(&problem, &initial, noise, ITERATIONS)?,
+                search(&problem, &initial, starts, ITERATIONS)?,
                 ITERATIONS,
             )?;
             found.into_iter().next().map(|fitted| (problem, fitted))
