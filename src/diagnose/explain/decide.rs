@@ -4,7 +4,7 @@
 //! D     = log Σ w_h·Z_h − log Z_nothing               w: 0.6 shared by listed effects, 0.4 by unknown functions;  a gap if D > 2
 //! Z_nothing = Z_0 + mean_N Z_0(N)                     N: other kinds of noise, correlated or with outliers
 //! r(E)  = max_U log Z(E + U) − log Z(E)               E leaves nothing to explain if r < 4
-//! named : the largest log Z of what leaves nothing;  a larger set must be 2 nats and 2 % better, an unknown function alone must not be
+//! named : the largest log Z of what leaves nothing;  a larger set must be 2 nats better, an unknown function alone must not be better
 //! ```
 
 use super::search::Found;
@@ -96,10 +96,12 @@ impl<'a> Findings<'a> {
         self.set(keys).map(|f| f.gain)
     }
 
-    /// Nats that so many effects together cost: one of all that could stand beside the first, in either order.
+    /// Nats that so many effects together cost: one of all that could stand beside the first, in either order, and what could be the
+    /// first law's fine print.
     pub fn price(&self, count: usize) -> f64 {
         let pairs = 0.5 * (self.listed.len() as f64 - 1.0);
-        pairs.max(1.0).ln() * (count - 1) as f64
+        let top = self.listed.first().map_or(0.0, |f| f.gain.max(0.0));
+        (pairs.max(1.0).ln() + Thresholds::FINE_PRINT * top) * (count - 1) as f64
     }
 
     /// The kind of noise that the records ask for: where something is missing beside it, where nothing is without it.
@@ -223,11 +225,6 @@ enum Kind {
     Unknown,
 }
 
-/// Nats by which a larger set must be better than one of this gain: less could be its law's fine print.
-pub(in crate::diagnose) fn worth_another(gain: f64) -> f64 {
-    Thresholds::WORTH_ANOTHER.max(Thresholds::FINE_PRINT * gain)
-}
-
 /// Returns whether what an unknown function adds on top of a gain is no more than chance, or than a law's fine print.
 pub(in crate::diagnose) fn leaves_nothing(gain: f64, added: f64) -> bool {
     added < Thresholds::ADEQUATE.max(Thresholds::FINE_PRINT * gain)
@@ -297,7 +294,7 @@ pub(in crate::diagnose) fn decide(
             .filter(|c| c.0.len() == count && leaves_nothing(c.1, c.2))
             .max_by(|a, b| a.1.total_cmp(&b.1));
         if let Some(best) = best
-            && chosen.is_none_or(|c| best.1 > c.1 + worth_another(c.1))
+            && chosen.is_none_or(|c| best.1 > c.1 + Thresholds::WORTH_ANOTHER)
         {
             chosen = Some(best);
         }

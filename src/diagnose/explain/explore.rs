@@ -1,6 +1,6 @@
 //! The order of the search: single explanations, what they leave, pairs.
 
-use super::decide::{Findings, leaves_nothing, worth_another};
+use super::decide::{Findings, leaves_nothing};
 use super::search::{Breadth, Found, listed, own_theta, sort, unknown};
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::scales::Scales;
@@ -124,7 +124,7 @@ pub(in crate::diagnose) fn explore<'a>(
     findings.several = pairs(&findings, terms, origin, breadth, enough)?;
     for i in 0..findings.several.len().min(2) {
         let found = findings.several[i].clone();
-        let better = found.gain > top + worth_another(top);
+        let better = found.gain - findings.price(2) > top;
         if !better || i > 0 && !may_suffice(&found) {
             break;
         }
