@@ -88,7 +88,7 @@ fn the_cascaded_tanks_are_followed_on_a_record_never_seen() {
 
 /// These tanks overflow at the upper one, which the twin lacks. The share that closes is on a record that no fit has seen.
 ///
-/// With `TRUETWIN_PICTURES=docs/pictures` the pictures of docs/diagnosing-a-gap.md are drawn anew.
+/// With `TRUETWIN_PICTURES=docs/pictures` the picture of docs/diagnosing-a-gap.md is drawn anew.
 #[test]
 fn the_cascaded_tanks_lack_their_overflow() {
     let Some((record, validation)) = tanks_records() else {
@@ -238,17 +238,13 @@ fn the_heater_lacks_a_lag() {
     }
 }
 
-/// The pictures of the page, of every fourth sample: the record itself is not to be handed on.
+/// The picture of the page, of every fourth sample: the record itself is not to be handed on.
 fn draw(study: &Study, found: &mut Diagnosis, folder: &Path) {
     thin(&mut found.free_runs);
     found.validation_runs.as_mut().map(thin);
-    let shown = ["validation", "which"];
     let pictures = gap_pictures(study, found);
-    for name in shown {
-        let (_, svg) = pictures.iter().find(|(n, _)| *n == name).unwrap();
-        let path = folder.join(format!("tanks-{name}.svg"));
-        std::fs::write(path, svg).unwrap();
-    }
+    let (_, svg) = pictures.iter().find(|(n, _)| *n == "validation").unwrap();
+    std::fs::write(folder.join("tanks-validation.svg"), svg).unwrap();
 }
 
 fn thin(runs: &mut FreeRuns) {
