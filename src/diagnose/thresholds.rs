@@ -91,6 +91,8 @@ impl Thresholds {
     pub const NEARER: f64 = 0.95;
     /// Least probability of a name together with its rivals.
     pub const SAID: f64 = 0.5;
+    /// Probability below which an effect is not accepted, whatever its rivals: the best set is then one that leaves something.
+    pub const REFUTED: f64 = 0.1;
     /// Distance within which effects are rivals.
     pub const RIVALS: f64 = 3.0;
     /// Prior probability that something unknown is missing beside what a listed effect explains.

@@ -340,7 +340,9 @@ fn named(
         .iter()
         .filter_map(|key| chances.effects.get(key))
         .sum();
-    if together < Thresholds::SAID * keys.len() as f64 {
+    let alone = |key: &String| chances.effects.get(key).copied().unwrap_or(0.0);
+    let refuted = keys.iter().any(|key| alone(key) < Thresholds::REFUTED);
+    if refuted || together < Thresholds::SAID * keys.len() as f64 {
         return Conclusion::none_of_these();
     }
     let decision = match decision {
