@@ -1,0 +1,476 @@
+"""A simulator with its setting, and what can be asked about it."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, overload
+
+from . import _process, _records
+from ._errors import TruetwinError
+from ._records import Record, Records
+from ._report import Report
+from ._results import Check, Diagnosis, Estimate, Estimator, Fit, Json, Scorecard
+from ._server import Server
+from ._simulator import Array, Model, Parameter, Range, Simulator
+
+if TYPE_CHECKING:
+    import pandas as pd  # type: ignore[import-untyped, unused-ignore]
+
+Path_ = str | os.PathLike[str]
+
+
+class Twin:
+    """A simulator with its parameters, inputs and outputs.
+
+    Parameters
+    ----------
+    simulator : callable, optional
+        ``f(parameters, inputs, time)`` returns the outputs at `time`. `parameters` is a dict of floats, `inputs` a dict of
+        arrays, and `time` the array 0, step, 2·step, …. Input k acts from sample k to sample k + 1. One output is a sequence of one
+        number per sample; several are a tuple, the columns of an array, or a dict. The same call must give the same result.
+        A run that is not finite counts as diverged: return nan, or raise `Diverged`. Other exceptions end the call.
+        If `f` has an argument `step`, it gets the step in seconds. If it has an argument `seed`, it draws its own noise from it,
+        and none if it is None; `noise` is much faster. Without a callable, the twin is one that the program knows: give `study`, or
+        use `Twin.named`.
+    parameters : dict of str to (low, high) or Parameter
+        Range of plausible values for each parameter; `Parameter` adds bounds and a unit.
+    inputs, outputs : str, sequence of str, or dict of str to unit
+        Names in the order of a record's columns; ``inputs=()`` for a simulator without inputs.
+    step : float
+        Step of simulated records in seconds. Records for `fit` and `diagnose` bring their own.
+    noise : float or dict of str to float, optional
+        Standard deviation of the measurement noise of each output, for `simulate`, `pretrain`, `check` and `withheld`. `fit` and
+        `diagnose` estimate it from the record.
+    samples : int, optional
+        Number of samples of simulated records.
+    levels : (low, high), optional
+        Range of the random inputs of simulated records.
+    hold : int, optional
+        Number of samples for which a random input is held.
+    name : str, optional
+        Name in reports and estimators. The default is the name of the callable.
+    study : path, optional
+        Study file (TOML). With a callable, its ``twin`` is `name`.
+    workers : int, optional
+        Number of calls of the simulator at once, each in a thread. More than one is faster only if it releases the
+        interpreter lock, and then it must be safe to call from several threads.
+    threads : int, optional
+        Number of threads of the program. The default is all cores.
+    timeout : float, optional
+        Seconds that one run may take.
+
+    Examples
+    --------
+    >>> import numpy as np, truetwin
+    >>> def decay(parameters, inputs, time):
+    ...     return np.exp(-parameters["rate"] * time)
+    >>> twin = truetwin.Twin(decay, parameters={"rate": (0.1, 2.0)}, outputs="y", step=0.1)
+    >>> record = twin.simulate({"rate": 0.5})
+    """
+
+    def __init__(
+        self,
+        simulator: Simulator | None = None,
+        *,
+        parameters: Mapping[str, Parameter | Range] | None = None,
+        inputs: str | Sequence[str] | Mapping[str, str] = (),
+        outputs: str | Sequence[str] | Mapping[str, str] | None = None,
+        step: float | None = None,
+        noise: float | Mapping[str, float] | None = None,
+        samples: int = 300,
+        levels: Range | None = None,
+        hold: int = 20,
+        name: str | None = None,
+        study: Path_ | None = None,
+        workers: int = 1,
+        threads: int | None = None,
+        timeout: float = 60.0,
+    ) -> None:
+        self._study = study
+        self._threads = threads
+        self._workers = workers
+        self._timeout = timeout
+        self._noise: dict[str, float] = {}
+        self._model: Model | None = None
+        if simulator is None:
+            if parameters or outputs or noise is not None or inputs or step is not None:
+                raise ValueError("parameters, inputs, outputs, step and noise describe a callable; give it, or put them into the study file")
+            if (study is None) == (name is None):
+                raise ValueError("no simulator; give a callable, study=FILE or Twin.named(NAME)")
+            self.name = name
+            return
+        if not callable(simulator):
+            raise TypeError(f"simulator of type {type(simulator).__name__}; give a callable, study=FILE or Twin.named(NAME)")
+        if not parameters or not outputs or step is None:
+            raise ValueError("a callable needs parameters={name: (low, high)}, outputs=[name] and step=seconds")
+        self._model = Model(simulator, parameters, inputs, outputs, step, samples, levels, hold, name)
+        self.name = self._model.name
+        if noise is not None:
+            if study is not None:
+                raise ValueError("noise and study; put the noise into the study file, as an [[effect]] with id = \"sensor-noise\"")
+            names = self._model.outputs
+            self._noise = dict(noise) if isinstance(noise, Mapping) else dict.fromkeys(names, float(noise))
+            if unknown := set(self._noise) - set(names):
+                raise ValueError(f"noise of {', '.join(sorted(unknown))}; the outputs are {', '.join(names)}")
+
+    @classmethod
+    def named(cls, name: str, *, threads: int | None = None) -> Twin:
+        """Return a reference twin of the program, such as ``"tanks"``; ``truetwin twins`` lists them."""
+        return cls(name=name, threads=threads)
+
+    def __repr__(self) -> str:
+        return f"Twin({self.name or os.fspath(self._study or '')!r})"
+
+    def fit(
+        self,
+        records: Records,
+        *,
+        columns: Mapping[str, str] | None = None,
+        seed: int = 1,
+        out: Path_ | None = None,
+    ) -> Fit:
+        """Fit parameters, noise levels and starts to measured records; no training.
+
+        Parameters
+        ----------
+        records : record or sequence of records
+            A path of a CSV file, a DataFrame, or a dict of arrays, with the columns ``t`` and the names of inputs and outputs. nan
+            marks outputs that were not measured. A record without ``t`` has the twin's step.
+        columns : dict of str to str, optional
+            Column of the record for each name in the twin, as in ``{"t": "time", "push": "torque"}``.
+        seed : int, optional
+            The same seed gives the same result.
+        out : path, optional
+            New folder that keeps the program's files.
+
+        Returns
+        -------
+        Fit
+        """
+        with _Call(self) as call:
+            files = call.records(records, columns)
+            folder, text = call.folder("fit", [*files, *call.subject(), *call.columns(columns)], seed, out)
+            pictures = sorted(folder.glob("overlay*.svg"), key=lambda path: (len(path.name), path.name))
+            report = Report(text, pictures=tuple(path.read_text(encoding="utf-8") for path in pictures))
+            return Fit._of(_json(folder / "fit.json"), report)
+
+    def diagnose(
+        self,
+        records: Records,
+        validation: Record | None = None,
+        without: str | Sequence[str] | None = None,
+        *,
+        calibrate: int = 0,
+        columns: Mapping[str, str] | None = None,
+        seed: int = 1,
+        out: Path_ | None = None,
+    ) -> Diagnosis:
+        """Diagnose what the twin lacks: whether parameters explain the records, and if not, which effect is missing and where.
+
+        For a callable, effects of its sensors and actuators can be named, and a gap elsewhere is stated without a name.
+
+        Parameters
+        ----------
+        records : record or sequence of records
+            Measured records of one system, as for `fit`.
+        validation : record, optional
+            Record that no fit uses: the closed share of the gap is measured on it.
+        without : str or sequence of str, optional
+            Effects to exclude, as ``"sensor-bias"`` or ``"state-ceiling@h1"``.
+        calibrate : int, optional
+            Number of records of the fitted twin that are diagnosed alike, for a p-value.
+        columns, seed, out
+            As for `fit`.
+
+        Returns
+        -------
+        Diagnosis
+        """
+        with _Call(self) as call:
+            files = call.records(records, columns)
+            options = [*call.subject(), *call.columns(columns), "--calibrate", str(calibrate)]
+            if validation is not None:
+                options += ["--validation", *call.records(validation, columns)]
+            if without:
+                options += ["--without", without if isinstance(without, str) else ",".join(without)]
+            folder, text = call.folder("diagnose", [*files, *options], seed, out)
+            report = Report(text, page=(folder / "report.html").read_text(encoding="utf-8"))
+            return Diagnosis._of(_json(folder / "report.json"), report)
+
+    def pretrain(
+        self,
+        out: Path_,
+        *,
+        bank_size: int | None = None,
+        epochs: int | None = None,
+        seed: int = 1,
+    ) -> Estimator:
+        """Train an estimator of this twin on simulations; once for a twin and its settings.
+
+        Parameters
+        ----------
+        out : path
+            New file of the estimator. A call that was stopped goes on where it was.
+        bank_size, epochs : int, optional
+            Number of simulations, and of passes over them. The defaults are those of the program.
+        seed : int, optional
+            The same seed gives the same estimator.
+
+        Returns
+        -------
+        Estimator
+            Its file is an argument of `estimate`.
+        """
+        with _Call(self) as call:
+            options = [*call.subject(noise=True), "--out", os.fspath(out), *_option("--bank-size", bank_size), *_option("--epochs", epochs)]
+            raw = json.loads(call.run("pretrain", [*options, "--json"], seed))
+            return Estimator._of(raw, Path(out))
+
+    def estimate(
+        self,
+        record: Record,
+        estimator: Estimator | Path_,
+        *,
+        validation: Record | None = None,
+        always_refine: bool = False,
+        columns: Mapping[str, str] | None = None,
+        seed: int = 1,
+        out: Path_ | None = None,
+    ) -> Estimate:
+        """Estimate the parameters behind a record with a trained estimator.
+
+        Parameters
+        ----------
+        record : record
+            One record, as for `fit`, with the estimator's step.
+        estimator : Estimator or path
+            Estimator from `pretrain` of the same twin.
+        validation : record, optional
+            Second record of the same system, to score the calibrated twin.
+        always_refine : bool, optional
+            Refine even if the record is consistent with the network's estimate.
+        columns, seed, out
+            As for `fit`.
+
+        Returns
+        -------
+        Estimate
+        """
+        with _Call(self) as call:
+            options = [*call.records([record], columns), *call.columns(columns), "--estimator", os.fspath(estimator)]
+            if validation is not None:
+                options += ["--validation", *call.records(validation, columns)]
+            if always_refine:
+                options.append("--always-refine")
+            folder, text = call.folder("estimate", options, seed, out)
+            report = Report(text, pictures=((folder / "overlay.svg").read_text(encoding="utf-8"),))
+            return Estimate._of(_json(folder / "estimate.json"), report)
+
+    @overload
+    def simulate(
+        self, parameters: Mapping[str, float], inputs: pd.DataFrame, *, noise_free: bool = False, seed: int = 1
+    ) -> pd.DataFrame: ...
+
+    @overload
+    def simulate(
+        self,
+        parameters: Mapping[str, float],
+        inputs: str | os.PathLike[str] | Mapping[str, Any] | None = None,
+        *,
+        noise_free: bool = False,
+        seed: int = 1,
+    ) -> dict[str, Array]: ...
+
+    def simulate(
+        self, parameters: Mapping[str, float], inputs: Record | None = None, *, noise_free: bool = False, seed: int = 1
+    ) -> Any:
+        """Simulate a record.
+
+        Parameters
+        ----------
+        parameters : dict of str to float
+            Value of each parameter.
+        inputs : record, optional
+            Times and inputs, without outputs. The default is random levels, as in the study.
+        noise_free : bool, optional
+            Leave out all noise.
+        seed : int, optional
+            Seed of the inputs and the noise.
+
+        Returns
+        -------
+        dict of str to array, or DataFrame
+            The record; a DataFrame if `inputs` is one.
+        """
+        with _Call(self) as call:
+            theta = ",".join(f"{name}={float(value)!r}" for name, value in parameters.items())
+            file = call.path / "simulated.csv"
+            options = [*call.subject(noise=True), "--theta", theta, "--out", str(file)]
+            if inputs is not None:
+                options += ["--input", *call.records([inputs], None)]
+            if noise_free:
+                options.append("--noise-free")
+            call.run("simulate", options, seed)
+            model = self._model
+            record = _records.read(file, list(model.inputs) if model else [], list(model.outputs) if model else [])
+            return _records.as_frame(record) if _records.is_frame(inputs) else record
+
+    def check(
+        self, record: Record | None = None, *, columns: Mapping[str, str] | None = None, seed: int = 1
+    ) -> Check:
+        """Check the twin for mistakes; with a record, check whether it suits the twin.
+
+        Parameters
+        ----------
+        record : record, optional
+            Measured record.
+        columns, seed
+            As for `fit`.
+
+        Returns
+        -------
+        Check
+        """
+        with _Call(self) as call:
+            files = [] if record is None else [*call.records([record], columns), *call.columns(columns)]
+            # A failed check is an answer with exit code 1.
+            return Check._of(json.loads(call.run("check", [*files, *call.subject(noise=True), "--json"], seed, answers=(0, 1))))
+
+    def withheld(
+        self,
+        trials: int,
+        *,
+        detection_only: bool = False,
+        validation: bool = False,
+        like: Record | None = None,
+        columns: Mapping[str, str] | None = None,
+        seed: int = 1,
+        out: Path_ | None = None,
+    ) -> Scorecard:
+        """Score `diagnose` on simulated records whose truth is sealed; takes seconds to minutes per trial.
+
+        Parameters
+        ----------
+        trials : int
+            Number of trials, one record each.
+        detection_only : bool, optional
+            Stop each diagnosis at its verdict.
+        validation : bool, optional
+            Give each diagnosis a validation record.
+        like : record, optional
+            Measured record whose inputs, length, step and gaps the trials have. The default is the twin's plan.
+        columns, seed
+            As for `fit`.
+        out : path, optional
+            Folder that keeps the program's files; the same call with the same folder goes on where it was stopped.
+
+        Returns
+        -------
+        Scorecard
+        """
+        with _Call(self) as call:
+            options = [*call.subject(noise=True), "--trials", str(trials)]
+            options += ["--detection-only"] * detection_only + ["--validation"] * validation
+            if like is not None:
+                options += ["--like", *call.records([like], columns), *call.columns(columns)]
+            folder, text = call.folder("withheld", options, seed, out)
+            page = (folder / "scorecard.html").read_text(encoding="utf-8")
+            return Scorecard._of(_json(folder / "scorecard.json"), Report(text, page=page))
+
+
+class _Call:
+    """One call of the program: its temporary folder, and the server of a callable."""
+
+    def __init__(self, twin: Twin) -> None:
+        self._twin = twin
+        self._model = twin._model
+        self._stack = ExitStack()
+        self._server: Server | None = None
+        self._writer: _records.Writer | None = None
+
+    def __enter__(self) -> _Call:
+        with ExitStack() as stack:
+            self.path = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="truetwin-")))
+            if self._model is not None:
+                self._model.failure = None
+                self._server = stack.enter_context(Server(self._model))
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._stack.close()
+
+    def records(self, records: Records, columns: Mapping[str, str] | None) -> list[str]:
+        """Return the paths of records, after writing those that are no files."""
+        if self._writer is None:
+            model = self._model
+            known = None if model is None else [*model.inputs, *model.outputs]
+            self._writer = _records.Writer(self.path, columns, known, None if model is None else model.step)
+        return [self._writer.path(record) for record in _records.as_list(records)]
+
+    def columns(self, columns: Mapping[str, str] | None) -> list[str]:
+        """Return the option that names columns."""
+        if not columns:
+            return []
+        if odd := [name for name in columns.values() if "," in name]:
+            raise ValueError(f"columns: {odd[0]!r} holds a comma; rename the column")
+        return ["--columns", ",".join(f"{name}={column}" for name, column in columns.items())]
+
+    def subject(self, noise: bool = False) -> list[str]:
+        """Return the options that name the twin."""
+        twin = self._twin
+        if twin._study is not None:
+            return ["--study", os.fspath(twin._study)]
+        if self._model is None:
+            return ["--twin", str(twin.name)]
+        if noise and twin._noise:
+            study = self.path / "study.toml"
+            study.write_text(_study(self._model, twin._noise), encoding="utf-8")
+            return ["--study", str(study)]
+        return []
+
+    def run(self, verb: str, options: Sequence[str], seed: int, *, answers: Sequence[int] = (0,)) -> str:
+        """Run a verb and return what it prints."""
+        words = [verb, *options, "--seed", str(seed), *_option("--threads", self._twin._threads)]
+        environment = {}
+        if self._server is not None:
+            words += ["--program", self._server.command]
+            words += ["--workers", str(self._twin._workers), "--timeout", repr(float(self._twin._timeout))]
+            environment = self._server.environment
+        try:
+            return _process.run(words, environment, answers=answers)
+        except TruetwinError as error:
+            if self._model is None or self._server is None:
+                raise
+            # The callable is known by its name; the command of the relay says nothing to a user.
+            line = error.line.replace(f"`{self._server.command}`", f"`{self._model.name}`")
+            raise type(error)(line, error.exit_code) from self._model.failure
+
+    def folder(self, verb: str, options: Sequence[str], seed: int, out: Path_ | None) -> tuple[Path, str]:
+        """Run a verb that fills a folder; return the folder and what it prints."""
+        folder = self.path / "result" if out is None else Path(out)
+        return folder, self.run(verb, [*options, "--out", str(folder)], seed)
+
+
+def _option(name: str, value: int | None) -> list[str]:
+    return [] if value is None else [name, str(value)]
+
+
+def _json(path: Path) -> Json:
+    raw: Json = json.loads(path.read_text(encoding="utf-8"))
+    return raw
+
+
+def _study(model: Model, noise: Mapping[str, float]) -> str:
+    """Return a study file that adds measurement noise to the outputs of a model."""
+    effects = [f"twin = {json.dumps(model.name)}"]
+    for number, name in enumerate(model.outputs, start=1):
+        if name in noise:
+            target = "sensor" if len(model.outputs) == 1 else f"sensor{number}"
+            effects.append(f'[[effect]]\nid = "sensor-noise"\ntarget = "{target}"\nmagnitudes = {{ std = {float(noise[name])!r} }}')
+    return "\n".join(effects) + "\n"

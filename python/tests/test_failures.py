@@ -1,0 +1,256 @@
+"""Wrong calls, failing simulators, and the end of the program."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import truetwin
+from conftest import SETTING, heater
+from truetwin import _process, _server
+
+
+def test_a_wrong_record_is_one_line(twin, tmp_path):
+    with pytest.raises(truetwin.TruetwinError, match=r"missing\.csv") as caught:
+        twin.fit(tmp_path / "missing.csv")
+    assert caught.value.exit_code == 2 and "\n" not in caught.value.line
+    assert not caught.value.line.startswith("error")
+
+
+def test_wrong_arguments_are_refused_before_the_program_starts(record):
+    with pytest.raises(ValueError, match="needs parameters="):
+        truetwin.Twin(heater)
+    with pytest.raises(ValueError, match="give a callable, study=FILE"):
+        truetwin.Twin()
+    with pytest.raises(ValueError, match=r"gain = 3; give \(low, high\)"):
+        truetwin.Twin(heater, **{**SETTING, "parameters": {"gain": 3}})
+    with pytest.raises(ValueError, match="noise of speed; the outputs are temperature"):
+        truetwin.Twin(heater, **SETTING, noise={"speed": 1.0})
+    twin = truetwin.Twin(heater, **SETTING)
+    with pytest.raises(ValueError, match="different lengths .*power: 99"):
+        twin.fit({**record, "power": record["power"][:99]})
+    with pytest.raises(ValueError, match="temperature: .* holds other values than numbers"):
+        twin.fit({**record, "temperature": ["warm"] * 100})
+    with pytest.raises(TypeError, match="a record of type int"):
+        twin.fit([3])
+
+
+def test_a_wrong_description_is_named():
+    twisted = truetwin.Twin(heater, **{**SETTING, "parameters": {"gain": (3.0, 1.0)}})
+    with pytest.raises(truetwin.TruetwinError, match=r"the program `heater` .*invalid interval \[3, 1\]"):
+        twisted.simulate({"gain": 2.0})
+
+
+def test_an_exception_of_the_simulator_comes_through(record):
+    def broken(parameters, inputs, time):
+        return inputs["pwoer"]
+
+    twin = truetwin.Twin(broken, **SETTING)
+    with pytest.raises(truetwin.TruetwinError) as caught:
+        twin.fit(record)
+    assert "`broken` says: test_failures.py, line" in caught.value.line and "KeyError: 'pwoer'" in caught.value.line
+    assert isinstance(caught.value.__cause__, KeyError)
+    frames = caught.value.__cause__.__traceback__
+    while frames.tb_next:
+        frames = frames.tb_next
+    assert frames.tb_frame.f_code.co_name == "broken"
+    # A failed call leaves nothing behind in the next one.
+    with pytest.raises(truetwin.TruetwinError) as caught:
+        twin.fit("missing.csv")
+    assert caught.value.__cause__ is None
+
+
+@pytest.mark.parametrize(
+    ("result", "problem"),
+    [
+        (lambda n: np.zeros(n - 1), r"shape \(99,\) for the output temperature; return shape \(100,\)"),
+        (lambda n: 1.0, r"shape \(\) for the output temperature"),
+        (lambda n: np.zeros((n, 2)), r"shape \(100, 2\) for the output temperature"),
+        (lambda n: {"heat": np.zeros(n)}, "the outputs heat; return temperature"),
+        (lambda n: ["warm"] * n, "could not convert string to float"),
+        (lambda n: None, "returned None; end it with `return`"),
+    ],
+)
+def test_a_wrong_shape_is_named(record, result, problem):
+    twin = truetwin.Twin(lambda parameters, inputs, time: result(len(time)), **SETTING, name="odd")
+    with pytest.raises(truetwin.TruetwinError, match="test_failures.py, line .*" + problem):
+        twin.fit(record)
+
+
+def test_a_diverging_simulator_is_tried_elsewhere(record):
+    """Beyond tau = 30 nothing works, in one of four ways; the fit stays below."""
+
+    def fragile(parameters, inputs, time):
+        if parameters["tau"] > 30:
+            way = int(parameters["tau"] * 1e6) % 4
+            if way == 0:
+                raise truetwin.Diverged(time[-1])
+            if way == 1:
+                raise OverflowError("math range error")
+            return np.full(len(time), np.nan if way == 2 else np.inf)
+        return heater(parameters, inputs, time)
+
+    assert truetwin.Twin(fragile, **SETTING).fit(record).parameters["tau"] == pytest.approx(10.0, abs=0.5)
+
+
+def test_a_late_simulator_ends_the_call(record):
+    twin = truetwin.Twin(lambda *call: time.sleep(1.0), **SETTING, name="slow", timeout=0.2)
+    with pytest.raises(truetwin.TruetwinError, match="`slow` gave no answer within 0.2 s"):
+        twin.fit(record)
+
+
+def test_exit_codes_are_told_apart(monkeypatch, tmp_path):
+    program = tmp_path / "program"
+    monkeypatch.setattr("truetwin._binary.find", lambda: str(program))
+    twin = truetwin.Twin.named("tanks")
+    for script, kind, text in [
+        ("echo noise >&2; echo 'error: wrong call; do this' >&2; exit 2", truetwin.TruetwinError, "wrong call; do this"),
+        ("echo 'error: disk' >&2; exit 1", truetwin.InternalError, "ended with exit code 1: disk"),
+        ("kill -SEGV $$", truetwin.InternalError, "ended by signal 11"),
+        ("echo 'error: stopped' >&2; exit 130", truetwin.Interrupted, "stopped"),
+    ]:
+        program.write_text(f"#!/bin/sh\n{script}\n")
+        program.chmod(0o755)
+        with pytest.raises(truetwin.TruetwinError, match=text) as caught:
+            twin.fit("record.csv")
+        assert type(caught.value) is kind
+    program.write_text("no program")
+    with pytest.raises(truetwin.TruetwinError, match="cannot be started"):
+        twin.fit("record.csv")
+
+
+def test_the_program_is_found_or_named(monkeypatch, tmp_path):
+    from truetwin import _binary
+
+    given = os.environ["TRUETWIN"]
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
+    monkeypatch.setattr(_binary.sysconfig, "get_path", lambda *_: str(tmp_path / "scripts"))
+    assert _binary.find() == given
+    monkeypatch.setenv("TRUETWIN", str(tmp_path / "none"))
+    with pytest.raises(truetwin.TruetwinError, match="none: not an executable file"):
+        _binary.find()
+    monkeypatch.delenv("TRUETWIN")
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    with pytest.raises(truetwin.TruetwinError, match="install the wheel"):
+        _binary.find()
+    for folder in ("bin", "scripts"):
+        (tmp_path / folder).mkdir()
+        Path(tmp_path, folder, "truetwin").symlink_to(Path(given).resolve())
+        assert _binary.find() == str(tmp_path / folder / "truetwin")
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_ctrl_c_ends_the_program(tmp_path, terminal):
+    """In a process of its own, with and without a terminal; no process of the call is left."""
+    script = tmp_path / "slow.py"
+    script.write_text(
+        "import sys, time, truetwin\n"
+        "sys.path.insert(0, sys.argv[1])\n"
+        "from conftest import SETTING, heater\n"
+        "def slow(*call):\n"
+        "    print('called', flush=True)\n"
+        "    time.sleep(0.05)\n"
+        "    return heater(*call)\n"
+        "try:\n"
+        "    truetwin.Twin(slow, **SETTING, levels=(-1, 1), workers=2).pretrain('slow.est', bank_size=100000)\n"
+        "except KeyboardInterrupt:\n"
+        "    print('interrupted', flush=True)\n"
+    )
+    command = [sys.executable, str(script), str(Path(__file__).parent)]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "TMPDIR": str(tmp_path)}
+    errors = subprocess.PIPE
+    if terminal:
+        ours, errors = os.openpty()
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, cwd=tmp_path, env=environment, text=True)
+    if terminal:
+        os.close(errors)
+        shown = bytearray()
+        threading.Thread(target=drain, args=(ours, shown), daemon=True).start()
+    assert process.stdout.readline() == "called\n"
+    if terminal:
+        wait_for(lambda: b"/100000" in shown)
+    children = descendants(process.pid)
+    assert children, "the program and its relays"
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=20)
+    assert output.endswith("interrupted\n") and process.returncode == 0
+    wait_for(lambda: not any(alive(child) for child in children))
+    assert not list(tmp_path.glob("truetwin-*")), "temporary folders are gone"
+    if terminal:
+        assert b"error:" not in shown
+
+
+def drain(terminal: int, shown: bytearray) -> None:
+    try:
+        while piece := os.read(terminal, 4096):
+            shown += piece
+    except OSError:
+        pass
+
+
+def wait_for(condition) -> None:
+    deadline = time.monotonic() + 10
+    while not condition():
+        assert time.monotonic() < deadline, "waited 10 s in vain"
+        time.sleep(0.05)
+
+
+def descendants(pid: int) -> list[int]:
+    listed = subprocess.run(["ps", "-A", "-o", "pid=,ppid="], capture_output=True, text=True, check=True).stdout
+    parents = {int(line.split()[0]): int(line.split()[1]) for line in listed.splitlines()}
+    found = [pid]
+    for parent in found:
+        found += [child for child, of in parents.items() if of == parent]
+    return found[1:]
+
+
+def alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_standard_error_without_a_terminal_stays_empty(twin, csv, capfd):
+    twin.fit(csv)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_local_socket_asks_for_its_token(record, monkeypatch):
+    """The way of systems without Unix sockets."""
+    monkeypatch.delattr(_server.socket, "AF_UNIX")
+    twin = truetwin.Twin(heater, **SETTING)
+    assert twin.fit(record).parameters["gain"] == pytest.approx(2.0, abs=0.05)
+    with _server.Server(twin._model) as server:
+        command = shlex.split(server.command)
+        request = b'{"truetwin": 1, "request": "describe"}\n'
+        for token, code in [(server.environment["TRUETWIN_RELAY_TOKEN"], 0), ("wrong", 1)]:
+            environment = {**os.environ, "TRUETWIN_RELAY_TOKEN": token}
+            relay = subprocess.run(command, input=request, capture_output=True, env=environment, timeout=20)
+            assert relay.returncode == code
+            assert (b'"name": "heater"' in relay.stdout) == (code == 0)
+    with pytest.raises(ConnectionRefusedError):
+        _server.socket.create_connection(("127.0.0.1", int(command[-1])))
+
+
+def test_a_socket_has_a_short_path(twin, csv, monkeypatch, tmp_path):
+    deep = tmp_path / ("deep" * 30)
+    deep.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(deep))
+    assert twin.fit(csv).converged
+
+
+def test_progress_ends_where_the_error_begins():
+    shown = b"\r\x1b[2K   simulating 3/9\r\x1b[2Kerror: wrong\r\n"
+    found = _process._ERROR.search(shown)
+    assert shown[: found.end() - 7].endswith(b"3/9\r\x1b[2K")
