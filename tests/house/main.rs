@@ -4,6 +4,7 @@ mod book;
 mod cycles;
 mod dependencies;
 mod layering;
+mod public_api;
 mod ratchets;
 mod readme;
 mod source;
