@@ -72,3 +72,35 @@ fn the_oldest_rust_is_the_same_everywhere() {
         assert_eq!(format!("1.{minor}"), rust, "{name}");
     }
 }
+
+/// CITATION.cff repeats version, licences and description of the package.
+#[test]
+fn the_citation_is_of_this_version() {
+    let text = file("CITATION.cff");
+    let has = |line: &str| text.lines().any(|l| l.trim() == line);
+    assert!(has(&format!("version: {}", package("version"))));
+    for licence in package("license").split(" OR ") {
+        assert!(has(&format!("- {licence}")), "{licence}");
+    }
+    assert!(
+        text.to_lowercase()
+            .contains(&package("description").to_lowercase())
+    );
+}
+
+/// Actions of others are pinned by commit: a tag can be moved.
+#[test]
+fn actions_are_pinned() {
+    let text = file(".github/workflows/ci.yml");
+    let uses: Vec<&str> = text.split("uses: ").skip(1).collect();
+    assert!(!uses.is_empty());
+    for action in uses {
+        let (_, commit) = action.split_once('@').expect("name@commit");
+        let commit: String = commit.chars().take_while(|c| !c.is_whitespace()).collect();
+        assert!(
+            commit.len() == 40 && commit.chars().all(|c| c.is_ascii_hexdigit()),
+            "{commit}"
+        );
+    }
+    assert!(text.contains("run: .ci/run"));
+}
