@@ -20,3 +20,30 @@ pub(crate) fn ends(values: &[f64]) -> (f64, f64) {
             (low.min(*v), high.max(*v))
         })
 }
+
+/// Pearson's correlation; 0 where one of the two does not vary.
+pub(crate) fn correlation(pairs: &[(f64, f64)]) -> f64 {
+    let n = pairs.len().max(1) as f64;
+    let (a, b) = (pairs.iter()).fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
+    let (mut xx, mut yy, mut xy) = (0.0, 0.0, 0.0);
+    for (x, y) in pairs {
+        (xx, yy) = (xx + (x - a).powi(2), yy + (y - b).powi(2));
+        xy += (x - a) * (y - b);
+    }
+    if xx * yy > 0.0 {
+        xy / (xx * yy).sqrt()
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn known_correlations() {
+        assert_eq!(correlation(&[(1.0, 2.0), (2.0, 4.0), (3.0, 6.0)]), 1.0);
+        assert_eq!(correlation(&[(1.0, 2.0), (1.0, 4.0)]), 0.0);
+    }
+}

@@ -173,17 +173,3 @@ fn expressions_are_understood() {
         assert_eq!(met(expression, &allowed), right, "{expression}");
     }
 }
-
-/// The package leaves out files that only this repository needs.
-#[test]
-fn the_package_leaves_out_other_folders() {
-    let text = std::fs::read_to_string(root().join("Cargo.toml")).unwrap();
-    let file: toml::Table = toml::from_str(&text).unwrap();
-    let excluded = file["package"]["exclude"].as_array().unwrap();
-    for folder in ["fuzz", ".ci", "python"] {
-        assert!(
-            excluded.iter().any(|e| e.as_str() == Some(folder)),
-            "{folder}"
-        );
-    }
-}

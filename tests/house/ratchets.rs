@@ -105,7 +105,7 @@ fn crowded(sources: &Crate, most: usize) -> Vec<String> {
 
 fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     let items = sources.public_items();
-    let items = items.iter().map(|(m, n)| format!("{}::{n}", m.join("::")));
+    let items = items.keys().map(|(m, n)| format!("{}::{n}", m.join("::")));
     let errors = (sources.sources.values())
         .flat_map(|source| {
             let derives = source.code.split("# [ derive (").skip(1);

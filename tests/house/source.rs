@@ -29,8 +29,8 @@ pub struct Source {
     pub paths: Vec<Vec<String>>,
     /// `mod x;`, and whether it is public and shown.
     pub children: BTreeMap<String, bool>,
-    /// Items declared `pub` at the file's root and shown.
-    pub items: BTreeSet<String>,
+    /// Items declared `pub` at the file's root and shown, with their kinds: `fn`, `struct`.
+    pub items: BTreeMap<String, String>,
 }
 
 /// All files of `src/` by module. Files of tests are left out.
@@ -145,9 +145,9 @@ impl Source {
                     let kinds = ["fn", "struct", "enum", "trait", "type", "static"];
                     let constant = is(1, "const") && !kinds.contains(&item[0].as_str());
                     if constant && !hidden {
-                        self.items.insert(tokens[at + 2].clone());
+                        self.items.insert(tokens[at + 2].clone(), "const".into());
                     } else if kinds.contains(&item[0].as_str()) && !hidden {
-                        self.items.insert(item[1].clone());
+                        self.items.insert(item[1].clone(), item[0].clone());
                     }
                     if !is(1, "mod") && !is(1, "use") {
                         hidden = false;
@@ -396,37 +396,5 @@ impl Crate {
             .filter_map(|path| Some(self.resolve(module, path)?.0))
             .filter(|used| used != module)
             .collect()
-    }
-
-    /// Public items, as (module that declares it, name): reachable from the root by `pub mod` and `pub use`.
-    pub fn public_items(&self) -> BTreeSet<(Module, String)> {
-        let (mut items, mut open, mut seen) =
-            (BTreeSet::new(), vec![Module::new()], BTreeSet::new());
-        while let Some(module) = open.pop() {
-            if !seen.insert(module.clone()) {
-                continue;
-            }
-            let source = &self.sources[&module];
-            items.extend(
-                source
-                    .items
-                    .iter()
-                    .map(|name| (module.clone(), name.clone())),
-            );
-            let children = source.children.iter().filter(|(_, shown)| **shown);
-            open.extend(children.map(|(name, _)| child(&module, name)));
-            for import in source.imports.iter().filter(|import| import.public) {
-                let glob = import.path.last().is_some_and(|last| last == "*");
-                let path = &import.path[..import.path.len() - usize::from(glob)];
-                match self.resolve(&module, path) {
-                    Some((target, rest)) if rest.is_empty() => open.push(target),
-                    Some((target, rest)) if self.sources[&target].items.contains(&rest[0]) => {
-                        items.insert((target, rest[0].clone()));
-                    }
-                    _ => {}
-                }
-            }
-        }
-        items
     }
 }

@@ -4,6 +4,7 @@ use crate::cli::args::FileColumns;
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
+use crate::math::six_digits;
 use crate::record::{InputRule, Record, resample, write_record};
 use crate::setting::number;
 use clap::{Args, ValueEnum};
@@ -115,5 +116,5 @@ fn grid_line(name: &str, record: &Record) -> String {
 
 /// A number to six digits.
 fn short(value: f64) -> String {
-    number(format!("{value:.5e}").parse().unwrap_or(value))
+    number(six_digits(value))
 }

@@ -14,7 +14,7 @@ use std::sync::Arc;
 const FEW: usize = 3;
 /// Steps of the search that are reported: functions, effects, functions of the corrected twin, what is left, pairs.
 const STEPS: usize = 5;
-/// Single effects that are looked at for something left.
+/// Single effects that are looked at for something left, or for a second one beside them.
 const SINGLES: usize = 3;
 /// Least share of the best single effect's evidence of a first of a pair.
 const FIRST: f64 = 1.0 / 3.0;
@@ -192,7 +192,6 @@ fn pairs<'a>(
     breadth: Breadth,
     enough: bool,
 ) -> Result<Vec<Found<'a>>, DiagnoseError> {
-    let firsts = if enough { 1 } else { 3 };
     let thetas: Vec<Vec<f64>> = findings
         .listed
         .iter()
@@ -200,43 +199,18 @@ fn pairs<'a>(
         .filter_map(own_theta)
         .collect();
     let mut all: Vec<Found<'a>> = vec![];
-    let sources: Vec<Found<'a>> = match findings.beside.iter().find(|_| enough) {
-        Some(_) => {
-            let adequate = |f: &&Found<'a>| {
-                findings
-                    .left(&f.keys())
-                    .is_some_and(|l| leaves_nothing(f.gain, l))
-            };
-            findings
-                .listed
-                .iter()
-                .find(adequate)
-                .cloned()
-                .into_iter()
-                .collect()
-        }
-        None => (findings.listed.iter().take(firsts))
-            .filter(|f| f.gain > FIRST * findings.listed[0].gain)
-            .cloned()
+    let adequate = |f: &&Found<'a>| {
+        let left = findings.left(&f.keys());
+        left.is_some_and(|left| leaves_nothing(f.gain, left))
+    };
+    let stands_out = |f: &&Found<'a>| f.gain > FIRST * findings.listed[0].gain;
+    let sources: Vec<&Found<'a>> = match enough {
+        true => findings.listed.iter().find(adequate).into_iter().collect(),
+        false => (findings.listed.iter().take(SINGLES))
+            .filter(stands_out)
             .collect(),
     };
-    let mut keep = |found: Vec<Found<'a>>| {
-        for pair in found.into_iter().filter(|f| f.model.is_some()) {
-            let keys = pair.keys();
-            match all
-                .iter_mut()
-                .find(|p| p.keys().iter().all(|k| keys.contains(k)))
-            {
-                Some(old) if old.gain >= pair.gain => {}
-                Some(old) => *old = pair,
-                None => all.push(pair),
-            }
-        }
-        sort(&mut all);
-        all.first().cloned()
-    };
-    let mut best = None;
-    for first in &sources {
+    for first in sources {
         let Some(model) = &first.model else { continue };
         let others: Vec<Arc<Term>> = (terms.listed.iter())
             .filter(|t| !first.terms.iter().any(|own| own.key() == t.key()))
@@ -249,21 +223,36 @@ fn pairs<'a>(
             least: 3.0,
             ..breadth
         };
-        best = keep(listed(model, &others, origin, &thetas, seconds)?);
+        keep(&mut all, listed(model, &others, origin, &thetas, seconds)?);
     }
     // A pair that wins has rivals: the second effect beside the rivals of the first.
     let top = findings.listed.first().map_or(0.0, |f| f.gain);
-    if let Some(pair) = best.filter(|pair| pair.gain - findings.price(2) > top) {
+    let wins = |pair: &&Found<'a>| pair.gain - findings.price(2) > top;
+    if let Some(pair) = all.first().filter(wins).cloned() {
         let second = &pair.terms[pair.terms.len() - 1..];
         let (keys, first) = (pair.keys(), findings.gain(&pair.keys()[..1]).unwrap_or(top));
         let rivals = (findings.listed.iter())
             .filter(|f| f.gain > first - Thresholds::RIVALS && !keys.contains(&f.last().key()));
         for model in rivals.filter_map(|f| f.model.as_ref()).take(SINGLES) {
-            keep(listed(model, second, origin, &thetas, breadth)?);
+            keep(&mut all, listed(model, second, origin, &thetas, breadth)?);
         }
     }
     all.truncate(Thresholds::PAIRS);
     Ok(all)
+}
+
+/// Adds fitted pairs, of two of the same effects the better one; best first.
+fn keep<'a>(all: &mut Vec<Found<'a>>, found: Vec<Found<'a>>) {
+    for pair in found.into_iter().filter(|f| f.model.is_some()) {
+        let keys = pair.keys();
+        let same = |p: &&mut Found<'a>| p.keys().iter().all(|k| keys.contains(k));
+        match all.iter_mut().find(same) {
+            Some(old) if old.gain >= pair.gain => {}
+            Some(old) => *old = pair,
+            None => all.push(pair),
+        }
+    }
+    sort(all);
 }
 
 /// Listed effects that explain a parameter gap with θ inside the prior, as well as θ outside does: best first.

@@ -110,6 +110,9 @@ pub(in crate::diagnose) fn listed<'a>(
     thetas: &[Vec<f64>],
     breadth: Breadth,
 ) -> Result<Vec<Found<'a>>, DiagnoseError> {
+    if terms.is_empty() {
+        return Ok(vec![]);
+    }
     let promises = scan(model, terms)?;
     let chosen: Vec<_> = (promises.iter().enumerate())
         .filter(|(i, p)| *i < breadth.listed && p.nats() > breadth.least)

@@ -6,6 +6,7 @@ use super::places::Places;
 use super::world::Conditions;
 use crate::fit::climb::climb;
 use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::math::correlation;
 use crate::record::Record;
 use crate::study::Study;
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -71,31 +72,4 @@ pub(super) fn correlated(study: &Study, record: &Record) -> Result<Option<String
     let threshold = Normal::standard().inverse_cdf(1.0 - 0.5 * LEVEL / tests);
     let best = best.filter(|(size, _)| *size > threshold);
     Ok(best.map(|(_, place)| places.name(place).to_owned()))
-}
-
-/// Pearson's correlation; 0 where one of the two does not vary.
-fn correlation(pairs: &[(f64, f64)]) -> f64 {
-    let n = pairs.len().max(1) as f64;
-    let (a, b) = (pairs.iter()).fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
-    let (mut xx, mut yy, mut xy) = (0.0, 0.0, 0.0);
-    for (x, y) in pairs {
-        (xx, yy) = (xx + (x - a).powi(2), yy + (y - b).powi(2));
-        xy += (x - a) * (y - b);
-    }
-    if xx * yy > 0.0 {
-        xy / (xx * yy).sqrt()
-    } else {
-        0.0
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn known_correlations() {
-        assert_eq!(correlation(&[(1.0, 2.0), (2.0, 4.0), (3.0, 6.0)]), 1.0);
-        assert_eq!(correlation(&[(1.0, 2.0), (1.0, 4.0)]), 0.0);
-    }
 }

@@ -21,11 +21,12 @@ pub(crate) use information::Knowable;
 
 use super::{Study, StudyError};
 use crate::likelihood::{measured, time_constants};
+use crate::math::three_digits;
 use crate::progress::Progress;
 use crate::record::{Drive, Record, Signal};
 use crate::setting::number;
 use crate::twin::Noise;
-use crate::twin::conformance::{Finding, Severity, short};
+use crate::twin::conformance::{Finding, Severity};
 use ndarray::s;
 
 /// Runs of the twin at draws of its prior, beside the one at the centre: one of them is near enough to any point of the prior for a
@@ -199,7 +200,7 @@ fn or_pass(findings: Vec<Finding>, check: &'static str, message: &str) -> Vec<Fi
 
 /// A number to three digits.
 fn text(value: f64) -> String {
-    number(short(value))
+    number(three_digits(value))
 }
 
 /// A number to three digits with its unit.

@@ -55,9 +55,8 @@ pub(super) fn check_inputs(
         let plan = format!("the study's in {} to {}", text(low), unit(high));
         let reach = largest(&values) / low.abs().max(high.abs());
         let in_reach = |factor: f64| (REACHED.0..=REACHED.1).contains(&(reach / factor));
-        let powers = (1..=POWERS).flat_map(|n| [10f64.powi(n), 10f64.powi(-n)]);
         let is_doubted = !(REACHED.0 / DOUBTED..=DOUBTED).contains(&reach);
-        if is_doubted && let Some(factor) = powers.into_iter().find(|f| in_reach(*f)) {
+        if is_doubted && let Some(factor) = powers().find(|f| in_reach(*f)) {
             findings.push(Finding::warning(
                 "scale",
                 format!(
@@ -113,8 +112,7 @@ pub(super) fn check_outputs(
         if !beyond(own, DOUBTED) {
             continue;
         }
-        let powers = (1..=POWERS).flat_map(|n| [10f64.powi(n), 10f64.powi(-n)]);
-        let nearest = powers
+        let nearest = powers()
             .filter(|factor| !beyond(own / factor, USUAL))
             .min_by(|a, b| {
                 let off = |factor: f64| (own / factor / middle).ln().abs();
@@ -152,6 +150,11 @@ pub(super) fn check_outputs(
         }
         false => (or_pass(findings, "scale", pass), factors),
     }
+}
+
+/// Factors that a unit may be off by, the nearest first.
+fn powers() -> impl Iterator<Item = f64> {
+    (1..=POWERS).flat_map(|n| [10f64.powi(n), 10f64.powi(-n)])
 }
 
 fn conversion(factor: f64) -> String {

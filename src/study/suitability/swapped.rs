@@ -1,5 +1,6 @@
 //! Swapped outputs.
 
+use crate::math::correlation;
 use crate::record::{Record, RecordError, Signal};
 use crate::study::Study;
 use crate::twin::conformance::Finding;
@@ -15,10 +16,8 @@ pub(super) fn check(study: &Study, record: &Record, runs: &[Signal]) -> (Vec<Fin
     let outputs = study.twin().signals().outputs;
     let mut order: Vec<usize> = (0..outputs.len()).collect();
     // The parameters are unknown: the run that is most alike counts.
-    let alike = |i: usize, j: usize| {
-        let runs = runs
-            .iter()
-            .map(|run| correlation(record.outputs(), i, run, j));
+    let most = |i: usize, j: usize| {
+        let runs = runs.iter().map(|run| alike(record.outputs(), i, run, j));
         runs.fold(f64::NEG_INFINITY, f64::max)
     };
     let mut findings = vec![];
@@ -27,7 +26,7 @@ pub(super) fn check(study: &Study, record: &Record, runs: &[Signal]) -> (Vec<Fin
             if order[i] != i || order[j] != j {
                 continue;
             }
-            let (own, other) = ([alike(i, i), alike(j, j)], [alike(i, j), alike(j, i)]);
+            let (own, other) = ([most(i, i), most(j, j)], [most(i, j), most(j, i)]);
             let left =
                 |r: [f64; 2]| (1.0 - r[0]).max(f64::EPSILON) * (1.0 - r[1]).max(f64::EPSILON);
             if other.iter().all(|r| *r > ALIKE) && left(other) * BETTER.powi(2) < left(own) {
@@ -58,22 +57,11 @@ pub(super) fn in_order(record: &Record, order: &[usize]) -> Result<Record, Recor
     Record::new(record.drive().clone(), outputs)
 }
 
-/// Correlation of an output with an output of a run, over the rows that have a value; 0 where one of them does not move.
-fn correlation(record: &Signal, i: usize, run: &Signal, j: usize) -> f64 {
+/// Correlation of an output with an output of a run, over the rows that have a value.
+fn alike(record: &Signal, i: usize, run: &Signal, j: usize) -> f64 {
     let pairs: Vec<(f64, f64)> = (record.column(i).iter().copied())
         .zip(run.column(j).iter().copied())
         .filter(|(a, _)| a.is_finite())
         .collect();
-    let n = pairs.len().max(1) as f64;
-    let (a, b) = pairs
-        .iter()
-        .fold((0.0, 0.0), |(a, b), p| (a + p.0 / n, b + p.1 / n));
-    let mut sums = [0.0; 3];
-    for (x, y) in &pairs {
-        sums[0] += (x - a) * (x - a);
-        sums[1] += (y - b) * (y - b);
-        sums[2] += (x - a) * (y - b);
-    }
-    let scale = (sums[0] * sums[1]).sqrt();
-    if scale > 0.0 { sums[2] / scale } else { 0.0 }
+    correlation(&pairs)
 }

@@ -1,7 +1,7 @@
 //! Check of the step: half of it moves no output by more than its noise.
 
 use super::finding::Finding;
-use crate::math::deviation;
+use crate::math::{deviation, three_digits};
 use crate::record::Drive;
 use crate::twin::{MOST_SUBSTEPS, Noise, Now, SimulationError, StateSpace, Twin};
 
@@ -40,7 +40,7 @@ pub(crate) fn check_step(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<Fi
     let coarse: Vec<String> = (errors.iter().zip(&levels).zip(units))
         .filter(|((error, (level, _)), _)| error.1 > *level)
         .map(|(((name, error), (level, source)), unit)| {
-            let (error, level) = (short(*error), short(*level));
+            let (error, level) = (three_digits(*error), three_digits(*level));
             format!("{name} moves by {error} {unit} rms, {source} is {level} {unit}")
         })
         .collect();
@@ -82,9 +82,4 @@ fn step_levels(
             ),
         })
         .collect())
-}
-
-/// A number to three digits.
-pub(crate) fn short(value: f64) -> f64 {
-    format!("{value:.2e}").parse().unwrap_or(value)
 }

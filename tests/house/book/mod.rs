@@ -1,4 +1,4 @@
-//! The pages of `docs/` and the README say what is there: pages, links, calls, messages, and the quick start as it is printed.
+//! The pages of `docs/`, the README and CONTRIBUTING say what is there: pages, links, calls, messages, and the quick start as it is printed.
 
 mod calls;
 mod links;
@@ -18,14 +18,17 @@ fn read(path: &Path) -> String {
     fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// Every page: those of `docs/`, and the README.
+/// Pages outside the book.
+const OUTSIDE: [&str; 2] = ["CONTRIBUTING.md", "README.md"];
+
+/// Every page: those of `docs/`, and those outside the book.
 fn pages() -> Vec<PathBuf> {
     let entries = fs::read_dir(root().join("docs")).unwrap();
     let mut pages: Vec<PathBuf> = entries
         .map(|entry| entry.unwrap().path())
         .filter(|path| path.extension().is_some_and(|e| e == "md"))
         .collect();
-    pages.push(root().join("README.md"));
+    pages.extend(OUTSIDE.map(|name| root().join(name)));
     pages.sort();
     assert!(pages.len() > 10);
     pages
