@@ -48,6 +48,8 @@ def test_nothing_is_missing_in_a_record_of_the_twin(twin, csv, record):
     diagnosis = twin.diagnose(csv, validation=record)
     assert diagnosis.verdict == "no-gap" and diagnosis.decision == "not-needed" and diagnosis.accepted == ()
     assert diagnosis.raw["shrinkage"]["held_out"] != "last third of the record"
+    # Its level is fitted.
+    assert "sensor-noise@sensor" in diagnosis.raw["not_tested"]
 
 
 def test_frames_dicts_and_files_are_the_same_record(twin, record, csv):

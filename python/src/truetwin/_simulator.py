@@ -69,7 +69,7 @@ class Model:
         self.name = name or _name(simulator)
         self.failure: BaseException | None = None
         self._takes_step = _takes(simulator, "step")
-        self._takes_seed = _takes(simulator, "seed")
+        self.takes_seed = _takes(simulator, "seed")
         self._kept: dict[bytes, dict[str, Array]] = {}
         self._times: dict[tuple[float, int], Array] = {}
         record: dict[str, Any] = {"step": self.step, "samples": int(samples)}
@@ -94,7 +94,7 @@ class Model:
             keywords: dict[str, Any] = {}
             if self._takes_step:
                 keywords["step"] = step
-            if self._takes_seed:
+            if self.takes_seed:
                 keywords["seed"] = json.loads(seed)
             result = self.simulator(request["theta"], self._inputs(inputs), self._time(step, samples), **keywords)
             outputs = ",".join(f"{json.dumps(key)}:[{_numbers(column)}]" for key, column in self._columns(result, samples))

@@ -172,7 +172,8 @@ class Twin:
     ) -> Diagnosis:
         """Diagnose what the twin lacks: whether parameters explain the records, and if not, which effect is missing and where.
 
-        For a callable, effects of its sensors and actuators can be named, and a gap elsewhere is stated without a name.
+        For a callable, effects of its sensors and actuators can be named, and a gap elsewhere is stated without a name. The noise
+        level of a callable without `seed` is fitted, and is no gap.
 
         Parameters
         ----------
@@ -196,8 +197,12 @@ class Twin:
             options = [*call.subject(), *call.columns(columns), "--calibrate", str(calibrate)]
             if validation is not None:
                 options += ["--validation", *call.records(validation, columns)]
-            if without:
-                options += ["--without", without if isinstance(without, str) else ",".join(without)]
+            excluded = [without] if isinstance(without, str) else list(without or ())
+            if self._model is not None and not self._model.takes_seed and self._study is None:
+                # The noise level of such a twin is fitted in every hypothesis. As an effect it would count twice, and be a gap.
+                excluded.append("sensor-noise")
+            if excluded:
+                options += ["--without", ",".join(excluded)]
             folder, text = call.folder("diagnose", [*files, *options], seed, out)
             report = Report(text, page=(folder / "report.html").read_text(encoding="utf-8"))
             return Diagnosis._of(_json(folder / "report.json"), report)
