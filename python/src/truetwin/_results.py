@@ -37,6 +37,10 @@ class Result:
         return self.report._repr_html_()
 
 
+def _texts(raw: Json) -> tuple[str, ...]:
+    return tuple(f"{warning['what']}; {warning['remedy']}" for warning in raw.get("warnings", ()))
+
+
 @dataclass(frozen=True, repr=False)
 class Fit(Result):
     """Fitted parameters.
@@ -83,7 +87,7 @@ class Fit(Result):
             noise={n["name"]: n["value"] for n in raw["noise"]},
             at_bound=tuple(p["name"] for p in fitted if p["at_bound"] is not None),
             converged=raw["convergence"]["converged"],
-            warnings=tuple(raw["warnings"]),
+            warnings=_texts(raw),
         )
 
 
@@ -101,12 +105,14 @@ class Estimate(Result):
         Probability that an interval holds the parameter.
     initial : dict of str to float
         The network's estimate before any refinement.
-    p_value : float
+    p_value : float or None
         p-value of the consistency test of the initial estimate.
-    consistent : bool
-        Whether the calibrated twin is consistent with the record.
+    consistent : bool or None
+        Whether the calibrated twin is consistent with the record; None if this could not be tested.
     refitted : bool
         Whether the estimate was refined on this record.
+    warnings : tuple of str
+        Doubts about the result.
     """
 
     parameters: Mapping[str, float]
@@ -114,14 +120,15 @@ class Estimate(Result):
     intervals: Mapping[str, tuple[float, float]]
     level: float
     initial: Mapping[str, float]
-    p_value: float
-    consistent: bool
+    p_value: float | None
+    consistent: bool | None
     refitted: bool
+    warnings: tuple[str, ...]
 
     @classmethod
     def _of(cls, raw: Json, report: Report) -> Estimate:
         names, interval = raw["names"], raw["interval"]
-        last = raw["after"] or raw["gate"]
+        after = raw["after"]
         return cls(
             raw=raw,
             report=report,
@@ -131,8 +138,9 @@ class Estimate(Result):
             level=interval["level"],
             initial=dict(zip(names, raw["theta"]["initial"])),
             p_value=raw["gate"]["p_value"],
-            consistent=not last["out_of_distribution"],
-            refitted=raw["refitted"],
+            consistent=after["consistent"] if after else not raw["gate"]["out_of_distribution"],
+            refitted=after is not None,
+            warnings=_texts(raw),
         )
 
 
@@ -224,7 +232,7 @@ class Diagnosis(Result):
             parameters={p["name"]: p["refitted"] for p in raw["parameters"]},
             std_errors={p["name"]: p["std_error"] for p in raw["parameters"]},
             probabilities=which["probabilities"] or {},
-            warnings=tuple(raw.get("warnings", ())),
+            warnings=_texts(raw),
         )
 
 

@@ -1,7 +1,8 @@
-"""Forwards lines between the program ``truetwin`` and the Python process that holds the simulator.
+"""Connects the program ``truetwin`` to the Python process that holds the simulator.
 
-The program starts ``python relay.py ADDRESS`` as its simulator program. ADDRESS is the path of a Unix socket, or the port of
-a local TCP socket; then the environment variable TRUETWIN_RELAY_TOKEN proves that the program's own child connects.
+The program starts ``python relay.py ADDRESS`` as its simulator program. ADDRESS is the path of a Unix socket: the relay hands its
+pipes over, and the other process answers the program directly. Or ADDRESS is the port of a local TCP socket: the relay forwards
+lines, and the environment variable TRUETWIN_RELAY_TOKEN proves that the program's own child connects.
 """
 
 import os
@@ -10,7 +11,7 @@ import sys
 
 
 def main() -> int:
-    """Forwards requests and answers until the program closes standard input."""
+    """Serves the program until it closes standard input."""
     if len(sys.argv) != 2:
         sys.stderr.write("usage: relay.py ADDRESS; truetwin's Python package starts it\n")
         return 2
@@ -20,14 +21,22 @@ def main() -> int:
             connection = socket.create_connection(("127.0.0.1", int(address)))
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             connection.sendall(os.environ["TRUETWIN_RELAY_TOKEN"].encode() + b"\n")
+            forward(connection)
         else:
             connection = socket.socket(socket.AF_UNIX)
             connection.connect(address)
-        forward(connection)
+            hand_over(connection)
     except (OSError, KeyError, EOFError) as error:
         sys.stderr.write(f"no connection to the Python process that holds the simulator: {error!r}\n")
         return 1
     return 0
+
+
+def hand_over(connection: socket.socket) -> None:
+    """Hands standard input and output to the other process, and waits for its word that the program needs no more."""
+    socket.send_fds(connection, [b"\n"], [0, 1])
+    if not connection.recv(1):
+        raise EOFError("it has closed the connection")
 
 
 def forward(connection: socket.socket) -> None:
