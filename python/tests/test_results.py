@@ -120,6 +120,12 @@ def test_twins_of_the_program(tmp_path):
     assert fit.parameters.keys() == {"k1", "k2", "k3"}
 
 
+def test_a_study_file_changes_a_callable(record, tmp_path):
+    (tmp_path / "study.toml").write_text('twin = "heater"\n[fixed]\ntau = 10.0\n')
+    fit = truetwin.Twin(heater, **SETTING, study=tmp_path / "study.toml").fit(record)
+    assert fit.parameters.keys() == {"gain"}
+
+
 def test_several_outputs_in_every_shape(record):
     def rows(parameters, inputs, time):
         one = np.asarray(heater(parameters, inputs, time))

@@ -134,7 +134,7 @@ def read(path: Path, inputs: Sequence[str], outputs: Sequence[str]) -> dict[str,
     """Read a record that the program wrote; its columns get the given names where these are known."""
     with open(path, encoding="utf-8") as file:
         header = file.readline().strip().split(",")
-    table = np.genfromtxt(path, delimiter=",", skip_header=1, ndmin=2)
+    table = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
     if len(header) == 1 + len(inputs) + len(outputs) and outputs:
         header = ["t", *inputs, *outputs]
     return {name: np.array(table[:, k]) for k, name in enumerate(header)}

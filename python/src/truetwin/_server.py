@@ -30,6 +30,8 @@ class Server:
     """
 
     def __init__(self, model: Model) -> None:
+        if not sys.executable:
+            raise TruetwinError("sys.executable is empty: this Python cannot start another one; use a Python with an executable")
         self._model = model
         self._open: set[socket.socket] = set()
         self._lock = threading.Lock()
@@ -46,8 +48,8 @@ class Server:
             self._listener = socket.create_server(("127.0.0.1", 0))
             address = str(self._listener.getsockname()[1])
         self._listener.listen(64)
-        if not sys.executable:
-            raise TruetwinError("sys.executable is empty: this Python cannot start another one; use a Python with an executable")
+        # Not every system wakes a thread that waits for a connection when the socket is closed.
+        self._listener.settimeout(0.5)
         # Isolated and without site-packages: the relay starts fast, and sees nothing of this process's paths.
         words = [sys.executable, "-I", "-S", str(Path(relay.__file__).resolve()), address]
         #: The value of ``--program``.
@@ -81,6 +83,9 @@ class Server:
         while True:
             try:
                 connection, _ = self._listener.accept()
+                connection.settimeout(None)
+            except TimeoutError:
+                continue
             except OSError:
                 return
             with self._lock:
