@@ -37,6 +37,8 @@ pub(super) struct Context<'a> {
     pub external: Option<&'a Project>,
     /// Name of the program.
     pub program: &'a str,
+    /// The call, without options that change no result.
+    pub call: String,
     pub json: bool,
     pub seed: u64,
     pub progress: &'a Progress,

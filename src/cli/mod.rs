@@ -20,7 +20,9 @@ mod context;
 mod external;
 mod failure;
 mod output;
+mod posterior;
 mod progress;
+mod provenance;
 mod records;
 mod say;
 mod stop;
@@ -81,6 +83,7 @@ fn run_from<P: Into<Project>, E: Into<StudyError>>(
     let program = (words.first())
         .and_then(|word| Some(Path::new(word).file_stem()?.to_str()?.to_owned()))
         .unwrap_or_else(|| "truetwin".into());
+    let call = provenance::call(&program, &words);
     stop::listen();
     stop::report_file_size_limit();
     let projects: Result<Vec<Project>, E> = (projects.into_iter())
@@ -90,7 +93,7 @@ fn run_from<P: Into<Project>, E: Into<StudyError>>(
         .map_err(|error| Failure::from(error.into()))
         .and_then(|projects| {
             in_pool(parsed.threads, || {
-                dispatch(&parsed, &program, &projects, &ranks)
+                dispatch(&parsed, &program, call, &projects, &ranks)
             })
         });
     match result {
@@ -137,6 +140,7 @@ fn in_pool<R: Send>(
 fn dispatch(
     arguments: &Arguments,
     program: &str,
+    call: String,
     registered: &[Project],
     ranks: &Ranks,
 ) -> Result<ExitCode, Failure> {
@@ -151,6 +155,7 @@ fn dispatch(
         projects: &projects,
         external: external.as_ref(),
         program,
+        call,
         json: arguments.json,
         seed: arguments.seed,
         progress: &progress,

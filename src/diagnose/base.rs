@@ -76,11 +76,9 @@ impl<'a> Base<'a> {
             Some(j) => sensors[j].clone(),
             None => name.to_owned(),
         };
-        let noisy = (measured.levels.iter())
-            .map(|level| match level.is_process {
-                true => level.parameter.target().to_owned(),
-                false => place(level.parameter.target()),
-            })
+        let noisy = (space.iter())
+            .filter(|parameter| parameter.role == Role::Noise)
+            .map(|parameter| place(parameter.target()))
             .collect();
         Self::of(model, noisy, vec![])
     }

@@ -32,8 +32,8 @@ pub use error::{DiagnoseError, GivenRecord};
 pub(crate) use outcome::Cell;
 pub use outcome::{
     Band, Cause, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit, FittedParameter,
-    FreeRuns, Lag, Location, Maps, MissingFunction, NextInput, Onset, Probabilities, Region,
-    Remains, Shrinkage, TargetShare, Term, Verdict, Visible, Window,
+    FreeRuns, Horizon, Lag, Location, Maps, MissingFunction, NextInput, Onset, Probabilities,
+    Region, Remains, Shrinkage, TargetShare, Term, Verdict, Visible, Window,
 };
 pub(crate) use quantify::share::SHORTEST_SPLIT;
 pub use run::diagnose;

@@ -19,7 +19,7 @@ use super::quantify::calibrate::calibrate;
 use super::quantify::free_run::{Runner, free_runs, root};
 use super::quantify::next_input::next_input;
 use super::quantify::power::power;
-use super::quantify::share::shrinkage;
+use super::quantify::share::{Measures, shrinkage};
 use super::settings::DiagnoseSettings;
 use super::summary::{effects, nuisance, onset, parameters, remains};
 use super::thresholds::Thresholds;
@@ -262,15 +262,15 @@ fn report(
         visible = power(model, listed)?;
         stage.tick()?;
         let validation = validation.map(std::slice::from_ref);
-        let initial = settings.initial.as_deref();
-        shrunk = shrinkage(
-            model,
+        let measures = Measures {
+            base: model,
             accepted,
-            &findings.listed,
+            others: &findings.listed,
+            class: &conclusion.class,
             validation,
-            initial,
-            noise,
-        )?;
+            initial: settings.initial.as_deref(),
+        };
+        shrunk = shrinkage(&measures, noise)?;
         stage.tick()?;
     }
     let runs = |records: &[Record]| -> Result<FreeRuns, DiagnoseError> {

@@ -47,6 +47,13 @@ impl Thresholds {
 impl Thresholds {
     /// Level of all intervals.
     pub const INTERVAL_LEVEL: f64 = 0.9;
+    /// Horizons of predictions in samples, up to a tenth of the record.
+    pub const HORIZONS: [usize; 6] = [1, 3, 10, 30, 100, 300];
+    /// Standard deviations of the floor that the error before lies above it, for a share to be given. At 1 shares of 5 or −3 are noise; at
+    /// 4 a gap of 10 nats has none.
+    pub const CLEAR: f64 = 2.0;
+    /// Effects drawn at random, fitted alike, as a control.
+    pub const RANDOM_EFFECTS: usize = 5;
     /// Records simulated for the floor.
     pub const FLOOR_RECORDS: u64 = 32;
     /// Resamples of the free-run error.

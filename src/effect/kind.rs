@@ -51,6 +51,7 @@ type MagnitudeCheck = fn(&[f64], f64) -> Result<(), String>;
 pub struct EffectKind {
     id: String,
     formula: String,
+    sentence: Option<String>,
     law: Law,
     batch: Batch,
     magnitudes: Vec<Magnitude>,
@@ -142,6 +143,7 @@ impl EffectKind {
         Self {
             id: id.into(),
             formula: formula.into(),
+            sentence: None,
             law,
             batch: Batch::None,
             magnitudes: vec![],
@@ -189,6 +191,14 @@ impl EffectKind {
         self
     }
 
+    /// Says in a sentence what the effect does. `{place}` stands for where it acts, `{other}` for the other state, `{name}` for the
+    /// magnitude of that name with its unit, `{%name}` for it in percent.
+    #[must_use]
+    pub fn with_sentence(mut self, sentence: &str) -> Self {
+        self.sentence = Some(sentence.into());
+        self
+    }
+
     /// Makes it a law between two states.
     #[must_use]
     pub fn other(mut self, other: OtherState) -> Self {
@@ -225,6 +235,11 @@ impl EffectKind {
     /// Returns the law in one line, for people.
     pub fn formula(&self) -> &str {
         &self.formula
+    }
+
+    /// Returns what it does in a sentence with names in braces, if it has one.
+    pub fn sentence(&self) -> Option<&str> {
+        self.sentence.as_deref()
     }
 
     /// Returns the law.

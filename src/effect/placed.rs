@@ -124,6 +124,11 @@ impl Effect {
         &self.kind
     }
 
+    /// Returns what it does in a sentence with names in braces ([`EffectKind::with_sentence`]), if it has one.
+    pub(crate) fn sentence(&self) -> Option<&str> {
+        self.kind.sentence()
+    }
+
     /// Returns the law.
     pub(crate) fn law(&self) -> &Law {
         self.kind.law()

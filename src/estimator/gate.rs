@@ -24,6 +24,11 @@ use nalgebra::{DMatrix, DVector};
 use ndarray::{Array2, ArrayView1};
 use serde::{Deserialize, Serialize};
 
+/// Monte-Carlo errors between p-value and level that leave the answer to chance in fewer than 1 of 20 cases.
+const UNSURE: f64 = 2.0;
+/// Simulations of the test of an unsure answer, over those of the first: they halve its Monte-Carlo error.
+const MORE: usize = 4;
+
 /// Which form of the test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -120,6 +125,16 @@ impl GateSettings {
         }
     }
 
+    /// The settings of a test that is four times as large.
+    pub(super) fn larger(&self) -> Self {
+        Self {
+            simulations: MORE * self.simulations,
+            per_feature: MORE * self.per_feature,
+            null: MORE * (self.null + 1) - 1,
+            ..self.clone()
+        }
+    }
+
     /// μ and S^{-1/2} from simulated features, in the form of the test.
     pub fn whiten(&self, features: &Array2<f64>) -> Result<Whitening, EstimatorError> {
         match self.form {
@@ -136,12 +151,28 @@ impl GateSettings {
 pub struct GateOutcome {
     /// (1 + number of simulations at least as far) / (B + 1).
     pub p_value: f64,
+    /// Monte-Carlo standard error of `p_value`, √(p(1 − p)/(B + 1)).
+    pub p_error: f64,
+    /// Number of simulations B that the record is ranked among.
+    pub simulations: usize,
     /// Nominal rate.
     pub alpha: f64,
     /// `true` if the record is not what the twin makes at this θ.
     pub out_of_distribution: bool,
     /// s of the record.
     pub statistic: f64,
+}
+
+impl GateOutcome {
+    /// Returns whether no simulation is as far as the record: p is below `p_value`.
+    pub(crate) fn at_floor(&self) -> bool {
+        self.p_value * (self.simulations as f64 + 1.0) < 1.5
+    }
+
+    /// Returns whether other random numbers could well turn the answer.
+    pub(super) fn is_unsure(&self) -> bool {
+        (self.p_value - self.alpha).abs() < UNSURE * self.p_error
+    }
 }
 
 /// Simulator and settings of the test.
@@ -309,9 +340,12 @@ impl Gate {
                 threshold.is_ok_and(|threshold| statistic > threshold)
             }
         };
+        let simulations = self.null.len();
         GateOutcome {
             statistic,
             p_value,
+            p_error: (p_value * (1.0 - p_value) / (simulations as f64 + 1.0)).sqrt(),
+            simulations,
             alpha,
             out_of_distribution,
         }

@@ -4,7 +4,6 @@
 //! likelihood of a whole record has a top for each cycle that is lost. Over the first quarter of a record there is one.
 
 use crate::fit::climb::{Fitted, climb};
-use crate::fit::first_part::first_part;
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::record::Record;
@@ -43,7 +42,7 @@ pub(crate) fn base_fit(
     for (level, share) in SHARES.into_iter().enumerate() {
         let begun: Vec<Record> = (problem.records.iter())
             .map(|r| {
-                let part = first_part(r, ((share * r.samples() as f64) as usize).max(1));
+                let part = r.first_part(((share * r.samples() as f64) as usize).max(1));
                 part.unwrap_or_else(|| r.clone())
             })
             .collect();

@@ -5,21 +5,22 @@
 //! | `run.rs`, `outcome.rs` | a fit from beginning to end, and its result |
 //! | `magnitude.rs`, `effects.rs` | how large an effect may be, and where a search for it begins |
 //! | `problem.rs`, `axis.rs` | what is unknown, in which bounds, and what is known before |
+//! | `score.rs` | how well a fit predicts a record that it has not seen |
 //! | `follow.rs` | how the fitted twin follows its records |
 //! | `starts.rs`, `growing.rs` | where does a search begin |
 //! | `climb.rs`, `slope.rs` | the most probable θ |
 //! | `certificate.rs` | has the search arrived, and what lies at a bound |
 //! | `evidence.rs` | the likelihood averaged over the prior |
 //! | `reference.rs` | linear gain of a direction beside θ |
-//! | `posterior.rs` | draws of θ given the records |
+//! | `posterior.rs`, `draws.rs` | draws of θ given the records, and as a table |
 //! | `least_squares/` | Gauss–Newton on residuals, on argmin |
 
 pub(crate) mod axis;
 pub(crate) mod certificate;
 pub(crate) mod climb;
+mod draws;
 mod effects;
 pub(crate) mod evidence;
-pub(crate) mod first_part;
 pub(crate) mod follow;
 pub(crate) mod growing;
 pub(crate) mod least_squares;
@@ -29,12 +30,17 @@ pub(crate) mod posterior;
 pub(crate) mod problem;
 pub(crate) mod reference;
 mod run;
+mod score;
 mod slope;
 pub(crate) mod starts;
 
 pub use certificate::Side;
+pub use draws::Posterior;
+pub(crate) use outcome::NOT_CONVERGED;
 pub use outcome::{
     Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedStart, FittedValue, Nuisance,
     OutputErrors, Warning,
 };
 pub(crate) use run::{Subject, run};
+pub use score::FitScore;
+pub(crate) use score::score;

@@ -1,6 +1,7 @@
 //! Result of a fit.
 
 use super::certificate::Side;
+use super::draws::Posterior;
 use crate::record::Signal;
 use serde::Serialize;
 
@@ -11,6 +12,8 @@ pub struct FitSettings {
     pub seed: u64,
     /// Level of the intervals, in (0, 1).
     pub level: f64,
+    /// Number of posterior draws to return; each costs four likelihoods, of a black box an ensemble of simulations each.
+    pub draws: usize,
 }
 
 impl Default for FitSettings {
@@ -18,6 +21,7 @@ impl Default for FitSettings {
         Self {
             seed: 0,
             level: 0.9,
+            draws: 0,
         }
     }
 }
@@ -44,10 +48,16 @@ pub struct Fit {
     pub errors: Vec<OutputErrors>,
     /// Reasons for doubt.
     pub warnings: Vec<Warning>,
+    /// Draws of everything unknown, where they were asked for.
+    #[serde(skip)]
+    pub posterior: Option<Posterior>,
     /// Number of samples of all records.
     pub samples: usize,
     /// Wall time in seconds.
     pub seconds: f64,
+    /// Innovations of each record in their own units, N × outputs: independent N(0, 1) if the twin is right.
+    #[serde(skip)]
+    pub residuals: Vec<Signal>,
     /// Free run beside each record, N × outputs; none where it diverges.
     #[serde(skip)]
     pub free_runs: Vec<Option<Signal>>,
@@ -163,6 +173,9 @@ pub struct OutputErrors {
     /// Standard deviation of the record: what a constant would reach.
     pub deviation: f64,
 }
+
+/// Code of the warning that a search has not arrived.
+pub(crate) const NOT_CONVERGED: &str = "not-converged";
 
 /// Something that makes the result doubtful.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]

@@ -1,7 +1,7 @@
 //! A twin and the records that it is fitted to.
 
 use crate::fit::axis::{Axis, Family};
-
+use crate::fit::draws::of_record;
 use crate::likelihood::kalman::{Coordinates, FilterError, Filtered, Score, Smoothed};
 use crate::likelihood::{Likelihood, Measured, likelihood_of};
 use crate::record::{Record, Signal};
@@ -130,6 +130,15 @@ impl<'a> Problem<'a> {
         self.likelihood.outline()
     }
 
+    /// Name of an entry of the full θ.
+    pub(super) fn name(&self, entry: usize) -> String {
+        let space = self.twin.parameters();
+        let place = (self.places.iter().enumerate())
+            .find_map(|(r, place)| Some((r, place.iter().position(|&j| j == entry)?)));
+        let (r, j) = place.unwrap_or((0, entry));
+        of_record(space[j].name.clone(), r)
+    }
+
     /// Number of samples of all records.
     pub fn samples(&self) -> usize {
         self.records.iter().map(Record::samples).sum()
@@ -228,6 +237,11 @@ impl<'a> Problem<'a> {
             log_likelihood,
             innovations,
         })
+    }
+
+    /// Outputs of a record predicted from its rows before, at θ of one record; `None` where only free runs are known.
+    pub fn predicted(&self, theta: &[f64], record: &Record) -> Result<Option<Signal>, FilterError> {
+        self.likelihood.predicted(theta, record)
     }
 
     /// Gradient and information of one record at the full θ; `None` where only differences give them.

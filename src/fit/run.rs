@@ -2,14 +2,16 @@
 
 use super::certificate::{Certificate, Side};
 use super::climb::Fitted;
+use super::draws::table;
 use super::effects::begin;
 use super::evidence::evidence;
 use super::follow::{free_runs, starts};
 use super::magnitude::{Kind, kinds, largest, shape_axis, size_axis};
 use super::outcome::{
-    Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedValue, OutputErrors, Warning,
+    Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedValue, NOT_CONVERGED,
+    OutputErrors, Warning,
 };
-use super::posterior::posterior;
+use super::posterior::{Draws, posterior};
 use super::problem::Problem;
 use super::starts::{base_fit, polish, search};
 use crate::effect::Effect;
@@ -81,16 +83,16 @@ pub(crate) fn run(
         return Ok(None);
     };
     let evidence = evidence(&problem, &fitted, Some(noise.child("evidence")))?;
-    let draws = if problem.is_simulated() {
-        vec![]
-    } else {
-        posterior(&problem, &fitted, noise.child("posterior"))?
+    let asked = (settings.draws > 0).then_some(settings.draws);
+    let draws = match problem.is_simulated() && asked.is_none() {
+        true => Draws::default(),
+        false => posterior(&problem, &fits, asked, noise.child("posterior"))?,
     };
-    let spread = Spread::new(&problem, &fitted, &draws, settings.level);
+    let spread = Spread::new(&problem, &fitted, &draws.thetas, settings.level);
     let (parameters, noise_levels) = values(&problem, &fitted, &certificate, &levels, &spread);
     let smoothed = problem.smoothed(&fitted.theta)?;
     let free_runs = free_runs(&problem, &fitted.theta, &smoothed);
-    let errors = errors(&problem, &fitted, &free_runs)?;
+    let errors = errors(&problem, &fitted.theta, &free_runs)?;
     let convergence = Convergence {
         converged: certificate.has_converged(),
         distance: certificate.distance,
@@ -113,8 +115,14 @@ pub(crate) fn run(
         convergence,
         errors,
         warnings,
+        posterior: (asked.is_some())
+            .then(|| table(&problem, &draws, noise.child("starts")))
+            .transpose()?,
         samples: problem.samples(),
         seconds: clock.elapsed().as_secs_f64(),
+        residuals: (problem.filtered(&fitted.theta)?.into_iter())
+            .map(|filtered| filtered.standardised)
+            .collect(),
         free_runs,
     }))
 }
@@ -227,12 +235,13 @@ fn values(
     (parameters, noise)
 }
 
-fn errors(
+/// Errors of each output at the full θ.
+pub(super) fn errors(
     problem: &Problem<'_>,
-    fitted: &Fitted,
+    theta: &[f64],
     free_runs: &[Option<Signal>],
 ) -> Result<Vec<OutputErrors>, FilterError> {
-    let filtered = problem.filtered(&fitted.theta)?;
+    let filtered = problem.filtered(theta)?;
     let outputs = problem.outline().outputs;
     let rms = |values: &[f64]| {
         (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
@@ -280,7 +289,7 @@ fn warnings(
             convergence.distance, convergence.agreeing, convergence.searches
         );
         warn(
-            "not-converged",
+            NOT_CONVERGED,
             what,
             "narrow [prior], or fix a parameter that the record does not identify",
         );

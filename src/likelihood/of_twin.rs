@@ -16,6 +16,8 @@ pub(crate) trait Likelihood: Send + Sync {
     fn states(&self, theta: &[f64], record: &Record) -> Result<(Filtered, Signal), FilterError>;
     /// States given the whole record; `None` where there are none.
     fn smoothed(&self, theta: &[f64], record: &Record) -> Result<Option<Smoothed>, FilterError>;
+    /// Outputs predicted from the rows before, over missing rows as far ahead as these last; `None` where only free runs are known.
+    fn predicted(&self, theta: &[f64], record: &Record) -> Result<Option<Signal>, FilterError>;
     /// Log-likelihood, with the innovations where they come at no extra cost.
     fn log_likelihood(
         &self,
@@ -64,6 +66,11 @@ impl Likelihood for Filter {
             .smooth(theta)
             .map(Some)
     }
+    fn predicted(&self, theta: &[f64], record: &Record) -> Result<Option<Signal>, FilterError> {
+        Kalman::new(self.0.as_ref(), record, &self.1)?
+            .predictions(theta)
+            .map(Some)
+    }
     fn log_likelihood(
         &self,
         theta: &[f64],
@@ -108,6 +115,9 @@ impl Likelihood for Ensemble {
         Ok((filtered, predicted))
     }
     fn smoothed(&self, _: &[f64], _: &Record) -> Result<Option<Smoothed>, FilterError> {
+        Ok(None)
+    }
+    fn predicted(&self, _: &[f64], _: &Record) -> Result<Option<Signal>, FilterError> {
         Ok(None)
     }
     fn log_likelihood(

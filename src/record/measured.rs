@@ -3,6 +3,7 @@
 use super::channels::column_names;
 use crate::math::six_digits;
 use crate::record::{Drive, RecordError, Signal, Signals};
+use ndarray::s;
 
 /// Inputs and outputs measured on one time grid. An output that is NaN is missing: it was not measured.
 ///
@@ -112,6 +113,13 @@ impl Record {
             given: six_digits(drive.step(k)),
             expected: six_digits(drive.dt()),
         })
+    }
+
+    /// The first samples; `None` where an output has no value in them.
+    pub(crate) fn first_part(&self, samples: usize) -> Option<Self> {
+        let drive = self.drive.first(samples);
+        let outputs = self.outputs.slice(s![..samples, ..]).to_owned();
+        Self::new(drive, outputs).ok()
     }
 
     /// The same cells of other outputs emptied, as many rows and channels.

@@ -2,8 +2,8 @@
 //!
 //! | result of | JSON | text | pictures and pages |
 //! |---|---|---|---|
-//! | `estimate` | [`Report::json`] | [`Report::text`] | [`overlay_svg`] |
-//! | `fit` | [`Report::json`] | [`Report::text`] | [`overlay_svg`] |
+//! | `estimate` | [`Report::json`] | [`Report::text`] | [`overlay_svg`], [`estimate_html`] |
+//! | `fit` | [`Report::json`] | [`Report::text`] | [`overlay_svg`], [`fit_html`] |
 //! | `diagnose` | [`Report::json`] | [`Report::text`] | [`gap_html`], [`gap_pictures`] |
 //! | `withheld` | | | [`scorecard_html`] |
 //!
@@ -20,14 +20,16 @@
 //! let settings = DiagnoseSettings { detection_only: true, ..DiagnoseSettings::default() };
 //! let diagnosis = diagnose(&study, &[record], None, &settings, &Progress::silent())?;
 //!
-//! assert_eq!(diagnosis.json(&study)["schema"], "truetwin.gap/1");
+//! assert_eq!(diagnosis.json(&study)["schema"], "truetwin.gap/2");
 //! assert!(diagnosis.text(&study).starts_with("No gap"));
 //! assert!(gap_html(&study, &diagnosis).starts_with("<!doctype html>"));
 //! assert!(gap_pictures(&study, &diagnosis).iter().all(|(_, svg)| svg.starts_with("<svg")));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod answer;
 mod chart;
+mod compare;
 mod digits;
 mod estimate;
 mod fit;
@@ -35,15 +37,20 @@ mod fit;
 mod fixture;
 mod gap;
 mod page;
+mod parameters;
 mod reproduce;
 mod scorecard;
 mod table;
 mod units;
 
+pub use answer::{estimate_html, fit_html};
+pub(crate) use compare::{Compared, compare_json, compare_svg, compare_text};
 pub use estimate::overlay_svg;
 pub(crate) use estimate::trajectories_csv;
+pub(crate) use fit::posterior_svg;
 pub(crate) use gap::NEXT_INPUT;
 pub use gap::{gap_html, gap_pictures};
+pub(crate) use page::with_footer;
 pub(crate) use reproduce::{first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
 pub use scorecard::scorecard_html;
 pub(crate) use scorecard::{scorecard_json, scorecard_text};

@@ -80,7 +80,7 @@ impl Units {
     }
 
     /// Returns the signal of a sensor or an actuator, and its kind.
-    fn signal(&self, place: &str) -> Option<(&'static str, &Quantity)> {
+    pub(super) fn signal(&self, place: &str) -> Option<(&'static str, &Quantity)> {
         if self.is_state(place) {
             return None;
         }

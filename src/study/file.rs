@@ -9,6 +9,7 @@ use crate::storage::untrusted::{MESSAGE, check_names, one_line, read_text};
 use crate::study::error::StudyError;
 use crate::study::lines::{line, with_line};
 use crate::study::plan::InputPlan;
+use crate::study::prior::PriorTable;
 use crate::twin::{Hold, Interval, NoiseLevel, StartLevel};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -32,6 +33,7 @@ const MOST: u64 = 1 << 20;
 /// [prior]
 /// k1 = [0.01, 0.1]
 /// start.h1 = [0.0, 10.0]
+/// trust = true      # estimates may lean on these boxes; by default they do not
 /// [bounds]
 /// k1 = [0.001, 1.0]
 /// [fixed]
@@ -61,11 +63,8 @@ pub struct StudyFile {
     #[serde(skip_serializing_if = "RecordTable::is_empty")]
     pub(crate) record: RecordTable,
     /// Prior boxes.
-    #[serde(
-        skip_serializing_if = "BTreeMap::is_empty",
-        deserialize_with = "dotted"
-    )]
-    pub(crate) prior: BTreeMap<String, Interval>,
+    #[serde(skip_serializing_if = "PriorTable::is_empty")]
+    pub(crate) prior: PriorTable,
     /// Physical bounds.
     #[serde(
         skip_serializing_if = "BTreeMap::is_empty",
@@ -225,7 +224,7 @@ where
     Ok(flat)
 }
 
-fn flatten<V: serde::de::DeserializeOwned>(
+pub(super) fn flatten<V: serde::de::DeserializeOwned>(
     prefix: &str,
     table: toml::Table,
     flat: &mut BTreeMap<String, V>,
@@ -265,6 +264,7 @@ mod tests {
             [prior]
             k1 = [0.01, 0.1]
             start.h1 = [0, 10]
+            trust = true
             [fixed]
             k4 = 1
             [limits]
@@ -283,7 +283,11 @@ mod tests {
             without = ["sensor-lag"]
         "#;
         let file = parse(text).unwrap();
-        assert_eq!(file.prior["start.h1"], Interval::new(0.0, 10.0).unwrap());
+        assert_eq!(
+            file.prior.boxes["start.h1"],
+            Interval::new(0.0, 10.0).unwrap()
+        );
+        assert!(file.prior.trust);
         assert_eq!(file.noise["y"], NoiseLevel::Estimate);
         assert_eq!(
             file.start["h2"],
@@ -295,7 +299,7 @@ mod tests {
         let written = toml::to_string(&file).unwrap();
         let again = parse(&written).unwrap();
         assert_eq!(written, toml::to_string(&again).unwrap());
-        for part in ["start.h1", "inf", "sensor-lag", "arx", "time (s)"] {
+        for part in ["trust", "start.h1", "inf", "sensor-lag", "arx", "time (s)"] {
             assert!(written.contains(part), "{written}");
         }
     }

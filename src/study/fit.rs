@@ -2,7 +2,7 @@
 
 use super::{Study, StudyError};
 use crate::effect::Effect;
-use crate::fit::{Fit, FitSettings, Subject, run};
+use crate::fit::{Fit, FitScore, FitSettings, Subject, run, score};
 use crate::likelihood::Beliefs;
 use crate::progress::Progress;
 use crate::record::Record;
@@ -66,6 +66,22 @@ impl Study {
         let fit = run(&subject, records, settings)?.ok_or(StudyError::NoFit)?;
         stage.tick()?;
         Ok(fit)
+    }
+
+    /// Scores a fit of this study on a record that it has not seen: log density of its rows, one-step and free-run errors.
+    ///
+    /// # Errors
+    ///
+    /// [`StudyError`]: a record that does not fit the twin, a twin that cannot be filtered there.
+    pub fn score(&self, fit: &Fit, record: &Record) -> Result<FitScore, StudyError> {
+        record.check_channels(&self.twin.signals())?;
+        let effects = self.added_effects()?;
+        let subject = Subject {
+            twin: &self.twin,
+            effects: &effects,
+            beliefs: &self.beliefs(),
+        };
+        score(&subject, fit, record)?.ok_or(StudyError::NoFit)
     }
 
     /// Effects that the study's file adds to the twin.

@@ -6,6 +6,7 @@ mod fit;
 mod lines;
 mod manifest;
 mod plan;
+mod prior;
 mod suitability;
 
 pub use error::StudyError;
@@ -117,7 +118,7 @@ impl Study {
                 .collect()
         };
         let step = file.record.step.unwrap_or(self.plan.step);
-        for (table, boxes) in [("prior", &file.prior), ("bounds", &file.bounds)] {
+        for (table, boxes) in [("prior", &file.prior.boxes), ("bounds", &file.bounds)] {
             if let Some(name) = boxes.keys().find(|name| file.fixed.contains_key(*name)) {
                 return Err(StudyError::Table(format!(
                     "{name} appears in both [fixed] and [{table}]; remove one"
@@ -126,14 +127,14 @@ impl Study {
         }
         self.check_library(&file.library)?;
         let first = Adaptation {
-            prior: part(&file.prior, false),
+            prior: part(&file.prior.boxes, false),
             bounds: part(&file.bounds, false),
             limits: file.limits.clone(),
             noise: file.noise.clone(),
             start: file.start.clone(),
         };
         let second = Adaptation {
-            prior: part(&file.prior, true),
+            prior: part(&file.prior.boxes, true),
             bounds: part(&file.bounds, true),
             ..Adaptation::default()
         };
@@ -174,6 +175,11 @@ impl Study {
             file: file.clone(),
             ..self.clone()
         })
+    }
+
+    /// Returns whether estimates may lean on the prior: `[prior] trust = true`.
+    pub(crate) fn trusts_prior(&self) -> bool {
+        self.file.prior.trust
     }
 
     /// Returns the twin as registered, with the substeps and the hold of a file.

@@ -4,6 +4,7 @@ use crate::cli::args::{FileColumns, Subject};
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
+use crate::cli::provenance::Provenance;
 use crate::estimator::PresetName;
 use crate::study::Study;
 use crate::twin::conformance::{Finding, Severity, check, check_step};
@@ -61,9 +62,10 @@ impl Verb for Check {
         }
         let failed = findings.iter().any(|f| f.severity == Severity::Failure);
         if context.json {
-            output::print_json(&json!({
+            let provenance = Provenance::new(context, Some(&self.subject), []);
+            output::print_json(&provenance.on(json!({
                 "schema": "truetwin.check/1", "twin": study.name(), "passed": !failed, "findings": findings,
-            }))?;
+            })))?;
         } else {
             output::print(&lines(&findings))?;
         }
@@ -86,10 +88,11 @@ impl Check {
         let record = self.columns.reader(study).record(path)?;
         let result = study.suitability(&record, context.seed, context.progress)?;
         if context.json {
-            output::print_json(&json!({
+            let provenance = Provenance::new(context, Some(&self.subject), [("record", path)]);
+            output::print_json(&provenance.on(json!({
                 "schema": "truetwin.suitability/1", "twin": study.name(), "record": path, "suits": result.suits(),
                 "findings": result.findings, "parameters": result.parameters,
-            }))?;
+            })))?;
         } else {
             output::print(&lines(&result.findings))?;
         }

@@ -4,6 +4,7 @@ use super::estimate::{show, write_results};
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
+use crate::cli::provenance::Provenance;
 use crate::estimator::{EstimateOptions, PresetName, PretrainOptions, pretrain};
 use crate::record::{Record, write_record};
 use crate::study::Study;
@@ -66,16 +67,17 @@ impl Verb for Demo {
             ..EstimateOptions::default()
         };
         let estimate = estimator.estimate(&record, &settings, context.progress)?;
+        let provenance = Provenance::new(context, None, []);
         if let (Some(folder), Some(out)) = (folder, &self.out) {
             write_record(&folder.file("record.csv"), &record)?;
-            write_results(&folder, study, &record, &estimate)?;
+            write_results(&folder, study, &record, &estimate, &provenance)?;
             folder.finish()?;
             output::say(&format!(
                 "demo: {0}/overlay.svg shows measured and twin, {0}/record.csv is the record",
                 out.display()
             ));
         }
-        show(context, study, &estimate)?;
+        show(context, study, &estimate, &provenance)?;
         Ok(ExitCode::SUCCESS)
     }
 }

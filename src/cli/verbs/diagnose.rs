@@ -3,6 +3,7 @@
 use crate::cli::args::{FileColumns, Subject};
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
+use crate::cli::provenance::Provenance;
 use crate::cli::{output, records};
 use crate::diagnose::{DiagnoseSettings, GivenRecord, diagnose};
 use crate::effect::EffectPattern;
@@ -90,11 +91,19 @@ impl Verb for Diagnose {
                 None => failure,
             }
         })?;
-        let json = found.json(&study);
+        let files = self.records.iter().map(|path| ("record", path.as_path()));
+        let others = [
+            ("validation", &self.validation),
+            ("estimator", &self.estimator),
+        ];
+        let others = (others.into_iter()).filter_map(|(role, path)| Some((role, path.as_deref()?)));
+        let provenance = Provenance::new(context, Some(&self.subject), files.chain(others));
+        let json = provenance.on(found.json(&study));
         if let Some(folder) = folder {
             let text = serde_json::to_string_pretty(&json).map_err(Failure::internal)?;
             folder.write("report.json", &text)?;
-            folder.write("report.html", &gap_html(&study, &found))?;
+            let page = provenance.in_page(&gap_html(&study, &found));
+            folder.write("report.html", &page)?;
             if let Some(next) = &found.cause.next_input {
                 folder.write(NEXT_INPUT, &drive_csv_text(&next.drive))?;
             }
@@ -103,7 +112,7 @@ impl Verb for Diagnose {
         if context.json {
             output::print_json(&json)?;
         } else {
-            output::print(&found.text(&study))?;
+            output::print(&provenance.below(&found.text(&study)))?;
         }
         Ok(ExitCode::SUCCESS)
     }

@@ -3,11 +3,13 @@
 use crate::cli::args::{FileColumns, PresetArgument};
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
+use crate::cli::posterior::{self, PosteriorDraws};
+use crate::cli::provenance::Provenance;
 use crate::cli::{output, records};
 use crate::estimator::bank::file;
 use crate::estimator::{self, EstimateOptions, Estimator};
 use crate::record::Record;
-use crate::report::{Report, overlay_svg, trajectories_csv};
+use crate::report::{Report, estimate_html, overlay_svg, trajectories_csv};
 use crate::study::Study;
 use clap::Args;
 use std::path::PathBuf;
@@ -33,10 +35,12 @@ pub(in crate::cli) struct Estimate {
     /// Settings of the refinement [default: the estimator's own].
     #[arg(long, value_enum)]
     preset: Option<PresetArgument>,
-    /// Refine even if the record is consistent with the network's estimate.
+    /// Refine though the study trusts its prior and the record is consistent with the network's estimate.
     #[arg(long)]
     always_refine: bool,
-    /// New folder for estimate.json, overlay.svg, trajectories.csv and, after a refit, the cloud of simulations (cloud.npz).
+    #[command(flatten)]
+    draws: PosteriorDraws,
+    /// New folder for estimate.json, the page report.html, overlay.svg, trajectories.csv and, after a refit, the cloud of simulations (cloud.npz).
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -55,6 +59,7 @@ impl Verb for Estimate {
             preset: self.preset.map(Into::into),
             always_refine: self.always_refine,
             validation,
+            draws: self.draws.count()?,
         };
         if let Some((validation, path)) = settings.validation.as_ref().zip(self.validation.as_ref())
         {
@@ -63,11 +68,17 @@ impl Verb for Estimate {
         }
         let estimate = (estimator.estimate(&record, &settings, context.progress))
             .map_err(|error| Failure::from(error).within(&self.record))?;
+        let files = [
+            ("record", self.record.as_path()),
+            ("estimator", self.estimator.as_path()),
+        ];
+        let validation = self.validation.as_deref().map(|path| ("validation", path));
+        let provenance = Provenance::new(context, None, files.into_iter().chain(validation));
         if let Some(folder) = folder {
-            write_results(&folder, estimator.study(), &record, &estimate)?;
+            write_results(&folder, estimator.study(), &record, &estimate, &provenance)?;
             folder.finish()?;
         }
-        show(context, estimator.study(), &estimate)?;
+        show(context, estimator.study(), &estimate, &provenance)?;
         Ok(ExitCode::SUCCESS)
     }
 }
@@ -77,27 +88,34 @@ pub(super) fn show(
     context: &Context<'_>,
     study: &Study,
     estimate: &estimator::Estimate,
+    provenance: &Provenance,
 ) -> Result<(), Failure> {
     if context.json {
-        output::print_json(&estimate.json(study))
+        output::print_json(&provenance.on(estimate.json(study)))
     } else {
-        output::print(&estimate.text(study))
+        output::print(&provenance.below(&estimate.text(study)))
     }
 }
 
-/// Writes `estimate.json`, `overlay.svg`, `trajectories.csv`, `cloud.npz`.
+/// Writes `estimate.json`, `report.html`, `overlay.svg`, `trajectories.csv`, `cloud.npz`.
 pub(super) fn write_results(
     folder: &output::NewFolder,
     study: &Study,
     record: &Record,
     estimate: &estimator::Estimate,
+    provenance: &Provenance,
 ) -> Result<(), Failure> {
-    let json = serde_json::to_string_pretty(&estimate.json(study));
+    let json = serde_json::to_string_pretty(&provenance.on(estimate.json(study)));
     folder.write("estimate.json", &json.map_err(Failure::internal)?)?;
     if let Some(cloud) = &estimate.cloud {
         let names: Vec<&str> = estimate.names.iter().map(String::as_str).collect();
         file::write(&folder.file("cloud.npz"), cloud, &names)?;
     }
+    if let Some(draws) = &estimate.posterior {
+        posterior::write(folder, study, draws)?;
+    }
+    let page = provenance.in_page(&estimate_html(study, record, estimate));
+    folder.write("report.html", &page)?;
     let before = estimate.tracking_initial.as_ref().map(|t| &t.outputs);
     // A free run that diverged cannot be drawn; the text reports it.
     let Some(after) = estimate.tracking.as_ref().map(|t| &t.outputs) else {

@@ -3,9 +3,11 @@
 use crate::cli::args::{FileColumns, Subject};
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
+use crate::cli::posterior::{self, PosteriorDraws};
+use crate::cli::provenance::Provenance;
 use crate::cli::{output, records};
 use crate::fit::FitSettings;
-use crate::report::{Report, overlay_svg};
+use crate::report::{Report, fit_html, overlay_svg};
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -23,7 +25,9 @@ pub(in crate::cli) struct Fit {
     subject: Subject,
     #[command(flatten)]
     columns: FileColumns,
-    /// New folder for fit.json and a picture of each record (overlay.svg, overlay-2.svg, …).
+    #[command(flatten)]
+    draws: PosteriorDraws,
+    /// New folder for fit.json, the page report.html and a picture of each record (overlay.svg, overlay-2.svg, …).
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -44,12 +48,18 @@ impl Verb for Fit {
         }
         let settings = FitSettings {
             seed: context.seed,
+            draws: self.draws.count()?,
             ..FitSettings::default()
         };
         let fit = study.fit(&records, &settings, context.progress)?;
+        let files = self.records.iter().map(|path| ("record", path.as_path()));
+        let provenance = Provenance::new(context, Some(&self.subject), files);
+        let json = provenance.on(fit.json(&study));
         if let Some(folder) = folder {
-            let json = serde_json::to_string_pretty(&fit.json(&study));
-            folder.write("fit.json", &json.map_err(Failure::internal)?)?;
+            let text = serde_json::to_string_pretty(&json).map_err(Failure::internal)?;
+            folder.write("fit.json", &text)?;
+            let page = provenance.in_page(&fit_html(&study, &records, &fit));
+            folder.write("report.html", &page)?;
             for (r, (record, run)) in records.iter().zip(&fit.free_runs).enumerate() {
                 let Some(run) = run else { continue };
                 let name = match r {
@@ -58,12 +68,15 @@ impl Verb for Fit {
                 };
                 folder.write(&name, &overlay_svg(&study, record, None, run))?;
             }
+            if let Some(draws) = &fit.posterior {
+                posterior::write(&folder, &study, draws)?;
+            }
             folder.finish()?;
         }
         if context.json {
-            output::print_json(&fit.json(&study))?;
+            output::print_json(&json)?;
         } else {
-            output::print(&fit.text(&study))?;
+            output::print(&provenance.below(&fit.text(&study)))?;
         }
         Ok(ExitCode::SUCCESS)
     }

@@ -2,6 +2,7 @@
 
 mod bank;
 mod check;
+mod compare;
 mod demo;
 mod diagnose;
 mod effects;
@@ -34,6 +35,7 @@ pub(super) enum Command {
     Pretrain(pretrain::Pretrain),
     Fit(fit::Fit),
     Estimate(estimate::Estimate),
+    Compare(compare::Compare),
     Diagnose(diagnose::Diagnose),
     Reproduce(reproduce::Reproduce),
     Withheld(withheld::Withheld),
@@ -57,6 +59,7 @@ impl Command {
             Self::Pretrain(verb) => verb,
             Self::Fit(verb) => verb,
             Self::Estimate(verb) => verb,
+            Self::Compare(verb) => verb,
             Self::Diagnose(verb) => verb,
             Self::Reproduce(verb) => verb,
             Self::Withheld(verb) => verb,

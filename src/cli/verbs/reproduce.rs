@@ -4,6 +4,7 @@ use crate::cli::args::{PresetArgument, Subject, at_least_one};
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
+use crate::cli::provenance::Provenance;
 use crate::estimator::{
     Estimator, EstimatorError, PretrainOptions, Pretraining, Project, pretrain,
 };
@@ -166,7 +167,9 @@ impl Verb for Reproduce {
         }
         let runs = plan.run_in(&estimator, folder.as_ref(), context.progress)?;
         let scores = score(study, &plan, &runs);
-        let json = reproduce_json(study, &plan, estimator.preset(), &scores);
+        let file = self.estimator.as_deref().map(|path| ("estimator", path));
+        let provenance = Provenance::new(context, Some(&self.subject), file);
+        let json = provenance.on(reproduce_json(study, &plan, estimator.preset(), &scores));
         let text = reproduce_text(study, &plan, estimator.preset(), &scores);
         if let Some(folder) = &folder {
             let stage = context.progress.stage("figures", 1);
@@ -179,7 +182,7 @@ impl Verb for Reproduce {
         if context.json {
             output::print_json(&json)?
         } else {
-            output::print(&text)?
+            output::print(&provenance.below(&text))?
         }
         Ok(ExitCode::SUCCESS)
     }

@@ -4,6 +4,7 @@ use crate::cli::args::{FileColumns, Subject, at_least_one};
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
+use crate::cli::provenance::Provenance;
 use crate::evaluate::trials::{self, Families, Kind, Settings};
 use crate::report::{scorecard_html, scorecard_json, scorecard_text};
 use crate::setting::did_you_mean;
@@ -101,14 +102,19 @@ impl Verb for Withheld {
             return Ok(ExitCode::SUCCESS);
         }
         let card = sealed.score(context.progress)?;
-        let json = scorecard_json(&card);
-        sealed.write("scorecard.html", &scorecard_html(&card))?;
+        let like = self.like.as_deref().map(|path| ("record", path));
+        let provenance = Provenance::new(context, Some(&self.subject), like);
+        let json = provenance.on(scorecard_json(&card));
+        sealed.write(
+            "scorecard.html",
+            &provenance.in_page(&scorecard_html(&card)),
+        )?;
         // Written last: it marks the folder as complete.
         sealed.write("scorecard.json", &format!("{json:#}\n"))?;
         if context.json {
             output::print_json(&json)?
         } else {
-            output::print(&scorecard_text(&card))?
+            output::print(&provenance.below(&scorecard_text(&card)))?
         }
         Ok(ExitCode::SUCCESS)
     }

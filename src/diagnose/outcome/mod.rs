@@ -243,7 +243,7 @@ pub struct FreeRuns {
 
 /// Result of a diagnosis.
 #[derive(Debug, Clone, Serialize)]
-#[serde(tag = "schema", rename = "truetwin.gap/1")]
+#[serde(tag = "schema", rename = "truetwin.gap/2")]
 pub struct Diagnosis {
     /// Name of the twin.
     pub twin: String,
@@ -281,30 +281,58 @@ pub struct Diagnosis {
     pub validation_runs: Option<FreeRuns>,
 }
 
-/// Free-run errors before and after, on held-out data.
+/// Prediction errors over one horizon, on held-out data: root mean squares over the standard deviation of the output.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Horizon {
+    /// Samples ahead; none for the free run.
+    pub samples: Option<usize>,
+    /// The same in seconds.
+    pub seconds: Option<f64>,
+    /// Of the refitted twin alone.
+    pub before: f64,
+    /// Of the same with the accepted effects.
+    pub after: f64,
+    /// To be expected of records that the accepted twin makes, noise and all.
+    pub floor: f64,
+    /// (before² − after²)/(before² − floor²): the true system has 1 in expectation; none where the floor's own spread reaches the error
+    /// before.
+    pub closed: Option<f64>,
+}
+
+/// Prediction errors before and after, on held-out data, at the horizon where twin and floor differ most clearly.
 #[derive(Debug, Clone)]
 pub struct Shrinkage {
-    /// Measure: [`Shrinkage::FREE_RUN`] or [`Shrinkage::LOG_SCORE`].
+    /// Measure: [`Shrinkage::PREDICTION`], [`Shrinkage::FREE_RUN`] or [`Shrinkage::LOG_SCORE`].
     pub metric: &'static str,
     /// Error of the refitted twin alone.
     pub before: f64,
     /// The same with the accepted effects.
     pub after: Option<f64>,
-    /// Error by noise alone: the median over records simulated from the accepted twin.
+    /// Error by noise alone: what records simulated from the accepted twin have.
     pub floor: Option<f64>,
-    /// (before − after)/(before − floor); none where the gap's own interval touches zero.
+    /// Share of the expected squared error that closes ([`Horizon::closed`]).
     pub closed: Option<f64>,
-    /// 90 % of what draws of θ given all data close: the uncertainty of the share that the true effects close.
+    /// 90 % of the shares over draws of θ and resampled blocks of the data; not clamped.
     pub interval: Option<[f64; 2]>,
     /// Held-out data: `validation record` or `last third of the record`.
     pub held_out: &'static str,
     /// The same error at the prior's centre or the estimator's first estimate, without any refit.
     pub unfitted: Option<f64>,
-    /// The same error with an effect that was not chosen, fitted alike: what any extra number gains.
+    /// The same error with the best effect outside the class, fitted alike: what a wrong effect gains.
     pub placebo: Option<f64>,
+    /// The same errors of effects drawn at random.
+    pub random: Vec<f64>,
+    /// Horizon in seconds; none for a free run.
+    pub horizon: Option<f64>,
+    /// All horizons, shortest first, the free run last.
+    pub horizons: Vec<Horizon>,
+    /// Mean log density of a held-out sample in nats, before and after.
+    pub log_score: Option<[f64; 2]>,
 }
 
 impl Shrinkage {
+    /// Root mean square of predictions over a horizon, over the standard deviation of the output.
+    pub const PREDICTION: &str = "prediction NRMSE";
     /// Root mean square of a free run's error over the standard deviation of the output.
     pub const FREE_RUN: &str = "free-run NRMSE";
     /// Mean log density of a sample, for effects that move no free run.
@@ -314,12 +342,13 @@ impl Shrinkage {
 impl Serialize for Shrinkage {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
-        struct Controls {
+        struct Controls<'s> {
             unfitted: Option<f64>,
             theta_only: f64,
             placebo: Option<f64>,
+            random: &'s [f64],
         }
-        let mut object = serializer.serialize_struct("Shrinkage", 8)?;
+        let mut object = serializer.serialize_struct("Shrinkage", 11)?;
         object.serialize_field("metric", self.metric)?;
         object.serialize_field("before", &self.before)?;
         object.serialize_field("after", &self.after)?;
@@ -331,8 +360,12 @@ impl Serialize for Shrinkage {
             unfitted: self.unfitted,
             theta_only: self.before,
             placebo: self.placebo,
+            random: &self.random,
         };
         object.serialize_field("controls", &controls)?;
+        object.serialize_field("horizon", &self.horizon)?;
+        object.serialize_field("horizons", &self.horizons)?;
+        object.serialize_field("log_score", &self.log_score)?;
         object.end()
     }
 }

@@ -5,7 +5,7 @@ use crate::diagnose::outcome::FreeRuns;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::recoverable;
-use crate::math::{median, quantile};
+use crate::math::median;
 use crate::record::{Record, Signal};
 use crate::twin::{Noise, Twin, begun};
 use ndarray::Array1;
@@ -48,6 +48,15 @@ impl Runner {
         run.iter().all(|v| v.is_finite()).then_some(run)
     }
 
+    /// Outputs that the twin simulates beside the record, with its noise.
+    pub fn simulated(&self, record: &Record, noise: Noise) -> Option<Signal> {
+        let run = self
+            .twin
+            .simulate(&self.theta, record.drive(), noise)
+            .ok()?;
+        run.iter().all(|v| v.is_finite()).then_some(run)
+    }
+
     /// Median error of records simulated at θ against their own free run.
     pub fn floor(&self, record: &Record, from: usize, noise: Noise) -> Option<f64> {
         let free = self.outputs(record)?;
@@ -55,10 +64,7 @@ impl Runner {
         let errors: Vec<f64> = (0..Thresholds::FLOOR_RECORDS)
             .into_par_iter()
             .filter_map(|i| {
-                let run = self
-                    .twin
-                    .simulate(&self.theta, record.drive(), noise.sample(i))
-                    .ok()?;
+                let run = self.simulated(record, noise.sample(i))?;
                 // In units of the measured record, as the other errors are.
                 let errors = record.with_gaps_in(run - &free);
                 Some(root(&scaled(&errors, &scale, from)))
@@ -83,7 +89,7 @@ pub(in crate::diagnose) fn free_runs(
     }
 }
 
-fn variances(y: &Signal) -> Vec<f64> {
+pub(super) fn variances(y: &Signal) -> Vec<f64> {
     (y.columns().into_iter())
         .map(|y| {
             let there: Array1<f64> = y.iter().copied().filter(|v| !v.is_nan()).collect();
@@ -92,7 +98,7 @@ fn variances(y: &Signal) -> Vec<f64> {
         .collect()
 }
 
-fn scaled(difference: &Signal, variances: &[f64], from: usize) -> Vec<f64> {
+pub(super) fn scaled(difference: &Signal, variances: &[f64], from: usize) -> Vec<f64> {
     (difference.rows().into_iter().skip(from))
         .filter_map(|row| {
             let there = || row.iter().zip(variances).filter(|(d, _)| !d.is_nan());
@@ -110,81 +116,4 @@ fn squares(y: &Signal, free: &Signal, from: usize) -> Vec<f64> {
 /// √(mean).
 pub(in crate::diagnose) fn root(squares: &[f64]) -> f64 {
     (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
-}
-
-/// `closed` and its interval from squared errors before and after, and the floor.
-pub(in crate::diagnose) fn closed(
-    before: &[f64],
-    after: &[f64],
-    floor: f64,
-    noise: Noise,
-) -> (Option<f64>, Option<[f64; 2]>) {
-    let share = |b: f64, a: f64| (b - a) / (b - floor);
-    let n = before.len();
-    let length = n.div_ceil(Thresholds::SHARE_BLOCKS).max(1);
-    let mut source = noise.source("blocks");
-    let mut gaps = Vec::new();
-    let mut shares = Vec::new();
-    for _ in 0..Thresholds::SHARE_RESAMPLES {
-        let (mut b, mut a, mut count) = (0.0, 0.0, 0usize);
-        while count < n {
-            let start = ((source.uniform() * n as f64) as usize).min(n - 1);
-            for k in (start..start + length).map(|k| k % n) {
-                b += before[k];
-                a += after[k];
-            }
-            count += length;
-        }
-        let (b, a) = ((b / count as f64).sqrt(), (a / count as f64).sqrt());
-        gaps.push(b - floor);
-        shares.push(share(b, a));
-    }
-    let tail = 0.5 * (1.0 - Thresholds::INTERVAL_LEVEL);
-    let low_gap = quantile(&gaps, tail).unwrap_or(f64::NEG_INFINITY);
-    if low_gap.is_nan() || low_gap <= 0.0 {
-        return (None, None);
-    }
-    let ends = [tail, 1.0 - tail].map(|p| quantile(&shares, p).unwrap_or(f64::NAN));
-    (Some(share(root(before), root(after))), Some(ends))
-}
-
-/// 90 % of the shares that draws of θ, given all data, close; the share that was reached lies within.
-///
-/// The true system is one such draw, where the accepted effects are the true ones.
-pub(in crate::diagnose) fn interval(
-    before: f64,
-    closed: f64,
-    floor: f64,
-    afters: &[f64],
-) -> Option<[f64; 2]> {
-    let shares: Vec<f64> = (afters.iter())
-        .map(|after| (before - after) / (before - floor))
-        .collect();
-    let tail = 0.5 * (1.0 - Thresholds::INTERVAL_LEVEL);
-    let end = |p: f64| quantile(&shares, p).ok();
-    Some([end(tail)?.min(closed), end(1.0 - tail)?.max(closed)])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn half_of_a_gap_is_half() {
-        let before = vec![1.0; 400];
-        let after = vec![0.36; 400];
-        let (share, interval) = closed(&before, &after, 0.2, Noise::new(1, "t", 0));
-        assert!((share.unwrap() - 0.5).abs() < 1e-12);
-        assert!(interval.unwrap().iter().all(|v| (v - 0.5).abs() < 1e-9));
-    }
-
-    #[test]
-    fn no_share_of_a_gap_that_noise_explains() {
-        let mut source = Noise::new(2, "t", 0).source("x");
-        let noisy: Vec<f64> = (0..300).map(|_| source.normal().powi(2)).collect();
-        assert_eq!(
-            closed(&noisy, &noisy, 1.0, Noise::new(1, "t", 0)),
-            (None, None)
-        );
-    }
 }

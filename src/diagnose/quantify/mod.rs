@@ -2,6 +2,7 @@
 
 pub(in crate::diagnose) mod calibrate;
 pub(in crate::diagnose) mod free_run;
+pub(in crate::diagnose) mod horizon;
 pub(in crate::diagnose) mod next_input;
 pub(in crate::diagnose) mod power;
 pub(crate) mod share;

@@ -1,24 +1,24 @@
 //! Share of the gap closed on held-out data.
 
-use super::free_run::{Runner, closed, interval, root};
+use super::free_run::{Runner, root};
+use super::horizon::{HeldOutRows, Predictor, compare};
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::explain::search::Found;
 use crate::diagnose::model::{Model, keys};
 use crate::diagnose::outcome::Shrinkage;
+use crate::diagnose::thresholds::Thresholds;
 use crate::fit::climb::climb;
-use crate::fit::first_part::first_part;
 use crate::fit::posterior::posterior;
 use crate::fit::problem::Problem;
-use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::likelihood::kalman::FilterError;
 use crate::record::Record;
 use crate::twin::Noise;
-use rayon::prelude::*;
 
 /// Samples of the shortest record whose last third is held out.
 pub const SHORTEST_SPLIT: usize = 300;
 /// Iterations of a refit without the held-out part.
 const REFIT: usize = 10;
-/// Posterior draws whose free runs make the interval.
+/// Posterior draws whose errors make the interval.
 const DRAWS: usize = 100;
 
 /// The first sample that is held out of a record without another to validate.
@@ -48,9 +48,34 @@ impl HeldOut<'_> {
         Ok(fitted.map(|fitted| problem.of_record(0, &fitted.theta)))
     }
 
-    fn runner(&self, model: &Model<'_>, theta: &[f64]) -> Result<Option<Runner>, DiagnoseError> {
+    /// The model at θ, begun as the held-out data show; `None` where that cannot be told.
+    fn predictor<'a>(
+        &'a self,
+        model: &Model<'_>,
+        theta: Vec<f64>,
+    ) -> Result<Option<Predictor<'a>>, DiagnoseError> {
         let problem = on(model, self.begins);
-        Runner::new(&problem, &problem.full(theta))
+        let runner = Runner::new(&problem, &problem.full(&theta))?;
+        Ok(runner.map(|runner| Predictor {
+            problem,
+            theta,
+            runner,
+        }))
+    }
+
+    /// The model refitted without what is held out.
+    fn refitted<'a>(&'a self, model: &Model<'_>) -> Result<Option<Predictor<'a>>, DiagnoseError> {
+        match self.theta(model)? {
+            Some(theta) => self.predictor(model, theta),
+            None => Ok(None),
+        }
+    }
+
+    fn rows(&self) -> HeldOutRows<'_> {
+        HeldOutRows {
+            record: self.record,
+            from: self.from,
+        }
     }
 }
 
@@ -61,18 +86,31 @@ fn on<'r>(model: &Model<'_>, records: &'r [Record]) -> Problem<'r> {
     problem
 }
 
-/// Measures how far the accepted effects close the gap on held-out data; `others` are the listed effects that were fitted.
+/// What the share of a gap is measured with.
+pub(in crate::diagnose) struct Measures<'m, 'a> {
+    /// The twin alone.
+    pub base: &'m Model<'a>,
+    /// The same with the accepted effects, if any were accepted.
+    pub accepted: Option<&'m Model<'a>>,
+    /// The listed effects that were fitted, best first.
+    pub others: &'m [Found<'a>],
+    /// Rivals of the accepted effects, as `id@target`.
+    pub class: &'m [String],
+    /// A record that nothing before has seen.
+    pub validation: Option<&'m [Record]>,
+    /// θ before any fit.
+    pub initial: Option<&'m [f64]>,
+}
+
+/// Measures how far the accepted effects close the gap on held-out data.
 pub(in crate::diagnose) fn shrinkage(
-    base: &Model<'_>,
-    accepted: Option<&Model<'_>>,
-    others: &[Found<'_>],
-    validation: Option<&[Record]>,
-    initial: Option<&[f64]>,
+    measures: &Measures<'_, '_>,
     noise: Noise,
 ) -> Result<Option<Shrinkage>, DiagnoseError> {
+    let base = measures.base;
     let whole = &base.problem.records[0];
     let short: Vec<Record>;
-    let held_out = match validation {
+    let held_out = match measures.validation {
         Some(records) => HeldOut {
             record: &records[0],
             begins: records,
@@ -81,7 +119,7 @@ pub(in crate::diagnose) fn shrinkage(
         },
         None if whole.samples() >= SHORTEST_SPLIT => {
             let split = held_out_from(whole.samples());
-            let Some(part) = first_part(whole, split) else {
+            let Some(part) = whole.first_part(split) else {
                 return Ok(None);
             };
             short = vec![part];
@@ -94,104 +132,115 @@ pub(in crate::diagnose) fn shrinkage(
         }
         None => return Ok(None),
     };
-    let (record, from) = (held_out.record, held_out.from);
-    let Some(theta) = held_out.theta(base)? else {
+    let (record, from, rows) = (held_out.record, held_out.from, held_out.rows());
+    let Some(before) = held_out.refitted(base)? else {
         return Ok(None);
     };
-    let Some(runner) = held_out.runner(base, &theta)? else {
-        return Ok(None);
-    };
-    let Some(before) = runner
-        .errors(record, from)
-        .filter(|errors| !errors.is_empty())
+    let free_run = |p: Predictor<'_>| p.runner.errors(record, from).map(|e| root(&e));
+    let Some(error) = (before.runner.errors(record, from)).filter(|errors| !errors.is_empty())
     else {
         return Ok(None);
     };
     let mut unfitted = base.problem.of_record(0, &base.problem.centre());
-    for (value, initial) in unfitted.iter_mut().zip(initial.into_iter().flatten()) {
+    for (value, initial) in unfitted
+        .iter_mut()
+        .zip(measures.initial.into_iter().flatten())
+    {
         *value = *initial;
     }
-    let unfitted = held_out
-        .runner(base, &unfitted)?
-        .and_then(|runner| runner.errors(record, from));
+    let unfitted = held_out.predictor(base, unfitted)?;
     let mut result = Shrinkage {
         metric: Shrinkage::FREE_RUN,
-        before: root(&before),
+        before: root(&error),
         after: None,
         floor: None,
         closed: None,
         interval: None,
         held_out: held_out.what,
-        unfitted: unfitted.map(|e| root(&e)),
+        horizon: None,
+        horizons: vec![],
+        log_score: None,
+        unfitted: None,
         placebo: None,
+        random: vec![],
     };
-    let Some(accepted) = accepted else {
-        result.floor = runner.floor(record, from, noise.child("floor"));
+    let Some(accepted) = measures.accepted else {
+        result.floor = before.runner.floor(record, from, noise.child("floor"));
+        result.unfitted = unfitted.and_then(free_run);
         return Ok(Some(result));
     };
-    let Some(grown) = held_out.theta(accepted)? else {
+    let Some(after) = held_out.refitted(accepted)? else {
+        result.unfitted = unfitted.and_then(free_run);
         return Ok(Some(result));
+    };
+    let scores = (before.log_score(rows)?, after.log_score(rows)?);
+    result.log_score = match scores {
+        (Some(before), Some(after)) => Some([before, after]),
+        _ => None,
     };
     if accepted.terms.iter().all(|term| term.is_noise()) {
-        // No free run moves: the density of what was held out does.
-        let records = std::slice::from_ref(record);
-        let score = |model: &Model<'_>, theta: &[f64]| -> Result<Option<f64>, FilterError> {
-            let problem = on(model, records);
-            let all = recoverable(problem.filtered(&problem.full(theta)))?;
-            Ok(all.map(|all| {
-                let d = &all[0].log_densities[from..];
-                d.iter().sum::<f64>() / d.len() as f64
-            }))
-        };
-        let Some(before) = score(base, &theta)? else {
+        // No prediction moves: the density of what was held out does.
+        let Some([before, after]) = result.log_score else {
             return Ok(None);
         };
         result.metric = Shrinkage::LOG_SCORE;
-        result.before = before;
-        result.after = score(accepted, &grown)?;
-        (result.unfitted, result.placebo) = (None, None);
+        (result.before, result.after) = (before, Some(after));
         return Ok(Some(result));
     }
-    let Some(runner) = held_out.runner(accepted, &grown)? else {
-        return Ok(Some(result));
-    };
-    let after = runner.errors(record, from);
-    result.after = after.as_deref().map(root);
-    result.floor = runner.floor(record, from, noise.child("floor"));
-    if let (Some(after), Some(floor)) = (&after, result.floor) {
-        (result.closed, result.interval) = closed(&before, after, floor, noise.child("bootstrap"));
+    let compared = compare(&before, &after, rows, noise.child("floor"))?;
+    result.horizons.clone_from(&compared.horizons);
+    let shown = compared.headline.or(compared.horizons.len().checked_sub(1));
+    if let Some(horizon) = shown.map(|at| &compared.horizons[at]) {
+        result.metric = match horizon.samples {
+            Some(_) => Shrinkage::PREDICTION,
+            None => Shrinkage::FREE_RUN,
+        };
+        result.before = horizon.before;
+        result.after = Some(horizon.after);
+        result.floor = Some(horizon.floor);
+        result.closed = horizon.closed;
+        result.horizon = horizon.seconds;
     }
-    if let (Some(closed), Some(floor)) = (result.closed, result.floor) {
-        let draws = posterior(
-            &accepted.problem,
-            &accepted.fitted,
-            noise.child("posterior"),
-        )?;
-        let afters: Vec<f64> = (draws.into_par_iter().take(DRAWS))
-            .map(|theta| {
-                Ok(held_out
-                    .runner(accepted, &theta)?
-                    .and_then(|r| r.errors(record, from)))
-            })
+    if compared.headline.is_some() {
+        let fitted = std::slice::from_ref(&accepted.fitted);
+        let draws = posterior(&accepted.problem, fitted, None, noise.child("posterior"))?;
+        let draws: Vec<Predictor<'_>> = (draws.thetas.into_iter().take(DRAWS))
+            .map(|theta| held_out.predictor(accepted, accepted.problem.of_record(0, &theta)))
             .collect::<Result<Vec<_>, DiagnoseError>>()?
             .into_iter()
             .flatten()
-            .map(|errors| root(&errors))
             .collect();
-        result.interval = interval(result.before, closed, floor, &afters).or(result.interval);
+        result.interval = compared.interval(&draws, rows, noise.child("bootstrap"))?;
     }
-    // The fitted effect that explains least, of those that move free runs.
+    let error = |p: &Predictor<'_>| compared.error(shown, p, rows);
+    result.unfitted = match &unfitted {
+        Some(unfitted) => error(unfitted)?,
+        None => None,
+    };
+    // Fitted effects outside the class: the best, and some at random.
     let used = keys(&accepted.terms);
-    let placebo = (others.iter().rev()).find_map(|found| {
-        let model = found.model.as_ref()?;
-        let is_free = !found.last().is_noise() && !used.contains(&found.last().key());
-        is_free.then_some(model)
-    });
-    if let Some(model) = placebo
-        && let Some(theta) = held_out.theta(model)?
-        && let Some(runner) = held_out.runner(model, &theta)?
-    {
-        result.placebo = runner.errors(record, from).map(|e| root(&e));
+    let outside: Vec<&Model<'_>> = (measures.others.iter())
+        .filter(|found| {
+            let key = found.last().key();
+            !found.last().is_noise() && !used.contains(&key) && !measures.class.contains(&key)
+        })
+        .filter_map(|found| found.model.as_ref())
+        .collect();
+    let of_wrong = |model: &Model<'_>| match held_out.refitted(model)? {
+        Some(predictor) => error(&predictor),
+        None => Ok(None),
+    };
+    if let Some(best) = outside.first() {
+        result.placebo = of_wrong(best)?;
+    }
+    if !accepted.problem.is_simulated() {
+        let (mut drawn, mut source) = (outside, noise.source("random effects"));
+        for _ in 0..Thresholds::RANDOM_EFFECTS.min(drawn.len()) {
+            let at = (source.uniform() * drawn.len() as f64) as usize;
+            result
+                .random
+                .extend(of_wrong(drawn.swap_remove(at.min(drawn.len() - 1)))?);
+        }
     }
     Ok(Some(result))
 }

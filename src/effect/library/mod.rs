@@ -3,6 +3,7 @@
 mod actuator;
 mod parameter;
 mod sensor;
+mod sentences;
 mod shared;
 mod state;
 
@@ -17,6 +18,12 @@ pub(super) fn rows() -> Vec<EffectKind> {
         parameter::rows(),
     ]
     .concat()
+    .into_iter()
+    .map(|kind| match sentences::sentence(kind.id()) {
+        Some(sentence) => kind.with_sentence(sentence),
+        None => kind,
+    })
+    .collect()
 }
 
 #[cfg(test)]

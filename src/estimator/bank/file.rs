@@ -98,6 +98,20 @@ pub fn write(path: &Path, draws: &Draws, names: &[&str]) -> Result<(), Estimator
         .map_err(|error| EstimatorError::io(path, error))
 }
 
+/// Writes a new `.npz` archive of these matrices.
+///
+/// # Errors
+///
+/// A place that is taken or cannot be written.
+pub(crate) fn write_matrices(
+    path: &Path,
+    matrices: &[(&str, &Array2<f64>)],
+) -> Result<(), EstimatorError> {
+    archive(matrices)
+        .and_then(|bytes| write_new(path, &bytes))
+        .map_err(|error| EstimatorError::io(path, error))
+}
+
 /// Reads a file in the form that its name ends with, of a twin with these parameters.
 ///
 /// # Errors

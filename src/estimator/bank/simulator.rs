@@ -26,15 +26,30 @@ impl FeatureSimulator {
     /// Features that this twin cannot have.
     pub fn new(twin: impl Into<Twin>, features: &dyn FeatureRecipe) -> Result<Self, FeatureError> {
         let calls = Arc::new(AtomicUsize::new(0));
-        let counter = calls.clone();
-        let twin = twin.into().watched(move || {
-            counter.fetch_add(1, Ordering::Relaxed);
-            Ok(())
-        });
+        let twin = counted(&twin.into(), &calls);
         Ok(Self {
             map: features.bind(&twin)?,
             twin,
             calls,
+        })
+    }
+
+    /// The simulator with another twin over the same θ and signals. Its features stay those of the first twin, unless they are given
+    /// to be bound anew. Calls are counted together.
+    ///
+    /// # Errors
+    ///
+    /// Features that this twin cannot have.
+    pub(in crate::estimator) fn of(
+        &self,
+        twin: &Twin,
+        features: Option<&dyn FeatureRecipe>,
+    ) -> Result<Self, FeatureError> {
+        let twin = counted(twin, &self.calls);
+        Ok(Self {
+            map: features.map_or_else(|| Ok(self.map.clone()), |features| features.bind(&twin))?,
+            twin,
+            calls: self.calls.clone(),
         })
     }
 
@@ -137,4 +152,13 @@ impl FeatureSimulator {
         }
         Ok(mean / seeds as f64)
     }
+}
+
+/// The twin with its runs counted.
+fn counted(twin: &Twin, calls: &Arc<AtomicUsize>) -> Twin {
+    let counter = calls.clone();
+    twin.watched(move || {
+        counter.fetch_add(1, Ordering::Relaxed);
+        Ok(())
+    })
 }

@@ -1,35 +1,45 @@
 //! From a measured record to a calibrated twin.
 
 mod cloud;
+mod merit;
+mod noise;
 mod outcome;
 mod tracking;
 mod tune;
+mod warnings;
 
+pub(crate) use outcome::Answer;
 pub use outcome::{Estimate, EstimateOptions, Seconds};
 pub use tracking::{Tracking, track};
 
 use crate::estimator::bank::{Draws, FeatureSimulator};
 use crate::estimator::error::EstimatorError;
 use crate::estimator::estimator::Estimator;
-use crate::estimator::gate::{GateForm, GateOutcome, GateTest};
+use crate::estimator::gate::{GateForm, GateOutcome, GateSettings, GateTest};
 use crate::estimator::readout::{INTERVAL_LEVEL, Spread};
+use crate::estimator::recipe::PresetName;
 use crate::estimator::refine::{Information, RefineSettings, Refined, Refinement};
 use crate::estimator::settings::Settings;
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::twin::Noise;
 use cloud::{Around, cloud};
+use merit::Merit;
 use nalgebra::DVector;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::time::Instant;
 use tune::tune;
+use warnings::warnings;
 
 /// The tuned estimate is kept while its whitened misfit is within this quantile of χ²_d.
 const KEEP_TUNED: f64 = 0.999;
 
 impl Estimator {
-    /// Estimates θ from a record: features, network, gate; and where the gate rejects: Gauss–Newton, cloud, tuned
-    /// heads, gate again.
+    /// Estimates θ from a record: features, network, gate; then Gauss–Newton, cloud, tuned heads, gate again, so that the answer is
+    /// the record's own and does not lean on the prior. Where the study trusts its prior (`[prior] trust = true`; the paper's preset
+    /// does), the network's estimate is kept if the gate agrees.
+    ///
+    /// Simulations are in the noise that the record shows, where that is surely not the declared one ([`Estimate::noise`]).
     ///
     /// # Errors
     ///
@@ -45,69 +55,112 @@ impl Estimator {
         if let Some(validation) = &options.validation {
             self.study().check_record(validation)?;
         }
-        let settings = match options.preset {
-            Some(name) if name != self.preset => &self.project.recipe(name).settings,
-            _ => &self.settings,
+        let preset = options.preset.unwrap_or(self.preset);
+        let settings = match preset == self.preset {
+            true => &self.settings,
+            false => &self.project.recipe(preset).settings,
         };
         settings.check()?;
-        let simulator = self.simulator()?;
-        let observed = simulator.observe(record)?;
+        // The paper takes the prior and the declared noise at their word.
+        let is_paper = preset == PresetName::Paper;
+        let (study, seed) = (self.study(), options.seed);
+        let declared = self.simulator()?;
+        let observed = declared.observe(record)?;
         let initial = self.predict_one(&observed)?;
         let mut seconds = Seconds {
             predict: clock.elapsed().as_secs_f64(),
             ..Seconds::default()
+        };
+        let lap = Instant::now();
+        let mut shown = match is_paper && options.draws == 0 {
+            true => None,
+            false => noise::shown(study, record, options, progress)?,
+        };
+        if let Some(shown) = shown.as_mut().filter(|_| is_paper) {
+            shown.levels.clear();
+        }
+        let in_noise = (shown.as_ref()).filter(|shown| !shown.levels.is_empty());
+        let simulator = match in_noise {
+            Some(shown) => declared.of(&shown.twin, None)?,
+            None => declared,
         };
         let run = Run {
             estimator: self,
             settings,
             record,
             observed: &observed,
-            noise: Noise::new(options.seed, "estimate", 0),
-            seed: options.seed,
+            noise: Noise::new(seed, "estimate", 0),
+            seed,
             progress,
         };
-        let lap = Instant::now();
         let gate = run.gate(&simulator, &initial)?;
         seconds.gate = lap.elapsed().as_secs_f64();
-        let outcome = if gate.out_of_distribution || options.always_refine {
-            run.refit(&simulator, &initial, &mut seconds)?
-        } else {
-            run.keep(&simulator, &initial)?
+        let trusting = run.trusting(&initial);
+        let is_trusted = is_paper || study.trusts_prior();
+        let is_kept = is_trusted && !gate.out_of_distribution && !options.always_refine;
+        let mut outcome = match is_kept {
+            true => run.keep(&simulator, &trusting)?,
+            false => {
+                let bound = in_noise.map(|shown| simulator.of(&shown.twin, Some(&*self.recipe)));
+                let bound = bound.transpose()?;
+                run.refit(bound.as_ref().unwrap_or(&simulator), &initial, &mut seconds)?
+            }
         };
         let twin = simulator.twin();
         // A free run may diverge where noisy runs do not; the estimate stands all the same.
         let follow = |theta: &[f64], record: &Record| track(twin, theta, record).ok();
-        let tracking = follow(&outcome.answer.theta, record);
+        let mut tracking = follow(&outcome.answer.theta, record);
+        let tracking_initial = (outcome.refitted)
+            .then(|| follow(&initial, record))
+            .flatten();
+        let mut refinement_refused = false;
+        if outcome.refitted && !is_paper {
+            let merit = |theta: &[f64], run: &Option<Tracking>| {
+                Merit::of(twin, record, theta, run.as_ref())
+            };
+            let first = merit(&initial, &tracking_initial);
+            let refined = merit(&outcome.answer.theta, &tracking);
+            if refined.is_worse_than(&first, initial.len()) {
+                refinement_refused = true;
+                outcome.answer = trusting.clone();
+                tracking = tracking_initial.clone();
+            }
+        }
         let fitted = tracking
             .as_ref()
             .map_or(&outcome.answer.theta, |t| &t.theta);
         let validation = (options.validation.as_ref()).and_then(|record| follow(fitted, record));
-        let tracking_initial = (outcome.refitted)
-            .then(|| follow(&initial, record))
-            .flatten();
         let space = twin.parameters();
-        seconds.total = clock.elapsed().as_secs_f64();
-        Ok(Estimate {
+        let mut estimate = Estimate {
             names: space.names().into_iter().map(str::to_owned).collect(),
             roles: space.iter().map(|p| p.role).collect(),
             tracking_initial,
             initial,
+            trusting,
             gate,
+            noise: in_noise.map_or_else(Vec::new, |shown| shown.levels.clone()),
             gauss_newton: outcome.gauss_newton,
             fine: outcome.fine,
-            low: space.clamp(&outcome.answer.low),
-            high: space.clamp(&outcome.answer.high),
             theta: outcome.answer.theta,
             std_error: outcome.answer.std_error,
+            low: outcome.answer.low,
+            high: outcome.answer.high,
             information: outcome.information,
             after: outcome.after,
             refitted: outcome.refitted,
+            refinement_refused,
             tracking,
             validation,
+            posterior: shown.as_ref().and_then(|shown| shown.fit.posterior.clone()),
+            warnings: vec![],
             simulations: simulator.calls(),
             cloud: outcome.cloud,
             seconds,
-        })
+        };
+        let fit = shown.as_ref().map(|shown| &shown.fit);
+        estimate.warnings = warnings(twin, record, &estimate, fit);
+        estimate.seconds.total = clock.elapsed().as_secs_f64();
+        Ok(estimate)
     }
 }
 
@@ -133,26 +186,6 @@ struct Outcome {
     cloud: Option<Draws>,
 }
 
-/// An estimate with its uncertainty.
-struct Answer {
-    theta: Vec<f64>,
-    std_error: Vec<f64>,
-    low: Vec<f64>,
-    high: Vec<f64>,
-}
-
-impl Answer {
-    fn new(theta: Vec<f64>, spread: Spread) -> Self {
-        let shifted = |by: &[f64]| theta.iter().zip(by).map(|(t, b)| t + b).collect();
-        Self {
-            low: shifted(&spread.low),
-            high: shifted(&spread.high),
-            std_error: spread.std_error,
-            theta,
-        }
-    }
-}
-
 impl Run<'_> {
     fn gate_test<'a>(&'a self, simulator: &'a FeatureSimulator, purpose: &str) -> GateTest<'a> {
         GateTest {
@@ -170,8 +203,31 @@ impl Run<'_> {
         simulator: &FeatureSimulator,
         initial: &[f64],
     ) -> Result<GateOutcome, EstimatorError> {
-        let test = self.gate_test(simulator, "gate");
-        let gate = match self.settings.gate.form {
+        let first = self.tested(simulator, initial, &self.settings.gate, "gate")?;
+        match (first.is_unsure(), self.settings.gate.form) {
+            (true, GateForm::Calibrated) => self.tested(
+                simulator,
+                initial,
+                &self.settings.gate.larger(),
+                "gate, larger",
+            ),
+            _ => Ok(first),
+        }
+    }
+
+    /// The test with these settings.
+    fn tested(
+        &self,
+        simulator: &FeatureSimulator,
+        initial: &[f64],
+        settings: &GateSettings,
+        purpose: &str,
+    ) -> Result<GateOutcome, EstimatorError> {
+        let test = GateTest {
+            settings,
+            ..self.gate_test(simulator, purpose)
+        };
+        let gate = match settings.form {
             GateForm::Paper => test.at(initial)?,
             GateForm::Calibrated => {
                 // The hypothesis is a θ in the prior; the network extrapolates, and errs, beyond.
@@ -206,26 +262,31 @@ impl Run<'_> {
         }
     }
 
-    /// The gate kept the network's estimate: its error is that of simulations predicted nearby.
-    fn keep(
-        &self,
-        simulator: &FeatureSimulator,
-        initial: &[f64],
-    ) -> Result<Outcome, EstimatorError> {
+    /// The network's estimate, with the errors of simulations of the prior that were predicted nearby.
+    fn trusting(&self, initial: &[f64]) -> Answer {
         let space = self.estimator.study().twin().parameters();
         let spread = (self.estimator.calibration).spread(initial, &space.widths(), INTERVAL_LEVEL);
         let unknown = || Spread::normal(vec![f64::NAN; initial.len()], INTERVAL_LEVEL);
+        Answer::new(initial.to_vec(), spread.unwrap_or_else(unknown), &space)
+    }
+
+    /// The gate kept the network's estimate.
+    fn keep(
+        &self,
+        simulator: &FeatureSimulator,
+        trusting: &Answer,
+    ) -> Result<Outcome, EstimatorError> {
         // The estimate stands whether or not its directions can be told.
         let information = match self
             .refinement(simulator, self.observed, &self.settings.refine)
-            .describe_at(initial)
+            .describe_at(&trusting.theta)
         {
             Ok(refined) => Some(refined.information),
             Err(error @ EstimatorError::Cancelled(_)) => return Err(error),
             Err(_) => None,
         };
         Ok(Outcome {
-            answer: Answer::new(initial.to_vec(), spread.unwrap_or_else(unknown)),
+            answer: trusting.clone(),
             gauss_newton: None,
             fine: None,
             information,
@@ -281,13 +342,14 @@ impl Run<'_> {
         seconds.tune = Some(lap.elapsed().as_secs_f64());
         let gauss_newton = refined.theta.as_slice().to_vec();
         let fine = tuned.theta.clone();
+        let space = simulator.twin().parameters();
         let answer = match tuned.spread {
             Some(spread) if self.keeps(&refinement, &refined, &tuned.theta) => {
-                Answer::new(tuned.theta, spread)
+                Answer::new(tuned.theta, spread, &space)
             }
             _ => {
                 let spread = Spread::normal(refined.information.std_error.clone(), INTERVAL_LEVEL);
-                Answer::new(gauss_newton.clone(), spread)
+                Answer::new(gauss_newton.clone(), spread, &space)
             }
         };
         let after = self.gate_test(simulator, "after").after_refit(

@@ -3,12 +3,17 @@
 use super::tracking::Tracking;
 use crate::estimator::bank::Draws;
 use crate::estimator::gate::GateOutcome;
+use crate::estimator::readout::Spread;
 use crate::estimator::recipe::PresetName;
 use crate::estimator::refine::Information;
-use crate::fit::Nuisance;
+use crate::fit::{FittedNoise, Nuisance, Posterior, Warning};
 use crate::record::Record;
-use crate::twin::Role;
+use crate::twin::{ParameterSpace, Role};
 use serde::Serialize;
+
+/// Codes of warnings that no estimate is consistent with.
+pub(super) const NO_BETTER: &str = "no-better-than-constant";
+pub(super) const DIVERGES: &str = "free-run-diverges";
 
 /// Options of an estimate.
 #[derive(Debug, Clone, Default)]
@@ -17,10 +22,37 @@ pub struct EstimateOptions {
     pub seed: u64,
     /// Numbers of another preset than the estimator's own; features and network stay.
     pub preset: Option<PresetName>,
-    /// Refine and tune whatever the gate says.
+    /// Refine and tune, though the prior is trusted and the gate agrees.
     pub always_refine: bool,
     /// A second record to score the calibrated twin on.
     pub validation: Option<Record>,
+    /// Number of posterior draws to return, of the likelihood's own fit.
+    pub draws: usize,
+}
+
+/// Parameters with their errors.
+#[derive(Debug, Clone)]
+pub(crate) struct Answer {
+    pub theta: Vec<f64>,
+    pub std_error: Vec<f64>,
+    /// Ends of the 90 % interval.
+    pub low: Vec<f64>,
+    pub high: Vec<f64>,
+}
+
+impl Answer {
+    pub(super) fn new(theta: Vec<f64>, spread: Spread, space: &ParameterSpace) -> Self {
+        let shifted = |by: &[f64]| {
+            let moved: Vec<f64> = theta.iter().zip(by).map(|(t, b)| t + b).collect();
+            space.clamp(&moved)
+        };
+        Self {
+            low: shifted(&spread.low),
+            high: shifted(&spread.high),
+            std_error: spread.std_error,
+            theta,
+        }
+    }
 }
 
 /// Estimate with the results of its stages. Skipped stages are `None`.
@@ -33,14 +65,19 @@ pub struct Estimate {
     pub roles: Vec<Role>,
     /// The network's estimate.
     pub initial: Vec<f64>,
+    /// The network's estimate with its errors, for those who trust the prior.
+    pub(crate) trusting: Answer,
     /// The test of the network's estimate.
     pub gate: GateOutcome,
+    /// Noise levels that the record shows in place of those that the twin declares; simulations take them.
+    pub noise: Vec<FittedNoise>,
     /// Gauss–Newton's estimate.
     pub gauss_newton: Option<Vec<f64>>,
     /// The tuned heads' estimate.
     pub fine: Option<Vec<f64>>,
-    /// The estimate: the network's where the gate kept it, else the tuned one unless its misfit is too large, else
-    /// Gauss–Newton's.
+    /// The estimate: the record's own, within the bounds. That is the tuned one, unless its misfit is too large, else
+    /// Gauss–Newton's. The network's is kept where the prior is trusted and the gate agrees, and where refined ones explain the record
+    /// worse.
     pub theta: Vec<f64>,
     /// Standard errors of `theta`.
     pub std_error: Vec<f64>,
@@ -54,12 +91,18 @@ pub struct Estimate {
     pub after: Option<GateOutcome>,
     /// `true` if a refit was made at all.
     pub refitted: bool,
+    /// `true` if its answer explains the record worse than the network's, which is kept.
+    pub(crate) refinement_refused: bool,
     /// The free run at `theta`, unknown starts refitted; `None` where it diverges.
     pub tracking: Option<Tracking>,
     /// The free run at the network's estimate, for comparison; `None` without a refit, or where it diverges.
     pub tracking_initial: Option<Tracking>,
     /// The free run on the validation record; `None` without one, or where it diverges.
     pub validation: Option<Tracking>,
+    /// Draws of everything unknown from likelihood and weak priors, where they were asked for.
+    pub posterior: Option<Posterior>,
+    /// Reasons for doubt.
+    pub warnings: Vec<Warning>,
     /// Simulator calls.
     pub simulations: usize,
     /// The cloud that the heads were tuned on, and measured on: its last rows they never saw.
@@ -107,6 +150,28 @@ impl Estimate {
             .filter(|(_, role)| **role == Role::Parameter)
             .map(|(value, _)| value.clone())
             .collect()
+    }
+
+    /// Returns whether the record is what the twin makes at the estimate: no test rejects, and the free run of every output is better
+    /// than a constant.
+    pub fn is_consistent(&self) -> bool {
+        let test = if self.refitted {
+            self.after
+        } else {
+            Some(self.gate)
+        };
+        test.is_some_and(|test| !test.out_of_distribution) && !self.is_no_better_than_constant()
+    }
+
+    /// Returns whether the free run of an output is no better than a constant, or diverges.
+    pub(crate) fn is_no_better_than_constant(&self) -> bool {
+        let codes = [NO_BETTER, DIVERGES];
+        self.warnings.iter().any(|w| codes.contains(&w.code))
+    }
+
+    /// Returns whether the answer is the network's.
+    pub(crate) fn leans_on_prior(&self) -> bool {
+        !self.refitted || self.refinement_refused
     }
 
     /// Draws of the cloud that were drawn again: out of bounds, diverged, or without features.

@@ -11,6 +11,8 @@ use crate::twin::{Now, Outliers};
 
 /// Innovation of one row.
 pub(super) struct Innovation<'w> {
+    /// Outputs given the rows before.
+    pub predicted: &'w [f64],
     pub innovation: &'w [f64],
     /// p × p.
     pub covariance: &'w [f64],
@@ -189,6 +191,7 @@ impl<'k, S: Size> Pass<'k, S> {
         sink.innovation(
             k,
             &Innovation {
+                predicted: &self.predicted.as_ref()[..p],
                 innovation: &self.update.innovation.as_ref()[..p],
                 covariance: &self.update.covariance.as_ref()[..p * p],
                 standardised: &self.update.standardised.as_ref()[..p],

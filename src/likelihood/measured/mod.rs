@@ -21,9 +21,10 @@ pub(crate) use level::{Beliefs, Level, Measured};
 use super::ensemble;
 use super::kalman::FilterError;
 use crate::record::Record;
-use crate::twin::{StateSpace, Twin};
+use crate::twin::{StateSpace, Twin, TwinError, fix};
 use level::build;
 use motion::{followed_motion, free_motion, size};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// The twin as these records show it. A black box has noise of its own, or is given that of a sensor.
@@ -39,6 +40,41 @@ pub(crate) fn measured(
             levels: vec![],
         }),
     }
+}
+
+/// The twin with these noise levels in place of its own; all else stays, its start too. Levels by state, per √s, or by output. A black
+/// box stays as it is.
+pub(crate) fn with_levels(
+    twin: &Twin,
+    record: &Record,
+    beliefs: &Beliefs,
+    levels: &BTreeMap<String, f64>,
+) -> Result<Twin, TwinError> {
+    let Twin::Equations(base) = twin else {
+        return Ok(twin.clone());
+    };
+    let outline = base.outline();
+    let beliefs = Beliefs {
+        starts: outline.states.iter().map(|s| s.name.clone()).collect(),
+        ..beliefs.clone()
+    };
+    // Sizes make guesses alone, and none is used.
+    let (states, outputs) = (outline.states.len(), outline.outputs.len());
+    let measured = build(
+        base,
+        &outline,
+        std::slice::from_ref(record),
+        &beliefs,
+        &outline.parameters.centre(),
+        &vec![1.0; states],
+        &vec![1.0; outputs],
+    );
+    let held = (measured.levels.iter()).map(|level| {
+        let own = level.declared.unwrap_or(0.0);
+        let value = levels.get(level.parameter.target()).copied();
+        (level.parameter.name.clone(), value.unwrap_or(own))
+    });
+    fix(measured.twin, &held.collect())
 }
 
 fn measured_equations(

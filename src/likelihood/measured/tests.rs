@@ -112,3 +112,22 @@ fn a_wide_start_is_integrated() {
     };
     assert!(log_likelihood(&wide) > log_likelihood(&known) + 100.0);
 }
+
+/// Levels take the place of the twin's own one by one, whatever the step; θ and the start stay.
+#[test]
+fn levels_are_put_in_the_place_of_the_twins_own() {
+    let (twin, record) = tanks();
+    let levels = BTreeMap::from([("h2".to_owned(), 0.3), ("y".to_owned(), 0.05)]);
+    let base = Twin::Equations(twin);
+    let loud = with_levels(&base, &record, &beliefs(0.5), &levels).unwrap();
+    assert_eq!(loud.parameters().names(), base.parameters().names());
+    let theta = loud.parameters().centre();
+    let equations = loud.equations().unwrap();
+    let (mut q, mut r, mut start) = ([0.0; 2], [0.0; 1], [0.0; 2]);
+    let now = Now::new(0.0, 0.25, &[1.0], &theta);
+    equations.noise(&now, &mut q, &mut r);
+    assert!((q[0] - 0.1 / 2f64.sqrt()).abs() < 1e-12, "declared: {q:?}");
+    assert!((q[1] - 0.15).abs() < 1e-12 && (r[0] - 0.05).abs() < 1e-12);
+    equations.start_deviation(&now, &mut start);
+    assert_eq!(start, [0.0; 2]);
+}

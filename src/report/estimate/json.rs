@@ -1,6 +1,8 @@
 //! An estimate as JSON, `truetwin.estimate/1`.
 
+use super::rows;
 use crate::estimator::{Estimate, INTERVAL_LEVEL};
+use crate::report::fit::posterior_json;
 use crate::study::Study;
 use serde_json::{Value, json};
 
@@ -15,8 +17,14 @@ use serde_json::{Value, json};
 /// | `free_run` | root mean square of record − noise-free run, in output units |
 /// | `simulations`, `seconds` | what it took |
 ///
-/// Beyond the contract: `parameters` (unit, prior, bounds), `directions` (all, least known first; null where the
-/// features do not tell them), `refitted`, `redrawn`.
+/// | `answer` | `record`: `theta.final` is the record's own; `prior`: the network's, which leans on the prior |
+/// | `trusting_prior` | the network's estimate with its errors, for those who trust the prior |
+/// | `noise` | levels that the record shows in place of those declared; simulations take them |
+/// | `posterior` | of posterior draws: names, how many independent ones they are worth, modes; null where none were asked for |
+/// | `warnings` | `code`, `what`, `remedy` |
+/// | `parameters` | value, standard error, interval, prior, bounds; `prior_share`: variance over the prior's; `at_bound`: `low`, `high` or null |
+///
+/// Beyond these: `directions` (all, least known first; null where the features do not tell them), `refitted`, `redrawn`.
 ///
 /// All keys are always there. Stages that were skipped are null, and so are numbers that are not finite.
 pub fn estimate_json(study: &Study, estimate: &Estimate) -> Value {
@@ -25,7 +33,7 @@ pub fn estimate_json(study: &Study, estimate: &Estimate) -> Value {
     let after = estimate.refitted.then(|| {
         json!({
             "p_value": estimate.after.map(|test| test.p_value),
-            "consistent": estimate.after.map(|test| !test.out_of_distribution),
+            "consistent": estimate.after.map(|_| estimate.is_consistent()),
             "alpha": estimate.after.map(|test| test.alpha),
             "statistic": estimate.after.map(|test| test.statistic),
         })
@@ -34,11 +42,7 @@ pub fn estimate_json(study: &Study, estimate: &Estimate) -> Value {
     let weak: Vec<_> = (estimate.information.iter())
         .flat_map(|known| known.weak())
         .collect();
-    let space = study.twin().parameters();
-    let described: Vec<_> = space.iter().collect();
-    let parameters: Vec<Value> = (estimate.physical(&described).iter())
-        .map(|p| json!({ "name": p.name, "unit": p.unit, "prior": p.prior, "bounds": p.bounds }))
-        .collect();
+    let trusting = &estimate.trusting;
     json!({
         "schema": "truetwin.estimate/1",
         "twin": study.name(),
@@ -66,7 +70,20 @@ pub fn estimate_json(study: &Study, estimate: &Estimate) -> Value {
         },
         "simulations": estimate.simulations,
         "seconds": estimate.seconds,
-        "parameters": parameters,
+        "answer": if estimate.leans_on_prior() { "prior" } else { "record" },
+        "trusting_prior": {
+            "theta": own(&trusting.theta),
+            "std_error": own(&trusting.std_error),
+            "interval": {
+                "level": INTERVAL_LEVEL,
+                "low": own(&trusting.low),
+                "high": own(&trusting.high),
+            },
+        },
+        "noise": estimate.noise,
+        "posterior": posterior_json(estimate.posterior.as_ref()),
+        "warnings": estimate.warnings,
+        "parameters": estimate.physical(&rows(study, estimate)),
         "directions": directions,
         "refitted": estimate.refitted,
         "redrawn": estimate.redrawn(),

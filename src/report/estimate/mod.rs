@@ -9,3 +9,22 @@ pub(super) use json::estimate_json;
 pub use overlay::overlay_svg;
 pub(super) use text::estimate_text;
 pub use trajectories::trajectories_csv;
+
+use super::parameters::ParameterRow;
+use crate::estimator::Estimate;
+use crate::study::Study;
+
+/// One line of the table a parameter, in the order of θ.
+pub(super) fn rows(study: &Study, estimate: &Estimate) -> Vec<ParameterRow> {
+    let space = study.twin().parameters();
+    let row = |(j, parameter)| {
+        let interval = [estimate.low[j], estimate.high[j]];
+        ParameterRow::new(
+            parameter,
+            estimate.theta[j],
+            estimate.std_error[j],
+            interval,
+        )
+    };
+    space.iter().enumerate().map(row).collect()
+}

@@ -1,13 +1,24 @@
 //! An estimate as text for the terminal.
 
-use crate::estimator::{Estimate, INTERVAL_LEVEL};
-use crate::report::digits::{self, Digits, probability, short, unit_suffix};
+use super::rows;
+use crate::estimator::{Estimate, GateOutcome, INTERVAL_LEVEL};
+use crate::math::three_digits;
+use crate::report::digits::{Digits, probability, short, unit_suffix};
+use crate::report::fit::posterior_text;
+use crate::report::parameters::ParameterRow;
+use crate::setting::number;
 use crate::study::Study;
 use crate::twin::{Parameter, Role};
 
 /// Limits of columns and lines.
 const COLUMNS: usize = 100;
-const LINES: usize = 20;
+const LINES: usize = 24;
+/// Cells of a parameter: name, unit, first estimate, final one, standard error, interval, prior, note.
+const COLUMNS_OF_TABLE: usize = 8;
+/// Least room for a name.
+const LEAST_NAME: usize = 8;
+/// Number of warnings shown.
+const WARNINGS: usize = 3;
 /// Number of weak combinations shown.
 const COMBINATIONS: usize = 2;
 
@@ -24,7 +35,9 @@ pub fn estimate_text(study: &Study, estimate: &Estimate) -> String {
         below.extend(paragraph(&verdict));
     }
     below.extend(paragraph(&tracking(study, estimate)));
+    below.extend(estimate.posterior.as_ref().map(posterior_text));
     below.push(effort(estimate));
+    below.extend(warnings(estimate));
     let left = LINES.saturating_sub(above.len() + below.len());
     let lines = [above, table(study, estimate, left), below].concat();
     lines.join("\n") + "\n"
@@ -33,17 +46,29 @@ pub fn estimate_text(study: &Study, estimate: &Estimate) -> String {
 /// Returns the answer of the gate and its consequence.
 fn gate(study: &Study, estimate: &Estimate) -> String {
     let (name, test) = (study.name(), estimate.gate);
-    let p = format!("{}, level {}", probability(test.p_value), test.alpha);
-    match (test.out_of_distribution, estimate.refitted) {
-        (true, _) => format!(
-            "{name}: the record is inconsistent with the network's estimate ({p}); parameters refitted."
+    let p = format!("{}, level {}", p_value(&test), test.alpha);
+    let found = match test.out_of_distribution {
+        true => "the record is inconsistent with",
+        false if estimate.is_no_better_than_constant() => "the test does not reject",
+        false => "the record is consistent with",
+    };
+    let answer = match (estimate.refitted, estimate.refinement_refused) {
+        (false, _) => "estimate kept, as the prior is trusted",
+        (true, true) => "estimate kept: refitted parameters explain the record worse",
+        (true, false) => "parameters refitted: the answer is the record's own, whatever the prior",
+    };
+    format!("{name}: {found} the network's estimate ({p}); {answer}.")
+}
+
+/// Returns the p-value of a test; one that no simulation reaches is an upper bound.
+fn p_value(test: &GateOutcome) -> String {
+    match test.at_floor() {
+        true => format!(
+            "p < {}, {} simulations",
+            number(three_digits(test.p_value)),
+            test.simulations
         ),
-        (false, false) => format!(
-            "{name}: the record is consistent with the network's estimate ({p}); estimate kept."
-        ),
-        (false, true) => format!(
-            "{name}: the record is consistent with the network's estimate ({p}); parameters refitted as requested."
-        ),
+        false => probability(test.p_value),
     }
 }
 
@@ -57,13 +82,16 @@ fn table(study: &Study, estimate: &Estimate, lines: usize) -> Vec<String> {
         "final",
         "± std error",
         &level,
+        "prior",
+        "",
     ];
     let space = study.twin().parameters();
     // The twin's own parameters first.
     let (own, others): (Vec<_>, Vec<_>) =
         (space.iter().enumerate()).partition(|(_, p)| p.role == Role::Parameter);
+    let table = rows(study, estimate);
     let all: Vec<_> = (own.into_iter().chain(others))
-        .map(|(j, parameter)| row(estimate, j, parameter))
+        .map(|(j, parameter)| row(estimate.initial[j], &table[j], parameter))
         .collect();
     let room = lines.saturating_sub(1).max(2);
     let shown = if all.len() > room {
@@ -73,11 +101,18 @@ fn table(study: &Study, estimate: &Estimate, lines: usize) -> Vec<String> {
     };
     let mut cells = vec![head.map(str::to_owned)];
     cells.extend_from_slice(&all[..shown]);
-    let mut widths: Vec<usize> = (0..head.len())
-        .map(|c| cells.iter().map(|row| length(&row[c])).max().unwrap_or(0))
-        .collect();
-    let others: usize = widths[1..].iter().map(|w| w + 2).sum();
-    widths[0] = widths[0].min(COLUMNS.saturating_sub(others).max(8));
+    let mut widths = widths_of(&cells);
+    let others = |widths: &[usize]| -> usize { widths[1..].iter().map(|w| w + 2).sum() };
+    if others(&widths) + LEAST_NAME > COLUMNS {
+        // Very long numbers: prior and note are in the JSON.
+        for row in &mut cells {
+            row[6].clear();
+            row[7].clear();
+        }
+        widths = widths_of(&cells);
+    }
+    let others = others(&widths);
+    widths[0] = widths[0].min(COLUMNS.saturating_sub(others).max(LEAST_NAME));
     let mut written: Vec<String> = (cells.iter())
         .map(|row| {
             let aligned = row
@@ -85,10 +120,10 @@ fn table(study: &Study, estimate: &Estimate, lines: usize) -> Vec<String> {
                 .zip(&widths)
                 .enumerate()
                 .map(|(c, (cell, &width))| match c {
-                    0 | 1 => format!("{:<width$}", clipped(cell, width)),
+                    0 | 1 | 7 => format!("{:<width$}", clipped(cell, width)),
                     _ => format!("{cell:>width$}"),
                 });
-            aligned.collect::<Vec<_>>().join("  ")
+            aligned.collect::<Vec<_>>().join("  ").trim_end().to_owned()
         })
         .collect();
     if shown < all.len() {
@@ -100,26 +135,30 @@ fn table(study: &Study, estimate: &Estimate, lines: usize) -> Vec<String> {
     written
 }
 
+fn widths_of(cells: &[[String; COLUMNS_OF_TABLE]]) -> Vec<usize> {
+    let width = |c: usize| cells.iter().map(|row| length(&row[c])).max().unwrap_or(0);
+    (0..COLUMNS_OF_TABLE).map(width).collect()
+}
+
 /// Returns one line of the table.
-fn row(estimate: &Estimate, j: usize, parameter: &Parameter) -> [String; 6] {
+fn row(initial: f64, row: &ParameterRow, parameter: &Parameter) -> [String; COLUMNS_OF_TABLE] {
     let name = match parameter.role {
         Role::Parameter | Role::Magnitude => parameter.name.clone(),
         Role::Start => format!("start of {}", parameter.target()),
         Role::Noise => format!("noise of {}", parameter.target()),
     };
-    let (value, error) = (estimate.theta[j], estimate.std_error[j]);
-    let digits = Digits::supported(value, error);
-    let (low, high) = (
-        digits.write(estimate.low[j]),
-        digits.write(estimate.high[j]),
-    );
+    let digits = Digits::supported(row.value, row.std_error);
+    let [value, error, interval, prior, note] = row.cells(parameter.role);
+    let unit = clipped(&parameter.unit, 10);
     [
         name,
-        clipped(&parameter.unit, 10),
-        digits.write(estimate.initial[j]),
-        digits.write(value),
-        digits::error(error),
-        format!("[{low}, {high}]"),
+        unit,
+        digits.write(initial),
+        value,
+        error,
+        interval,
+        prior,
+        note,
     ]
 }
 
@@ -160,20 +199,26 @@ fn weak(estimate: &Estimate) -> Vec<String> {
 
 /// Returns the test of the calibrated twin; `None` without a refit.
 fn after(estimate: &Estimate) -> Option<String> {
-    if !estimate.refitted {
+    if !estimate.refitted || estimate.refinement_refused {
         return None;
     }
     Some(match estimate.after {
+        Some(test) if !test.out_of_distribution && estimate.is_no_better_than_constant() => {
+            format!(
+                "The test after the refit does not reject ({}), but the free run shows nothing of the record.",
+                p_value(&test)
+            )
+        }
         None => "The calibrated twin cannot be tested: there are no more features than parameters."
             .into(),
         Some(test) if test.out_of_distribution => format!(
             "The calibrated twin does not explain the record ({}, false-alarm rate {} %): no parameters compensate for what it lacks. Standard errors hold only for a complete twin. Next: truetwin diagnose.",
-            probability(test.p_value),
+            p_value(&test),
             100.0 * test.alpha,
         ),
         Some(test) => format!(
             "The calibrated twin is consistent with the record ({}).",
-            probability(test.p_value)
+            p_value(&test)
         ),
     })
 }
@@ -218,6 +263,18 @@ fn effort(estimate: &Estimate) -> String {
         estimate.simulations,
         short(estimate.seconds.total)
     )
+}
+
+/// Returns the first warnings.
+fn warnings(estimate: &Estimate) -> Vec<String> {
+    let mut lines: Vec<String> = (estimate.warnings.iter().take(WARNINGS))
+        .flat_map(|w| paragraph(&format!("warning: {}; {}", w.what, w.remedy)))
+        .collect();
+    let more = estimate.warnings.len().saturating_sub(WARNINGS);
+    if more > 0 {
+        lines.push(format!("… and {more} more warnings; --json has them all"));
+    }
+    lines
 }
 
 /// Breaks text into lines of at most [`COLUMNS`] columns.

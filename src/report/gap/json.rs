@@ -1,4 +1,4 @@
-//! A diagnosis as JSON, `truetwin.gap/1`.
+//! A diagnosis as JSON, `truetwin.gap/2`.
 
 use crate::diagnose::Diagnosis;
 use serde_json::Value;
@@ -6,7 +6,7 @@ use serde_json::Value;
 /// File of the record to measure next, beside the report.
 pub const NEXT_INPUT: &str = "next-input.csv";
 
-/// The diagnosis as one JSON object, `truetwin.gap/1`.
+/// The diagnosis as one JSON object, `truetwin.gap/2`.
 ///
 /// | key | holds |
 /// |---|---|

@@ -3,6 +3,7 @@
 mod html;
 mod json;
 mod pictures;
+mod story;
 mod text;
 
 pub use html::gap_html;

@@ -185,9 +185,18 @@ pub(super) fn remains_sentence(cause: &Cause) -> Option<String> {
     })
 }
 
+/// Returns the name of the measure with its horizon.
+pub(super) fn measure(s: &Shrinkage) -> String {
+    match (s.metric, s.horizon) {
+        (Shrinkage::LOG_SCORE, _) => "Log density of a sample, in nats".into(),
+        (_, Some(seconds)) => format!("Error of predictions {} s ahead", short(seconds)),
+        (_, None) => "Error of the free run".into(),
+    }
+}
+
 /// Returns errors on held-out data before and after, and the share of the gap closed.
 pub(super) fn closed_sentence(s: &Shrinkage) -> String {
-    let mut text = format!("{} on the {}: {}", s.metric, s.held_out, short(s.before));
+    let mut text = format!("{}, {}: {}", measure(s), s.held_out, short(s.before));
     if let Some(after) = s.after {
         text.push_str(&format!(" → {}", short(after)));
     }

@@ -159,7 +159,7 @@ mod tests {
         assert_eq!(Manifest::parse("reproduce", &text), Ok(manifest()));
         let other = Manifest::parse("withheld", &text).unwrap_err();
         assert!(other.contains("`truetwin reproduce`"), "{other}");
-        for text in ["", "[]", "{}", r#"{"schema": "truetwin.gap/1"}"#] {
+        for text in ["", "[]", "{}", r#"{"schema": "truetwin.gap/2"}"#] {
             assert!(Manifest::parse("reproduce", text).is_err(), "{text}");
         }
     }

@@ -47,11 +47,16 @@ fn an_incomplete_twin_is_reported() {
     let test = |p_value| GateOutcome {
         statistic: 9.0,
         p_value,
+        p_error: 0.0,
+        simulations: 199,
         alpha: 0.1,
         out_of_distribution: p_value <= 0.1,
     };
     for (after, expected) in [
-        (Some(test(0.005)), "no parameters compensate"),
+        (
+            Some(test(0.005)),
+            "(p < 0.005, 199 simulations, false-alarm rate 10 %): no parameters compensate",
+        ),
         (Some(test(0.5)), "is consistent with the record (p = 0.500)"),
         (None, "cannot be tested"),
     ] {

@@ -3,7 +3,7 @@
 use crate::diagnose::{Decision, Diagnosis, EffectFit, RIVALS, Verdict};
 use crate::report::digits::{chance, short};
 use crate::report::gap::pictures;
-use crate::report::gap::text::{remains_sentence, rivals};
+use crate::report::gap::text::{evidence_sentence, remains_sentence, rivals};
 use crate::report::page::Column::{Number, Text};
 use crate::report::page::{Section, figure, paragraph, table};
 use crate::report::units::Units;
@@ -15,6 +15,10 @@ pub(super) fn section_of(units: &Units, diagnosis: &Diagnosis) -> Section {
 fn body(units: &Units, diagnosis: &Diagnosis) -> String {
     let which = &diagnosis.cause;
     let mut body = paragraph(&decision(diagnosis));
+    body.push_str(&paragraph(&format!(
+        "{} Nats are natural logarithms of odds: above 0, something is missing.",
+        evidence_sentence(diagnosis)
+    )));
     if let Some(svg) = pictures::explanations(diagnosis) {
         let caption = match which.decision {
             Decision::Absorbed => {

@@ -18,22 +18,37 @@ fn body(diagnosis: &Diagnosis) -> String {
     if s.metric == Shrinkage::LOG_SCORE {
         body.push_str(&paragraph(
             "The score is the mean log density of a held-out sample in nats; higher is better. The accepted effects change the noise \
-             only, so free runs do not change.",
+             only, so predictions do not change.",
         ));
     }
     if let Some(svg) = pictures::extent(diagnosis) {
         let wrong = match s.placebo {
             Some(_) => {
-                " The wrong effect, fitted in the same way, shows the gain of any extra parameter."
+                " Wrong effects, fitted in the same way, show what any extra parameter gains."
             }
             None => "",
         };
-        let caption = "Errors of free runs over the standard deviation of the output. Floor: the error that noise alone causes.";
+        let caption = "Root mean squares over the standard deviation of the output. The share counts squared errors above the floor: the \
+             true system has 100 % in expectation.";
         body.push_str(&figure(&svg, &format!("{caption}{wrong}")));
+    }
+    if let Some(svg) = pictures::horizons(diagnosis) {
+        body.push_str(&figure(
+            &svg,
+            "Predictions begin anew from what the record has shown, and reach so far ahead. Floor: errors of records that the twin with \
+             effects makes itself, with its fitted noise.",
+        ));
+    }
+    if let Some([before, after]) = s.log_score.filter(|_| s.metric != Shrinkage::LOG_SCORE) {
+        body.push_str(&paragraph(&format!(
+            "Mean log density of a held-out sample: {} → {} nats; higher is better.",
+            short(before),
+            short(after)
+        )));
     }
     if s.closed.is_none()
         && let (Some(after), Some(floor)) = (s.after, s.floor)
-        && s.metric == Shrinkage::FREE_RUN
+        && s.metric != Shrinkage::LOG_SCORE
     {
         body.push_str(&paragraph(&format!(
             "No share is given: the error before ({}) and the floor ({}) are too close; the error after is {}.",

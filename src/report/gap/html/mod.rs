@@ -10,7 +10,7 @@ mod steps;
 
 use crate::diagnose::{Diagnosis, Verdict};
 use crate::report::gap::pictures;
-use crate::report::gap::text::{evidence_sentence, verdict_sentence};
+use crate::report::gap::story::story;
 use crate::report::page::{Section, escaped, figure, page, paragraph};
 use crate::report::units::Units;
 use crate::study::Study;
@@ -21,12 +21,18 @@ use crate::study::Study;
 /// has no scripts and loads nothing.
 pub fn gap_html(study: &Study, diagnosis: &Diagnosis) -> String {
     let units = Units::of(study);
-    let verdict = escaped(&verdict_sentence(diagnosis));
-    let lead = format!(
-        "<p class=\"verdict\">{verdict}</p>\n{}",
-        paragraph(&evidence(diagnosis))
+    let (headline, sentences) = story(&units, diagnosis);
+    let told = format!(
+        "<p class=\"verdict\">{}</p>\n{}",
+        escaped(&headline),
+        paragraph(&sentences.join(" "))
     );
-    let mut sections = vec![runs(study, diagnosis), place::section_of(study, diagnosis)];
+    let lead = format!(
+        "<div class=\"first\">\n<div>\n{told}</div>\n{}</div>\n",
+        record(study, diagnosis)
+    );
+    let mut sections = vec![place::section_of(study, diagnosis)];
+    sections.extend(validation(study, diagnosis));
     sections.push(explanations::section_of(&units, diagnosis));
     sections.extend(discovery::section_of(study, diagnosis));
     sections.extend([
@@ -47,16 +53,8 @@ pub fn gap_html(study: &Study, diagnosis: &Diagnosis) -> String {
     )
 }
 
-/// The evidence behind the verdict.
-fn evidence(diagnosis: &Diagnosis) -> String {
-    format!(
-        "{} Nats are natural logarithms of odds: above 0, something is missing.",
-        evidence_sentence(diagnosis)
-    )
-}
-
-/// Measured and twin.
-fn runs(study: &Study, diagnosis: &Diagnosis) -> Section {
+/// Measured and twin, as a figure.
+fn record(study: &Study, diagnosis: &Diagnosis) -> String {
     let marked = if diagnosis.location.maps.notable().windows.is_empty() {
         ""
     } else {
@@ -65,17 +63,15 @@ fn runs(study: &Study, diagnosis: &Diagnosis) -> Section {
     let caption = format!(
         "The twin runs from the inputs alone, without noise. Its parameters are fitted to this record.{marked}"
     );
-    let mut body = String::new();
-    if let Some(svg) = pictures::runs(study, diagnosis, false) {
-        body.push_str(&figure(&svg, &caption));
-    }
-    if let Some(svg) = pictures::runs(study, diagnosis, true) {
-        body.push_str(&figure(
-            &svg,
-            "The validation record; no parameter is fitted to it.",
-        ));
-    }
-    Section::new("runs", "Measured against twin", body)
+    let svg = pictures::runs(study, diagnosis, false);
+    svg.map_or_else(String::new, |svg| figure(&svg, &caption))
+}
+
+/// The validation record and twin.
+fn validation(study: &Study, diagnosis: &Diagnosis) -> Option<Section> {
+    let svg = pictures::runs(study, diagnosis, true)?;
+    let body = figure(&svg, "No parameter is fitted to the validation record.");
+    Some(Section::new("validation", "The validation record", body))
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@ use super::*;
 use crate::diagnose::{Decision, EffectFit, Verdict};
 use crate::report::fixture::{diagnoses, made, oscillator, tanks};
 use crate::report::gap::gap_json;
+use crate::report::gap::text::verdict_sentence;
 
 /// Elements that have no end tag.
 const VOID: [&str; 1] = ["meta"];

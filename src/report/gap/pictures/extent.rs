@@ -1,20 +1,23 @@
 //! Errors on held-out data.
 
 use crate::diagnose::{Diagnosis, Shrinkage};
+use crate::math::median;
 use crate::report::chart::{Bar, BarChart, BarGroup};
 use crate::report::digits::{percent, short};
+use crate::report::gap::text::measure;
 
-/// Free-run errors on held-out data, and the share of the gap that closes; `None` without such data, and for effects that move
-/// no free run.
+/// Errors on held-out data at the headline's horizon, and the share of the gap that closes; `None` without such data, and for effects
+/// that move no prediction.
 pub fn extent(diagnosis: &Diagnosis) -> Option<String> {
     let s = diagnosis.shrinkage.as_ref()?;
-    if s.metric != Shrinkage::FREE_RUN {
+    if s.metric == Shrinkage::LOG_SCORE {
         return None;
     }
     let errors = [
         ("not refitted", s.unfitted, false),
         ("before, refitted", Some(s.before), false),
-        ("a wrong effect instead", s.placebo, false),
+        ("best effect outside the class", s.placebo, false),
+        ("effects at random, median", median(&s.random).ok(), false),
         ("after, with effects", s.after, true),
         ("floor, noise alone", s.floor, false),
     ];
@@ -24,7 +27,7 @@ pub fn extent(diagnosis: &Diagnosis) -> Option<String> {
         })
         .collect();
     let mut groups = vec![BarGroup::new(
-        &format!("{}, {}", s.metric, s.held_out),
+        &format!("{}, {}", measure(s), s.held_out),
         None,
         bars,
     )];
@@ -44,9 +47,9 @@ pub fn extent(diagnosis: &Diagnosis) -> Option<String> {
     let chart = BarChart {
         title: match s.after {
             Some(_) => "How far the gap closes".into(),
-            None => "Errors of free runs".into(),
+            None => "Errors on held-out data".into(),
         },
-        description: format!("Errors of free runs: {} before{after}.", short(s.before)),
+        description: format!("{}: {} before{after}.", measure(s), short(s.before)),
         groups,
     };
     Some(chart.svg())

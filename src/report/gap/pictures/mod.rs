@@ -4,6 +4,7 @@ mod discovery;
 mod explanations;
 mod extent;
 mod functions;
+mod horizons;
 mod next;
 mod places;
 mod runs;
@@ -14,6 +15,7 @@ pub(super) use discovery::terms;
 pub(super) use explanations::explanations;
 pub(super) use extent::extent;
 pub(super) use functions::functions;
+pub(super) use horizons::horizons;
 pub(super) use next::next_input;
 pub(super) use places::{bands, channels, lags, regions, targets};
 pub(super) use runs::runs;
@@ -25,7 +27,7 @@ use crate::study::Study;
 /// Returns the pictures of a diagnosis as SVG, each with its name; what has nothing to show is left out.
 ///
 /// Names: `record`, `validation`, `time`, `functions`, `targets`, `regions`, `channels`, `lags`, `bands`, `which`,
-/// `extent`, `terms`, `next-input`.
+/// `extent`, `horizons`, `terms`, `next-input`.
 pub fn gap_pictures(study: &Study, diagnosis: &Diagnosis) -> Vec<(&'static str, String)> {
     let all = [
         ("record", runs(study, diagnosis, false)),
@@ -39,6 +41,7 @@ pub fn gap_pictures(study: &Study, diagnosis: &Diagnosis) -> Vec<(&'static str, 
         ("bands", bands(diagnosis)),
         ("which", explanations(diagnosis)),
         ("extent", extent(diagnosis)),
+        ("horizons", horizons(diagnosis)),
         ("terms", terms(study, diagnosis)),
         ("next-input", next_input(study, diagnosis)),
     ];

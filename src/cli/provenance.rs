@@ -1,0 +1,183 @@
+//! Where a result comes from: version, call, seed, files.
+
+use super::args::Subject;
+use super::context::Context;
+use crate::report::with_footer;
+use crate::storage::files::sha256_of;
+use serde::Serialize;
+use serde_json::{Value, json};
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+/// Options that change no result, and whether a value follows.
+const SILENT: [(&str, bool); 6] = [
+    ("--threads", true),
+    ("--out", true),
+    ("--shard", true),
+    ("--workers", true),
+    ("--timeout", true),
+    ("--json", false),
+];
+/// Digits of a checksum in a line of text.
+const SHORT: usize = 12;
+const SECONDS_A_DAY: i64 = 86_400;
+
+/// Everything that repeats a result. The same call on the same files has the same provenance.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Provenance {
+    /// Version of the program.
+    version: &'static str,
+    /// The call, without options that change no result.
+    call: String,
+    seed: u64,
+    files: Vec<File>,
+    /// Date in UTC from SOURCE_DATE_EPOCH; none without it, so that results repeat.
+    date: Option<String>,
+}
+
+/// A file that a result was made from.
+#[derive(Debug, Clone, Serialize)]
+struct File {
+    /// `record`, `validation`, `study` or `estimator`.
+    role: &'static str,
+    path: PathBuf,
+    /// SHA-256 of its bytes; none where it cannot be read again.
+    sha256: Option<String>,
+}
+
+impl Provenance {
+    /// Of a call on these files, beside the study file of its subject.
+    pub fn new<'p>(
+        context: &Context<'_>,
+        subject: Option<&'p Subject>,
+        files: impl IntoIterator<Item = (&'static str, &'p Path)>,
+    ) -> Self {
+        let study = subject.and_then(|subject| subject.study.as_deref());
+        let file = |(role, path): (&'static str, &Path)| File {
+            role,
+            path: path.into(),
+            sha256: sha256_of(path).ok(),
+        };
+        let epoch = std::env::var("SOURCE_DATE_EPOCH").ok();
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            call: context.call.clone(),
+            seed: context.seed,
+            files: (files.into_iter())
+                .chain(study.map(|path| ("study", path)))
+                .map(file)
+                .collect(),
+            date: epoch.and_then(|epoch| epoch.parse().ok()).map(date),
+        }
+    }
+
+    /// The result with its provenance.
+    pub fn on(&self, mut result: Value) -> Value {
+        if let Some(object) = result.as_object_mut() {
+            object.insert("provenance".into(), json!(self));
+        }
+        result
+    }
+
+    /// The text with a last line on where it comes from.
+    pub fn below(&self, text: &str) -> String {
+        let ends = if text.ends_with('\n') { "" } else { "\n" };
+        format!("{text}{ends}{}\n", self.line(SHORT))
+    }
+
+    /// The page with a footer on where it comes from.
+    pub fn in_page(&self, page: &str) -> String {
+        with_footer(page, &[self.call.clone(), self.line(usize::MAX)])
+    }
+
+    fn line(&self, digits: usize) -> String {
+        let mut parts = vec![
+            format!("truetwin {}", self.version),
+            format!("seed {}", self.seed),
+        ];
+        parts.extend(self.date.clone());
+        parts.extend(self.files.iter().map(|file| {
+            let path = file.path.display();
+            match &file.sha256 {
+                Some(sum) => format!("{path} (sha256 {})", &sum[..digits.min(sum.len())]),
+                None => path.to_string(),
+            }
+        }));
+        parts.join(", ")
+    }
+}
+
+/// The words of a call, without the program's folder and options that change no result.
+pub(super) fn call(program: &str, words: &[OsString]) -> String {
+    let mut call = vec![program.to_owned()];
+    let mut rest = words.iter().skip(1).map(|word| word.to_string_lossy());
+    while let Some(word) = rest.next() {
+        let name = word.split('=').next().unwrap_or_default();
+        match SILENT.iter().find(|(silent, _)| *silent == name) {
+            Some((_, true)) if !word.contains('=') => {
+                rest.next();
+            }
+            Some(_) => {}
+            None if word.contains(char::is_whitespace) => call.push(format!("'{word}'")),
+            None => call.push(word.into_owned()),
+        }
+    }
+    call.join(" ")
+}
+
+/// `2026-11-21T18:56:27Z` of a number of seconds since 1970.
+///
+/// Source: Hinnant, "chrono-compatible low-level date algorithms" (2013), `civil_from_days`.
+fn date(epoch: i64) -> String {
+    let (days, seconds) = (
+        epoch.div_euclid(SECONDS_A_DAY),
+        epoch.rem_euclid(SECONDS_A_DAY),
+    );
+    let days = days + 719_468;
+    let (era, of_era) = (days.div_euclid(146_097), days.rem_euclid(146_097));
+    let year = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
+    let of_year = of_era - (365 * year + year / 4 - year / 100);
+    let from_march = (5 * of_year + 2) / 153;
+    let day = of_year - (153 * from_march + 2) / 5 + 1;
+    let month = if from_march < 10 {
+        from_march + 3
+    } else {
+        from_march - 9
+    };
+    let year = year + 400 * era + i64::from(month <= 2);
+    let (hour, minute, second) = (seconds / 3600, seconds / 60 % 60, seconds % 60);
+    format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}Z")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_that_change_nothing_are_left_out() {
+        let words = [
+            "/bin/truetwin",
+            "fit",
+            "R.csv",
+            "--threads",
+            "2",
+            "--out=x",
+            "--json",
+            "--columns",
+            "t=a b",
+        ];
+        let words = words.map(OsString::from);
+        assert_eq!(
+            call("truetwin", &words),
+            "truetwin fit R.csv --columns 't=a b'"
+        );
+    }
+
+    #[test]
+    fn dates_are_those_of_the_calendar() {
+        assert_eq!(date(0), "1970-01-01T00:00:00Z");
+        assert_eq!(date(951_868_799), "2000-02-29T23:59:59Z");
+        assert_eq!(date(1_795_287_387), "2026-11-21T18:56:27Z");
+        assert_eq!(date(-1), "1969-12-31T23:59:59Z");
+    }
+}

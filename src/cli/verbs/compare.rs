@@ -1,0 +1,105 @@
+//! `compare`: several studies, fitted to the same records and scored on another.
+
+use crate::cli::args::{FileColumns, Subject};
+use crate::cli::context::{Context, Verb};
+use crate::cli::failure::Failure;
+use crate::cli::provenance::Provenance;
+use crate::cli::{output, records};
+use crate::fit::FitSettings;
+use crate::report::{Compared, compare_json, compare_svg, compare_text};
+use clap::Args;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Share of a record that is fitted where no other is given.
+const FITTED: f64 = 2.0 / 3.0;
+
+/// Compare studies of one system: each is fitted to the records and scored on the validation record.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+        truetwin compare plain.toml friction.toml lag.toml --record R.csv --validation V.csv --out compared\n\
+        Next: truetwin diagnose V.csv --study BEST.toml, for what the best of them lacks")]
+pub(in crate::cli) struct Compare {
+    /// Study files; the first is the one that others are compared with.
+    #[arg(value_name = "S.toml", required = true)]
+    studies: Vec<PathBuf>,
+    /// Records that all studies are fitted to [default: the first two thirds of the validation record].
+    #[arg(long = "record", value_name = "R.csv")]
+    records: Vec<PathBuf>,
+    /// Record that they are scored on.
+    #[arg(long, value_name = "V.csv")]
+    validation: PathBuf,
+    #[command(flatten)]
+    columns: FileColumns,
+    /// New folder for compare.json and overlay.svg.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+impl Verb for Compare {
+    fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
+        let folder = self.out.as_deref().map(output::NewFolder::new);
+        let folder = folder.transpose()?;
+        let mut compared = vec![];
+        let mut shown = None;
+        for path in &self.studies {
+            let subject = Subject {
+                twin: None,
+                study: Some(path.clone()),
+            };
+            let study = context.study(&subject)?;
+            let reader = self.columns.reader(&study);
+            let (mut measured, validation) =
+                records::read(reader, &self.records, Some(&self.validation))?;
+            let Some(validation) = validation else {
+                continue;
+            };
+            if measured.is_empty() {
+                let samples = (FITTED * validation.samples() as f64) as usize;
+                measured.extend(validation.first_part(samples));
+            }
+            let settings = FitSettings {
+                seed: context.seed,
+                ..FitSettings::default()
+            };
+            let at = |failure: Failure| failure.within(path);
+            let fit = (study.fit(&measured, &settings, context.progress))
+                .map_err(|error| at(error.into()))?;
+            let score = study
+                .score(&fit, &validation)
+                .map_err(|error| at(error.into()))?;
+            let name = path
+                .file_stem()
+                .map_or_else(String::new, |n| n.to_string_lossy().into());
+            compared.push(Compared {
+                name,
+                study,
+                fit,
+                score,
+            });
+            shown = Some(validation);
+        }
+        let files = [("validation", &self.validation)].into_iter();
+        let files = files.chain(self.studies.iter().map(|path| ("study", path)));
+        let files = files.chain(self.records.iter().map(|path| ("record", path)));
+        let files = files.map(|(role, path)| (role, path.as_path()));
+        let provenance = Provenance::new(context, None, files);
+        let json = provenance.on(compare_json(&compared));
+        if let (Some(folder), Some(record)) = (folder, &shown) {
+            let text = serde_json::to_string_pretty(&json).map_err(Failure::internal)?;
+            folder.write("compare.json", &text)?;
+            folder.write("overlay.svg", &compare_svg(&compared, record))?;
+            folder.finish()?;
+        }
+        if context.json {
+            output::print_json(&json)?;
+        } else {
+            let what = match self.records.is_empty() {
+                true => "on the whole of the record whose first two thirds were fitted",
+                false => "on the validation record",
+            };
+            output::print(&provenance.below(&compare_text(&compared, what)))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}

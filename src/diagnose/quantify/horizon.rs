@@ -1,0 +1,286 @@
+//! Errors of predictions over several horizons, before and after a gap is closed.
+//!
+//! A free run forgets the record: where a twin drifts, noise alone drives it away, and a gap that is closed does not show. A prediction
+//! over h samples begins anew from what the record has shown. Windows of h samples are kept from the filter, every second one, then
+//! the others; squared errors over the windows, divided by the variance of y, are compared with those of records that the accepted twin
+//! simulates with its fitted noise:
+//!
+//! ```text
+//! closed = (B − A)/(B − F)      B, A: mean squares of twin and accepted twin;  F: expected ones of the accepted twin's own records
+//! ```
+//!
+//! so that the true system scores 1 in expectation. The headline is the horizon with the largest (B − F)/s, s the standard deviation of
+//! the simulated mean squares: where twin and floor differ most clearly. A does not take part in the choice.
+
+use super::free_run::{Runner, scaled, variances};
+use crate::diagnose::error::DiagnoseError;
+use crate::diagnose::outcome::Horizon;
+use crate::diagnose::thresholds::Thresholds;
+use crate::fit::problem::Problem;
+use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::math::{deviation, quantile};
+use crate::record::{Record, Signal};
+use crate::twin::{Noise, Source};
+use rayon::prelude::*;
+
+/// Held-out data: a record, and its first row that counts.
+#[derive(Clone, Copy)]
+pub(in crate::diagnose) struct HeldOutRows<'r> {
+    pub record: &'r Record,
+    pub from: usize,
+}
+
+/// A model at θ that has not seen the held-out data.
+pub(in crate::diagnose) struct Predictor<'a> {
+    pub problem: Problem<'a>,
+    /// θ of one record.
+    pub theta: Vec<f64>,
+    pub runner: Runner,
+}
+
+/// How far ahead predictions reach.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Reach {
+    /// Samples.
+    Samples(usize),
+    /// From the start, inputs alone.
+    FreeRun,
+}
+
+impl Predictor<'_> {
+    /// Mean log density of a row that counts, given the rows before; `None` where the filter fails.
+    pub fn log_score(&self, rows: HeldOutRows<'_>) -> Result<Option<f64>, FilterError> {
+        let problem = self.problem.on(std::slice::from_ref(rows.record));
+        let filtered = recoverable(problem.filtered(&problem.full(&self.theta)))?;
+        Ok(filtered.map(|all| mean(&all[0].log_densities[rows.from..])))
+    }
+
+    /// Squared errors over the variance of y, mean over channels, by row that counts; `None` where predictions fail. `scale`
+    /// are the variances that errors are divided by.
+    fn errors(
+        &self,
+        rows: HeldOutRows<'_>,
+        reach: Reach,
+        scale: &[f64],
+    ) -> Result<Option<Vec<f64>>, FilterError> {
+        let HeldOutRows { record, from } = rows;
+        let Reach::Samples(h) = reach else {
+            return Ok(self
+                .runner
+                .outputs(record)
+                .map(|run| scaled(&(record.outputs() - &run), scale, from)));
+        };
+        let predicted = |record: &Record| -> Result<Option<Signal>, FilterError> {
+            Ok(recoverable(self.problem.predicted(&self.theta, record))?.flatten())
+        };
+        if h == 1 {
+            let all = predicted(record)?;
+            return Ok(all.map(|p| scaled(&(record.outputs() - &p), scale, from.max(1))));
+        }
+        // Rows before the first window are seen: predictions begin where the record has shown the state.
+        let begin = from.max(h);
+        let window = |k: usize| (k - begin) / h % 2;
+        let mut errors = Signal::from_elem(record.outputs().dim(), f64::NAN);
+        for part in 0..2 {
+            let mut seen = record.outputs().clone();
+            for (k, mut row) in seen.rows_mut().into_iter().enumerate().skip(begin) {
+                if window(k) == part {
+                    row.fill(f64::NAN);
+                }
+            }
+            let Ok(masked) = Record::new(record.drive().clone(), seen) else {
+                return Ok(None);
+            };
+            let Some(predicted) = predicted(&masked)? else {
+                return Ok(None);
+            };
+            for k in (begin..record.samples()).filter(|&k| window(k) == part) {
+                let error = &record.outputs().row(k) - &predicted.row(k);
+                errors.row_mut(k).assign(&error);
+            }
+        }
+        Ok(Some(scaled(&errors, scale, begin)))
+    }
+}
+
+/// Horizons that are looked at: one sample, a tenth of the record and between, the free run.
+fn reaches(problem: &Problem<'_>, rows: HeldOutRows<'_>) -> Vec<Reach> {
+    if problem.is_simulated() {
+        return vec![Reach::FreeRun];
+    }
+    let longest = rows.record.samples() / 10;
+    let lengths = Thresholds::HORIZONS
+        .into_iter()
+        .take_while(|h| *h < longest);
+    let mut all: Vec<Reach> = lengths.chain([longest]).map(Reach::Samples).collect();
+    all.push(Reach::FreeRun);
+    all
+}
+
+/// Errors over all horizons, and the squared errors at each that the headline is resampled from.
+pub(in crate::diagnose) struct Compared {
+    pub horizons: Vec<Horizon>,
+    /// The horizon where twin and floor differ most clearly, if any does.
+    pub headline: Option<usize>,
+    reaches: Vec<Reach>,
+    squares: Vec<(Vec<f64>, Vec<f64>)>,
+    floors: Vec<f64>,
+    scale: Vec<f64>,
+}
+
+/// Compares the twin (`before`) with the accepted one (`after`) on held-out data.
+pub(in crate::diagnose) fn compare(
+    before: &Predictor<'_>,
+    after: &Predictor<'_>,
+    rows: HeldOutRows<'_>,
+    noise: Noise,
+) -> Result<Compared, DiagnoseError> {
+    let record = rows.record;
+    let scale = variances(record.outputs());
+    let simulated: Vec<Record> = (0..Thresholds::FLOOR_RECORDS)
+        .filter_map(|i| {
+            let run = after.runner.simulated(record, noise.sample(i))?;
+            Record::new(record.drive().clone(), record.with_gaps_in(run)).ok()
+        })
+        .collect();
+    let mut compared = Compared {
+        horizons: vec![],
+        headline: None,
+        reaches: vec![],
+        squares: vec![],
+        floors: vec![],
+        scale,
+    };
+    let mut clearest = Thresholds::CLEAR;
+    for reach in reaches(&after.problem, rows) {
+        let own = |p: &Predictor<'_>| p.errors(rows, reach, &compared.scale);
+        let (Some(b), Some(a)) = (own(before)?, own(after)?) else {
+            continue;
+        };
+        if b.is_empty() {
+            continue;
+        }
+        let floors: Vec<f64> = (simulated.par_iter())
+            .map(|record| {
+                let rows = HeldOutRows { record, ..rows };
+                Ok(after
+                    .errors(rows, reach, &compared.scale)?
+                    .map(|e| mean(&e)))
+            })
+            .collect::<Result<Vec<_>, FilterError>>()?
+            .into_iter()
+            .flatten()
+            .collect();
+        let (floor, spread) = (mean(&floors), deviation(&floors));
+        let clear = (mean(&b) - floor) / spread.max(f64::MIN_POSITIVE);
+        let is_clear = clear.is_finite() && clear > Thresholds::CLEAR;
+        if clear > clearest {
+            (compared.headline, clearest) = (Some(compared.horizons.len()), clear);
+        }
+        let drive = record.drive();
+        let samples = match reach {
+            Reach::Samples(h) => Some(h),
+            Reach::FreeRun => None,
+        };
+        compared.horizons.push(Horizon {
+            samples,
+            seconds: samples.map(|h| h as f64 * drive.dt()),
+            before: mean(&b).sqrt(),
+            after: mean(&a).sqrt(),
+            floor: floor.sqrt(),
+            closed: is_clear.then(|| share(mean(&b), mean(&a), floor)),
+        });
+        compared.reaches.push(reach);
+        compared.squares.push((b, a));
+        compared.floors.push(floor);
+    }
+    Ok(compared)
+}
+
+impl Compared {
+    /// Error of another model at a horizon, as a root mean square.
+    pub fn error(
+        &self,
+        horizon: Option<usize>,
+        of: &Predictor<'_>,
+        rows: HeldOutRows<'_>,
+    ) -> Result<Option<f64>, DiagnoseError> {
+        let Some(at) = horizon else {
+            return Ok(None);
+        };
+        let errors = of.errors(rows, self.reaches[at], &self.scale)?;
+        Ok(errors.map(|errors| mean(&errors).sqrt()))
+    }
+
+    /// 90 % of the shares that resampled blocks of the headline's errors close, with θ from `draws` of the accepted twin. Not clamped.
+    pub fn interval(
+        &self,
+        draws: &[Predictor<'_>],
+        rows: HeldOutRows<'_>,
+        noise: Noise,
+    ) -> Result<Option<[f64; 2]>, DiagnoseError> {
+        let Some(at) = self.headline else {
+            return Ok(None);
+        };
+        let (before, after) = &self.squares[at];
+        let mut drawn: Vec<Vec<f64>> = (draws.par_iter())
+            .map(|draw| draw.errors(rows, self.reaches[at], &self.scale))
+            .collect::<Result<Vec<_>, FilterError>>()?
+            .into_iter()
+            .flatten()
+            .filter(|errors| errors.len() == before.len())
+            .collect();
+        drawn.push(after.clone());
+        let mut source = noise.source("blocks");
+        let shares: Vec<f64> = (0..Thresholds::SHARE_RESAMPLES as usize)
+            .map(|i| {
+                let (b, a) = resampled(before, &drawn[i % drawn.len()], &mut source);
+                share(b, a, self.floors[at])
+            })
+            .filter(|share| share.is_finite())
+            .collect();
+        let tail = 0.5 * (1.0 - Thresholds::INTERVAL_LEVEL);
+        let ends = [tail, 1.0 - tail].map(|p| quantile(&shares, p).ok());
+        Ok(match ends {
+            [Some(low), Some(high)] => Some([low, high]),
+            _ => None,
+        })
+    }
+}
+
+fn share(before: f64, after: f64, floor: f64) -> f64 {
+    (before - after) / (before - floor)
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// Means of both over the same blocks, drawn with replacement.
+fn resampled(before: &[f64], after: &[f64], source: &mut Source) -> (f64, f64) {
+    let n = before.len();
+    let length = n.div_ceil(Thresholds::SHARE_BLOCKS).max(1);
+    let (mut b, mut a, mut count) = (0.0, 0.0, 0usize);
+    while count < n {
+        let start = ((source.uniform() * n as f64) as usize).min(n - 1);
+        for k in (start..start + length).map(|k| k % n) {
+            b += before[k];
+            a += after[k];
+        }
+        count += length;
+    }
+    (b / count as f64, a / count as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_of_a_gap_is_half() {
+        assert!((share(1.0, 0.6, 0.2) - 0.5).abs() < 1e-12);
+        let mut source = Noise::new(1, "t", 0).source("blocks");
+        let (b, a) = resampled(&[1.0; 400], &[0.6; 400], &mut source);
+        assert!((b - 1.0).abs() < 1e-12 && (a - 0.6).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,62 @@
+//! A fit on a record that it has not seen.
+
+use super::follow::free_runs;
+use super::outcome::{Fit, OutputErrors};
+use super::problem::Problem;
+use super::run::{Subject, errors};
+use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::likelihood::measured;
+use crate::record::{Record, Signal};
+use crate::twin::Role;
+
+/// Predictions of a fitted twin on another record.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct FitScore {
+    /// Mean log density of a row given those before it, in nats; the first row, which only the start predicts, is left out.
+    pub log_score: f64,
+    /// Errors of each output.
+    pub errors: Vec<OutputErrors>,
+    /// Free run beside the record; none where it diverges.
+    pub free_run: Option<Signal>,
+}
+
+/// Scores a fit; `None` where the twin cannot be filtered there.
+pub(crate) fn score(
+    subject: &Subject<'_>,
+    fit: &Fit,
+    record: &Record,
+) -> Result<Option<FitScore>, FilterError> {
+    let records = std::slice::from_ref(record);
+    let measured = measured(subject.twin, records, subject.beliefs)?;
+    let problem = Problem::of_measured(&measured, records);
+    let centre = problem.centre();
+    let theta: Vec<f64> = (problem.twin.parameters().iter().zip(centre))
+        .map(|(p, centre)| {
+            let found = match p.role {
+                Role::Noise => {
+                    let level = fit.noise.iter().find(|level| level.name == p.target());
+                    level.map(|level| level.value)
+                }
+                // A start belongs to its record.
+                Role::Start => None,
+                _ => {
+                    let fitted = fit.parameters.iter().find(|fitted| fitted.name == p.name);
+                    fitted.map(|fitted| fitted.value)
+                }
+            };
+            found.map_or(centre, |value| p.bounds.clamp(value))
+        })
+        .collect();
+    let Some(filtered) = recoverable(problem.filtered(&theta))? else {
+        return Ok(None);
+    };
+    let smoothed = problem.smoothed(&theta)?;
+    let mut runs = free_runs(&problem, &theta, &smoothed);
+    let densities = &filtered[0].log_densities[1..];
+    Ok(Some(FitScore {
+        log_score: densities.iter().sum::<f64>() / densities.len().max(1) as f64,
+        errors: errors(&problem, &theta, &runs)?,
+        free_run: runs.swap_remove(0),
+    }))
+}

@@ -1,0 +1,112 @@
+//! The table of parameters that `estimate`, `fit` and `diagnose` share.
+
+use super::digits::{self, Digits};
+use crate::twin::{Interval, PRIOR_DEVIATION, Parameter, Role};
+use serde::Serialize;
+
+/// A value so near to a bound, in its own standard errors, lies at it.
+const AT_BOUND: f64 = 0.1;
+
+/// One parameter: what the record says of it beside what was said before.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct ParameterRow {
+    /// Name, as in study files.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Estimate.
+    pub value: f64,
+    /// Standard error.
+    pub std_error: f64,
+    /// Ends of the interval.
+    pub interval: [f64; 2],
+    /// The prior box.
+    pub prior: Interval,
+    /// The physical bounds.
+    pub bounds: Interval,
+    /// Variance over that of the prior box, at most 1: near 0 the record decides, near 1 it adds nothing to the prior.
+    pub prior_share: f64,
+    /// The bound that the value lies at: `low` or `high`.
+    pub at_bound: Option<&'static str>,
+}
+
+impl ParameterRow {
+    pub fn new(parameter: &Parameter, value: f64, std_error: f64, interval: [f64; 2]) -> Self {
+        let reach = AT_BOUND * std_error;
+        let bounds = parameter.bounds;
+        let prior = PRIOR_DEVIATION * parameter.prior.width();
+        Self {
+            name: parameter.name.clone(),
+            unit: parameter.unit.clone(),
+            value,
+            std_error,
+            interval,
+            prior: parameter.prior,
+            bounds,
+            prior_share: (std_error / prior).powi(2).min(1.0),
+            at_bound: match value {
+                value if value - bounds.low() <= reach => Some("low"),
+                value if bounds.high() - value <= reach => Some("high"),
+                _ => None,
+            },
+        }
+    }
+
+    /// Cells of text: value, standard error, interval, prior, note.
+    pub fn cells(&self, role: Role) -> [String; 5] {
+        let digits = Digits::supported(self.value, self.std_error);
+        let [low, high] = self.interval.map(|end| digits.write(end));
+        let prior = match role {
+            Role::Parameter | Role::Start => format!(
+                "{} to {}",
+                digits::short(self.prior.low()),
+                digits::short(self.prior.high())
+            ),
+            Role::Noise | Role::Magnitude => String::new(),
+        };
+        [
+            digits.write(self.value),
+            digits::error(self.std_error),
+            format!("[{low}, {high}]"),
+            prior,
+            self.note(role).to_owned(),
+        ]
+    }
+
+    fn note(&self, role: Role) -> &'static str {
+        match (self.at_bound, role) {
+            (Some("low"), _) => "at its lower bound",
+            (Some(_), _) => "at its upper bound",
+            (None, Role::Parameter) if self.prior_share >= 1.0 => "not identified",
+            (None, Role::Parameter) if !self.prior.contains(self.value) => "outside prior",
+            (None, _) => "",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn notes_say_what_is_special() {
+        let parameter = Parameter::new("k", "1/s", 0.0, 1.0).within(0.0, 2.0);
+        let note = |value: f64, error: f64| {
+            let row = ParameterRow::new(&parameter, value, error, [value - error, value + error]);
+            row.cells(Role::Parameter)[4].clone()
+        };
+        assert_eq!(note(0.5, 0.01), "");
+        assert_eq!(note(0.5, 0.3), "not identified");
+        assert_eq!(note(1.5, 0.01), "outside prior");
+        assert_eq!(note(2.0, 0.01), "at its upper bound");
+        assert_eq!(note(0.0, 0.01), "at its lower bound");
+    }
+
+    #[test]
+    fn the_prior_share_is_one_where_the_record_is_mute() {
+        let parameter = Parameter::new("k", "", 0.0, 1.0);
+        let share = |error| ParameterRow::new(&parameter, 0.5, error, [0.0, 1.0]).prior_share;
+        assert_eq!(share(1.0), 1.0);
+        assert!((share(PRIOR_DEVIATION / 10.0) - 0.01).abs() < 1e-12);
+    }
+}
