@@ -25,7 +25,7 @@ impl PosteriorDraws {
     /// Number of draws, 0 for none.
     pub fn count(&self) -> Result<usize, Failure> {
         match self.draws {
-            Some(draws) if !(1..=MOST).contains(&draws) => Err(Failure::user(&format!(
+            Some(draws) if !(1..=MOST).contains(&draws) => Err(Failure::user(format!(
                 "--draws {draws}: choose a number from 1 to {MOST}"
             ))),
             draws => Ok(draws.unwrap_or(0)),

@@ -37,7 +37,7 @@ fn estimator() -> &'static Estimator {
             seed: 1,
             ..PretrainOptions::default()
         };
-        pretrain(&oscillator(true), &options, &Progress::silent())
+        pretrain(oscillator(true), &options, &Progress::silent())
             .unwrap()
             .0
     })

@@ -38,6 +38,9 @@ enum ScenarioArgument {
     /// Drawn from the physical bounds
     #[value(name = "uniform", alias = "3")]
     Uniform,
+    /// Twelve fixed points, six in the prior and six outside it: errors and coverage at each
+    #[value(name = "grid", alias = "4")]
+    Grid,
 }
 
 impl From<ScenarioArgument> for Scenario {
@@ -47,6 +50,7 @@ impl From<ScenarioArgument> for Scenario {
             ScenarioArgument::First => Self::First,
             ScenarioArgument::Second => Self::Second,
             ScenarioArgument::Uniform => Self::Uniform,
+            ScenarioArgument::Grid => Self::Grid,
         }
     }
 }

@@ -110,7 +110,7 @@ mod tests {
         let rows = super::super::rows();
         assert_eq!(rows.len(), SENTENCES.len());
         for kind in rows {
-            let sentence = kind.sentence().expect(kind.id());
+            let sentence = kind.sentence().unwrap_or_else(|| panic!("{}", kind.id()));
             for part in sentence.split('{').skip(1) {
                 let name = part.split('}').next().unwrap().trim_start_matches('%');
                 let known = kind.magnitudes().iter().any(|m| m.name == name);

@@ -31,7 +31,7 @@ pub(super) fn simulated(
             _ => first.child("again").sample(attempt),
         };
         attempt += 1;
-        let (truth, drive) = draws.draw(noise)?;
+        let (truth, drive) = draws.draw(run, noise)?;
         match study.twin().simulate(&truth, &drive, noise) {
             Ok(outputs) => {
                 return Ok(Simulated {

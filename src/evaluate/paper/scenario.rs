@@ -2,9 +2,11 @@
 
 use super::{Invariant, Method, Symmetry};
 use crate::evaluate::EvaluateError;
+use crate::fit::least_squares::{Bounds, space_filling};
 use crate::record::{Drive, RecordError, Signal};
 use crate::study::{DriveSource, Study};
-use crate::twin::Noise;
+use crate::twin::{Interval, Noise, Parameter, ParameterSpace};
+use nalgebra::DVector;
 use serde::Serialize;
 
 /// Source of true parameters.
@@ -19,7 +21,14 @@ pub enum Scenario {
     Second,
     /// Uniform in the physical bounds.
     Uniform,
+    /// Fixed points, half of them in the prior and half outside it, one after the other: errors and coverage are not averaged over θ.
+    Grid,
 }
+
+/// Points of the grid on either side of the prior's border.
+const POINTS: usize = 6;
+/// Space-filling points of the bounds that are looked at for some outside the prior.
+const LOOKED_AT: usize = 200;
 
 impl Scenario {
     /// Its number in `truetwin.reproduce/1`.
@@ -29,6 +38,7 @@ impl Scenario {
             Self::First => 1,
             Self::Second => 2,
             Self::Uniform => 3,
+            Self::Grid => 4,
         }
     }
 
@@ -80,6 +90,8 @@ pub(super) struct Draws<'a> {
     scenario: Scenario,
     /// Values that are not drawn, in the order of θ.
     held: Vec<Option<f64>>,
+    /// Of [`Scenario::Grid`].
+    grid: Vec<Vec<f64>>,
     inputs: Inputs,
 }
 
@@ -126,19 +138,29 @@ impl<'a> Draws<'a> {
         } else {
             Inputs::Fixed(staircase(study, benchmark)?)
         };
+        let grid = match scenario {
+            Scenario::Grid => grid(&study.twin().parameters())?,
+            _ => vec![],
+        };
         Ok(Self {
             study,
             scenario,
+            grid,
             held,
             inputs,
         })
     }
 
-    /// True parameters and drive of the record with this noise.
-    pub(super) fn draw(&self, noise: Noise) -> Result<(Vec<f64>, Drive), EvaluateError> {
+    /// True parameters and drive of record `run` with this noise.
+    pub(super) fn draw(
+        &self,
+        run: usize,
+        noise: Noise,
+    ) -> Result<(Vec<f64>, Drive), EvaluateError> {
         let space = self.study.twin().parameters();
         let drawn = match self.scenario {
             Scenario::Uniform => space.draw_bounds(noise),
+            Scenario::Grid => self.grid[run % self.grid.len()].clone(),
             // What a study has beyond the paper's parameters is drawn from its prior.
             _ => space.draw_prior(noise),
         };
@@ -154,8 +176,28 @@ impl<'a> Draws<'a> {
 
     /// Returns true if another draw may help where this one diverged.
     pub(super) fn can_redraw(&self) -> bool {
-        !self.scenario.is_point()
+        !self.scenario.is_point() && self.scenario != Scenario::Grid
     }
+}
+
+/// Space-filling points of the prior, then of the bounds outside it.
+fn grid(space: &ParameterSpace) -> Result<Vec<Vec<f64>>, EvaluateError> {
+    let points = |of: &dyn Fn(&Parameter) -> Interval, count: usize| {
+        let side = |end: fn(Interval) -> f64| {
+            DVector::from_iterator(space.len(), space.iter().map(|p| end(of(p))))
+        };
+        let bounds = Bounds::new(side(Interval::low), side(Interval::high))
+            .map_err(|error| EvaluateError::Grid(error.to_string()))?;
+        let points = space_filling(&bounds, count, 0);
+        let points = points.map_err(|error| EvaluateError::Grid(error.to_string()))?;
+        Ok::<Vec<Vec<f64>>, EvaluateError>(points.iter().map(|p| p.as_slice().to_vec()).collect())
+    };
+    let mut all = points(&|p| p.prior, POINTS)?;
+    let outside = points(&|p| p.bounds, LOOKED_AT)?;
+    let is_outside =
+        |theta: &Vec<f64>| (space.iter().zip(theta)).any(|(p, value)| !p.prior.contains(*value));
+    all.extend(outside.into_iter().filter(is_outside).take(POINTS));
+    Ok(all)
 }
 
 /// The benchmark's levels, over and over, as every input of the study's records.
@@ -189,13 +231,13 @@ mod tests {
         let study = tanks("twin = 'tanks'");
         let noise = |run| Noise::new(1, "record", run);
         let first = draws(&study, Scenario::First).unwrap();
-        let (theta, drive) = first.draw(noise(0)).unwrap();
+        let (theta, drive) = first.draw(0, noise(0)).unwrap();
         assert_eq!(theta, [1.2, 1.2, 0.9, 1.0]);
         assert_eq!(drive.input(29), [1.81107]);
         assert_eq!(drive.input(30), [0.892673]);
         let second = draws(&study, Scenario::Second).unwrap();
         assert_eq!(
-            second.draw(noise(9)).unwrap(),
+            second.draw(9, noise(9)).unwrap(),
             (vec![1.3, 1.3, 0.6, 0.7], drive)
         );
     }
@@ -210,12 +252,12 @@ mod tests {
         let mut low = [0; 4];
         for run in 0..200 {
             let noise = Noise::new(1, "record", run);
-            let (theta, _) = uniform.draw(noise).unwrap();
+            let (theta, _) = uniform.draw(0, noise).unwrap();
             space.check_point(&theta).unwrap();
             for (j, p) in space.iter().enumerate() {
                 low[j] += u32::from(theta[j] < p.bounds.centre());
             }
-            let (theta, _) = prior.draw(noise).unwrap();
+            let (theta, _) = prior.draw(0, noise).unwrap();
             assert!(space.iter().zip(theta).all(|(p, v)| p.prior.contains(v)));
         }
         assert!(low.iter().all(|n| (65..=135).contains(n)), "{low:?}");
@@ -231,7 +273,7 @@ mod tests {
             "{error}"
         );
         let uniform = draws(&study, Scenario::Uniform).unwrap();
-        let drive = |run| uniform.draw(Noise::new(1, "record", run)).unwrap().1;
+        let drive = |run| uniform.draw(0, Noise::new(1, "record", run)).unwrap().1;
         assert_ne!(drive(0), drive(1));
     }
 
@@ -239,7 +281,7 @@ mod tests {
     fn a_study_with_its_own_records_and_bounds_keeps_them() {
         let study = tanks("twin = 'tanks'\n[record]\nsamples = 60\n");
         let first = draws(&study, Scenario::First).unwrap();
-        let (_, drive) = first.draw(Noise::new(1, "record", 0)).unwrap();
+        let (_, drive) = first.draw(0, Noise::new(1, "record", 0)).unwrap();
         assert!(drive.samples() == 60 && drive.input(0) != [1.81107]);
         let study = tanks("twin = 'tanks'\n[bounds]\nk1 = [0.3, 1.0]\n");
         let error = draws(&study, Scenario::First).err().unwrap().to_string();
@@ -248,5 +290,24 @@ mod tests {
             "{error}"
         );
         assert!(draws(&study, Scenario::Uniform).is_ok());
+    }
+
+    /// Half of the points lie in the prior, half outside, all in the bounds; record 12 is at the first point again.
+    #[test]
+    fn the_grid_has_points_on_both_sides() {
+        let study = tanks("twin = 'tanks'");
+        let space = study.twin().parameters();
+        let grid = draws(&study, Scenario::Grid).unwrap();
+        let theta = |run| {
+            grid.draw(run, Noise::new(1, "record", run as u64))
+                .unwrap()
+                .0
+        };
+        let inside = |theta: &[f64]| space.iter().zip(theta).all(|(p, v)| p.prior.contains(*v));
+        for run in 0..2 * POINTS {
+            space.check_point(&theta(run)).unwrap();
+            assert_eq!(inside(&theta(run)), run < POINTS);
+        }
+        assert_eq!(theta(0), theta(2 * POINTS));
     }
 }

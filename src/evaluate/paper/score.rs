@@ -3,6 +3,7 @@
 use super::{Method, MonteCarlo, Published, Run, Scenario};
 use crate::math::{clopper_pearson, median};
 use crate::study::Study;
+use crate::twin::ParameterSpace;
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
@@ -17,8 +18,24 @@ pub struct Scores {
     pub methods: Vec<MethodScore>,
     /// Coverage of the truth by the refitted estimate's interval, by parameter.
     pub coverage: Vec<Coverage>,
+    /// Errors and coverage at each point of [`Scenario::Grid`]; empty otherwise.
+    pub points: Vec<PointScore>,
     /// Runs without an estimate.
     pub failed: usize,
+}
+
+/// Errors and coverage of the refitted estimate at one θ.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct PointScore {
+    /// True parameters.
+    pub theta: Vec<f64>,
+    /// True if they lie in the prior.
+    pub in_prior: bool,
+    /// Root mean squared error of each parameter; NaN where a run failed.
+    pub rmse: Vec<f64>,
+    /// By parameter.
+    pub coverage: Vec<Coverage>,
 }
 
 /// Error of one method.
@@ -130,17 +147,53 @@ pub fn score(study: &Study, plan: &MonteCarlo, runs: &[Run]) -> Scores {
         })
         .collect();
     let coverage = (space.names().into_iter().enumerate())
-        .map(|(j, name)| covered(name, j, runs))
+        .map(|(j, name)| covered(name, j, &runs.iter().collect::<Vec<_>>()))
         .collect();
+    let points = match plan.scenario {
+        Scenario::Grid => points(&space, runs),
+        _ => vec![],
+    };
     Scores {
         methods,
         coverage,
+        points,
         failed: runs.iter().filter(|run| run.failure.is_some()).count(),
     }
 }
 
+/// Scores of the runs at each true θ, in the order of their first runs.
+fn points(space: &ParameterSpace, runs: &[Run]) -> Vec<PointScore> {
+    let mut truths: Vec<&Vec<f64>> = vec![];
+    for run in runs {
+        if !truths.contains(&&run.truth) {
+            truths.push(&run.truth);
+        }
+    }
+    (truths.into_iter())
+        .map(|theta| {
+            let own: Vec<&Run> = runs.iter().filter(|run| run.truth == *theta).collect();
+            let fine = |run: &Run| {
+                let answer = run.answers.iter().find(|a| a.method == Method::TsFine);
+                answer.and_then(|answer| answer.theta.clone())
+            };
+            let rmse = |j: usize| {
+                let squares = (own.iter())
+                    .map(|run| fine(run).map_or(f64::NAN, |found| (found[j] - theta[j]).powi(2)));
+                mean(&squares.collect::<Vec<_>>()).sqrt()
+            };
+            let names = space.names().into_iter().enumerate();
+            PointScore {
+                in_prior: (space.iter().zip(theta)).all(|(p, value)| p.prior.contains(*value)),
+                rmse: (0..theta.len()).map(rmse).collect(),
+                coverage: names.map(|(j, name)| covered(name, j, &own)).collect(),
+                theta: theta.clone(),
+            }
+        })
+        .collect()
+}
+
 /// Coverage of parameter number `j`.
-fn covered(name: &str, j: usize, runs: &[Run]) -> Coverage {
+fn covered(name: &str, j: usize, runs: &[&Run]) -> Coverage {
     let (mut covered, mut of) = (0, 0);
     for run in runs {
         if let Some(interval) = run.interval.get(j) {

@@ -11,7 +11,8 @@ use serde_json::{Value, json};
 /// | key | holds |
 /// |---|---|
 /// | `methods` | a row a method and start: `mse`, `median` of the squared error over runs, `ms` |
-/// | `scenario` | 0, 1, 2 as on the command line; 3 for θ from the bounds |
+/// | `scenario` | 0, 1, 2 as on the command line; 3 for θ from the bounds; 4 for the grid |
+/// | `points` | of a grid: θ, whether it lies in the prior, errors and coverage by parameter |
 ///
 /// Beyond the contract: `theta_from` (`prior`, `point`, `bounds`), `seed`, `failed` (runs without an answer),
 /// `mse_std_error`, `invariants` and `mse_without_scale` (what a record determines, of twins that it does not determine
@@ -32,12 +33,14 @@ pub fn reproduce_json(
             Scenario::InDistribution => "prior",
             Scenario::First | Scenario::Second => "point",
             Scenario::Uniform => "bounds",
+            Scenario::Grid => "grid",
         },
         "runs": plan.runs,
         "seed": plan.seed,
         "preset": preset,
         "failed": scores.failed,
         "methods": scores.methods,
+        "points": scores.points,
         "coverage": {
             "level": INTERVAL_LEVEL, "interval_level": COVERAGE_LEVEL, "parameters": scores.coverage,
         },

@@ -69,6 +69,7 @@ fn the_json_is_the_contracts_in_every_scenario() {
         Scenario::First,
         Scenario::Second,
         Scenario::Uniform,
+        Scenario::Grid,
     ] {
         let plan = MonteCarlo {
             scenario,

@@ -20,6 +20,7 @@ pub fn reproduce_text(
         Scenario::First => "1 (the paper's OOD 1)",
         Scenario::Second => "2 (the paper's OOD 2)",
         Scenario::Uniform => "uniform (θ from the bounds)",
+        Scenario::Grid => "grid (fixed θ in and out of the prior)",
     };
     let (name, runs, seed) = (study.name(), plan.runs, plan.seed);
     let title = format!("{name}, scenario {theta}, {runs} runs, preset {preset}, seed {seed}");
@@ -27,6 +28,7 @@ pub fn reproduce_text(
         format!("{title}\n\n{}", errors(scores)),
         invariants(scores),
         coverage(scores),
+        points(study, scores),
         failures(plan, scores),
     ];
     parts.retain(|part| !part.is_empty());
@@ -80,6 +82,35 @@ fn invariants(scores: &Scores) -> String {
         rows.push(std::iter::once(s.method.label()).chain(row).collect());
     }
     format!("MSE of what the output determines\n\n{}", table(&rows))
+}
+
+/// Returns coverage and error at each point of a grid; nothing without one.
+fn points(study: &Study, scores: &Scores) -> String {
+    if scores.points.is_empty() {
+        return String::new();
+    }
+    let space = study.twin().parameters();
+    let mut head = vec!["θ".to_owned(), "prior".to_owned()];
+    for name in space.names() {
+        head.extend([format!("{name} held"), "rms error".to_owned()]);
+    }
+    let mut rows = vec![head];
+    for point in &scores.points {
+        let theta: Vec<String> = point.theta.iter().map(|v| short(*v)).collect();
+        let side = if point.in_prior { "inside" } else { "outside" };
+        let mut row = vec![theta.join(", "), side.to_owned()];
+        for (covered, rmse) in point.coverage.iter().zip(&point.rmse) {
+            row.extend([
+                format!("{} of {}", covered.covered, covered.of),
+                short(*rmse),
+            ]);
+        }
+        rows.push(row);
+    }
+    format!(
+        "Intervals that held the truth and errors of the tuned heads, by true θ\n\n{}",
+        table(&rows)
+    )
 }
 
 /// Returns the coverage of the intervals.
