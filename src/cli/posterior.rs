@@ -12,7 +12,7 @@ use ndarray::Array2;
 /// Most draws: a file of a hundred megabytes.
 const MOST: usize = 1_000_000;
 
-/// How many posterior draws a verb writes.
+/// The number of posterior draws that a verb writes.
 #[derive(Debug, Args)]
 pub(super) struct PosteriorDraws {
     /// Posterior draws of parameters, noise levels and starts for posterior.csv, posterior.npz and posterior.svg in the folder of

@@ -46,7 +46,7 @@ struct File {
 }
 
 impl Provenance {
-    /// Of a call on these files, beside the study file of its subject.
+    /// The provenance of a call on these files, beside the study file of its subject.
     pub fn new<'p>(
         context: &Context<'_>,
         subject: Option<&'p Subject>,

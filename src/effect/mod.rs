@@ -27,8 +27,8 @@ mod magnitude;
 mod marks;
 mod placed;
 
+pub use augment::augment;
 pub(crate) use augment::augment_short;
-pub use augment::{augment, given_magnitudes};
 pub use catalogue::Catalogue;
 pub(crate) use check::targets;
 pub use error::EffectError;

@@ -114,6 +114,12 @@ impl Effect {
         self.given.get(magnitude).copied()
     }
 
+    /// Returns the given magnitudes by the names of the parameters that [`augment`](super::augment) adds for them.
+    pub fn given_by_parameter(&self) -> impl Iterator<Item = (String, f64)> + '_ {
+        let given = self.magnitudes().iter();
+        given.filter_map(|m| Some((self.key().magnitude(m.name), self.given(m.name)?)))
+    }
+
     /// Returns the magnitudes that are given.
     pub(super) fn all_given(&self) -> &BTreeMap<String, f64> {
         &self.given

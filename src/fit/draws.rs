@@ -1,7 +1,7 @@
 //! Posterior draws of everything unknown, as a table.
 
 use super::posterior::Draws;
-use super::problem::Problem;
+use super::problem::{Problem, of_record};
 use crate::likelihood::kalman::{FilterError, Smoothed};
 use crate::math::to_matrix;
 use crate::twin::{Noise, Role, is_memory};
@@ -102,14 +102,6 @@ pub(super) fn table(
         modes: draws.modes.iter().map(|mode| mode + 1).collect(),
         effective: draws.effective,
     })
-}
-
-/// The name of an entry of record `r`, from 0.
-pub(super) fn of_record(name: String, r: usize) -> String {
-    match r {
-        0 => name,
-        r => format!("{name} (record {})", r + 1),
-    }
 }
 
 /// A first state, given the record.

@@ -75,7 +75,7 @@ pub struct FittedValue {
     pub value: f64,
     /// Standard error, first order.
     pub std_error: f64,
-    /// Lower end of the interval.
+    /// Lower end of the interval, which holds the value.
     pub low: f64,
     /// Upper end of the interval.
     pub high: f64,

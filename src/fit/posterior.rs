@@ -112,7 +112,7 @@ struct Proposal {
     free: Vec<usize>,
     /// The whole of φ.
     centre: DVector<f64>,
-    /// Of the entries that may move, not widened.
+    /// Covariance of the entries that may move, not widened.
     covariance: DMatrix<f64>,
     /// Widened root of `covariance`.
     root: DMatrix<f64>,

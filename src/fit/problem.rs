@@ -1,7 +1,6 @@
 //! A twin and the records that it is fitted to.
 
 use crate::fit::axis::{Axis, Family};
-use crate::fit::draws::of_record;
 use crate::likelihood::kalman::{Coordinates, FilterError, Filtered, Score, Smoothed};
 use crate::likelihood::{Likelihood, Measured, likelihood_of};
 use crate::record::{Record, Signal};
@@ -305,5 +304,12 @@ impl<'a> Problem<'a> {
                 (self.coordinates.theta(&moved), distance)
             })
             .collect()
+    }
+}
+/// The name of an entry of record `r`, from 0.
+pub(super) fn of_record(name: String, r: usize) -> String {
+    match r {
+        0 => name,
+        r => format!("{name} (record {})", r + 1),
     }
 }

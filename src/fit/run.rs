@@ -227,8 +227,9 @@ fn values(
             unit: p.unit.clone(),
             value: fitted.theta[j],
             std_error: errors[j],
-            low: spread.low[j],
-            high: spread.high[j],
+            // At a bound, draws may lie on one side of the value alone.
+            low: spread.low[j].min(fitted.theta[j]),
+            high: spread.high[j].max(fitted.theta[j]),
             at_bound: certificate.at_bound[j],
         });
     }

@@ -13,25 +13,37 @@ use crate::record::{Drive, Record, RecordError, Signals};
 use crate::storage::untrusted::MOST_NUMBERS;
 use std::path::Path;
 
-/// Reads a measured record.
-///
-/// ```
-/// use truetwin::record::{Drive, Record, Signal, read_record, write_record};
-///
-/// let record = Record::new(Drive::new(0.5, Signal::ones((3, 1)))?, Signal::zeros((3, 1)))?;
-/// let folder = tempfile::tempdir()?;
-/// let path = folder.path().join("R.csv");
-/// write_record(&path, &record)?;
-/// assert_eq!(read_record(&path)?, record);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub fn read_record(path: &Path) -> Result<Record, RecordError> {
-    RecordReader::default().record(path)
+impl Record {
+    /// Reads a measured record: CSV, or Parquet in a build with that feature.
+    ///
+    /// ```
+    /// use truetwin::record::{Drive, Record, Signal};
+    ///
+    /// let record = Record::new(Drive::new(0.5, Signal::ones((3, 1)))?, Signal::zeros((3, 1)))?;
+    /// let folder = tempfile::tempdir()?;
+    /// let path = folder.path().join("R.csv");
+    /// record.write(&path)?;
+    /// assert_eq!(Record::read(&path)?, record);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// File, row and column that cannot be read, and what to do.
+    pub fn read(path: &Path) -> Result<Self, RecordError> {
+        RecordReader::default().record(path)
+    }
 }
 
-/// Reads time and inputs to simulate with; a file with outputs is refused.
-pub fn read_drive(path: &Path) -> Result<Drive, RecordError> {
-    RecordReader::default().drive(path)
+impl Drive {
+    /// Reads time and inputs to simulate with; a file with outputs is refused.
+    ///
+    /// # Errors
+    ///
+    /// As [`Record::read`].
+    pub fn read(path: &Path) -> Result<Self, RecordError> {
+        RecordReader::default().drive(path)
+    }
 }
 
 /// Parses the text of a record that stands in the program itself; `path` is for messages.
@@ -100,13 +112,13 @@ impl RecordReader {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::{Signal, drive_csv_text, record_csv_text, write_record};
+    use crate::record::{Signal, drive_csv_text, record_csv_text};
 
     fn written(text: &str) -> Result<Record, RecordError> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("r.csv");
         std::fs::write(&path, text).unwrap();
-        read_record(&path)
+        Record::read(&path)
     }
 
     fn message(text: &str) -> String {
@@ -204,13 +216,13 @@ mod tests {
         let record = Record::new(drive, outputs).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("r.csv");
-        write_record(&path, &record).unwrap();
+        record.write(&path).unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
         assert!(
             text.starts_with("t,u1,u2,y\n0,") && text.contains("\n0.3,"),
             "{text}"
         );
-        let back = read_record(&path).unwrap();
+        let back = Record::read(&path).unwrap();
         assert_eq!(back.outputs(), record.outputs());
         assert_eq!(back.drive().inputs(), record.drive().inputs());
     }
@@ -228,7 +240,7 @@ mod tests {
             let text = drive_csv_text(&drive);
             assert!(text.starts_with(header), "{text}");
             std::fs::write(&path, text).unwrap();
-            let back = read_drive(&path).unwrap();
+            let back = Drive::read(&path).unwrap();
             assert_eq!(back.inputs(), drive.inputs());
             assert!((back.dt() - drive.dt()).abs() < 1e-12);
         }

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | hand over inputs | [`Drive`] |
 //! | take a measurement | [`Record`] |
-//! | read and write CSV, read Parquet | [`read_record`], [`write_record`], [`read_drive`] |
+//! | read and write CSV, read Parquet | [`Record::read`], [`Record::write`], [`Drive::read`] |
 
 mod channels;
 mod columns;
@@ -22,10 +22,8 @@ mod write;
 pub use channels::{Quantity, Signals};
 pub(crate) use columns::Columns;
 pub(crate) use csv::{RecordReader, parse_record};
-pub use csv::{read_drive, read_record};
 pub use drive::{Drive, Signal};
 pub use error::RecordError;
 pub use measured::Record;
 pub(crate) use resample::{InputRule, resample};
-pub use write::write_record;
 pub(crate) use write::{drive_csv_text, record_csv_text};

@@ -5,7 +5,7 @@ use crate::record::{Drive, Record, RecordError, Signal};
 use crate::storage::files::write_new;
 use std::path::Path;
 
-/// The text of an input file, as [`read_drive`] reads it.
+/// The text of an input file, as [`Drive::read`] reads it.
 pub(crate) fn drive_csv_text(drive: &Drive) -> String {
     csv_text(drive, &Signal::zeros((drive.samples(), 0)))
 }
@@ -39,10 +39,16 @@ fn csv_text(drive: &Drive, outputs: &Signal) -> String {
     text
 }
 
-/// Writes a record to a new file, which appears whole or not at all.
-pub fn write_record(path: &Path, record: &Record) -> Result<(), RecordError> {
-    write_new(path, record_csv_text(record).as_bytes())
-        .map_err(|error| RecordError::io(path, error))
+impl Record {
+    /// Writes a new CSV file, which appears whole or not at all.
+    ///
+    /// # Errors
+    ///
+    /// The file exists, or cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), RecordError> {
+        write_new(path, record_csv_text(self).as_bytes())
+            .map_err(|error| RecordError::io(path, error))
+    }
 }
 
 /// Time to a billionth of the step, so that 3·0.1 is written as 0.3.

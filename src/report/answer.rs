@@ -23,7 +23,7 @@ const BAND: f64 = 1.96;
 const QUANTILES: usize = 200;
 
 /// The page of an estimate.
-pub fn estimate_html(study: &Study, record: &Record, estimate: &Estimate) -> String {
+pub(crate) fn estimate_html(study: &Study, record: &Record, estimate: &Estimate) -> String {
     let before = estimate.tracking_initial.as_ref().map(|run| &run.outputs);
     let after = estimate.tracking.as_ref().map(|run| &run.outputs);
     let picture = after.map(|after| overlay_svg(study, record, before, after));
@@ -50,7 +50,7 @@ pub fn estimate_html(study: &Study, record: &Record, estimate: &Estimate) -> Str
 }
 
 /// The page of a fit.
-pub fn fit_html(study: &Study, records: &[Record], fit: &Fit) -> String {
+pub(crate) fn fit_html(study: &Study, records: &[Record], fit: &Fit) -> String {
     let runs = records.iter().zip(&fit.free_runs);
     let pictures =
         runs.filter_map(|(record, run)| Some(overlay_svg(study, record, None, run.as_ref()?)));
@@ -77,7 +77,7 @@ pub fn fit_html(study: &Study, records: &[Record], fit: &Fit) -> String {
     answer.html(study)
 }
 
-/// What both pages show.
+/// Contents of both pages.
 struct Answer<'a> {
     title: String,
     summary: String,

@@ -2,15 +2,15 @@
 //!
 //! | result of | JSON | text | pictures and pages |
 //! |---|---|---|---|
-//! | `estimate` | [`Report::json`] | [`Report::text`] | [`overlay_svg`], [`estimate_html`] |
-//! | `fit` | [`Report::json`] | [`Report::text`] | [`overlay_svg`], [`fit_html`] |
-//! | `diagnose` | [`Report::json`] | [`Report::text`] | [`gap_html`], [`gap_pictures`] |
-//! | `withheld` | | | [`scorecard_html`] |
+//! | `estimate` | [`Report::json`] | [`Report::text`] | [`Estimate::html`] |
+//! | `fit` | [`Report::json`] | [`Report::text`] | [`Fit::html`] |
+//! | `diagnose` | [`Report::json`] | [`Report::text`] | [`Diagnosis::html`], [`Diagnosis::pictures`] |
+//! | `withheld` | | | [`Scorecard::html`] |
 //!
 //! ```
 //! use truetwin::diagnose::{DiagnoseSettings, diagnose};
 //! use truetwin::prelude::*;
-//! use truetwin::report::{Report, gap_html, gap_pictures};
+//! use truetwin::report::Report;
 //! use truetwin::twins::VanDerPol;
 //!
 //! let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 200))?;
@@ -22,8 +22,8 @@
 //!
 //! assert_eq!(diagnosis.json(&study)["schema"], "truetwin.gap/2");
 //! assert!(diagnosis.text(&study).starts_with("No gap"));
-//! assert!(gap_html(&study, &diagnosis).starts_with("<!doctype html>"));
-//! assert!(gap_pictures(&study, &diagnosis).iter().all(|(_, svg)| svg.starts_with("<svg")));
+//! assert!(diagnosis.html(&study).starts_with("<!doctype html>"));
+//! assert!(diagnosis.pictures(&study).iter().all(|(_, svg)| svg.starts_with("<svg")));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -43,21 +43,19 @@ mod scorecard;
 mod table;
 mod units;
 
-pub use answer::{estimate_html, fit_html};
 pub(crate) use compare::{Compared, compare_json, compare_svg, compare_text};
-pub use estimate::overlay_svg;
-pub(crate) use estimate::trajectories_csv;
+pub(crate) use estimate::{overlay_svg, trajectories_csv};
 pub(crate) use fit::posterior_svg;
 pub(crate) use gap::NEXT_INPUT;
-pub use gap::{gap_html, gap_pictures};
 pub(crate) use page::with_footer;
 pub(crate) use reproduce::{first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
-pub use scorecard::scorecard_html;
 pub(crate) use scorecard::{scorecard_json, scorecard_text};
 
 use crate::diagnose::Diagnosis;
 use crate::estimator::Estimate;
+use crate::evaluate::trials::Scorecard;
 use crate::fit::Fit;
+use crate::record::Record;
 use crate::study::Study;
 use serde_json::Value;
 
@@ -95,5 +93,41 @@ impl Report for Diagnosis {
     }
     fn text(&self, _: &Study) -> String {
         gap::gap_text(self)
+    }
+}
+
+impl Estimate {
+    /// Page of its own: record and free run, parameters with prior and bounds, draws, residuals, warnings.
+    pub fn html(&self, study: &Study, record: &Record) -> String {
+        answer::estimate_html(study, record, self)
+    }
+}
+
+impl Fit {
+    /// Page of its own, as [`Estimate::html`]; the records in the order of the fit.
+    pub fn html(&self, study: &Study, records: &[Record]) -> String {
+        answer::fit_html(study, records, self)
+    }
+}
+
+impl Diagnosis {
+    /// Self-contained page for screen, phone and print.
+    ///
+    /// Pictures are SVG inside the page with descriptions for screen readers; colour never carries information alone. The page
+    /// has no scripts and loads nothing.
+    pub fn html(&self, study: &Study) -> String {
+        gap::gap_html(study, self)
+    }
+
+    /// Pictures of the page as files of their own: name, SVG.
+    pub fn pictures(&self, study: &Study) -> Vec<(&'static str, String)> {
+        gap::gap_pictures(study, self)
+    }
+}
+
+impl Scorecard {
+    /// Page of its own: what was found of what was there, place, probabilities, every trial.
+    pub fn html(&self) -> String {
+        scorecard::scorecard_html(self)
     }
 }

@@ -2,14 +2,14 @@
 
 use crate::effect::{EffectEntry, EffectError, EffectPattern};
 use crate::feature::FeatureRecipe;
-use crate::record::{Columns, read_drive};
+use crate::record::{Columns, Drive};
 use crate::setting::number;
 use crate::storage::files::folder;
 use crate::storage::untrusted::{MESSAGE, check_names, one_line, read_text};
 use crate::study::error::StudyError;
 use crate::study::lines::{line, with_line};
 use crate::study::plan::InputPlan;
-use crate::study::prior::PriorTable;
+use crate::study::prior::{PriorTable, flatten};
 use crate::twin::{Hold, Interval, NoiseLevel, StartLevel};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -164,7 +164,7 @@ impl StudyFile {
         let record = &mut file.record;
         if let Some(InputPlan::File(input)) = &mut record.input {
             *input = folder(path).join(&*input);
-            let drive = read_drive(input)?;
+            let drive = Drive::read(input)?;
             let (step, samples) = (drive.dt(), drive.samples());
             let other = record.step.is_some_and(|s| (s - step).abs() > 1e-3 * step)
                 || record.samples.is_some_and(|n| n != samples);
@@ -222,24 +222,6 @@ where
     let mut flat = BTreeMap::new();
     flatten("", table, &mut flat).map_err(serde::de::Error::custom)?;
     Ok(flat)
-}
-
-pub(super) fn flatten<V: serde::de::DeserializeOwned>(
-    prefix: &str,
-    table: toml::Table,
-    flat: &mut BTreeMap<String, V>,
-) -> Result<(), String> {
-    for (key, value) in table {
-        let key = format!("{prefix}{key}");
-        match value {
-            toml::Value::Table(inner) => flatten(&format!("{key}."), inner, flat)?,
-            value => {
-                let value = V::deserialize(value).map_err(|e| format!("{key}: {}", e.message()))?;
-                flat.insert(key, value);
-            }
-        }
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ pub(crate) use plan::Levels;
 pub use plan::{DriveSource, RecordPlan};
 
 use crate::effect::{
-    Catalogue, Effect, EffectError, EffectKey, EffectKind, EffectPattern, augment, given_magnitudes,
+    Catalogue, Effect, EffectError, EffectKey, EffectKind, EffectPattern, augment,
 };
 use crate::record::Record;
 use crate::setting::did_you_mean;
@@ -46,7 +46,7 @@ pub struct Study {
     twin: Twin,
     plan: RecordPlan,
     file: StudyFile,
-    demo: Option<Arc<Record>>,
+    demo: Option<Arc<(StudyFile, Record)>>,
     /// The library's effects and the study's own.
     catalogue: Catalogue,
 }
@@ -93,10 +93,10 @@ impl Study {
         self
     }
 
-    /// With a record to show the program on.
+    /// With a record to show the program on, and the setting that the record is of.
     #[must_use]
-    pub fn with_demo(mut self, record: Record) -> Self {
-        self.demo = Some(Arc::new(record));
+    pub fn with_demo(mut self, file: StudyFile, record: Record) -> Self {
+        self.demo = Some(Arc::new((file, record)));
         self
     }
 
@@ -157,7 +157,7 @@ impl Study {
             parameter.check_value(value).map_err(fixed)?;
         }
         let mut held = file.fixed.clone();
-        held.extend(given_magnitudes(&effects));
+        held.extend(effects.iter().flat_map(Effect::given_by_parameter));
         twin = fix(twin, &held).map_err(fixed)?;
         let RecordTable {
             step,
@@ -270,9 +270,9 @@ impl Study {
             .collect()
     }
 
-    /// A record to show the program on.
-    pub fn demo(&self) -> Option<&Record> {
-        self.demo.as_deref()
+    /// A record to show the program on, and its setting.
+    pub fn demo(&self) -> Option<(&StudyFile, &Record)> {
+        self.demo.as_deref().map(|(file, record)| (file, record))
     }
 
     /// Name of the twin.

@@ -1,6 +1,6 @@
 //! Plan of simulated records: step, length, input.
 
-use crate::record::{Drive, Record, RecordError, Signal, Signals, read_drive};
+use crate::record::{Drive, Record, RecordError, Signal, Signals};
 use crate::setting::number;
 use crate::storage::untrusted::MOST_NUMBERS;
 use crate::study::error::StudyError;
@@ -122,7 +122,7 @@ impl RecordPlan {
     }
 
     fn read(&self, path: &Path, channels: usize) -> Result<Drive, StudyError> {
-        let drive = read_drive(path)?;
+        let drive = Drive::read(path)?;
         if !drive.is_uniform() {
             return Err(StudyError::Plan(format!(
                 "{}, column t: the steps vary; simulated records need one step: resample the inputs",

@@ -1,6 +1,5 @@
 //! The table `[prior]` of a study file: boxes of parameters, and whether they are to be trusted.
 
-use super::file::flatten;
 use crate::twin::Interval;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
@@ -45,6 +44,25 @@ impl<'de> Deserialize<'de> for PriorTable {
             boxes,
         })
     }
+}
+
+/// Adds the values of a table and its inner tables to `flat`, by dotted names.
+pub(super) fn flatten<V: serde::de::DeserializeOwned>(
+    prefix: &str,
+    table: toml::Table,
+    flat: &mut BTreeMap<String, V>,
+) -> Result<(), String> {
+    for (key, value) in table {
+        let key = format!("{prefix}{key}");
+        match value {
+            toml::Value::Table(inner) => flatten(&format!("{key}."), inner, flat)?,
+            value => {
+                let value = V::deserialize(value).map_err(|e| format!("{key}: {}", e.message()))?;
+                flat.insert(key, value);
+            }
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -24,7 +24,6 @@ use truetwin::evaluate::trials::{Scorecard, Settings, Withheld};
 use truetwin::fit::Nuisance;
 use truetwin::progress::Progress;
 use truetwin::record::{Drive, Quantity, Signal};
-use truetwin::report::{gap_html, scorecard_html};
 use truetwin::study::{RecordPlan, Study};
 use truetwin::twin::{Interval, Now, Outline, Parameter, ParameterSpace, StateSpace};
 
@@ -101,11 +100,11 @@ fn pages() -> Vec<(&'static str, String)> {
     };
     let rig = Study::new("rig", Rig, RecordPlan::autonomous(0.1, 4)).unwrap();
     vec![
-        ("class", gap_html(tanks, &made::tanks_class())),
-        ("none", gap_html(oscillator, &made::oscillator_none())),
-        ("no-gap", gap_html(oscillator, &made::oscillator_no_gap())),
-        ("partial", gap_html(&rig, &made::rig_pair())),
-        ("scorecard", scorecard_html(&scorecard(oscillator))),
+        ("class", made::tanks_class().html(tanks)),
+        ("none", made::oscillator_none().html(oscillator)),
+        ("no-gap", made::oscillator_no_gap().html(oscillator)),
+        ("partial", made::rig_pair().html(&rig)),
+        ("scorecard", scorecard(oscillator).html()),
     ]
 }
 

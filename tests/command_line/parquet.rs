@@ -7,7 +7,7 @@ use parquet::schema::parser::parse_message_type;
 use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
-use truetwin::record::read_record;
+use truetwin::record::Record;
 
 /// Columns t and y of doubles, and u of integers.
 fn write(path: &Path, t: &[f64], y: &[f64]) {
@@ -42,10 +42,10 @@ fn a_record_is_read_bit_for_bit_and_checked_as_csv_is() {
     let path = place.path().join("r.parquet");
     let y = [1.0 / 3.0, -1e-300, 0.1 + 0.2];
     write(&path, &[0.0, 0.5, 1.0], &y);
-    let record = read_record(&path).unwrap();
+    let record = Record::read(&path).unwrap();
     assert_eq!(record.outputs().column(0).to_vec(), y);
     assert_eq!(record.drive().inputs().column(0).to_vec(), [0.0, 1.0, 2.0]);
-    let refused = || read_record(&path).unwrap_err().to_string();
+    let refused = || Record::read(&path).unwrap_err().to_string();
     write(&path, &[0.0, 0.5, 0.5], &y);
     assert!(
         refused().contains("r.parquet, row 4, column t"),
@@ -59,7 +59,7 @@ fn a_record_is_read_bit_for_bit_and_checked_as_csv_is() {
         refused()
     );
     write(&path, &[0.0, 0.5, 1.5], &[1.0, f64::NAN, 2.0]);
-    let record = read_record(&path).unwrap();
+    let record = Record::read(&path).unwrap();
     assert_eq!((record.missing(), record.drive().step(1)), (1, 1.0));
     std::fs::write(&path, "t,u,y").unwrap();
     assert!(refused().contains("r.parquet"), "{}", refused());

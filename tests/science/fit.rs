@@ -9,7 +9,7 @@ use rigs::{Carriage, Heater};
 use truetwin::evaluate::paper::reference_studies;
 use truetwin::fit::{Fit, FitSettings};
 use truetwin::prelude::*;
-use truetwin::record::read_record;
+use truetwin::record::Record;
 use truetwin::study::StudyFile;
 use truetwin::twin::DigitalTwin;
 use truetwin::twins::CascadedTanks;
@@ -152,7 +152,7 @@ fn a_value_at_its_bound_is_told() {
 
 /// The carriage's record at 20 ms: forces averaged over each step, every other position.
 fn carriage() -> Option<Record> {
-    let record = read_record(&data("emps-estimation.csv")?).unwrap();
+    let record = Record::read(&data("emps-estimation.csv")?).unwrap();
     let n = record.samples() / 2;
     let mean =
         |k: usize| 0.5 * (record.drive().input(2 * k)[0] + record.drive().input(2 * k + 1)[0]);
@@ -217,7 +217,7 @@ fn the_heater_shows_its_lag() {
     let Some(path) = data("tclab-first.csv") else {
         return;
     };
-    let records = [read_record(&path).unwrap()];
+    let records = [Record::read(&path).unwrap()];
     let evidence = |effects: &str| {
         let text = format!("twin = 'heater'\n{effects}");
         let file = StudyFile::parse(&text, "s.toml".as_ref()).unwrap();

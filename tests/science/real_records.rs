@@ -7,8 +7,7 @@ use truetwin::diagnose::{Decision, DiagnoseSettings, Diagnosis, FreeRuns, Verdic
 use truetwin::estimator::{EstimateOptions, PretrainOptions, pretrain};
 use truetwin::evaluate::paper::reference_studies;
 use truetwin::progress::Progress;
-use truetwin::record::{Drive, Record, Signal, read_record};
-use truetwin::report::gap_pictures;
+use truetwin::record::{Drive, Record, Signal};
 use truetwin::study::{RecordPlan, Study, StudyFile};
 
 /// The path of a file of measured data; says in the output of the tests, past libtest's capture, whether it is at hand.
@@ -40,7 +39,7 @@ fn tanks() -> Study {
 
 /// The record to fit and the one to validate, where the data are at hand.
 fn tanks_records() -> Option<(Record, Record)> {
-    let read = |name| data(name).map(|path| read_record(&path).unwrap());
+    let read = |name| data(name).map(|path| Record::read(&path).unwrap());
     Some((
         read("cascaded-tanks-estimation.csv")?,
         read("cascaded-tanks-validation.csv")?,
@@ -171,7 +170,7 @@ fn the_positioning_rig_lacks_dry_friction_and_an_offset() {
     let Some(path) = data("emps-estimation.csv") else {
         return;
     };
-    let whole = read_record(&path).unwrap();
+    let whole = Record::read(&path).unwrap();
     let (u, y) = (whole.drive().inputs(), whole.outputs());
     let rows = whole.samples() / 2;
     let force = Signal::from_shape_fn((rows, 1), |(k, _)| {
@@ -214,7 +213,7 @@ fn the_heater_lacks_a_lag() {
     let Some(path) = data("tclab-first.csv") else {
         return;
     };
-    let record = read_record(&path).unwrap();
+    let record = Record::read(&path).unwrap();
     let plan = RecordPlan::levels(1.0, 600, 0.0, 100.0, 60);
     let study = Study::new("heater", Heater, plan).unwrap();
     let settings = DiagnoseSettings::default();
@@ -242,7 +241,7 @@ fn the_heater_lacks_a_lag() {
 fn draw(study: &Study, found: &mut Diagnosis, folder: &Path) {
     thin(&mut found.free_runs);
     found.validation_runs.as_mut().map(thin);
-    let pictures = gap_pictures(study, found);
+    let pictures = found.pictures(study);
     let (_, svg) = pictures.iter().find(|(n, _)| *n == "validation").unwrap();
     std::fs::write(folder.join("tanks-validation.svg"), svg).unwrap();
 }

@@ -6,7 +6,7 @@ use crate::cli::failure::Failure;
 use crate::cli::output;
 use crate::cli::provenance::Provenance;
 use crate::estimator::{EstimateOptions, PresetName, PretrainOptions, pretrain};
-use crate::record::{Record, write_record};
+use crate::record::Record;
 use crate::study::Study;
 use crate::twin::Noise;
 use clap::Args;
@@ -43,14 +43,15 @@ impl Verb for Demo {
                     Failure::user("no twin is registered; give --program 'COMMAND' or --fmu M.fmu")
                 })?,
         };
-        let study = project.study();
-        let (record, origin) = match study.demo() {
-            Some(record) => (record.clone(), "embedded record"),
+        let (project, record, origin) = match project.study().demo() {
+            Some((file, record)) => (project.configure(file)?, record.clone(), "embedded record"),
             None => (
-                simulated(context, study)?,
+                project.clone(),
+                simulated(context, project.study())?,
                 "record simulated at parameters drawn from the bounds",
             ),
         };
+        let study = project.study();
         output::say(&format!(
             "demo: {origin}, twin {}; training on {BANK} simulations from the prior",
             study.name()
@@ -61,7 +62,7 @@ impl Verb for Demo {
             epochs: Some(EPOCHS),
             seed: context.seed,
         };
-        let (estimator, _) = pretrain(project, &settings, context.progress)?;
+        let (estimator, _) = pretrain(&project, &settings, context.progress)?;
         let settings = EstimateOptions {
             seed: context.seed,
             ..EstimateOptions::default()
@@ -69,7 +70,7 @@ impl Verb for Demo {
         let estimate = estimator.estimate(&record, &settings, context.progress)?;
         let provenance = Provenance::new(context, None, []);
         if let (Some(folder), Some(out)) = (folder, &self.out) {
-            write_record(&folder.file("record.csv"), &record)?;
+            record.write(&folder.file("record.csv"))?;
             write_results(&folder, study, &record, &estimate, &provenance)?;
             folder.finish()?;
             output::say(&format!(

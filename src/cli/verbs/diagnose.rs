@@ -9,7 +9,7 @@ use crate::diagnose::{DiagnoseSettings, GivenRecord, diagnose};
 use crate::effect::EffectPattern;
 use crate::estimator::Estimator;
 use crate::record::{Record, drive_csv_text};
-use crate::report::{NEXT_INPUT, Report, gap_html};
+use crate::report::{NEXT_INPUT, Report};
 use crate::study::Study;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -102,7 +102,7 @@ impl Verb for Diagnose {
         if let Some(folder) = folder {
             let text = serde_json::to_string_pretty(&json).map_err(Failure::internal)?;
             folder.write("report.json", &text)?;
-            let page = provenance.in_page(&gap_html(&study, &found));
+            let page = provenance.in_page(&found.html(&study));
             folder.write("report.html", &page)?;
             if let Some(next) = &found.cause.next_input {
                 folder.write(NEXT_INPUT, &drive_csv_text(&next.drive))?;

@@ -9,7 +9,7 @@ use crate::cli::{output, records};
 use crate::estimator::bank::file;
 use crate::estimator::{self, EstimateOptions, Estimator};
 use crate::record::Record;
-use crate::report::{Report, estimate_html, overlay_svg, trajectories_csv};
+use crate::report::{Report, overlay_svg, trajectories_csv};
 use crate::study::Study;
 use clap::Args;
 use std::path::PathBuf;
@@ -114,7 +114,7 @@ pub(super) fn write_results(
     if let Some(draws) = &estimate.posterior {
         posterior::write(folder, study, draws)?;
     }
-    let page = provenance.in_page(&estimate_html(study, record, estimate));
+    let page = provenance.in_page(&estimate.html(study, record));
     folder.write("report.html", &page)?;
     let before = estimate.tracking_initial.as_ref().map(|t| &t.outputs);
     // A free run that diverged cannot be drawn; the text reports it.

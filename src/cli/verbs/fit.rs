@@ -7,7 +7,7 @@ use crate::cli::posterior::{self, PosteriorDraws};
 use crate::cli::provenance::Provenance;
 use crate::cli::{output, records};
 use crate::fit::FitSettings;
-use crate::report::{Report, fit_html, overlay_svg};
+use crate::report::{Report, overlay_svg};
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -58,7 +58,7 @@ impl Verb for Fit {
         if let Some(folder) = folder {
             let text = serde_json::to_string_pretty(&json).map_err(Failure::internal)?;
             folder.write("fit.json", &text)?;
-            let page = provenance.in_page(&fit_html(&study, &records, &fit));
+            let page = provenance.in_page(&fit.html(&study, &records));
             folder.write("report.html", &page)?;
             for (r, (record, run)) in records.iter().zip(&fit.free_runs).enumerate() {
                 let Some(run) = run else { continue };

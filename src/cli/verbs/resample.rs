@@ -5,7 +5,7 @@ use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
 use crate::math::six_digits;
-use crate::record::{InputRule, Record, resample, write_record};
+use crate::record::{InputRule, Record, resample};
 use crate::setting::number;
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -54,7 +54,7 @@ impl Verb for Resample {
         };
         let new = resample(&record, self.step, rule)
             .map_err(|error| Failure::from(error).within(&self.record))?;
-        write_record(&self.out, &new.record)?;
+        new.record.write(&self.out)?;
         if context.json {
             let grid = |record: &Record| {
                 let (shortest, longest) = steps(record);

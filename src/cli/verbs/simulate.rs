@@ -4,8 +4,8 @@ use crate::cli::args::{FileColumns, Subject};
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
-use crate::effect::{augment, given_magnitudes};
-use crate::record::{Drive, Record, record_csv_text, write_record};
+use crate::effect::{Effect, augment};
+use crate::record::{Drive, Record, record_csv_text};
 use crate::setting::{did_you_mean, number};
 use crate::twin::{Noise, ParameterSpace, Role, Twin};
 use clap::Args;
@@ -57,7 +57,10 @@ impl Verb for Simulate {
         let mut magnitudes = BTreeMap::new();
         if let Some(path) = &self.effect {
             let effects = study.catalogue().read(path)?;
-            magnitudes = given_magnitudes(&effects);
+            magnitudes = effects
+                .iter()
+                .flat_map(Effect::given_by_parameter)
+                .collect();
             twin = augment(twin, effects).map_err(|error| Failure::from(error).within(path))?;
         }
         let theta = complete(&twin.parameters(), &given, &magnitudes)?;
@@ -71,7 +74,7 @@ impl Verb for Simulate {
         let outputs = twin.simulate(&theta, &drive, noise)?;
         let record = Record::complete(drive, outputs)?;
         match &self.out {
-            Some(out) => write_record(out, &record)?,
+            Some(out) => record.write(out)?,
             None if !context.json => output::print(&record_csv_text(&record))?,
             None => {}
         }

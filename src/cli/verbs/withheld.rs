@@ -6,7 +6,7 @@ use crate::cli::failure::Failure;
 use crate::cli::output;
 use crate::cli::provenance::Provenance;
 use crate::evaluate::trials::{self, Families, Kind, Settings};
-use crate::report::{scorecard_html, scorecard_json, scorecard_text};
+use crate::report::{scorecard_json, scorecard_text};
 use crate::setting::did_you_mean;
 use crate::storage::work::Share;
 use clap::Args;
@@ -105,10 +105,7 @@ impl Verb for Withheld {
         let like = self.like.as_deref().map(|path| ("record", path));
         let provenance = Provenance::new(context, Some(&self.subject), like);
         let json = provenance.on(scorecard_json(&card));
-        sealed.write(
-            "scorecard.html",
-            &provenance.in_page(&scorecard_html(&card)),
-        )?;
+        sealed.write("scorecard.html", &provenance.in_page(&card.html()))?;
         // Written last: it marks the folder as complete.
         sealed.write("scorecard.json", &format!("{json:#}\n"))?;
         if context.json {

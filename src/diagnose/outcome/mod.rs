@@ -288,9 +288,9 @@ pub struct Horizon {
     pub samples: Option<usize>,
     /// The same in seconds.
     pub seconds: Option<f64>,
-    /// Of the refitted twin alone.
+    /// The refitted twin's alone.
     pub before: f64,
-    /// Of the same with the accepted effects.
+    /// That of the same with the accepted effects.
     pub after: f64,
     /// To be expected of records that the accepted twin makes, noise and all.
     pub floor: f64,

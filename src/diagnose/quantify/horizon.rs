@@ -38,7 +38,7 @@ pub(in crate::diagnose) struct Predictor<'a> {
     pub runner: Runner,
 }
 
-/// How far ahead predictions reach.
+/// Reach of predictions ahead.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Reach {
     /// Samples.

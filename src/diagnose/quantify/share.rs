@@ -86,7 +86,7 @@ fn on<'r>(model: &Model<'_>, records: &'r [Record]) -> Problem<'r> {
     problem
 }
 
-/// What the share of a gap is measured with.
+/// Means to measure the share of a gap.
 pub(in crate::diagnose) struct Measures<'m, 'a> {
     /// The twin alone.
     pub base: &'m Model<'a>,

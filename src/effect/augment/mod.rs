@@ -12,7 +12,6 @@ use super::placed::Effect;
 use crate::twin::{Interval, Modified, Parameter, ParameterSpace, Role, SimulationError, Twin};
 use black_box::AugmentedBlackBox;
 use equations::AugmentedEquations;
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -70,17 +69,6 @@ pub(crate) fn augment_short(
         }
         Twin::BlackBox(base) => Twin::BlackBox(Arc::new(AugmentedBlackBox::new(base, slots))),
     })
-}
-
-/// Returns the given magnitudes of effects, by the names of the parameters that [`augment`] adds.
-pub fn given_magnitudes(effects: &[Effect]) -> BTreeMap<String, f64> {
-    let named = effects.iter().flat_map(|effect| {
-        effect.magnitudes().iter().filter_map(move |m| {
-            let value = effect.given(m.name)?;
-            Some((effect.key().magnitude(m.name), value))
-        })
-    });
-    named.collect()
 }
 
 /// Where the numbers of an effect stand.

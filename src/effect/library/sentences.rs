@@ -1,4 +1,4 @@
-//! What each effect of the library does, in a sentence for people.
+//! Each effect of the library in a sentence for people.
 //!
 //! `{place}` stands for where it acts, `{other}` for the other state, `{name}` for the magnitude of that name with its unit, `{%name}`
 //! for a magnitude in percent.

@@ -1,4 +1,4 @@
-//! What speaks for an answer: how well the twin predicts and follows the record there.
+//! Merit of an answer: how well the twin predicts and follows the record there.
 
 use super::tracking::Tracking;
 use crate::likelihood::likelihood_of;
@@ -22,7 +22,7 @@ pub(super) struct Merit {
 }
 
 impl Merit {
-    /// Of `twin` at `theta`.
+    /// The merit of `twin` at `theta`.
     pub fn of(twin: &Twin, record: &Record, theta: &[f64], run: Option<&Tracking>) -> Self {
         let likelihood = likelihood_of(twin);
         let log_likelihood = match likelihood.is_simulated() {

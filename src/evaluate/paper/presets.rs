@@ -16,7 +16,9 @@ use crate::twins::{CascadedTanks, VanDerPol};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Made by `truetwin simulate --twin van-der-pol --theta nu=3.2 --seed 2026`.
+/// The demo's setting: one step a sample is too coarse for ν = 3.2.
+const DEMO_STUDY: &str = include_str!("demo-van-der-pol.toml");
+/// Made by `truetwin simulate --study demo-van-der-pol.toml --theta nu=3.2 --seed 2026`.
 const DEMO: &str = include_str!("demo-van-der-pol.csv");
 
 /// The reference twins under their command-line names, `van-der-pol` and `tanks`.
@@ -39,8 +41,9 @@ fn van_der_pol() -> Result<Project, StudyError> {
         settings,
     };
     let plan = RecordPlan::autonomous(0.05, 300);
+    let file = StudyFile::parse(DEMO_STUDY, Path::new("demo-van-der-pol.toml"))?;
     let demo = parse_record(DEMO, Path::new("demo-van-der-pol.csv"))?;
-    let study = Study::new("van-der-pol", VanDerPol, plan)?.with_demo(demo);
+    let study = Study::new("van-der-pol", VanDerPol, plan)?.with_demo(file, demo);
     Ok(Project::from(study).with_recipe(PresetName::Paper, recipe))
 }
 

@@ -90,7 +90,7 @@ pub(super) struct Draws<'a> {
     scenario: Scenario,
     /// Values that are not drawn, in the order of θ.
     held: Vec<Option<f64>>,
-    /// Of [`Scenario::Grid`].
+    /// Points of [`Scenario::Grid`].
     grid: Vec<Vec<f64>>,
     inputs: Inputs,
 }

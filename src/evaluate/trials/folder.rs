@@ -2,7 +2,7 @@
 
 use super::truth::Truth;
 use crate::evaluate::EvaluateError;
-use crate::record::{Record, read_record, record_csv_text};
+use crate::record::{Record, record_csv_text};
 use crate::storage::StorageError;
 use crate::storage::files::sha256;
 use crate::storage::untrusted::check_file;
@@ -102,7 +102,7 @@ impl Folder {
         self.work.part(RECORDS)?;
         let path = self.work.file(&record_name(trial, which));
         check_file(&path).map_err(|error| StorageError::io(&path, error))?;
-        Ok(read_record(&path)?)
+        Ok(Record::read(&path)?)
     }
 
     /// Opens the keys of so many trials, if they are still those that were sealed.

@@ -40,7 +40,6 @@
 //! depend on the state. Outliers ([`StateSpace::outliers`](crate::twin::StateSpace::outliers)) make the density of a row
 //! a mixture; what follows from it for the state is again a mean and a covariance.
 
-mod ahead;
 mod bound;
 mod clip;
 mod coordinates;

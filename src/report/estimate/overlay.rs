@@ -13,7 +13,7 @@ const RESIDUAL_HEIGHT: f64 = 110.0;
 ///
 /// `before` is the run at the network's first estimate (`None` where it was kept), `after` the run at the calibrated
 /// θ; both N × channels, as [`crate::estimator::Tracking::outputs`].
-pub fn overlay_svg(
+pub(crate) fn overlay_svg(
     study: &Study,
     record: &Record,
     before: Option<&Signal>,

@@ -6,8 +6,8 @@ mod pictures;
 mod story;
 mod text;
 
-pub use html::gap_html;
+pub(super) use html::gap_html;
 pub(crate) use json::NEXT_INPUT;
 pub(super) use json::gap_json;
-pub use pictures::gap_pictures;
+pub(super) use pictures::gap_pictures;
 pub(super) use text::gap_text;

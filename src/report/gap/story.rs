@@ -20,7 +20,7 @@ pub(super) fn story(units: &Units, diagnosis: &Diagnosis) -> (String, Vec<String
     (verdict_sentence(diagnosis), sentences)
 }
 
-/// What the accepted effects do.
+/// Sentences of the accepted effects.
 fn effects(units: &Units, diagnosis: &Diagnosis) -> Vec<String> {
     let cause = &diagnosis.cause;
     let accepted = cause
@@ -107,7 +107,7 @@ fn how_far(diagnosis: &Diagnosis) -> Option<String> {
     ))
 }
 
-/// What to do.
+/// Advice on what to do.
 fn next(diagnosis: &Diagnosis) -> &'static str {
     match (diagnosis.verdict, diagnosis.cause.decision) {
         (Verdict::NoGap, _) => "Next: use the twin, within the range of this record.",

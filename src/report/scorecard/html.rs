@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 
 /// The scorecard as a self-contained page: statements with intervals, answers by expected information, kinds, reliability,
 /// baselines, the confusion matrix, every trial.
-pub fn scorecard_html(card: &Scorecard) -> String {
+pub(crate) fn scorecard_html(card: &Scorecard) -> String {
     let sections = [
         Section::new("scores", "Scores", scores(card)),
         Section::new("information", "Answers by expected information", bins(card)),

@@ -5,6 +5,6 @@ mod html;
 mod json;
 mod text;
 
-pub use html::scorecard_html;
+pub(super) use html::scorecard_html;
 pub use json::scorecard_json;
 pub use text::scorecard_text;

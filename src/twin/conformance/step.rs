@@ -2,11 +2,13 @@
 
 use super::finding::Finding;
 use crate::math::{deviation, three_digits};
-use crate::record::Drive;
+use crate::record::{Drive, Signal};
 use crate::twin::{MOST_SUBSTEPS, Noise, Now, SimulationError, StateSpace, Twin};
 
-/// Largest error of the step where no measurement noise is declared, as a share of an output's deviation.
+/// Largest error of the step where no noise is declared, as a share of an output's deviation.
 const STEP_SHARE: f64 = 0.01;
+/// Runs that show what process noise does to an output without measurement noise: its scatter is known to a quarter.
+const NOISY_RUNS: u64 = 8;
 
 /// Differences of the noise-free outputs at θ between one step and half of it, rms by output; none for a black box.
 pub(crate) fn step_error(
@@ -72,14 +74,51 @@ fn step_levels(
     let now = Now::new(0.0, drive.step(0), drive.input(0), theta);
     twin.noise(&now, &mut process, &mut measurement);
     let run = twin.run(theta, drive, Noise::OFF)?;
-    let levels = measurement.iter().zip(run.columns());
+    let scatter = scatter(twin, theta, drive, &run)?;
+    let levels = measurement.iter().zip(scatter).zip(run.columns());
     Ok(levels
-        .map(|(noise, column)| match noise.abs() {
-            noise if noise > 0.0 => (noise, "its noise"),
+        .map(|((noise, scatter), column)| match (noise.abs(), scatter) {
+            (noise, _) if noise > 0.0 => (noise, "its noise"),
+            (_, scatter) if scatter > 0.0 => (scatter, "its noise"),
             _ => (
                 STEP_SHARE * deviation(&column.to_vec()),
                 "1 % of its deviation",
             ),
         })
         .collect())
+}
+
+/// Root mean square of what noise adds to each output.
+fn scatter(
+    twin: &dyn StateSpace,
+    theta: &[f64],
+    drive: &Drive,
+    run: &Signal,
+) -> Result<Vec<f64>, SimulationError> {
+    let mut squares = vec![0.0; run.ncols()];
+    for draw in 0..NOISY_RUNS {
+        let moved = twin.run(theta, drive, Noise::new(0, "scatter", draw))? - run;
+        for (square, column) in squares.iter_mut().zip(moved.columns()) {
+            *square += column.mapv(|d| d * d).mean().unwrap_or(0.0) / NOISY_RUNS as f64;
+        }
+    }
+    Ok(squares.into_iter().map(f64::sqrt).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::twin::conformance::Severity;
+    use crate::twins::VanDerPol;
+
+    /// The oscillator has process noise alone: what it moves the output by is the measure.
+    #[test]
+    fn a_step_may_be_wrong_by_less_than_noise() {
+        let drive = Drive::autonomous(0.05, 300).unwrap();
+        let coarse = Twin::new(VanDerPol);
+        let fine = coarse.stepped(|stepping| stepping.substeps = 16).unwrap();
+        let of = |twin: &Twin| check_step(twin, &[3.2], &drive).unwrap().severity;
+        assert_eq!(of(&coarse), Severity::Warning);
+        assert_eq!(of(&fine), Severity::Pass);
+    }
 }

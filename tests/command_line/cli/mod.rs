@@ -194,6 +194,7 @@ fn an_estimate_repeats_fits_its_schema_and_writes_its_folder() {
             "cloud.npz",
             "estimate.json",
             "overlay.svg",
+            "report.html",
             "trajectories.csv"
         ]
     );

@@ -5,7 +5,7 @@ use crate::memory;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use truetwin::estimator::fuzzing as bank;
-use truetwin::record::read_record;
+use truetwin::record::Record;
 use truetwin::study::StudyFile;
 
 /// The message of a refusal, which may hold so many bytes.
@@ -52,7 +52,7 @@ fn rows_without_end_and_too_many_columns() {
         ("header.csv", vec![b'y'; 3 * MIB]),
     ] {
         let path = file(&place, name, &bytes);
-        let message = refused(8 * MIB, || read_record(&path));
+        let message = refused(8 * MIB, || Record::read(&path));
         assert!(message.contains("a row of more than 1 MiB"), "{message}");
     }
     let columns: Vec<String> = (1..=3000).map(|j| format!("y{j}")).collect();
@@ -61,7 +61,7 @@ fn rows_without_end_and_too_many_columns() {
         "wide.csv",
         format!("t,{}\n", columns.join(",")).as_bytes(),
     );
-    let message = refused(8 * MIB, || read_record(&path));
+    let message = refused(8 * MIB, || Record::read(&path));
     assert!(message.contains("3001 columns, at most 2001"), "{message}");
 }
 
@@ -69,7 +69,7 @@ fn rows_without_end_and_too_many_columns() {
 #[test]
 fn devices_and_pipes_without_end() {
     let zero = Path::new("/dev/zero");
-    assert!(refused(8 * MIB, || read_record(zero)).contains("binary"));
+    assert!(refused(8 * MIB, || Record::read(zero)).contains("binary"));
     assert!(refused(8 * MIB, || StudyFile::read(zero)).contains("longer than 1 MiB"));
     assert!(
         refused(8 * MIB, || truetwin::effect::Catalogue::default()
@@ -94,7 +94,7 @@ fn devices_and_pipes_without_end() {
         // Ends when nobody reads any more.
         while to.write_all(&[b'7'; 4096]).is_ok() {}
     });
-    assert!(refused(8 * MIB, || read_record(&pipe)).contains("1 MiB"));
+    assert!(refused(8 * MIB, || Record::read(&pipe)).contains("1 MiB"));
 }
 
 /// Nested beyond what any stack holds, in every format.

@@ -18,7 +18,7 @@ use truetwin::evaluate::paper::reference_projects;
 use truetwin::external::program::fuzzing as program;
 use truetwin::network::HeadArchitecture;
 use truetwin::network::layers::*;
-use truetwin::record::{read_drive, read_record};
+use truetwin::record::{Drive, Record};
 use truetwin::storage::fuzzing as work;
 use truetwin::study::{RecordPlan, Study, StudyFile};
 use truetwin::twins::VanDerPol;
@@ -66,8 +66,8 @@ fn file(name: &str, bytes: &[u8]) -> PathBuf {
 /// Reads a record, and the same file as inputs alone, which refuses outputs.
 pub fn record(data: &[u8]) -> Result<(), String> {
     let path = file("record.csv", data);
-    hold_message("record", read_drive(&path));
-    read_record(&path).map(|_| ()).map_err(text)
+    hold_message("record", Drive::read(&path));
+    Record::read(&path).map(|_| ()).map_err(text)
 }
 
 fn projects() -> &'static [Project] {

@@ -1,7 +1,8 @@
 //! Records with known gaps, and what a diagnosis makes of many of them.
 
+use std::collections::BTreeMap;
 use truetwin::diagnose::{DiagnoseSettings, Diagnosis, diagnose};
-use truetwin::effect::{Catalogue, augment, given_magnitudes};
+use truetwin::effect::{Catalogue, Effect, augment};
 use truetwin::evaluate::paper::reference_studies;
 use truetwin::progress::Progress;
 use truetwin::record::{Drive, Record, Signal, Signals};
@@ -64,7 +65,10 @@ pub fn drive(study: &Study, noise: Noise) -> Drive {
 /// A record of `twin` with the effects of a text.
 pub fn record(twin: &Twin, effects: &str, theta: &[f64], drive: Drive, noise: Noise) -> Record {
     let effects = Catalogue::default().parse(effects).unwrap();
-    let given = given_magnitudes(&effects);
+    let given: BTreeMap<_, _> = effects
+        .iter()
+        .flat_map(Effect::given_by_parameter)
+        .collect();
     let twin = augment(twin.clone(), effects).unwrap();
     let space = twin.parameters();
     let all: Vec<f64> = (space.iter().enumerate())

@@ -29,7 +29,7 @@ fn golden_records() {
                 .unwrap(),
         };
         seen.insert(id.to_owned());
-        let record = read_record(&path).unwrap();
+        let record = Record::read(&path).unwrap();
         // The contract's step is exact; the file's last digit decides whether a step falls on a sample.
         let dt = if twin == "tanks" { 0.5 } else { 0.05 };
         let drive = Drive::new(dt, record.drive().inputs().clone()).unwrap();

@@ -19,7 +19,7 @@ use crate::study::Study;
 ///
 /// Pictures are SVG inside the page with descriptions for screen readers; colour never carries information alone. The page
 /// has no scripts and loads nothing.
-pub fn gap_html(study: &Study, diagnosis: &Diagnosis) -> String {
+pub(crate) fn gap_html(study: &Study, diagnosis: &Diagnosis) -> String {
     let units = Units::of(study);
     let (headline, sentences) = story(&units, diagnosis);
     let told = format!(

@@ -28,7 +28,7 @@ use crate::study::Study;
 ///
 /// Names: `record`, `validation`, `time`, `functions`, `targets`, `regions`, `channels`, `lags`, `bands`, `which`,
 /// `extent`, `horizons`, `terms`, `next-input`.
-pub fn gap_pictures(study: &Study, diagnosis: &Diagnosis) -> Vec<(&'static str, String)> {
+pub(crate) fn gap_pictures(study: &Study, diagnosis: &Diagnosis) -> Vec<(&'static str, String)> {
     let all = [
         ("record", runs(study, diagnosis, false)),
         ("validation", runs(study, diagnosis, true)),
