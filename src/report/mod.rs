@@ -91,8 +91,8 @@ impl Report for Diagnosis {
     fn json(&self, _: &Study) -> Value {
         gap::gap_json(self)
     }
-    fn text(&self, _: &Study) -> String {
-        gap::gap_text(self)
+    fn text(&self, study: &Study) -> String {
+        gap::gap_text(study, self)
     }
 }
 

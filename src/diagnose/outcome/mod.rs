@@ -312,7 +312,7 @@ pub struct Shrinkage {
     pub floor: Option<f64>,
     /// Share of the expected squared error that closes ([`Horizon::closed`]).
     pub closed: Option<f64>,
-    /// 90 % of the shares over draws of θ and resampled blocks of the data; not clamped.
+    /// 90 % interval of the share, from records that the accepted twin simulates; not clamped.
     pub interval: Option<[f64; 2]>,
     /// Held-out data: `validation record` or `last third of the record`.
     pub held_out: &'static str,

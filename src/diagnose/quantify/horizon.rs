@@ -3,14 +3,16 @@
 //! A free run forgets the record: where a twin drifts, noise alone drives it away, and a gap that is closed does not show. A prediction
 //! over h samples begins anew from what the record has shown. Windows of h samples are kept from the filter, every second one, then
 //! the others; squared errors over the windows, divided by the variance of y, are compared with those of records that the accepted twin
-//! simulates with its fitted noise:
+//! simulates at draws of its posterior, noise levels included:
 //!
 //! ```text
-//! closed = (B − A)/(B − F)      B, A: mean squares of twin and accepted twin;  F: expected ones of the accepted twin's own records
+//! closed = (B − A)/(B − F)      B, A: mean squares of twin and accepted twin;  F: mean over simulated records of Aᵢ
 //! ```
 //!
-//! so that the true system scores 1 in expectation. The headline is the horizon with the largest (B − F)/s, s the standard deviation of
-//! the simulated mean squares: where twin and floor differ most clearly. A does not take part in the choice.
+//! If the accepted twin is right, A is one more of the Aᵢ, errors of estimation included, and the true system scores 1 in expectation.
+//! The headline is the horizon with the largest (B − F)/s, s the standard deviation of the Aᵢ: where twin and floor differ most clearly.
+//! A does not take part in the choice. Its interval is that of (B − δBᵢ − A + δAᵢ)/(B − δBᵢ − F), δ the deviations of simulated records
+//! from their mean: what another record of the same system would have given.
 
 use super::free_run::{Runner, scaled, variances};
 use crate::diagnose::error::DiagnoseError;
@@ -20,7 +22,7 @@ use crate::fit::problem::Problem;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::math::{deviation, quantile};
 use crate::record::{Record, Signal};
-use crate::twin::{Noise, Source};
+use crate::twin::Noise;
 use rayon::prelude::*;
 
 /// Held-out data: a record, and its first row that counts.
@@ -123,33 +125,23 @@ pub(in crate::diagnose) struct Compared {
     /// The horizon where twin and floor differ most clearly, if any does.
     pub headline: Option<usize>,
     reaches: Vec<Reach>,
-    squares: Vec<(Vec<f64>, Vec<f64>)>,
-    floors: Vec<f64>,
     scale: Vec<f64>,
 }
 
-/// Compares the twin (`before`) with the accepted one (`after`) on held-out data.
+/// Compares the twin (`before`) with the accepted one (`after`) on held-out data; `draws` are of the accepted one's posterior.
 pub(in crate::diagnose) fn compare(
     before: &Predictor<'_>,
     after: &Predictor<'_>,
+    draws: &[Predictor<'_>],
     rows: HeldOutRows<'_>,
     noise: Noise,
 ) -> Result<Compared, DiagnoseError> {
-    let record = rows.record;
-    let scale = variances(record.outputs());
-    let simulated: Vec<Record> = (0..Thresholds::FLOOR_RECORDS)
-        .filter_map(|i| {
-            let run = after.runner.simulated(record, noise.sample(i))?;
-            Record::new(record.drive().clone(), record.with_gaps_in(run)).ok()
-        })
-        .collect();
+    let simulated = simulated(draws, rows.record, Thresholds::FLOOR_RECORDS, noise);
     let mut compared = Compared {
         horizons: vec![],
         headline: None,
         reaches: vec![],
-        squares: vec![],
-        floors: vec![],
-        scale,
+        scale: variances(rows.record.outputs()),
     };
     let mut clearest = Thresholds::CLEAR;
     for reach in reaches(&after.problem, rows) {
@@ -160,44 +152,60 @@ pub(in crate::diagnose) fn compare(
         if b.is_empty() {
             continue;
         }
-        let floors: Vec<f64> = (simulated.par_iter())
-            .map(|record| {
-                let rows = HeldOutRows { record, ..rows };
-                Ok(after
-                    .errors(rows, reach, &compared.scale)?
-                    .map(|e| mean(&e)))
-            })
-            .collect::<Result<Vec<_>, FilterError>>()?
-            .into_iter()
-            .flatten()
-            .collect();
+        let floors = compared.means(after, reach, rows, &simulated)?;
+        let floors: Vec<f64> = floors.into_iter().flatten().collect();
         let (floor, spread) = (mean(&floors), deviation(&floors));
         let clear = (mean(&b) - floor) / spread.max(f64::MIN_POSITIVE);
         let is_clear = clear.is_finite() && clear > Thresholds::CLEAR;
         if clear > clearest {
             (compared.headline, clearest) = (Some(compared.horizons.len()), clear);
         }
-        let drive = record.drive();
         let samples = match reach {
             Reach::Samples(h) => Some(h),
             Reach::FreeRun => None,
         };
         compared.horizons.push(Horizon {
             samples,
-            seconds: samples.map(|h| h as f64 * drive.dt()),
+            seconds: samples.map(|h| h as f64 * rows.record.drive().dt()),
             before: mean(&b).sqrt(),
             after: mean(&a).sqrt(),
             floor: floor.sqrt(),
             closed: is_clear.then(|| share(mean(&b), mean(&a), floor)),
         });
         compared.reaches.push(reach);
-        compared.squares.push((b, a));
-        compared.floors.push(floor);
     }
     Ok(compared)
 }
 
+/// Records like the measured one, each at a draw.
+fn simulated(draws: &[Predictor<'_>], record: &Record, count: u64, noise: Noise) -> Vec<Record> {
+    (0..count)
+        .into_par_iter()
+        .filter_map(|i| {
+            let draw = draws.get(i as usize % draws.len().max(1))?;
+            let run = draw.runner.simulated(record, noise.sample(i))?;
+            Record::new(record.drive().clone(), record.with_gaps_in(run)).ok()
+        })
+        .collect()
+}
+
 impl Compared {
+    /// Mean squared error of a model on each record; `None` where it fails.
+    fn means(
+        &self,
+        of: &Predictor<'_>,
+        reach: Reach,
+        rows: HeldOutRows<'_>,
+        records: &[Record],
+    ) -> Result<Vec<Option<f64>>, FilterError> {
+        (records.par_iter())
+            .map(|record| {
+                let errors = of.errors(HeldOutRows { record, ..rows }, reach, &self.scale)?;
+                Ok(errors.map(|errors| mean(&errors)))
+            })
+            .collect()
+    }
+
     /// Error of another model at a horizon, as a root mean square.
     pub fn error(
         &self,
@@ -212,9 +220,11 @@ impl Compared {
         Ok(errors.map(|errors| mean(&errors).sqrt()))
     }
 
-    /// 90 % of the shares that resampled blocks of the headline's errors close, with θ from `draws` of the accepted twin. Not clamped.
+    /// 90 % interval of the headline's share, from records that the accepted twin simulates. Not clamped.
     pub fn interval(
         &self,
+        before: &Predictor<'_>,
+        after: &Predictor<'_>,
         draws: &[Predictor<'_>],
         rows: HeldOutRows<'_>,
         noise: Noise,
@@ -222,21 +232,16 @@ impl Compared {
         let Some(at) = self.headline else {
             return Ok(None);
         };
-        let (before, after) = &self.squares[at];
-        let mut drawn: Vec<Vec<f64>> = (draws.par_iter())
-            .map(|draw| draw.errors(rows, self.reaches[at], &self.scale))
-            .collect::<Result<Vec<_>, FilterError>>()?
-            .into_iter()
-            .flatten()
-            .filter(|errors| errors.len() == before.len())
+        let records = simulated(draws, rows.record, Thresholds::SHARE_RECORDS, noise);
+        let of = |p: &Predictor<'_>| self.means(p, self.reaches[at], rows, &records);
+        let pairs: Vec<[f64; 2]> = (of(before)?.into_iter().zip(of(after)?))
+            .filter_map(|(b, a)| Some([b?, a?]))
             .collect();
-        drawn.push(after.clone());
-        let mut source = noise.source("blocks");
-        let shares: Vec<f64> = (0..Thresholds::SHARE_RESAMPLES as usize)
-            .map(|i| {
-                let (b, a) = resampled(before, &drawn[i % drawn.len()], &mut source);
-                share(b, a, self.floors[at])
-            })
+        let centre = [0, 1].map(|m| mean(&pairs.iter().map(|pair| pair[m]).collect::<Vec<_>>()));
+        let shown = &self.horizons[at];
+        let [b, a, floor] = [shown.before, shown.after, shown.floor].map(|root| root * root);
+        let shares: Vec<f64> = (pairs.iter())
+            .map(|pair| share(b - pair[0] + centre[0], a - pair[1] + centre[1], floor))
             .filter(|share| share.is_finite())
             .collect();
         let tail = 0.5 * (1.0 - Thresholds::INTERVAL_LEVEL);
@@ -256,22 +261,6 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-/// Means of both over the same blocks, drawn with replacement.
-fn resampled(before: &[f64], after: &[f64], source: &mut Source) -> (f64, f64) {
-    let n = before.len();
-    let length = n.div_ceil(Thresholds::SHARE_BLOCKS).max(1);
-    let (mut b, mut a, mut count) = (0.0, 0.0, 0usize);
-    while count < n {
-        let start = ((source.uniform() * n as f64) as usize).min(n - 1);
-        for k in (start..start + length).map(|k| k % n) {
-            b += before[k];
-            a += after[k];
-        }
-        count += length;
-    }
-    (b / count as f64, a / count as f64)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -279,8 +268,5 @@ mod tests {
     #[test]
     fn half_of_a_gap_is_half() {
         assert!((share(1.0, 0.6, 0.2) - 0.5).abs() < 1e-12);
-        let mut source = Noise::new(1, "t", 0).source("blocks");
-        let (b, a) = resampled(&[1.0; 400], &[0.6; 400], &mut source);
-        assert!((b - 1.0).abs() < 1e-12 && (a - 0.6).abs() < 1e-12);
     }
 }

@@ -7,7 +7,7 @@ use crate::diagnose::explain::search::Found;
 use crate::diagnose::model::{Model, keys};
 use crate::diagnose::outcome::Shrinkage;
 use crate::diagnose::thresholds::Thresholds;
-use crate::fit::climb::climb;
+use crate::fit::climb::{Fitted, climb};
 use crate::fit::posterior::posterior;
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::FilterError;
@@ -18,8 +18,6 @@ use crate::twin::Noise;
 pub const SHORTEST_SPLIT: usize = 300;
 /// Iterations of a refit without the held-out part.
 const REFIT: usize = 10;
-/// Posterior draws whose errors make the interval.
-const DRAWS: usize = 100;
 
 /// The first sample that is held out of a record without another to validate.
 pub(crate) fn held_out_from(samples: usize) -> usize {
@@ -38,14 +36,15 @@ struct HeldOut<'r> {
 }
 
 impl HeldOut<'_> {
-    /// θ of a model without what is held out; `None` where it cannot be fitted.
-    fn theta(&self, model: &Model<'_>) -> Result<Option<Vec<f64>>, FilterError> {
+    /// The problem of a model without what is held out, and its fit; `None` where it cannot be fitted.
+    fn refit<'p>(&'p self, model: &'p Model<'_>) -> Result<Option<Refit<'p>>, FilterError> {
         if self.from == 0 {
-            return Ok(Some(model.theta()));
+            let (problem, fitted) = (on(model, model.problem.records), model.fitted.clone());
+            return Ok(Some(Refit { problem, fitted }));
         }
         let problem = on(model, self.begins);
         let fitted = climb(&problem, &problem.full(&model.theta()), REFIT)?;
-        Ok(fitted.map(|fitted| problem.of_record(0, &fitted.theta)))
+        Ok(fitted.map(|fitted| Refit { problem, fitted }))
     }
 
     /// The model at θ, begun as the held-out data show; `None` where that cannot be told.
@@ -65,10 +64,32 @@ impl HeldOut<'_> {
 
     /// The model refitted without what is held out.
     fn refitted<'a>(&'a self, model: &Model<'_>) -> Result<Option<Predictor<'a>>, DiagnoseError> {
-        match self.theta(model)? {
-            Some(theta) => self.predictor(model, theta),
+        match self.refit(model)? {
+            Some(refit) => self.predictor(model, refit.theta()),
             None => Ok(None),
         }
+    }
+
+    /// The model at draws of its posterior without what is held out.
+    fn draws<'a>(
+        &'a self,
+        model: &Model<'_>,
+        noise: Noise,
+    ) -> Result<Vec<Predictor<'a>>, DiagnoseError> {
+        let Some(refit) = self.refit(model)? else {
+            return Ok(vec![]);
+        };
+        let fitted = std::slice::from_ref(&refit.fitted);
+        let drawn = posterior(&refit.problem, fitted, None, noise)?;
+        let mut all = vec![];
+        for theta in drawn.thetas.iter().take(Thresholds::SHARE_RECORDS as usize) {
+            all.extend(self.predictor(model, refit.problem.of_record(0, theta))?);
+        }
+        if all.is_empty() {
+            // Without a posterior, θ is taken as known.
+            all.extend(self.predictor(model, refit.theta())?);
+        }
+        Ok(all)
     }
 
     fn rows(&self) -> HeldOutRows<'_> {
@@ -76,6 +97,19 @@ impl HeldOut<'_> {
             record: self.record,
             from: self.from,
         }
+    }
+}
+
+/// A fit that has not seen the held-out data.
+struct Refit<'p> {
+    problem: Problem<'p>,
+    fitted: Fitted,
+}
+
+impl Refit<'_> {
+    /// θ of the first record.
+    fn theta(&self) -> Vec<f64> {
+        self.problem.of_record(0, &self.fitted.theta)
     }
 }
 
@@ -187,7 +221,8 @@ pub(in crate::diagnose) fn shrinkage(
         (result.before, result.after) = (before, Some(after));
         return Ok(Some(result));
     }
-    let compared = compare(&before, &after, rows, noise.child("floor"))?;
+    let draws = held_out.draws(accepted, noise.child("posterior"))?;
+    let compared = compare(&before, &after, &draws, rows, noise.child("floor"))?;
     result.horizons.clone_from(&compared.horizons);
     let shown = compared.headline.or(compared.horizons.len().checked_sub(1));
     if let Some(horizon) = shown.map(|at| &compared.horizons[at]) {
@@ -201,17 +236,7 @@ pub(in crate::diagnose) fn shrinkage(
         result.closed = horizon.closed;
         result.horizon = horizon.seconds;
     }
-    if compared.headline.is_some() {
-        let fitted = std::slice::from_ref(&accepted.fitted);
-        let draws = posterior(&accepted.problem, fitted, None, noise.child("posterior"))?;
-        let draws: Vec<Predictor<'_>> = (draws.thetas.into_iter().take(DRAWS))
-            .map(|theta| held_out.predictor(accepted, accepted.problem.of_record(0, &theta)))
-            .collect::<Result<Vec<_>, DiagnoseError>>()?
-            .into_iter()
-            .flatten()
-            .collect();
-        result.interval = compared.interval(&draws, rows, noise.child("bootstrap"))?;
-    }
+    result.interval = compared.interval(&before, &after, &draws, rows, noise.child("share"))?;
     let error = |p: &Predictor<'_>| compared.error(shown, p, rows);
     result.unfitted = match &unfitted {
         Some(unfitted) => error(unfitted)?,

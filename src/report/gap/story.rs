@@ -1,15 +1,13 @@
 //! The answer in a few sentences: which effect, how sure, how far, what next.
 
 use super::json::NEXT_INPUT;
-use super::text::verdict_sentence;
+use super::text::{SAID, verdict_sentence};
 use crate::diagnose::{Decision, Diagnosis, EffectFit, Verdict};
 use crate::report::digits::{chance, percent, short, unit_suffix};
 use crate::report::units::Units;
 
 /// Effects that are told of.
 const TOLD: usize = 2;
-/// Probability below which no effect is told of.
-const SAID: f64 = 0.5;
 
 /// Headline and further sentences, at most 60 words together.
 pub(super) fn story(units: &Units, diagnosis: &Diagnosis) -> (String, Vec<String>) {
@@ -21,7 +19,7 @@ pub(super) fn story(units: &Units, diagnosis: &Diagnosis) -> (String, Vec<String
 }
 
 /// Sentences of the accepted effects.
-fn effects(units: &Units, diagnosis: &Diagnosis) -> Vec<String> {
+pub(super) fn effects(units: &Units, diagnosis: &Diagnosis) -> Vec<String> {
     let cause = &diagnosis.cause;
     let accepted = cause
         .effects
@@ -108,18 +106,18 @@ fn how_far(diagnosis: &Diagnosis) -> Option<String> {
 }
 
 /// Advice on what to do.
-fn next(diagnosis: &Diagnosis) -> &'static str {
+pub(super) fn next(diagnosis: &Diagnosis) -> &'static str {
     match (diagnosis.verdict, diagnosis.cause.decision) {
         (Verdict::NoGap, _) => "Next: use the twin, within the range of this record.",
         (Verdict::ParameterGap, _) => "Next: widen [prior] to these parameters.",
-        (_, Decision::Named) => "Next: add it to the study (table below) and fit again.",
-        (_, Decision::Partial) => "Next: add it to the study (table below) and diagnose again.",
+        (_, Decision::Named) => "Next: add it to the study and fit again.",
+        (_, Decision::Partial) => "Next: add it to the study and diagnose again.",
         (_, Decision::Class) if diagnosis.cause.next_input.is_some() => {
             const { assert!(NEXT_INPUT.len() == 14) };
             "Next: measure next-input.csv, which can tell them apart."
         }
         (_, Decision::Class) => "Next: another record, with other inputs, may tell them apart.",
-        _ => "Next: look at the missing function below, and at the system there.",
+        _ => "Next: look at the system there, with the missing function in mind.",
     }
 }
 

@@ -1,11 +1,14 @@
 //! A diagnosis on the terminal.
 
 use super::json::NEXT_INPUT;
+use super::story::{effects, next};
 use crate::diagnose::{
     Cause, Decision, Detection, Diagnosis, Discovery, EffectFit, Location, NextInput,
     SHORTEST_SPLIT, Shrinkage, Verdict,
 };
 use crate::report::digits::{Digits, chance, error, percent, probability, short, unit_suffix};
+use crate::report::units::Units;
+use crate::study::Study;
 
 /// Limit of lines.
 const LINES: usize = 15;
@@ -13,11 +16,20 @@ const LINES: usize = 15;
 const SHOWN: usize = 4;
 /// Number of terms shown of a missing function.
 const TERMS: usize = 3;
+/// Characters of a headline: two lines of a page.
+const LONGEST: usize = 140;
+/// Names in one sentence.
+const MOST_NAMES: usize = 3;
+/// Probability below which no effect is named alone.
+pub(super) const SAID: f64 = 0.5;
 
-/// Returns the diagnosis in at most fifteen lines: verdict, evidence, parameters, location, explanations, what remains, extent, next
-/// record.
-pub fn gap_text(diagnosis: &Diagnosis) -> String {
-    let mut lines = vec![verdict_sentence(diagnosis), evidence_sentence(diagnosis)];
+/// Returns the diagnosis in at most fifteen lines: verdict, effects in words, evidence, parameters, location, explanations, what
+/// remains, extent, next record, what to do.
+pub fn gap_text(study: &Study, diagnosis: &Diagnosis) -> String {
+    let told = effects(&Units::of(study), diagnosis).join(" ");
+    let mut lines = vec![verdict_sentence(diagnosis)];
+    lines.extend((!told.is_empty()).then_some(told));
+    lines.push(evidence_sentence(diagnosis));
     let parameters: Vec<String> = (diagnosis.parameters.iter())
         .map(|p| {
             let known = if p.identified {
@@ -53,7 +65,10 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
         Some(s) => closed_sentence(s),
         None => no_share(diagnosis),
     });
-    lines.extend(diagnosis.cause.next_input.as_ref().map(measure_next));
+    lines.push(match &diagnosis.cause.next_input {
+        Some(input) => measure_next(input),
+        None => next(diagnosis).to_owned(),
+    });
     lines.push(format!(
         "{} explanations, {} s.",
         diagnosis.candidates,
@@ -63,38 +78,38 @@ pub fn gap_text(diagnosis: &Diagnosis) -> String {
     lines.join("\n") + "\n"
 }
 
-/// Returns the answer in one sentence.
+/// Returns the answer in one sentence, of at most [`LONGEST`] characters where names allow it.
 pub fn verdict_sentence(diagnosis: &Diagnosis) -> String {
-    let listed = |keys: &[String]| keys.join(" and ");
-    match (diagnosis.verdict, diagnosis.cause.decision) {
+    let cause = &diagnosis.cause;
+    let lacks = || (cause.accepted.join(" and "), others(&cause.accepted));
+    match (diagnosis.verdict, cause.decision) {
         (Verdict::NoGap, _) => {
             "No gap: the twin explains the record with parameters inside the prior.".into()
         }
         (Verdict::ParameterGap, Decision::Absorbed) => format!(
             "Parameter gap: parameters outside the prior explain the record; so would {} with parameters inside.",
-            diagnosis.cause.class.first().cloned().unwrap_or_default()
+            cause.class.first().cloned().unwrap_or_default()
         ),
         (Verdict::ParameterGap, _) => {
             "Parameter gap: the twin explains the record with parameters outside the prior.".into()
         }
         (_, Decision::Named) => {
-            format!(
-                "Structural gap: the twin lacks {}.",
-                listed(&diagnosis.cause.accepted)
-            )
+            let (all, few) = lacks();
+            short_enough([all, few].map(|names| format!("Structural gap: the twin lacks {names}.")))
         }
-        (_, Decision::Class) => format!(
-            "Structural gap: the twin lacks {}, or a rival that this record cannot separate from it ({}).",
-            listed(&diagnosis.cause.accepted),
-            rivals(&diagnosis.cause).join(", ")
-        ),
+        (_, Decision::Class) => one_of(cause),
         (_, Decision::Partial) => {
-            let place = match &diagnosis.cause.remains {
+            let (all, few) = lacks();
+            let somewhere = "something remains".to_owned();
+            let place = match &cause.remains {
                 Some(remains) => format!("something remains at {}", remains.place),
-                None => "something remains".into(),
+                None => somewhere.clone(),
             };
-            let lacks = listed(&diagnosis.cause.accepted);
-            format!("Structural gap: the twin lacks {lacks}; {place}.")
+            short_enough(
+                [(&all, &place), (&all, &somewhere), (&few, &somewhere)].map(|(names, remains)| {
+                    format!("Structural gap: the twin lacks {names}; {remains}.")
+                }),
+            )
         }
         _ => match &diagnosis.location.target {
             Some(target) => format!(
@@ -103,6 +118,62 @@ pub fn verdict_sentence(diagnosis: &Diagnosis) -> String {
             None => "Structural gap outside the library: no listed effect explains it.".into(),
         },
     }
+}
+
+/// The first name, and how many more there are.
+fn others(names: &[String]) -> String {
+    match names {
+        [] => "nothing".into(),
+        [one] => one.clone(),
+        [first, more @ ..] => format!("{first} and {} more", more.len()),
+    }
+}
+
+/// A class of effects: each by name where they are few; one alone only if it is more likely than not.
+fn one_of(cause: &Cause) -> String {
+    const APART: &str = "this record cannot tell which";
+    let rivals = rivals(cause);
+    // A second effect has rivals of its own; the first stays.
+    let (first, before) = match cause.accepted.split_last() {
+        Some((last, before)) => (last.as_str(), before.join(" and ")),
+        None => ("", String::new()),
+    };
+    let before = if before.is_empty() {
+        before
+    } else {
+        format!("{before} and ")
+    };
+    let likely =
+        (cause.effects.iter()).any(|effect| effect.key() == first && effect.probability >= SAID);
+    let named = match rivals.len() < MOST_NAMES {
+        true => Some(format!(
+            "Structural gap: the twin lacks {before}{first} or {}; {APART}.",
+            rivals.join(" or ")
+        )),
+        false => None,
+    };
+    let count = rivals.len() + 1;
+    let lead = if likely {
+        format!(", most likely {first}")
+    } else {
+        String::new()
+    };
+    let counted =
+        format!("Structural gap: the twin lacks {before}one of {count} effects{lead}; {APART}.");
+    let last = format!("Structural gap: the twin lacks one of {count} effects; {APART}.");
+    short_enough(named.into_iter().chain([counted, last]))
+}
+
+/// The first sentence that is short enough, or else the last.
+fn short_enough(sentences: impl IntoIterator<Item = String>) -> String {
+    let mut last = String::new();
+    for sentence in sentences {
+        last = sentence;
+        if last.chars().count() <= LONGEST {
+            break;
+        }
+    }
+    last
 }
 
 /// Returns the evidence behind the verdict.
@@ -266,7 +337,11 @@ fn with_magnitudes(effect: &EffectFit) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::fixture::{diagnoses, made};
+    use crate::report::fixture::{diagnoses, made, oscillator};
+
+    fn gap_text(diagnosis: &Diagnosis) -> String {
+        super::gap_text(&oscillator(), diagnosis)
+    }
 
     #[test]
     fn fifteen_lines_say_it_all() {
@@ -286,7 +361,7 @@ mod tests {
     fn evidence_change_exploration_and_what_to_measure_are_said() {
         let class = gap_text(&made::tanks_class());
         for text in [
-            "the twin lacks state-ceiling@h1, or a rival that this record cannot separate from it (power-law@h1, quadratic-drag@h1).",
+            "the twin lacks state-ceiling@h1 or power-law@h1 or quadratic-drag@h1; this record cannot tell which.",
             "Evidence for a gap: 43.9 nats; probability that nothing is missing: < 0.01; p < 0.0099 (100 simulations).",
             "Where: h1 (probability 0.93); k1 changes at 612 s; clearest",
             "         0.61   38.5   state-ceiling@h1 (level 4.80, spill 0.500)",
@@ -303,7 +378,7 @@ mod tests {
             "{none}"
         );
         let partial = gap_text(&made::rig_pair());
-        let lacks = "lacks state-ceiling@a_state_with_a_name_that_is_long and sensor-quantization@sensor2; something remains at enthalpy.";
+        let lacks = "lacks state-ceiling@a_state_with_a_name_that_is_long and sensor-quantization@sensor2; something remains.";
         assert!(partial.contains(lacks), "{partial}");
         let no_gap = gap_text(&made::oscillator_no_gap());
         let evidence = "Evidence for a gap: −2.30 nats; probability that nothing is missing: 0.91; p = 0.440 (100 simulations).";

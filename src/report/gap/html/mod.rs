@@ -43,7 +43,7 @@ pub(crate) fn gap_html(study: &Study, diagnosis: &Diagnosis) -> String {
     // Without a structural gap, the parameters are the answer.
     let parameters = match diagnosis.verdict {
         Verdict::StructuralGap => sections.len(),
-        _ => 1,
+        _ => 0,
     };
     sections.insert(parameters, numbers::section_of(&units, diagnosis));
     page(
