@@ -1,5 +1,6 @@
 //! A diagnosis as JSON, text, pictures and page.
 
+mod headline;
 mod html;
 mod json;
 mod pictures;

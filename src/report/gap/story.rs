@@ -1,7 +1,7 @@
 //! The answer in a few sentences: which effect, how sure, how far, what next.
 
+use super::headline::{SAID, headline};
 use super::json::NEXT_INPUT;
-use super::text::{SAID, verdict_sentence};
 use crate::diagnose::{Decision, Diagnosis, EffectFit, Verdict};
 use crate::report::digits::{chance, percent, short, unit_suffix};
 use crate::report::units::Units;
@@ -15,7 +15,7 @@ pub(super) fn story(units: &Units, diagnosis: &Diagnosis) -> (String, Vec<String
     sentences.extend(how_sure(diagnosis));
     sentences.extend(how_far(diagnosis));
     sentences.push(next(diagnosis).to_owned());
-    (verdict_sentence(diagnosis), sentences)
+    (headline(diagnosis), sentences)
 }
 
 /// Sentences of the accepted effects.

@@ -1,10 +1,11 @@
 //! A diagnosis on the terminal.
 
+use super::headline::headline;
 use super::json::NEXT_INPUT;
 use super::story::{effects, next};
 use crate::diagnose::{
-    Cause, Decision, Detection, Diagnosis, Discovery, EffectFit, Location, NextInput,
-    SHORTEST_SPLIT, Shrinkage, Verdict,
+    Cause, Detection, Diagnosis, Discovery, EffectFit, Location, NextInput, SHORTEST_SPLIT,
+    Shrinkage,
 };
 use crate::report::digits::{Digits, chance, error, percent, probability, short, unit_suffix};
 use crate::report::units::Units;
@@ -16,18 +17,12 @@ const LINES: usize = 15;
 const SHOWN: usize = 4;
 /// Number of terms shown of a missing function.
 const TERMS: usize = 3;
-/// Characters of a headline: two lines of a page.
-const LONGEST: usize = 140;
-/// Names in one sentence.
-const MOST_NAMES: usize = 3;
-/// Probability below which no effect is named alone.
-pub(super) const SAID: f64 = 0.5;
 
 /// Returns the diagnosis in at most fifteen lines: verdict, effects in words, evidence, parameters, location, explanations, what
 /// remains, extent, next record, what to do.
 pub fn gap_text(study: &Study, diagnosis: &Diagnosis) -> String {
     let told = effects(&Units::of(study), diagnosis).join(" ");
-    let mut lines = vec![verdict_sentence(diagnosis)];
+    let mut lines = vec![headline(diagnosis)];
     lines.extend((!told.is_empty()).then_some(told));
     lines.push(evidence_sentence(diagnosis));
     let parameters: Vec<String> = (diagnosis.parameters.iter())
@@ -78,104 +73,6 @@ pub fn gap_text(study: &Study, diagnosis: &Diagnosis) -> String {
     lines.join("\n") + "\n"
 }
 
-/// Returns the answer in one sentence, of at most [`LONGEST`] characters where names allow it.
-pub fn verdict_sentence(diagnosis: &Diagnosis) -> String {
-    let cause = &diagnosis.cause;
-    let lacks = || (cause.accepted.join(" and "), others(&cause.accepted));
-    match (diagnosis.verdict, cause.decision) {
-        (Verdict::NoGap, _) => {
-            "No gap: the twin explains the record with parameters inside the prior.".into()
-        }
-        (Verdict::ParameterGap, Decision::Absorbed) => format!(
-            "Parameter gap: parameters outside the prior explain the record; so would {} with parameters inside.",
-            cause.class.first().cloned().unwrap_or_default()
-        ),
-        (Verdict::ParameterGap, _) => {
-            "Parameter gap: the twin explains the record with parameters outside the prior.".into()
-        }
-        (_, Decision::Named) => {
-            let (all, few) = lacks();
-            short_enough([all, few].map(|names| format!("Structural gap: the twin lacks {names}.")))
-        }
-        (_, Decision::Class) => one_of(cause),
-        (_, Decision::Partial) => {
-            let (all, few) = lacks();
-            let somewhere = "something remains".to_owned();
-            let place = match &cause.remains {
-                Some(remains) => format!("something remains at {}", remains.place),
-                None => somewhere.clone(),
-            };
-            short_enough(
-                [(&all, &place), (&all, &somewhere), (&few, &somewhere)].map(|(names, remains)| {
-                    format!("Structural gap: the twin lacks {names}; {remains}.")
-                }),
-            )
-        }
-        _ => match &diagnosis.location.target {
-            Some(target) => format!(
-                "Structural gap outside the library: no listed effect explains it; the missing law acts on {target}."
-            ),
-            None => "Structural gap outside the library: no listed effect explains it.".into(),
-        },
-    }
-}
-
-/// The first name, and how many more there are.
-fn others(names: &[String]) -> String {
-    match names {
-        [] => "nothing".into(),
-        [one] => one.clone(),
-        [first, more @ ..] => format!("{first} and {} more", more.len()),
-    }
-}
-
-/// A class of effects: each by name where they are few; one alone only if it is more likely than not.
-fn one_of(cause: &Cause) -> String {
-    const APART: &str = "this record cannot tell which";
-    let rivals = rivals(cause);
-    // A second effect has rivals of its own; the first stays.
-    let (first, before) = match cause.accepted.split_last() {
-        Some((last, before)) => (last.as_str(), before.join(" and ")),
-        None => ("", String::new()),
-    };
-    let before = if before.is_empty() {
-        before
-    } else {
-        format!("{before} and ")
-    };
-    let likely =
-        (cause.effects.iter()).any(|effect| effect.key() == first && effect.probability >= SAID);
-    let named = match rivals.len() < MOST_NAMES {
-        true => Some(format!(
-            "Structural gap: the twin lacks {before}{first} or {}; {APART}.",
-            rivals.join(" or ")
-        )),
-        false => None,
-    };
-    let count = rivals.len() + 1;
-    let lead = if likely {
-        format!(", most likely {first}")
-    } else {
-        String::new()
-    };
-    let counted =
-        format!("Structural gap: the twin lacks {before}one of {count} effects{lead}; {APART}.");
-    let last = format!("Structural gap: the twin lacks one of {count} effects; {APART}.");
-    short_enough(named.into_iter().chain([counted, last]))
-}
-
-/// The first sentence that is short enough, or else the last.
-fn short_enough(sentences: impl IntoIterator<Item = String>) -> String {
-    let mut last = String::new();
-    for sentence in sentences {
-        last = sentence;
-        if last.chars().count() <= LONGEST {
-            break;
-        }
-    }
-    last
-}
-
 /// Returns the evidence behind the verdict.
 pub(super) fn evidence_sentence(diagnosis: &Diagnosis) -> String {
     let calibrated = match calibration(&diagnosis.detection) {
@@ -197,15 +94,6 @@ pub(super) fn calibration(d: &Detection) -> Option<String> {
         false => probability(p),
     };
     Some(format!("{p} ({} simulations)", d.simulations))
-}
-
-/// Returns the members of the class that are not accepted.
-pub(super) fn rivals(cause: &Cause) -> Vec<&str> {
-    let others = cause
-        .class
-        .iter()
-        .filter(|key| !cause.accepted.contains(key));
-    others.map(String::as_str).collect()
 }
 
 /// Returns the place of the gap, in the twin, in time and by values; none where it is not known.
@@ -274,9 +162,15 @@ pub(super) fn closed_sentence(s: &Shrinkage) -> String {
     if let Some(floor) = s.floor {
         text.push_str(&format!(", noise alone {}", short(floor)));
     }
-    if let (Some(closed), Some(ends)) = (s.closed, s.interval) {
-        let (closed, [low, high]) = (percent(closed), ends.map(percent));
-        text.push_str(&format!("; {closed} of the gap closed ({low} to {high})"));
+    match (s.closed, s.interval) {
+        (Some(closed), Some(ends)) => {
+            let (closed, [low, high]) = (percent(closed), ends.map(percent));
+            text.push_str(&format!("; {closed} of the gap closed ({low} to {high})"));
+        }
+        _ if s.after.is_some() && s.floor.is_some() => {
+            text.push_str("; too near to noise for a share of the gap");
+        }
+        _ => {}
     }
     text + "."
 }

@@ -2,8 +2,9 @@
 
 use crate::diagnose::{Decision, Diagnosis, EffectFit, RIVALS, Verdict};
 use crate::report::digits::{chance, short};
+use crate::report::gap::headline::{few, rivals};
 use crate::report::gap::pictures;
-use crate::report::gap::text::{evidence_sentence, remains_sentence, rivals};
+use crate::report::gap::text::{evidence_sentence, remains_sentence};
 use crate::report::page::Column::{Number, Text};
 use crate::report::page::{Section, figure, paragraph, table};
 use crate::report::units::Units;
@@ -65,7 +66,7 @@ fn decision(diagnosis: &Diagnosis) -> String {
         Decision::Named => "One effect is accepted; no other one comes near it.".into(),
         Decision::Class => format!(
             "The best explanation is accepted; the record cannot separate it from {} within {RIVALS} nats.",
-            rivals(which).join(", ")
+            few(&rivals(which))
         ),
         Decision::Partial => format!(
             "{} explains most of the gap; something unknown remains.",

@@ -2,7 +2,7 @@ use super::*;
 use crate::diagnose::{Decision, EffectFit, Verdict};
 use crate::report::fixture::{diagnoses, made, oscillator, tanks};
 use crate::report::gap::gap_json;
-use crate::report::gap::text::verdict_sentence;
+use crate::report::gap::headline::headline;
 
 /// Elements that have no end tag.
 const VOID: [&str; 1] = ["meta"];
@@ -104,7 +104,7 @@ fn every_section_is_there_under_every_verdict() {
         let more: usize = more.into_iter().map(usize::from).sum();
         assert_eq!(page.matches("<h2").count(), sections.len() + more);
         assert_eq!(page.matches("<h1>").count(), 1);
-        assert!(page.contains(&escaped(&verdict_sentence(&diagnosis))));
+        assert!(page.contains(&escaped(&headline(&diagnosis))));
         let pictures = page.matches("<svg").count();
         assert!(pictures > 0);
         assert_eq!(page.matches("role=\"img\"").count(), pictures);

@@ -3,7 +3,7 @@
 use crate::diagnose::{Decision, Diagnosis, EffectFit};
 use crate::report::chart::{Bar, BarChart, BarGroup};
 use crate::report::digits::{chance, short};
-use crate::report::gap::text::rivals;
+use crate::report::gap::headline::rivals;
 
 /// Explanations that are drawn.
 const SHOWN: usize = 8;
