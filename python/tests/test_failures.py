@@ -153,7 +153,9 @@ def test_ctrl_c_ends_the_program(tmp_path, terminal):
     """In a process of its own, with and without a terminal; no process of the call is left."""
     script = tmp_path / "slow.py"
     script.write_text(
-        "import sys, time, truetwin\n"
+        "import signal, sys, time, truetwin\n"
+        # A shell's background job ignores the signal, and so would we.
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "sys.path.insert(0, sys.argv[1])\n"
         "from conftest import SETTING, heater\n"
         "def slow(*call):\n"
