@@ -16,6 +16,14 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum EstimatorError {
+    /// One of several records cannot be estimated.
+    #[error("record {number}: {error}")]
+    Record {
+        /// Its number, from 1.
+        number: usize,
+        /// The reason.
+        error: Box<EstimatorError>,
+    },
     /// A setting is out of range.
     #[error(transparent)]
     Setting(#[from] SettingError),

@@ -32,8 +32,6 @@
 //! assert!((estimate.theta[0] - 3.0).abs() < 5.0 * estimate.std_error[0]);
 //! let tracking: &Tracking = estimate.tracking.as_ref().ok_or("the free run is finite")?;
 //! assert_eq!(tracking.outputs.dim(), (200, 1));
-//! let seconds: &Seconds = &estimate.seconds;
-//! assert!(seconds.total >= seconds.predict);
 //! assert!(estimate.nuisance().is_empty()); // no unknown starts, no unknown noise
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -59,7 +57,8 @@ pub(crate) mod sample;
 pub(crate) mod shards;
 
 pub use error::EstimatorError;
-pub use estimate::{Estimate, EstimateOptions, Seconds, Tracking};
+pub(crate) use estimate::Contributions;
+pub use estimate::{Estimate, EstimateOptions, Together, Tracking};
 pub use estimator::Estimator;
 pub use gate::{GateForm, GateOutcome, GateSettings};
 pub(crate) use pretrain::GivenBank;

@@ -44,7 +44,7 @@ mod table;
 mod units;
 
 pub(crate) use compare::{Compared, compare_json, compare_svg, compare_text};
-pub(crate) use estimate::{overlay_svg, trajectories_csv};
+pub(crate) use estimate::{overlay_svg, together_json, together_text, trajectories_csv};
 pub(crate) use fit::posterior_svg;
 pub(crate) use gap::NEXT_INPUT;
 pub(crate) use page::with_footer;

@@ -93,6 +93,45 @@ fn in_distribution_most_records_keep_the_estimate_of_a_trusted_prior() {
     }
 }
 
+/// Four records of one ν, one of them half as long: errors shrink, 90 % intervals hold ν, and the records agree. Two of another ν do not.
+/// Weights without the precisions, or simulations shared by records, fail the bounds.
+#[test]
+fn records_of_one_system_are_weighed_together() {
+    let options = EstimateOptions::default();
+    let all = |records: &[Record]| {
+        (estimator().estimate_together(records, &options, &Progress::silent())).unwrap()
+    };
+    let (mut held, mut agreed, mut square) = (0, 0, 0.0);
+    const TRIALS: u64 = 12;
+    for i in 0..TRIALS {
+        let mut records: Vec<Record> = (0..4).map(|r| record(3.0, 100 + 4 * i + r)).collect();
+        let drive = Drive::autonomous(0.05, 150).unwrap();
+        let outputs = records[3]
+            .outputs()
+            .slice(ndarray::s![..150, ..])
+            .to_owned();
+        records[3] = Record::new(drive, outputs).unwrap();
+        let found = all(&records);
+        let least = found.records.iter().map(|one| one.std_error[0]);
+        assert!(found.std_error[0] < least.fold(f64::INFINITY, f64::min));
+        held += u64::from((found.low[0]..=found.high[0]).contains(&3.0));
+        agreed += u64::from(found.p_value > 0.05);
+        square += ((found.theta[0] - 3.0) / found.std_error[0]).powi(2) / TRIALS as f64;
+    }
+    assert!(
+        crate::binomial_bounds(TRIALS, 0.9, 0.99).contains(&held),
+        "{held}"
+    );
+    assert!(
+        crate::binomial_bounds(TRIALS, 0.95, 0.99).contains(&agreed),
+        "{agreed}"
+    );
+    // χ² of twelve, over twelve, is below 2.2 in 99 of 100 cases.
+    assert!(square < 2.2, "{square}");
+    let changed = all(&[record(3.0, 1), record(3.1, 2)]);
+    assert!(changed.p_value < 0.01, "{}", changed.p_value);
+}
+
 /// Without trust in the prior the answer is the record's own: with one parameter alone outside its prior, 90 % intervals hold the truth
 /// in the records that the gate does not reject, too. Ten records; with the network's answers kept, k1 is missed in each.
 #[test]

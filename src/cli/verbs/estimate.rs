@@ -7,9 +7,9 @@ use crate::cli::posterior::{self, PosteriorDraws};
 use crate::cli::provenance::Provenance;
 use crate::cli::{output, records};
 use crate::estimator::bank::file;
-use crate::estimator::{self, EstimateOptions, Estimator};
+use crate::estimator::{self, EstimateOptions, Estimator, EstimatorError};
 use crate::record::Record;
-use crate::report::{Report, overlay_svg, trajectories_csv};
+use crate::report::{Report, overlay_svg, together_json, together_text, trajectories_csv};
 use crate::study::Study;
 use clap::Args;
 use std::path::PathBuf;
@@ -18,12 +18,13 @@ use std::process::ExitCode;
 /// Estimate the parameters behind a measured record.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
-        truetwin estimate R.csv --estimator tanks.est --validation V.csv --out result\n\
+        truetwin estimate R.csv --estimator tanks.est --validation V.csv --out result\n  \
+        truetwin estimate MONDAY.csv TUESDAY.csv --estimator tanks.est\n\
         If the calibrated twin does not explain the record, next: truetwin diagnose R.csv")]
 pub(in crate::cli) struct Estimate {
-    /// Measured record.
-    #[arg(value_name = "R.csv")]
-    record: PathBuf,
+    /// Measured records; of several, each is estimated, and the answers are weighed by their precision.
+    #[arg(value_name = "R.csv", required = true)]
+    records: Vec<PathBuf>,
     /// Estimator from `truetwin pretrain`.
     #[arg(long, value_name = "EST")]
     estimator: PathBuf,
@@ -40,7 +41,7 @@ pub(in crate::cli) struct Estimate {
     always_refine: bool,
     #[command(flatten)]
     draws: PosteriorDraws,
-    /// New folder for estimate.json, the page report.html, overlay.svg, trajectories.csv and, after a refit, the cloud of simulations (cloud.npz).
+    /// New folder for estimate.json, the page report.html, overlay.svg, trajectories.csv and, after a refit, the cloud of simulations (cloud.npz); of several records, report-1.html and so on.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -50,10 +51,9 @@ impl Verb for Estimate {
         let folder = self.out.as_deref().map(output::NewFolder::new);
         let folder = folder.transpose()?;
         let estimator = Estimator::load(&self.estimator, context.projects)?;
-        let paths = std::slice::from_ref(&self.record);
         let reader = self.columns.reader(estimator.study());
-        let (mut records, validation) = records::read(reader, paths, self.validation.as_deref())?;
-        let record = records.remove(0);
+        let (records, validation) =
+            records::read(reader, &self.records, self.validation.as_deref())?;
         let settings = EstimateOptions {
             seed: context.seed,
             preset: self.preset.map(Into::into),
@@ -66,20 +66,75 @@ impl Verb for Estimate {
             let checked = estimator.study().check_record(validation);
             checked.map_err(|error| Failure::from(error).within(path))?;
         }
-        let estimate = (estimator.estimate(&record, &settings, context.progress))
-            .map_err(|error| Failure::from(error).within(&self.record))?;
-        let files = [
-            ("record", self.record.as_path()),
-            ("estimator", self.estimator.as_path()),
-        ];
+        let files = self.records.iter().map(|path| ("record", path.as_path()));
+        let files = files.chain([("estimator", self.estimator.as_path())]);
         let validation = self.validation.as_deref().map(|path| ("validation", path));
-        let provenance = Provenance::new(context, None, files.into_iter().chain(validation));
+        let files: Vec<_> = files.chain(validation).collect();
+        let provenance = || Provenance::new(context, None, files.clone());
+        if let [record] = &records[..] {
+            let estimate = (estimator.estimate(record, &settings, context.progress))
+                .map_err(|error| Failure::from(error).within(&self.records[0]))?;
+            let provenance = provenance();
+            if let Some(folder) = folder {
+                write_results(&folder, estimator.study(), record, &estimate, &provenance)?;
+                folder.finish()?;
+            }
+            show(context, estimator.study(), &estimate, &provenance)?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        if settings.draws > 0 {
+            return Err(Failure::user(
+                "--draws with several records: estimate them one by one, or draw with truetwin fit, which fits them together",
+            ));
+        }
+        let all = estimator
+            .estimate_together(&records, &settings, context.progress)
+            .map_err(|error| match error {
+                EstimatorError::Record { number, error } => {
+                    Failure::from(*error).within(&self.records[number - 1])
+                }
+                other => other.into(),
+            })?;
+        self.finish_together(
+            context,
+            estimator.study(),
+            &records,
+            &all,
+            folder,
+            &provenance(),
+        )?;
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+impl Estimate {
+    /// Prints several estimates as one; `estimate.json` holds all, and each record has page, overlay and trajectories of its own.
+    fn finish_together(
+        &self,
+        context: &Context<'_>,
+        study: &Study,
+        records: &[Record],
+        all: &estimator::Together,
+        folder: Option<output::NewFolder>,
+        provenance: &Provenance,
+    ) -> Result<(), Failure> {
+        let names: Vec<String> = (self.records.iter())
+            .map(|path| path.display().to_string())
+            .collect();
+        let json = provenance.on(together_json(study, all, &names));
         if let Some(folder) = folder {
-            write_results(&folder, estimator.study(), &record, &estimate, &provenance)?;
+            let text = serde_json::to_string_pretty(&json).map_err(Failure::internal)?;
+            folder.write("estimate.json", &text)?;
+            for (r, (record, estimate)) in records.iter().zip(&all.records).enumerate() {
+                let part = format!("-{}", r + 1);
+                write_pictures(&folder, study, record, estimate, provenance, &part)?;
+            }
             folder.finish()?;
         }
-        show(context, estimator.study(), &estimate, &provenance)?;
-        Ok(ExitCode::SUCCESS)
+        match context.json {
+            true => output::print_json(&json),
+            false => output::print(&provenance.below(&together_text(study, all, &names))),
+        }
     }
 }
 
@@ -114,13 +169,27 @@ pub(super) fn write_results(
     if let Some(draws) = &estimate.posterior {
         posterior::write(folder, study, draws)?;
     }
+    write_pictures(folder, study, record, estimate, provenance, "")
+}
+
+/// Writes `report.html`, `overlay.svg` and `trajectories.csv`, with `part` before the dot.
+fn write_pictures(
+    folder: &output::NewFolder,
+    study: &Study,
+    record: &Record,
+    estimate: &estimator::Estimate,
+    provenance: &Provenance,
+    part: &str,
+) -> Result<(), Failure> {
     let page = provenance.in_page(&estimate.html(study, record));
-    folder.write("report.html", &page)?;
+    folder.write(&format!("report{part}.html"), &page)?;
     let before = estimate.tracking_initial.as_ref().map(|t| &t.outputs);
     // A free run that diverged cannot be drawn; the text reports it.
     let Some(after) = estimate.tracking.as_ref().map(|t| &t.outputs) else {
         return Ok(());
     };
-    folder.write("overlay.svg", &overlay_svg(study, record, before, after))?;
-    folder.write("trajectories.csv", &trajectories_csv(record, before, after))
+    let overlay = overlay_svg(study, record, before, after);
+    folder.write(&format!("overlay{part}.svg"), &overlay)?;
+    let rows = trajectories_csv(record, before, after);
+    folder.write(&format!("trajectories{part}.csv"), &rows)
 }

@@ -4,13 +4,17 @@ mod cloud;
 mod merit;
 mod noise;
 mod outcome;
+mod together;
 mod tracking;
 mod tune;
 mod warnings;
 
 pub(crate) use outcome::Answer;
-pub use outcome::{Estimate, EstimateOptions, Seconds};
+pub(crate) use outcome::Seconds;
+pub use outcome::{Estimate, EstimateOptions};
+pub use together::Together;
 pub use tracking::{Tracking, track};
+pub(crate) use tune::Contributions;
 
 use crate::estimator::bank::{Draws, FeatureSimulator};
 use crate::estimator::error::EstimatorError;
@@ -141,6 +145,7 @@ impl Estimator {
             noise: in_noise.map_or_else(Vec::new, |shown| shown.levels.clone()),
             gauss_newton: outcome.gauss_newton,
             fine: outcome.fine,
+            contributions: outcome.contributions,
             theta: outcome.answer.theta,
             std_error: outcome.answer.std_error,
             low: outcome.answer.low,
@@ -180,6 +185,7 @@ struct Outcome {
     answer: Answer,
     gauss_newton: Option<Vec<f64>>,
     fine: Option<Vec<f64>>,
+    contributions: Option<Contributions>,
     information: Option<Information>,
     after: Option<GateOutcome>,
     refitted: bool,
@@ -289,6 +295,7 @@ impl Run<'_> {
             answer: trusting.clone(),
             gauss_newton: None,
             fine: None,
+            contributions: None,
             information,
             after: None,
             refitted: false,
@@ -367,6 +374,7 @@ impl Run<'_> {
             answer,
             gauss_newton: Some(gauss_newton),
             fine: Some(fine),
+            contributions: tuned.contributions,
             information: Some(refined.information),
             after,
             refitted: true,

@@ -1,6 +1,7 @@
 //! Options and results of an estimate.
 
 use super::tracking::Tracking;
+use super::tune::Contributions;
 use crate::estimator::bank::Draws;
 use crate::estimator::gate::GateOutcome;
 use crate::estimator::readout::Spread;
@@ -75,6 +76,8 @@ pub struct Estimate {
     pub gauss_newton: Option<Vec<f64>>,
     /// The tuned heads' estimate.
     pub fine: Option<Vec<f64>>,
+    /// Contributions of layer and heads to it.
+    pub(crate) contributions: Option<Contributions>,
     /// The estimate: the record's own, within the bounds. That is the tuned one, unless its misfit is too large, else
     /// Gauss–Newton's. The network's is kept where the prior is trusted and the gate agrees, and where refined ones explain the record
     /// worse.
@@ -108,13 +111,12 @@ pub struct Estimate {
     /// The cloud that the heads were tuned on, and measured on: its last rows they never saw.
     pub(crate) cloud: Option<Draws>,
     /// Wall-clock times.
-    pub seconds: Seconds,
+    pub(crate) seconds: Seconds,
 }
 
 /// Wall-clock seconds of each stage; `None` for skipped ones.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-#[non_exhaustive]
-pub struct Seconds {
+pub(crate) struct Seconds {
     /// Features and network.
     pub predict: f64,
     /// The test.

@@ -12,10 +12,25 @@ use crate::math::one_row;
 use crate::network::Training;
 use crate::progress::Progress;
 use nalgebra::DVector;
-use ndarray::{Array2, s};
+use ndarray::{Array2, Axis, s};
+use serde::{Deserialize, Serialize};
 
 /// Largest network input, in standard deviations of the cloud.
 const LIMIT: f64 = 8.0;
+
+/// Contributions of the quadratic layer and the heads to a tuned estimate, by parameter; measured on draws that neither saw.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Contributions {
+    /// α, the share of what the heads say that holds; the layer alone has 0.
+    pub alpha: Vec<f64>,
+    /// Share of the cloud's variance that the layer alone explains.
+    pub layer: Vec<f64>,
+    /// The same of layer and heads.
+    pub both: Vec<f64>,
+    /// The layer's estimate alone, within the bounds.
+    pub theta: Vec<f64>,
+}
 
 /// Heads tuned to one record.
 #[derive(Debug, Clone)]
@@ -24,6 +39,8 @@ pub struct Tuned {
     pub theta: Vec<f64>,
     /// Errors to expect, measured on a part of the cloud that the heads never saw.
     pub spread: Option<Spread>,
+    /// `None` without a quadratic layer.
+    pub contributions: Option<Contributions>,
 }
 
 /// Tunes the heads on a cloud, the trunk frozen, and reads the record with them.
@@ -89,20 +106,38 @@ pub fn tune(
         network,
     };
     let space = estimator.study().twin().parameters();
-    let theta = space.clamp(
-        &readout
-            .predict(&one_row(observed.as_slice()))?
-            .row(0)
-            .to_vec(),
-    );
+    let record = one_row(observed.as_slice());
+    let theta = space.clamp(&readout.predict(&record)?.row(0).to_vec());
     let calibration = Calibration {
         predicted: readout.predict(&unseen)?,
         truth,
     };
+    let contributions = readout.layer.as_ref().map(|layer| {
+        let alone = |features| {
+            let z = readout.inputs.apply(features);
+            readout.targets.invert(&layer.quadratic.predict(&z))
+        };
+        Contributions {
+            alpha: layer.weight.clone(),
+            layer: explained(&alone(&unseen), &calibration.truth),
+            both: explained(&calibration.predicted, &calibration.truth),
+            theta: space.clamp(&alone(&record).row(0).to_vec()),
+        }
+    });
     Ok(Tuned {
+        contributions,
         spread: calibration.spread(&theta, &readout.targets.scale, INTERVAL_LEVEL),
         theta,
     })
+}
+
+/// Share of each column's variance that a prediction explains.
+fn explained(predicted: &Array2<f64>, truth: &Array2<f64>) -> Vec<f64> {
+    let errors = (predicted - truth).mapv(|e| e * e).sum_axis(Axis(0));
+    let all = truth.var_axis(Axis(0), 0.0) * truth.nrows() as f64;
+    (errors.iter().zip(all))
+        .map(|(error, all)| 1.0 - error / all)
+        .collect()
 }
 
 /// w_j for standardised targets.

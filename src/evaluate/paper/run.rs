@@ -2,7 +2,7 @@
 
 use super::Method;
 use super::record::Simulated;
-use crate::estimator::{Estimate, EstimateOptions, Estimator};
+use crate::estimator::{Contributions, Estimate, EstimateOptions, Estimator};
 use crate::evaluate::EvaluateError;
 use crate::evaluate::baseline::{DualFilter, Initialisation, PredictionErrorMethod};
 use crate::progress::Progress;
@@ -24,6 +24,9 @@ pub struct Run {
     pub interval: Vec<Option<[f64; 2]>>,
     /// In the order of [`Method::all`].
     pub answers: Vec<Answer>,
+    /// Contributions of layer and heads to TS-fine.
+    #[serde(default)]
+    pub(crate) contributions: Option<Contributions>,
     /// Why the estimator gave no estimate, where it did not.
     pub failure: Option<String>,
 }
@@ -125,6 +128,7 @@ impl Run {
             truth: truth.clone(),
             interval: estimate.as_ref().map(interval).unwrap_or_default(),
             answers: Method::all().into_iter().map(answer).collect(),
+            contributions: estimate.and_then(|estimate| estimate.contributions),
             failure,
         })
     }

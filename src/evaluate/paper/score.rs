@@ -1,6 +1,7 @@
 //! Errors and coverage over many runs.
 
 use super::{Method, MonteCarlo, Published, Run, Scenario};
+use crate::estimator::Contributions;
 use crate::math::{clopper_pearson, median};
 use crate::study::Study;
 use crate::twin::ParameterSpace;
@@ -20,8 +21,23 @@ pub struct Scores {
     pub coverage: Vec<Coverage>,
     /// Errors and coverage at each point of [`Scenario::Grid`]; empty otherwise.
     pub points: Vec<PointScore>,
+    /// Contributions of layer and heads to TS-fine, where there is a layer.
+    pub(crate) heads: Option<HeadScore>,
     /// Runs without an estimate.
     pub failed: usize,
+}
+
+/// Mean contributions to the tuned estimates, by parameter.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct HeadScore {
+    /// Weight of the heads beside the quadratic layer, from 0 to 1.
+    pub alpha: Vec<f64>,
+    /// Share of the cloud's variance that the layer alone explains.
+    pub explained_layer: Vec<f64>,
+    /// The same of layer and heads.
+    pub explained_both: Vec<f64>,
+    /// Mean squared error of the layer alone.
+    pub mse_layer: f64,
 }
 
 /// Errors and coverage of the refitted estimate at one θ.
@@ -157,8 +173,32 @@ pub fn score(study: &Study, plan: &MonteCarlo, runs: &[Run]) -> Scores {
         methods,
         coverage,
         points,
+        heads: heads(runs),
         failed: runs.iter().filter(|run| run.failure.is_some()).count(),
     }
+}
+
+/// Means over the runs that have a layer.
+fn heads(runs: &[Run]) -> Option<HeadScore> {
+    let all: Vec<(&Contributions, &Run)> = (runs.iter())
+        .filter_map(|run| Some((run.contributions.as_ref()?, run)))
+        .collect();
+    let (first, _) = all.first()?;
+    let means = |of: fn(&Contributions) -> &[f64]| -> Vec<f64> {
+        (0..first.alpha.len())
+            .map(|j| mean(&all.iter().map(|(c, _)| of(c)[j]).collect::<Vec<_>>()))
+            .collect()
+    };
+    let squares = all.iter().map(|(c, run)| {
+        let squares = c.theta.iter().zip(&run.truth).map(|(a, b)| (a - b).powi(2));
+        squares.sum::<f64>() / run.truth.len() as f64
+    });
+    Some(HeadScore {
+        alpha: means(|c| &c.alpha),
+        explained_layer: means(|c| &c.layer),
+        explained_both: means(|c| &c.both),
+        mse_layer: mean(&squares.collect::<Vec<_>>()),
+    })
 }
 
 /// Scores of the runs at each true θ, in the order of their first runs.
@@ -248,7 +288,24 @@ mod tests {
             interval: theta.map_or(vec![], |_| vec![Some(interval); 4]),
             answers: Method::all().into_iter().map(answer).collect(),
             failure: theta.is_none().then(|| "no start".to_owned()),
+            contributions: None,
         }
+    }
+
+    #[test]
+    fn parts_are_means_over_the_runs_that_have_them() {
+        let part = |alpha: f64, off: f64| Contributions {
+            alpha: vec![alpha; 4],
+            layer: vec![0.5; 4],
+            both: vec![0.75; 4],
+            theta: TRUTH.map(|v| v + off).into(),
+        };
+        let mut runs = [0, 1, 2].map(|number| run(number, Some(TRUTH), [0.0, 1.0]));
+        runs[0].contributions = Some(part(0.2, 0.1));
+        runs[1].contributions = Some(part(0.6, 0.3));
+        let heads = heads(&runs).unwrap();
+        assert!((heads.alpha[3] - 0.4).abs() < 1e-12 && (heads.mse_layer - 0.05).abs() < 1e-12);
+        assert_eq!(super::heads(&runs[2..]), None);
     }
 
     fn scored(scenario: Scenario, runs: &[Run]) -> Scores {

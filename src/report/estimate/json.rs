@@ -19,6 +19,7 @@ use serde_json::{Value, json};
 ///
 /// | `answer` | `record`: `theta.final` is the record's own; `prior`: the network's, which leans on the prior |
 /// | `trusting_prior` | the network's estimate with its errors, for those who trust the prior |
+/// | `heads` | parts of `theta.fine`: `alpha`, what the heads add to the quadratic layer (0 nothing, 1 all they say); shares of the cloud's variance that the layer, and both, explain; `layer`, its estimate alone; null where heads were not tuned on a layer |
 /// | `noise` | levels that the record shows in place of those declared; simulations take them |
 /// | `posterior` | of posterior draws: names, how many independent ones they are worth, modes; null where none were asked for |
 /// | `warnings` | `code`, `what`, `remedy` |
@@ -80,6 +81,12 @@ pub fn estimate_json(study: &Study, estimate: &Estimate) -> Value {
                 "high": own(&trusting.high),
             },
         },
+        "heads": estimate.contributions.as_ref().map(|parts| json!({
+            "alpha": own(&parts.alpha),
+            "explained_layer": own(&parts.layer),
+            "explained_both": own(&parts.both),
+            "layer": own(&parts.theta),
+        })),
         "noise": estimate.noise,
         "posterior": posterior_json(estimate.posterior.as_ref()),
         "warnings": estimate.warnings,

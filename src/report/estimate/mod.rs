@@ -3,11 +3,13 @@
 mod json;
 mod overlay;
 mod text;
+mod together;
 mod trajectories;
 
 pub(super) use json::estimate_json;
 pub(crate) use overlay::overlay_svg;
 pub(super) use text::estimate_text;
+pub(crate) use together::{together_json, together_text};
 pub use trajectories::trajectories_csv;
 
 use super::parameters::ParameterRow;

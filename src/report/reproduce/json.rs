@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 /// |---|---|
 /// | `methods` | a row a method and start: `mse`, `median` of the squared error over runs, `ms` |
 /// | `scenario` | 0, 1, 2 as on the command line; 3 for θ from the bounds; 4 for the grid |
+/// | `heads` | TS-fine's parts: α of the heads, shares of the cloud's variance that the quadratic layer and both explain, MSE of the layer alone; null without a layer |
 /// | `points` | of a grid: θ, whether it lies in the prior, errors and coverage by parameter |
 ///
 /// Beyond the contract: `theta_from` (`prior`, `point`, `bounds`), `seed`, `failed` (runs without an answer),
@@ -41,6 +42,7 @@ pub fn reproduce_json(
         "failed": scores.failed,
         "methods": scores.methods,
         "points": scores.points,
+        "heads": scores.heads,
         "coverage": {
             "level": INTERVAL_LEVEL, "interval_level": COVERAGE_LEVEL, "parameters": scores.coverage,
         },

@@ -29,6 +29,7 @@ pub fn reproduce_text(
         invariants(scores),
         coverage(scores),
         points(study, scores),
+        heads(study, scores),
         failures(plan, scores),
     ];
     parts.retain(|part| !part.is_empty());
@@ -82,6 +83,35 @@ fn invariants(scores: &Scores) -> String {
         rows.push(std::iter::once(s.method.label()).chain(row).collect());
     }
     format!("MSE of what the output determines\n\n{}", table(&rows))
+}
+
+/// Returns the parts of TS-fine; nothing without a layer.
+fn heads(study: &Study, scores: &Scores) -> String {
+    let Some(heads) = &scores.heads else {
+        return String::new();
+    };
+    let head = [
+        "TS-fine",
+        "layer explains",
+        "layer and heads",
+        "α of the heads",
+    ];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    let space = study.twin().parameters();
+    for (j, name) in space.names().into_iter().enumerate() {
+        let shares = [
+            heads.explained_layer[j],
+            heads.explained_both[j],
+            heads.alpha[j],
+        ];
+        let shares = shares.map(|share| format!("{share:.3}"));
+        rows.push([vec![name.to_owned()], shares.to_vec()].concat());
+    }
+    format!(
+        "Parts of TS-fine, on simulations that neither saw; MSE of the quadratic layer alone: {}\n\n{}",
+        figure(heads.mse_layer),
+        table(&rows)
+    )
 }
 
 /// Returns coverage and error at each point of a grid; nothing without one.

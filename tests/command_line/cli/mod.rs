@@ -203,6 +203,21 @@ fn an_estimate_repeats_fits_its_schema_and_writes_its_folder() {
             .unwrap()
             .starts_with("<svg")
     );
+    let (several, second) = (at("several"), at("second.csv"));
+    let theta = ["--theta", "nu=3", "--seed", "9", "--out", &second];
+    done(&[&["simulate", "--twin", "van-der-pol"], &theta[..]].concat());
+    let two = ["estimate", &record, &second, "--estimator", &estimator];
+    let value = json(&[&two[..], &["--json", "--out", &several]].concat());
+    assert_eq!(value["schema"], "truetwin.estimates/1");
+    assert_eq!(value["records"].as_array().unwrap().len(), 2);
+    assert!(value["std_error"][0].as_f64() < value["records"][0]["std_error"][0].as_f64());
+    assert!(fs::exists(format!("{several}/report-2.html")).unwrap());
+    let text = done(&two);
+    assert!(text.contains("The records agree"), "{text}");
+    refused(
+        &[&two[..], &["--draws", "10", "--out", &at("drawn")]].concat(),
+        &["truetwin fit"],
+    );
     refused(
         &[
             "estimate",
