@@ -93,6 +93,7 @@ pub(super) fn percent(share: f64) -> String {
 pub(super) fn chance(p: f64) -> String {
     match p {
         p if p < 0.005 => "< 0.01".into(),
+        p if p >= 0.995 => "> 0.99".into(),
         p => format!("{p:.2}"),
     }
 }

@@ -92,7 +92,10 @@ fn how_sure(diagnosis: &Diagnosis) -> Option<String> {
 /// The share of the gap that closes.
 fn how_far(diagnosis: &Diagnosis) -> Option<String> {
     let s = diagnosis.shrinkage.as_ref()?;
-    let (closed, [low, high]) = (s.closed?, s.interval?);
+    let (Some(closed), Some([low, high])) = (s.closed, s.interval) else {
+        let is_near = s.after.is_some() && s.floor.is_some();
+        return is_near.then(|| "Noise hides how much of the gap closes.".to_owned());
+    };
     let ahead = match s.horizon {
         Some(seconds) => format!("{} s ahead", short(seconds)),
         None => "of the free run".to_owned(),
