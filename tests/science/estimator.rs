@@ -5,7 +5,9 @@ use std::fs;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
-use truetwin::estimator::{EstimateOptions, Estimator, EstimatorError, PretrainOptions, pretrain};
+use truetwin::estimator::{
+    EstimateOptions, Estimator, EstimatorError, PretrainOptions, Project, Settings, pretrain,
+};
 use truetwin::evaluate::paper::reference_studies;
 use truetwin::progress::{Listener, Progress};
 use truetwin::record::Signals;
@@ -372,6 +374,58 @@ fn simulator_calls_are_pinned() {
     let kept = estimate(1.2, kept_seed());
     assert_eq!(kept.simulations, 349 + 2 * 16 + 150 + 64 + 2 * 64 + 1);
     assert!(estimate(3.0, 0).simulations < 12_000);
+}
+
+/// Mean squared errors of the parts of a tuned estimate, in widths of the prior, θ from the bounds: Gauss–Newton, quadratic layer, layer and
+/// heads, heads without a layer. docs/estimating.md has the result of
+/// `cargo test --release --test science study_of_the_parts -- --ignored --nocapture`.
+#[test]
+#[ignore = "minutes; a study, not a test"]
+fn study_of_the_parts() {
+    const RECORDS: u64 = 60;
+    for study in studies() {
+        let space = study.twin().parameters();
+        for quadratic in [true, false] {
+            let mut settings = Settings::default();
+            settings.cloud.quadratic = quadratic;
+            let project = Project::from(study.clone()).with_settings(settings);
+            let options = PretrainOptions {
+                bank_size: Some(3000),
+                epochs: Some(30),
+                seed: 1,
+                ..PretrainOptions::default()
+            };
+            let (estimator, _) = pretrain(&project, &options, &Progress::silent()).unwrap();
+            let mut squares = [0.0; 3];
+            for i in 0..RECORDS {
+                let noise = Noise::new(35, study.name(), i);
+                let theta = space.draw_bounds(noise);
+                let drive = study.drives().unwrap().draw(noise).unwrap();
+                let outputs = study.twin().simulate(&theta, &drive, noise).unwrap();
+                let record = Record::new(drive, outputs).unwrap();
+                let options = EstimateOptions {
+                    seed: i,
+                    ..EstimateOptions::default()
+                };
+                let found = estimator.estimate(&record, &options, &Progress::silent());
+                let found = found.unwrap().json(&study);
+                let parts = ["/theta/gauss_newton", "/heads/layer", "/theta/fine"];
+                for (square, part) in squares.iter_mut().zip(parts) {
+                    for (j, p) in space.iter().enumerate() {
+                        let value = found.pointer(&format!("{part}/{j}"));
+                        let value = value.and_then(|v| v.as_f64()).unwrap_or(f64::NAN);
+                        let off = (value - theta[j]) / p.prior.width();
+                        *square += off * off / (RECORDS * space.len() as u64) as f64;
+                    }
+                }
+            }
+            let [name, squares] = [
+                study.name().into(),
+                squares.map(|s| format!("{s:.2e}")).join(" "),
+            ];
+            println!("{name}, layer {quadratic}: Gauss–Newton, layer, tuned {squares}");
+        }
+    }
 }
 
 /// A seed whose in-distribution record the gate keeps.
