@@ -114,6 +114,12 @@ impl NewFolder {
         self.filling.file(name)
     }
 
+    /// Writes an indented JSON object.
+    pub fn write_json(&self, name: &str, value: &Value) -> Result<(), Failure> {
+        let text = serde_json::to_string_pretty(value).map_err(Failure::internal)?;
+        self.write(name, &text)
+    }
+
     pub fn write(&self, name: &str, text: &str) -> Result<(), Failure> {
         fs::write(self.file(name), text)
             .map_err(|error| StorageError::io(&self.place.join(name), error).into())

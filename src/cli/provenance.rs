@@ -2,6 +2,8 @@
 
 use super::args::Subject;
 use super::context::Context;
+use super::failure::Failure;
+use super::output;
 use crate::report::with_footer;
 use crate::storage::files::sha256_of;
 use serde::Serialize;
@@ -80,9 +82,22 @@ impl Provenance {
     }
 
     /// The text with a last line on where it comes from.
-    pub fn below(&self, text: &str) -> String {
+    fn below(&self, text: &str) -> String {
         let ends = if text.ends_with('\n') { "" } else { "\n" };
         format!("{text}{ends}{}\n", self.line(SHORT))
+    }
+
+    /// Prints a result: its JSON, which has its provenance, or else its text with the last line.
+    pub fn print(
+        &self,
+        context: &Context<'_>,
+        json: &Value,
+        text: impl FnOnce() -> String,
+    ) -> Result<(), Failure> {
+        match context.json {
+            true => output::print_json(json),
+            false => output::print(&self.below(&text())),
+        }
     }
 
     /// The page with a footer on where it comes from.

@@ -4,9 +4,6 @@ use super::digits::{self, Digits};
 use crate::twin::{Interval, PRIOR_DEVIATION, Parameter, Role};
 use serde::Serialize;
 
-/// A value so near to a bound, in its own standard errors, lies at it.
-const AT_BOUND: f64 = 0.1;
-
 /// One parameter: what the record says of it beside what was said before.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct ParameterRow {
@@ -32,8 +29,6 @@ pub(super) struct ParameterRow {
 
 impl ParameterRow {
     pub fn new(parameter: &Parameter, value: f64, std_error: f64, interval: [f64; 2]) -> Self {
-        let reach = AT_BOUND * std_error;
-        let bounds = parameter.bounds;
         let prior = PRIOR_DEVIATION * parameter.prior.width();
         Self {
             name: parameter.name.clone(),
@@ -42,13 +37,9 @@ impl ParameterRow {
             std_error,
             interval,
             prior: parameter.prior,
-            bounds,
+            bounds: parameter.bounds,
             prior_share: (std_error / prior).powi(2).min(1.0),
-            at_bound: match value {
-                value if value - bounds.low() <= reach => Some("low"),
-                value if bounds.high() - value <= reach => Some("high"),
-                _ => None,
-            },
+            at_bound: parameter.bound_at(value, std_error),
         }
     }
 

@@ -7,6 +7,9 @@ use std::collections::BTreeSet;
 /// The standard deviation of a uniform prior over its width, 1/√12; an estimate that is no better rests on the prior alone.
 pub const PRIOR_DEVIATION: f64 = 0.288_675_134_594_812_9;
 
+/// A value so near to a bound, in its own standard errors, lies at it.
+const AT_BOUND: f64 = 0.1;
+
 /// The kind of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -72,6 +75,16 @@ pub struct Parameter {
 }
 
 impl Parameter {
+    /// Bound that a value with this standard error lies at: `low` or `high`.
+    pub(crate) fn bound_at(&self, value: f64, std_error: f64) -> Option<&'static str> {
+        let reach = AT_BOUND * std_error;
+        match value {
+            value if value - self.bounds.low() <= reach => Some("low"),
+            value if self.bounds.high() - value <= reach => Some("high"),
+            _ => None,
+        }
+    }
+
     /// A physical parameter with prior `[low, high]` and the same bounds; ends are checked with the twin.
     pub fn new(name: &str, unit: &str, low: f64, high: f64) -> Self {
         let prior = Interval::unchecked(low, high);

@@ -86,20 +86,15 @@ impl Verb for Compare {
         let provenance = Provenance::new(context, None, files);
         let json = provenance.on(compare_json(&compared));
         if let (Some(folder), Some(record)) = (folder, &shown) {
-            let text = serde_json::to_string_pretty(&json).map_err(Failure::internal)?;
-            folder.write("compare.json", &text)?;
+            folder.write_json("compare.json", &json)?;
             folder.write("overlay.svg", &compare_svg(&compared, record))?;
             folder.finish()?;
         }
-        if context.json {
-            output::print_json(&json)?;
-        } else {
-            let what = match self.records.is_empty() {
-                true => "on the whole of the record whose first two thirds were fitted",
-                false => "on the validation record",
-            };
-            output::print(&provenance.below(&compare_text(&compared, what)))?;
-        }
+        let what = match self.records.is_empty() {
+            true => "on the whole of the record whose first two thirds were fitted",
+            false => "on the validation record",
+        };
+        provenance.print(context, &json, || compare_text(&compared, what))?;
         Ok(ExitCode::SUCCESS)
     }
 }

@@ -100,8 +100,7 @@ impl Verb for Diagnose {
         let provenance = Provenance::new(context, Some(&self.subject), files.chain(others));
         let json = provenance.on(found.json(&study));
         if let Some(folder) = folder {
-            let text = serde_json::to_string_pretty(&json).map_err(Failure::internal)?;
-            folder.write("report.json", &text)?;
+            folder.write_json("report.json", &json)?;
             let page = provenance.in_page(&found.html(&study));
             folder.write("report.html", &page)?;
             if let Some(next) = &found.cause.next_input {
@@ -109,11 +108,7 @@ impl Verb for Diagnose {
             }
             folder.finish()?;
         }
-        if context.json {
-            output::print_json(&json)?;
-        } else {
-            output::print(&provenance.below(&found.text(&study)))?;
-        }
+        provenance.print(context, &json, || found.text(&study))?;
         Ok(ExitCode::SUCCESS)
     }
 }

@@ -123,18 +123,14 @@ impl Estimate {
             .collect();
         let json = provenance.on(together_json(study, all, &names));
         if let Some(folder) = folder {
-            let text = serde_json::to_string_pretty(&json).map_err(Failure::internal)?;
-            folder.write("estimate.json", &text)?;
+            folder.write_json("estimate.json", &json)?;
             for (r, (record, estimate)) in records.iter().zip(&all.records).enumerate() {
                 let part = format!("-{}", r + 1);
                 write_pictures(&folder, study, record, estimate, provenance, &part)?;
             }
             folder.finish()?;
         }
-        match context.json {
-            true => output::print_json(&json),
-            false => output::print(&provenance.below(&together_text(study, all, &names))),
-        }
+        provenance.print(context, &json, || together_text(study, all, &names))
     }
 }
 
@@ -145,11 +141,8 @@ pub(super) fn show(
     estimate: &estimator::Estimate,
     provenance: &Provenance,
 ) -> Result<(), Failure> {
-    if context.json {
-        output::print_json(&provenance.on(estimate.json(study)))
-    } else {
-        output::print(&provenance.below(&estimate.text(study)))
-    }
+    let json = provenance.on(estimate.json(study));
+    provenance.print(context, &json, || estimate.text(study))
 }
 
 /// Writes `estimate.json`, `report.html`, `overlay.svg`, `trajectories.csv`, `cloud.npz`.
@@ -160,8 +153,7 @@ pub(super) fn write_results(
     estimate: &estimator::Estimate,
     provenance: &Provenance,
 ) -> Result<(), Failure> {
-    let json = serde_json::to_string_pretty(&provenance.on(estimate.json(study)));
-    folder.write("estimate.json", &json.map_err(Failure::internal)?)?;
+    folder.write_json("estimate.json", &provenance.on(estimate.json(study)))?;
     if let Some(cloud) = &estimate.cloud {
         let names: Vec<&str> = estimate.names.iter().map(String::as_str).collect();
         file::write(&folder.file("cloud.npz"), cloud, &names)?;

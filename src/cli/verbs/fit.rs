@@ -56,8 +56,7 @@ impl Verb for Fit {
         let provenance = Provenance::new(context, Some(&self.subject), files);
         let json = provenance.on(fit.json(&study));
         if let Some(folder) = folder {
-            let text = serde_json::to_string_pretty(&json).map_err(Failure::internal)?;
-            folder.write("fit.json", &text)?;
+            folder.write_json("fit.json", &json)?;
             let page = provenance.in_page(&fit.html(&study, &records));
             folder.write("report.html", &page)?;
             for (r, (record, run)) in records.iter().zip(&fit.free_runs).enumerate() {
@@ -73,11 +72,7 @@ impl Verb for Fit {
             }
             folder.finish()?;
         }
-        if context.json {
-            output::print_json(&json)?;
-        } else {
-            output::print(&provenance.below(&fit.text(&study)))?;
-        }
+        provenance.print(context, &json, || fit.text(&study))?;
         Ok(ExitCode::SUCCESS)
     }
 }

@@ -183,11 +183,7 @@ impl Verb for Reproduce {
             // Written last: it marks the folder as complete.
             folder.write("reproduce.json", &format!("{json:#}\n"))?;
         }
-        if context.json {
-            output::print_json(&json)?
-        } else {
-            output::print(&provenance.below(&text))?
-        }
+        provenance.print(context, &json, || text)?;
         Ok(ExitCode::SUCCESS)
     }
 }

@@ -108,11 +108,7 @@ impl Verb for Withheld {
         sealed.write("scorecard.html", &provenance.in_page(&card.html()))?;
         // Written last: it marks the folder as complete.
         sealed.write("scorecard.json", &format!("{json:#}\n"))?;
-        if context.json {
-            output::print_json(&json)?
-        } else {
-            output::print(&provenance.below(&scorecard_text(&card)))?
-        }
+        provenance.print(context, &json, || scorecard_text(&card))?;
         Ok(ExitCode::SUCCESS)
     }
 }

@@ -115,5 +115,10 @@ fn squares(y: &Signal, free: &Signal, from: usize) -> Vec<f64> {
 
 /// √(mean).
 pub(in crate::diagnose) fn root(squares: &[f64]) -> f64 {
-    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+    mean(squares).sqrt()
+}
+
+/// Mean; 0 of nothing.
+pub(super) fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
 }

@@ -14,7 +14,7 @@
 //! A does not take part in the choice. Its interval is that of (B − δBᵢ − A + δAᵢ)/(B − δBᵢ − F), δ the deviations of simulated records
 //! from their mean: what another record of the same system would have given.
 
-use super::free_run::{Runner, scaled, variances};
+use super::free_run::{Runner, mean, scaled, variances};
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::outcome::Horizon;
 use crate::diagnose::thresholds::Thresholds;
@@ -255,10 +255,6 @@ impl Compared {
 
 fn share(before: f64, after: f64, floor: f64) -> f64 {
     (before - after) / (before - floor)
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 #[cfg(test)]

@@ -74,11 +74,9 @@ impl HeldOut<'_> {
     fn draws<'a>(
         &'a self,
         model: &Model<'_>,
+        refit: &Refit<'_>,
         noise: Noise,
     ) -> Result<Vec<Predictor<'a>>, DiagnoseError> {
-        let Some(refit) = self.refit(model)? else {
-            return Ok(vec![]);
-        };
         let fitted = std::slice::from_ref(&refit.fitted);
         let drawn = posterior(&refit.problem, fitted, None, noise)?;
         let mut all = vec![];
@@ -203,7 +201,11 @@ pub(in crate::diagnose) fn shrinkage(
         result.unfitted = unfitted.and_then(free_run);
         return Ok(Some(result));
     };
-    let Some(after) = held_out.refitted(accepted)? else {
+    let refit = held_out.refit(accepted)?;
+    let after = refit
+        .as_ref()
+        .map(|refit| held_out.predictor(accepted, refit.theta()));
+    let (Some(refit), Some(after)) = (&refit, after.transpose()?.flatten()) else {
         result.unfitted = unfitted.and_then(free_run);
         return Ok(Some(result));
     };
@@ -221,7 +223,7 @@ pub(in crate::diagnose) fn shrinkage(
         (result.before, result.after) = (before, Some(after));
         return Ok(Some(result));
     }
-    let draws = held_out.draws(accepted, noise.child("posterior"))?;
+    let draws = held_out.draws(accepted, refit, noise.child("posterior"))?;
     let compared = compare(&before, &after, &draws, rows, noise.child("floor"))?;
     result.horizons.clone_from(&compared.horizons);
     let shown = compared.headline.or(compared.horizons.len().checked_sub(1));

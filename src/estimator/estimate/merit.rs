@@ -7,7 +7,7 @@ use crate::twin::Twin;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// A free run whose error is this much larger is worse: process noise alone moves the error of the truth's own run by as much.
-/// Measured on the tanks (30 records, k1 outside its prior): at 1.2 no right answer is refused, at 1.1 one.
+/// Measured on the tanks (30 records, k1 outside its prior): no right answer is refused.
 const LARGER: f64 = 1.2;
 /// Probability that the likelihood at the truth lies so far below its top.
 const BY_CHANCE: f64 = 0.1;

@@ -9,8 +9,7 @@ mod tracking;
 mod tune;
 mod warnings;
 
-pub(crate) use outcome::Answer;
-pub(crate) use outcome::Seconds;
+pub(crate) use outcome::{Answer, Seconds};
 pub use outcome::{Estimate, EstimateOptions};
 pub use together::Together;
 pub use tracking::{Tracking, track};

@@ -1,6 +1,6 @@
 //! Several records of one system: one estimate of what they share.
 
-use super::{Estimate, EstimateOptions};
+use super::{Answer, Estimate, EstimateOptions};
 use crate::estimator::error::EstimatorError;
 use crate::estimator::estimator::Estimator;
 use crate::estimator::readout::{INTERVAL_LEVEL, Spread};
@@ -117,18 +117,15 @@ fn together(records: Vec<Estimate>, space: &ParameterSpace) -> Together {
         _ => 1.0,
     };
     let std_error: Vec<f64> = covariance.diagonal().iter().map(|v| v.sqrt()).collect();
+    let own = ParameterSpace::new(shared.iter().map(|&j| space[j].clone()));
     let spread = Spread::normal(std_error, INTERVAL_LEVEL);
-    let bounds = |a: usize| space[shared[a]].bounds;
-    let moved = |by: &[f64]| -> Vec<f64> {
-        let ends = theta.iter().zip(by).enumerate();
-        ends.map(|(a, (t, by))| bounds(a).clamp(t + by)).collect()
-    };
+    let answer = Answer::new(theta.as_slice().to_vec(), spread, &own);
     Together {
-        names: shared.iter().map(|&j| space[j].name.clone()).collect(),
-        theta: moved(&vec![0.0; n]),
-        low: moved(&spread.low),
-        high: moved(&spread.high),
-        std_error: spread.std_error,
+        names: own.names().into_iter().map(str::to_owned).collect(),
+        theta: own.clamp(&answer.theta),
+        low: answer.low,
+        high: answer.high,
+        std_error: answer.std_error,
         disagreement,
         degrees,
         p_value,

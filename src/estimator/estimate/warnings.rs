@@ -8,8 +8,6 @@ use crate::setting::number;
 use crate::twin::conformance::{Severity, check_step};
 use crate::twin::{PRIOR_DEVIATION, Role, Twin};
 
-/// A value so near to a bound, in its own standard errors, lies at it.
-const AT_BOUND: f64 = 0.1;
 /// Share of a prior's information in an answer from which on the answer leans on it: the prior then moves the answer by this share of
 /// the truth's distance from its centre.
 const LEANING: f64 = 0.1;
@@ -77,11 +75,10 @@ pub(super) fn warnings(
     }
     let space = twin.parameters();
     for (j, parameter) in space.iter().enumerate() {
-        let reach = AT_BOUND * estimate.std_error[j];
-        let side = match estimate.theta[j] {
-            value if value - parameter.bounds.low() <= reach => "lower",
-            value if parameter.bounds.high() - value <= reach => "upper",
-            _ => continue,
+        let side = match parameter.bound_at(estimate.theta[j], estimate.std_error[j]) {
+            Some("low") => "lower",
+            Some(_) => "upper",
+            None => continue,
         };
         warn(
             "at-bound",

@@ -17,12 +17,12 @@ const SHOWN: usize = 6;
 /// One line of the shared table a parameter.
 fn rows(study: &Study, all: &Together) -> Vec<(ParameterRow, Role)> {
     let space = study.twin().parameters();
-    let shared = space.iter().filter(|p| p.role != Role::Start).enumerate();
-    shared
-        .map(|(a, p)| {
+    (all.names.iter().enumerate())
+        .filter_map(|(a, name)| {
+            let p = space.iter().find(|p| p.name == *name)?;
             let interval = [all.low[a], all.high[a]];
             let row = ParameterRow::new(p, all.theta[a], all.std_error[a], interval);
-            (row, p.role)
+            Some((row, p.role))
         })
         .collect()
 }
