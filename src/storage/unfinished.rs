@@ -160,10 +160,11 @@ impl NewFolder {
 
     fn locked(place: &Path, filling: TempDir) -> Option<Self> {
         let open = File::open(filling.path()).ok();
-        if open
-            .as_ref()
-            .is_some_and(|file| !holds(file, filling.path()))
-        {
+        let is_lost = match &open {
+            Some(file) => !holds(file, filling.path()),
+            None => !filling.path().exists(),
+        };
+        if is_lost {
             // Removed by a sweep; the name may be another process's by now.
             let _ = filling.keep();
             return None;
@@ -207,6 +208,15 @@ mod tests {
             .collect();
         names.sort();
         names
+    }
+
+    /// Between the creation of a folder and its lock, a sweep may take it.
+    #[test]
+    fn a_new_folder_that_a_sweep_took_is_none() {
+        let place = tempfile::tempdir().unwrap();
+        let taken = tempfile::tempdir_in(place.path()).unwrap();
+        fs::remove_dir(taken.path()).unwrap();
+        assert!(NewFolder::locked(&place.path().join("out"), taken).is_none());
     }
 
     #[test]
