@@ -34,6 +34,8 @@ pub(in crate::diagnose) struct Base<'a> {
     pub noisy: Vec<String>,
     /// Kinds of noise that the records asked for.
     pub noises: Vec<Arc<Term>>,
+    /// Substeps of a sample, where the records asked for a finer step.
+    pub substeps: Option<usize>,
 }
 
 impl<'a> Base<'a> {
@@ -96,7 +98,11 @@ impl<'a> Base<'a> {
             return Ok(None);
         };
         let noises = self.noises.iter().chain(&found.terms).cloned().collect();
-        Base::of(model, self.noisy.clone(), noises).map(Some)
+        let base = Base::of(model, self.noisy.clone(), noises)?;
+        Ok(Some(Base {
+            substeps: self.substeps,
+            ..base
+        }))
     }
 
     fn of(
@@ -113,6 +119,7 @@ impl<'a> Base<'a> {
             noises,
             theta,
             model,
+            substeps: None,
         })
     }
 }

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `run.rs`, `base.rs`, `summary.rs` | order of the steps; the fitted twin that they begin with; the summary of their results |
 //! | `model.rs` | a twin with terms, fitted |
+//! | `step.rs` | whether a finer step of the integrator explains the records better |
 //! | `hypotheses/` | what could be missing: listed effects, unknown functions |
 //! | `explain/` | which of them: screened, refitted, weighed, decided |
 //! | `residuals/` | innovations cut by time, state, lag and frequency |
@@ -25,6 +26,7 @@ mod quantify;
 mod residuals;
 mod run;
 mod settings;
+mod step;
 mod summary;
 mod thresholds;
 

@@ -21,6 +21,7 @@ use super::quantify::next_input::next_input;
 use super::quantify::power::power;
 use super::quantify::share::{Measures, shrinkage};
 use super::settings::DiagnoseSettings;
+use super::step::finer_step;
 use super::summary::{effects, nuisance, onset, parameters, remains};
 use super::thresholds::Thresholds;
 use crate::fit::climb::climb;
@@ -30,7 +31,7 @@ use crate::progress::Progress;
 use crate::record::Record;
 use crate::setting::SettingError;
 use crate::study::Study;
-use crate::twin::Noise;
+use crate::twin::{Noise, Twin};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -112,10 +113,43 @@ fn search<R>(
     let measured = measured(study.twin(), records, &study.beliefs())?;
     let base = Base::new(&measured, records, settings, noise)?;
     stage.tick()?;
+    match finer(study, &base.model)? {
+        Some(finer) => with_step(study, &base, finer, settings, progress, then),
+        None => explored(study, base, settings, ROUNDS, progress, then),
+    }
+}
+
+/// The twin with a finer step, and its substeps, where the records ask for it.
+fn finer(study: &Study, model: &Model<'_>) -> Result<Option<(Twin, usize)>, DiagnoseError> {
+    let twin = study.twin();
+    let found = finer_step(model)?;
+    Ok(found.and_then(|substeps| Some((twin.stepped(|to| to.substeps = substeps)?, substeps))))
+}
+
+/// Fits the twin with a finer step, and searches with it.
+fn with_step<R>(
+    study: &Study,
+    base: &Base<'_>,
+    (twin, substeps): (Twin, usize),
+    settings: &DiagnoseSettings,
+    progress: &Progress,
+    then: impl FnOnce(Explored<'_, '_>) -> Result<R, DiagnoseError>,
+) -> Result<R, DiagnoseError> {
+    let records = base.model.problem.records;
+    let measured = measured(&twin, records, &study.beliefs())?;
+    let begin = DiagnoseSettings {
+        initial: Some(base.theta.clone()),
+        ..settings.clone()
+    };
+    let noise = Noise::new(settings.seed, "diagnose", 0);
+    let base = Base {
+        substeps: Some(substeps),
+        ..Base::new(&measured, records, &begin, noise)?
+    };
     explored(study, base, settings, ROUNDS, progress, then)
 }
 
-/// Searches for what explains the records beside a fitted twin; anew where they ask for another kind of noise.
+/// Searches for what explains the records beside a fitted twin; anew where they ask for another kind of noise, or for a finer step.
 fn explored<R>(
     study: &Study,
     base: Base<'_>,
@@ -157,6 +191,12 @@ fn explored<R>(
         if let Some(noisier) = base.with_noise(model, &twin)? {
             return explored(study, noisier, settings, rounds - 1, progress, then);
         }
+    }
+    // Beside a gap, noise levels are fitted loud, and hide the step.
+    if let (None, Some(model)) = (base.substeps, findings.best_listed())
+        && let Some(finer) = finer(study, model)?
+    {
+        return with_step(study, &base, finer, settings, progress, then);
     }
     then(Explored {
         study,
@@ -312,6 +352,7 @@ fn report(
         validation_runs: validation
             .map(|v| runs(std::slice::from_ref(v)))
             .transpose()?,
+        substeps: base.substeps,
         candidates: findings.listed.len() + findings.unknown.len(),
         not_tested: not_tested.clone(),
         seconds: 0.0,

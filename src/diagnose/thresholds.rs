@@ -9,7 +9,7 @@ pub(in crate::diagnose) struct Thresholds;
 impl Thresholds {
     /// Delays in samples, a list for each register: the shorter the register, the faster the filter.
     pub const DELAYS: [&[f64]; 3] = [&[0.5, 1.5], &[3.0], &[5.5]];
-    /// Samples that the registers of the delays hold.
+    /// Samples that the registers of the delays hold. One of 16 takes five times as long where a delay is likely.
     pub const REGISTERS: [usize; 3] = [3, 5, 8];
     /// Times of a step that are tried, evenly over the record.
     pub const TIMES: usize = 9;
@@ -76,9 +76,14 @@ impl Thresholds {
 
 /// Decision, in nats.
 impl Thresholds {
-    /// log of the odds that something is missing from which a gap is told: 7 to 1. At 1, two of 21 open trials without a gap are called
-    /// instead of one; at 4, a weak gap in ten is lost.
-    pub const GAP: f64 = 2.0;
+    /// log of the odds that something is missing from which a gap is told: 20 to 1, since prior odds are even and a false alarm in
+    /// twenty is the most. At 2, three of 21 open trials without a gap are called instead of two, and three of 22 gaps more, all below 7
+    /// nats; at 4, two more are lost.
+    pub const GAP: f64 = 3.0;
+    /// Nats by which a finer step must move the innovations, θ free to answer, to be fitted at all: less is hardly 2 nats of evidence.
+    pub const STEP_SHOWS: f64 = 1.0;
+    /// Evidence from which a finer step becomes that of the twin: 7 to 1, as the user is then asked to change the study.
+    pub const STEP_WINS: f64 = 2.0;
     /// Evidence from which noise of another kind becomes the noise of the twin: 20 to 1.
     pub const NOISE: f64 = 3.0;
     /// Prior share of listed effects among what could be missing; the rest belongs to unknown functions. At 0.4 or 0.8 evidence moves by 0.4.
@@ -104,6 +109,9 @@ impl Thresholds {
     pub const SECOND: f64 = 0.15;
     /// Largest share of the whole that may remain beside a partial explanation.
     pub const REST: f64 = 0.34;
+    /// Share of its evidence by which an unknown function alone may be better than a partial explanation. At half, the lag of a real
+    /// heater is not named; at twice, a pair is named on an open trial whose law is outside the library.
+    pub const OUTDONE: f64 = 0.15;
     /// Evidence up to which few hypotheses are refitted: nothing seems to be missing.
     pub const NULL_LIKE: f64 = 4.0;
     /// Evidence from which fits begin with loud noise, too: where much is missing, the likelihood of quiet noise has narrow valleys.

@@ -1,5 +1,6 @@
 //! The handle by which every stage holds a twin.
 
+use super::definitions::defined_states;
 use super::digital_twin::FREE_RUNS;
 use crate::record::{Drive, RecordError, Signal, Signals};
 use crate::twin::{
@@ -103,6 +104,14 @@ impl Twin {
         match self {
             Self::Equations(_) => 1,
             Self::BlackBox(_) => FREE_RUNS as usize,
+        }
+    }
+
+    /// Which states' rates are other states by definition; empty for a black box.
+    pub(crate) fn defined_states(&self) -> Vec<bool> {
+        match self {
+            Self::Equations(twin) => defined_states(twin.as_ref()),
+            Self::BlackBox(_) => vec![],
         }
     }
 

@@ -12,6 +12,7 @@
 mod adapt;
 mod advance;
 pub mod conformance;
+mod definitions;
 mod digital_twin;
 mod direction;
 mod error;

@@ -1,10 +1,11 @@
 //! Decision by posterior odds.
 //!
 //! ```text
-//! D     = log Σ w_h·Z_h − log Z_nothing               w: 0.6 shared by listed effects, 0.4 by unknown functions;  a gap if D > 2
+//! D     = log Σ w_h·Z_h − log Z_nothing               w: 0.6 shared by listed effects, 0.4 by unknown functions;  a gap if D > 3
 //! Z_nothing = Z_0 + mean_N Z_0(N)                     N: other kinds of noise, correlated or with outliers
 //! r(E)  = max_U log Z(E + U) − log Z(E)               E leaves nothing to explain if r < 4
 //! named : the largest log Z of what leaves nothing;  a larger set must be 2 nats better, an unknown function alone must not be better
+//! partial: the largest log Z, where it leaves a third at most;  an unknown function alone must not be better by 15 %
 //! ```
 
 use super::search::Found;
@@ -89,6 +90,14 @@ impl<'a> Findings<'a> {
         .filter(|f| f.model.is_some())
         .max_by(|a, b| a.gain.total_cmp(&b.gain))
         .and_then(|f| f.model.as_ref())
+    }
+
+    /// The listed effects that explain most, where something is missing.
+    pub fn best_listed(&self) -> Option<&Model<'a>> {
+        let all = self.listed.iter().chain(&self.several);
+        let gain = |f: &&Found<'a>| f.gain - self.price(f.terms.len());
+        let best = all.max_by(|a, b| gain(a).total_cmp(&gain(b)))?;
+        best.model.as_ref().filter(|_| best.gain > Thresholds::GAP)
     }
 
     /// log of the evidence of a set over that of the twin.
@@ -309,6 +318,7 @@ pub(in crate::diagnose) fn decide(
     let best = (candidates.iter()).max_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((keys, own, left)) = best
         && has_equations
+        && *own > (1.0 - Thresholds::OUTDONE) * best_unknown
         && chances.kinds.partial > chances.kinds.unknown
         && *left < Thresholds::REST * (own + left)
     {

@@ -34,9 +34,10 @@ pub(in crate::diagnose) struct Beginning {
 }
 
 impl Promise {
-    /// The best gain, in nats.
+    /// The best gain in nats, that of a mark on the outputs included.
     pub fn nats(&self) -> f64 {
-        self.starts.first().map_or(0.0, |start| start.nats)
+        let best = self.starts.first().map_or(0.0, |start| start.nats);
+        best + self.term.mark
     }
 }
 

@@ -13,7 +13,7 @@ pub(in crate::diagnose) struct Scales<'a> {
     pub outline: Outline,
     /// Root mean square of each state's rate by the twin's equations; empty without equations.
     pub rates: Vec<f64>,
-    /// States whose rate is another state, whatever θ: a position and its velocity.
+    /// States whose rate is another state by definition.
     pub defined: Vec<bool>,
 }
 
@@ -25,16 +25,16 @@ impl<'a> Scales<'a> {
         states: Vec<Signal>,
         outline: Outline,
     ) -> Self {
-        let (rates, defined) = match twin.equations() {
-            Some(equations) => along(equations, theta, records, &states),
-            None => (vec![], vec![]),
+        let rates = match twin.equations() {
+            Some(equations) => rates(equations, theta, records, &states),
+            None => vec![],
         };
         Self {
             records,
             states,
             outline,
             rates,
-            defined,
+            defined: twin.defined_states(),
         }
     }
 
@@ -83,40 +83,23 @@ impl<'a> Scales<'a> {
     }
 }
 
-/// Root mean square of the rates along states, and the states whose rate is another state.
-fn along(
-    twin: &dyn StateSpace,
-    theta: &[f64],
-    records: &[Record],
-    states: &[Signal],
-) -> (Vec<f64>, Vec<bool>) {
+/// Root mean square of the rates along states.
+fn rates(twin: &dyn StateSpace, theta: &[f64], records: &[Record], states: &[Signal]) -> Vec<f64> {
     let n = twin.outline().states.len();
     let (mut squares, mut count) = (vec![0.0; n], 0.0);
-    let mut same = vec![vec![true; n]; n];
-    let bent: Vec<f64> = theta.iter().map(|v| 1.37 * v).collect();
     for (record, states) in records.iter().zip(states) {
         let drive = record.drive();
         for k in 0..record.samples() {
-            let x = states.row(k).to_vec();
-            for (which, theta) in [theta, &bent[..]].into_iter().enumerate() {
-                let mut rate = vec![0.0; n];
-                twin.drift(
-                    &Now::new(drive.time(k), drive.step(k), drive.input(k), theta),
-                    &x,
-                    &mut rate,
-                );
-                for i in 0..n {
-                    for j in 0..n {
-                        same[i][j] &= i != j && rate[i] == x[j];
-                    }
-                    if which == 0 && rate[i].is_finite() {
-                        squares[i] += rate[i] * rate[i];
-                    }
+            let now = Now::new(drive.time(k), drive.step(k), drive.input(k), theta);
+            let mut rate = vec![0.0; n];
+            twin.drift(&now, &states.row(k).to_vec(), &mut rate);
+            for (square, rate) in squares.iter_mut().zip(rate) {
+                if rate.is_finite() {
+                    *square += rate * rate;
                 }
             }
             count += 1.0;
         }
     }
-    let rates = squares.iter().map(|s: &f64| (s / count).sqrt()).collect();
-    (rates, same.iter().map(|row| row.contains(&true)).collect())
+    squares.iter().map(|s: &f64| (s / count).sqrt()).collect()
 }

@@ -71,7 +71,7 @@ impl Decision {
 /// Evidence for a gap: something is missing against nothing is.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Detection {
-    /// log of the odds that something is missing, in nats, prior odds even: a gap above 1.
+    /// log of the odds that something is missing, in nats, prior odds even: a gap above 3.
     pub log_evidence: f64,
     /// Share of records simulated by the fitted twin with as much evidence; none unless asked for. Where no simulation has as much, an
     /// upper bound: [`Detection::at_floor`].
@@ -265,6 +265,8 @@ pub struct Diagnosis {
     pub shrinkage: Option<Shrinkage>,
     /// Sparse law for the missing function, where something unknown is missing.
     pub discovery: Option<Discovery>,
+    /// Substeps of a sample that everything here is said with, where the records ask for a finer step than the twin's.
+    pub substeps: Option<usize>,
     /// Smallest visible magnitude of each listed effect.
     pub power: Vec<Visible>,
     /// Number of explanations tested: listed effects and unknown functions.
@@ -337,6 +339,11 @@ impl Shrinkage {
     pub const FREE_RUN: &str = "free-run NRMSE";
     /// Mean log density of a sample, for effects that move no free run.
     pub const LOG_SCORE: &str = "held-out log score";
+
+    /// Errors after and of noise alone, where these are too close for a share.
+    pub(crate) fn hidden_by_noise(&self) -> Option<(f64, f64)> {
+        self.after.zip(self.floor).filter(|_| self.closed.is_none())
+    }
 }
 
 impl Serialize for Shrinkage {

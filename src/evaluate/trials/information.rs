@@ -8,11 +8,20 @@
 //! information = ½·‖d⊥‖²   in nats
 //! ```
 //!
-//! The two records share all noise. Two pairs with the same process noise and different measurement noise are made, and the square is
+//! That is a linear measure. Noise levels and a distant θ may take more of a departure, so what the best fit of the twin loses bounds it:
+//!
+//! ```text
+//! lost = mean of max ll(record without) − max ll(record with)      ll: log-likelihood of the twin, maximised over θ and noise levels
+//! ```
+//!
+//! over a record and the same with all noise of the other sign, so that no product of noise and departure counts.
+//!
+//! The two records of a pair share all noise. Two pairs with the same process noise and different measurement noise are made, and the square is
 //! taken across them: what only the noise decides, as the rounding of a sensor, then counts for nothing.
 
 use super::world::Conditions;
 use crate::fit::axis::Axis;
+use crate::fit::climb::climb;
 use crate::fit::problem::Problem;
 use crate::fit::reference::{Reference, weak};
 use crate::likelihood::kalman::{FilterError, recoverable};
@@ -28,6 +37,8 @@ const KNOWN: f64 = 1e-4;
 const FINE: usize = 20;
 /// Most substeps that a twin can have.
 const MOST: usize = 1000;
+/// Iterations of a fit from the truth.
+const ITERATIONS: usize = 30;
 
 /// Whitened change of the innovations of two records.
 pub(super) struct Change([DVector<f64>; 2]);
@@ -38,6 +49,8 @@ pub(super) struct Information<'a> {
     theta: Vec<f64>,
     first: Reference,
     again: Reference,
+    /// Log-likelihood of the best fit without departures, mean over both signs of the noise.
+    alone: f64,
 }
 
 /// θ and noise levels as they are in a world.
@@ -96,12 +109,13 @@ pub(super) fn problem<'a>(
 }
 
 impl<'a> Information<'a> {
-    /// Filters two records without departures, one each, that share their process noise; `None` where the filter fails.
+    /// Filters two records without departures, one each, that share their process noise, and fits the first one and the same with all
+    /// noise of the other sign; `None` where the filter fails.
     pub fn new(
         study: &Study,
         theta: &[f64],
         conditions: &Conditions,
-        [record, again]: [&'a [Record]; 2],
+        [record, again, mirrored]: [&'a [Record]; 3],
     ) -> Result<Option<Self>, FilterError> {
         let (problem, theta) = problem(study.twin(), study, theta, conditions, record)?;
         let known = weak(&problem) * KNOWN;
@@ -112,12 +126,41 @@ impl<'a> Information<'a> {
         let Some(again) = recoverable(problem.on(again).filtered(&theta))? else {
             return Ok(None);
         };
-        Ok(Some(Self {
+        let mut information = Self {
             again: Reference::bare(again),
+            alone: 0.0,
             first,
             problem,
             theta,
-        }))
+        };
+        let Some(alone) = information.best([&record[0], &mirrored[0]])? else {
+            return Ok(None);
+        };
+        information.alone = alone;
+        Ok(Some(information))
+    }
+
+    /// Log-likelihood of the best fit of the twin to each of these records, their mean; `None` where the filter fails.
+    fn best(&self, records: [&Record; 2]) -> Result<Option<f64>, FilterError> {
+        let mut sum = 0.0;
+        for record in records {
+            let record = std::slice::from_ref(record);
+            let Some(fitted) = climb(&self.problem.on(record), &self.theta, ITERATIONS)? else {
+                return Ok(None);
+            };
+            sum += fitted.log_likelihood;
+        }
+        Ok(Some(0.5 * sum))
+    }
+
+    /// Nats that the best fit loses by departures, from a record with them and the same with all noise of the other sign; `None` where
+    /// the filter fails. What a black box loses is not known: each of its fits costs ensembles.
+    pub fn lost(&self, records: [&Record; 2]) -> Result<Option<f64>, FilterError> {
+        if self.problem.is_simulated() {
+            return Ok(Some(f64::INFINITY));
+        }
+        let best = self.best(records)?;
+        Ok(best.map(|best| (self.alone - best).max(0.0)))
     }
 
     /// The change that departures make in the innovations, from the records with them; `None` where the filter fails.

@@ -14,17 +14,19 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// Sensors, actuators, states that are no memory, and parameters of a twin.
+    /// Sensors, actuators, states that are neither memory nor defined by another state, and parameters of a twin.
     pub fn new(twin: &Twin) -> Self {
         let (outline, signals) = (twin.outline(), twin.signals());
         let states: Vec<String> = (outline.iter())
             .flat_map(|o| o.states.iter().map(|s| s.name.clone()))
             .collect();
+        let defined = twin.defined_states();
         let mut named = Vec::new();
         let signals_of = |kind| targets(kind, None, &signals);
+        let is_defined = |place| matches!(place, Place::State(i) if defined.get(i) == Some(&true));
         let mut add = |names: Vec<String>, place: fn(usize) -> Place| {
             for (i, name) in names.into_iter().enumerate() {
-                if !is_memory(&name) {
+                if !is_memory(&name) && !is_defined(place(i)) {
                     named.push((place(i), name));
                 }
             }

@@ -14,7 +14,7 @@ pub(super) fn story(units: &Units, diagnosis: &Diagnosis) -> (String, Vec<String
     let mut sentences = effects(units, diagnosis);
     sentences.extend(how_sure(diagnosis));
     sentences.extend(how_far(diagnosis));
-    sentences.push(next(diagnosis).to_owned());
+    sentences.push(next(diagnosis));
     (headline(diagnosis), sentences)
 }
 
@@ -92,10 +92,10 @@ fn how_sure(diagnosis: &Diagnosis) -> Option<String> {
 /// The share of the gap that closes.
 fn how_far(diagnosis: &Diagnosis) -> Option<String> {
     let s = diagnosis.shrinkage.as_ref()?;
-    let (Some(closed), Some([low, high])) = (s.closed, s.interval) else {
-        let is_near = s.after.is_some() && s.floor.is_some();
-        return is_near.then(|| "Noise hides how much of the gap closes.".to_owned());
-    };
+    if s.hidden_by_noise().is_some() {
+        return Some("Noise hides how much of the gap closes.".to_owned());
+    }
+    let (closed, [low, high]) = (s.closed?, s.interval?);
     let ahead = match s.horizon {
         Some(seconds) => format!("{} s ahead", short(seconds)),
         None => "of the free run".to_owned(),
@@ -109,8 +109,15 @@ fn how_far(diagnosis: &Diagnosis) -> Option<String> {
 }
 
 /// Advice on what to do.
-pub(super) fn next(diagnosis: &Diagnosis) -> &'static str {
-    match (diagnosis.verdict, diagnosis.cause.decision) {
+pub(super) fn next(diagnosis: &Diagnosis) -> String {
+    if let Some(substeps) = diagnosis.substeps
+        && diagnosis.verdict != Verdict::StructuralGap
+    {
+        return format!(
+            "Next: set [record] substeps = {substeps}; the twin's own step is too long."
+        );
+    }
+    let next = match (diagnosis.verdict, diagnosis.cause.decision) {
         (Verdict::NoGap, _) => "Next: use the twin, within the range of this record.",
         (Verdict::ParameterGap, _) => "Next: widen [prior] to these parameters.",
         (_, Decision::Named) => "Next: add it to the study and fit again.",
@@ -121,7 +128,8 @@ pub(super) fn next(diagnosis: &Diagnosis) -> &'static str {
         }
         (_, Decision::Class) => "Next: another record, with other inputs, may tell them apart.",
         _ => "Next: look at the system there, with the missing function in mind.",
-    }
+    };
+    next.to_owned()
 }
 
 #[cfg(test)]
@@ -145,6 +153,17 @@ mod tests {
             assert!(headline.chars().count() <= 140, "{headline}");
             assert!(!words.contains('{'), "{words}");
         }
+    }
+
+    #[test]
+    fn a_step_that_is_too_long_comes_first() {
+        let diagnosis = Diagnosis {
+            substeps: Some(4),
+            ..made::oscillator_no_gap()
+        };
+        let (_, sentences) = story(&Units::of(&oscillator()), &diagnosis);
+        let last = sentences.last().unwrap();
+        assert!(last.contains("substeps = 4"), "{last}");
     }
 
     #[test]

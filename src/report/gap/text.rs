@@ -25,6 +25,7 @@ pub fn gap_text(study: &Study, diagnosis: &Diagnosis) -> String {
     let mut lines = vec![headline(diagnosis)];
     lines.extend((!told.is_empty()).then_some(told));
     lines.push(evidence_sentence(diagnosis));
+    lines.extend(step_sentence(diagnosis));
     let parameters: Vec<String> = (diagnosis.parameters.iter())
         .map(|p| {
             let known = if p.identified {
@@ -62,7 +63,7 @@ pub fn gap_text(study: &Study, diagnosis: &Diagnosis) -> String {
     });
     lines.push(match &diagnosis.cause.next_input {
         Some(input) => measure_next(input),
-        None => next(diagnosis).to_owned(),
+        None => next(diagnosis),
     });
     lines.push(format!(
         "{} explanations, {} s.",
@@ -84,6 +85,14 @@ pub(super) fn evidence_sentence(diagnosis: &Diagnosis) -> String {
         short(diagnosis.detection.log_evidence),
         chance(diagnosis.cause.probabilities.nothing)
     )
+}
+
+/// Returns with which step everything is said; none where it is the twin's own.
+pub(super) fn step_sentence(diagnosis: &Diagnosis) -> Option<String> {
+    let substeps = diagnosis.substeps?;
+    Some(format!(
+        "The twin's own step is too long for this record: all this is said with [record] substeps = {substeps}."
+    ))
 }
 
 /// Returns the p-value by simulation; none where it was not asked for.
@@ -162,15 +171,12 @@ pub(super) fn closed_sentence(s: &Shrinkage) -> String {
     if let Some(floor) = s.floor {
         text.push_str(&format!(", noise alone {}", short(floor)));
     }
-    match (s.closed, s.interval) {
-        (Some(closed), Some(ends)) => {
-            let (closed, [low, high]) = (percent(closed), ends.map(percent));
-            text.push_str(&format!("; {closed} of the gap closed ({low} to {high})"));
-        }
-        _ if s.after.is_some() && s.floor.is_some() => {
-            text.push_str("; too near to noise for a share of the gap");
-        }
-        _ => {}
+    if let (Some(closed), Some(ends)) = (s.closed, s.interval) {
+        let (closed, [low, high]) = (percent(closed), ends.map(percent));
+        text.push_str(&format!("; {closed} of the gap closed ({low} to {high})"));
+    }
+    if s.hidden_by_noise().is_some() {
+        text.push_str("; too near to noise for a share of the gap");
     }
     text + "."
 }

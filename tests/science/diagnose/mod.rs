@@ -66,6 +66,20 @@ fn clear_effects_are_found_and_named() {
     }
 }
 
+/// Steps of a converter below the noise that the twin declares are told by the values themselves, whatever noise could take.
+#[test]
+fn a_rounded_sensor_is_known_by_its_values() {
+    let (study, key) = (study("tanks"), "sensor-quantization@sensor");
+    let text = "[[effect]]\nid='sensor-quantization'\ntarget='sensor'\nmagnitudes={step=0.23}\n";
+    let noise = Noise::new(33, key, 0);
+    let drive = drive(&study, noise);
+    let theta = study.twin().parameters().centre();
+    let record = record(study.twin(), text, &theta, drive, noise);
+    let found = found(&study, record, None);
+    println!("{}", line(key, &found));
+    assert_eq!(found.cause.accepted, [key]);
+}
+
 /// A gain of the pump is nothing but another k4: no structural gap.
 #[test]
 fn what_parameters_absorb_is_no_structural_gap() {

@@ -239,12 +239,11 @@ impl<'a> TruthSampler<'a> {
             draws,
             scene: &scene,
         };
-        let Some([plain, again]) = stage.records(&[]) else {
+        let Some(plain) = stage.records(&[]) else {
             return Ok(Err(Reject::Diverged));
         };
-        let (plain, again) = ([plain], [again]);
-        let information = Information::new(self.study, &theta, &conditions, [&plain, &again])?;
-        let Some(information) = information else {
+        let plain = plain.each_ref().map(std::slice::from_ref);
+        let Some(information) = Information::new(self.study, &theta, &conditions, plain)? else {
             return Ok(Err(Reject::NoFilter));
         };
         let mut truth = Truth {

@@ -36,8 +36,9 @@ pub(super) struct Sized {
 }
 
 impl Stage<'_> {
-    /// Makes the record with these departures, and once more with other measurement noise; `None` where it diverges.
-    pub fn records(&self, departures: &[Departure]) -> Option<[Record; 2]> {
+    /// Makes the record with these departures; once more with other measurement noise; and with all noise of the other sign. `None`
+    /// where it diverges.
+    pub fn records(&self, departures: &[Departure]) -> Option<[Record; 3]> {
         let record = |draws: Draws| {
             let system = System {
                 theta: self.theta,
@@ -50,7 +51,9 @@ impl Stage<'_> {
             }
             Record::new(run.drive, run.outputs).ok()
         };
-        Some([record(self.draws)?, record(self.draws.remeasured())?])
+        let all = [self.draws, self.draws.remeasured(), self.draws.mirrored()];
+        let [own, again, mirrored] = all.map(record);
+        Some([own?, again?, mirrored?])
     }
 
     /// The departure of a size, and what it changes; `None` where it cannot be made or diverges.
@@ -63,11 +66,14 @@ impl Stage<'_> {
         let Some(departure) = draft.of_size(size, self.scene) else {
             return Ok(None);
         };
-        let Some(records) = self.records(std::slice::from_ref(&departure)) else {
+        let Some([own, again, mirrored]) = self.records(std::slice::from_ref(&departure)) else {
             return Ok(None);
         };
-        Ok(information.change(records)?.map(|change| Sized {
-            nats: information.nats(&change),
+        let Some(lost) = information.lost([&own, &mirrored])? else {
+            return Ok(None);
+        };
+        Ok(information.change([own, again])?.map(|change| Sized {
+            nats: information.nats(&change).min(lost),
             departure,
             change,
         }))
@@ -79,8 +85,11 @@ impl Stage<'_> {
         draft: &Draft,
         information: &Information<'_>,
     ) -> Result<Option<Change>, EvaluateError> {
-        let small = self.of_size(draft, FIRST, information)?;
-        Ok(small.map(|sized| sized.change))
+        let small = draft.of_size(FIRST, self.scene);
+        let Some([own, again, _]) = small.and_then(|small| self.records(&[small])) else {
+            return Ok(None);
+        };
+        Ok(information.change([own, again])?)
     }
 
     /// Searches the size at which a departure has about `wanted` nats; `None` where none comes near.

@@ -63,7 +63,7 @@ pub(super) fn run(
         plant.sense(t, dt, &x, own, false, &mut y);
         for (j, y) in y.iter_mut().enumerate() {
             let added = conditions.added.get(j).copied().unwrap_or(0.0);
-            let level = conditions.measurement * r[j].hypot(added);
+            let level = draws.sign * conditions.measurement * r[j].hypot(added);
             *y += level * measurement[j].next();
         }
         plant.sense(t, dt, &x, own, true, &mut y);
@@ -88,7 +88,7 @@ pub(super) fn run(
         };
         plant.advance(&now, &next, &command, &mut x);
         for ((x, q), noise) in x.iter_mut().zip(&q).zip(&mut process) {
-            *x += conditions.process * q * noise.next();
+            *x += draws.sign * conditions.process * q * noise.next();
         }
         twin.constrain(&now, &mut x);
         plant.overflow(&mut x);

@@ -35,6 +35,8 @@ pub(super) struct Draws {
     /// Process noise, start, gaps.
     pub process: Noise,
     pub measurement: Noise,
+    /// Sign of all noise: 1 or −1.
+    pub sign: f64,
 }
 
 impl Draws {
@@ -43,6 +45,7 @@ impl Draws {
         Self {
             process: noise.child("world process"),
             measurement: noise.child("world measurement"),
+            sign: 1.0,
         }
     }
 
@@ -50,6 +53,14 @@ impl Draws {
     pub fn remeasured(self) -> Self {
         Self {
             measurement: self.measurement.child("again"),
+            ..self
+        }
+    }
+
+    /// The same with all noise of the other sign.
+    pub fn mirrored(self) -> Self {
+        Self {
+            sign: -self.sign,
             ..self
         }
     }

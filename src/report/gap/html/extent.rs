@@ -46,10 +46,7 @@ fn body(diagnosis: &Diagnosis) -> String {
             short(after)
         )));
     }
-    if s.closed.is_none()
-        && let (Some(after), Some(floor)) = (s.after, s.floor)
-        && s.metric != Shrinkage::LOG_SCORE
-    {
+    if let Some((after, floor)) = s.hidden_by_noise() {
         body.push_str(&paragraph(&format!(
             "No share is given: the error before ({}) and the floor ({}) are too close; the error after is {}.",
             short(s.before),

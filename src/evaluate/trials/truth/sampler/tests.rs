@@ -139,6 +139,13 @@ fn information_is_that_of_theory() {
         fn noise(&self, _: &Now<'_>, _: &mut [f64], measurement: &mut [f64]) {
             measurement[0] = 0.1;
         }
+        fn stepping(&self) -> crate::twin::Stepping {
+            // As fine as the world's: a step that shows would be fitted as noise.
+            crate::twin::Stepping {
+                substeps: 16,
+                ..Default::default()
+            }
+        }
         fn integrator(&self) -> crate::twin::Integrator {
             crate::twin::Integrator::RungeKutta4
         }
@@ -159,20 +166,24 @@ fn information_is_that_of_theory() {
         draws,
         scene: &scene,
     };
-    let [plain, again] = stage.records(&[]).unwrap();
-    let (plain, again) = ([plain], [again]);
-    let information = Information::new(&study, &theta, &conditions, [&plain, &again]);
+    let plain = stage.records(&[]).unwrap();
+    let plain = plain.each_ref().map(std::slice::from_ref);
+    let information = Information::new(&study, &theta, &conditions, plain);
     let information = information.unwrap().unwrap();
     let draft = Draft::shapeless("sensor-bias", Place::Sensor(0), None).unwrap();
     let departure = draft.of_size(0.05, &scene).unwrap();
     let bias = 0.05 * scene.outputs[0].deviation;
-    let records = stage.records(&[departure]).unwrap();
-    let change = information.change(records).unwrap().unwrap();
+    let [own, again, mirrored] = stage.records(&[departure]).unwrap();
+    let lost = information.lost([&own, &mirrored]).unwrap().unwrap();
+    let change = information.change([own, again]).unwrap().unwrap();
     let (nats, theory) = (
         information.nats(&change),
         0.5 * 400.0 * (bias / 0.1).powi(2),
     );
     assert!((nats / theory - 1.0).abs() < 0.15, "{nats} {theory}");
+    // A fitted noise level takes a part of a bias: N/2·log(1 + (b/r)²).
+    let absorbed = 0.5 * 400.0 * (1.0 + (bias / 0.1).powi(2)).ln();
+    assert!((lost / absorbed - 1.0).abs() < 0.15, "{lost} {absorbed}");
     // The gain of the actuator is what θ does; the bias is no gain.
     let gain = Draft::shapeless("actuator-gain", Place::Actuator(0), None).unwrap();
     let gain = stage.direction(&gain, &information).unwrap().unwrap();
