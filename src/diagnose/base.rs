@@ -180,7 +180,7 @@ mod tests {
 
     #[test]
     fn evidence_comes_before_the_prior() {
-        assert_eq!(verdict(3.0, true), Verdict::StructuralGap);
+        assert_eq!(verdict(4.0, true), Verdict::StructuralGap);
         assert_eq!(verdict(-1.0, true), Verdict::ParameterGap);
         assert_eq!(verdict(-1.0, false), Verdict::NoGap);
     }

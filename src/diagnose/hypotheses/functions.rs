@@ -119,7 +119,7 @@ fn sines(value: f64, (a, b): (f64, f64), out: &mut [f64]) {
 }
 
 /// The sum of a function of one variable.
-fn sum_of_one(m: &[f64], value: f64, ends: (f64, f64)) -> f64 {
+pub(super) fn sum_of_one(m: &[f64], value: f64, ends: (f64, f64)) -> f64 {
     let mut phi = [0.0; TERMS];
     sines(value, ends, &mut phi[..m.len()]);
     m.iter().zip(phi).map(|(m, phi)| m * phi).sum()
@@ -262,6 +262,29 @@ pub(super) fn of_signal(target: &str, is_sensor: bool, variable: &Variable, larg
         largest,
         seen,
     )
+}
+
+/// An unknown function of a state or an input that is added to an output.
+pub(super) fn of_reading(target: &str, output: usize, variable: &Variable, largest: f64) -> Term {
+    let ends = variable.ends();
+    Term {
+        id: format!("f({})", variable.name),
+        target: target.into(),
+        nature: Nature::Function,
+        part: Part::Reading {
+            output,
+            of: variable.of,
+            ends,
+        },
+        axes: vec![coefficient(largest); TERMS],
+        family: Some((weights(1), largest)),
+        starts: vec![Start {
+            m: vec![0.0; TERMS],
+            scales: false,
+        }],
+        variables: vec![(variable.name.clone(), ends.0, ends.1)],
+        mark: 0.0,
+    }
 }
 
 /// An unknown answer of a signal to its past: s + Σ β_k·(s seen through a first-order lag of τ_k − s).

@@ -6,11 +6,12 @@ pub(in crate::diagnose) mod entry;
 pub(in crate::diagnose) mod functions;
 pub(in crate::diagnose) mod listed;
 pub(in crate::diagnose) mod noise;
+mod readings;
 pub(in crate::diagnose) mod scales;
 pub(in crate::diagnose) mod term;
 
 use self::entry::Entry;
-use self::functions::{Of, PASTS, Variable, of_past, of_signal, of_state, wave};
+use self::functions::{Of, PASTS, Variable, of_past, of_reading, of_signal, of_state, wave};
 use self::listed::Library;
 use self::scales::Scales;
 use self::term::{Nature, Part, Start, Term};
@@ -176,6 +177,11 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
             terms.push(of_signal(&target, is_sensor, &seen, size));
             if has_equations {
                 terms.push(of_past(&target, is_sensor, name, past));
+            }
+            if has_equations && is_sensor {
+                let states = of_states.iter().map(|(_, state)| state);
+                let others = states.chain(&of_inputs);
+                terms.extend(others.map(|other| of_reading(&target, j, other, size)));
             }
             if is_sensor || !has_equations {
                 let entry = if is_sensor {

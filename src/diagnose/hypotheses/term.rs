@@ -2,6 +2,8 @@
 
 use super::disturbed_equations::disturbed;
 use super::entry::Entry;
+use super::functions::Of;
+use super::readings::with_reading;
 use crate::diagnose::error::DiagnoseError;
 use crate::effect::{Effect, EffectKey, augment_short};
 use crate::fit::axis::Axis;
@@ -36,6 +38,12 @@ pub(in crate::diagnose) enum Part {
     },
     /// A disturbance that keeps a share `memory` of itself at each step.
     Disturbance { entry: Entry, memory: f64 },
+    /// A function of a state or an input, drawn between `ends`, that is added to an output.
+    Reading {
+        output: usize,
+        of: Of,
+        ends: (f64, f64),
+    },
 }
 
 /// Values of a term's magnitudes at which a search looks.
@@ -77,6 +85,7 @@ impl Term {
         match &self.part {
             Part::Effect { effect, .. } => effect.law().is_noise(),
             Part::Disturbance { .. } => true,
+            Part::Reading { .. } => false,
         }
     }
 
@@ -87,12 +96,12 @@ impl Term {
                 .filter(|m| !held.contains_key(m.name))
                 .map(|m| effect.key().magnitude(m.name))
                 .collect(),
-            Part::Disturbance { .. } => vec![],
+            Part::Disturbance { .. } | Part::Reading { .. } => vec![],
         }
     }
 }
 
-/// The twin with terms: effects first, a disturbance last.
+/// The twin with terms: effects first, a disturbance or a function of an output last.
 pub(in crate::diagnose) fn with_terms<'t>(
     base: &Twin,
     terms: impl Iterator<Item = &'t Term> + Clone,
@@ -109,6 +118,7 @@ pub(in crate::diagnose) fn with_terms<'t>(
     let twin = fix(augment_short(base.clone(), effects, memories)?, &off)?;
     Ok(terms.fold(twin, |twin, term| match term.part {
         Part::Disturbance { entry, memory } => disturbed(twin, entry, memory),
+        Part::Reading { output, of, ends } => with_reading(twin, output, of, ends),
         Part::Effect { .. } => twin,
     }))
 }
