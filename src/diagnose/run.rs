@@ -397,15 +397,16 @@ fn located(
     targets.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let accepted = findings.model(&conclusion.accepted);
     let accepted = accepted.map(|model| model.terms[0].target.clone());
-    let mut functions = told(&findings.unknown, false, 0.0);
+    let target = accepted.or_else(|| targets.first().map(|t| t.target.clone()));
+    let mut functions = told(&findings.unknown, target.as_deref(), false, 0.0);
     if let Some((keys, on_top)) = findings.beside(&conclusion.accepted) {
         let floor = findings.gain(keys).unwrap_or(0.0);
-        functions.extend(told(on_top, true, floor));
+        functions.extend(told(on_top, target.as_deref(), true, floor));
     }
     let best = findings.best();
     Ok(Location {
         maps: maps(model, best)?,
-        target: accepted.or_else(|| targets.first().map(|t| t.target.clone())),
+        target,
         targets,
         functions,
         ..Location::default()

@@ -115,17 +115,19 @@ impl Twin {
         }
     }
 
+    /// The twin with changed equations; a black box stays.
+    pub(crate) fn modified<M: Modify>(self, change: impl FnOnce(Arc<dyn StateSpace>) -> M) -> Self {
+        match self {
+            Self::Equations(base) => Self::Equations(Arc::new(Modified(change(base)))),
+            Self::BlackBox(_) => self,
+        }
+    }
+
     /// The twin with another stepping, as `change` makes it; `None` for a black box.
     pub(crate) fn stepped(&self, change: impl FnOnce(&mut Stepping)) -> Option<Self> {
-        let Self::Equations(base) = self else {
-            return None;
-        };
-        let (base, mut stepping) = (base.clone(), base.stepping());
+        let mut stepping = self.equations()?.stepping();
         change(&mut stepping);
-        Some(Self::Equations(Arc::new(Modified(Stepped {
-            base,
-            stepping,
-        }))))
+        Some(self.clone().modified(|base| Stepped { base, stepping }))
     }
 
     /// The twin with `hook` called before each of its runs; an error of the hook stops the run.

@@ -215,6 +215,14 @@ pub(in crate::diagnose) fn listed<'a>(
             all[i] = found;
         }
     }
+    // A filter sees rounding by its first two moments, and may be worse off with it than with louder noise; the values bear its mark
+    // all the same.
+    for found in &mut all {
+        let mark = found.last().mark;
+        if mark > 0.0 {
+            found.gain = found.gain.max(floor + mark);
+        }
+    }
     // What was not refitted is no better than its promise.
     for promise in &promises {
         if !all
@@ -263,6 +271,7 @@ pub(in crate::diagnose) fn unknown<'a>(
             0.0,
             breadth.functions,
         ),
+        (&[Nature::Reading], 0.0, half),
         (&[Nature::Periodic], PRICE_OF_FREQUENCY, half),
     ] {
         let linear = functions(model, &of(natures))?;

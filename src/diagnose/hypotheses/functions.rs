@@ -9,19 +9,14 @@
 //!
 //! Source: Solin & Särkkä, "Hilbert space methods for reduced-rank Gaussian process regression", *Statistics and Computing* 30 (2020).
 
+use super::basis::{Of, TERMS, pairs, sum_of_one, sum_of_two};
 use super::term::{Nature, Part, Start, Term};
 use crate::effect::{Effect, EffectKind, Magnitude};
 use crate::fit::axis::{Axis, EvidencePrior};
 use crate::twin::{Interval, Parameter};
 use std::collections::BTreeMap;
-use std::f64::consts::{PI, SQRT_2};
+use std::f64::consts::PI;
 
-/// Terms of a function of one variable. At the shortest length the last one has e^−2 of the first one's variance; half of them cannot
-/// turn as fast as a ceiling does, twice of them double the time.
-pub(super) const TERMS: usize = 10;
-/// Most that the orders of a product of two add up to.
-const ORDER: usize = 7;
-const HIGHEST: usize = 6;
 /// Lengths in ranges of the variable.
 const LENGTHS: [f64; 3] = [0.15, 0.3, 0.7];
 const LENGTHS_OF_TWO: [f64; 2] = [0.3, 0.7];
@@ -45,17 +40,6 @@ pub(in crate::diagnose) struct Variable {
     pub high: f64,
 }
 
-/// Kind of a function's variable.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::diagnose) enum Of {
-    /// State of this index.
-    State(usize),
-    /// Input of this index.
-    Input(usize),
-    /// The signal that passes a sensor or actuator.
-    Signal,
-}
-
 impl Variable {
     fn ends(&self) -> (f64, f64) {
         let span = (self.high - self.low)
@@ -63,13 +47,6 @@ impl Variable {
             .max(f64::MIN_POSITIVE);
         (self.low - MARGIN * span, self.high + MARGIN * span)
     }
-}
-
-/// Pairs of orders of a function of two variables.
-fn pairs() -> impl Iterator<Item = (usize, usize)> {
-    (1..=HIGHEST)
-        .flat_map(|i| (1..=HIGHEST).map(move |j| (i, j)))
-        .filter(|(i, j)| i + j <= ORDER)
 }
 
 /// Weights of the coefficients for each length.
@@ -105,45 +82,6 @@ fn weights(variables: usize) -> Vec<Vec<f64>> {
             })
             .to_vec(),
     }
-}
-
-/// √2·sin(kπz) for k = 1… into `out`, z = (value − a)/(b − a) held in [0, 1].
-fn sines(value: f64, (a, b): (f64, f64), out: &mut [f64]) {
-    let z = ((value - a) / (b - a)).clamp(0.0, 1.0);
-    let (sin, cos) = (PI * z).sin_cos();
-    let (mut before, mut now) = (0.0, SQRT_2 * sin);
-    for out in out {
-        *out = now;
-        (before, now) = (now, 2.0 * cos * now - before);
-    }
-}
-
-/// The sum of a function of one variable.
-pub(super) fn sum_of_one(m: &[f64], value: f64, ends: (f64, f64)) -> f64 {
-    let mut phi = [0.0; TERMS];
-    sines(value, ends, &mut phi[..m.len()]);
-    m.iter().zip(phi).map(|(m, phi)| m * phi).sum()
-}
-
-fn sum_of_two(m: &[f64], values: [f64; 2], ends: [(f64, f64); 2]) -> f64 {
-    let mut phi = [[0.0; HIGHEST]; 2];
-    for ((phi, value), ends) in phi.iter_mut().zip(values).zip(ends) {
-        sines(value, ends, phi);
-    }
-    (pairs().zip(m))
-        .map(|((i, j), m)| m * phi[0][i - 1] * phi[1][j - 1] * std::f64::consts::FRAC_1_SQRT_2)
-        .sum()
-}
-
-/// The value of a fitted function where its variable is `value`; of one variable.
-pub(in crate::diagnose) fn basis(
-    value: f64,
-    variable: &(String, f64, f64),
-    count: usize,
-) -> Vec<f64> {
-    let mut phi = vec![0.0; count];
-    sines(value, (variable.1, variable.2), &mut phi);
-    phi
 }
 
 fn with_coefficients(mut kind: EffectKind, count: usize) -> EffectKind {
@@ -270,7 +208,7 @@ pub(super) fn of_reading(target: &str, output: usize, variable: &Variable, large
     Term {
         id: format!("f({})", variable.name),
         target: target.into(),
-        nature: Nature::Function,
+        nature: Nature::Reading,
         part: Part::Reading {
             output,
             of: variable.of,
@@ -347,17 +285,6 @@ pub(super) fn wave(kind: &str, target: &str, largest: f64, frequency: Axis) -> T
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Sines by their recurrence.
-    #[test]
-    fn terms_are_sines() {
-        let mut phi = [0.0; TERMS];
-        sines(0.3, (-1.0, 2.0), &mut phi);
-        for (k, value) in (1..).zip(phi) {
-            let expected = SQRT_2 * (f64::from(k) * PI * 1.3 / 3.0).sin();
-            assert!((value - expected).abs() < 1e-12, "{k}");
-        }
-    }
 
     #[test]
     fn weights_add_up_to_one_and_long_lengths_are_smooth() {

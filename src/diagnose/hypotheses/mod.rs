@@ -1,5 +1,6 @@
 //! Hypotheses of what could be missing: listed effects, and unknown functions of states, of the past, of time.
 
+pub(in crate::diagnose) mod basis;
 pub(in crate::diagnose) mod disturbed_equations;
 mod disturbed_signals;
 pub(in crate::diagnose) mod entry;
@@ -10,8 +11,9 @@ mod readings;
 pub(in crate::diagnose) mod scales;
 pub(in crate::diagnose) mod term;
 
+use self::basis::Of;
 use self::entry::Entry;
-use self::functions::{Of, PASTS, Variable, of_past, of_reading, of_signal, of_state, wave};
+use self::functions::{PASTS, Variable, of_past, of_reading, of_signal, of_state, wave};
 use self::listed::Library;
 use self::scales::Scales;
 use self::term::{Nature, Part, Start, Term};

@@ -1,8 +1,8 @@
 //! Unknown functions of states and inputs that an output may have beside what the twin's equations give it.
 
-use super::functions::{Of, TERMS, sum_of_one};
+use super::basis::{Of, TERMS, sum_of_one};
 use crate::twin::{
-    Layout, Modified, Modify, Now, Outline, Parameter, ParameterSpace, Role, StateSpace, Twin,
+    Layout, Modify, Now, Outline, Parameter, ParameterSpace, Role, StateSpace, Twin,
 };
 use std::sync::Arc;
 
@@ -13,21 +13,21 @@ pub(in crate::diagnose) fn with_reading(
     of: Of,
     ends: (f64, f64),
 ) -> Twin {
-    let Twin::Equations(base) = base else {
-        return base;
-    };
-    let mut outline = base.outline();
-    let coefficients = (1..=TERMS)
-        .map(|k| Parameter::new(&format!("reading/{k}"), "", -1.0, 1.0).with_role(Role::Magnitude));
-    outline.parameters =
-        ParameterSpace::new(outline.parameters.iter().cloned().chain(coefficients));
-    Twin::Equations(Arc::new(Modified(Reading {
-        base,
-        output,
-        of,
-        ends,
-        outline,
-    })))
+    base.modified(|base| {
+        let mut outline = base.outline();
+        let coefficients = (1..=TERMS).map(|k| {
+            Parameter::new(&format!("reading/{k}"), "", -1.0, 1.0).with_role(Role::Magnitude)
+        });
+        outline.parameters =
+            ParameterSpace::new(outline.parameters.iter().cloned().chain(coefficients));
+        Reading {
+            base,
+            output,
+            of,
+            ends,
+            outline,
+        }
+    })
 }
 
 struct Reading {

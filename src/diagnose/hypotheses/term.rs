@@ -1,8 +1,8 @@
 //! One hypothesis of what a twin lacks: a term that is added to it.
 
+use super::basis::Of;
 use super::disturbed_equations::disturbed;
 use super::entry::Entry;
-use super::functions::Of;
 use super::readings::with_reading;
 use crate::diagnose::error::DiagnoseError;
 use crate::effect::{Effect, EffectKey, augment_short};
@@ -17,6 +17,8 @@ pub(in crate::diagnose) enum Nature {
     Listed,
     /// An unknown function of states, inputs or signals.
     Function,
+    /// An unknown function of a state or an input at an output.
+    Reading,
     /// An unknown answer to the past of a signal.
     Past,
     /// An unknown function of time that wanders.

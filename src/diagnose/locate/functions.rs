@@ -1,7 +1,7 @@
 //! Missing functions as they were fitted: values, errors, the range that the records show.
 
 use crate::diagnose::explain::search::Found;
-use crate::diagnose::hypotheses::functions::basis;
+use crate::diagnose::hypotheses::basis::basis;
 use crate::diagnose::hypotheses::term::Nature;
 use crate::diagnose::model::Model;
 use crate::diagnose::outcome::MissingFunction;
@@ -53,14 +53,20 @@ pub(in crate::diagnose) fn curve(model: &Model<'_>) -> Option<Curve> {
     })
 }
 
-/// Fitted functions of one variable, clearest first; `floor` is the evidence of the model that they stand beside.
+/// Fitted functions of one variable, those at `place` first, then the clearest; `floor` is the evidence of the model that they stand
+/// beside.
 pub(in crate::diagnose) fn told(
     all: &[Found<'_>],
+    place: Option<&str>,
     on_top: bool,
     floor: f64,
 ) -> Vec<MissingFunction> {
-    (all.iter())
-        .filter(|f| f.last().nature == Nature::Function && f.gain > floor)
+    let is_there = |found: &Found<'_>| Some(found.last().target.as_str()) == place;
+    let there = all.iter().filter(|found| is_there(found));
+    let elsewhere = all.iter().filter(|found| !is_there(found));
+    (there.chain(elsewhere))
+        .filter(|f| [Nature::Function, Nature::Reading].contains(&f.last().nature))
+        .filter(|f| f.gain > floor)
         .filter_map(|found| {
             let model = found.model.as_ref()?;
             let curve = curve(model)?;
