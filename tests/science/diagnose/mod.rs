@@ -66,18 +66,20 @@ fn clear_effects_are_found_and_named() {
     }
 }
 
-/// Steps of a converter below the noise that the twin declares are told by the values themselves, whatever noise could take.
+/// Steps of a converter that louder noise could pass for are told by the values themselves.
 #[test]
 fn a_rounded_sensor_is_known_by_its_values() {
     let (study, key) = (study("tanks"), "sensor-quantization@sensor");
-    let text = "[[effect]]\nid='sensor-quantization'\ntarget='sensor'\nmagnitudes={step=0.23}\n";
+    let text = "[[effect]]\nid='sensor-quantization'\ntarget='sensor'\nmagnitudes={step=0.4}\n";
     let noise = Noise::new(33, key, 0);
     let drive = drive(&study, noise);
     let theta = study.twin().parameters().centre();
     let record = record(study.twin(), text, &theta, drive, noise);
     let found = found(&study, record, None);
     println!("{}", line(key, &found));
-    assert_eq!(found.cause.accepted, [key]);
+    assert_eq!(found.verdict, Verdict::StructuralGap);
+    assert_eq!(found.cause.effects[0].key(), key);
+    assert!(found.cause.effects[0].probability > 0.9);
 }
 
 /// A gain of the pump is nothing but another k4: no structural gap.
