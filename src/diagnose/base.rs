@@ -7,6 +7,7 @@ use super::model::Model;
 use super::outcome::Verdict;
 use super::residuals::frequencies::frequencies;
 use super::settings::DiagnoseSettings;
+use super::step::FinerStep;
 use super::thresholds::Thresholds;
 use crate::effect::{TargetKind, targets};
 use crate::fit::axis::Axis;
@@ -34,8 +35,8 @@ pub(in crate::diagnose) struct Base<'a> {
     pub noisy: Vec<String>,
     /// Kinds of noise that the records asked for.
     pub noises: Vec<Arc<Term>>,
-    /// Substeps of a sample, where the records asked for a finer step.
-    pub substeps: Option<usize>,
+    /// The finer step that the records asked for.
+    pub step: Option<FinerStep>,
 }
 
 impl<'a> Base<'a> {
@@ -44,7 +45,6 @@ impl<'a> Base<'a> {
         measured: &'a Measured,
         records: &'a [Record],
         settings: &DiagnoseSettings,
-        noise: Noise,
     ) -> Result<Self, DiagnoseError> {
         let twin = &measured.twin;
         let space = twin.parameters();
@@ -67,7 +67,8 @@ impl<'a> Base<'a> {
             found.into_iter().next().map(|fitted| (problem, fitted))
         } else {
             let problem = Problem::of_twin(twin, records);
-            base_fit(&problem, initial.as_deref(), noise)?.map(|fitted| (problem, fitted))
+            base_fit(&problem, initial.as_deref(), settings.noise())?
+                .map(|fitted| (problem, fitted))
         };
         let (problem, fitted) = fitted.ok_or(DiagnoseError::NoFit)?;
         let model = Model::bare(twin, problem, fitted).ok_or(DiagnoseError::NoFit)?;
@@ -82,7 +83,7 @@ impl<'a> Base<'a> {
             .filter(|parameter| parameter.role == Role::Noise)
             .map(|parameter| place(parameter.target()))
             .collect();
-        Self::of(model, noisy, vec![])
+        Self::of(model, noisy, vec![], None)
     }
 
     /// The twin with another kind of noise, fitted; `twin` is that of the model.
@@ -98,17 +99,14 @@ impl<'a> Base<'a> {
             return Ok(None);
         };
         let noises = self.noises.iter().chain(&found.terms).cloned().collect();
-        let base = Base::of(model, self.noisy.clone(), noises)?;
-        Ok(Some(Base {
-            substeps: self.substeps,
-            ..base
-        }))
+        Base::of(model, self.noisy.clone(), noises, self.step).map(Some)
     }
 
     fn of(
         model: Model<'a>,
         noisy: Vec<String>,
         noises: Vec<Arc<Term>>,
+        step: Option<FinerStep>,
     ) -> Result<Self, DiagnoseError> {
         let (theta, outline) = (model.theta(), model.problem.outline());
         let records = model.problem.records;
@@ -119,7 +117,7 @@ impl<'a> Base<'a> {
             noises,
             theta,
             model,
-            substeps: None,
+            step,
         })
     }
 }

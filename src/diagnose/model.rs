@@ -7,7 +7,7 @@ use crate::fit::climb::{Fitted, climb};
 use crate::fit::evidence::{CREDIT, Laplace, laplace};
 use crate::fit::problem::Problem;
 use crate::record::Signal;
-use crate::twin::{MOST_SUBSTEPS, Twin};
+use crate::twin::Twin;
 use std::sync::Arc;
 
 /// A twin with terms, fitted.
@@ -59,19 +59,13 @@ impl<'a> Model<'a> {
         Self::new(self.base, self.terms.clone(), self.problem.clone(), fitted)
     }
 
-    /// Substeps of a sample, so many times as many as the twin's, and the problem with them; `None` for a black box.
-    pub fn stepped(&self, times: usize) -> Result<Option<(usize, Problem<'a>)>, DiagnoseError> {
-        let mut substeps = 0;
-        let base = self.base.stepped(|to| {
-            substeps = (times * to.substeps).min(MOST_SUBSTEPS);
-            to.substeps = substeps;
-        });
-        let Some(base) = base else { return Ok(None) };
-        let twin = with_terms(&base, self.terms.iter().map(Arc::as_ref))?;
+    /// The problem with another twin in the place of its own, of the same parameters.
+    pub fn problem_of(&self, base: &Twin) -> Result<Problem<'a>, DiagnoseError> {
+        let twin = with_terms(base, self.terms.iter().map(Arc::as_ref))?;
         let axes = self.problem.axes[..twin.parameters().len()].to_vec();
         let mut problem = Problem::new(twin, axes, self.problem.records);
         problem.families.clone_from(&self.problem.families);
-        Ok(Some((substeps, problem)))
+        Ok(problem)
     }
 
     /// θ of the first record.

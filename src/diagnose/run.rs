@@ -21,7 +21,7 @@ use super::quantify::next_input::next_input;
 use super::quantify::power::power;
 use super::quantify::share::{Measures, shrinkage};
 use super::settings::DiagnoseSettings;
-use super::step::finer_step;
+use super::step::{FinerStep, finer_step};
 use super::summary::{effects, nuisance, onset, parameters, remains};
 use super::thresholds::Thresholds;
 use crate::fit::climb::climb;
@@ -31,7 +31,7 @@ use crate::progress::Progress;
 use crate::record::Record;
 use crate::setting::SettingError;
 use crate::study::Study;
-use crate::twin::{Noise, Twin};
+use crate::twin::Noise;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -80,9 +80,8 @@ pub fn diagnose(
 ) -> Result<Diagnosis, DiagnoseError> {
     let clock = Instant::now();
     check(study, records, validation, settings)?;
-    let noise = Noise::new(settings.seed, "diagnose", 0);
-    let found = search(study, records, settings, noise, progress, |explored| {
-        report(explored, validation, settings, noise, progress)
+    let found = search(study, records, settings, progress, |explored| {
+        report(explored, validation, settings, progress)
     })?;
     Ok(Diagnosis {
         seconds: clock.elapsed().as_secs_f64(),
@@ -105,46 +104,39 @@ fn search<R>(
     study: &Study,
     records: &[Record],
     settings: &DiagnoseSettings,
-    noise: Noise,
     progress: &Progress,
     then: impl FnOnce(Explored<'_, '_>) -> Result<R, DiagnoseError>,
 ) -> Result<R, DiagnoseError> {
     let stage = progress.stage("fit", 1);
     let measured = measured(study.twin(), records, &study.beliefs())?;
-    let base = Base::new(&measured, records, settings, noise)?;
+    let base = Base::new(&measured, records, settings)?;
     stage.tick()?;
-    match finer(study, &base.model)? {
-        Some(finer) => with_step(study, &base, finer, settings, progress, then),
+    match finer_step(&base.model)? {
+        Some(step) => with_step(study, &base, step, settings, progress, then),
         None => explored(study, base, settings, ROUNDS, progress, then),
     }
-}
-
-/// The twin with a finer step, and its substeps, where the records ask for it.
-fn finer(study: &Study, model: &Model<'_>) -> Result<Option<(Twin, usize)>, DiagnoseError> {
-    let twin = study.twin();
-    let found = finer_step(model)?;
-    Ok(found.and_then(|substeps| Some((twin.stepped(|to| to.substeps = substeps)?, substeps))))
 }
 
 /// Fits the twin with a finer step, and searches with it.
 fn with_step<R>(
     study: &Study,
     base: &Base<'_>,
-    (twin, substeps): (Twin, usize),
+    step: FinerStep,
     settings: &DiagnoseSettings,
     progress: &Progress,
     then: impl FnOnce(Explored<'_, '_>) -> Result<R, DiagnoseError>,
 ) -> Result<R, DiagnoseError> {
     let records = base.model.problem.records;
-    let measured = measured(&twin, records, &study.beliefs())?;
+    let twin = step.of(study.twin());
+    let twin = twin.as_ref().unwrap_or(study.twin());
+    let measured = measured(twin, records, &study.beliefs())?;
     let begin = DiagnoseSettings {
         initial: Some(base.theta.clone()),
         ..settings.clone()
     };
-    let noise = Noise::new(settings.seed, "diagnose", 0);
     let base = Base {
-        substeps: Some(substeps),
-        ..Base::new(&measured, records, &begin, noise)?
+        step: Some(step),
+        ..Base::new(&measured, records, &begin)?
     };
     explored(study, base, settings, ROUNDS, progress, then)
 }
@@ -193,10 +185,10 @@ fn explored<R>(
         }
     }
     // Beside a gap, noise levels are fitted loud, and hide the step.
-    if let (None, Some(model)) = (base.substeps, findings.best_listed())
-        && let Some(finer) = finer(study, model)?
+    if let (None, Some(model)) = (base.step, findings.best_listed())
+        && let Some(step) = finer_step(model)?
     {
-        return with_step(study, &base, finer, settings, progress, then);
+        return with_step(study, &base, step, settings, progress, then);
     }
     then(Explored {
         study,
@@ -213,9 +205,9 @@ fn report(
     explored: Explored<'_, '_>,
     validation: Option<&Record>,
     settings: &DiagnoseSettings,
-    noise: Noise,
     progress: &Progress,
 ) -> Result<Diagnosis, DiagnoseError> {
+    let noise = settings.noise();
     let Explored {
         study,
         base,
@@ -242,7 +234,7 @@ fn report(
         };
         let log_odds = |records: &[Record]| {
             let silent = Progress::silent();
-            search(study, records, &alone, noise, &silent, |found| {
+            search(study, records, &alone, &silent, |found| {
                 Ok(found.chances.log_odds)
             })
         };
@@ -352,7 +344,8 @@ fn report(
         validation_runs: validation
             .map(|v| runs(std::slice::from_ref(v)))
             .transpose()?,
-        substeps: base.substeps,
+        integrator: base.step.map(|step| step.integrator),
+        substeps: base.step.map(|step| step.substeps),
         candidates: findings.listed.len() + findings.unknown.len(),
         not_tested: not_tested.clone(),
         seconds: 0.0,

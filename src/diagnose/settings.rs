@@ -1,6 +1,7 @@
 //! Settings of a diagnosis.
 
 use crate::effect::EffectPattern;
+use crate::twin::Noise;
 
 /// Settings of a diagnosis.
 ///
@@ -26,6 +27,13 @@ pub struct DiagnoseSettings {
     pub initial: Option<Vec<f64>>,
     /// Stop after the verdict.
     pub detection_only: bool,
+}
+
+impl DiagnoseSettings {
+    /// Source of everything random.
+    pub(in crate::diagnose) fn noise(&self) -> Noise {
+        Noise::new(self.seed, "diagnose", 0)
+    }
 }
 
 impl Default for DiagnoseSettings {

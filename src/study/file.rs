@@ -10,7 +10,7 @@ use crate::study::error::StudyError;
 use crate::study::lines::{line, with_line};
 use crate::study::plan::InputPlan;
 use crate::study::prior::{PriorTable, flatten};
-use crate::twin::{Hold, Interval, NoiseLevel, StartLevel};
+use crate::twin::{Hold, Integrator, Interval, NoiseLevel, StartLevel};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -28,6 +28,7 @@ const MOST: u64 = 1 << 20;
 /// samples = 1024
 /// input = { levels = [0.5, 6.0], hold = 25 }   # or a file: "U.csv"
 /// hold = "linear"   # inputs on the line between samples; "zero" holds them
+/// integrator = "runge-kutta-4"   # or "euler"
 /// substeps = 4      # steps of the integrator within a sample
 /// columns = { t = "time", u = "pump", y = "level" }   # of measured records
 /// [prior]
@@ -116,6 +117,9 @@ pub struct RecordTable {
     /// Inputs between samples, also of measured records.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hold: Option<Hold>,
+    /// Integrator of the twin, also for measured records.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub integrator: Option<Integrator>,
     /// Steps of the integrator within a sample, also of measured records.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub substeps: Option<usize>,

@@ -23,7 +23,8 @@ use crate::effect::{
 use crate::record::Record;
 use crate::setting::did_you_mean;
 use crate::twin::{
-    Adaptation, DigitalTwin, MOST_SUBSTEPS, Role, Stepping, Twin, TwinError, adapt, check_twin, fix,
+    Adaptation, DigitalTwin, Integrator, MOST_SUBSTEPS, Role, Stepping, Twin, TwinError, adapt,
+    check_twin, fix,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -182,20 +183,24 @@ impl Study {
         self.file.prior.trust
     }
 
-    /// Returns the twin as registered, with the substeps and the hold of a file.
+    /// Returns the twin as registered, with the integrator, the substeps and the hold of a file.
     fn stepped(&self, record: &RecordTable) -> Result<Twin, StudyError> {
-        let (hold, substeps) = (record.hold, record.substeps);
-        let (key, value) = match (hold, substeps) {
-            (None, None) => return Ok(self.base.clone()),
-            (_, Some(n)) => ("substeps", n),
-            (Some(_), None) => ("hold", 1),
+        let (integrator, substeps, hold) = (record.integrator, record.substeps, record.hold);
+        let given = [
+            (substeps.is_some(), "substeps"),
+            (integrator.is_some(), "integrator"),
+            (hold.is_some(), "hold"),
+        ];
+        let Some((_, key)) = given.into_iter().find(|(given, _)| *given) else {
+            return Ok(self.base.clone());
         };
-        if !(1..=MOST_SUBSTEPS).contains(&value) {
+        if let Some(n) = substeps.filter(|n| !(1..=MOST_SUBSTEPS).contains(n)) {
             return Err(StudyError::Plan(format!(
-                "[record] substeps = {value}; choose between 1 and {MOST_SUBSTEPS}"
+                "[record] substeps = {n}; choose between 1 and {MOST_SUBSTEPS}"
             )));
         }
-        let change = |stepping: &mut Stepping| {
+        let change = |rule: &mut Integrator, stepping: &mut Stepping| {
+            *rule = integrator.unwrap_or(*rule);
             stepping.hold = hold.unwrap_or(stepping.hold);
             stepping.substeps = substeps.unwrap_or(stepping.substeps);
         };
@@ -365,7 +370,7 @@ mod tests {
         }
         let plan = RecordPlan::levels(0.5, 60, 0.0, 3.0, 30);
         let study = Study::new("boxed", Boxed, plan).unwrap();
-        for key in ["hold = 'linear'", "substeps = 2"] {
+        for key in ["hold = 'linear'", "integrator = 'euler'", "substeps = 2"] {
             let text = format!("twin = 'boxed'\n[record]\n{key}");
             let file = StudyFile::parse(&text, "s.toml".as_ref()).unwrap();
             let message = study.configure(&file).unwrap_err().to_string();

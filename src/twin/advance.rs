@@ -302,7 +302,7 @@ mod tests {
 
     fn refined(rule: Integrator, substeps: usize, hold: Hold) -> Twin {
         let twin = Twin::new(Vessel(rule));
-        let change = |to: &mut Stepping| *to = Stepping { substeps, hold };
+        let change = |_: &mut _, to: &mut Stepping| *to = Stepping { substeps, hold };
         twin.stepped(change).unwrap()
     }
 

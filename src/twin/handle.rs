@@ -4,8 +4,8 @@ use super::definitions::defined_states;
 use super::digital_twin::FREE_RUNS;
 use crate::record::{Drive, RecordError, Signal, Signals};
 use crate::twin::{
-    DigitalTwin, Modified, Modify, Noise, Outline, ParameterSpace, SimulationError, StateSpace,
-    Stepping,
+    DigitalTwin, Integrator, Modified, Modify, Noise, Outline, ParameterSpace, SimulationError,
+    StateSpace, Stepping,
 };
 use std::sync::Arc;
 
@@ -123,11 +123,19 @@ impl Twin {
         }
     }
 
-    /// The twin with another stepping, as `change` makes it; `None` for a black box.
-    pub(crate) fn stepped(&self, change: impl FnOnce(&mut Stepping)) -> Option<Self> {
-        let mut stepping = self.equations()?.stepping();
-        change(&mut stepping);
-        Some(self.clone().modified(|base| Stepped { base, stepping }))
+    /// The twin with another integrator and stepping, as `change` makes them; `None` for a black box.
+    pub(crate) fn stepped(
+        &self,
+        change: impl FnOnce(&mut Integrator, &mut Stepping),
+    ) -> Option<Self> {
+        let equations = self.equations()?;
+        let (mut integrator, mut stepping) = (equations.integrator(), equations.stepping());
+        change(&mut integrator, &mut stepping);
+        Some(self.clone().modified(|base| Stepped {
+            base,
+            integrator,
+            stepping,
+        }))
     }
 
     /// The twin with `hook` called before each of its runs; an error of the hook stops the run.
@@ -188,12 +196,17 @@ impl<F: Fn() -> Result<(), SimulationError> + Send + Sync + 'static> Hook for F 
 /// Equations with another stepping.
 struct Stepped {
     base: Arc<dyn StateSpace>,
+    integrator: Integrator,
     stepping: Stepping,
 }
 
 impl Modify for Stepped {
     fn base(&self) -> &dyn StateSpace {
         self.base.as_ref()
+    }
+
+    fn integrator(&self) -> Integrator {
+        self.integrator
     }
 
     fn stepping(&self) -> Stepping {

@@ -92,6 +92,7 @@ pub enum Integrator {
     #[default]
     Euler,
     /// The classical fourth-order Runge–Kutta step.
+    #[serde(rename = "runge-kutta-4")]
     RungeKutta4,
 }
 

@@ -121,15 +121,17 @@ fn moments(longest: u64) -> impl Iterator<Item = u64> {
     })
 }
 
-/// Kills a call again and again until it is done; how often it was killed.
-fn killed(folder: &Path, arguments: &str, longest: u64, done: impl Fn() -> bool) -> usize {
-    let mut kills = 0;
+/// Kills a call again and again until it is done; how often it was killed. On a slow machine the longest piece of work may not fit into
+/// the first moments: they grow by a tenth from one to the next after the first ten.
+fn killed(folder: &Path, arguments: &str, longest: u64, done: impl Fn() -> bool) -> i32 {
+    let mut kills: i32 = 0;
     for moment in moments(longest) {
         if done() {
             return kills;
         }
         let mut child = start(folder, arguments);
-        let by = Instant::now() + Duration::from_millis(moment);
+        let longer = 1.1_f64.powi((kills - 10).max(0));
+        let by = Instant::now() + Duration::from_millis(moment).mul_f64(longer);
         while Instant::now() < by && child.try_wait().unwrap().is_none() {
             std::thread::sleep(Duration::from_millis(1));
         }
@@ -144,7 +146,7 @@ fn killed(folder: &Path, arguments: &str, longest: u64, done: impl Fn() -> bool)
                 child.kill().unwrap();
                 child.wait().unwrap();
                 kills += 1;
-                assert!(kills < 1000, "it does not come forward");
+                assert!(kills < 100, "it does not come forward");
             }
         }
     }
@@ -231,7 +233,6 @@ fn two_processes_do_not_pretrain_one_estimator() {
 fn trials_and_records_survive_kills_at_any_moment() {
     let place = tempfile::tempdir().unwrap();
     let at = place.path();
-    // A moment must now and then be long enough for the longest piece.
     for (call, part, result, longest) in [
         (
             "withheld --twin van-der-pol --trials 6 --detection-only",

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! D     = log Σ w_h·Z_h − log Z_nothing               w: 0.6 shared by listed effects, 0.4 by unknown functions;  a gap if D > 3
-//! Z_nothing = Z_0 + mean_N Z_0(N)                     N: other kinds of noise, correlated or with outliers
+//! Z_nothing = Z_0 + mean_N Z_0(N)                     N: other kinds of noise, correlated or with outliers, and pairs of them
 //! r(E)  = max_U log Z(E + U) − log Z(E)               E leaves nothing to explain if r < 4
 //! named : the largest log Z of what leaves nothing;  a larger set must be 2 nats better, an unknown function alone must not be better
 //! partial: the largest log Z, where it leaves a third at most;  an unknown function alone must not be better by 15 %
@@ -14,7 +14,6 @@ use crate::diagnose::outcome::{Decision, Probabilities};
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::evidence::log_mean;
 use std::collections::BTreeMap;
-use std::f64::consts::LN_2;
 
 /// Everything that was found.
 #[derive(Default)]
@@ -29,6 +28,8 @@ pub(in crate::diagnose) struct Findings<'a> {
     pub beside: Vec<(Vec<String>, Vec<Found<'a>>)>,
     /// Other kinds of noise alone, best first.
     pub noise: Vec<Found<'a>>,
+    /// The likeliest kind of noise with each other one, best first.
+    pub noise_pairs: Vec<Found<'a>>,
     /// Another kind of noise beside the best listed effect, which makes it likelier by these nats.
     pub noise_beside: Option<(String, f64)>,
 }
@@ -129,11 +130,15 @@ impl<'a> Findings<'a> {
 
     /// log of the evidence of nothing missing, whatever the noise, over that of the twin.
     fn nothing(&self) -> f64 {
-        let gains: Vec<f64> = self.noise.iter().map(|f| f.gain).collect();
-        match gains.is_empty() {
-            true => 0.0,
-            false => log_mean(&[0.0, log_mean(&gains)]) + LN_2,
-        }
+        let [alone, pairs] = [&self.noise, &self.noise_pairs]
+            .map(|all| log_mean(&all.iter().map(|f| f.gain).collect::<Vec<f64>>()));
+        // The best of n kinds makes n − 1 of the n(n − 1)/2 pairs.
+        let pairs = pairs - (0.5 * self.noise.len() as f64).ln();
+        let all: Vec<f64> = [0.0, alone, pairs]
+            .into_iter()
+            .filter(|z| z.is_finite())
+            .collect();
+        log_mean(&all) + (all.len() as f64).ln()
     }
 
     /// Posterior probabilities of all hypotheses.

@@ -94,8 +94,10 @@ pub(in crate::diagnose) fn explore<'a>(
         listed: usize::MAX,
         ..breadth
     };
+    let noise = listed(base, terms.noise, origin, &[], every)?;
     let mut findings = Findings {
-        noise: listed(base, terms.noise, origin, &[], every)?,
+        noise_pairs: noise_pairs(&noise, terms.noise, origin, every)?,
+        noise,
         noise_beside: noise_beside(&singles, terms.noise, origin, every)?,
         listed: singles,
         unknown: unknown_alone,
@@ -163,6 +165,24 @@ fn noise_beside<'a>(
         .collect();
     let found = listed(model, &outliers, origin, &[], breadth)?;
     Ok((found.first()).map(|f| (f.last().key(), f.gain - best.gain)))
+}
+
+/// Second kinds of noise beside the likeliest one.
+fn noise_pairs<'a>(
+    noise: &[Found<'a>],
+    terms: &[Arc<Term>],
+    origin: f64,
+    breadth: Breadth,
+) -> Result<Vec<Found<'a>>, DiagnoseError> {
+    let best = noise.first().filter(|f| f.gain > Thresholds::NOISE);
+    let Some((best, model)) = best.and_then(|f| Some((f, f.model.as_ref()?))) else {
+        return Ok(vec![]);
+    };
+    let others: Vec<Arc<Term>> = (terms.iter())
+        .filter(|term| term.key() != best.last().key())
+        .cloned()
+        .collect();
+    listed(model, &others, origin, &[], breadth)
 }
 
 /// Unknown functions on top of fitted effects.

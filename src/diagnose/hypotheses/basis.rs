@@ -8,6 +8,7 @@ pub(super) const TERMS: usize = 10;
 /// Most that the orders of a product of two add up to.
 const ORDER: usize = 7;
 const HIGHEST: usize = 6;
+
 /// Kind of a function's variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::diagnose) enum Of {
@@ -17,6 +18,17 @@ pub(in crate::diagnose) enum Of {
     Input(usize),
     /// The signal that passes a sensor or actuator.
     Signal,
+}
+
+impl Of {
+    /// The variable's value.
+    pub fn value(self, states: &[f64], inputs: &[f64], signal: f64) -> f64 {
+        match self {
+            Self::State(i) => states[i],
+            Self::Input(i) => inputs[i],
+            Self::Signal => signal,
+        }
+    }
 }
 
 /// Pairs of orders of a function of two variables.
@@ -44,6 +56,7 @@ pub(super) fn sum_of_one(m: &[f64], value: f64, ends: (f64, f64)) -> f64 {
     m.iter().zip(phi).map(|(m, phi)| m * phi).sum()
 }
 
+/// The sum of a function of two variables.
 pub(super) fn sum_of_two(m: &[f64], values: [f64; 2], ends: [(f64, f64); 2]) -> f64 {
     let mut phi = [[0.0; HIGHEST]; 2];
     for ((phi, value), ends) in phi.iter_mut().zip(values).zip(ends) {

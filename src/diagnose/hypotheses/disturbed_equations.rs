@@ -4,7 +4,7 @@ use crate::diagnose::hypotheses::disturbed_signals;
 use crate::diagnose::hypotheses::entry::{Entry, share};
 use crate::record::Quantity;
 use crate::twin::{
-    Layout, Modified, Modify, Now, Outline, Parameter, ParameterSpace, Role, StateSpace, Twin,
+    Layout, Modify, Now, Outline, Parameter, ParameterSpace, Role, StateSpace, Twin,
 };
 use smallvec::SmallVec;
 use std::sync::Arc;
@@ -17,22 +17,23 @@ use std::sync::Arc;
 ///
 /// θ is longer by σ > 0. A filter that may follow d gains on every gap at the right place, and on one elsewhere less.
 pub(in crate::diagnose) fn disturbed(base: Twin, entry: Entry, memory: f64) -> Twin {
-    let base = match base {
-        Twin::Equations(base) => base,
-        Twin::BlackBox(base) => return disturbed_signals::disturbed(base, entry, memory),
-    };
-    let mut outline = base.outline();
-    // Noise may be coloured where something else is disturbed.
-    let name = format!("disturbance/{}", outline.states.len());
-    outline.states.push(Quantity::new(&name, ""));
-    let sigma = Parameter::new(&name, "", 0.01, 1.0).with_role(Role::Magnitude);
-    outline.parameters = ParameterSpace::new(outline.parameters.iter().cloned().chain([sigma]));
-    Twin::Equations(Arc::new(Modified(Disturbed {
-        base,
-        entry,
-        memory,
-        outline,
-    })))
+    if let Twin::BlackBox(base) = base {
+        return disturbed_signals::disturbed(base, entry, memory);
+    }
+    base.modified(|base| {
+        let mut outline = base.outline();
+        // Noise may be coloured where something else is disturbed.
+        let name = format!("disturbance/{}", outline.states.len());
+        outline.states.push(Quantity::new(&name, ""));
+        let sigma = Parameter::new(&name, "", 0.01, 1.0).with_role(Role::Magnitude);
+        outline.parameters = ParameterSpace::new(outline.parameters.iter().cloned().chain([sigma]));
+        Disturbed {
+            base,
+            entry,
+            memory,
+            outline,
+        }
+    })
 }
 
 struct Disturbed {

@@ -146,11 +146,7 @@ pub(super) fn of_state(target: &str, variables: &[Variable], largest: f64) -> Te
     let id = format!("f({})", names.join(","));
     let ends: Vec<(f64, f64)> = variables.iter().map(Variable::ends).collect();
     let of: Vec<Of> = variables.iter().map(|v| v.of).collect();
-    let value = |of: Of, at: &crate::effect::ForcePoint<'_>| match of {
-        Of::State(i) => at.states[i],
-        Of::Input(i) => at.u[i],
-        Of::Signal => at.x,
-    };
+    let value = |of: Of, at: &crate::effect::ForcePoint<'_>| of.value(at.states, at.u, at.x);
     let kind = match (of.as_slice(), ends.as_slice()) {
         (&[of], &[ends]) => with_coefficients(
             EffectKind::force(&id, "ẋ + f", move |m, at| {

@@ -52,11 +52,7 @@ impl Modify for Reading {
         self.now(now, |now| self.base.observe_each(now, at, p, x, y));
         let coefficients = &now.theta[now.theta.len() - TERMS..];
         for (x, y) in at.each(x).zip(y.chunks_exact_mut(p)) {
-            let z = match self.of {
-                Of::State(i) => x[i],
-                Of::Input(i) => now.u[i],
-                Of::Signal => y[self.output],
-            };
+            let z = self.of.value(x, now.u, y[self.output]);
             y[self.output] += sum_of_one(coefficients, z, self.ends);
         }
     }

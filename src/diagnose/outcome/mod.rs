@@ -9,7 +9,7 @@ pub use location::{
 
 use crate::fit::Nuisance;
 use crate::record::{Drive, Signal};
-use crate::twin::Interval;
+use crate::twin::{Integrator, Interval};
 use serde::ser::{SerializeStruct, Serializer};
 use serde::{Deserialize, Serialize};
 
@@ -265,7 +265,9 @@ pub struct Diagnosis {
     pub shrinkage: Option<Shrinkage>,
     /// Sparse law for the missing function, where something unknown is missing.
     pub discovery: Option<Discovery>,
-    /// Substeps of a sample that everything here is said with, where the records ask for a finer step than the twin's.
+    /// Integrator that everything here is said with, where the records ask for a finer step than the twin's.
+    pub integrator: Option<Integrator>,
+    /// Its substeps of a sample.
     pub substeps: Option<usize>,
     /// Smallest visible magnitude of each listed effect.
     pub power: Vec<Visible>,

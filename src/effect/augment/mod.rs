@@ -286,7 +286,7 @@ mod tests {
     /// Between samples, effects on inputs leave a line a line: off, no bit changes; a bias moves both ends.
     #[test]
     fn actuator_effects_keep_inputs_on_lines() {
-        let linear = |stepping: &mut Stepping| {
+        let linear = |_: &mut _, stepping: &mut Stepping| {
             stepping.hold = Hold::Linear;
             stepping.substeps = 3;
         };

@@ -200,7 +200,7 @@ impl<'a> Information<'a> {
 
     /// Nats by which the twin's own step shows: as a departure, against twenty times as many substeps. 0 for a black box.
     pub fn step(&self, study: &Study, conditions: &Conditions) -> Result<f64, FilterError> {
-        let fine = (study.twin()).stepped(|to| to.substeps = (FINE * to.substeps).min(MOST));
+        let fine = (study.twin()).stepped(|_, to| to.substeps = (FINE * to.substeps).min(MOST));
         let Some(fine) = fine else {
             return Ok(0.0);
         };

@@ -131,9 +131,9 @@ fn plan(table: &RecordTable) -> Result<RecordPlan, String> {
             path.display()
         ));
     }
-    if table.hold.is_some() || table.substeps.is_some() {
+    if table.hold.is_some() || table.integrator.is_some() || table.substeps.is_some() {
         return Err(
-            "record: hold and substeps need the twin's equations, which a program does not show; leave them out"
+            "record: hold, integrator and substeps need the twin's equations, which a program does not show; leave them out"
                 .into(),
         );
     }

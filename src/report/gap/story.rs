@@ -2,6 +2,7 @@
 
 use super::headline::{SAID, headline};
 use super::json::NEXT_INPUT;
+use super::step::step_setting;
 use crate::diagnose::{Decision, Diagnosis, EffectFit, Verdict};
 use crate::report::digits::{chance, percent, short, unit_suffix};
 use crate::report::units::Units;
@@ -110,12 +111,10 @@ fn how_far(diagnosis: &Diagnosis) -> Option<String> {
 
 /// Advice on what to do.
 pub(super) fn next(diagnosis: &Diagnosis) -> String {
-    if let Some(substeps) = diagnosis.substeps
+    if let Some(setting) = step_setting(diagnosis)
         && diagnosis.verdict != Verdict::StructuralGap
     {
-        return format!(
-            "Next: set [record] substeps = {substeps}; the twin's own step is too long."
-        );
+        return format!("Next: set {setting}; the twin's own step is too long.");
     }
     let next = match (diagnosis.verdict, diagnosis.cause.decision) {
         (Verdict::NoGap, _) => "Next: use the twin, within the range of this record.",
@@ -136,6 +135,7 @@ pub(super) fn next(diagnosis: &Diagnosis) -> String {
 mod tests {
     use super::*;
     use crate::report::fixture::{diagnoses, made, oscillator};
+    use crate::twin::Integrator;
     use crate::twins::CascadedTanks;
 
     #[test]
@@ -158,12 +158,16 @@ mod tests {
     #[test]
     fn a_step_that_is_too_long_comes_first() {
         let diagnosis = Diagnosis {
+            integrator: Some(Integrator::RungeKutta4),
             substeps: Some(4),
             ..made::oscillator_no_gap()
         };
         let (_, sentences) = story(&Units::of(&oscillator()), &diagnosis);
         let last = sentences.last().unwrap();
-        assert!(last.contains("substeps = 4"), "{last}");
+        assert!(
+            last.contains("set [record] integrator = \"runge-kutta-4\", substeps = 4;"),
+            "{last}"
+        );
     }
 
     #[test]

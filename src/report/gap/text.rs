@@ -2,6 +2,7 @@
 
 use super::headline::headline;
 use super::json::NEXT_INPUT;
+use super::step::step_setting;
 use super::story::{effects, next};
 use crate::diagnose::{
     Cause, Detection, Diagnosis, Discovery, EffectFit, Location, NextInput, SHORTEST_SPLIT,
@@ -89,9 +90,9 @@ pub(super) fn evidence_sentence(diagnosis: &Diagnosis) -> String {
 
 /// Returns with which step everything is said; none where it is the twin's own.
 pub(super) fn step_sentence(diagnosis: &Diagnosis) -> Option<String> {
-    let substeps = diagnosis.substeps?;
+    let setting = step_setting(diagnosis)?;
     Some(format!(
-        "The twin's own step is too long for this record: all this is said with [record] substeps = {substeps}."
+        "The twin's own step is too long for this record: all this is said with {setting}."
     ))
 }
 

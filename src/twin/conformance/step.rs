@@ -16,7 +16,7 @@ pub(crate) fn step_error(
     theta: &[f64],
     drive: &Drive,
 ) -> Result<Vec<(String, f64)>, SimulationError> {
-    let Some(finer) = twin.stepped(|stepping| stepping.substeps *= 2) else {
+    let Some(finer) = twin.stepped(|_, stepping| stepping.substeps *= 2) else {
         return Ok(vec![]);
     };
     let difference = twin.free_run(theta, drive)? - finer.free_run(theta, drive)?;
@@ -56,7 +56,7 @@ pub(crate) fn check_step(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<Fi
     Some(Finding::warning(
         CHECK,
         format!(
-            "too long: with half the step, {}; set [record] substeps = {substeps} in a study file, or use another integrator",
+            "too long: with half the step, {}; set [record] substeps = {substeps} in a study file, or integrator = \"runge-kutta-4\"",
             coarse.join("; ")
         ),
     ))
@@ -116,7 +116,9 @@ mod tests {
     fn a_step_may_be_wrong_by_less_than_noise() {
         let drive = Drive::autonomous(0.05, 300).unwrap();
         let coarse = Twin::new(VanDerPol);
-        let fine = coarse.stepped(|stepping| stepping.substeps = 16).unwrap();
+        let fine = coarse
+            .stepped(|_, stepping| stepping.substeps = 16)
+            .unwrap();
         let of = |twin: &Twin| check_step(twin, &[3.2], &drive).unwrap().severity;
         assert_eq!(of(&coarse), Severity::Warning);
         assert_eq!(of(&fine), Severity::Pass);

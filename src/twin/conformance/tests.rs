@@ -124,7 +124,7 @@ fn a_step_that_is_too_long_is_named_by_output() {
     assert_eq!(errors[1].0, "y2");
     assert!(errors[1].1 > 0.05, "{errors:?}");
     // What it advises helps.
-    let finer = twin.stepped(|stepping| stepping.substeps = 64).unwrap();
+    let finer = twin.stepped(|_, stepping| stepping.substeps = 64).unwrap();
     let fine = check_step(&finer, &[15.0], &drive).unwrap();
     assert_eq!(fine.severity, Severity::Pass, "{}", fine.message);
     let boxed: Arc<dyn DigitalTwin> = Arc::new(Flawed(Flaw::None, AtomicU64::new(0)));

@@ -37,23 +37,30 @@ pub(super) struct Sized {
 
 impl Stage<'_> {
     /// Makes the record with these departures; once more with other measurement noise; and with all noise of the other sign. `None`
-    /// where it diverges.
+    /// where one diverges.
     pub fn records(&self, departures: &[Departure]) -> Option<[Record; 3]> {
-        let record = |draws: Draws| {
-            let system = System {
-                theta: self.theta,
-                departures,
-                conditions: self.conditions,
-            };
-            let run = self.world.run(system, self.drive, draws)?;
-            if !self.scene.is_near(&run) {
-                return None;
-            }
-            Record::new(run.drive, run.outputs).ok()
+        let [own, again] = self.pair(departures)?;
+        Some([own, again, self.record(departures, self.draws.mirrored())?])
+    }
+
+    /// The record with these departures, and once more with other measurement noise.
+    fn pair(&self, departures: &[Departure]) -> Option<[Record; 2]> {
+        let [own, again] =
+            [self.draws, self.draws.remeasured()].map(|draws| self.record(departures, draws));
+        Some([own?, again?])
+    }
+
+    fn record(&self, departures: &[Departure], draws: Draws) -> Option<Record> {
+        let system = System {
+            theta: self.theta,
+            departures,
+            conditions: self.conditions,
         };
-        let all = [self.draws, self.draws.remeasured(), self.draws.mirrored()];
-        let [own, again, mirrored] = all.map(record);
-        Some([own?, again?, mirrored?])
+        let run = self.world.run(system, self.drive, draws)?;
+        if !self.scene.is_near(&run) {
+            return None;
+        }
+        Record::new(run.drive, run.outputs).ok()
     }
 
     /// The departure of a size, and what it changes; `None` where it cannot be made or diverges.
@@ -86,10 +93,10 @@ impl Stage<'_> {
         information: &Information<'_>,
     ) -> Result<Option<Change>, EvaluateError> {
         let small = draft.of_size(FIRST, self.scene);
-        let Some([own, again, _]) = small.and_then(|small| self.records(&[small])) else {
+        let Some(pair) = small.and_then(|small| self.pair(&[small])) else {
             return Ok(None);
         };
-        Ok(information.change([own, again])?)
+        Ok(information.change(pair)?)
     }
 
     /// Searches the size at which a departure has about `wanted` nats; `None` where none comes near.

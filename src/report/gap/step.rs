@@ -1,0 +1,17 @@
+//! The finer step that a diagnosis was made with, as a user would set it.
+
+use crate::diagnose::Diagnosis;
+use crate::twin::Integrator;
+
+/// The settings of a study that take the finer step which everything is said with; none where it is the twin's own.
+pub(super) fn step_setting(diagnosis: &Diagnosis) -> Option<String> {
+    let (integrator, substeps) = (diagnosis.integrator?, diagnosis.substeps?);
+    let mut settings = vec![];
+    if integrator == Integrator::RungeKutta4 {
+        settings.push("integrator = \"runge-kutta-4\"".to_owned());
+    }
+    if substeps > 1 || settings.is_empty() {
+        settings.push(format!("substeps = {substeps}"));
+    }
+    Some(format!("[record] {}", settings.join(", ")))
+}
