@@ -1,8 +1,10 @@
 //! The twin as it is, fitted: where a diagnosis begins.
 
 use super::error::DiagnoseError;
+use super::hypotheses::listed::Library;
 use super::hypotheses::scales::Scales;
 use super::hypotheses::term::Term;
+use super::hypotheses::{listed, shared};
 use super::model::Model;
 use super::outcome::Verdict;
 use super::residuals::frequencies::frequencies;
@@ -16,6 +18,7 @@ use crate::fit::problem::Problem;
 use crate::fit::starts::{base_fit, polish, search};
 use crate::likelihood::Measured;
 use crate::record::Record;
+use crate::study::Study;
 use crate::twin::{Noise, Role, Twin};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::sync::Arc;
@@ -100,6 +103,26 @@ impl<'a> Base<'a> {
         };
         let noises = self.noises.iter().chain(&found.terms).cloned().collect();
         Base::of(model, self.noisy.clone(), noises, self.step).map(Some)
+    }
+
+    /// What effects are made from.
+    pub fn library(&self) -> Library<'_> {
+        Library {
+            twin: self.model.base,
+            theta: &self.theta,
+            scales: &self.scales,
+            frequencies: &self.frequencies,
+        }
+    }
+
+    /// Every listed effect that may be named.
+    pub fn listed(
+        &self,
+        study: &Study,
+        settings: &DiagnoseSettings,
+    ) -> Result<Vec<Arc<Term>>, DiagnoseError> {
+        let terms = listed(study, &settings.without, &self.library(), &self.noisy)?;
+        Ok(shared(terms))
     }
 
     fn of(

@@ -4,12 +4,11 @@ use super::base::{Base, left_the_prior, verdict};
 use super::error::{DiagnoseError, GivenRecord};
 use super::explain::decide::{Chances, Conclusion, Findings, decide};
 use super::explain::explore::{Terms, absorbing, explore};
-use super::explain::search::Breadth;
-use super::hypotheses::listed::Library;
+use super::explain::search::{self, Breadth};
 use super::hypotheses::noise::kinds;
 use super::hypotheses::scales::Scales;
 use super::hypotheses::term::Term;
-use super::hypotheses::{listed, not_tested, unknown};
+use super::hypotheses::{not_tested, shared, unknown};
 use super::locate::discover::discover;
 use super::locate::functions::{curve, told};
 use super::locate::maps::maps;
@@ -111,9 +110,29 @@ fn search<R>(
     let measured = measured(study.twin(), records, &study.beliefs())?;
     let base = Base::new(&measured, records, settings)?;
     stage.tick()?;
-    match finer_step(&base.model)? {
+    match step_of(study, &base, settings)? {
         Some(step) => with_step(study, &base, step, settings, progress, then),
         None => explored(study, base, settings, ROUNDS, progress, then),
+    }
+}
+
+/// The finer step that the records ask for. A gap may pass for one: an effect that explains more is asked first.
+fn step_of(
+    study: &Study,
+    base: &Base<'_>,
+    settings: &DiagnoseSettings,
+) -> Result<Option<FinerStep>, DiagnoseError> {
+    let Some((step, gain)) = finer_step(&base.model)? else {
+        return Ok(None);
+    };
+    let model = &base.model;
+    let terms = base.listed(study, settings)?;
+    let breadth = Breadth::of(model);
+    let effects = search::listed(model, &terms, model.log_evidence, &[], breadth)?;
+    let best = effects.first().filter(|effect| effect.gain > gain);
+    match best.and_then(|effect| effect.model.as_ref()) {
+        Some(beside) => Ok(finer_step(beside)?.map(|(step, _)| step)),
+        None => Ok(Some(step)),
     }
 }
 
@@ -150,18 +169,11 @@ fn explored<R>(
     progress: &Progress,
     then: impl FnOnce(Explored<'_, '_>) -> Result<R, DiagnoseError>,
 ) -> Result<R, DiagnoseError> {
-    let library = Library {
-        twin: base.model.base,
-        theta: &base.theta,
-        scales: &base.scales,
-        frequencies: &base.frequencies,
-    };
-    let without = &settings.without;
-    let shared = |terms: Vec<Term>| -> Vec<Arc<Term>> { terms.into_iter().map(Arc::new).collect() };
-    let listed = shared(listed(study, without, &library, &base.noisy)?);
+    let library = base.library();
+    let listed = base.listed(study, settings)?;
     let mut noise = match rounds {
         0 => vec![],
-        _ => shared(kinds(study, without, &library, &base.noisy)?),
+        _ => shared(kinds(study, &settings.without, &library, &base.noisy)?),
     };
     noise.retain(|term| !base.noises.iter().any(|own| own.key() == term.key()));
     let unlisted = |seen: &[Scales<'_>]| shared(unknown(&library, seen));
@@ -186,7 +198,7 @@ fn explored<R>(
     }
     // Beside a gap, noise levels are fitted loud, and hide the step.
     if let (None, Some(model)) = (base.step, findings.best_listed())
-        && let Some(step) = finer_step(model)?
+        && let Some((step, _)) = finer_step(model)?
     {
         return with_step(study, &base, step, settings, progress, then);
     }
@@ -317,7 +329,7 @@ fn report(
         twin: study.name().into(),
         verdict,
         detection,
-        parameters: parameters(last, settings),
+        parameters: parameters(last, &base.theta, settings),
         nuisance: nuisance(last, &base.noises)?,
         location: Location {
             onset: accepted.and_then(onset),

@@ -6,7 +6,7 @@ use super::thresholds::Thresholds;
 use crate::fit::climb::climb;
 use crate::fit::reference::Reference;
 use crate::likelihood::kalman::recoverable;
-use crate::twin::{Integrator, MOST_SUBSTEPS, StateSpace, Twin};
+use crate::twin::{Integrator, MOST_SUBSTEPS, Twin};
 
 /// Iterations of a fit with the finer step.
 const ITERATIONS: usize = 40;
@@ -21,8 +21,7 @@ pub(in crate::diagnose) struct FinerStep {
 impl FinerStep {
     /// Finer steps from the cheapest to the last, which stands for an exact one. A Runge–Kutta step takes four rates, and is given the time
     /// of four of Euler's; limits of states act once a substep, so that only more of them help a state that runs into its limits.
-    fn candidates(twin: &dyn StateSpace) -> Vec<Self> {
-        let (own, integrator) = (twin.stepping().substeps, twin.integrator());
+    fn candidates(integrator: Integrator, own: usize) -> Vec<Self> {
         let smooth =
             (integrator == Integrator::Euler).then(|| (Integrator::RungeKutta4, own.div_ceil(4)));
         let exact = (Integrator::RungeKutta4, 16 * own);
@@ -44,12 +43,12 @@ impl FinerStep {
     }
 }
 
-/// The cheapest step that does as well as an exact one, where a model explains its records better with it than with its twin's own; `None`
-/// where the step does not show, or shows for the better, and for a black box.
+/// The cheapest step that does as well as an exact one, where a model explains its records better with it than with its twin's own, and
+/// how much better, in nats; `None` where the step does not show, or shows for the better, and for a black box.
 pub(in crate::diagnose) fn finer_step(
     model: &Model<'_>,
-) -> Result<Option<FinerStep>, DiagnoseError> {
-    let Some(equations) = model.base.equations() else {
+) -> Result<Option<(FinerStep, f64)>, DiagnoseError> {
+    let Some((integrator, stepping)) = model.base.step() else {
         return Ok(None);
     };
     let theta = &model.fitted.theta;
@@ -57,7 +56,7 @@ pub(in crate::diagnose) fn finer_step(
         return Ok(None);
     };
     let mut finer = vec![];
-    for step in FinerStep::candidates(equations) {
+    for step in FinerStep::candidates(integrator, stepping.substeps) {
         let Some(twin) = step.of(model.base) else {
             return Ok(None);
         };
@@ -79,17 +78,18 @@ pub(in crate::diagnose) fn finer_step(
     let Some((_, problem, step)) = enough else {
         return Ok(None);
     };
-    let finer = climb(&problem, theta, ITERATIONS)?.and_then(|fitted| {
-        let model = Model {
-            problem,
-            ..model.clone()
-        };
-        model.refitted(fitted)
-    });
-    let least = model.log_evidence + Thresholds::STEP_WINS;
-    Ok(finer
-        .filter(|finer| finer.log_evidence > least)
-        .map(|_| step))
+    // A search stops before the end of a climb: with its own step, too, the model is carried on.
+    let carried_on = |model: &Model<'_>| -> Result<_, DiagnoseError> {
+        let fitted = climb(&model.problem, theta, ITERATIONS)?;
+        Ok((fitted.and_then(|fitted| model.refitted(fitted))).map(|model| model.log_evidence))
+    };
+    let own = carried_on(model)?.map_or(model.log_evidence, |own| own.max(model.log_evidence));
+    let finer = carried_on(&Model {
+        problem,
+        ..model.clone()
+    })?;
+    let gain = finer.map_or(f64::NEG_INFINITY, |finer| finer - own);
+    Ok((gain > Thresholds::STEP_WINS).then_some((step, gain)))
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use crate::fit::Nuisance;
 use crate::fit::follow::starts;
 use crate::likelihood::kalman::recoverable;
 use crate::twin::{PRIOR_DEVIATION, Role};
+use statrs::distribution::{ContinuousCDF, Normal};
 use std::sync::Arc;
 
 /// Listed effects as they are reported: the accepted ones first, then by probability.
@@ -88,10 +89,12 @@ fn fit_of(model: &Model<'_>, term: &Term, probability: f64, log_evidence: f64) -
 /// The twin's own parameters.
 pub(in crate::diagnose) fn parameters(
     model: &Model<'_>,
+    alone: &[f64],
     settings: &DiagnoseSettings,
 ) -> Vec<FittedParameter> {
     let errors = model.fitted.std_errors(&model.problem);
     let theta = model.theta();
+    let reach = Normal::standard().inverse_cdf(0.5 * (1.0 + Thresholds::INTERVAL_LEVEL));
     let space = model.base.parameters();
     (space.iter().enumerate())
         .filter(|(_, p)| p.role == Role::Parameter)
@@ -99,10 +102,13 @@ pub(in crate::diagnose) fn parameters(
             name: p.name.clone(),
             unit: p.unit.clone(),
             initial: settings.initial.as_ref().and_then(|i| i.get(j).copied()),
+            alone: alone[j],
             refitted: theta[j],
             std_error: errors[j],
+            interval: [-reach, reach].map(|by| p.bounds.clamp(theta[j] + by * errors[j])),
             identified: errors[j] < PRIOR_DEVIATION * p.prior.width(),
             prior: p.prior,
+            bounds: p.bounds,
         })
         .collect()
 }

@@ -2,12 +2,10 @@
 
 use super::chart::{Area, Dot, Dots, Panel, Series, Style};
 use super::chart::{Chart, Curves};
-use super::digits::unit_suffix;
 use super::estimate::{estimate_text, overlay_svg, rows};
 use super::fit::{described, posterior_svg};
-use super::page::Column::{Number, Text};
-use super::page::{Section, escaped, figure, page, paragraph, preformatted, table};
-use super::parameters::ParameterRow;
+use super::page::{Section, escaped, figure, page, paragraph, preformatted};
+use super::parameters::{Line, ParameterRow, parameter_table};
 use crate::estimator::Estimate;
 use crate::fit::{Fit, Posterior, Warning};
 use crate::record::{Record, Signal};
@@ -139,28 +137,17 @@ impl Answer<'_> {
     }
 
     fn table(&self) -> String {
-        let head = [
-            ("parameter", Text),
-            ("value", Number),
-            ("± std error", Number),
-            ("interval", Number),
-            ("unit", Text),
-            ("prior", Number),
-            ("", Text),
-        ];
-        let rows: Vec<Vec<String>> = (self.lines.iter())
+        let lines: Vec<Line> = (self.lines.iter())
             .map(|(parameter, line)| {
-                let [value, error, interval, prior, note] = line.cells(parameter.role);
                 let name = match parameter.role {
                     Role::Start => format!("start of {}", parameter.target()),
                     _ => line.name.clone(),
                 };
-                let unit = unit_suffix(&line.unit).trim_start().to_owned();
-                vec![name, value, error, interval, unit, prior, note]
+                (name, parameter.role, line.clone(), vec![])
             })
             .collect();
         let caption = "Prior: the range that was trained on or expected. Not identified: the record says no more than the prior.";
-        table(caption, &head, &rows)
+        parameter_table(caption, &[], &lines)
     }
 
     fn residual_figures(&self, study: &Study, residuals: &Signal) -> String {

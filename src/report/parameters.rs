@@ -1,6 +1,9 @@
 //! The table of parameters that `estimate`, `fit` and `diagnose` share.
 
-use super::digits::{self, Digits};
+use super::digits::{self, Digits, unit_suffix};
+use super::page::Column::{Number, Text};
+use super::page::table;
+use crate::diagnose::FittedParameter;
 use crate::twin::{Interval, PRIOR_DEVIATION, Parameter, Role};
 use serde::Serialize;
 
@@ -43,6 +46,13 @@ impl ParameterRow {
         }
     }
 
+    /// One parameter of a diagnosis.
+    pub fn diagnosed(p: &FittedParameter) -> Self {
+        let parameter = Parameter::new(&p.name, &p.unit, p.prior.low(), p.prior.high())
+            .within(p.bounds.low(), p.bounds.high());
+        Self::new(&parameter, p.refitted, p.std_error, p.interval)
+    }
+
     /// Cells of text: value, standard error, interval, prior, note.
     pub fn cells(&self, role: Role) -> [String; 5] {
         let digits = Digits::supported(self.value, self.std_error);
@@ -64,7 +74,8 @@ impl ParameterRow {
         ]
     }
 
-    fn note(&self, role: Role) -> &'static str {
+    /// Remark on the value; empty where there is nothing to remark.
+    pub fn note(&self, role: Role) -> &'static str {
         match (self.at_bound, role) {
             (Some("low"), _) => "at its lower bound",
             (Some(_), _) => "at its upper bound",
@@ -73,6 +84,34 @@ impl ParameterRow {
             (None, _) => "",
         }
     }
+}
+
+/// A line of a page's table: the name, the role, the row, and cells of further columns before the value.
+pub(super) type Line = (String, Role, ParameterRow, Vec<String>);
+
+/// Table of a page; `more` are the heads of further columns.
+pub(super) fn parameter_table(caption: &str, more: &[&str], lines: &[Line]) -> String {
+    let mut head = vec![("parameter", Text)];
+    head.extend(more.iter().map(|name| (*name, Number)));
+    head.extend([
+        ("value", Number),
+        ("± std error", Number),
+        ("interval", Number),
+        ("unit", Text),
+        ("prior", Number),
+        ("", Text),
+    ]);
+    let rows: Vec<Vec<String>> = (lines.iter())
+        .map(|(name, role, row, more)| {
+            let [value, error, interval, prior, note] = row.cells(*role);
+            let unit = unit_suffix(&row.unit).trim_start().to_owned();
+            let mut cells = vec![name.clone()];
+            cells.extend(more.iter().cloned());
+            cells.extend([value, error, interval, unit, prior, note]);
+            cells
+        })
+        .collect();
+    table(caption, &head, &rows)
 }
 
 #[cfg(test)]

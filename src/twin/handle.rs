@@ -123,13 +123,18 @@ impl Twin {
         }
     }
 
+    /// Integrator and stepping; `None` for a black box.
+    pub(crate) fn step(&self) -> Option<(Integrator, Stepping)> {
+        let equations = self.equations()?;
+        Some((equations.integrator(), equations.stepping()))
+    }
+
     /// The twin with another integrator and stepping, as `change` makes them; `None` for a black box.
     pub(crate) fn stepped(
         &self,
         change: impl FnOnce(&mut Integrator, &mut Stepping),
     ) -> Option<Self> {
-        let equations = self.equations()?;
-        let (mut integrator, mut stepping) = (equations.integrator(), equations.stepping());
+        let (mut integrator, mut stepping) = self.step()?;
         change(&mut integrator, &mut stepping);
         Some(self.clone().modified(|base| Stepped {
             base,

@@ -180,6 +180,8 @@ fn ranks_share_records_and_trials() {
                 "van-der-pol",
                 "--trials",
                 "4",
+                "--kinds",
+                "none,outside",
                 "--detection-only",
             ],
         ),

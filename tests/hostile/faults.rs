@@ -54,7 +54,7 @@ const WRITERS: [&str; 8] = [
     "features r.csv --twin van-der-pol --out disk/new.npy",
     "estimate r.csv --estimator v.est --out disk/new",
     "diagnose r.csv --twin van-der-pol --out disk/new",
-    "withheld --twin van-der-pol --trials 4 --detection-only --out disk/new",
+    "withheld --twin van-der-pol --trials 4 --kinds none,outside --detection-only --out disk/new",
     "reproduce --twin van-der-pol --estimator v.est --runs 2 --out disk/new",
 ];
 
@@ -177,7 +177,7 @@ fn two_processes_fill_one_folder() {
     for (words, part) in [
         ("bank --twin van-der-pol --size 6000", ""),
         (
-            "withheld --twin van-der-pol --trials 4 --detection-only",
+            "withheld --twin van-der-pol --trials 4 --kinds none,outside --detection-only",
             "keys",
         ),
         (

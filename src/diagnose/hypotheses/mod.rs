@@ -32,6 +32,11 @@ const SIZES: [f64; 5] = [0.01, 0.03, 0.1, 0.3, 1.0];
 /// Most states for which functions of any two are rivals; beyond, only those with the state's own value.
 const MOST_STATES: usize = 4;
 
+/// Terms that several models hold.
+pub(in crate::diagnose) fn shared(terms: Vec<Term>) -> Vec<Arc<Term>> {
+    terms.into_iter().map(Arc::new).collect()
+}
+
 /// Every listed effect that the study lets a diagnosis name, in the units of the record.
 pub(in crate::diagnose) fn listed(
     study: &Study,

@@ -93,14 +93,20 @@ pub struct FittedParameter {
     pub unit: String,
     /// The estimator's first estimate.
     pub initial: Option<f64>,
+    /// Fitted to the twin without effects.
+    pub alone: f64,
     /// Refitted, beside accepted effects.
     pub refitted: f64,
     /// Standard deviation by information and weak prior.
     pub std_error: f64,
+    /// Ends of the 90 % interval, inside the bounds.
+    pub interval: [f64; 2],
     /// True where the record determines it better than the prior.
     pub identified: bool,
     /// The prior box.
     pub prior: Interval,
+    /// The physical bounds.
+    pub bounds: Interval,
 }
 
 /// One listed effect, fitted.

@@ -9,8 +9,10 @@ use crate::diagnose::{
     Shrinkage,
 };
 use crate::report::digits::{Digits, chance, error, percent, probability, short, unit_suffix};
+use crate::report::parameters::ParameterRow;
 use crate::report::units::Units;
 use crate::study::Study;
+use crate::twin::Role;
 
 /// Limit of lines.
 const LINES: usize = 15;
@@ -29,14 +31,13 @@ pub fn gap_text(study: &Study, diagnosis: &Diagnosis) -> String {
     lines.extend(step_sentence(diagnosis));
     let parameters: Vec<String> = (diagnosis.parameters.iter())
         .map(|p| {
-            let known = if p.identified {
-                ""
-            } else {
-                " (not identified)"
+            let note = match ParameterRow::diagnosed(p).note(Role::Parameter) {
+                "" => String::new(),
+                note => format!(" ({note})"),
             };
             let unit = unit_suffix(&p.unit);
             format!(
-                "{} = {} ± {}{unit}{known}",
+                "{} = {} ± {}{unit}{note}",
                 p.name,
                 short(p.refitted),
                 error(p.std_error)

@@ -144,7 +144,7 @@ fn power_is_what_it_says() {
         let text = format!(
             "[[effect]]\nid='{id}'\ntarget='{target}'\n{more}magnitudes={{{name}={value}}}\n"
         );
-        for i in 0..8 {
+        for i in 0..5 {
             let noise = Noise::new(45, id, i);
             let drive = drive(&study, noise);
             let record = record(study.twin(), &text, &theta, drive, noise);

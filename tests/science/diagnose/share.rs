@@ -120,7 +120,7 @@ fn middle(shares: &[(f64, [f64; 2])]) -> f64 {
 /// An interval of θ̂ alone, or of blocks shorter than the noise's memory, holds 1 in six of ten.
 #[test]
 fn the_right_effect_closes_the_whole_gap() {
-    let (shares, of) = shares(&CASES[..5], 3);
+    let (shares, of) = shares(&CASES[..5], 2);
     assert!(shares.len() as u64 >= of - 2, "{shares:?}");
     let least = *binomial_bounds(shares.len() as u64, 0.88, 0.99).start();
     assert!(held(&shares) >= least, "{shares:?}");

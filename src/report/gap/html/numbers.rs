@@ -4,46 +4,42 @@ use crate::diagnose::Diagnosis;
 use crate::report::digits::{Digits, error, short, unit_suffix};
 use crate::report::page::Column::{Number, Text};
 use crate::report::page::{Section, paragraph, table};
+use crate::report::parameters::{Line, ParameterRow, parameter_table};
 use crate::report::units::Units;
+use crate::twin::Role;
 
 pub(super) fn section_of(units: &Units, diagnosis: &Diagnosis) -> Section {
-    let beside = if diagnosis.cause.accepted.is_empty() {
-        "refitted"
-    } else {
-        "refitted together with the accepted effects"
-    };
-    let rows: Vec<Vec<String>> = (diagnosis.parameters.iter())
+    let is_told = diagnosis.parameters.iter().any(|p| p.initial.is_some());
+    let is_beside = !diagnosis.cause.accepted.is_empty();
+    let further = [("first estimate", is_told), ("twin alone", is_beside)];
+    let more: Vec<&str> = (further.iter().filter(|(_, there)| *there))
+        .map(|(name, _)| *name)
+        .collect();
+    let lines: Vec<Line> = (diagnosis.parameters.iter())
         .map(|p| {
-            let unit = unit_suffix(&p.unit);
-            let known = match (p.identified, p.prior.contains(p.refitted)) {
-                (false, _) => "not identified",
-                (true, false) => "outside the prior",
-                (true, true) => "",
-            };
-            vec![
+            let cells = [
+                (p.initial.map_or("–".into(), short), is_told),
+                (short(p.alone), is_beside),
+            ];
+            let cells = cells.into_iter().filter(|(_, there)| *there);
+            let row = ParameterRow::diagnosed(p);
+            (
                 p.name.clone(),
-                p.initial.map_or("–".into(), short),
-                Digits::supported(p.refitted, p.std_error).write(p.refitted),
-                error(p.std_error),
-                unit.trim_start().to_owned(),
-                format!("{} … {}", short(p.prior.low()), short(p.prior.high())),
-                known.into(),
-            ]
+                Role::Parameter,
+                row,
+                cells.map(|(cell, _)| cell).collect(),
+            )
         })
         .collect();
-    let head = [
-        ("parameter", Text),
-        ("first estimate", Number),
-        ("refitted", Number),
-        ("std. error", Number),
-        ("unit", Text),
-        ("prior", Number),
-        ("", Text),
-    ];
+    let beside = if is_beside {
+        " beside the accepted effects; twin alone: fitted without them"
+    } else {
+        ""
+    };
     let caption = format!(
-        "The twin's own parameters, {beside}. Not identified: the record adds nothing to the prior."
+        "The twin's own parameters{beside}. Not identified: the record adds nothing to the prior."
     );
-    let mut body = table(&caption, &head, &rows);
+    let mut body = parameter_table(&caption, &more, &lines);
     if !diagnosis.nuisance.is_empty() {
         let rows: Vec<Vec<String>> = (diagnosis.nuisance.iter())
             .map(|n| {

@@ -111,9 +111,7 @@ fn every_kind_can_be_drawn_of_a_twin_of_several_outputs() {
         assert!(keys.contains(&key), "{keys:?}");
     }
     for kind in Kind::ALL {
-        for trial in 0..3 {
-            holds(&sampler, kind, trial);
-        }
+        holds(&sampler, kind, 0);
     }
 }
 
