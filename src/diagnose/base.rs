@@ -105,7 +105,7 @@ impl<'a> Base<'a> {
         Base::of(model, self.noisy.clone(), noises, self.step).map(Some)
     }
 
-    /// What effects are made from.
+    /// The fitted twin with its units, as terms are made from it.
     pub fn library(&self) -> Library<'_> {
         Library {
             twin: self.model.base,

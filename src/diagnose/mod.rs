@@ -3,6 +3,7 @@
 //! | room | question |
 //! |---|---|
 //! | `run.rs`, `base.rs`, `summary.rs` | order of the steps; the fitted twin that they begin with; the summary of their results |
+//! | `rounds.rs` | the search, again with another kind of noise or a finer step |
 //! | `model.rs` | a twin with terms, fitted |
 //! | `step.rs` | whether a finer step of the integrator explains the records better |
 //! | `hypotheses/` | what could be missing: listed effects, unknown functions |
@@ -24,6 +25,7 @@ mod model;
 mod outcome;
 mod quantify;
 mod residuals;
+mod rounds;
 mod run;
 mod settings;
 mod step;

@@ -1,14 +1,9 @@
 //! Entry of a diagnosis, and the order of its steps.
 
-use super::base::{Base, left_the_prior, verdict};
+use super::base::{left_the_prior, verdict};
 use super::error::{DiagnoseError, GivenRecord};
 use super::explain::decide::{Chances, Conclusion, Findings, decide};
-use super::explain::explore::{Terms, absorbing, explore};
-use super::explain::search::{self, Breadth};
-use super::hypotheses::noise::kinds;
-use super::hypotheses::scales::Scales;
-use super::hypotheses::term::Term;
-use super::hypotheses::{not_tested, shared, unknown};
+use super::explain::explore::absorbing;
 use super::locate::discover::discover;
 use super::locate::functions::{curve, told};
 use super::locate::maps::maps;
@@ -19,27 +14,23 @@ use super::quantify::free_run::{Runner, free_runs, root};
 use super::quantify::next_input::next_input;
 use super::quantify::power::power;
 use super::quantify::share::{Measures, shrinkage};
+use super::rounds::{Explored, search};
 use super::settings::DiagnoseSettings;
-use super::step::{FinerStep, finer_step};
 use super::summary::{effects, nuisance, onset, parameters, remains};
 use super::thresholds::Thresholds;
 use crate::fit::climb::climb;
-use crate::likelihood::measured;
 use crate::math::six_digits;
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::setting::SettingError;
 use crate::study::Study;
 use crate::twin::Noise;
-use std::sync::Arc;
 use std::time::Instant;
 
 /// Most effects that are named together.
 const MOST_EFFECTS: usize = 2;
 /// Most iterations of the last fit of what is accepted.
 const FINISH: usize = 80;
-/// Most kinds of noise that are added to the twin's own.
-const ROUNDS: usize = 2;
 
 /// Diagnoses the gap between a twin and records of one real system.
 ///
@@ -85,130 +76,6 @@ pub fn diagnose(
     Ok(Diagnosis {
         seconds: clock.elapsed().as_secs_f64(),
         ..found
-    })
-}
-
-/// Everything that is known once the search is over.
-struct Explored<'s, 'a> {
-    study: &'s Study,
-    base: &'s Base<'a>,
-    listed: &'s [Arc<Term>],
-    findings: Findings<'a>,
-    chances: Chances,
-    not_tested: Vec<String>,
-}
-
-/// Fits the twin, searches for what explains the records beside it, and hands it all on.
-fn search<R>(
-    study: &Study,
-    records: &[Record],
-    settings: &DiagnoseSettings,
-    progress: &Progress,
-    then: impl FnOnce(Explored<'_, '_>) -> Result<R, DiagnoseError>,
-) -> Result<R, DiagnoseError> {
-    let stage = progress.stage("fit", 1);
-    let measured = measured(study.twin(), records, &study.beliefs())?;
-    let base = Base::new(&measured, records, settings)?;
-    stage.tick()?;
-    match step_of(study, &base, settings)? {
-        Some(step) => with_step(study, &base, step, settings, progress, then),
-        None => explored(study, base, settings, ROUNDS, progress, then),
-    }
-}
-
-/// The finer step that the records ask for. A gap may pass for one: an effect that explains more is asked first.
-fn step_of(
-    study: &Study,
-    base: &Base<'_>,
-    settings: &DiagnoseSettings,
-) -> Result<Option<FinerStep>, DiagnoseError> {
-    let Some((step, gain)) = finer_step(&base.model)? else {
-        return Ok(None);
-    };
-    let model = &base.model;
-    let terms = base.listed(study, settings)?;
-    let breadth = Breadth::of(model);
-    let effects = search::listed(model, &terms, model.log_evidence, &[], breadth)?;
-    let best = effects.first().filter(|effect| effect.gain > gain);
-    match best.and_then(|effect| effect.model.as_ref()) {
-        Some(beside) => Ok(finer_step(beside)?.map(|(step, _)| step)),
-        None => Ok(Some(step)),
-    }
-}
-
-/// Fits the twin with a finer step, and searches with it.
-fn with_step<R>(
-    study: &Study,
-    base: &Base<'_>,
-    step: FinerStep,
-    settings: &DiagnoseSettings,
-    progress: &Progress,
-    then: impl FnOnce(Explored<'_, '_>) -> Result<R, DiagnoseError>,
-) -> Result<R, DiagnoseError> {
-    let records = base.model.problem.records;
-    let twin = step.of(study.twin());
-    let twin = twin.as_ref().unwrap_or(study.twin());
-    let measured = measured(twin, records, &study.beliefs())?;
-    let begin = DiagnoseSettings {
-        initial: Some(base.theta.clone()),
-        ..settings.clone()
-    };
-    let base = Base {
-        step: Some(step),
-        ..Base::new(&measured, records, &begin)?
-    };
-    explored(study, base, settings, ROUNDS, progress, then)
-}
-
-/// Searches for what explains the records beside a fitted twin; anew where they ask for another kind of noise, or for a finer step.
-fn explored<R>(
-    study: &Study,
-    base: Base<'_>,
-    settings: &DiagnoseSettings,
-    rounds: usize,
-    progress: &Progress,
-    then: impl FnOnce(Explored<'_, '_>) -> Result<R, DiagnoseError>,
-) -> Result<R, DiagnoseError> {
-    let library = base.library();
-    let listed = base.listed(study, settings)?;
-    let mut noise = match rounds {
-        0 => vec![],
-        _ => shared(kinds(study, &settings.without, &library, &base.noisy)?),
-    };
-    noise.retain(|term| !base.noises.iter().any(|own| own.key() == term.key()));
-    let unlisted = |seen: &[Scales<'_>]| shared(unknown(&library, seen));
-    let terms = Terms {
-        listed: &listed,
-        noise: &noise,
-        unknown: &unlisted,
-    };
-    let breadth = Breadth::of(&base.model);
-    let findings = explore(
-        &base.model,
-        &terms,
-        breadth,
-        !settings.detection_only,
-        progress,
-    )?;
-    if let Some(model) = findings.asks_for_noise().and_then(|f| f.model.as_ref()) {
-        let twin = model.problem.twin.clone();
-        if let Some(noisier) = base.with_noise(model, &twin)? {
-            return explored(study, noisier, settings, rounds - 1, progress, then);
-        }
-    }
-    // Beside a gap, noise levels are fitted loud, and hide the step.
-    if let (None, Some(model)) = (base.step, findings.best_listed())
-        && let Some((step, _)) = finer_step(model)?
-    {
-        return with_step(study, &base, step, settings, progress, then);
-    }
-    then(Explored {
-        study,
-        chances: findings.chances(),
-        findings,
-        base: &base,
-        listed: &listed,
-        not_tested: not_tested(study, &listed),
     })
 }
 
@@ -296,14 +163,17 @@ fn report(
     }
     stage.tick()?;
     if !settings.detection_only {
-        if conclusion.decision == Decision::Class && conclusion.accepted.len() == 1 {
+        let is_class = conclusion.decision == Decision::Class && conclusion.accepted.len() == 1;
+        if is_class && !settings.quick {
             let rivals: Vec<&Model<'_>> = (conclusion.class.iter())
                 .filter_map(|key| findings.model(std::slice::from_ref(key)))
                 .collect();
             next = next_input(&rivals, noise.child("next"))?;
         }
         stage.tick()?;
-        visible = power(model, listed)?;
+        if !settings.quick {
+            visible = power(model, listed)?;
+        }
         stage.tick()?;
         let validation = validation.map(std::slice::from_ref);
         let measures = Measures {
@@ -356,6 +226,7 @@ fn report(
         validation_runs: validation
             .map(|v| runs(std::slice::from_ref(v)))
             .transpose()?,
+        quick: settings.quick,
         integrator: base.step.map(|step| step.integrator),
         substeps: base.step.map(|step| step.substeps),
         candidates: findings.listed.len() + findings.unknown.len(),

@@ -13,6 +13,7 @@ use crate::twin::Noise;
 /// | `without` | none | ids, or `id@target` | effects that are not to be named |
 /// | `initial` | none | | θ that an estimator gave, a start of the fit |
 /// | `detection_only` | no | | stop after the verdict: neither where, nor which, nor how far |
+/// | `quick` | no | | effects one at a time, from few starts; no pairs, smallest visible effects or next input |
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiagnoseSettings {
     /// Level of the test whether θ left its prior.
@@ -27,6 +28,8 @@ pub struct DiagnoseSettings {
     pub initial: Option<Vec<f64>>,
     /// Stop after the verdict.
     pub detection_only: bool,
+    /// Try effects one at a time, from few starts.
+    pub quick: bool,
 }
 
 impl DiagnoseSettings {
@@ -45,6 +48,7 @@ impl Default for DiagnoseSettings {
             without: vec![],
             initial: None,
             detection_only: false,
+            quick: false,
         }
     }
 }

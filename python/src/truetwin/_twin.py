@@ -166,6 +166,7 @@ class Twin:
         without: str | Sequence[str] | None = None,
         *,
         calibrate: int = 0,
+        quick: bool = False,
         columns: Mapping[str, str] | None = None,
         seed: int = 1,
         out: Path_ | None = None,
@@ -185,6 +186,8 @@ class Twin:
             Effects to exclude, as ``"sensor-bias"`` or ``"state-ceiling@h1"``.
         calibrate : int, optional
             Number of records of the fitted twin that are diagnosed alike, for a p-value.
+        quick : bool, optional
+            Try effects one at a time, from few starts, without pairs, smallest visible effects or next input.
         columns, seed, out
             As for `fit`.
 
@@ -195,6 +198,7 @@ class Twin:
         with _Call(self) as call:
             files = call.records(records, columns)
             options = [*call.subject(), *call.columns(columns), "--calibrate", str(calibrate)]
+            options += ["--quick"] * quick
             if validation is not None:
                 options += ["--validation", *call.records(validation, columns)]
             excluded = [without] if isinstance(without, str) else list(without or ())

@@ -41,6 +41,9 @@ pub(in crate::cli) struct Diagnose {
     /// Simulate N records of the fitted twin and diagnose them alike, for a p-value.
     #[arg(long, value_name = "N", default_value_t = 0)]
     calibrate: usize,
+    /// Quick look: effects one at a time, from few starts; no pairs, smallest visible effects or next input.
+    #[arg(long)]
+    quick: bool,
     /// Effects to exclude.
     #[arg(long, value_name = "ID[@TARGET],..", value_delimiter = ',')]
     without: Vec<EffectPattern>,
@@ -68,6 +71,7 @@ impl Verb for Diagnose {
         let settings = DiagnoseSettings {
             seed: context.seed,
             calibrate: self.calibrate,
+            quick: self.quick,
             without: self.without.clone(),
             initial,
             ..DiagnoseSettings::default()

@@ -123,7 +123,9 @@ pub(in crate::diagnose) fn explore<'a>(
         }
     }
     stage.tick()?;
-    findings.several = pairs(&findings, terms, origin, breadth, enough)?;
+    if breadth.pairs {
+        findings.several = pairs(&findings, terms, origin, breadth, enough)?;
+    }
     for i in 0..findings.several.len().min(2) {
         let found = findings.several[i].clone();
         let better = found.gain - findings.price(2) > top;
@@ -239,7 +241,7 @@ fn pairs<'a>(
         let count = if enough { 4 } else { 8 };
         let seconds = Breadth {
             listed: count,
-            annealed: count,
+            annealed: count.min(breadth.annealed),
             least: 3.0,
             ..breadth
         };
@@ -283,7 +285,7 @@ pub(in crate::diagnose) fn absorbing<'a>(
 ) -> Result<Vec<Found<'a>>, DiagnoseError> {
     let breadth = Breadth {
         listed: usize::MAX,
-        ..Breadth::of(within)
+        ..Breadth::of(within, false)
     };
     let found = listed(within, terms, within.log_evidence, &[], breadth)?;
     let best = free.fitted.log_likelihood - Thresholds::ABSORBS;

@@ -50,18 +50,21 @@ pub(in crate::diagnose) struct Breadth {
     pub least: f64,
     /// True where much is missing, so that fits begin with loud noise, too.
     pub deep: bool,
+    /// True if pairs of effects are searched.
+    pub pairs: bool,
 }
 
 impl Breadth {
-    /// As many as a twin's likelihood allows: that of a black box costs an ensemble.
-    pub fn of(model: &Model<'_>) -> Self {
-        let simulated = model.problem.is_simulated();
+    /// As many as a twin's likelihood allows: that of a black box costs an ensemble. Few for a quick look.
+    pub fn of(model: &Model<'_>, quick: bool) -> Self {
+        let few = model.problem.is_simulated() || quick;
         Self {
             listed: 6,
-            annealed: if simulated { 0 } else { usize::MAX },
-            functions: if simulated { 2 } else { 5 },
+            annealed: if few { 0 } else { usize::MAX },
+            functions: if few { 2 } else { 5 },
             least: 2.5,
             deep: false,
+            pairs: !quick,
         }
     }
 }

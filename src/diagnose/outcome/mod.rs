@@ -271,6 +271,8 @@ pub struct Diagnosis {
     pub shrinkage: Option<Shrinkage>,
     /// Sparse law for the missing function, where something unknown is missing.
     pub discovery: Option<Discovery>,
+    /// True for a quick look: effects were tried one at a time.
+    pub quick: bool,
     /// Integrator that everything here is said with, where the records ask for a finer step than the twin's.
     pub integrator: Option<Integrator>,
     /// Its substeps of a sample.

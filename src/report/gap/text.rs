@@ -29,6 +29,7 @@ pub fn gap_text(study: &Study, diagnosis: &Diagnosis) -> String {
     lines.extend((!told.is_empty()).then_some(told));
     lines.push(evidence_sentence(diagnosis));
     lines.extend(step_sentence(diagnosis));
+    lines.extend(quick_sentence(diagnosis));
     let parameters: Vec<String> = (diagnosis.parameters.iter())
         .map(|p| {
             let note = match ParameterRow::diagnosed(p).note(Role::Parameter) {
@@ -87,6 +88,12 @@ pub(super) fn evidence_sentence(diagnosis: &Diagnosis) -> String {
         short(diagnosis.detection.log_evidence),
         chance(diagnosis.cause.probabilities.nothing)
     )
+}
+
+/// Returns what a quick look leaves out; none for a whole diagnosis.
+pub(super) fn quick_sentence(diagnosis: &Diagnosis) -> Option<String> {
+    let said = "A quick look: effects one at a time, each from few starts. Without --quick, pairs are searched, and names are surer.";
+    diagnosis.quick.then(|| said.to_owned())
 }
 
 /// Returns with which step everything is said; none where it is the twin's own.

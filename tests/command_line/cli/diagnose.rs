@@ -1,6 +1,6 @@
 //! `diagnose` as a user meets it.
 
-use super::{done, refused};
+use super::{done, json, refused};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -68,6 +68,11 @@ fn a_lacking_spring_is_reported_and_bad_calls_are_refused() {
     assert_eq!(next.exists(), !report["which"]["next_input"].is_null());
 
     refused(&[&call[..], &twin].concat(), &["exists already"]);
+
+    let quick = json(&["diagnose", &record, "--twin", "van-der-pol", "--quick"]);
+    assert_eq!(quick["which"]["accepted"][0], "cubic-stiffness@x2");
+    assert_eq!(quick["quick"], true);
+    assert!(quick["power"].as_array().unwrap().is_empty());
 }
 
 /// A record of the oscillator, so long, with its path.

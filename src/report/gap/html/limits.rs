@@ -2,7 +2,7 @@
 
 use crate::diagnose::{Diagnosis, Maps, Visible};
 use crate::report::digits::{short, unit_suffix};
-use crate::report::gap::text::{calibration, step_sentence};
+use crate::report::gap::text::{calibration, quick_sentence, step_sentence};
 use crate::report::page::Column::{Number, Text};
 use crate::report::page::{Section, folded, list, paragraph, table};
 use crate::report::units::Units;
@@ -31,6 +31,7 @@ fn sure(diagnosis: &Diagnosis) -> Vec<String> {
         None => "The evidence was not calibrated on simulated records; --calibrate does that.".into(),
     });
     items.extend(step_sentence(diagnosis));
+    items.extend(quick_sentence(diagnosis));
     if !diagnosis.cause.effects.is_empty() {
         items.push(
             "Probabilities hold for the explanations that were tested; unknown functions stand for laws outside the list. Sealed \
