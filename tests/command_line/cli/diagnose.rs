@@ -69,7 +69,7 @@ fn a_lacking_spring_is_reported_and_bad_calls_are_refused() {
 
     refused(&[&call[..], &twin].concat(), &["exists already"]);
 
-    let quick = json(&["diagnose", &record, "--twin", "van-der-pol", "--quick"]);
+    let quick = json(&[&["diagnose", &record, "--quick", "--json"][..], &twin].concat());
     assert_eq!(quick["which"]["accepted"][0], "cubic-stiffness@x2");
     assert_eq!(quick["quick"], true);
     assert!(quick["power"].as_array().unwrap().is_empty());
