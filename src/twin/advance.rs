@@ -54,11 +54,8 @@ impl<T: StateSpace> Advance for T {
     #[inline]
     fn advance(&self, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
         self.update(now, x);
-        if work.refined.is_some() {
-            return advance_refined(self, now, x, work);
-        }
-        self.integrator()
-            .step(now, x, work, |now, x, dx| self.drift(now, x, dx));
+        let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| self.drift(now, x, dx);
+        self.integrator().carry(x.len(), now, x, work, drift);
     }
 
     fn run_equations(
@@ -114,48 +111,6 @@ impl<T: StateSpace> Advance for T {
         }
         changed
     }
-}
-
-/// Steps of Δt/n, inputs on the line to the next sample where the twin says so. States are put into their limits between
-/// substeps, as they would be between samples of a finer step.
-#[cold]
-fn advance_refined<T: StateSpace>(twin: &T, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
-    let Some(mut refined) = work.refined.take() else {
-        return;
-    };
-    let n = refined.substeps;
-    let h = now.dt / n as f64;
-    for i in 0..n {
-        if i > 0 {
-            for &(j, limit) in &refined.limits {
-                x[j] = limit.clamp(x[j]);
-            }
-        }
-        let sub = Now {
-            t: now.t + i as f64 * h,
-            dt: h,
-            ..*now
-        };
-        let inputs = &mut refined.inputs;
-        let rule = twin.integrator();
-        rule.step_in_stages(&sub, x, work, |share, stage, x, dx| {
-            let Some(between) = now.between else {
-                return twin.drift(stage, x, dx);
-            };
-            let between = Between {
-                share: (i as f64 + share) / n as f64,
-                ..*between
-            };
-            between.line(now.u, inputs);
-            let stage = Now {
-                u: inputs,
-                between: Some(&between),
-                ..*stage
-            };
-            twin.drift(&stage, x, dx);
-        });
-    }
-    work.refined = Some(refined);
 }
 
 #[inline(always)]

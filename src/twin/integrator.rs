@@ -125,11 +125,6 @@ impl Workspace {
         }
     }
 
-    /// Returns whether a sample takes several steps, or inputs lie on lines.
-    pub(super) fn has_substeps(&self) -> bool {
-        self.refined.is_some()
-    }
-
     /// A buffer for `states` states.
     pub(super) fn stage(&mut self, states: usize) -> &mut [f64] {
         grown(&mut self.stage, states)
@@ -156,6 +151,72 @@ impl Integrator {
         mut drift: impl FnMut(&Now<'_>, &[f64], &mut [f64]),
     ) {
         self.step_in_stages(now, x, work, |_, now, x, dx| drift(now, x, dx));
+    }
+
+    /// Carries points of `n` states each over one sample, in the substeps of `work`.
+    #[inline(always)]
+    pub(super) fn carry(
+        self,
+        n: usize,
+        now: &Now<'_>,
+        x: &mut [f64],
+        work: &mut Workspace,
+        drift: impl FnMut(&Now<'_>, &[f64], &mut [f64]),
+    ) {
+        match work.refined.take() {
+            Some(mut refined) => {
+                self.substeps(n, now, x, (work, &mut refined), drift);
+                work.refined = Some(refined);
+            }
+            None => self.step(now, x, work, drift),
+        }
+    }
+
+    /// Steps of Δt/m, inputs on the line to the next sample where there is one. States are put into their limits between substeps, as
+    /// they would be between samples of a finer step.
+    #[inline(never)]
+    fn substeps(
+        self,
+        n: usize,
+        now: &Now<'_>,
+        x: &mut [f64],
+        (work, refined): (&mut Workspace, &mut Refined),
+        mut drift: impl FnMut(&Now<'_>, &[f64], &mut [f64]),
+    ) {
+        let m = refined.substeps;
+        let h = now.dt / m as f64;
+        for i in 0..m {
+            if i > 0 {
+                for &(j, limit) in &refined.limits {
+                    for x in x.iter_mut().skip(j).step_by(n) {
+                        *x = limit.clamp(*x);
+                    }
+                }
+            }
+            let sub = Now {
+                t: now.t + i as f64 * h,
+                dt: h,
+                ..*now
+            };
+            let Some(between) = now.between else {
+                self.step(&sub, x, work, &mut drift);
+                continue;
+            };
+            let inputs = &mut refined.inputs;
+            self.step_in_stages(&sub, x, work, |share, stage, x, dx| {
+                let between = Between {
+                    share: (i as f64 + share) / m as f64,
+                    ..*between
+                };
+                between.line(now.u, inputs);
+                let stage = Now {
+                    u: inputs,
+                    between: Some(&between),
+                    ..*stage
+                };
+                drift(&stage, x, dx);
+            });
+        }
     }
 
     /// As [`step`](Self::step); `drift` is also told the share of the step that has passed at each stage.

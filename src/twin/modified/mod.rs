@@ -2,7 +2,6 @@
 
 mod together;
 
-use super::points::advance_one_by_one;
 use crate::record::{Drive, Signal};
 use crate::twin::{
     Advance, Integrator, Interval, Layout, Noise, Now, Outliers, Outline, Points, SimulationError,
@@ -209,11 +208,6 @@ impl<M: Modify> StateSpace for Modified<M> {
         self.0.readout_each(now, p, y)
     }
     fn advance_each(&self, now: &Now<'_>, points: Points<'_>, work: &mut Workspace) -> bool {
-        if work.has_substeps() {
-            let constrain = |x: &mut [f64]| self.constrain(now, x);
-            let advance = |x: &mut [f64]| self.advance(now, x, work);
-            return advance_one_by_one(points.shifts.len(), points, advance, constrain);
-        }
         // Loops of known length, for the sizes of most twins.
         match points.shifts.len() {
             2 => advance_together(self, 2, now, points, work),

@@ -17,7 +17,7 @@ pub(super) fn advance_together<T: StateSpace>(
     let (moving, shifted) = points.all.split_at_mut(points.moving * n);
     twin.update_each(now, at, moving);
     let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| twin.drift_each(now, at, x, dx);
-    twin.integrator().step(now, moving, work, drift);
+    twin.integrator().carry(n, now, moving, work, drift);
     let pairs = || (shifts.iter().enumerate()).flat_map(|(i, s)| [(i, *s), (i, -s)]);
     let before = work.stage(n);
     before.copy_from_slice(&moving[..n]);
