@@ -11,6 +11,7 @@ use super::hypotheses::term::Term;
 use super::hypotheses::{not_tested, shared, unknown};
 use super::settings::DiagnoseSettings;
 use super::step::{FinerStep, finer_step};
+use super::thresholds::Thresholds;
 use crate::likelihood::measured;
 use crate::progress::Progress;
 use crate::record::Record;
@@ -48,7 +49,8 @@ pub(in crate::diagnose) fn search<R>(
     }
 }
 
-/// The finer step that the records ask for. A gap may pass for one: an effect that explains more is asked first.
+/// The finer step that the records ask for. A gap may pass for one: an effect that is more probable, as one of all that are listed, is
+/// asked first.
 fn step_of(
     study: &Study,
     base: &Base<'_>,
@@ -61,7 +63,8 @@ fn step_of(
     let terms = base.listed(study, settings)?;
     let breadth = Breadth::of(model, settings.quick);
     let effects = listed(model, &terms, model.log_evidence, &[], breadth)?;
-    let best = effects.first().filter(|effect| effect.gain > gain);
+    let price = (effects.len() as f64 / Thresholds::LISTED).ln();
+    let best = (effects.first()).filter(|effect| effect.gain - price > gain);
     match best.and_then(|effect| effect.model.as_ref()) {
         Some(beside) => Ok(finer_step(beside)?.map(|(step, _)| step)),
         None => Ok(Some(step)),

@@ -22,11 +22,17 @@ impl FinerStep {
     /// Finer steps from the cheapest to the last, which stands for an exact one. A Runge–Kutta step takes four rates, and is given the time
     /// of four of Euler's; limits of states act once a substep, so that only more of them help a state that runs into its limits.
     fn candidates(integrator: Integrator, own: usize) -> Vec<Self> {
-        let smooth =
-            (integrator == Integrator::Euler).then(|| (Integrator::RungeKutta4, own.div_ceil(4)));
-        let exact = (Integrator::RungeKutta4, 16 * own);
-        let all = [(integrator, 4 * own), (integrator, 16 * own), exact];
-        (smooth.into_iter().chain(all))
+        use Integrator::{Euler, RungeKutta4};
+        let all = match integrator {
+            Euler => vec![
+                (RungeKutta4, own.div_ceil(4)),
+                (Euler, 4 * own),
+                (Euler, 16 * own),
+                (RungeKutta4, 16 * own),
+            ],
+            rule => vec![(rule, 2 * own), (rule, 4 * own), (rule, 16 * own)],
+        };
+        (all.into_iter())
             .map(|(integrator, substeps)| Self {
                 integrator,
                 substeps: substeps.min(MOST_SUBSTEPS),
@@ -43,12 +49,12 @@ impl FinerStep {
     }
 }
 
-/// The cheapest step that does as well as an exact one, where a model explains its records better with it than with its twin's own, and
-/// how much better, in nats; `None` where the step does not show, or shows for the better, and for a black box.
+/// The cheapest step that explains a model's records as well as the best, where that is better than its twin's own, and how much better,
+/// in nats; `None` where the step does not show, or shows for the better, and for a black box.
 pub(in crate::diagnose) fn finer_step(
     model: &Model<'_>,
 ) -> Result<Option<(FinerStep, f64)>, DiagnoseError> {
-    let Some((integrator, stepping)) = model.base.step() else {
+    let Some((integrator, stepping)) = model.base.integration() else {
         return Ok(None);
     };
     let theta = &model.fitted.theta;
@@ -60,36 +66,40 @@ pub(in crate::diagnose) fn finer_step(
         let Some(twin) = step.of(model.base) else {
             return Ok(None);
         };
-        let problem = model.problem_of(&twin)?;
-        let Some(filtered) = recoverable(problem.filtered(theta))? else {
-            return Ok(None);
-        };
-        finer.push((reference.direction(&filtered), problem, step));
+        finer.push((model.problem_of(&twin)?, step));
     }
-    let shows = |change: &_| 0.5 * reference.own(change) > Thresholds::STEP_SHOWS;
-    let Some((exact, ..)) = finer.last() else {
+    let Some((exact, _)) = finer.last() else {
         return Ok(None);
     };
-    if !shows(exact) {
-        return Ok(None);
-    }
-    let exact = exact.clone();
-    let enough = (finer.into_iter()).find(|(change, ..)| !shows(&(change - &exact)));
-    let Some((_, problem, step)) = enough else {
+    let Some(filtered) = recoverable(exact.filtered(theta))? else {
         return Ok(None);
     };
+    if 0.5 * reference.own(&reference.direction(&filtered)) <= Thresholds::STEP_SHOWS {
+        return Ok(None);
+    }
     // A search stops before the end of a climb: with its own step, too, the model is carried on.
-    let carried_on = |model: &Model<'_>| -> Result<_, DiagnoseError> {
-        let fitted = climb(&model.problem, theta, ITERATIONS)?;
-        Ok((fitted.and_then(|fitted| model.refitted(fitted))).map(|model| model.log_evidence))
-    };
-    let own = carried_on(model)?.map_or(model.log_evidence, |own| own.max(model.log_evidence));
-    let finer = carried_on(&Model {
-        problem,
-        ..model.clone()
-    })?;
-    let gain = finer.map_or(f64::NEG_INFINITY, |finer| finer - own);
-    Ok((gain > Thresholds::STEP_WINS).then_some((step, gain)))
+    let mut last = carried_on(model)?.unwrap_or_else(|| model.clone());
+    let own = last.log_evidence.max(model.log_evidence);
+    let mut fitted = vec![];
+    for (problem, step) in finer {
+        let begin = Model {
+            problem,
+            ..last.clone()
+        };
+        if let Some(model) = carried_on(&begin)? {
+            fitted.push((step, model.log_evidence - own));
+            last = model;
+        }
+    }
+    let best = (fitted.iter()).fold(f64::NEG_INFINITY, |best, (_, gain)| best.max(*gain));
+    let enough = (best - Thresholds::STEP_SHOWS).max(Thresholds::STEP_WINS);
+    Ok((fitted.into_iter()).find(|(_, gain)| *gain > enough))
+}
+
+/// A model, fitted to the end of a climb.
+fn carried_on<'a>(model: &Model<'a>) -> Result<Option<Model<'a>>, DiagnoseError> {
+    let fitted = climb(&model.problem, &model.fitted.theta, ITERATIONS)?;
+    Ok(fitted.and_then(|fitted| model.refitted(fitted)))
 }
 
 #[cfg(test)]

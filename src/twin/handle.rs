@@ -124,7 +124,7 @@ impl Twin {
     }
 
     /// Integrator and stepping; `None` for a black box.
-    pub(crate) fn step(&self) -> Option<(Integrator, Stepping)> {
+    pub(crate) fn integration(&self) -> Option<(Integrator, Stepping)> {
         let equations = self.equations()?;
         Some((equations.integrator(), equations.stepping()))
     }
@@ -134,7 +134,7 @@ impl Twin {
         &self,
         change: impl FnOnce(&mut Integrator, &mut Stepping),
     ) -> Option<Self> {
-        let (mut integrator, mut stepping) = self.step()?;
+        let (mut integrator, mut stepping) = self.integration()?;
         change(&mut integrator, &mut stepping);
         Some(self.clone().modified(|base| Stepped {
             base,

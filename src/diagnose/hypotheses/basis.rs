@@ -1,6 +1,6 @@
 //! Sums of sines that unknown functions of one and two variables are written as, and their variables.
 
-use std::f64::consts::{PI, SQRT_2};
+use std::f64::consts::{FRAC_1_SQRT_2, PI, SQRT_2};
 
 /// Terms of a function of one variable. At the shortest length the last one has e^−2 of the first one's variance; half of them cannot
 /// turn as fast as a ceiling does, twice of them double the time.
@@ -51,20 +51,38 @@ fn sines(value: f64, (a, b): (f64, f64), out: &mut [f64]) {
 
 /// The sum of a function of one variable.
 pub(super) fn sum_of_one(m: &[f64], value: f64, ends: (f64, f64)) -> f64 {
+    if is_nothing(m) {
+        return 0.0;
+    }
     let mut phi = [0.0; TERMS];
     sines(value, ends, &mut phi[..m.len()]);
     m.iter().zip(phi).map(|(m, phi)| m * phi).sum()
 }
 
-/// The sum of a function of two variables.
+/// The sum of a function of two variables, its coefficients in the order of [`pairs`].
 pub(super) fn sum_of_two(m: &[f64], values: [f64; 2], ends: [(f64, f64); 2]) -> f64 {
+    if is_nothing(m) {
+        return 0.0;
+    }
     let mut phi = [[0.0; HIGHEST]; 2];
     for ((phi, value), ends) in phi.iter_mut().zip(values).zip(ends) {
         sines(value, ends, phi);
     }
-    (pairs().zip(m))
-        .map(|((i, j), m)| m * phi[0][i - 1] * phi[1][j - 1] * std::f64::consts::FRAC_1_SQRT_2)
-        .sum()
+    let (mut sum, mut rest) = (0.0, m);
+    for (i, first) in phi[0].iter().enumerate() {
+        let (own, others) = rest.split_at(ORDER - 1 - i);
+        rest = others;
+        if !is_nothing(own) {
+            let inner: f64 = own.iter().zip(phi[1]).map(|(m, phi)| m * phi).sum();
+            sum += first * inner;
+        }
+    }
+    sum * FRAC_1_SQRT_2
+}
+
+/// True before a function is fitted: most of its coefficients are zero where one is looked at after the other.
+fn is_nothing(m: &[f64]) -> bool {
+    m.iter().all(|m| *m == 0.0)
 }
 
 /// The value of a fitted function where its variable is `value`; of one variable.
@@ -90,6 +108,20 @@ mod tests {
         for (k, value) in (1..).zip(phi) {
             let expected = SQRT_2 * (f64::from(k) * PI * 1.3 / 3.0).sin();
             assert!((value - expected).abs() < 1e-12, "{k}");
+        }
+    }
+
+    /// Every pair of orders has its own coefficient.
+    #[test]
+    fn functions_of_two_are_products_of_sines() {
+        let ends = [(-1.0, 2.0), (0.0, 5.0)];
+        let sine = |k: usize, z: f64| SQRT_2 * (k as f64 * PI * z).sin();
+        for (n, (i, j)) in pairs().enumerate() {
+            let mut m = [0.0; 21];
+            m[n] = 1.5;
+            let expected = 1.5 * sine(i, 1.3 / 3.0) * sine(j, 0.4) * FRAC_1_SQRT_2;
+            let value = sum_of_two(&m, [0.3, 2.0], ends);
+            assert!((value - expected).abs() < 1e-12, "{i}, {j}");
         }
     }
 }

@@ -181,7 +181,7 @@ impl Slots {
 /// Bounds of a magnitude whose limits are open, in multiples of its largest start. Starts are for a signal of size 1; a
 /// sensor may read pascals or nanometres, so that the bounds must be wide. They are finite for the sake of differences near
 /// them; fits start within the prior ([`Parameter::start_range`]).
-const WIDE: f64 = 1e6;
+const WIDE: f64 = 1e15;
 
 /// Returns the magnitudes as parameters.
 fn magnitude_parameters(effect: &Effect) -> Vec<Parameter> {
