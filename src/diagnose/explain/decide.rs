@@ -52,6 +52,7 @@ impl<'a> Findings<'a> {
     pub fn add(&mut self, found: &Found<'a>, on_top: Option<Vec<Found<'a>>>) -> bool {
         let Some(on_top) = on_top else { return false };
         let added = on_top.first().map_or(0.0, |f| f.gain - found.gain);
+        self.beside.retain(|(keys, _)| !same(keys, &found.keys()));
         self.beside.push((found.keys(), on_top));
         leaves_nothing(found.gain, added)
     }

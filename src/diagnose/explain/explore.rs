@@ -125,7 +125,11 @@ pub(in crate::diagnose) fn explore<'a>(
     stage.tick()?;
     if breadth.pairs {
         findings.several = pairs(&findings, terms, origin, breadth, enough)?;
+        if let Some(found) = alone(base, &mut findings, terms, origin, breadth)? {
+            enough |= findings.add(&found, on_top(&found, terms, origin, few)?);
+        }
     }
+    let top = findings.listed.first().map_or(0.0, |f| f.gain);
     for i in 0..findings.several.len().min(2) {
         let found = findings.several[i].clone();
         let better = found.gain - findings.price(2) > top;
@@ -261,6 +265,40 @@ fn pairs<'a>(
     }
     all.truncate(Thresholds::PAIRS);
     Ok(all)
+}
+
+/// A pair may win since the fits of its effects alone stopped early: these begin again where the pair ended. Returns the best single
+/// effect if it is a new one.
+fn alone<'a>(
+    base: &Model<'a>,
+    findings: &mut Findings<'a>,
+    terms: &Terms<'_>,
+    origin: f64,
+    breadth: Breadth,
+) -> Result<Option<Found<'a>>, DiagnoseError> {
+    let top = findings.listed.first().map_or(0.0, |f| f.gain);
+    let wins = |pair: &&Found<'a>| pair.gain - findings.price(2) > top;
+    let Some(pair) = findings.several.first().filter(wins) else {
+        return Ok(None);
+    };
+    let keys = pair.keys();
+    let own: Vec<Arc<Term>> = (terms.listed.iter())
+        .filter(|term| keys.contains(&term.key()))
+        .cloned()
+        .collect();
+    let every = Breadth {
+        listed: usize::MAX,
+        ..breadth
+    };
+    let thetas: Vec<Vec<f64>> = own_theta(pair).into_iter().collect();
+    for found in listed(base, &own, origin, &thetas, every)? {
+        let old = (findings.listed.iter_mut()).find(|old| old.keys() == found.keys());
+        if let Some(old) = old.filter(|old| old.gain < found.gain) {
+            *old = found;
+        }
+    }
+    sort(&mut findings.listed);
+    Ok((findings.listed.first().cloned()).filter(|first| first.gain > top))
 }
 
 /// Adds fitted pairs, of two of the same effects the better one; best first.
