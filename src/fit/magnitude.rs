@@ -85,7 +85,7 @@ pub(crate) fn largest(
         // Starts are for signals of size 1; those of others are lost in rounding, or bend the twin.
         match change {
             0.0 => step *= FARTHER,
-            c if c.is_finite() && SEEN.contains(&c) => return Some(step.abs() / c),
+            c if SEEN.contains(&c) => return Some(step.abs() / c),
             c if c.is_finite() => step *= SHARE / c,
             _ => step /= FARTHER,
         }

@@ -107,11 +107,21 @@ impl<'a> Findings<'a> {
         self.set(keys).map(|f| f.gain)
     }
 
+    /// Evidence of the best single effect.
+    pub fn top(&self) -> f64 {
+        self.listed.first().map_or(0.0, |f| f.gain)
+    }
+
+    /// Returns whether a pair explains more than any single effect, its price paid.
+    pub fn wins(&self, pair: &Found<'_>) -> bool {
+        pair.gain - self.price(2) > self.top()
+    }
+
     /// Nats that so many effects together cost: one of all that could stand beside the first, in either order, and what could be the
     /// first law's fine print.
     pub fn price(&self, count: usize) -> f64 {
         let pairs = 0.5 * (self.listed.len() as f64 - 1.0);
-        let top = self.listed.first().map_or(0.0, |f| f.gain.max(0.0));
+        let top = self.top().max(0.0);
         (pairs.max(1.0).ln() + Thresholds::FINE_PRINT * top) * (count - 1) as f64
     }
 

@@ -62,16 +62,7 @@ pub(in crate::diagnose) fn explore<'a>(
     )?;
     let top = singles.first().map_or(0.0, |f| f.gain);
     if best <= Thresholds::NULL_LIKE && top > Thresholds::NULL_LIKE {
-        singles = listed(
-            base,
-            terms.listed,
-            origin,
-            &[],
-            Breadth {
-                listed: usize::MAX,
-                ..breadth
-            },
-        )?;
+        singles = listed(base, terms.listed, origin, &[], breadth.of_all())?;
     }
     let top = singles.first().map_or(0.0, |f| f.gain);
     stage.tick()?;
@@ -90,10 +81,7 @@ pub(in crate::diagnose) fn explore<'a>(
         }
         sort(&mut unknown_alone);
     }
-    let every = Breadth {
-        listed: usize::MAX,
-        ..breadth
-    };
+    let every = breadth.of_all();
     let noise = listed(base, terms.noise, origin, &[], every)?;
     let mut findings = Findings {
         noise_pairs: noise_pairs(&noise, terms.noise, origin, every)?,
@@ -129,11 +117,9 @@ pub(in crate::diagnose) fn explore<'a>(
             enough |= findings.add(&found, on_top(&found, terms, origin, few)?);
         }
     }
-    let top = findings.listed.first().map_or(0.0, |f| f.gain);
     for i in 0..findings.several.len().min(2) {
         let found = findings.several[i].clone();
-        let better = found.gain - findings.price(2) > top;
-        if !better || i > 0 && !may_suffice(&found) {
+        if !findings.wins(&found) || i > 0 && !may_suffice(&found) {
             break;
         }
         if findings.add(&found, on_top(&found, terms, origin, few)?) {
@@ -252,11 +238,12 @@ fn pairs<'a>(
         keep(&mut all, listed(model, &others, origin, &thetas, seconds)?);
     }
     // A pair that wins has rivals: the second effect beside the rivals of the first.
-    let top = findings.listed.first().map_or(0.0, |f| f.gain);
-    let wins = |pair: &&Found<'a>| pair.gain - findings.price(2) > top;
-    if let Some(pair) = all.first().filter(wins).cloned() {
+    if let Some(pair) = all.first().filter(|pair| findings.wins(pair)).cloned() {
         let second = &pair.terms[pair.terms.len() - 1..];
-        let (keys, first) = (pair.keys(), findings.gain(&pair.keys()[..1]).unwrap_or(top));
+        let (keys, first) = (
+            pair.keys(),
+            findings.gain(&pair.keys()[..1]).unwrap_or(findings.top()),
+        );
         let rivals = (findings.listed.iter())
             .filter(|f| f.gain > first - Thresholds::RIVALS && !keys.contains(&f.last().key()));
         for model in rivals.filter_map(|f| f.model.as_ref()).take(SINGLES) {
@@ -276,9 +263,9 @@ fn alone<'a>(
     origin: f64,
     breadth: Breadth,
 ) -> Result<Option<Found<'a>>, DiagnoseError> {
-    let top = findings.listed.first().map_or(0.0, |f| f.gain);
-    let wins = |pair: &&Found<'a>| pair.gain - findings.price(2) > top;
-    let Some(pair) = findings.several.first().filter(wins) else {
+    let top = findings.top();
+    let first = findings.several.first();
+    let Some(pair) = first.filter(|pair| findings.wins(pair)) else {
         return Ok(None);
     };
     let keys = pair.keys();
@@ -286,12 +273,8 @@ fn alone<'a>(
         .filter(|term| keys.contains(&term.key()))
         .cloned()
         .collect();
-    let every = Breadth {
-        listed: usize::MAX,
-        ..breadth
-    };
     let thetas: Vec<Vec<f64>> = own_theta(pair).into_iter().collect();
-    for found in listed(base, &own, origin, &thetas, every)? {
+    for found in listed(base, &own, origin, &thetas, breadth.of_all())? {
         let old = (findings.listed.iter_mut()).find(|old| old.keys() == found.keys());
         if let Some(old) = old.filter(|old| old.gain < found.gain) {
             *old = found;
@@ -321,10 +304,7 @@ pub(in crate::diagnose) fn absorbing<'a>(
     within: &Model<'a>,
     terms: &[Arc<Term>],
 ) -> Result<Vec<Found<'a>>, DiagnoseError> {
-    let breadth = Breadth {
-        listed: usize::MAX,
-        ..Breadth::of(within, false)
-    };
+    let breadth = Breadth::of(within, false).of_all();
     let found = listed(within, terms, within.log_evidence, &[], breadth)?;
     let best = free.fitted.log_likelihood - Thresholds::ABSORBS;
     let explains = |f: &Found<'a>| {

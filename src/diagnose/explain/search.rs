@@ -67,6 +67,14 @@ impl Breadth {
             pairs: !quick,
         }
     }
+
+    /// The same, every listed effect that promises something refitted.
+    pub fn of_all(self) -> Self {
+        Self {
+            listed: usize::MAX,
+            ..self
+        }
+    }
 }
 
 /// The best of terms that are one hypothesis used in several ways, which share its prior.
