@@ -3,7 +3,7 @@
 use super::axis::{Axis, EvidencePrior};
 use crate::effect::{Effect, Magnitude};
 use crate::record::{Record, Signal};
-use crate::twin::{Now, Parameter, StateSpace, Twin};
+use crate::twin::{Acting, Parameter, StateSpace, Twin};
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
@@ -106,18 +106,21 @@ fn change(
     let (mut change, mut whole, mut total) = (vec![0.0; n + p], vec![0.0; n + p], vec![0.0; n + p]);
     let mut rows = 0.0;
     for (record, states) in records.iter().zip(states) {
+        let acting = |theta| Acting::of(twin, theta, record.drive());
+        let (Ok(here), Ok(there)) = (acting(theta), acting(moved)) else {
+            return f64::NAN;
+        };
         for k in 0..record.samples() {
             let x: Vec<f64> = states.row(k).to_vec();
-            let at = |theta: &[f64]| -> Vec<f64> {
-                let drive = record.drive();
-                let now = Now::new(drive.time(k), drive.step(k), drive.input(k), theta);
+            let at = |acting: &Acting<'_>, theta: &[f64]| -> Vec<f64> {
+                let now = acting.at(k, theta);
                 let mut values = vec![0.0; n + p];
                 let (rates, outputs) = values.split_at_mut(n);
                 twin.drift(&now, &x, rates);
                 twin.observe(&now, &x, outputs);
                 values
             };
-            let (here, there) = (at(theta), at(moved));
+            let (here, there) = (at(&here, theta), at(&there, moved));
             rows += 1.0;
             for i in 0..n + p {
                 change[i] += (there[i] - here[i]).powi(2);
@@ -173,7 +176,7 @@ mod tests {
     use super::*;
     use crate::effect::{Catalogue, augment};
     use crate::record::Drive;
-    use crate::twin::Outline;
+    use crate::twin::{Now, Outline};
 
     /// ẋ = g·(u − x), x in a unit of anybody's choice.
     struct Level(f64);

@@ -2,7 +2,7 @@
 
 use crate::math::{MathError, Stencil, median};
 use crate::record::{Drive, Signal};
-use crate::twin::{Now, Twin, is_memory};
+use crate::twin::{Acting, Twin, is_memory};
 use nalgebra::{DMatrix, DVector, Schur};
 
 /// Points of the motion that are looked at: their median does not need more.
@@ -31,9 +31,10 @@ pub(crate) fn time_constants(
         .collect();
     let endless = vec![f64::INFINITY; sizes.len()];
     let beginless = vec![f64::NEG_INFINITY; sizes.len()];
+    let acting = Acting::of(equations, theta, drive).ok()?;
     let (mut fastest, mut slowest) = (vec![], vec![]);
     for k in (0..states.nrows()).step_by(states.nrows().div_ceil(POINTS).max(1)) {
-        let now = Now::new(drive.time(k), drive.step(k), drive.input(k), theta);
+        let now = acting.at(k, theta);
         let stencil = Stencil::new(&states.row(k).to_vec(), &sizes, &beginless, &endless).ok()?;
         let drift = |x: &[f64]| {
             let mut drift = DVector::zeros(x.len());

@@ -1,12 +1,12 @@
 //! One step of any equations; the points of several filters.
 
-use super::integrator::{Between, Refined};
+use super::integrator::Refined;
 use super::points::{gather, scatter};
 use super::simulation::simulate_equations;
 use crate::math::Lanes;
 use crate::record::{Drive, Signal};
 use crate::twin::{
-    Advance, Hold, Interval, LanePoints, Layout, Noise, Now, Points, SimulationError, StateSpace,
+    Advance, Interval, LanePoints, Layout, Noise, Now, Points, SimulationError, StateSpace,
     Stepping, Workspace,
 };
 
@@ -31,22 +31,6 @@ impl Workspace {
         let mut work = Self::of_states(outline.states.len());
         work.refined = refined;
         work
-    }
-}
-
-impl<'a> Between<'a> {
-    /// Samples of a drive, if `twin` joins inputs by lines; none if it holds them. The last input is held.
-    pub fn rows(twin: &(impl StateSpace + ?Sized), drive: &'a Drive) -> Vec<Self> {
-        let last = drive.samples() - 1;
-        match twin.stepping().hold {
-            Hold::Zero => vec![],
-            Hold::Linear => (0..=last)
-                .map(|k| Self {
-                    next: drive.input((k + 1).min(last)),
-                    share: 0.0,
-                })
-                .collect(),
-        }
     }
 }
 
@@ -223,7 +207,7 @@ mod tests {
     use super::*;
     use crate::likelihood::kalman::{FilterSettings, Kalman};
     use crate::record::Record;
-    use crate::twin::{Integrator, Outline, Parameter, Twin, fix};
+    use crate::twin::{Hold, Integrator, Outline, Parameter, Twin, fix};
 
     /// ẋ = u − k·x³ within limits, y = x.
     struct Vessel(Integrator);

@@ -15,7 +15,7 @@ pub struct Now<'a> {
     /// Parameters θ.
     pub theta: &'a [f64],
     /// Position between samples; `None` where inputs are held.
-    pub(crate) between: Option<&'a Between<'a>>,
+    pub(crate) between: Option<Between<'a>>,
 }
 
 impl<'a> Now<'a> {
@@ -206,12 +206,12 @@ impl Integrator {
             self.step_in_stages(&sub, x, work, |share, stage, x, dx| {
                 let between = Between {
                     share: (i as f64 + share) / m as f64,
-                    ..*between
+                    ..between
                 };
                 between.line(now.u, inputs);
                 let stage = Now {
                     u: inputs,
-                    between: Some(&between),
+                    between: Some(between),
                     ..*stage
                 };
                 drift(&stage, x, dx);

@@ -9,6 +9,7 @@
 //! | draw noise that pairs across runs | [`Noise`] |
 //! | find out what is wrong with a new twin | [`conformance`] |
 
+mod acting;
 mod adapt;
 mod advance;
 pub mod conformance;
@@ -29,13 +30,14 @@ mod points;
 mod simulation;
 mod state_space;
 
+pub(crate) use acting::Acting;
 pub(crate) use adapt::{Adaptation, NoiseLevel, StartLevel, adapt, begun};
 pub use digital_twin::DigitalTwin;
 pub(crate) use direction::{combination, oriented};
 pub use error::{SimulationError, TwinError};
 pub(crate) use fix::fix;
 pub use handle::Twin;
-pub(crate) use integrator::{Between, MOST_SUBSTEPS};
+pub(crate) use integrator::MOST_SUBSTEPS;
 pub use integrator::{Hold, Integrator, Now, Stepping, Workspace};
 pub use interval::Interval;
 pub(crate) use modified::{Modified, Modify};

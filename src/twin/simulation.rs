@@ -2,7 +2,7 @@
 
 use crate::record::{Drive, Signal, Signals};
 use crate::twin::{
-    Between, DigitalTwin, Interval, Noise, Now, Outline, ParameterSpace, SimulationError,
+    Acting, DigitalTwin, Interval, Noise, Now, Outline, ParameterSpace, SimulationError,
     StateSpace, Workspace,
 };
 use std::sync::Arc;
@@ -83,16 +83,14 @@ pub(super) fn simulate_equations(
     let (mut q, mut r) = (vec![0.0; n], vec![0.0; p]);
     let mut x = vec![0.0; n];
     let mut work = Workspace::new(twin);
-    let between = Between::rows(twin, drive);
+    let acting = Acting::of(twin, theta, drive)?;
     let mut outputs = vec![0.0; drive.samples() * p];
-    let mut now = Now::new(0.0, drive.step(0), drive.input(0), theta);
-    twin.start(&now, &mut x);
+    twin.start(&acting.at(0, theta), &mut x);
     if !noise.is_off() {
-        draw_start(twin, &now, &outline, noise, &mut x);
+        draw_start(twin, &acting.at(0, theta), &outline, noise, &mut x);
     }
     for k in 0..drive.samples() {
-        (now.t, now.dt, now.u) = (drive.time(k), drive.step(k), drive.input(k));
-        now.between = between.get(k);
+        let now = acting.at(k, theta);
         let y = &mut outputs[k * p..(k + 1) * p];
         twin.observe(&now, &x, y);
         if !noise.is_off() {

@@ -118,6 +118,13 @@ pub trait StateSpace: Advance + Send + Sync {
         Stepping::default()
     }
 
+    /// The drive behind the actuators, where effects stand there; `None` where inputs act as they are recorded. Inputs do not depend on
+    /// states, so that filters need no states for what actuators remember.
+    #[doc(hidden)]
+    fn actuated(&self, _theta: &[f64], _drive: &Drive) -> Result<Option<Drive>, SimulationError> {
+        Ok(None)
+    }
+
     /// One run. Wrappers that leave the motion alone run the twin that they hold.
     #[doc(hidden)]
     fn run(&self, theta: &[f64], drive: &Drive, noise: Noise) -> Result<Signal, SimulationError> {

@@ -67,9 +67,10 @@ impl Library<'_> {
             .filter(|&i| magnitudes[i].is_threshold())
             .collect();
         let (least, most) = effect.kind().memories();
+        let is_sensor = matches!(effect.law(), Law::Sensor(_));
         match thresholds.len() {
-            0 | 1 if self.scales.has_equations() && least < most => (0..Thresholds::REGISTERS
-                .len())
+            0 | 1 if self.scales.has_equations() && is_sensor && least < most => (0
+                ..Thresholds::REGISTERS.len())
                 .map(|i| (vec![], Some(i)))
                 .collect(),
             0 | 1 => vec![(vec![], None)],
@@ -134,8 +135,7 @@ impl Library<'_> {
             let j = space
                 .position(name)
                 .map_err(crate::diagnose::error::DiagnoseError::from)?;
-            let (grid, axis) =
-                self.magnitude(m, effect.law(), values, register, (&twin, j, &space[j]));
+            let (grid, axis) = self.magnitude(m, effect, values, register, (&twin, j, &space[j]));
             if matches!(axis.evidence, EvidencePrior::Magnitude { .. }) && i == 0 {
                 scales = true;
             }
@@ -159,12 +159,13 @@ impl Library<'_> {
     fn magnitude(
         &self,
         m: &Magnitude,
-        law: &Law,
+        effect: &Effect,
         values: &[f64],
         register: Option<usize>,
         (twin, j, parameter): (&Twin, usize, &Parameter),
     ) -> (Vec<f64>, Axis) {
         let (dt, duration) = (self.scales.dt(), self.scales.duration());
+        let law = effect.law();
         let (low, high) = if values.is_empty() {
             (0.0, 1.0)
         } else {
@@ -246,8 +247,12 @@ impl Library<'_> {
                 )
             }
             ("s", Some(_)) => {
-                let grid = [1.0, 4.0, 12.0, 40.0].map(|steps| steps * dt).to_vec();
-                logarithmic(0.3 * dt, (duration / 8.0).max(0.6 * dt), grid)
+                let (mut longest, grid) = ((duration / 8.0).max(0.6 * dt), Thresholds::LAGS_TRIED);
+                let (least, most) = effect.kind().memories();
+                if least < most {
+                    longest = longest.min((most - 1) as f64 * dt);
+                }
+                logarithmic(0.3 * dt, longest, grid.map(|steps| steps * dt).to_vec())
             }
             ("s", None) => {
                 let times = (1..=Thresholds::TIMES)

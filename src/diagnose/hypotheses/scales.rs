@@ -3,7 +3,7 @@
 use crate::effect::TargetKind;
 use crate::math::deviation;
 use crate::record::{Record, Signal};
-use crate::twin::{Now, Outline, StateSpace, Twin};
+use crate::twin::{Acting, Outline, StateSpace, Twin};
 
 /// Records, the states that the twin has along them, and how fast these move.
 pub(in crate::diagnose) struct Scales<'a> {
@@ -88,11 +88,12 @@ fn rates(twin: &dyn StateSpace, theta: &[f64], records: &[Record], states: &[Sig
     let n = twin.outline().states.len();
     let (mut squares, mut count) = (vec![0.0; n], 0.0);
     for (record, states) in records.iter().zip(states) {
-        let drive = record.drive();
+        let Ok(acting) = Acting::of(twin, theta, record.drive()) else {
+            continue;
+        };
         for k in 0..record.samples() {
-            let now = Now::new(drive.time(k), drive.step(k), drive.input(k), theta);
             let mut rate = vec![0.0; n];
-            twin.drift(&now, &states.row(k).to_vec(), &mut rate);
+            twin.drift(&acting.at(k, theta), &states.row(k).to_vec(), &mut rate);
             for (square, rate) in squares.iter_mut().zip(rate) {
                 if rate.is_finite() {
                     *square += rate * rate;

@@ -4,31 +4,22 @@ use super::outliers::strike;
 use super::{Place, Placed, Slots};
 use crate::effect::batch::{Batch, Channel, ForceBatch, LimitBatch, SignalBatch};
 use crate::effect::law::{ForcePoint, Instant, Law, NOISE_ENTERS, NoiseLaw, ParameterLaw};
-use crate::record::{Quantity, Signal};
-use crate::twin::{
-    Between, Hold, Layout, Modify, Noise, Now, Outliers, Outline, SimulationError, StateSpace,
-};
+use crate::record::{Drive, Quantity, Signal};
+use crate::twin::{Layout, Modify, Noise, Now, Outliers, Outline, SimulationError, StateSpace};
 use smallvec::SmallVec;
-use std::ops::Range;
 use std::sync::Arc;
 
 /// Short vectors that stay on the stack in the simulation loop.
 type Short = SmallVec<[f64; SHORT]>;
 const SHORT: usize = 16;
 
-/// Equations with effects. The state is the base twin's, then one held value for each input (where an
-/// actuator effect stands), then the memories of the signal effects; the added ones carry no noise.
+/// Equations with effects. The state is the base twin's, then the memories of the sensor effects, which carry no noise.
 pub(super) struct AugmentedEquations {
     base: Arc<dyn StateSpace>,
     slots: Slots,
     /// Number of the base twin's states.
     states: usize,
-    /// Held inputs in the state; empty without actuator effects.
-    held: Range<usize>,
-    /// The same at the next sample, where inputs lie on lines between samples; else empty.
-    next: Range<usize>,
-    sensors: Vec<OnSignal>,
-    actuators: Vec<OnSignal>,
+    sensors: Vec<OnSensor>,
     forces: Vec<Placed<dyn ForceBatch>>,
     ceilings: Vec<Placed<dyn LimitBatch>>,
     parameters: Vec<Placed<ParameterLaw>>,
@@ -37,8 +28,8 @@ pub(super) struct AugmentedEquations {
     outline: Outline,
 }
 
-/// A signal effect and its memory in the state.
-struct OnSignal {
+/// A sensor effect and its memory in the state.
+struct OnSensor {
     law: Arc<dyn SignalBatch>,
     at: Place,
     channel: Channel,
@@ -48,54 +39,32 @@ struct OnSignal {
 impl AugmentedEquations {
     pub(super) fn new(base: Arc<dyn StateSpace>, slots: Slots) -> Self {
         let mut outline = base.outline();
-        let (states, inputs) = (outline.states.len(), outline.inputs.len());
+        let states = outline.states.len();
         outline.parameters = slots.space(&outline.parameters);
-        let any_actuator = (slots.all.iter()).any(|s| matches!(s.effect.law(), Law::Actuator(_)));
-        let held = states..states + if any_actuator { inputs } else { 0 };
-        let hidden = |name: String| Quantity::new(&name, "");
-        for j in 1..=held.len() {
-            outline.states.push(hidden(format!("held/{j}")));
+        let mut sensors = Vec::new();
+        for slot in &slots.all {
+            let kind = slot.effect.kind();
+            let (Batch::Signal(law), Law::Sensor(_)) = (kind.over_points(), kind.law()) else {
+                continue;
+            };
+            let from = outline.states.len();
+            let names = (0..slot.place.memory).map(|k| format!("{}/{k}", slot.effect.key()));
+            outline
+                .states
+                .extend(names.map(|name| Quantity::new(&name, "")));
+            sensors.push(OnSensor {
+                law: law.clone(),
+                at: slot.place.clone(),
+                channel: Channel {
+                    memory: from..outline.states.len(),
+                    target: slot.place.target,
+                },
+                after_noise: kind.position() > NOISE_ENTERS,
+            });
         }
-        let next = match base.stepping().hold {
-            Hold::Linear => held.end..held.end + held.len(),
-            Hold::Zero => held.end..held.end,
-        };
-        for j in 1..=next.len() {
-            outline.states.push(hidden(format!("next/{j}")));
-        }
-        let mut signals = |pick: fn(&Law) -> bool| {
-            let mut placed = Vec::new();
-            for slot in &slots.all {
-                let kind = slot.effect.kind();
-                let (Batch::Signal(law), true) = (kind.over_points(), pick(kind.law())) else {
-                    continue;
-                };
-                let from = outline.states.len();
-                for k in 0..slot.place.memory {
-                    outline
-                        .states
-                        .push(hidden(format!("{}/{k}", slot.effect.key())));
-                }
-                placed.push(OnSignal {
-                    law: law.clone(),
-                    at: slot.place.clone(),
-                    channel: Channel {
-                        memory: from..outline.states.len(),
-                        target: slot.place.target,
-                    },
-                    after_noise: kind.position() > NOISE_ENTERS,
-                });
-            }
-            placed
-        };
-        let sensors = signals(|law| matches!(law, Law::Sensor(_)));
-        let actuators = signals(|law| matches!(law, Law::Actuator(_)));
         Self {
             states,
-            held,
-            next,
             sensors,
-            actuators,
             forces: slots.of_law(|kind| match kind.over_points() {
                 Batch::Force(law) => Some(law),
                 _ => None,
@@ -122,37 +91,21 @@ impl AugmentedEquations {
         }
     }
 
-    /// Calls `with` with the base twin and its own `Now`: its part of θ, bent by the parameter effects, and inputs `u`.
+    /// Calls `with` with the base twin and its own `Now`: its part of θ, bent by the parameter effects.
     #[inline]
-    fn inner<R>(
-        &self,
-        now: &Now<'_>,
-        u: &[f64],
-        with: impl FnOnce(&dyn StateSpace, &Now<'_>) -> R,
-    ) -> R {
+    fn inner<R>(&self, now: &Now<'_>, with: impl FnOnce(&dyn StateSpace, &Now<'_>) -> R) -> R {
         let own = &now.theta[..self.slots.base];
         let base = self.base.as_ref();
         if self.parameters.is_empty() {
-            return with(
-                base,
-                &Now {
-                    u,
-                    theta: own,
-                    ..*now
-                },
-            );
+            return with(base, &Now { theta: own, ..*now });
         }
         let mut theta = Short::from_slice(own);
         for Placed { law, at } in &self.parameters {
             let value = &mut theta[at.target];
             *value = law(at.m(now.theta), now.t, *value);
         }
-        let now = Now {
-            u,
-            theta: &theta,
-            ..*now
-        };
-        with(base, &now)
+        let theta = &theta[..];
+        with(base, &Now { theta, ..*now })
     }
 
     /// Adds the forces to the rates. `inner` is the base twin's.
@@ -171,24 +124,6 @@ impl AugmentedEquations {
         }
     }
 
-    /// The inputs of this sample behind the actuator effects; advances their memories in `x`.
-    fn actuate(&self, now: &Now<'_>, x: &mut [f64]) -> Short {
-        let mut u = Short::from_slice(now.u);
-        for actuator in &self.actuators {
-            actuator.pass(now, (Layout::dense(x.len()), x), (now.u.len(), &mut u));
-        }
-        u
-    }
-
-    /// As [`actuate`](Self::actuate), the memories left as they are.
-    fn actuated(&self, now: &Now<'_>, x: &[f64]) -> Short {
-        let mut u = Short::from_slice(now.u);
-        for actuator in &self.actuators {
-            actuator.peek(now, (Layout::dense(x.len()), x), (now.u.len(), &mut u));
-        }
-        u
-    }
-
     /// Sets the base twin's states by `base`, then fills the memories with the first values of their signals.
     fn set_out(
         &self,
@@ -196,18 +131,8 @@ impl AugmentedEquations {
         x: &mut [f64],
         base: impl FnOnce(&dyn StateSpace, &Now<'_>, &mut [f64]),
     ) {
-        let mut u = Short::from_slice(now.u);
-        for actuator in &self.actuators {
-            actuator.begin(now, x, &mut u);
-        }
-        if !self.held.is_empty() {
-            x[self.held.clone()].copy_from_slice(&u);
-        }
-        if !self.next.is_empty() {
-            x[self.next.clone()].copy_from_slice(&u);
-        }
         let mut y = Short::from_elem(0.0, self.outline.outputs.len());
-        self.inner(now, &u, |twin, now| {
+        self.inner(now, |twin, now| {
             let x = &mut x[..self.states];
             base(twin, now, x);
             twin.observe(now, x, &mut y);
@@ -217,21 +142,8 @@ impl AugmentedEquations {
         }
     }
 
-    /// The inputs of the next sample behind the actuator effects, kept in `x`; memories stay as they are.
-    fn foresee(&self, now: &Now<'_>, x: &mut [f64]) -> Option<Short> {
-        let between = now.between.filter(|_| !self.next.is_empty())?;
-        let later = Now {
-            t: now.t + now.dt,
-            u: between.next,
-            ..*now
-        };
-        let next = self.actuated(&later, x);
-        x[self.next.clone()].copy_from_slice(&next);
-        Some(next)
-    }
-
     /// Sensor effects before the noise, or after it.
-    fn sensors(&self, after_noise: bool) -> impl Iterator<Item = &OnSignal> {
+    fn sensors(&self, after_noise: bool) -> impl Iterator<Item = &OnSensor> {
         (self.sensors.iter()).filter(move |sensor| sensor.after_noise == after_noise)
     }
 
@@ -262,7 +174,7 @@ impl AugmentedEquations {
     }
 }
 
-impl OnSignal {
+impl OnSensor {
     /// Passes its channel of points through the effect; advances its memory.
     fn pass(&self, now: &Now<'_>, states: (Layout, &mut [f64]), channels: (usize, &mut [f64])) {
         let m = self.at.m(now.theta);
@@ -319,46 +231,15 @@ impl Modify for AugmentedEquations {
                 dx[own.states..].fill(0.0);
             }
         }
-        if self.held.is_empty() {
-            return self.inner(now, now.u, |twin, inner| {
-                twin.drift_each(inner, own, x, dx);
-                self.push(now, inner, own, x, dx);
-            });
-        }
-        // Inputs as the effects left them at the last sample, or between it and the next.
-        let mut line = Short::new();
-        for (x, dx) in at.each(x).zip(at.each_mut(dx)) {
-            let u = match now.between {
-                Some(between) if !self.next.is_empty() => {
-                    let between = Between {
-                        next: &x[self.next.clone()],
-                        ..*between
-                    };
-                    line.resize(self.held.len(), 0.0);
-                    between.line(&x[self.held.clone()], &mut line);
-                    &line
-                }
-                _ => &x[self.held.clone()],
-            };
-            let (states, rates) = (&x[..own.states], &mut dx[..own.states]);
-            self.inner(now, u, |twin, inner| {
-                twin.drift(inner, states, rates);
-                self.push(now, inner, Layout::dense(own.states), states, rates);
-            });
-        }
+        self.inner(now, |twin, inner| {
+            twin.drift_each(inner, own, x, dx);
+            self.push(now, inner, own, x, dx);
+        });
     }
 
     fn observe_each(&self, now: &Now<'_>, at: Layout, p: usize, x: &[f64], y: &mut [f64]) {
         let own = at.without(self.added());
-        if self.actuators.is_empty() {
-            self.inner(now, now.u, |twin, now| twin.observe_each(now, own, p, x, y));
-        } else {
-            for (x, y) in at.each(x).zip(y.chunks_exact_mut(p)) {
-                let u = self.actuated(now, x);
-                let states = &x[..own.states];
-                self.inner(now, &u, |twin, now| twin.observe(now, states, y));
-            }
-        }
+        self.inner(now, |twin, now| twin.observe_each(now, own, p, x, y));
         // Memories advance in `update`, once a sample; looking changes nothing.
         for sensor in self.sensors(false) {
             sensor.peek(now, (at, x), (p, y));
@@ -366,7 +247,7 @@ impl Modify for AugmentedEquations {
     }
 
     fn readout_each(&self, now: &Now<'_>, p: usize, y: &mut [f64]) -> bool {
-        let mut changed = self.inner(now, now.u, |twin, now| twin.readout_each(now, p, y));
+        let mut changed = self.inner(now, |twin, now| twin.readout_each(now, p, y));
         for sensor in self.sensors(true) {
             // After the noise nobody remembers.
             changed |= sensor.read(now, (p, y));
@@ -385,42 +266,18 @@ impl Modify for AugmentedEquations {
 
     fn update_each(&self, now: &Now<'_>, at: Layout, x: &mut [f64]) {
         let own = at.without(self.added());
-        if self.actuators.is_empty() {
-            return self.inner(now, now.u, |twin, inner| {
-                if !self.sensors.is_empty() {
-                    let p = self.outline.outputs.len();
-                    let observe = |x: &[f64], y: &mut [f64]| twin.observe_each(inner, own, p, x, y);
-                    self.remember(now, at, x, observe);
-                }
-                twin.update_each(inner, own, x);
-            });
-        }
-        for x in at.each_mut(x) {
-            let u = self.actuate(now, x);
-            x[self.held.clone()].copy_from_slice(&u);
-            let next = self.foresee(now, x);
-            let between = now.between.map(|between| Between {
-                next: next.as_deref().unwrap_or(between.next),
-                ..*between
-            });
-            let now = &Now {
-                between: between.as_ref(),
-                ..*now
-            };
-            self.inner(now, &u, |twin, inner| {
-                if !self.sensors.is_empty() {
-                    let observe = |x: &[f64], y: &mut [f64]| {
-                        twin.observe(inner, &x[..own.states], y);
-                    };
-                    self.remember(now, Layout::dense(at.states), x, observe);
-                }
-                twin.update(inner, &mut x[..own.states]);
-            });
-        }
+        self.inner(now, |twin, inner| {
+            if !self.sensors.is_empty() {
+                let p = self.outline.outputs.len();
+                let observe = |x: &[f64], y: &mut [f64]| twin.observe_each(inner, own, p, x, y);
+                self.remember(now, at, x, observe);
+            }
+            twin.update_each(inner, own, x);
+        });
     }
 
     fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
-        self.inner(now, now.u, |twin, now| {
+        self.inner(now, |twin, now| {
             twin.noise(now, &mut process[..self.states], measurement);
         });
         for (added, levels) in [(&self.process, process), (&self.measurement, measurement)] {
@@ -440,7 +297,14 @@ impl Modify for AugmentedEquations {
             law.hold(place.m(now.theta), place.pair(), at, x);
         }
         let own = at.without(self.added());
-        self.inner(now, now.u, |twin, now| twin.constrain_each(now, own, x));
+        self.inner(now, |twin, now| twin.constrain_each(now, own, x));
+    }
+
+    fn actuated(&self, theta: &[f64], drive: &Drive) -> Result<Option<Drive>, SimulationError> {
+        let own = self.slots.actuated(theta, drive)?;
+        let acting = own.as_ref().unwrap_or(drive);
+        let inner = self.theta(theta, |theta| self.base.actuated(theta, acting))?;
+        Ok(inner.or(own))
     }
 
     fn check_parameters(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {

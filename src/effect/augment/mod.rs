@@ -8,7 +8,9 @@ use super::batch::Pair;
 use super::check::{check_effects, targets};
 use super::error::EffectError;
 use super::kind::EffectKind;
+use super::law::{Instant, Law, SignalLaw};
 use super::placed::Effect;
+use crate::record::{Drive, RecordError, Signal};
 use crate::twin::{Interval, Modified, Parameter, ParameterSpace, Role, SimulationError, Twin};
 use black_box::AugmentedBlackBox;
 use equations::AugmentedEquations;
@@ -105,6 +107,23 @@ struct Slot {
     place: Place,
 }
 
+impl Slot {
+    /// Passes the channel of a whole signal through a law.
+    fn pass(&self, law: &SignalLaw, theta: &[f64], drive: &Drive, signal: &mut Signal) {
+        let m = self.place.m(theta);
+        let mut channel = signal.column_mut(self.place.target);
+        // No filter pays for the states of a long register here.
+        let mut memory = vec![channel[0]; self.effect.kind().memories().1];
+        for (k, value) in channel.iter_mut().enumerate() {
+            let now = Instant {
+                t: drive.time(k),
+                dt: drive.step(k),
+            };
+            *value = law(m, now, &mut memory, *value);
+        }
+    }
+}
+
 /// The function of a law, and its place.
 struct Placed<L: ?Sized> {
     law: Arc<L>,
@@ -168,6 +187,27 @@ impl Slots {
             .collect()
     }
 
+    /// The drive behind the actuator effects; `None` without any.
+    fn actuated(&self, theta: &[f64], drive: &Drive) -> Result<Option<Drive>, SimulationError> {
+        let mut inputs: Option<Signal> = None;
+        for slot in &self.all {
+            if let Law::Actuator(law) = slot.effect.law() {
+                let inputs = inputs.get_or_insert_with(|| drive.inputs().clone());
+                slot.pass(law.as_ref(), theta, drive, inputs);
+            }
+        }
+        let Some(inputs) = inputs else {
+            return Ok(None);
+        };
+        match drive.with_inputs(inputs) {
+            Ok(actuated) => Ok(Some(actuated)),
+            Err(RecordError::NotFinite { sample, .. }) => Err(SimulationError::Diverged {
+                at: drive.time(sample),
+            }),
+            Err(error) => Err(SimulationError::Fatal(error.into())),
+        }
+    }
+
     fn check(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {
         for Slot { effect, place } in &self.all {
             (effect.kind().check_values(place.m(theta), dt)).map_err(|problem| {
@@ -217,8 +257,7 @@ fn magnitude_parameters(effect: &Effect) -> Vec<Parameter> {
 mod tests {
     use super::*;
     use crate::effect::{Catalogue, Magnitude, OtherState};
-    use crate::record::{Drive, Signal};
-    use crate::twin::{Hold, Noise, Now, Stepping};
+    use crate::twin::{Acting, Hold, Noise, Stepping};
     use crate::twins::CascadedTanks;
 
     #[test]
@@ -259,10 +298,10 @@ mod tests {
         let equations = twin.equations().unwrap();
         let rate = |size: f64| {
             let theta = [0.6, 0.5, 0.55, 1.0, size, 0.25, 0.5];
-            let now = Now::new(2.0, 0.5, &[3.0], &theta);
-            // Two levels, and the held input behind the bias.
-            let mut rates = [0.0; 3];
-            equations.drift(&now, &[4.0, 7.0, 3.25], &mut rates);
+            let drive = Drive::new(0.5, Signal::from_elem((5, 1), 3.0)).unwrap();
+            let acting = Acting::of(equations, &theta, &drive).unwrap();
+            let mut rates = [0.0; 2];
+            equations.drift(&acting.at(4, &theta), &[4.0, 7.0], &mut rates);
             rates[0]
         };
         let expected = 4.0 + 7.0 + 2.0 + 7.0 + 3.25 + 1.0 * (1.0 + 0.5 * 2.0);

@@ -3,9 +3,9 @@
 use crate::evaluate::EvaluateError;
 use crate::likelihood::kalman::FilterError;
 use crate::math::{Stencil, to_vector};
-use crate::record::{Record, Signal};
+use crate::record::{Drive, Record, Signal};
 use crate::setting::SettingError;
-use crate::twin::{Between, Interval, Now, ParameterSpace, StateSpace, Workspace};
+use crate::twin::{Acting, Interval, Now, ParameterSpace, StateSpace, Workspace};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -129,11 +129,9 @@ impl DualFilter {
         twin.check_parameters(&theta, drive.dt())?;
         let (n, p, d) = (outline.states.len(), outline.outputs.len(), theta.len());
         let mut step = Step::new(twin, space, p);
-        let between = Between::rows(twin, drive);
 
         let mut x = vec![0.0; n];
-        let first = at(record, &between, 0, &theta);
-        twin.start(&first, &mut x);
+        twin.start(&Acting::of(twin, &theta, drive)?.at(0, &theta), &mut x);
         if self.start == DualStart::FirstOutput {
             x.fill(record.outputs()[[0, 0]]);
         }
@@ -145,7 +143,8 @@ impl DualFilter {
         let noise = DMatrix::identity(p, p) * (sd * sd);
         let mut trajectory = Signal::zeros((record.samples(), d));
         for k in 0..record.samples() {
-            let now = at(record, &between, k, &theta);
+            let acting = Acting::of(twin, &theta, drive)?;
+            let now = acting.at(k, &theta);
             let diverged = || FilterError::Diverged { at: now.t };
             let seen = step.observe(&now, x.as_slice());
             let slope = step.observe_slope(&now, x.as_slice())?;
@@ -171,9 +170,11 @@ impl DualFilter {
                 *to = *from;
             }
 
-            let now = at(record, &between, k, &theta);
+            let acting = Acting::of(twin, &theta, drive)?;
+            let now = acting.at(k, &theta);
             let motion = step.advance_slope(&now, x.as_slice())?;
-            sensitivity = &motion * (kept * sensitivity) + step.theta_slope(&now, x.as_slice())?;
+            sensitivity = &motion * (kept * sensitivity)
+                + step.theta_slope((drive, k), &theta, x.as_slice())?;
             x = DVector::from_vec(step.advance(&now, x.as_slice()));
             step.hold(x.as_mut_slice());
             spread = symmetric(&motion * spread * motion.transpose());
@@ -190,14 +191,6 @@ impl DualFilter {
             covariance: belief,
         })
     }
-}
-
-/// Row `k` of a record at θ.
-fn at<'a>(record: &'a Record, between: &'a [Between<'a>], k: usize, theta: &'a [f64]) -> Now<'a> {
-    let drive = record.drive();
-    let mut now = Now::new(drive.time(k), drive.dt(), drive.input(k), theta);
-    now.between = between.get(k);
-    now
 }
 
 /// P·Cᵀ·(C·P·Cᵀ + R)⁻¹.
@@ -270,11 +263,17 @@ impl<'a> Step<'a> {
         Self::around(x)?.jacobian(|x| Ok(DVector::from_vec(self.advance(now, x))))
     }
 
-    fn theta_slope(&mut self, now: &Now<'_>, x: &[f64]) -> Result<DMatrix<f64>, EvaluateError> {
-        let stencil = Stencil::new(now.theta, &self.steps, &self.lower, &self.upper)?;
+    /// At row k of a drive.
+    fn theta_slope(
+        &mut self,
+        (drive, k): (&Drive, usize),
+        theta: &[f64],
+        x: &[f64],
+    ) -> Result<DMatrix<f64>, EvaluateError> {
+        let stencil = Stencil::new(theta, &self.steps, &self.lower, &self.upper)?;
         stencil.jacobian(|theta| {
-            let now = Now { theta, ..*now };
-            Ok(DVector::from_vec(self.advance(&now, x)))
+            let acting = Acting::of(self.twin, theta, drive)?;
+            Ok(DVector::from_vec(self.advance(&acting.at(k, theta), x)))
         })
     }
 }
@@ -282,7 +281,7 @@ impl<'a> Step<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::{Drive, Quantity};
+    use crate::record::Quantity;
     use crate::twin::{DigitalTwin, Noise, Outline, Parameter};
 
     /// ẋ = −k·x + u, measured well.

@@ -5,7 +5,7 @@ use crate::evaluate::EvaluateError;
 use crate::record::{Drive, Record, Signal};
 use crate::study::{Study, StudyFile};
 use crate::twin::{
-    Integrator, Interval, Noise, Now, Outliers, Outline, SimulationError, StateSpace, Stepping,
+    Layout, Modified, Modify, Noise, Now, Outliers, Outline, SimulationError, StateSpace,
 };
 use std::sync::Arc;
 
@@ -34,7 +34,7 @@ pub(super) fn rescaled(
         library: file.library.clone(),
         ..StudyFile::default()
     };
-    let new = Study::new(study.name(), Rescaled(twin), study.plan().clone())?;
+    let new = Study::new(study.name(), Modified(Rescaled(twin)), study.plan().clone())?;
     let kinds = study.catalogue().kinds().iter();
     let new = new.with_effects(kinds.map(|kind| kind.as_ref().clone()));
     let scaled = |record: &Record| Record::new(record.drive().clone(), record.outputs() * FACTOR);
@@ -42,7 +42,10 @@ pub(super) fn rescaled(
     Ok(Some((new.configure(&same)?, scaled(record)?, validation)))
 }
 
-impl StateSpace for Rescaled {
+impl Modify for Rescaled {
+    fn base(&self) -> &dyn StateSpace {
+        self.0.as_ref()
+    }
     fn outline(&self) -> Outline {
         let mut outline = self.0.outline();
         for output in &mut outline.outputs {
@@ -50,42 +53,19 @@ impl StateSpace for Rescaled {
         }
         outline
     }
-    fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
-        self.0.drift(now, x, dx);
-    }
-    fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
-        self.0.observe(now, x, y);
+    fn observe_each(&self, now: &Now<'_>, at: Layout, p: usize, x: &[f64], y: &mut [f64]) {
+        self.0.observe_each(now, at, p, x, y);
         y.iter_mut().for_each(|y| *y *= FACTOR);
-    }
-    fn start(&self, now: &Now<'_>, x: &mut [f64]) {
-        self.0.start(now, x);
-    }
-    fn start_deviation(&self, now: &Now<'_>, std: &mut [f64]) {
-        self.0.start_deviation(now, std);
-    }
-    fn begin(&self, now: &Now<'_>, x: &mut [f64]) {
-        self.0.begin(now, x);
     }
     fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
         self.0.noise(now, process, measurement);
         measurement.iter_mut().for_each(|r| *r *= FACTOR);
     }
-    fn limits(&self) -> Vec<Interval> {
-        self.0.limits()
-    }
-    fn constrain(&self, now: &Now<'_>, x: &mut [f64]) {
-        self.0.constrain(now, x);
-    }
-    fn update(&self, now: &Now<'_>, x: &mut [f64]) {
-        self.0.update(now, x);
-    }
-    fn readout(&self, now: &Now<'_>, y: &mut [f64]) {
+    fn readout_each(&self, now: &Now<'_>, p: usize, y: &mut [f64]) -> bool {
         y.iter_mut().for_each(|y| *y /= FACTOR);
-        self.0.readout(now, y);
+        let changed = self.0.readout_each(now, p, y);
         y.iter_mut().for_each(|y| *y *= FACTOR);
-    }
-    fn check_parameters(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {
-        self.0.check_parameters(theta, dt)
+        changed
     }
     fn corrupt_outputs(&self, theta: &[f64], noise: Noise, outputs: &mut Signal) {
         *outputs /= FACTOR;
@@ -99,14 +79,13 @@ impl StateSpace for Rescaled {
         };
         self.0.outliers(theta).into_iter().map(scaled).collect()
     }
-    fn integrator(&self) -> Integrator {
-        self.0.integrator()
-    }
-    fn stepping(&self) -> Stepping {
-        self.0.stepping()
-    }
-    fn run(&self, theta: &[f64], drive: &Drive, noise: Noise) -> Result<Signal, SimulationError> {
-        Ok(self.0.run(theta, drive, noise)? * FACTOR)
+    fn run(
+        whole: &Modified<Self>,
+        theta: &[f64],
+        drive: &Drive,
+        noise: Noise,
+    ) -> Result<Signal, SimulationError> {
+        Ok(whole.0.0.run(theta, drive, noise)? * FACTOR)
     }
 }
 

@@ -4,7 +4,7 @@ use super::clip::clip;
 use super::gaussian::Gaussian;
 use super::{FilterError, FilterSettings};
 use crate::record::Record;
-use crate::twin::{Between, Interval, ParameterSpace, StateSpace, TwinError};
+use crate::twin::{Interval, ParameterSpace, StateSpace, TwinError};
 
 /// A filter for many θ on one record: what does not depend on θ is prepared once.
 ///
@@ -51,8 +51,6 @@ pub struct Kalman<'a> {
     pub(super) states: usize,
     pub(super) outputs: Vec<f64>,
     pub(super) channels: usize,
-    /// By row; empty where inputs are held.
-    pub(super) between: Vec<Between<'a>>,
     /// `true` if outputs are missing.
     pub(super) gaps: bool,
     /// Limits of the states.
@@ -93,7 +91,6 @@ impl<'a> Kalman<'a> {
             states,
             outputs: record.outputs().iter().copied().collect(),
             channels: record.outputs().ncols(),
-            between: Between::rows(twin, record.drive()),
             gaps: !record.is_complete(),
             limits,
             floor,

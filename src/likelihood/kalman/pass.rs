@@ -7,7 +7,7 @@ use super::size::{Any, Fixed, Numbers, Size, Wide};
 use super::start::spread_start;
 use super::update::{Measured, Update};
 use super::{FilterError, Kalman};
-use crate::twin::{Now, Outliers};
+use crate::twin::{Acting, Now, Outliers};
 
 /// Innovation of one row.
 pub(super) struct Innovation<'w> {
@@ -97,6 +97,7 @@ impl<S: Size> State<S> {
 pub(super) struct Pass<'k, S: Size> {
     size: S,
     kalman: &'k Kalman<'k>,
+    acting: &'k Acting<'k>,
     now: Now<'k>,
     root: Root<S::Matrix>,
     moments: Moments<'k, S>,
@@ -112,17 +113,14 @@ pub(super) struct Pass<'k, S: Size> {
 }
 
 impl<'k, S: Size> Pass<'k, S> {
-    pub fn new(size: S, kalman: &'k Kalman<'k>, theta: &'k [f64]) -> Result<Self, FilterError> {
-        kalman.check(theta)?;
-        let drive = kalman.record.drive();
-        kalman.twin.check_parameters(theta, drive.dt())?;
+    pub fn new(size: S, kalman: &'k Kalman<'k>, acting: &'k Acting<'k>, theta: &'k [f64]) -> Self {
         let (n, p) = (size.states(), size.outputs());
-        let now = Now::new(0.0, drive.step(0), drive.input(0), theta);
         let (twin, method) = (kalman.twin, kalman.settings.method);
-        Ok(Self {
+        Self {
             size,
             kalman,
-            now,
+            acting,
+            now: acting.at(0, theta),
             root: Root::new(n),
             copy: State::zero(n),
             moments: Moments::new(size, twin, method, &kalman.limits),
@@ -133,7 +131,7 @@ impl<'k, S: Size> Pass<'k, S> {
             scale: S::Vector::zeros(n),
             outliers: twin.outliers(theta),
             likelihood: LogLikelihood::NONE,
-        })
+        }
     }
 
     /// Over the whole record; the log-likelihood.
@@ -166,9 +164,7 @@ impl<'k, S: Size> Pass<'k, S> {
         sink: &mut K,
     ) -> Result<(), FilterError> {
         let (n, p) = (self.size.states(), self.size.outputs());
-        let drive = self.kalman.record.drive();
-        (self.now.t, self.now.dt, self.now.u) = (drive.time(k), drive.step(k), drive.input(k));
-        self.now.between = self.kalman.between.get(k);
+        self.now = self.acting.at(k, self.now.theta);
         let (q, r) = (&mut self.q.as_mut()[..n], &mut self.r.as_mut()[..p]);
         q.fill(0.0);
         r.fill(0.0);
@@ -311,6 +307,14 @@ impl<'k, S: Size> Pass<'k, S> {
 }
 
 impl Kalman<'_> {
+    /// The record's drive as the twin sees it at θ, which is checked.
+    pub(super) fn acting(&self, theta: &[f64]) -> Result<Acting<'_>, FilterError> {
+        let drive = self.record.drive();
+        self.check(theta)?;
+        self.twin.check_parameters(theta, drive.dt())?;
+        Ok(Acting::of(self.twin, theta, drive)?)
+    }
+
     /// The first state; `cov` comes zeroed.
     pub(super) fn start(
         &self,
@@ -343,19 +347,20 @@ impl Kalman<'_> {
     }
 
     fn run_into<K: Sink + ?Sized>(&self, theta: &[f64], sink: &mut K) -> Result<f64, FilterError> {
+        let acting = self.acting(theta)?;
         match (self.states, self.channels) {
-            (1, 1) => Pass::new(Fixed::<1>, self, theta)?.run(sink),
-            (2, 1) => Pass::new(Fixed::<2>, self, theta)?.run(sink),
-            (3, 1) => Pass::new(Fixed::<3>, self, theta)?.run(sink),
-            (4, 1) => Pass::new(Fixed::<4>, self, theta)?.run(sink),
-            (5, 1) => Pass::new(Fixed::<5>, self, theta)?.run(sink),
-            (6, 1) => Pass::new(Fixed::<6>, self, theta)?.run(sink),
-            (7, 1) => Pass::new(Fixed::<7>, self, theta)?.run(sink),
-            (8, 1) => Pass::new(Fixed::<8>, self, theta)?.run(sink),
-            (9, 1) => Pass::new(Fixed::<9>, self, theta)?.run(sink),
-            (10, 1) => Pass::new(Fixed::<10>, self, theta)?.run(sink),
-            (states, 1) => Pass::new(Wide { states }, self, theta)?.run(sink),
-            (states, outputs) => Pass::new(Any { states, outputs }, self, theta)?.run(sink),
+            (1, 1) => Pass::new(Fixed::<1>, self, &acting, theta).run(sink),
+            (2, 1) => Pass::new(Fixed::<2>, self, &acting, theta).run(sink),
+            (3, 1) => Pass::new(Fixed::<3>, self, &acting, theta).run(sink),
+            (4, 1) => Pass::new(Fixed::<4>, self, &acting, theta).run(sink),
+            (5, 1) => Pass::new(Fixed::<5>, self, &acting, theta).run(sink),
+            (6, 1) => Pass::new(Fixed::<6>, self, &acting, theta).run(sink),
+            (7, 1) => Pass::new(Fixed::<7>, self, &acting, theta).run(sink),
+            (8, 1) => Pass::new(Fixed::<8>, self, &acting, theta).run(sink),
+            (9, 1) => Pass::new(Fixed::<9>, self, &acting, theta).run(sink),
+            (10, 1) => Pass::new(Fixed::<10>, self, &acting, theta).run(sink),
+            (states, 1) => Pass::new(Wide { states }, self, &acting, theta).run(sink),
+            (states, outputs) => Pass::new(Any { states, outputs }, self, &acting, theta).run(sink),
         }
     }
 }

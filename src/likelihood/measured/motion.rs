@@ -4,7 +4,7 @@ use super::level::Measured;
 use crate::likelihood::kalman::{FilterError, FilterSettings, Kalman, recoverable};
 use crate::math::deviation;
 use crate::record::Record;
-use crate::twin::{Between, Now, StateSpace, Workspace};
+use crate::twin::{Acting, StateSpace, Workspace};
 
 /// Deviation, or what is left of it where nothing moves.
 pub(super) fn size(values: &[f64]) -> f64 {
@@ -28,14 +28,14 @@ pub(super) fn free_motion(
     let mut work = Workspace::new(base);
     for record in records {
         let drive = record.drive();
-        let between = Between::rows(base, drive);
-        let mut now = Now::new(0.0, drive.dt(), drive.input(0), theta);
+        let Ok(acting) = Acting::of(base, theta, drive) else {
+            continue;
+        };
         let (mut x, mut start) = (vec![0.0; n], vec![0.0; n]);
-        base.start(&now, &mut x);
+        base.start(&acting.at(0, theta), &mut x);
         start.copy_from_slice(&x);
         for k in 0..drive.samples() {
-            (now.t, now.dt, now.u) = (drive.time(k), drive.step(k), drive.input(k));
-            now.between = between.get(k);
+            let now = acting.at(k, theta);
             base.advance(&now, &mut x, &mut work);
             base.constrain(&now, &mut x);
             for (x, limit) in x.iter_mut().zip(&limits) {

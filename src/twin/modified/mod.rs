@@ -125,6 +125,10 @@ pub(crate) trait Modify: Send + Sync + Sized + 'static {
         self.base().stepping()
     }
 
+    fn actuated(&self, theta: &[f64], drive: &Drive) -> Result<Option<Drive>, SimulationError> {
+        self.theta(theta, |theta| self.base().actuated(theta, drive))
+    }
+
     /// Simulates the modified equations; a change that leaves the motion alone may run the base twin instead.
     fn run(
         whole: &Modified<Self>,
@@ -188,6 +192,9 @@ impl<M: Modify> StateSpace for Modified<M> {
     }
     fn stepping(&self) -> Stepping {
         self.0.stepping()
+    }
+    fn actuated(&self, theta: &[f64], drive: &Drive) -> Result<Option<Drive>, SimulationError> {
+        self.0.actuated(theta, drive)
     }
     fn run(&self, theta: &[f64], drive: &Drive, noise: Noise) -> Result<Signal, SimulationError> {
         M::run(self, theta, drive, noise)

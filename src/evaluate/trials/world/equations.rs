@@ -3,7 +3,8 @@
 use super::{Draws, Run, System};
 use crate::evaluate::trials::law::{Departure, Law, Moment, Place, above};
 use crate::record::{Drive, Signal};
-use crate::twin::{Hold, Interval, Noise, Now, StateSpace};
+use crate::twin::{Acting, Hold, Interval, Noise, Now, StateSpace};
+use ndarray::ArrayView1;
 
 /// Steps of the integrator within a sample.
 const SUBSTEPS: usize = 10;
@@ -38,6 +39,7 @@ pub(super) fn run(
     plant.begin(system, drive, draws.process, &mut x)?;
     let samples = drive.samples();
     let mut inputs = drive.inputs().clone();
+    let mut sent = Sent::new(twin, system.theta, drive)?;
     let mut outputs = Signal::zeros((samples, p));
     let (mut states, mut rates) = (Signal::zeros((samples, n)), Signal::zeros((samples, n)));
     let (mut q, mut r) = (vec![0.0; n], vec![0.0; p]);
@@ -53,6 +55,7 @@ pub(super) fn run(
             inputs[[k, 0]] = command[0];
         }
         let u = plant.inputs(t, dt, &x, &command);
+        let u = sent.acting(k, u)?;
         let theta = plant.theta(system.theta, t, dt, &x, &command);
         let now = Now::new(t, dt, &u, &theta);
         twin.observe(&now, &x, &mut y);
@@ -108,6 +111,39 @@ pub(super) fn run(
     })
 }
 
+/// Inputs as departures leave them, on their way through the twin's own actuators. A controller answers row by row, so that they are not
+/// known before.
+struct Sent<'w> {
+    twin: &'w dyn StateSpace,
+    theta: &'w [f64],
+    /// The rows so far; none where the twin's inputs act as they are.
+    drive: Option<Drive>,
+}
+
+impl<'w> Sent<'w> {
+    fn new(twin: &'w dyn StateSpace, theta: &'w [f64], drive: &Drive) -> Option<Self> {
+        let actuated = twin.actuated(theta, drive).ok()?;
+        Some(Self {
+            twin,
+            theta,
+            drive: actuated.map(|_| drive.clone()),
+        })
+    }
+
+    /// Row k behind the actuators.
+    fn acting(&mut self, k: usize, u: Vec<f64>) -> Option<Vec<f64>> {
+        let Some(drive) = &self.drive else {
+            return Some(u);
+        };
+        let mut inputs = drive.inputs().clone();
+        inputs.row_mut(k).assign(&ArrayView1::from(&u));
+        let sent = drive.with_inputs(inputs).ok()?;
+        let acting = self.twin.actuated(self.theta, &sent.first(k + 1)).ok()?;
+        self.drive = Some(sent);
+        Some(acting?.input(k).to_vec())
+    }
+}
+
 /// Equations with departures, and the memories of these.
 struct Plant<'w> {
     twin: &'w dyn StateSpace,
@@ -121,8 +157,9 @@ struct Plant<'w> {
 impl Plant<'_> {
     /// Sets the first state.
     fn begin(&self, system: System<'_>, drive: &Drive, noise: Noise, x: &mut [f64]) -> Option<()> {
-        let now = Now::new(0.0, drive.step(0), drive.input(0), system.theta);
         (self.twin.check_parameters(system.theta, drive.dt())).ok()?;
+        let acting = Acting::of(self.twin, system.theta, drive).ok()?;
+        let now = acting.at(0, system.theta);
         self.twin.start(&now, x);
         let mut deviation = vec![0.0; x.len()];
         self.twin.start_deviation(&now, &mut deviation);

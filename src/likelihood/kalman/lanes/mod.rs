@@ -45,18 +45,19 @@ impl Kalman<'_> {
 /// Runs up to eight filters side by side; `None` where one of them fails or needs more than lanes offer, to be run one by one.
 pub(super) fn together(jobs: &[(&Kalman<'_>, &[f64])]) -> Option<Together> {
     let first = jobs.first()?.0;
-    for (kalman, theta) in jobs {
-        let twin = kalman.twin;
-        kalman.check(theta).ok()?;
-        twin.check_parameters(theta, kalman.record.drive().dt())
-            .ok()?;
-        if !kalman.fits_lanes() || !kalman.runs_beside(first) || !twin.outliers(theta).is_empty() {
-            return None;
-        }
-    }
+    let alike = |&(kalman, theta): &(&Kalman<'_>, &[f64])| {
+        kalman.fits_lanes() && kalman.runs_beside(first) && kalman.twin.outliers(theta).is_empty()
+    };
     let jobs: Vec<Job<'_>> = (jobs.iter())
-        .map(|&(kalman, theta)| Job { kalman, theta })
-        .collect();
+        .map(|job @ &(kalman, theta)| {
+            let acting = kalman.acting(theta).ok()?;
+            alike(job).then_some(Job {
+                kalman,
+                theta,
+                acting,
+            })
+        })
+        .collect::<Option<_>>()?;
     let mut rows = Vec::with_capacity(first.record.samples());
     let (jobs, to) = (&jobs[..jobs.len().min(LANES)], &mut rows);
     let log_likelihoods = match first.states {

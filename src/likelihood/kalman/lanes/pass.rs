@@ -8,13 +8,14 @@ use super::super::likelihood::LOG_TWO_PI;
 use super::super::moments::{BEND, HALF_PER_REACH, REACH};
 use super::clip::clip;
 use crate::math::{Kernel, LANES, Lanes};
-use crate::twin::{LanePoints, Now, Workspace};
+use crate::twin::{Acting, LanePoints, Now, Workspace};
 
 /// Parameters on a record.
-#[derive(Clone, Copy)]
 pub(super) struct Job<'j> {
     pub kalman: &'j Kalman<'j>,
     pub theta: &'j [f64],
+    /// The record's drive as the twin sees it at θ.
+    pub acting: Acting<'j>,
 }
 
 /// Innovation and its variance, row by row; 0 and 1 where the output is missing.
@@ -38,9 +39,9 @@ impl<const N: usize, const P: usize> Kernel for Pass<'_, N, P> {
     fn run(self) -> Option<Lanes> {
         let Self { jobs, rows } = self;
         let first = jobs[0].kalman;
-        let (twin, drive) = (first.twin, first.record.drive());
+        let twin = first.twin;
         let limits = &first.limits[..N];
-        let mut nows = jobs_at(jobs, 0);
+        let mut nows = begin(jobs);
         let mut mean = [Lanes::ZERO; N];
         let mut cov = [[Lanes::ZERO; N]; N];
         let mut floor = Lanes::all(first.floor[0]);
@@ -68,12 +69,8 @@ impl<const N: usize, const P: usize> Kernel for Pass<'_, N, P> {
         let (samples, mut values) = (first.record.samples(), 0);
         rows.clear();
         for k in 0..samples {
-            if k > 0 {
-                let (t, dt) = (drive.time(k), drive.step(k));
-                for (now, job) in nows.iter_mut().zip(jobs) {
-                    (now.t, now.dt, now.u) = (t, dt, job.kalman.record.drive().input(k));
-                    now.between = job.kalman.between.get(k);
-                }
+            for (now, job) in nows.iter_mut().zip(jobs) {
+                *now = job.acting.at(k, job.theta);
             }
             let active = &nows[..jobs.len()];
             let mut r = zero;
@@ -198,14 +195,11 @@ impl<const N: usize, const P: usize> Kernel for Pass<'_, N, P> {
     }
 }
 
-/// The twin's view of each job at a row; lanes without a job repeat the first.
-fn jobs_at<'j>(jobs: &'j [Job<'j>], k: usize) -> [Now<'j>; LANES] {
+/// The twin's view of each job's first row; lanes without a job repeat the first.
+fn begin<'j>(jobs: &'j [Job<'j>]) -> [Now<'j>; LANES] {
     std::array::from_fn(|lane| {
         let job = &jobs[if lane < jobs.len() { lane } else { 0 }];
-        let drive = job.kalman.record.drive();
-        let mut now = Now::new(drive.time(k), drive.step(k), drive.input(k), job.theta);
-        now.between = job.kalman.between.get(k);
-        now
+        job.acting.at(0, job.theta)
     })
 }
 
