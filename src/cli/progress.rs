@@ -1,5 +1,6 @@
-//! Progress bars on standard error, on a terminal only.
+//! Progress on standard error: bars on a terminal, a line now and then in a log.
 
+use super::say::say;
 use super::stop;
 use crate::progress::{Listener, Progress};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -14,18 +15,23 @@ const PATIENCE: Duration = Duration::from_millis(500);
 /// Refresh interval; one unit of a stage may take long.
 const LOOK: Duration = Duration::from_millis(250);
 
+/// Interval of the lines in a log: an hour fills two pages.
+const LINES: Duration = Duration::from_secs(30);
+
 /// The time left is unknown before the first unit is done.
 const FIRST: &str = "{prefix:>13} {bar:32} {pos}/{len}  {elapsed} elapsed";
 const LATER: &str = "{prefix:>13} {bar:32} {pos}/{len}  {elapsed} elapsed, {eta} left";
 
-/// Creates progress bars with the time left.
+/// Creates progress bars with the time left, or lines where there is no terminal.
 pub(super) fn bars() -> Progress {
-    let bars = Arc::new(Bars::default());
-    if stderr().is_terminal() {
-        let watched = Arc::downgrade(&bars);
-        // Without this thread, bars appear with the first unit.
-        let _ = thread::Builder::new().spawn(move || watch(&watched));
-    }
+    let bars = Arc::new(Bars {
+        terminal: stderr().is_terminal(),
+        all: MultiProgress::default(),
+        open: Mutex::default(),
+    });
+    let watched = Arc::downgrade(&bars);
+    // Without this thread, bars and lines appear with the next unit.
+    let _ = thread::Builder::new().spawn(move || watch(&watched));
     Progress::new(bars)
 }
 
@@ -39,8 +45,8 @@ fn watch(bars: &Weak<Bars>) {
     }
 }
 
-#[derive(Default)]
 struct Bars {
+    terminal: bool,
     all: MultiProgress,
     open: Mutex<HashMap<String, Open>>,
 }
@@ -51,6 +57,8 @@ struct Open {
     done: u64,
     total: u64,
     bar: Option<ProgressBar>,
+    /// Lines in a log so far.
+    lines: u32,
 }
 
 impl Open {
@@ -70,6 +78,20 @@ impl Open {
         self.bar = Some(bar);
     }
 
+    /// The next line of a log, once it is time.
+    fn line(&mut self, stage: &str) -> Option<String> {
+        let elapsed = self.since.elapsed();
+        if elapsed < LINES * (self.lines + 1) {
+            return None;
+        }
+        self.lines = (elapsed.as_secs() / LINES.as_secs()) as u32;
+        let (done, total) = (self.done, self.total);
+        Some(format!(
+            "{stage}: {done} of {total} done, {} s elapsed",
+            elapsed.as_secs()
+        ))
+    }
+
     fn style(&self, bar: &ProgressBar) {
         let template = if self.done == 0 { FIRST } else { LATER };
         if let Ok(style) = ProgressStyle::with_template(template) {
@@ -83,7 +105,11 @@ impl Bars {
         // A poisoned lock means that another thread panicked.
         if let Ok(mut open) = self.open.lock() {
             for (stage, entry) in open.iter_mut() {
-                entry.show(stage, &self.all);
+                if self.terminal {
+                    entry.show(stage, &self.all);
+                } else if let Some(line) = entry.line(stage) {
+                    say(&line);
+                }
             }
         }
     }
@@ -111,6 +137,7 @@ impl Listener for Bars {
                 done,
                 total,
                 bar: None,
+                lines: 0,
             };
             open.insert(stage.into(), entry);
             return;
@@ -120,7 +147,9 @@ impl Listener for Bars {
         };
         let first = entry.done == 0;
         entry.done = done;
-        entry.show(stage, &self.all);
+        if self.terminal {
+            entry.show(stage, &self.all);
+        }
         if let Some(bar) = &entry.bar {
             if first {
                 entry.style(bar);
@@ -132,5 +161,30 @@ impl Listener for Bars {
         {
             bar.finish_and_clear();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A log gets a line each half minute, and not one for each missed.
+    #[test]
+    fn lines_come_now_and_then() {
+        let mut open = Open {
+            since: Instant::now(),
+            done: 2,
+            total: 5,
+            bar: None,
+            lines: 0,
+        };
+        assert_eq!(open.line("explain"), None);
+        let Some(earlier) = open.since.checked_sub(Duration::from_secs(95)) else {
+            return;
+        };
+        open.since = earlier;
+        let line = open.line("explain").unwrap();
+        assert_eq!(line, "explain: 2 of 5 done, 95 s elapsed");
+        assert_eq!(open.line("explain"), None);
     }
 }

@@ -10,6 +10,9 @@ use crate::record::Signal;
 use crate::twin::Twin;
 use std::sync::Arc;
 
+/// Iterations of a fit that is carried on to its end.
+const TO_THE_END: usize = 40;
+
 /// A twin with terms, fitted.
 #[derive(Clone)]
 pub(in crate::diagnose) struct Model<'a> {
@@ -81,27 +84,47 @@ impl<'a> Model<'a> {
 
     /// The model with one more term.
     pub fn extend(&self, term: &Arc<Term>) -> Result<Extended<'a>, DiagnoseError> {
-        let terms: Vec<Arc<Term>> = self.terms.iter().chain([term]).cloned().collect();
+        self.extend_by(std::slice::from_ref(term))
+    }
+
+    fn extend_by(&self, new: &[Arc<Term>]) -> Result<Extended<'a>, DiagnoseError> {
+        let terms: Vec<Arc<Term>> = self.terms.iter().chain(new).cloned().collect();
         let twin = with_terms(self.base, terms.iter().map(Arc::as_ref))?;
         let d = self.problem.twin.parameters().len();
         let mut axes = self.problem.axes[..d].to_vec();
-        axes.extend(term.axes.iter().cloned());
-        let entries: Vec<usize> = (d..d + term.axes.len()).collect();
-        let mut problem = Problem::new(twin, axes, self.problem.records);
-        problem.families = self.problem.families.clone();
-        if let Some((weights, largest)) = &term.family {
-            let count = weights[0].len();
-            problem.families.push(Family {
-                entries: entries[..count].to_vec(),
-                weights: weights.clone(),
-                largest: *largest,
-            });
+        let mut families = self.problem.families.clone();
+        for term in new {
+            if let Some((weights, largest)) = &term.family {
+                families.push(Family {
+                    entries: (axes.len()..).take(weights[0].len()).collect(),
+                    weights: weights.clone(),
+                    largest: *largest,
+                });
+            }
+            axes.extend(term.axes.iter().cloned());
         }
+        let entries: Vec<usize> = (d..axes.len()).collect();
+        let mut problem = Problem::new(twin, axes, self.problem.records);
+        problem.families = families;
         Ok(Extended {
             terms,
             problem,
             entries,
         })
+    }
+
+    /// The model fitted to the end of a climb: a search stops before.
+    pub fn carried_on(&self) -> Result<Option<Self>, DiagnoseError> {
+        let fitted = climb(&self.problem, &self.fitted.theta, TO_THE_END)?;
+        Ok(fitted.and_then(|fitted| self.refitted(fitted)))
+    }
+
+    /// The terms beside another twin of the same parameters, fitted on from here.
+    pub fn beside_twin<'b>(&self, base: &Model<'b>) -> Result<Option<Model<'b>>, DiagnoseError> {
+        let extended = base.extend_by(&self.terms)?;
+        let fitted = climb(&extended.problem, &self.fitted.theta, TO_THE_END)?;
+        let problem = extended.problem.clone();
+        Ok(fitted.and_then(|fitted| extended.fitted(base.base, fitted, problem)))
     }
 
     /// Full θ of the extended model where the new term has these magnitudes.

@@ -3,7 +3,7 @@
 use super::base::Base;
 use super::error::DiagnoseError;
 use super::explain::decide::{Chances, Findings};
-use super::explain::explore::{Terms, explore};
+use super::explain::explore::{Known, Terms, explore};
 use super::explain::search::{Breadth, listed};
 use super::hypotheses::noise::kinds;
 use super::hypotheses::scales::Scales;
@@ -18,6 +18,8 @@ use crate::record::Record;
 use crate::study::Study;
 use std::sync::Arc;
 
+/// Share of the best effect's evidence below which what a finer step explains does not change which effects stand out.
+const MINOR: f64 = 1.0 / 3.0;
 /// Most kinds of noise that are added to the twin's own.
 const ROUNDS: usize = 2;
 
@@ -44,8 +46,8 @@ pub(in crate::diagnose) fn search<R>(
     let base = Base::new(&measured, records, settings)?;
     stage.tick()?;
     match step_of(study, &base, settings)? {
-        Some(step) => with_step(study, &base, step, settings, progress, then),
-        None => explored(study, base, settings, ROUNDS, progress, then),
+        Some(step) => with_step(study, &base, step, None, settings, progress, then),
+        None => explored(study, base, None, settings, ROUNDS, progress, then),
     }
 }
 
@@ -71,11 +73,12 @@ fn step_of(
     }
 }
 
-/// Fits the twin with a finer step, and searches with it.
+/// Fits the twin with a finer step, and searches with it; where it matters little beside what was found, goes on from that.
 fn with_step<R>(
     study: &Study,
     base: &Base<'_>,
     step: FinerStep,
+    known: Option<Known<'_>>,
     settings: &DiagnoseSettings,
     progress: &Progress,
     then: impl FnOnce(Explored<'_, '_>) -> Result<R, DiagnoseError>,
@@ -92,13 +95,14 @@ fn with_step<R>(
         step: Some(step),
         ..Base::new(&measured, records, &begin)?
     };
-    explored(study, base, settings, ROUNDS, progress, then)
+    explored(study, base, known, settings, ROUNDS, progress, then)
 }
 
-/// Searches for what explains the records beside a fitted twin; anew where they ask for another kind of noise, or for a finer step.
+/// Searches for what explains the records beside a fitted twin, from what is known with another step where that is given; anew where they ask for another kind of noise, or for a finer step.
 fn explored<R>(
     study: &Study,
     base: Base<'_>,
+    known: Option<Known<'_>>,
     settings: &DiagnoseSettings,
     rounds: usize,
     progress: &Progress,
@@ -118,24 +122,24 @@ fn explored<R>(
         unknown: &unlisted,
     };
     let breadth = Breadth::of(&base.model, settings.quick);
-    let findings = explore(
-        &base.model,
-        &terms,
-        breadth,
-        !settings.detection_only,
-        progress,
-    )?;
+    let explain = !settings.detection_only;
+    let findings = explore(&base.model, &terms, breadth, known, explain, progress)?;
     if let Some(model) = findings.asks_for_noise().and_then(|f| f.model.as_ref()) {
         let twin = model.problem.twin.clone();
         if let Some(noisier) = base.with_noise(model, &twin)? {
-            return explored(study, noisier, settings, rounds - 1, progress, then);
+            return explored(study, noisier, None, settings, rounds - 1, progress, then);
         }
     }
     // Beside a gap, noise levels are fitted loud, and hide the step.
     if let (None, Some(model)) = (base.step, findings.best_listed())
-        && let Some((step, _)) = finer_step(model)?
+        && let Some((step, gain)) = finer_step(model)?
     {
-        return with_step(study, &base, step, settings, progress, then);
+        let minor = gain < MINOR * findings.top() && base.noises.is_empty();
+        let known = minor.then_some(Known {
+            findings: &findings,
+            origin: base.model.log_evidence,
+        });
+        return with_step(study, &base, step, known, settings, progress, then);
     }
     then(Explored {
         study,

@@ -3,13 +3,9 @@
 use super::error::DiagnoseError;
 use super::model::Model;
 use super::thresholds::Thresholds;
-use crate::fit::climb::climb;
 use crate::fit::reference::Reference;
 use crate::likelihood::kalman::recoverable;
 use crate::twin::{Integrator, MOST_SUBSTEPS, Twin};
-
-/// Iterations of a fit with the finer step.
-const ITERATIONS: usize = 40;
 
 /// A finer step than a twin's own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,7 +74,7 @@ pub(in crate::diagnose) fn finer_step(
         return Ok(None);
     }
     // A search stops before the end of a climb: with its own step, too, the model is carried on.
-    let mut last = carried_on(model)?.unwrap_or_else(|| model.clone());
+    let mut last = model.carried_on()?.unwrap_or_else(|| model.clone());
     let own = last.log_evidence.max(model.log_evidence);
     let mut fitted = vec![];
     for (problem, step) in finer {
@@ -86,7 +82,7 @@ pub(in crate::diagnose) fn finer_step(
             problem,
             ..last.clone()
         };
-        if let Some(model) = carried_on(&begin)? {
+        if let Some(model) = begin.carried_on()? {
             fitted.push((step, model.log_evidence - own));
             last = model;
         }
@@ -94,12 +90,6 @@ pub(in crate::diagnose) fn finer_step(
     let best = (fitted.iter()).fold(f64::NEG_INFINITY, |best, (_, gain)| best.max(*gain));
     let enough = (best - Thresholds::STEP_SHOWS).max(Thresholds::STEP_WINS);
     Ok((fitted.into_iter()).find(|(_, gain)| *gain > enough))
-}
-
-/// A model, fitted to the end of a climb.
-fn carried_on<'a>(model: &Model<'a>) -> Result<Option<Model<'a>>, DiagnoseError> {
-    let fitted = climb(&model.problem, &model.fitted.theta, ITERATIONS)?;
-    Ok(fitted.and_then(|fitted| model.refitted(fitted)))
 }
 
 #[cfg(test)]

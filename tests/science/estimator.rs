@@ -104,7 +104,7 @@ fn records_of_one_system_are_weighed_together() {
         (estimator().estimate_together(records, &options, &Progress::silent())).unwrap()
     };
     let (mut held, mut agreed, mut square) = (0, 0, 0.0);
-    const TRIALS: u64 = 12;
+    const TRIALS: u64 = 6;
     for i in 0..TRIALS {
         let mut records: Vec<Record> = (0..4).map(|r| record(3.0, 100 + 4 * i + r)).collect();
         let drive = Drive::autonomous(0.05, 150).unwrap();
@@ -128,8 +128,8 @@ fn records_of_one_system_are_weighed_together() {
         crate::binomial_bounds(TRIALS, 0.95, 0.99).contains(&agreed),
         "{agreed}"
     );
-    // χ² of twelve, over twelve, is below 2.2 in 99 of 100 cases.
-    assert!(square < 2.2, "{square}");
+    // χ² of six, over six, is below 2.8 in 99 of 100 cases.
+    assert!(square < 2.8, "{square}");
     let changed = all(&[record(3.0, 1), record(3.1, 2)]);
     assert!(changed.p_value < 0.01, "{}", changed.p_value);
 }

@@ -1,17 +1,16 @@
 //! The order of the search: single explanations, what they leave, pairs.
 
 use super::decide::{Findings, leaves_nothing};
-use super::search::{Breadth, Found, listed, own_theta, sort, unknown};
+use super::search::{Breadth, FEW, Found, listed, own_theta, sort, unknown};
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::scales::Scales;
 use crate::diagnose::hypotheses::term::{Part, Term};
 use crate::diagnose::model::Model;
 use crate::diagnose::thresholds::Thresholds;
-use crate::progress::Progress;
+use crate::progress::{Progress, Stage};
+use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Functions that are refitted where the place of what is missing is known about.
-const FEW: usize = 3;
 /// Steps of the search that are reported: functions, effects, functions of the corrected twin, what is left, pairs.
 const STEPS: usize = 5;
 /// Single effects that are looked at for something left, or for a second one beside them.
@@ -33,19 +32,100 @@ pub(in crate::diagnose) fn explore<'a>(
     base: &Model<'a>,
     terms: &Terms<'_>,
     breadth: Breadth,
+    known: Option<Known<'_>>,
     explain: bool,
     progress: &Progress,
 ) -> Result<Findings<'a>, DiagnoseError> {
     let stage = progress.stage("explain", STEPS);
+    let (findings, several) = match known {
+        Some(known) => carried_on(known, base, terms, breadth, &stage)?,
+        None => (one_by_one(base, terms, breadth, &stage)?, None),
+    };
+    match explain {
+        true => beside_each_other(findings, base, terms, breadth, several, &stage),
+        false => Ok(findings),
+    }
+}
+
+/// What was found beside the same twin with another step.
+#[derive(Clone, Copy)]
+pub(in crate::diagnose) struct Known<'k> {
+    pub findings: &'k Findings<'k>,
+    /// log Z of that twin.
+    pub origin: f64,
+}
+
+/// What is known with another step, its fits carried on from where they ended: single explanations, and pairs.
+fn carried_on<'a>(
+    known: Known<'_>,
+    base: &Model<'a>,
+    terms: &Terms<'_>,
+    breadth: Breadth,
+    stage: &Stage,
+) -> Result<(Findings<'a>, Option<Vec<Found<'a>>>), DiagnoseError> {
+    let old = known.findings;
+    let origin = base.log_evidence;
+    let few = breadth.few();
+    // What does not stand out keeps its evidence: another step does not help it more than the others.
+    let least = FIRST * old.top();
+    let carry = |found: &Found<'_>| -> Result<Found<'a>, DiagnoseError> {
+        let carried = match &found.model {
+            Some(old) if found.gain > least => {
+                let new = old.beside_twin(base)?;
+                new.map(|new| (new.log_evidence - old.log_evidence, new))
+            }
+            _ => None,
+        };
+        let (change, model) = carried.map_or((0.0, None), |(change, new)| (change, Some(new)));
+        Ok(Found {
+            terms: found.terms.clone(),
+            gain: found.gain + known.origin - origin + change,
+            model,
+        })
+    };
+    let carry_all = |all: &[Found<'_>]| -> Result<Vec<Found<'a>>, DiagnoseError> {
+        let mut all: Vec<Found<'a>> = all.par_iter().map(carry).collect::<Result<_, _>>()?;
+        sort(&mut all);
+        Ok(all)
+    };
+    let best: Vec<Arc<Term>> = (old.unknown.iter().take(FEW))
+        .flat_map(|found| found.terms.last().cloned())
+        .collect();
+    let again = unknown(base, &best, origin, few)?;
+    let mut functions: Vec<Found<'a>> = (old.unknown.iter())
+        .map(
+            |found| match again.iter().find(|f| f.keys() == found.keys()) {
+                Some(new) => Ok(new.clone()),
+                None => carry(&Found {
+                    model: None,
+                    ..found.clone()
+                }),
+            },
+        )
+        .collect::<Result<_, _>>()?;
+    sort(&mut functions);
+    stage.tick()?;
+    let listed = carry_all(&old.listed)?;
+    stage.tick()?;
+    let findings = with_noise(base, terms, breadth, listed, functions)?;
+    let several = carry_all(&old.several)?;
+    stage.tick()?;
+    Ok((findings, Some(several)))
+}
+
+/// Unknown functions and effects alone, and other kinds of noise.
+fn one_by_one<'a>(
+    base: &Model<'a>,
+    terms: &Terms<'_>,
+    breadth: Breadth,
+    stage: &Stage,
+) -> Result<Findings<'a>, DiagnoseError> {
     let origin = base.log_evidence;
     let first = (terms.unknown)(&[]);
     let mut unknown_alone = unknown(base, &first, origin, breadth)?;
     stage.tick()?;
     let best = unknown_alone.first().map_or(0.0, |f| f.gain);
-    let breadth = Breadth {
-        deep: best > Thresholds::DEEP && breadth.annealed > 0,
-        ..breadth
-    };
+    let breadth = breadth.for_gap(best);
     let mut singles = listed(
         base,
         terms.listed,
@@ -66,14 +146,10 @@ pub(in crate::diagnose) fn explore<'a>(
     }
     let top = singles.first().map_or(0.0, |f| f.gain);
     stage.tick()?;
-    let few = Breadth {
-        functions: FEW.min(breadth.functions),
-        ..breadth
-    };
     if top > Thresholds::WIDER {
         // The twin that is misfitted may not go where the corrected one goes.
         let seen = scales(&singles[..singles.len().min(2)])?;
-        for found in unknown(base, &(terms.unknown)(&seen), origin, few)? {
+        for found in unknown(base, &(terms.unknown)(&seen), origin, breadth.few())? {
             match unknown_alone.iter_mut().find(|f| f.keys() == found.keys()) {
                 Some(old) if found.gain > old.gain => *old = found,
                 _ => {}
@@ -81,23 +157,49 @@ pub(in crate::diagnose) fn explore<'a>(
         }
         sort(&mut unknown_alone);
     }
-    let every = breadth.of_all();
+    let findings = with_noise(base, terms, breadth, singles, unknown_alone)?;
+    stage.tick()?;
+    Ok(findings)
+}
+
+/// What was found alone, with other kinds of noise.
+fn with_noise<'a>(
+    base: &Model<'a>,
+    terms: &Terms<'_>,
+    breadth: Breadth,
+    singles: Vec<Found<'a>>,
+    unknown: Vec<Found<'a>>,
+) -> Result<Findings<'a>, DiagnoseError> {
+    let (origin, every) = (base.log_evidence, breadth.of_all());
     let noise = listed(base, terms.noise, origin, &[], every)?;
-    let mut findings = Findings {
+    Ok(Findings {
         noise_pairs: noise_pairs(&noise, terms.noise, origin, every)?,
         noise,
         noise_beside: noise_beside(&singles, terms.noise, origin, every)?,
         listed: singles,
-        unknown: unknown_alone,
+        unknown,
         ..Findings::default()
-    };
-    stage.tick()?;
+    })
+}
+
+/// What single effects leave, pairs, which are searched unless they are given, and what these leave; nothing where nothing is missing.
+fn beside_each_other<'a>(
+    mut findings: Findings<'a>,
+    base: &Model<'a>,
+    terms: &Terms<'_>,
+    breadth: Breadth,
+    several: Option<Vec<Found<'a>>>,
+    stage: &Stage,
+) -> Result<Findings<'a>, DiagnoseError> {
     let is_null = findings.chances().log_odds <= Thresholds::GAP;
-    if !explain || is_null || findings.asks_for_noise().is_some() {
+    if is_null || findings.asks_for_noise().is_some() {
         return Ok(findings);
     }
+    let (origin, top) = (base.log_evidence, findings.top());
     // What an unknown function alone explains better leaves something.
     let best = findings.unknown.first().map_or(0.0, |f| f.gain);
+    let breadth = breadth.for_gap(best);
+    let few = breadth.few();
     let may_suffice = |found: &Found<'_>| found.gain > best - Thresholds::CANDIDATES;
     let mut enough = false;
     for i in 0..findings.listed.len().min(SINGLES) {
@@ -111,7 +213,9 @@ pub(in crate::diagnose) fn explore<'a>(
         }
     }
     stage.tick()?;
-    if breadth.pairs {
+    if let Some(several) = several {
+        findings.several = several;
+    } else if breadth.pairs {
         findings.several = pairs(&findings, terms, origin, breadth, enough)?;
         if let Some(found) = alone(base, &mut findings, terms, origin, breadth)? {
             enough |= findings.add(&found, on_top(&found, terms, origin, few)?);

@@ -5,11 +5,14 @@ use super::scan::{functions, scan};
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::term::{Nature, Term};
 use crate::diagnose::model::Model;
+use crate::diagnose::thresholds::Thresholds;
 use crate::fit::evidence::log_mean;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+/// Functions that are refitted where it is known about what is missing.
+pub(super) const FEW: usize = 3;
 /// Nats that averaging over its size takes off an effect that nothing speaks for.
 const AVERAGED: f64 = 2.0;
 /// Nats that the best of all frequencies is worth less than it looks, before a refit says how sharp it is.
@@ -65,6 +68,22 @@ impl Breadth {
             least: 2.5,
             deep: false,
             pairs: !quick,
+        }
+    }
+
+    /// The same for a gap of so many nats, as unknown functions tell it.
+    pub fn for_gap(self, nats: f64) -> Self {
+        Self {
+            deep: nats > Thresholds::DEEP && self.annealed > 0,
+            ..self
+        }
+    }
+
+    /// The same, fewer functions: where it is known about what is missing.
+    pub fn few(self) -> Self {
+        Self {
+            functions: FEW.min(self.functions),
+            ..self
         }
     }
 

@@ -280,6 +280,27 @@ mod tests {
         }
     }
 
+    /// What actuators remember is no state: a delay there is the twin with its inputs later, the first one held before.
+    #[test]
+    fn a_delayed_input_costs_no_state() {
+        let delay = Catalogue::default()
+            .effect("actuator-delay", "actuator")
+            .unwrap();
+        let base = Twin::new(CascadedTanks);
+        let twin = augment(base.clone(), vec![delay]).unwrap();
+        assert_eq!(twin.outline().unwrap().states.len(), 2);
+        let input = |k: usize| (k % 17) as f64 / 6.0;
+        let drive = |late: usize| {
+            let rows = Signal::from_shape_fn((80, 1), |(k, _)| input(k.saturating_sub(late)));
+            Drive::new(0.5, rows).unwrap()
+        };
+        let theta = [0.6, 0.5, 0.55, 1.0];
+        let noise = Noise::new(1, "t", 0);
+        let later = base.simulate(&theta, &drive(30), noise).unwrap();
+        let delayed = twin.simulate(&[&theta[..], &[15.0]].concat(), &drive(0), noise);
+        assert_eq!(delayed.unwrap(), later);
+    }
+
     /// A force of one's own sees inputs, parameters bent by other effects, all states and the time.
     #[test]
     fn a_force_sees_the_whole_twin() {

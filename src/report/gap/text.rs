@@ -177,6 +177,9 @@ pub(super) fn closed_sentence(s: &Shrinkage) -> String {
     if let Some(after) = s.after {
         text.push_str(&format!(" → {}", short(after)));
     }
+    if s.metric != Shrinkage::LOG_SCORE {
+        text.push_str(" deviations of the output");
+    }
     if let Some(floor) = s.floor {
         text.push_str(&format!(", noise alone {}", short(floor)));
     }

@@ -82,6 +82,22 @@ fn a_rounded_sensor_is_known_by_its_values() {
     assert!(found.cause.effects[0].probability > 0.9);
 }
 
+/// A delay of thirty samples, far longer than any register of a filter: actuators are computed before it.
+#[test]
+fn a_long_delay_of_an_actuator_is_named() {
+    let (study, key) = (study("tanks"), "actuator-delay@actuator");
+    let text = "[[effect]]\nid='actuator-delay'\ntarget='actuator'\nmagnitudes={delay=15.0}\n";
+    let noise = Noise::new(33, key, 0);
+    let drive = drive(&study, noise);
+    let theta = study.twin().parameters().centre();
+    let record = record(study.twin(), text, &theta, drive, noise);
+    let found = found(&study, record, None);
+    println!("{}", line(key, &found));
+    assert_eq!(found.cause.accepted, [key]);
+    let (_, delay) = found.cause.effects[0].magnitudes[0];
+    assert!((delay - 15.0).abs() < 1.0, "{delay}");
+}
+
 /// A gain of the pump is nothing but another k4: no structural gap.
 #[test]
 fn what_parameters_absorb_is_no_structural_gap() {

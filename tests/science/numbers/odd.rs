@@ -59,6 +59,7 @@ fn odd_records_give_numbers_or_reasons() {
         }
         let settings = DiagnoseSettings {
             detection_only: true,
+            quick: true,
             ..DiagnoseSettings::default()
         };
         match diagnose(&study, &[record], None, &settings, &silent) {

@@ -73,9 +73,9 @@ fn twenty_parameters_and_ten_outputs() {
 }
 
 #[test]
-fn ten_thousand_samples() {
+fn five_thousand_samples() {
     let chain = Chain::pair(Units::PLAIN);
-    estimated(chain, chain.study(10_000), 10_000, 150);
+    estimated(chain, chain.study(5_000), 5_000, 150);
 }
 
 /// `cargo test --release --test science numbers -- --ignored --nocapture`
