@@ -47,7 +47,7 @@ pub(in crate::diagnose) fn explore<'a>(
     }
 }
 
-/// What was found beside the same twin with another step.
+/// Findings beside the same twin with another step.
 #[derive(Clone, Copy)]
 pub(in crate::diagnose) struct Known<'k> {
     pub findings: &'k Findings<'k>,
@@ -55,7 +55,7 @@ pub(in crate::diagnose) struct Known<'k> {
     pub origin: f64,
 }
 
-/// What is known with another step, its fits carried on from where they ended: single explanations, and pairs.
+/// Carries the fits that are known with another step on from where they ended: single explanations, and pairs.
 fn carried_on<'a>(
     known: Known<'_>,
     base: &Model<'a>,
@@ -162,7 +162,7 @@ fn one_by_one<'a>(
     Ok(findings)
 }
 
-/// What was found alone, with other kinds of noise.
+/// Adds other kinds of noise to what was found alone.
 fn with_noise<'a>(
     base: &Model<'a>,
     terms: &Terms<'_>,
@@ -182,7 +182,7 @@ fn with_noise<'a>(
     })
 }
 
-/// What single effects leave, pairs, which are searched unless they are given, and what these leave; nothing where nothing is missing.
+/// Adds what single effects leave, pairs, which are searched unless they are given, and what these leave; stops where nothing is missing.
 fn beside_each_other<'a>(
     mut findings: Findings<'a>,
     base: &Model<'a>,

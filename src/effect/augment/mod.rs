@@ -280,7 +280,7 @@ mod tests {
         }
     }
 
-    /// What actuators remember is no state: a delay there is the twin with its inputs later, the first one held before.
+    /// Actuators remember nothing in the state: a delay there is the twin with its inputs later, the first one held before.
     #[test]
     fn a_delayed_input_costs_no_state() {
         let delay = Catalogue::default()
