@@ -19,7 +19,6 @@ use super::settings::DiagnoseSettings;
 use super::summary::{effects, nuisance, onset, parameters, remains};
 use super::thresholds::Thresholds;
 use crate::fit::climb::climb;
-use crate::fit::errors::steady_errors;
 use crate::math::six_digits;
 use crate::progress::Progress;
 use crate::record::Record;
@@ -196,13 +195,12 @@ fn report(
         let (base, grown) = (runner(model)?, accepted.map(runner).transpose()?.flatten());
         Ok(free_runs(&records[0], base.as_ref(), grown.as_ref()))
     };
-    let errors = steady_errors(&last.problem, &last.fitted)?;
     Ok(Diagnosis {
         twin: study.name().into(),
         verdict,
         detection,
-        parameters: parameters(last, &errors, &base.theta, settings),
-        nuisance: nuisance(last, &errors, &base.noises)?,
+        parameters: parameters(last, &base.theta, settings),
+        nuisance: nuisance(last, &base.noises)?,
         location: Location {
             onset: accepted.and_then(onset),
             ..location

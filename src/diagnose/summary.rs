@@ -86,13 +86,13 @@ fn fit_of(model: &Model<'_>, term: &Term, probability: f64, log_evidence: f64) -
     }
 }
 
-/// The twin's own parameters, `errors` those of all of θ.
+/// The twin's own parameters.
 pub(in crate::diagnose) fn parameters(
     model: &Model<'_>,
-    errors: &[f64],
     alone: &[f64],
     settings: &DiagnoseSettings,
 ) -> Vec<FittedParameter> {
+    let errors = model.fitted.std_errors(&model.problem);
     let theta = model.theta();
     let reach = Normal::standard().inverse_cdf(0.5 * (1.0 + Thresholds::INTERVAL_LEVEL));
     let space = model.base.parameters();
@@ -116,9 +116,9 @@ pub(in crate::diagnose) fn parameters(
 /// Noise levels, magnitudes of the study's own effects, and the first states given the records; `noises` are the last parameters.
 pub(in crate::diagnose) fn nuisance(
     model: &Model<'_>,
-    errors: &[f64],
     noises: &[Arc<Term>],
 ) -> Result<Vec<Nuisance>, DiagnoseError> {
+    let errors = model.fitted.std_errors(&model.problem);
     let theta = model.theta();
     let space = model.base.parameters();
     let kinds: Vec<String> = noises.iter().flat_map(|term| noise_names(term)).collect();
@@ -144,7 +144,7 @@ pub(in crate::diagnose) fn nuisance(
         // A black box has its own parameters for unknown starts, one set a record.
         for r in 0..model.problem.records.len() {
             let own = model.problem.of_record(r, &model.fitted.theta);
-            let full = model.problem.of_record(r, errors);
+            let full = model.problem.of_record(r, &errors);
             for (j, p) in space
                 .iter()
                 .enumerate()

@@ -20,7 +20,6 @@ pub(crate) mod certificate;
 pub(crate) mod climb;
 mod draws;
 mod effects;
-pub(crate) mod errors;
 pub(crate) mod evidence;
 pub(crate) mod follow;
 pub(crate) mod growing;

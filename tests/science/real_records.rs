@@ -205,8 +205,6 @@ fn the_positioning_rig_lacks_dry_friction_and_an_offset() {
     );
     let mass = &found.parameters[0];
     assert!((mass.refitted / 95.1 - 1.0).abs() < 0.05, "{mass:?}");
-    // Friction jumps: over short differences the mass would be known to grams.
-    assert!((0.05..1.0).contains(&mass.std_error), "{mass:?}");
 }
 
 /// The heater: a lag, at the sensor or the actuator; what radiates has no weight.
