@@ -98,7 +98,8 @@ fn with_step<R>(
     explored(study, base, known, settings, ROUNDS, progress, then)
 }
 
-/// Searches for what explains the records beside a fitted twin, from what is known with another step where that is given; anew where they ask for another kind of noise, or for a finer step.
+/// Searches for what explains the records beside a fitted twin, from what is known with another step where that is given; again where
+/// they ask for another kind of noise, or for a finer step.
 fn explored<R>(
     study: &Study,
     base: Base<'_>,

@@ -17,8 +17,8 @@ pub(super) struct Channel {
 /// Memories that a look at a signal copies without the heap.
 const SHORT: usize = 8;
 
-/// A signal law over the points of a filter.
-pub(super) trait SignalBatch: Send + Sync {
+/// A sensor's law over the points of a filter.
+pub(super) trait SensorBatch: Send + Sync {
     /// Passes the channel of points, `p` outputs each, through the effect; advances its memory in the states.
     fn pass(
         &self,
@@ -43,7 +43,7 @@ pub(super) trait SignalBatch: Send + Sync {
     fn read(&self, m: &[f64], now: Instant, target: usize, outputs: (usize, &mut [f64])) -> bool;
 }
 
-impl<F> SignalBatch for F
+impl<F> SensorBatch for F
 where
     F: Fn(&[f64], Instant, &mut [f64], f64) -> f64 + Send + Sync,
 {
@@ -114,7 +114,7 @@ where
 #[derive(Clone)]
 pub(super) enum Batch {
     None,
-    Signal(Arc<dyn SignalBatch>),
+    Sensor(Arc<dyn SensorBatch>),
     Force(Arc<dyn ForceBatch>),
     Limit(Arc<dyn LimitBatch>),
 }

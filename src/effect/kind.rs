@@ -72,7 +72,7 @@ impl EffectKind {
         law: impl Fn(&[f64], Instant, &mut [f64], f64) -> f64 + Send + Sync + 'static,
     ) -> Self {
         let law = Arc::new(law);
-        Self::new(id, formula, Law::Sensor(law.clone())).batch(Batch::Signal(law))
+        Self::new(id, formula, Law::Sensor(law.clone())).batch(Batch::Sensor(law))
     }
 
     /// Creates an effect that changes an input: `law(m, now, memory, u)` returns the signal that acts.
@@ -81,8 +81,7 @@ impl EffectKind {
         formula: &str,
         law: impl Fn(&[f64], Instant, &mut [f64], f64) -> f64 + Send + Sync + 'static,
     ) -> Self {
-        let law = Arc::new(law);
-        Self::new(id, formula, Law::Actuator(law.clone())).batch(Batch::Signal(law))
+        Self::new(id, formula, Law::Actuator(Arc::new(law)))
     }
 
     /// Creates an effect on the rate of a state: `law(m, at)` is added to it.

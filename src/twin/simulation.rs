@@ -85,9 +85,10 @@ pub(super) fn simulate_equations(
     let mut work = Workspace::new(twin);
     let acting = Acting::of(twin, theta, drive)?;
     let mut outputs = vec![0.0; drive.samples() * p];
-    twin.start(&acting.at(0, theta), &mut x);
+    let first = acting.at(0, theta);
+    twin.start(&first, &mut x);
     if !noise.is_off() {
-        draw_start(twin, &acting.at(0, theta), &outline, noise, &mut x);
+        draw_start(twin, &first, &outline, noise, &mut x);
     }
     for k in 0..drive.samples() {
         let now = acting.at(k, theta);

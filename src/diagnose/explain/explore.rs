@@ -41,10 +41,12 @@ pub(in crate::diagnose) fn explore<'a>(
         Some(known) => carried_on(known, base, terms, breadth, &stage)?,
         None => (one_by_one(base, terms, breadth, &stage)?, None),
     };
-    match explain {
-        true => beside_each_other(findings, base, terms, breadth, several, &stage),
-        false => Ok(findings),
-    }
+    let findings = match explain {
+        true => beside_each_other(findings, base, terms, breadth, several, &stage)?,
+        false => findings,
+    };
+    stage.finish();
+    Ok(findings)
 }
 
 /// Findings beside the same twin with another step.
@@ -65,23 +67,22 @@ fn carried_on<'a>(
 ) -> Result<(Findings<'a>, Option<Vec<Found<'a>>>), DiagnoseError> {
     let old = known.findings;
     let origin = base.log_evidence;
-    let few = breadth.few();
+    let kept = |found: &Found<'_>| Found {
+        terms: found.terms.clone(),
+        gain: found.gain + known.origin - origin,
+        model: None,
+    };
     // What does not stand out keeps its evidence: another step does not help it more than the others.
     let least = FIRST * old.top();
     let carry = |found: &Found<'_>| -> Result<Found<'a>, DiagnoseError> {
-        let carried = match &found.model {
-            Some(old) if found.gain > least => {
-                let new = old.beside_twin(base)?;
-                new.map(|new| (new.log_evidence - old.log_evidence, new))
-            }
-            _ => None,
-        };
-        let (change, model) = carried.map_or((0.0, None), |(change, new)| (change, Some(new)));
-        Ok(Found {
-            terms: found.terms.clone(),
-            gain: found.gain + known.origin - origin + change,
-            model,
-        })
+        let mut carried = kept(found);
+        if let Some(old) = found.model.as_ref().filter(|_| found.gain > least)
+            && let Some(new) = old.beside_twin(base)?
+        {
+            carried.gain += new.log_evidence - old.log_evidence;
+            carried.model = Some(new);
+        }
+        Ok(carried)
     };
     let carry_all = |all: &[Found<'_>]| -> Result<Vec<Found<'a>>, DiagnoseError> {
         let mut all: Vec<Found<'a>> = all.par_iter().map(carry).collect::<Result<_, _>>()?;
@@ -89,20 +90,14 @@ fn carried_on<'a>(
         Ok(all)
     };
     let best: Vec<Arc<Term>> = (old.unknown.iter().take(FEW))
-        .flat_map(|found| found.terms.last().cloned())
+        .filter_map(|found| found.terms.last().cloned())
         .collect();
-    let again = unknown(base, &best, origin, few)?;
-    let mut functions: Vec<Found<'a>> = (old.unknown.iter())
-        .map(
-            |found| match again.iter().find(|f| f.keys() == found.keys()) {
-                Some(new) => Ok(new.clone()),
-                None => carry(&Found {
-                    model: None,
-                    ..found.clone()
-                }),
-            },
-        )
-        .collect::<Result<_, _>>()?;
+    let mut functions = unknown(base, &best, origin, breadth.few())?;
+    let others = old.unknown.iter().filter(|found| {
+        let again = functions.iter().any(|f| f.keys() == found.keys());
+        !again
+    });
+    functions.extend(others.map(kept).collect::<Vec<_>>());
     sort(&mut functions);
     stage.tick()?;
     let listed = carry_all(&old.listed)?;
@@ -126,20 +121,11 @@ fn one_by_one<'a>(
     stage.tick()?;
     let best = unknown_alone.first().map_or(0.0, |f| f.gain);
     let breadth = breadth.for_gap(best);
-    let mut singles = listed(
-        base,
-        terms.listed,
-        origin,
-        &[],
-        Breadth {
-            listed: if best > Thresholds::NULL_LIKE {
-                usize::MAX
-            } else {
-                breadth.listed
-            },
-            ..breadth
-        },
-    )?;
+    let looked = match best > Thresholds::NULL_LIKE {
+        true => breadth.of_all(),
+        false => breadth,
+    };
+    let mut singles = listed(base, terms.listed, origin, &[], looked)?;
     let top = singles.first().map_or(0.0, |f| f.gain);
     if best <= Thresholds::NULL_LIKE && top > Thresholds::NULL_LIKE {
         singles = listed(base, terms.listed, origin, &[], breadth.of_all())?;
@@ -319,7 +305,7 @@ fn pairs<'a>(
         let left = findings.left(&f.keys());
         left.is_some_and(|left| leaves_nothing(f.gain, left))
     };
-    let stands_out = |f: &&Found<'a>| f.gain > FIRST * findings.listed[0].gain;
+    let stands_out = |f: &&Found<'a>| f.gain > FIRST * findings.top();
     let sources: Vec<&Found<'a>> = match enough {
         true => findings.listed.iter().find(adequate).into_iter().collect(),
         false => (findings.listed.iter().take(SINGLES))

@@ -2,7 +2,7 @@
 
 use super::outliers::strike;
 use super::{Place, Placed, Slots};
-use crate::effect::batch::{Batch, Channel, ForceBatch, LimitBatch, SignalBatch};
+use crate::effect::batch::{Batch, Channel, ForceBatch, LimitBatch, SensorBatch};
 use crate::effect::law::{ForcePoint, Instant, Law, NOISE_ENTERS, NoiseLaw, ParameterLaw};
 use crate::record::{Drive, Quantity, Signal};
 use crate::twin::{Layout, Modify, Noise, Now, Outliers, Outline, SimulationError, StateSpace};
@@ -30,7 +30,7 @@ pub(super) struct AugmentedEquations {
 
 /// A sensor effect and its memory in the state.
 struct OnSensor {
-    law: Arc<dyn SignalBatch>,
+    law: Arc<dyn SensorBatch>,
     at: Place,
     channel: Channel,
     after_noise: bool,
@@ -44,7 +44,7 @@ impl AugmentedEquations {
         let mut sensors = Vec::new();
         for slot in &slots.all {
             let kind = slot.effect.kind();
-            let (Batch::Signal(law), Law::Sensor(_)) = (kind.over_points(), kind.law()) else {
+            let Batch::Sensor(law) = kind.over_points() else {
                 continue;
             };
             let from = outline.states.len();

@@ -3,7 +3,7 @@
 use super::super::magnitude::Magnitude;
 use crate::setting::number;
 
-/// Samples that a delay keeps: the present one and 63 before it. Each is a state for whoever simulates or filters
+/// Samples that a delay keeps: the present one and 63 before it. Those of a sensor are states for whoever simulates or filters
 /// the twin, so there are no more of them than delays in practice need.
 pub(super) const DELAY_SAMPLES: usize = 64;
 

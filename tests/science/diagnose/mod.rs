@@ -9,7 +9,7 @@ mod trials;
 use crate::binomial_bounds;
 use std::sync::Arc;
 use trials::*;
-use truetwin::diagnose::{Decision, DiagnoseSettings, Verdict, diagnose};
+use truetwin::diagnose::{Decision, DiagnoseSettings, Diagnosis, Verdict, diagnose};
 use truetwin::progress::{Listener, Progress};
 use truetwin::record::{Drive, Record, Signal};
 use truetwin::twin::{Noise, Twin};
@@ -66,17 +66,24 @@ fn clear_effects_are_found_and_named() {
     }
 }
 
+/// The diagnosis of a record of the tanks at the centre of the prior, with an effect.
+fn found_in_tanks(key: &str, magnitudes: &str) -> Diagnosis {
+    let study = study("tanks");
+    let (id, target) = key.split_once('@').unwrap();
+    let text = format!("[[effect]]\nid='{id}'\ntarget='{target}'\nmagnitudes={{{magnitudes}}}\n");
+    let noise = Noise::new(33, key, 0);
+    let theta = study.twin().parameters().centre();
+    let record = record(study.twin(), &text, &theta, drive(&study, noise), noise);
+    let found = found(&study, record, None);
+    println!("{}", line(key, &found));
+    found
+}
+
 /// Steps of a converter that louder noise could pass for are told by the values themselves.
 #[test]
 fn a_rounded_sensor_is_known_by_its_values() {
-    let (study, key) = (study("tanks"), "sensor-quantization@sensor");
-    let text = "[[effect]]\nid='sensor-quantization'\ntarget='sensor'\nmagnitudes={step=0.4}\n";
-    let noise = Noise::new(33, key, 0);
-    let drive = drive(&study, noise);
-    let theta = study.twin().parameters().centre();
-    let record = record(study.twin(), text, &theta, drive, noise);
-    let found = found(&study, record, None);
-    println!("{}", line(key, &found));
+    let key = "sensor-quantization@sensor";
+    let found = found_in_tanks(key, "step=0.4");
     assert_eq!(found.verdict, Verdict::StructuralGap);
     assert_eq!(found.cause.effects[0].key(), key);
     assert!(found.cause.effects[0].probability > 0.9);
@@ -85,14 +92,8 @@ fn a_rounded_sensor_is_known_by_its_values() {
 /// A delay of thirty samples, far longer than any register of a filter: actuators are computed before it.
 #[test]
 fn a_long_delay_of_an_actuator_is_named() {
-    let (study, key) = (study("tanks"), "actuator-delay@actuator");
-    let text = "[[effect]]\nid='actuator-delay'\ntarget='actuator'\nmagnitudes={delay=15.0}\n";
-    let noise = Noise::new(33, key, 0);
-    let drive = drive(&study, noise);
-    let theta = study.twin().parameters().centre();
-    let record = record(study.twin(), text, &theta, drive, noise);
-    let found = found(&study, record, None);
-    println!("{}", line(key, &found));
+    let key = "actuator-delay@actuator";
+    let found = found_in_tanks(key, "delay=15.0");
     assert_eq!(found.cause.accepted, [key]);
     let (_, delay) = found.cause.effects[0].magnitudes[0];
     assert!((delay - 15.0).abs() < 1.0, "{delay}");

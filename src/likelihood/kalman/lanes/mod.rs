@@ -45,13 +45,11 @@ impl Kalman<'_> {
 /// Runs up to eight filters side by side; `None` where one of them fails or needs more than lanes offer, to be run one by one.
 pub(super) fn together(jobs: &[(&Kalman<'_>, &[f64])]) -> Option<Together> {
     let first = jobs.first()?.0;
-    let alike = |&(kalman, theta): &(&Kalman<'_>, &[f64])| {
-        kalman.fits_lanes() && kalman.runs_beside(first) && kalman.twin.outliers(theta).is_empty()
-    };
     let jobs: Vec<Job<'_>> = (jobs.iter())
-        .map(|job @ &(kalman, theta)| {
+        .map(|&(kalman, theta)| {
             let acting = kalman.acting(theta).ok()?;
-            alike(job).then_some(Job {
+            let alike = kalman.fits_lanes() && kalman.runs_beside(first);
+            (alike && kalman.twin.outliers(theta).is_empty()).then_some(Job {
                 kalman,
                 theta,
                 acting,
