@@ -49,15 +49,16 @@ impl Library<'_> {
             return Ok(vec![]);
         }
         let mut terms = vec![];
-        for (off, register) in self.ways(effect, &mark) {
-            if let Some(term) = self.term(effect, &values, &mark, &off, register)? {
+        for (off, kept) in self.ways(effect, &mark) {
+            if let Some(term) = self.term(effect, &values, &mark, &off, kept)? {
                 terms.push(term);
             }
         }
         Ok(terms)
     }
 
-    /// Magnitudes that are off, and the memory of a delay, of each way to use an effect.
+    /// Magnitudes that are off, and the values in the memory of a sensor's delay, of each way to use an effect. A delay of the only sensor
+    /// makes the whole twin late, and needs none.
     fn ways(&self, effect: &Effect, mark: &Mark) -> Vec<(Vec<usize>, Option<usize>)> {
         let magnitudes = effect.magnitudes();
         if let Mark::Present(m) = mark {
@@ -69,10 +70,12 @@ impl Library<'_> {
         let (least, most) = effect.kind().memories();
         let is_sensor = matches!(effect.law(), Law::Sensor(_));
         match thresholds.len() {
-            0 | 1 if self.scales.has_equations() && is_sensor && least < most => (0
-                ..Thresholds::REGISTERS.len())
-                .map(|i| (vec![], Some(i)))
-                .collect(),
+            0 | 1 if self.scales.has_equations() && is_sensor && least < most => {
+                match self.scales.outline.outputs.len() {
+                    1 => vec![(vec![], Some(0))],
+                    _ => Thresholds::REGISTERS.map(|n| (vec![], Some(n))).to_vec(),
+                }
+            }
             0 | 1 => vec![(vec![], None)],
             _ => (thresholds.iter())
                 .map(|i| {
@@ -91,7 +94,7 @@ impl Library<'_> {
         values: &[f64],
         mark: &Mark,
         off: &[usize],
-        register: Option<usize>,
+        kept: Option<usize>,
     ) -> Result<Option<Term>, DiagnoseError> {
         let magnitudes = effect.magnitudes();
         let held: BTreeMap<String, f64> = (off.iter())
@@ -115,7 +118,7 @@ impl Library<'_> {
             part: Part::Effect {
                 effect: effect.clone(),
                 held,
-                kept: register.map(|i| Thresholds::REGISTERS[i]),
+                kept,
             },
             axes: vec![],
             family: None,
@@ -129,6 +132,7 @@ impl Library<'_> {
         let twin = with_terms(self.twin, std::iter::once(&term))?;
         let space = twin.parameters();
         let names = term.names();
+        let register = kept.and_then(|n| Thresholds::REGISTERS.iter().position(|r| *r == n));
         let mut grids: Vec<Vec<f64>> = vec![];
         let mut scales = false;
         for (i, (m, name)) in free.iter().zip(&names).enumerate() {

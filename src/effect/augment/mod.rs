@@ -53,7 +53,9 @@ pub fn augment(base: impl Into<Twin>, effects: Vec<Effect>) -> Result<Twin, Effe
 
 /// Adds effects as [`augment`] does, with so many memory values for each of them, within what its law allows.
 ///
-/// A filter's cost grows with the square of the states, and a delay's register is longer than most delays.
+/// A filter's cost grows with the square of the states, and a delay's register is longer than most delays. Without any memory, a delay of
+/// the only sensor makes the whole twin late: its states stand still until then, its inputs and its time are those of before. A delay of
+/// several samples is the same to the last bits, one between samples interpolates inputs in place of outputs.
 pub(crate) fn augment_short(
     base: Twin,
     effects: Vec<Effect>,
@@ -84,6 +86,8 @@ struct Place {
     other: Option<usize>,
     /// Memory values.
     memory: usize,
+    /// True of a delay of the only sensor that makes the whole twin late, and needs no memory.
+    late: bool,
 }
 
 impl Place {
@@ -153,11 +157,14 @@ impl Slots {
             let from = base + parameters.len();
             parameters.extend(magnitude_parameters(effect));
             let (least, most) = effect.kind().memories();
+            let only = signals.outputs.len() == 1 && matches!(effect.law(), Law::Sensor(_));
+            let late = memory == 0 && least < most && only && outline.is_some();
             let place = Place {
                 magnitudes: from..base + parameters.len(),
                 target: index(effect.target()).unwrap_or(0),
                 other: effect.other().and_then(index),
-                memory: memory.clamp(least.min(most), most),
+                memory: if late { 0 } else { memory.clamp(least, most) },
+                late,
             };
             let effect = effect.clone();
             all.push(Slot { effect, place });
@@ -277,6 +284,24 @@ mod tests {
             let noise = Noise::new(1, "t", 0);
             let run = |twin: &Twin| twin.simulate(&theta, &drive, noise).unwrap();
             assert_eq!(run(&long), run(&short));
+        }
+    }
+
+    /// A twin that is late shows what a register shows, while it stands still at the start, too.
+    #[test]
+    fn a_late_twin_is_a_twin_with_a_late_sensor() {
+        let delay = || Catalogue::default().effect("sensor-delay", "sensor");
+        let base = Twin::new(CascadedTanks);
+        let register = augment(base.clone(), vec![delay().unwrap()]).unwrap();
+        let late = augment_short(base, vec![delay().unwrap()], vec![0]).unwrap();
+        assert_eq!(late.outline().unwrap().states.len(), 2);
+        let u = Signal::from_shape_fn((120, 1), |(k, _)| ((k / 9) % 5) as f64 / 2.0);
+        let drive = Drive::new(0.5, u).unwrap();
+        for (delay, near) in [(0.0, 1e-12), (10.0, 1e-12), (7.3, 0.02)] {
+            let theta = [0.6, 0.5, 0.55, 1.0, delay];
+            let run = |twin: &Twin| twin.free_run(&theta, &drive).unwrap();
+            let difference = run(&register) - run(&late);
+            assert!(difference.iter().all(|d| d.abs() < near), "{delay}");
         }
     }
 
