@@ -8,7 +8,7 @@ use super::hypotheses::{listed, shared};
 use super::model::Model;
 use super::outcome::Verdict;
 use super::residuals::frequencies::frequencies;
-use super::settings::DiagnoseSettings;
+use super::settings::{Ablation, DiagnoseSettings};
 use super::step::FinerStep;
 use super::thresholds::Thresholds;
 use crate::effect::{TargetKind, targets};
@@ -74,7 +74,8 @@ impl<'a> Base<'a> {
                 .map(|fitted| (problem, fitted))
         };
         let (problem, fitted) = fitted.ok_or(DiagnoseError::NoFit)?;
-        let model = Model::bare(twin, problem, fitted).ok_or(DiagnoseError::NoFit)?;
+        let model = Model::bare(twin, problem, fitted, settings.lacks(Ablation::Evidence))
+            .ok_or(DiagnoseError::NoFit)?;
         let outline = model.problem.outline();
         let outputs = &outline.outputs;
         let sensors = targets(TargetKind::Sensor, None, &twin.signals());
@@ -98,7 +99,12 @@ impl<'a> Base<'a> {
     where
         'a: 'b,
     {
-        let Some(model) = Model::bare(twin, found.problem.clone(), found.fitted.clone()) else {
+        let Some(model) = Model::bare(
+            twin,
+            found.problem.clone(),
+            found.fitted.clone(),
+            found.by_bic,
+        ) else {
             return Ok(None);
         };
         let noises = self.noises.iter().chain(&found.terms).cloned().collect();
@@ -191,7 +197,7 @@ pub(in crate::diagnose) fn left_the_prior<'a>(
     // As many bounds as bind are what chance can gain from.
     let limit =
         ChiSquared::new(beyond as f64).map_or(f64::INFINITY, |c| c.inverse_cdf(1.0 - alpha));
-    let within = within.and_then(|w| Model::bare(model.base, boxed, w));
+    let within = within.and_then(|w| Model::bare(model.base, boxed, w, model.by_bic));
     Ok((ratio > limit, within))
 }
 

@@ -5,6 +5,7 @@
 //! | `run.rs`, `base.rs`, `summary.rs` | order of the steps; the fitted twin that they begin with; the summary of their results |
 //! | `rounds.rs` | the search, again with another kind of noise or a finer step |
 //! | `model.rs` | a twin with terms, fitted |
+//! | `greedy.rs` | a baseline: forward selection by BIC |
 //! | `step.rs` | whether a finer step of the integrator explains the records better |
 //! | `hypotheses/` | what could be missing: listed effects, unknown functions |
 //! | `explain/` | which of them: screened, refitted, weighed, decided |
@@ -19,6 +20,7 @@
 mod base;
 mod error;
 mod explain;
+mod greedy;
 mod hypotheses;
 mod locate;
 mod model;
@@ -33,6 +35,7 @@ mod summary;
 mod thresholds;
 
 pub use error::{DiagnoseError, GivenRecord};
+pub(crate) use greedy::greedy;
 pub(crate) use outcome::Cell;
 pub use outcome::{
     Band, Cause, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit, FittedParameter,
@@ -41,7 +44,7 @@ pub use outcome::{
 };
 pub(crate) use quantify::share::SHORTEST_SPLIT;
 pub use run::diagnose;
-pub use settings::DiagnoseSettings;
+pub use settings::{Ablation, DiagnoseSettings};
 
 /// Nats within which explanations are rivals.
 pub(crate) const RIVALS: f64 = thresholds::Thresholds::RIVALS;

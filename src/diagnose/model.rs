@@ -21,8 +21,10 @@ pub(in crate::diagnose) struct Model<'a> {
     pub terms: Vec<Arc<Term>>,
     pub problem: Problem<'a>,
     pub fitted: Fitted,
-    /// log Z, in nats.
+    /// log Z, in nats; BIC in its place where evidence is taken out.
     pub log_evidence: f64,
+    /// True where BIC stands in the place of evidence.
+    pub by_bic: bool,
 }
 
 /// A model with one more term, not yet fitted.
@@ -31,12 +33,18 @@ pub(in crate::diagnose) struct Extended<'a> {
     pub problem: Problem<'a>,
     /// Entries of the new term's magnitudes.
     pub entries: Vec<usize>,
+    by_bic: bool,
 }
 
 impl<'a> Model<'a> {
     /// The twin alone; `None` where its evidence cannot be told.
-    pub fn bare(base: &'a Twin, problem: Problem<'a>, fitted: Fitted) -> Option<Self> {
-        Self::new(base, vec![], problem, fitted)
+    pub fn bare(
+        base: &'a Twin,
+        problem: Problem<'a>,
+        fitted: Fitted,
+        by_bic: bool,
+    ) -> Option<Self> {
+        Self::new(base, vec![], problem, fitted, by_bic)
     }
 
     /// The twin with terms; `None` where its evidence cannot be told.
@@ -45,8 +53,12 @@ impl<'a> Model<'a> {
         terms: Vec<Arc<Term>>,
         problem: Problem<'a>,
         fitted: Fitted,
+        by_bic: bool,
     ) -> Option<Self> {
-        let (log_evidence, _) = laplace(&problem, &fitted, CREDIT)?;
+        let log_evidence = match by_bic {
+            true => bic(&problem, &fitted),
+            false => laplace(&problem, &fitted, CREDIT)?.0,
+        };
         let mark: f64 = terms.iter().map(|t| t.mark).sum();
         log_evidence.is_finite().then_some(Self {
             base,
@@ -54,12 +66,14 @@ impl<'a> Model<'a> {
             problem,
             fitted,
             log_evidence: log_evidence + mark,
+            by_bic,
         })
     }
 
     /// The same model, carried on to another fit.
     pub fn refitted(&self, fitted: Fitted) -> Option<Self> {
-        Self::new(self.base, self.terms.clone(), self.problem.clone(), fitted)
+        let (terms, problem) = (self.terms.clone(), self.problem.clone());
+        Self::new(self.base, terms, problem, fitted, self.by_bic)
     }
 
     /// The problem with another twin in the place of its own, of the same parameters.
@@ -110,6 +124,7 @@ impl<'a> Model<'a> {
             terms,
             problem,
             entries,
+            by_bic: self.by_bic,
         })
     }
 
@@ -172,8 +187,17 @@ impl<'a> Extended<'a> {
 
     /// The fitted model.
     pub fn fitted(self, base: &'a Twin, fitted: Fitted, problem: Problem<'a>) -> Option<Model<'a>> {
-        Model::new(base, self.terms, problem, fitted)
+        Model::new(base, self.terms, problem, fitted, self.by_bic)
     }
+}
+
+/// The Bayesian information criterion in nats, the larger the better.
+fn bic(problem: &Problem<'_>, fitted: &Fitted) -> f64 {
+    let fitted_entries = problem.axes.iter().filter(|axis| !axis.held).count();
+    let values = (problem.records.iter())
+        .map(|r| r.outputs().iter().filter(|y| !y.is_nan()).count())
+        .sum::<usize>();
+    fitted.log_likelihood - 0.5 * fitted_entries as f64 * (values.max(1) as f64).ln()
 }
 
 /// Keys of terms, in their order.

@@ -9,7 +9,7 @@ use super::hypotheses::noise::kinds;
 use super::hypotheses::scales::Scales;
 use super::hypotheses::term::Term;
 use super::hypotheses::{not_tested, shared, unknown};
-use super::settings::DiagnoseSettings;
+use super::settings::{Ablation, DiagnoseSettings};
 use super::step::{FinerStep, finer_step};
 use super::thresholds::Thresholds;
 use crate::likelihood::measured;
@@ -42,7 +42,7 @@ pub(in crate::diagnose) fn search<R>(
     then: impl FnOnce(Explored<'_, '_>) -> Result<R, DiagnoseError>,
 ) -> Result<R, DiagnoseError> {
     let stage = progress.stage("fit", 1);
-    let measured = measured(study.twin(), records, &study.beliefs())?;
+    let measured = measured(study.twin(), records, &settings.beliefs(study))?;
     let base = Base::new(&measured, records, settings)?;
     stage.tick()?;
     match step_of(study, &base, settings)? {
@@ -86,7 +86,7 @@ fn with_step<R>(
     let records = base.model.problem.records;
     let twin = step.of(study.twin());
     let twin = twin.as_ref().unwrap_or(study.twin());
-    let measured = measured(twin, records, &study.beliefs())?;
+    let measured = measured(twin, records, &settings.beliefs(study))?;
     let begin = DiagnoseSettings {
         initial: Some(base.theta.clone()),
         ..settings.clone()
@@ -116,7 +116,10 @@ fn explored<R>(
         _ => shared(kinds(study, &settings.without, &library, &base.noisy)?),
     };
     noise.retain(|term| !base.noises.iter().any(|own| own.key() == term.key()));
-    let unlisted = |seen: &[Scales<'_>]| shared(unknown(&library, seen));
+    let unlisted = |seen: &[Scales<'_>]| match settings.lacks(Ablation::UnknownFunctions) {
+        true => vec![],
+        false => shared(unknown(&library, seen)),
+    };
     let terms = Terms {
         listed: &effects,
         noise: &noise,

@@ -1,7 +1,43 @@
 //! Settings of a diagnosis.
 
 use crate::effect::EffectPattern;
+use crate::likelihood::Beliefs;
+use crate::study::Study;
 use crate::twin::Noise;
+use serde::{Deserialize, Serialize};
+
+/// A part of a diagnosis that can be taken out, to measure what it is worth.
+///
+/// ```
+/// use truetwin::diagnose::{Ablation, DiagnoseSettings};
+///
+/// let ablated = vec![Ablation::UnknownFunctions];
+/// let settings = DiagnoseSettings { ablated, ..DiagnoseSettings::default() };
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ablation {
+    /// Noise levels are held as they are declared. The measurement noise of a black box stays fitted.
+    FittedNoise,
+    /// Listed effects have no rivals: what they leave is not looked for.
+    UnknownFunctions,
+    /// BIC takes the place of evidence: ll(θ̂) − ½·k·ln N, k fitted entries, N samples of all outputs.
+    Evidence,
+}
+
+impl Ablation {
+    /// All parts.
+    pub const ALL: [Self; 3] = [Self::FittedNoise, Self::UnknownFunctions, Self::Evidence];
+
+    /// Name of the part.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::FittedNoise => "fitted-noise",
+            Self::UnknownFunctions => "unknown-functions",
+            Self::Evidence => "evidence",
+        }
+    }
+}
 
 /// Settings of a diagnosis.
 ///
@@ -14,6 +50,7 @@ use crate::twin::Noise;
 /// | `initial` | none | | θ that an estimator gave, a start of the fit |
 /// | `detection_only` | no | | stop after the verdict: neither where, nor which, nor how far |
 /// | `quick` | no | | effects one at a time, from few starts; no pairs, smallest visible effects or next input |
+/// | `ablated` | none | | parts taken out, to measure what they are worth |
 #[derive(Debug, Clone, PartialEq)]
 pub struct DiagnoseSettings {
     /// Level of the test whether θ left its prior.
@@ -30,12 +67,31 @@ pub struct DiagnoseSettings {
     pub detection_only: bool,
     /// Try effects one at a time, from few starts.
     pub quick: bool,
+    /// Parts that are taken out, to measure what they are worth.
+    pub ablated: Vec<Ablation>,
 }
 
 impl DiagnoseSettings {
     /// Source of everything random.
     pub(in crate::diagnose) fn noise(&self) -> Noise {
         Noise::new(self.seed, "diagnose", 0)
+    }
+
+    /// Returns true if a part is taken out.
+    pub(in crate::diagnose) fn lacks(&self, part: Ablation) -> bool {
+        self.ablated.contains(&part)
+    }
+
+    /// The study's word on noise and starts; levels that are not fitted are known.
+    pub(in crate::diagnose) fn beliefs(&self, study: &Study) -> Beliefs {
+        let mut beliefs = study.beliefs();
+        if self.lacks(Ablation::FittedNoise)
+            && let Some(outline) = study.twin().outline()
+        {
+            let all = outline.states.iter().chain(&outline.outputs);
+            beliefs.known.extend(all.map(|signal| signal.name.clone()));
+        }
+        beliefs
     }
 }
 
@@ -49,6 +105,7 @@ impl Default for DiagnoseSettings {
             initial: None,
             detection_only: false,
             quick: false,
+            ablated: vec![],
         }
     }
 }

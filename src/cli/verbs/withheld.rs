@@ -5,6 +5,7 @@ use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
 use crate::cli::provenance::Provenance;
+use crate::diagnose::Ablation;
 use crate::evaluate::trials::{self, Families, Kind, Settings};
 use crate::report::{scorecard_json, scorecard_text};
 use crate::setting::did_you_mean;
@@ -51,6 +52,9 @@ pub(in crate::cli) struct Withheld {
     /// Stop each diagnosis at its verdict: false alarms and detection only, in a third of the time.
     #[arg(long)]
     detection_only: bool,
+    /// Parts taken out of the diagnosis, to measure what they are worth: fitted-noise, unknown-functions, evidence.
+    #[arg(long, value_name = "PART,..", value_delimiter = ',', value_parser = ablation)]
+    ablate: Vec<Ablation>,
     /// Repeat the diagnosis of the first N trials with other seeds, twice the record, other units, another order of the library.
     #[arg(long, value_name = "N", default_value_t = 0)]
     steadiness: usize,
@@ -85,6 +89,7 @@ impl Verb for Withheld {
             without: self.without,
             validation: self.validation,
             detection_only: self.detection_only,
+            ablated: self.ablate.clone(),
             steadiness: self.steadiness,
         };
         let sealed = trials::Withheld::new(&study, settings)?.seal(&self.out, context.progress)?;
@@ -116,6 +121,18 @@ impl Verb for Withheld {
 /// Parses a half of the families.
 fn families(text: &str) -> Result<Families, String> {
     text.parse()
+}
+
+/// Parses a part of a diagnosis.
+fn ablation(text: &str) -> Result<Ablation, String> {
+    let known = Ablation::ALL.map(Ablation::id);
+    (Ablation::ALL.into_iter().find(|part| part.id() == text)).ok_or_else(|| {
+        let near = did_you_mean(text, known);
+        format!(
+            "no part is called {text}{near}; there are {}",
+            known.join(", ")
+        )
+    })
 }
 
 /// Parses a kind of truth.

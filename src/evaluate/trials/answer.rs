@@ -21,6 +21,8 @@ pub(crate) struct Answer {
     pub seconds: f64,
     /// Place of the largest residual correlation, if it stands out.
     pub correlated: Option<String>,
+    /// Effects that forward selection by BIC adds; none of a black box, whose selection would cost as much as its diagnosis.
+    pub greedy: Option<Vec<String>>,
     /// Answers to the same question, asked otherwise.
     pub repeats: Vec<Repeat>,
 }
@@ -114,6 +116,7 @@ impl Answer {
             failure,
             seconds,
             correlated: None,
+            greedy: None,
             repeats: vec![],
         })
     }

@@ -77,6 +77,7 @@ pub(crate) struct Row {
     pub failure: Option<String>,
     pub seconds: f64,
     pub correlated: Option<String>,
+    pub greedy: Option<Vec<String>>,
     pub repeats: Vec<Repeat>,
 }
 
@@ -112,6 +113,7 @@ impl Row {
             failure: answer.failure.clone(),
             seconds: answer.seconds,
             correlated: answer.correlated.clone(),
+            greedy: answer.greedy.clone(),
             repeats: answer.repeats.clone(),
         }
     }

@@ -10,7 +10,7 @@ use super::score::Setup;
 use super::steadiness::repeats;
 use super::truth::{Drawn, Extra, TruthSampler};
 use super::{Families, Kind, Scorecard};
-use crate::diagnose::DiagnoseSettings;
+use crate::diagnose::{Ablation, DiagnoseError, DiagnoseSettings, greedy};
 use crate::evaluate::EvaluateError;
 use crate::likelihood::kalman::recoverable;
 use crate::progress::Progress;
@@ -26,7 +26,7 @@ use serde_json::json;
 use std::path::Path;
 
 /// Layout of the folder; raised when it changes.
-const LAYOUT: u32 = 5;
+const LAYOUT: u32 = 6;
 /// Most trials of a folder; their keys are in memory.
 const MOST: usize = 1_000_000;
 /// Trials that are drawn before their records are written.
@@ -44,6 +44,7 @@ const PART: usize = 64;
 /// | `without` | no | whether the true effects are taken out of the library: then every trial with one must abstain |
 /// | `validation` | no | whether each trial has a second record |
 /// | `detection_only` | no | whether a diagnosis ends with its verdict: for false alarms over many trials |
+/// | `ablated` | none | parts taken out of the diagnosis, to measure what they are worth |
 /// | `steadiness` | 0 | first trials whose diagnosis is repeated with other seeds, a doubled record, other units, another order of the library |
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
@@ -63,6 +64,8 @@ pub struct Settings {
     pub validation: bool,
     /// True if a diagnosis ends with its verdict.
     pub detection_only: bool,
+    /// Parts taken out of the diagnosis.
+    pub ablated: Vec<Ablation>,
     /// Number of first trials whose diagnosis is repeated.
     pub steadiness: usize,
 }
@@ -78,6 +81,7 @@ impl Default for Settings {
             without: false,
             validation: false,
             detection_only: false,
+            ablated: vec![],
             steadiness: 0,
         }
     }
@@ -203,6 +207,7 @@ impl<'a> Withheld<'a> {
             .with("like", like)
             .with("validation", settings.validation)
             .with("detection_only", settings.detection_only)
+            .with("ablated", json!(settings.ablated))
             .with("steadiness", settings.steadiness))
     }
 }
@@ -246,6 +251,7 @@ impl Sealed<'_> {
             validation: settings.validation,
             like: settings.like.is_some(),
             detection_only: settings.detection_only,
+            ablated: settings.ablated.clone(),
             seal: self.seal().into(),
         };
         Ok(Scorecard::new(setup, rows))
@@ -286,6 +292,12 @@ impl Sealed<'_> {
         let mut answer = Answer::of(trial, study, given, &settings, progress)?;
         // A baseline that fails says nothing.
         answer.correlated = recoverable(correlated(study, &record))?.flatten();
+        if study.twin().equations().is_some() {
+            answer.greedy = match greedy(study, &record, &settings.without) {
+                Err(error @ DiagnoseError::Cancelled(_)) => return Err(error.into()),
+                selected => selected.ok(),
+            };
+        }
         if trial < own.steadiness {
             let is_even = (own.like.as_ref()).is_none_or(|like| like.drive().is_uniform());
             let doubled = (is_even)
@@ -333,6 +345,7 @@ impl Sealed<'_> {
             seed: noise.seed().unwrap_or_default(),
             without: without.into_iter().map(Into::into).collect(),
             detection_only: self.trials.settings.detection_only,
+            ablated: self.trials.settings.ablated.clone(),
             ..DiagnoseSettings::default()
         }
     }

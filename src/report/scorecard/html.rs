@@ -39,12 +39,13 @@ fn lead(card: &Scorecard) -> String {
     );
     let setup = &card.setup;
     format!(
-        "<p class=\"verdict\">{}</p>\n<p>{} trials, seed {}, random laws of {} families. Truths were sealed before the first \
+        "<p class=\"verdict\">{}</p>\n<p>{} trials, seed {}, random laws of {} families{}. Truths were sealed before the first \
          diagnosis: sha256 of the key file <code>{}</code>.</p>\n",
         escaped(&verdict),
         card.trials,
         setup.seed,
         setup.families,
+        setup.taken_out(),
         escaped(&setup.seal)
     )
 }

@@ -8,8 +8,13 @@ use crate::report::table::table;
 pub fn scorecard_text(card: &Scorecard) -> String {
     let setup = &card.setup;
     let head = format!(
-        "{}: {} withheld trials, seed {}, families {}; keys sealed as sha256 {}\n\n",
-        setup.twin, card.trials, setup.seed, setup.families, setup.seal
+        "{}: {} withheld trials, seed {}, families {}{}; keys sealed as sha256 {}\n\n",
+        setup.twin,
+        card.trials,
+        setup.seed,
+        setup.families,
+        setup.taken_out(),
+        setup.seal
     );
     let mut scores = vec![cells(&["", "count", "of", "95 % interval"])];
     scores.extend((named_scores(card).into_iter()).map(|(name, score)| line(&name, score)));

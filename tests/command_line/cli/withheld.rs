@@ -31,6 +31,11 @@ fn a_few_sealed_trials_are_scored_kept_and_refused_to_another_call() {
         call.iter().map(String::as_str).collect()
     }
     let (first, other) = (call("5"), call("6"));
+    let mistyped = [&words(&first)[..], &["--ablate", "evidense"]].concat();
+    refused(
+        &mistyped,
+        &["no part is called evidense (did you mean \"evidence\"?)"],
+    );
     let text = done(&words(&first));
     assert!(
         text.contains("2 withheld trials") && text.contains("nothing missing, called structural"),

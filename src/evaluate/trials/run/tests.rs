@@ -170,6 +170,35 @@ fn a_verdict_alone_is_the_verdict_of_the_whole() {
     assert_eq!(whole.rows[0].information, alone.rows[0].information);
 }
 
+/// The parts that are taken out change the answer and its statement, not the trial.
+#[test]
+fn a_diagnosis_with_parts_taken_out_is_another() {
+    let study = oscillator();
+    let place = tempfile::tempdir().unwrap();
+    let card = |ablated: &[Ablation], name: &str| {
+        let settings = Settings {
+            trials: 1,
+            kinds: vec![Kind::Listed],
+            ablated: ablated.to_vec(),
+            ..Settings::default()
+        };
+        let sealed = sealed(&study, settings, &place.path().join(name)).unwrap();
+        sealed.score(&Progress::silent()).unwrap()
+    };
+    let whole = card(&[], "whole");
+    assert!(whole.rows[0].greedy.is_some() && whole.setup.taken_out().is_empty());
+    let probability = |card: &Scorecard| {
+        let outcome = card.rows[0].outcome.clone().unwrap();
+        outcome.effects[0].probability
+    };
+    for part in Ablation::ALL {
+        let without = card(&[part], part.id());
+        assert_eq!(without.rows[0].information, whole.rows[0].information);
+        assert!(without.setup.taken_out().ends_with(part.id()));
+        assert_ne!(probability(&without), probability(&whole), "{}", part.id());
+    }
+}
+
 /// Every change of the question is asked, and counted.
 #[test]
 fn steadiness_asks_every_question_again() {

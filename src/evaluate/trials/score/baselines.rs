@@ -43,6 +43,7 @@ pub(super) fn baselines(rows: &[Row]) -> Vec<Baseline> {
         let place = row.correlated.as_ref();
         place.is_some_and(|place| row.targets.contains(place))
     };
+    let selected = |row: &Row| row.greedy.as_deref().unwrap_or_default();
     vec![
         Baseline {
             name: "diagnosis",
@@ -55,6 +56,14 @@ pub(super) fn baselines(rows: &[Row]) -> Vec<Baseline> {
             verdict: over(&|row| row.correlated.is_some() != row.is_null()),
             right: over(&|row| is_right(row.fate_of(row.correlated.is_some(), &[], || false))),
             place: Some(gaps(&correlated)),
+        },
+        Baseline {
+            name: "forward selection by BIC, declared noise",
+            verdict: over(&|row| selected(row).is_empty() == row.is_null()),
+            right: over(&|row| {
+                is_right(row.fate_of(!selected(row).is_empty(), selected(row), || false))
+            }),
+            place: None,
         },
         constant("always no gap", false, &[]),
         constant("always the most frequent truth", is_gap, &accepted),

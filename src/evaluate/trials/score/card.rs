@@ -7,6 +7,7 @@ use super::said::{
     Coverage, Precision, Probabilities, Reliability, coverage, mean, precision, probabilities,
     reliability,
 };
+use crate::diagnose::Ablation;
 use crate::evaluate::trials::row::{Fate, Row};
 use crate::evaluate::trials::{Families, Kind};
 use serde::Serialize;
@@ -62,8 +63,21 @@ pub(crate) struct Setup {
     pub like: bool,
     /// True if each diagnosis ended with its verdict: nothing is named then.
     pub detection_only: bool,
+    /// Parts taken out of the diagnosis.
+    pub ablated: Vec<Ablation>,
     /// SHA-256 of the key file.
     pub seal: String,
+}
+
+impl Setup {
+    /// Parts that the diagnosis does without, as a sentence goes on; empty where it has all.
+    pub fn taken_out(&self) -> String {
+        let parts: Vec<&str> = self.ablated.iter().map(|part| part.id()).collect();
+        match parts.is_empty() {
+            true => String::new(),
+            false => format!(", diagnosed without {}", parts.join(", ")),
+        }
+    }
 }
 
 /// All scores; docs/withheld.md defines each.

@@ -54,6 +54,7 @@ fn row(kind: Kind, truth: &[&str], accepted: &[&str], probability: f64) -> Row {
         failure: None,
         seconds: 2.0,
         correlated: None,
+        greedy: None,
         repeats: vec![],
     }
 }
@@ -75,6 +76,7 @@ fn card(rows: Vec<Row>) -> Scorecard {
         validation: false,
         like: false,
         detection_only: false,
+        ablated: vec![],
         seal: "seal".into(),
     };
     Scorecard::new(setup, rows)

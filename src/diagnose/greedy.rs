@@ -1,0 +1,74 @@
+//! Forward selection by BIC, noise levels as declared: what a diagnosis is to be held against.
+
+use super::base::Base;
+use super::error::DiagnoseError;
+use super::explain::search::{Breadth, listed};
+use super::settings::{Ablation, DiagnoseSettings};
+use crate::effect::EffectPattern;
+use crate::likelihood::measured;
+use crate::record::Record;
+use crate::study::Study;
+
+/// Most effects that are selected.
+const MOST: usize = 3;
+
+/// Adds the listed effect that raises BIC most, one after the other, while one does; returns their keys.
+pub(crate) fn greedy(
+    study: &Study,
+    record: &Record,
+    without: &[EffectPattern],
+) -> Result<Vec<String>, DiagnoseError> {
+    let settings = DiagnoseSettings {
+        without: without.to_vec(),
+        ablated: Ablation::ALL.to_vec(),
+        quick: true,
+        ..DiagnoseSettings::default()
+    };
+    let records = std::slice::from_ref(record);
+    let measured = measured(study.twin(), records, &settings.beliefs(study))?;
+    let base = Base::new(&measured, records, &settings)?;
+    let mut terms = base.listed(study, &settings)?;
+    let mut model = base.model.clone();
+    let breadth = Breadth::of(&model, settings.quick);
+    let mut keys = vec![];
+    while keys.len() < MOST {
+        let found = listed(&model, &terms, model.log_evidence, &[], breadth)?;
+        let best = (found.into_iter().next()).filter(|best| best.gain > 0.0);
+        let Some((key, better)) = best.and_then(|best| Some((best.last().key(), best.model?)))
+        else {
+            break;
+        };
+        terms.retain(|term| term.key() != key);
+        keys.push(key);
+        model = better;
+    }
+    Ok(keys)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::{Catalogue, augment};
+    use crate::study::RecordPlan;
+    use crate::twin::Noise;
+    use crate::twins::CascadedTanks;
+
+    /// A bias that is plain is selected first, nothing on a record of the twin itself.
+    #[test]
+    fn a_plain_effect_is_selected() {
+        let plan = RecordPlan::levels(4.0, 200, 0.5, 3.0, 20);
+        let study = Study::new("tanks", CascadedTanks, plan).unwrap();
+        let bias = Catalogue::default().effect("sensor-bias", "sensor");
+        let twin = augment(study.twin().clone(), vec![bias.unwrap()]).unwrap();
+        let drives = study.drives().unwrap();
+        let selected = |bias: f64| {
+            let drive = drives.draw(Noise::new(5, "drive", 0)).unwrap();
+            let theta = [study.twin().parameters().centre(), vec![bias]].concat();
+            let outputs = twin.simulate(&theta, &drive, Noise::new(5, "record", 0));
+            let record = Record::new(drive, outputs.unwrap()).unwrap();
+            greedy(&study, &record, &[]).unwrap()
+        };
+        assert_eq!(selected(0.0), Vec::<String>::new());
+        assert_eq!(selected(3.0)[0], "sensor-bias@sensor");
+    }
+}
