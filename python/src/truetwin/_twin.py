@@ -167,6 +167,7 @@ class Twin:
         *,
         calibrate: int = 0,
         quick: bool = False,
+        step_of_record: bool = False,
         columns: Mapping[str, str] | None = None,
         seed: int = 1,
         out: Path_ | None = None,
@@ -188,6 +189,8 @@ class Twin:
             Number of records of the fitted twin that are diagnosed alike, for a p-value.
         quick : bool, optional
             Try effects one at a time, from few starts, without pairs, smallest visible effects or next input.
+        step_of_record : bool, optional
+            Take records whose step is not the twin's: the twin then steps as they do.
         columns, seed, out
             As for `fit`.
 
@@ -198,7 +201,7 @@ class Twin:
         with _Call(self) as call:
             files = call.records(records, columns)
             options = [*call.subject(), *call.columns(columns), "--calibrate", str(calibrate)]
-            options += ["--quick"] * quick
+            options += ["--quick"] * quick + ["--step-of-record"] * step_of_record
             if validation is not None:
                 options += ["--validation", *call.records(validation, columns)]
             excluded = [without] if isinstance(without, str) else list(without or ())

@@ -10,6 +10,7 @@ use crate::effect::EffectPattern;
 use crate::estimator::Estimator;
 use crate::record::{Record, drive_csv_text};
 use crate::report::{NEXT_INPUT, Report};
+use crate::setting::number;
 use crate::study::Study;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -47,6 +48,9 @@ pub(in crate::cli) struct Diagnose {
     /// Effects to exclude.
     #[arg(long, value_name = "ID[@TARGET],..", value_delimiter = ',')]
     without: Vec<EffectPattern>,
+    /// Take records whose step is not the study's: the twin then steps as they do, and declared process noise is scaled to that step.
+    #[arg(long)]
+    step_of_record: bool,
     /// New folder for report.json, report.html and next-input.csv.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -64,6 +68,7 @@ impl Verb for Diagnose {
         let reader = self.columns.reader(&study);
         let (records, validation) =
             records::read(reader, &self.records, self.validation.as_deref())?;
+        self.check_step(&study, &records[0])?;
         let initial = match &self.estimator {
             Some(path) => Some(first_estimate(context, &study, path, &records[0])?),
             None => None,
@@ -114,6 +119,30 @@ impl Verb for Diagnose {
         }
         provenance.print(context, &json, || found.text(&study))?;
         Ok(ExitCode::SUCCESS)
+    }
+}
+
+impl Diagnose {
+    /// Checks that the first record has the study's step, as all others then must: equations that hold for one step may lack something with
+    /// another.
+    fn check_step(&self, study: &Study, record: &Record) -> Result<(), Failure> {
+        let plan = study.plan();
+        let other_twin = record.check_channels(&study.twin().signals()).is_err();
+        if other_twin || plan.check_step(record).is_ok() {
+            return Ok(());
+        }
+        let (given, expected) = (number(record.drive().dt()), number(plan.step));
+        if self.step_of_record {
+            output::say(&format!(
+                "the twin steps {given} s, as the record does, in place of the study's {expected} s; its process noise is scaled to that"
+            ));
+            return Ok(());
+        }
+        let refused = Failure::user(format!(
+            "the record's step is {given} s, the study's {expected} s; give --step-of-record, and the twin steps as the record does, or set \
+             [record] step = {given} in a study file"
+        ));
+        Err(refused.within(&self.records[0]))
     }
 }
 

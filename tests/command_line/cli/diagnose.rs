@@ -151,6 +151,10 @@ fn wrong_calls_are_refused_in_one_line_that_names_what_and_where() {
         &["slow.csv: the validation record", remedy],
     );
     refuses(&[&record, &slow], &["slow.csv: record 2", remedy]);
+    refuses(
+        &[&slow],
+        &["slow.csv: the record's step is 0.1 s", "--step-of-record"],
+    );
     let brief = oscillation("brief.csv", 3, 0.05);
     refuses(
         &[&brief],
