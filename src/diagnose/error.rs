@@ -6,7 +6,6 @@ use crate::progress::Cancelled;
 use crate::record::RecordError;
 use crate::setting::{SettingError, number};
 use crate::twin::{SimulationError, TwinError};
-use std::fmt;
 
 /// Reasons for a diagnosis to fail.
 #[derive(Debug, thiserror::Error)]
@@ -16,20 +15,20 @@ pub enum DiagnoseError {
     #[error("no record given; pass at least one")]
     NoRecord,
     /// Records of different steps.
-    #[error("{record} has a step of {} s, the first record {} s; resample it", number(*given), number(*expected))]
+    #[error("{} has a step of {} s, the first record {} s; resample it", of(*record), number(*given), number(*expected))]
     Steps {
-        /// The record.
-        record: GivenRecord,
+        /// Index among the measured records, from 0; none for the validation record.
+        record: Option<usize>,
         /// Step of the record, in seconds.
         given: f64,
         /// Step of the first record.
         expected: f64,
     },
     /// A record that is too short.
-    #[error("{record} has {samples} samples; at least {least} are needed, measure longer")]
+    #[error("{} has {samples} samples; at least {least} are needed, measure longer", of(*record))]
     TooShort {
-        /// The record.
-        record: GivenRecord,
+        /// Index among the measured records, from 0; none for the validation record.
+        record: Option<usize>,
         /// Number of samples.
         samples: usize,
         /// Least number of samples.
@@ -52,10 +51,10 @@ pub enum DiagnoseError {
     )]
     NoSimulation,
     /// A record with channels or steps that the twin cannot have.
-    #[error("{record} does not fit the twin: {error}")]
+    #[error("{} does not fit the twin: {error}", of(*record))]
     Channels {
-        /// The record.
-        record: GivenRecord,
+        /// Index among the measured records, from 0; none for the validation record.
+        record: Option<usize>,
         /// The error.
         error: RecordError,
     },
@@ -79,34 +78,29 @@ pub enum DiagnoseError {
     Cancelled(#[from] Cancelled),
 }
 
+/// A record, as a message calls it.
+fn of(record: Option<usize>) -> String {
+    record.map_or("the validation record".into(), |index| {
+        format!("record {}", index + 1)
+    })
+}
+
 impl DiagnoseError {
-    /// Returns the record that caused the error, if one did.
-    pub fn record(&self) -> Option<GivenRecord> {
+    /// Returns what stands for the record that caused the error among what stands for all of them, if one did.
+    pub(crate) fn culprit<'a, R>(
+        &self,
+        records: &'a [R],
+        validation: Option<&'a R>,
+    ) -> Option<&'a R> {
         match self {
             Self::Steps { record, .. }
             | Self::TooShort { record, .. }
-            | Self::Channels { record, .. } => Some(*record),
-            Self::NoFit | Self::NoSimulation => Some(GivenRecord::Measured(0)),
+            | Self::Channels { record, .. } => match record {
+                Some(index) => records.get(*index),
+                None => validation,
+            },
+            Self::NoFit | Self::NoSimulation => records.first(),
             _ => None,
-        }
-    }
-}
-
-/// A record given to a diagnosis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum GivenRecord {
-    /// Index among the measured records, from 0.
-    Measured(usize),
-    /// The validation record.
-    Validation,
-}
-
-impl fmt::Display for GivenRecord {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Measured(index) => write!(f, "record {}", index + 1),
-            Self::Validation => f.write_str("the validation record"),
         }
     }
 }

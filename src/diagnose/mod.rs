@@ -34,7 +34,7 @@ mod step;
 mod summary;
 mod thresholds;
 
-pub use error::{DiagnoseError, GivenRecord};
+pub use error::DiagnoseError;
 pub(crate) use greedy::greedy;
 pub(crate) use outcome::Cell;
 pub use outcome::{

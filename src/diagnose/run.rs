@@ -1,7 +1,7 @@
 //! Entry of a diagnosis, and the order of its steps.
 
 use super::base::{left_the_prior, verdict};
-use super::error::{DiagnoseError, GivenRecord};
+use super::error::DiagnoseError;
 use super::explain::decide::{Chances, Conclusion, Findings, decide};
 use super::explain::explore::absorbing;
 use super::locate::discover::discover;
@@ -325,9 +325,8 @@ fn check(
 ) -> Result<(), DiagnoseError> {
     let first = records.first().ok_or(DiagnoseError::NoRecord)?;
     let expected = first.drive().dt();
-    let measured =
-        (records.iter().enumerate()).map(|(i, record)| (GivenRecord::Measured(i), record));
-    let validation = validation.map(|record| (GivenRecord::Validation, record));
+    let measured = (records.iter().enumerate()).map(|(i, record)| (Some(i), record));
+    let validation = validation.map(|record| (None, record));
     for (which, record) in measured.chain(validation) {
         (record.check_channels(&study.twin().signals()))
             .and_then(|()| study.twin().check_drive(record.drive()))

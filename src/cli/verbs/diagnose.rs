@@ -5,7 +5,7 @@ use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::provenance::Provenance;
 use crate::cli::{output, records};
-use crate::diagnose::{DiagnoseSettings, GivenRecord, diagnose};
+use crate::diagnose::{DiagnoseSettings, diagnose};
 use crate::effect::EffectPattern;
 use crate::estimator::Estimator;
 use crate::record::{Record, drive_csv_text};
@@ -89,11 +89,7 @@ impl Verb for Diagnose {
             context.progress,
         )
         .map_err(|error| {
-            let path = match error.record() {
-                Some(GivenRecord::Validation) => self.validation.as_ref(),
-                Some(GivenRecord::Measured(index)) => self.records.get(index),
-                None => None,
-            };
+            let path = error.culprit(&self.records, self.validation.as_ref());
             let failure = Failure::from(error);
             match path {
                 Some(path) => failure.within(path),
