@@ -87,7 +87,7 @@ fn the_cascaded_tanks_are_followed_on_a_record_never_seen() {
 
 /// These tanks overflow at the upper one, which the twin lacks. The share that closes is on a record that no fit has seen.
 ///
-/// With `TRUETWIN_PICTURES=docs/pictures` the picture of docs/diagnosing-a-gap.md is drawn anew.
+/// With `TRUETWIN_PICTURES=docs/pictures` the picture of docs/real-records.md is drawn anew.
 #[test]
 fn the_cascaded_tanks_lack_their_overflow() {
     let Some((record, validation)) = tanks_records() else {

@@ -1,6 +1,6 @@
 //! Studies over many records, and the paper's settings of the reference twins.
 //!
-//! The verb `reproduce` runs them ([docs/reproducing.md](../../../../../docs/reproducing.md)). An embedding crate takes the twins:
+//! The verb `reproduce` runs them ([docs/benchmarks.md](../../../../../docs/benchmarks.md)). An embedding crate takes the twins:
 //!
 //! ```
 //! use truetwin::evaluate::paper::reference_studies;

@@ -292,12 +292,10 @@ impl Sealed<'_> {
         let mut answer = Answer::of(trial, study, given, &settings, progress)?;
         // A baseline that fails says nothing.
         answer.correlated = recoverable(correlated(study, &record))?.flatten();
-        if study.twin().equations().is_some() {
-            answer.greedy = match greedy(study, &record, &settings.without) {
-                Err(error @ DiagnoseError::Cancelled(_)) => return Err(error.into()),
-                selected => selected.ok(),
-            };
-        }
+        answer.greedy = match greedy(study, &record, &settings.without) {
+            Err(error @ DiagnoseError::Cancelled(_)) => return Err(error.into()),
+            selected => selected.ok().flatten(),
+        };
         if trial < own.steadiness {
             let is_even = (own.like.as_ref()).is_none_or(|like| like.drive().is_uniform());
             let doubled = (is_even)

@@ -1,4 +1,4 @@
-//! Files are data: they run nothing, lead nowhere, and steer no terminal (docs/security.md).
+//! Files are data: they run nothing, lead nowhere, and steer no terminal (docs/reliability.md).
 
 mod folders;
 mod programs;
