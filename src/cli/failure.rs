@@ -9,6 +9,7 @@ use crate::feature::FeatureError;
 use crate::network::NetworkError;
 use crate::record::RecordError;
 use crate::storage::StorageError;
+use crate::storage::untrusted::one_line;
 use crate::storage::work::Ranks;
 use crate::study::StudyError;
 use crate::twin::{SimulationError, TwinError};
@@ -16,6 +17,8 @@ use std::fmt::Display;
 use std::path::Path;
 use std::process::ExitCode;
 
+/// Most characters of a message: it may quote what was given.
+const LONGEST: usize = 2000;
 /// Exit code of a wrong call or file.
 const USER: u8 = 2;
 /// Exit code of everything else.
@@ -96,7 +99,14 @@ impl Failure {
     /// Adds the name of the file unless the message has it.
     pub fn within(mut self, path: &Path) -> Self {
         let name = path.display().to_string();
-        if !self.message.contains(&name) {
+        // A remedy may name a file of the same name, a column may have it.
+        let begins = [":", ","].map(|end| format!("{name}{end}"));
+        let is_path = name.contains(['.', '/']);
+        let named = (begins.iter()).any(|begin| {
+            self.message.starts_with(begin)
+                || is_path && self.message.contains(&format!(" {begin}"))
+        });
+        if !named {
             self.message = format!("{name}: {}", self.message);
         }
         self
@@ -118,12 +128,7 @@ impl Failure {
 
     /// Prints the line and gives the exit code.
     pub fn report(self) -> ExitCode {
-        let line = self
-            .message
-            .split_whitespace()
-            .collect::<Vec<_>>()
-            .join(" ");
-        say(&format!("error: {line}"));
+        say(&format!("error: {}", one_line(&self.message, LONGEST)));
         ExitCode::from(self.code)
     }
 }

@@ -23,6 +23,7 @@ pub(super) fn read(
     let measured = || paths.iter().map(PathBuf::as_path).zip(&records);
     for (j, (path, record)) in measured().enumerate() {
         warn_of_outlier(path, record);
+        warn_of_still(path, record);
         if let Some((first, _)) = measured().take(j).find(|(_, other)| *other == record) {
             warn(&format!(
                 "{} and {} hold the same record, which now counts twice; give each once",
@@ -48,6 +49,42 @@ fn warn(text: &str) {
     output::say(&format!("warning: {text}"));
 }
 
+/// Warns of channels that never change.
+fn warn_of_still(path: &Path, record: &Record) {
+    let channels = [
+        (
+            "u",
+            record.drive().inputs(),
+            "what acts through it cannot be told from a constant",
+        ),
+        (
+            "y",
+            record.outputs(),
+            "a sensor that is stuck tells nothing of the twin",
+        ),
+    ];
+    for (letter, signal, meaning) in channels {
+        for (j, channel) in signal.columns().into_iter().enumerate() {
+            let mut there = channel.iter().filter(|value| !value.is_nan());
+            if there.next().is_some_and(|first| there.all(|v| v == first)) {
+                warn(&format!(
+                    "{}: {} never changes; {meaning}",
+                    path.display(),
+                    column(letter, signal.ncols(), j)
+                ));
+            }
+        }
+    }
+}
+
+/// Name of the column of channel `j` of `count`.
+fn column(letter: &str, count: usize, j: usize) -> String {
+    match count {
+        1 => letter.into(),
+        _ => format!("{letter}{}", j + 1),
+    }
+}
+
 /// Warns of the largest value of a record if it is far beyond the others of its channel.
 fn warn_of_outlier(path: &Path, record: &Record) {
     let signals = [("u", record.drive().inputs()), ("y", record.outputs())];
@@ -62,15 +99,11 @@ fn warn_of_outlier(path: &Path, record: &Record) {
                 continue;
             }
             let sample = channel.iter().position(|value| value.abs() == largest);
-            let number = if signal.ncols() > 1 {
-                format!("{}", j + 1)
-            } else {
-                String::new()
-            };
             warn(&format!(
-                "{}, row {}, column {letter}{number}: {:?} is an outlier, 95 % of the column lie within ±{usual:?}; correct it if it is a mistake",
+                "{}, row {}, column {}: {:?} is an outlier, 95 % of the column lie within ±{usual:?}; correct it if it is a mistake",
                 path.display(),
                 sample.unwrap_or_default() + 2,
+                column(letter, signal.ncols(), j),
                 sample.map_or(largest, |k| channel[k]),
             ));
         }

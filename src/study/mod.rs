@@ -7,6 +7,7 @@ mod lines;
 mod manifest;
 mod plan;
 mod prior;
+mod shapes;
 mod suitability;
 
 pub use error::StudyError;
@@ -166,13 +167,15 @@ impl Study {
             input,
             ..
         } = file.record.clone();
+        let plan = RecordPlan {
+            step: step.unwrap_or(self.plan.step),
+            samples: samples.unwrap_or(self.plan.samples),
+            input: input.or_else(|| self.plan.input.clone()),
+        };
+        plan.check(&twin.signals())?;
         Ok(Self {
             twin,
-            plan: RecordPlan {
-                step: step.unwrap_or(self.plan.step),
-                samples: samples.unwrap_or(self.plan.samples),
-                input: input.or_else(|| self.plan.input.clone()),
-            },
+            plan,
             file: file.clone(),
             ..self.clone()
         })

@@ -1,5 +1,6 @@
 //! Plan of simulated records: step, length, input.
 
+use crate::math::six_digits;
 use crate::record::{Drive, Record, RecordError, Signal, Signals};
 use crate::setting::number;
 use crate::storage::untrusted::MOST_NUMBERS;
@@ -75,27 +76,46 @@ impl RecordPlan {
         }
     }
 
-    /// Makes ready what drives are drawn from; reads the input file, if one is named.
-    pub fn prepare(&self, signals: &Signals) -> Result<DriveSource, StudyError> {
+    /// Checks step, length and levels; a file of inputs is not read.
+    pub(super) fn check(&self, signals: &Signals) -> Result<(), StudyError> {
         let channels = signals.inputs.len();
         let all = channels + signals.outputs.len();
-        let fixed = match &self.input {
+        if self.samples > MOST_SAMPLES {
+            return Err(StudyError::Plan(format!(
+                "[record] samples = {}; at most {MOST_SAMPLES} can be simulated: take a larger step or a shorter record",
+                self.samples
+            )));
+        }
+        if self.samples.saturating_mul(all) > MOST_NUMBERS {
+            return Err(StudyError::Plan(format!(
+                "[record] samples = {} for {all} inputs and outputs; at most {MOST_NUMBERS} numbers can be simulated: take a shorter record",
+                self.samples
+            )));
+        }
+        let levels = match &self.input {
             Some(_) if channels == 0 => {
                 let problem = "[record] input is given, but the twin has no input; remove it";
                 return Err(StudyError::Plan(problem.into()));
             }
-            _ if self.samples > MOST_SAMPLES => {
-                return Err(StudyError::Plan(format!(
-                    "[record] samples = {}; at most {MOST_SAMPLES} can be simulated: take a larger step or a shorter record",
-                    self.samples
-                )));
+            Some(InputPlan::Levels(Levels { hold: 0, .. })) => {
+                let problem = "[record] hold = 0; a level is held for at least 1 sample";
+                return Err(StudyError::Plan(problem.into()));
             }
-            _ if self.samples.saturating_mul(all) > MOST_NUMBERS => {
-                return Err(StudyError::Plan(format!(
-                    "[record] samples = {} for {all} inputs and outputs; at most {MOST_NUMBERS} numbers can be simulated: take a shorter record",
-                    self.samples
-                )));
-            }
+            Some(InputPlan::Levels(Levels { levels, .. })) => [levels.low(), levels.high()],
+            Some(InputPlan::File(_)) | None => [0.0; 2],
+        };
+        // The ends of the levels, one after the other, are what any drive is drawn between.
+        let samples = self.samples.min(levels.len());
+        let ends = Signal::from_shape_fn((samples, 1), |(k, _)| levels[k]);
+        Drive::new(self.step, ends)?;
+        Ok(())
+    }
+
+    /// Makes ready what drives are drawn from; reads the input file, if one is named.
+    pub fn prepare(&self, signals: &Signals) -> Result<DriveSource, StudyError> {
+        self.check(signals)?;
+        let channels = signals.inputs.len();
+        let fixed = match &self.input {
             None if channels == 0 => Some(Drive::autonomous(self.step, self.samples)?),
             None => {
                 return Err(StudyError::Plan(format!(
@@ -103,16 +123,7 @@ impl RecordPlan {
                 )));
             }
             Some(InputPlan::File(path)) => Some(self.read(path, channels)?),
-            Some(InputPlan::Levels(Levels { levels, hold })) => {
-                if *hold == 0 {
-                    let problem = "[record] hold = 0; a level is held for at least 1 sample";
-                    return Err(StudyError::Plan(problem.into()));
-                }
-                // Step and ends are checked here, once, so that drawing cannot fail; one sample shows it.
-                let samples = self.samples.min(1);
-                Drive::new(self.step, Signal::from_elem((samples, 1), levels.centre()))?;
-                None
-            }
+            Some(InputPlan::Levels(_)) => None,
         };
         Ok(DriveSource {
             plan: self.clone(),
@@ -143,7 +154,7 @@ impl RecordPlan {
     pub fn check_step(&self, record: &Record) -> Result<(), StudyError> {
         let (given, expected) = (record.drive().dt(), self.step);
         if (given - expected).abs() > 1e-3 * expected {
-            let (given, expected) = (number(given), number(expected));
+            let (given, expected) = (number(six_digits(given)), number(expected));
             return Err(StudyError::Plan(format!(
                 "the record's step is {given} s, the study's {expected} s; resample the record (`truetwin resample R.csv --step {expected} --out R2.csv`), or set [record] step = {given} in a study file and pretrain again"
             )));

@@ -8,6 +8,7 @@ use crate::cli::{output, records};
 use crate::diagnose::{DiagnoseSettings, diagnose};
 use crate::effect::EffectPattern;
 use crate::estimator::Estimator;
+use crate::math::six_digits;
 use crate::record::{Record, drive_csv_text};
 use crate::report::{NEXT_INPUT, Report};
 use crate::setting::number;
@@ -127,7 +128,7 @@ impl Diagnose {
         if other_twin || plan.check_step(record).is_ok() {
             return Ok(());
         }
-        let (given, expected) = (number(record.drive().dt()), number(plan.step));
+        let (given, expected) = (number(six_digits(record.drive().dt())), number(plan.step));
         if self.step_of_record {
             output::say(&format!(
                 "the twin steps {given} s, as the record does, in place of the study's {expected} s; its process noise is scaled to that"

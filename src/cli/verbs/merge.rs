@@ -25,9 +25,22 @@ pub(in crate::cli) struct Merge {
     out: PathBuf,
 }
 
+/// Endings that nobody gives to a folder.
+const FILES: [&str; 6] = ["csv", "json", "npy", "npz", "parquet", "txt"];
+
 impl Verb for Merge {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         output::check_new(&self.out)?;
+        let ending = self
+            .out
+            .extension()
+            .map(|e| e.to_string_lossy().to_lowercase());
+        if ending.is_some_and(|e| FILES.contains(&e.as_str())) && !file::is_named(&self.out) {
+            return Err(Failure::user(format!(
+                "{}: a file of a bank ends with .npz or .csv; name it so, or a folder without such an ending",
+                self.out.display()
+            )));
+        }
         let out = self.out.display();
         let (what, count) = if file::is_named(&self.out) {
             (

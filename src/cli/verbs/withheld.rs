@@ -129,7 +129,7 @@ fn ablation(text: &str) -> Result<Ablation, String> {
     (Ablation::ALL.into_iter().find(|part| part.id() == text)).ok_or_else(|| {
         let near = did_you_mean(text, known);
         format!(
-            "no part is called {text}{near}; there are {}",
+            "no part is called \"{text}\"{near}; there are {}",
             known.join(", ")
         )
     })
@@ -141,7 +141,7 @@ fn kind(text: &str) -> Result<Kind, String> {
     Kind::named(text).ok_or_else(|| {
         let near = did_you_mean(text, known);
         format!(
-            "no kind is called {text}{near}; there are {}",
+            "no kind is called \"{text}\"{near}; there are {}",
             known.join(", ")
         )
     })

@@ -14,7 +14,7 @@ const NAMED: usize = 10;
 
 /// Puts the shards of several folders of one call together in a folder of their own; returns how many there are.
 ///
-/// Every shard is read and checked. Nothing is written before all are known to be there.
+/// Every shard is read and checked. Nothing is written before all are known to be there; `out` goes where one of them is not what it was.
 ///
 /// # Errors
 ///
@@ -26,17 +26,25 @@ pub fn merge(from: &[PathBuf], out: &Path, progress: &Progress) -> Result<usize,
     };
     let holders = holders(&all, first.of)?;
     let folder = WorkFolder::open::<EstimatorError>(out, first.manifest(), &[SHARDS], |_| Ok(()))?;
-    let merged = Shards::list(folder, first.manifest().clone())?;
-    let stage = progress.stage("merge", holders.len());
-    for (number, holder) in holders.into_iter().enumerate() {
-        if !merged.there.contains_key(&number) {
-            merged.add(number, &holder.bytes(number)?)?;
+    let new = folder.clone();
+    let fill = || {
+        let merged = Shards::list(folder, first.manifest().clone())?;
+        let stage = progress.stage("merge", holders.len());
+        for (number, holder) in holders.into_iter().enumerate() {
+            if !merged.there.contains_key(&number) {
+                merged.add(number, &holder.bytes(number)?)?;
+            }
+            stage.tick()?;
         }
-        stage.tick()?;
+        let merged = merged.again()?;
+        merged.finish()?;
+        Ok(merged.of)
+    };
+    let count = fill();
+    if count.is_err() {
+        new.remove()?;
     }
-    let merged = merged.again()?;
-    merged.finish()?;
-    Ok(merged.of)
+    count
 }
 
 /// Puts the shards of several folders, or those of one whole bank, into one `.npz` or `.csv` file; returns the number of rows.

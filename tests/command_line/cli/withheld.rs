@@ -34,7 +34,7 @@ fn a_few_sealed_trials_are_scored_kept_and_refused_to_another_call() {
     let mistyped = [&words(&first)[..], &["--ablate", "evidense"]].concat();
     refused(
         &mistyped,
-        &["no part is called evidense (did you mean \"evidence\"?)"],
+        &["no part is called \"evidense\" (did you mean \"evidence\"?)"],
     );
     let text = done(&words(&first));
     assert!(

@@ -197,9 +197,9 @@ fn counts_have_the_denominators_that_they_name() {
     assert_eq!(card.coverage.delivered, count(2, 2));
     assert_eq!(card.steadiness[0].same, count(1, 2));
     assert_eq!((card.failed, card.redraws), (count(0, 10), 10));
-    let quiet = &card.baselines[2];
+    let quiet = &card.baselines[3];
     assert_eq!((quiet.name, quiet.verdict), ("always no gap", count(2, 9)));
-    let most = &card.baselines[3];
+    let most = &card.baselines[4];
     assert_eq!((most.verdict, most.right), (count(7, 9), count(4, 9)));
     let correlation = &card.baselines[1];
     assert_eq!(correlation.place, Some(count(1, 7)));
