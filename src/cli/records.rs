@@ -23,7 +23,6 @@ pub(super) fn read(
     let measured = || paths.iter().map(PathBuf::as_path).zip(&records);
     for (j, (path, record)) in measured().enumerate() {
         warn_of_outlier(path, record);
-        warn_of_still(path, record);
         if let Some((first, _)) = measured().take(j).find(|(_, other)| *other == record) {
             warn(&format!(
                 "{} and {} hold the same record, which now counts twice; give each once",
@@ -50,7 +49,13 @@ fn warn(text: &str) {
 }
 
 /// Warns of channels that never change.
-fn warn_of_still(path: &Path, record: &Record) {
+pub(super) fn warn_of_still(paths: &[PathBuf], records: &[Record]) {
+    for (path, record) in paths.iter().zip(records) {
+        warn_of_still_channels(path, record);
+    }
+}
+
+fn warn_of_still_channels(path: &Path, record: &Record) {
     let channels = [
         (
             "u",

@@ -1,6 +1,6 @@
 //! `fit` as a user meets it.
 
-use super::{done, json, refused};
+use super::{done, json, refused, truetwin};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -84,4 +84,21 @@ fn a_record_is_fitted_and_bad_calls_are_refused() {
         refused(&["fit", &record, "--study", &study], &parts);
     }
     fs::remove_dir_all(&place).unwrap();
+}
+
+#[test]
+fn an_input_that_never_moves_is_warned_of() {
+    let place = place();
+    let at = |name: &str| place.join(name).display().to_string();
+    let rows: String = (0..200)
+        .map(|k| format!("{},2\n", 0.5 * f64::from(k)))
+        .collect();
+    fs::write(place.join("still-input.csv"), format!("t,u\n{rows}")).unwrap();
+    let (input, record) = (at("still-input.csv"), at("still.csv"));
+    let theta = "k1=0.6,k2=0.5,k3=0.55,k4=1";
+    let simulate = ["simulate", "--twin", "tanks", "--theta", theta];
+    done(&[&simulate[..], &["--input", &input, "--out", &record]].concat());
+    let fitted = truetwin(&["fit", &record, "--twin", "tanks"]);
+    let said = String::from_utf8_lossy(&fitted.stderr);
+    assert!(said.contains("still.csv: u never changes"), "{said}");
 }
