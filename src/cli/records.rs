@@ -3,6 +3,7 @@
 use super::failure::Failure;
 use super::output;
 use crate::record::{Record, RecordReader};
+use crate::study::Study;
 use std::path::{Path, PathBuf};
 
 /// A value is an outlier if it exceeds this multiple of nearly all magnitudes of its channel.
@@ -48,10 +49,13 @@ fn warn(text: &str) {
     output::say(&format!("warning: {text}"));
 }
 
-/// Warns of channels that never change.
-pub(super) fn warn_of_still(paths: &[PathBuf], records: &[Record]) {
+/// Warns of channels that never change, in records that have the channels of the study.
+pub(super) fn warn_of_still(study: &Study, paths: &[PathBuf], records: &[Record]) {
+    let signals = study.twin().signals();
     for (path, record) in paths.iter().zip(records) {
-        warn_of_still_channels(path, record);
+        if record.check_channels(&signals).is_ok() {
+            warn_of_still_channels(path, record);
+        }
     }
 }
 
