@@ -199,7 +199,7 @@ fn report(
         twin: study.name().into(),
         verdict,
         detection,
-        parameters: parameters(last, &base.theta, settings),
+        parameters: parameters(last, &base.theta, settings)?,
         nuisance: nuisance(last, &base.noises)?,
         location: Location {
             onset: accepted.and_then(onset),

@@ -10,9 +10,9 @@ use super::settings::DiagnoseSettings;
 use super::thresholds::Thresholds;
 use crate::fit::Nuisance;
 use crate::fit::follow::starts;
+use crate::fit::spread::Spread;
 use crate::likelihood::kalman::recoverable;
 use crate::twin::{PRIOR_DEVIATION, Role};
-use statrs::distribution::{ContinuousCDF, Normal};
 use std::sync::Arc;
 
 /// Listed effects as they are reported: the accepted ones first, then by probability.
@@ -86,17 +86,18 @@ fn fit_of(model: &Model<'_>, term: &Term, probability: f64, log_evidence: f64) -
     }
 }
 
-/// The twin's own parameters.
+/// The twin's own parameters, with errors and intervals from posterior draws: what a record hardly knows is not normal.
 pub(in crate::diagnose) fn parameters(
     model: &Model<'_>,
     alone: &[f64],
     settings: &DiagnoseSettings,
-) -> Vec<FittedParameter> {
-    let errors = model.fitted.std_errors(&model.problem);
+) -> Result<Vec<FittedParameter>, DiagnoseError> {
+    let noise = settings.noise().child("parameters");
+    let level = Thresholds::INTERVAL_LEVEL;
+    let spread = Spread::drawn(&model.problem, &model.fitted, level, noise)?;
     let theta = model.theta();
-    let reach = Normal::standard().inverse_cdf(0.5 * (1.0 + Thresholds::INTERVAL_LEVEL));
     let space = model.base.parameters();
-    (space.iter().enumerate())
+    let all = (space.iter().enumerate())
         .filter(|(_, p)| p.role == Role::Parameter)
         .map(|(j, p)| FittedParameter {
             name: p.name.clone(),
@@ -104,13 +105,14 @@ pub(in crate::diagnose) fn parameters(
             initial: settings.initial.as_ref().and_then(|i| i.get(j).copied()),
             alone: alone[j],
             refitted: theta[j],
-            std_error: errors[j],
-            interval: [-reach, reach].map(|by| p.bounds.clamp(theta[j] + by * errors[j])),
-            identified: errors[j] < PRIOR_DEVIATION * p.prior.width(),
+            std_error: spread.errors[j],
+            interval: [spread.low[j], spread.high[j]],
+            identified: spread.errors[j] < PRIOR_DEVIATION * p.prior.width(),
             prior: p.prior,
             bounds: p.bounds,
         })
-        .collect()
+        .collect();
+    Ok(all)
 }
 
 /// Noise levels, magnitudes of the study's own effects, and the first states given the records; `noises` are the last parameters.

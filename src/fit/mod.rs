@@ -12,7 +12,7 @@
 //! | `certificate.rs` | has the search arrived, and what lies at a bound |
 //! | `evidence.rs` | the likelihood averaged over the prior |
 //! | `reference.rs` | linear gain of a direction beside θ |
-//! | `posterior.rs`, `draws.rs` | draws of θ given the records, and as a table |
+//! | `posterior.rs`, `draws.rs`, `spread.rs` | draws of θ given the records, as a table, as errors and intervals |
 //! | `least_squares/` | Gauss–Newton on residuals, on argmin |
 
 pub(crate) mod axis;
@@ -32,6 +32,7 @@ pub(crate) mod reference;
 mod run;
 mod score;
 mod slope;
+pub(crate) mod spread;
 pub(crate) mod starts;
 
 pub use certificate::Side;

@@ -13,20 +13,18 @@ use super::outcome::{
 };
 use super::posterior::{Draws, posterior};
 use super::problem::Problem;
+use super::spread::Spread;
 use super::starts::{base_fit, polish, search};
 use crate::effect::Effect;
 use crate::likelihood::kalman::FilterError;
 use crate::likelihood::{Beliefs, Level, measured};
-use crate::math::{deviation, quantile};
+use crate::math::deviation;
 use crate::record::{Record, Signal};
 use crate::twin::{Noise, Role, Twin};
-use statrs::distribution::{ContinuousCDF, Normal};
 use std::time::Instant;
 
 /// Iterations of each search: loud noise has a way to go.
 const ITERATIONS: usize = 80;
-/// Different posterior draws that intervals need: three of them lie beyond an end at 0.9.
-const LEAST_DRAWS: usize = 60;
 
 /// Subject of a fit: a twin in its study's setting.
 pub(crate) struct Subject<'a> {
@@ -149,50 +147,6 @@ fn search_all(
         search(problem, &initial, noise, ITERATIONS)?
     };
     polish(problem, fits, ITERATIONS)
-}
-
-/// Standard errors and intervals of θ of the first record.
-struct Spread {
-    errors: Vec<f64>,
-    low: Vec<f64>,
-    high: Vec<f64>,
-}
-
-impl Spread {
-    /// From posterior draws, where enough of them differ; otherwise first order in φ.
-    fn new(problem: &Problem<'_>, fitted: &Fitted, draws: &[Vec<f64>], level: f64) -> Self {
-        let d = problem.twin.parameters().len();
-        let mut first: Vec<u64> = draws
-            .iter()
-            .map(|theta| theta.iter().map(|v| v.to_bits()).fold(0, u64::wrapping_add))
-            .collect();
-        first.sort_unstable();
-        first.dedup();
-        let column = |j: usize| -> Vec<f64> { draws.iter().map(|theta| theta[j]).collect() };
-        let end = |j: usize, p: f64| quantile(&column(j), p).unwrap_or(f64::NAN);
-        if first.len() >= LEAST_DRAWS {
-            return Self {
-                errors: (0..d).map(|j| deviation(&column(j))).collect(),
-                low: (0..d).map(|j| end(j, 0.5 - 0.5 * level)).collect(),
-                high: (0..d).map(|j| end(j, 0.5 + 0.5 * level)).collect(),
-            };
-        }
-        let c = &problem.coordinates;
-        let phi = c.of(&fitted.theta);
-        let slopes = c.slopes(&fitted.theta);
-        let errors = fitted.std_errors(problem);
-        let reach = Normal::standard().inverse_cdf(0.5 + 0.5 * level);
-        let end = |j: usize, sign: f64| {
-            let mut moved = phi.clone();
-            moved[j] += sign * reach * errors[j] / slopes[j];
-            c.theta(&moved)[j]
-        };
-        Self {
-            low: (0..d).map(|j| end(j, -1.0)).collect(),
-            high: (0..d).map(|j| end(j, 1.0)).collect(),
-            errors,
-        }
-    }
 }
 
 /// Parameters and noise levels with errors and intervals.

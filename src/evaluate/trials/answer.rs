@@ -75,7 +75,8 @@ pub(crate) struct Named {
 pub(crate) struct Refitted {
     pub name: String,
     pub value: f64,
-    pub std_error: f64,
+    /// Interval of level 0.9.
+    pub interval: [f64; 2],
 }
 
 /// Diagnoses records. A diagnosis that fails is an answer, too; only a stop is an error.
@@ -151,7 +152,7 @@ impl Outcome {
                 .map(|p| Refitted {
                     name: p.name.clone(),
                     value: p.refitted,
-                    std_error: p.std_error,
+                    interval: p.interval,
                 })
                 .collect(),
         }

@@ -11,8 +11,6 @@ const STATED: [f64; 7] = [0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0];
 const LEAST: f64 = 1e-3;
 /// Expected information that a diagnosis need not see.
 const FAINT: f64 = 3.0;
-/// Half-width of a 90 % interval, in standard deviations.
-const NINETY: f64 = 1.644_853_6;
 
 /// Share of statements that are right.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -159,7 +157,8 @@ pub(super) fn coverage(rows: &[Row]) -> Coverage {
                 let estimates = row.outcome.iter().flat_map(|o| &o.parameters);
                 estimates.filter_map(|estimate| {
                     let (_, truth) = (row.theta.iter()).find(|(name, _)| *name == estimate.name)?;
-                    Some((truth - estimate.value).abs() <= NINETY * estimate.std_error)
+                    let [low, high] = estimate.interval;
+                    Some((low..=high).contains(truth))
                 })
             })
             .collect()

@@ -48,7 +48,7 @@ fn row(kind: Kind, truth: &[&str], accepted: &[&str], probability: f64) -> Row {
             parameters: vec![Refitted {
                 name: "k".into(),
                 value: 1.1,
-                std_error: 0.1,
+                interval: [0.95, 1.25],
             }],
         }),
         failure: None,

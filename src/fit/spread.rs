@@ -1,0 +1,70 @@
+//! Standard errors and intervals of a fit.
+
+use super::climb::Fitted;
+use super::posterior::{Draws, posterior};
+use super::problem::Problem;
+use crate::likelihood::kalman::FilterError;
+use crate::math::{deviation, quantile};
+use crate::twin::Noise;
+use statrs::distribution::{ContinuousCDF, Normal};
+
+/// Different posterior draws that intervals need: three of them lie beyond an end at 0.9.
+const LEAST_DRAWS: usize = 60;
+
+/// Standard errors and intervals of θ of the first record.
+pub(crate) struct Spread {
+    pub errors: Vec<f64>,
+    pub low: Vec<f64>,
+    pub high: Vec<f64>,
+}
+
+impl Spread {
+    /// From posterior draws around a fit; of a simulated likelihood, whose draws would cost ensembles, to first order.
+    pub fn drawn(
+        problem: &Problem<'_>,
+        fitted: &Fitted,
+        level: f64,
+        noise: Noise,
+    ) -> Result<Self, FilterError> {
+        let draws = match problem.is_simulated() {
+            true => Draws::default(),
+            false => posterior(problem, std::slice::from_ref(fitted), None, noise)?,
+        };
+        Ok(Self::new(problem, fitted, &draws.thetas, level))
+    }
+
+    /// From posterior draws, where enough of them differ; otherwise first order in φ.
+    pub fn new(problem: &Problem<'_>, fitted: &Fitted, draws: &[Vec<f64>], level: f64) -> Self {
+        let d = problem.twin.parameters().len();
+        let mut first: Vec<u64> = draws
+            .iter()
+            .map(|theta| theta.iter().map(|v| v.to_bits()).fold(0, u64::wrapping_add))
+            .collect();
+        first.sort_unstable();
+        first.dedup();
+        let column = |j: usize| -> Vec<f64> { draws.iter().map(|theta| theta[j]).collect() };
+        let end = |j: usize, p: f64| quantile(&column(j), p).unwrap_or(f64::NAN);
+        if first.len() >= LEAST_DRAWS {
+            return Self {
+                errors: (0..d).map(|j| deviation(&column(j))).collect(),
+                low: (0..d).map(|j| end(j, 0.5 - 0.5 * level)).collect(),
+                high: (0..d).map(|j| end(j, 0.5 + 0.5 * level)).collect(),
+            };
+        }
+        let c = &problem.coordinates;
+        let phi = c.of(&fitted.theta);
+        let slopes = c.slopes(&fitted.theta);
+        let errors = fitted.std_errors(problem);
+        let reach = Normal::standard().inverse_cdf(0.5 + 0.5 * level);
+        let end = |j: usize, sign: f64| {
+            let mut moved = phi.clone();
+            moved[j] += sign * reach * errors[j] / slopes[j];
+            c.theta(&moved)[j]
+        };
+        Self {
+            low: (0..d).map(|j| end(j, -1.0)).collect(),
+            high: (0..d).map(|j| end(j, 1.0)).collect(),
+            errors,
+        }
+    }
+}
