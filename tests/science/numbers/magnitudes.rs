@@ -118,14 +118,11 @@ fn diagnoses_do_not_depend_on_units() {
             );
             for (g, p) in given.parameters.iter().zip(&plain.parameters) {
                 same("θ", units, g.refitted / units.parameters, p.refitted, 1e-3);
-                same(
-                    "sd",
-                    units,
-                    g.std_error / units.parameters,
-                    p.std_error,
-                    // The likelihood of a clipped sensor has kinks: within its roughness, fits end at different points.
-                    5e-2,
-                );
+                // The likelihood of a clipped sensor has kinks: within its roughness, fits end at different points, and a standard error
+                // from a few hundred draws around them differs by its Monte-Carlo error.
+                let roughness = if ceiling.is_some() { 0.12 } else { 1e-6 };
+                let sd = g.std_error / units.parameters;
+                same("sd", units, sd, p.std_error, roughness);
             }
             assert_eq!(given.cause.decision, plain.cause.decision, "{units:?}");
             let named = |d: &Diagnosis| (d.cause.accepted.clone(), d.cause.class.clone());
