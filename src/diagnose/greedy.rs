@@ -52,24 +52,14 @@ pub(crate) fn greedy(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effect::{Catalogue, augment};
-    use crate::study::RecordPlan;
-    use crate::twin::Noise;
-    use crate::twins::CascadedTanks;
+    use crate::diagnose::fixture::{biased_record, tanks};
 
     /// A bias that is plain is selected, or another effect of its sensor; nothing on a record of the twin itself.
     #[test]
     fn a_plain_effect_is_selected() {
-        let plan = RecordPlan::levels(4.0, 200, 0.5, 3.0, 20);
-        let study = Study::new("tanks", CascadedTanks, plan).unwrap();
-        let bias = Catalogue::default().effect("sensor-bias", "sensor");
-        let twin = augment(study.twin().clone(), vec![bias.unwrap()]).unwrap();
-        let drives = study.drives().unwrap();
+        let study = tanks(200);
         let selected = |bias: f64| {
-            let drive = drives.draw(Noise::new(5, "drive", 0)).unwrap();
-            let theta = [study.twin().parameters().centre(), vec![bias]].concat();
-            let outputs = twin.simulate(&theta, &drive, Noise::new(5, "record", 0));
-            let record = Record::new(drive, outputs.unwrap()).unwrap();
+            let record = biased_record(&study, bias, 5);
             greedy(&study, &record, &[]).unwrap().unwrap()
         };
         assert_eq!(selected(0.0), Vec::<String>::new());

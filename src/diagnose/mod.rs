@@ -20,6 +20,8 @@
 mod base;
 mod error;
 mod explain;
+#[cfg(test)]
+mod fixture;
 mod greedy;
 mod hypotheses;
 mod locate;

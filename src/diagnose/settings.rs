@@ -114,24 +114,14 @@ impl Default for DiagnoseSettings {
 mod tests {
     use super::*;
     use crate::diagnose::diagnose;
-    use crate::effect::{Catalogue, augment};
+    use crate::diagnose::fixture::{biased_record, tanks};
     use crate::progress::Progress;
-    use crate::record::Record;
-    use crate::study::RecordPlan;
-    use crate::twins::CascadedTanks;
 
     /// Each part has its say in the evidence for a gap.
     #[test]
     fn every_part_that_is_taken_out_changes_what_is_said() {
-        let plan = RecordPlan::levels(4.0, 150, 0.5, 3.0, 20);
-        let study = Study::new("tanks", CascadedTanks, plan).unwrap();
-        let bias = Catalogue::default().effect("sensor-bias", "sensor");
-        let twin = augment(study.twin().clone(), vec![bias.unwrap()]).unwrap();
-        let drive = study.drives().unwrap().draw(Noise::new(5, "drive", 0));
-        let theta = [study.twin().parameters().centre(), vec![2.0]].concat();
-        let drive = drive.unwrap();
-        let outputs = twin.simulate(&theta, &drive, Noise::new(5, "record", 0));
-        let records = [Record::new(drive, outputs.unwrap()).unwrap()];
+        let study = tanks(150);
+        let records = [biased_record(&study, 2.0, 5)];
         let said = |ablated: Vec<Ablation>| {
             let settings = DiagnoseSettings {
                 detection_only: true,

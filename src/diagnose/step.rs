@@ -96,27 +96,22 @@ pub(in crate::diagnose) fn finer_step(
 mod tests {
     use super::*;
     use crate::diagnose::base::Base;
+    use crate::diagnose::fixture::{self, tanks};
     use crate::diagnose::{DiagnoseSettings, Verdict, diagnose};
     use crate::likelihood::measured;
     use crate::progress::Progress;
     use crate::record::Record;
-    use crate::study::{RecordPlan, Study};
-    use crate::twin::Noise;
-    use crate::twins::CascadedTanks;
+    use crate::study::Study;
 
     fn record(twin: &Twin, study: &Study, seed: u64) -> [Record; 1] {
-        let drives = study.drives().unwrap();
-        let drive = drives.draw(Noise::new(seed, "drive", 0)).unwrap();
         let theta = twin.parameters().centre();
-        let outputs = twin.simulate(&theta, &drive, Noise::new(seed, "record", 0));
-        [Record::new(drive, outputs.unwrap()).unwrap()]
+        [fixture::record(study, twin, &theta, seed)]
     }
 
     /// A finer step is asked for where the records were made with one, and then nothing is missing; the twin's own records keep its own.
     #[test]
     fn a_step_that_shows_is_no_gap_and_an_own_one_stays() {
-        let plan = RecordPlan::levels(4.0, 400, 0.5, 3.0, 20);
-        let study = Study::new("tanks", CascadedTanks, plan).unwrap();
+        let study = tanks(400);
         let exact = study.twin().stepped(|_, to| to.substeps = 64).unwrap();
         let settings = DiagnoseSettings::default();
         let asked = |records: &[Record]| {

@@ -125,24 +125,20 @@ fn families(text: &str) -> Result<Families, String> {
 
 /// Parses a part of a diagnosis.
 fn ablation(text: &str) -> Result<Ablation, String> {
-    let known = Ablation::ALL.map(Ablation::id);
-    (Ablation::ALL.into_iter().find(|part| part.id() == text)).ok_or_else(|| {
-        let near = did_you_mean(text, known);
-        format!(
-            "no part is called \"{text}\"{near}; there are {}",
-            known.join(", ")
-        )
-    })
+    let found = Ablation::ALL.into_iter().find(|part| part.id() == text);
+    known("part", found, text, &Ablation::ALL.map(Ablation::id))
 }
 
 /// Parses a kind of truth.
 fn kind(text: &str) -> Result<Kind, String> {
-    let known = Kind::ALL.map(Kind::id);
-    Kind::named(text).ok_or_else(|| {
-        let near = did_you_mean(text, known);
-        format!(
-            "no kind is called \"{text}\"{near}; there are {}",
-            known.join(", ")
-        )
+    known("kind", Kind::named(text), text, &Kind::ALL.map(Kind::id))
+}
+
+/// What was found by a name; else says which names there are.
+fn known<T>(what: &str, found: Option<T>, text: &str, names: &[&str]) -> Result<T, String> {
+    found.ok_or_else(|| {
+        let near = did_you_mean(text, names);
+        let all = names.join(", ");
+        format!("no {what} is called \"{text}\"{near}; there are {all}")
     })
 }

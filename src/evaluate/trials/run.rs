@@ -10,7 +10,7 @@ use super::score::Setup;
 use super::steadiness::repeats;
 use super::truth::{Drawn, Extra, TruthSampler};
 use super::{Families, Kind, Scorecard};
-use crate::diagnose::{Ablation, DiagnoseError, DiagnoseSettings, greedy};
+use crate::diagnose::{Ablation, DiagnoseSettings, greedy};
 use crate::evaluate::EvaluateError;
 use crate::likelihood::kalman::recoverable;
 use crate::progress::Progress;
@@ -292,10 +292,7 @@ impl Sealed<'_> {
         let mut answer = Answer::of(trial, study, given, &settings, progress)?;
         // A baseline that fails says nothing.
         answer.correlated = recoverable(correlated(study, &record))?.flatten();
-        answer.greedy = match greedy(study, &record, &settings.without) {
-            Err(error @ DiagnoseError::Cancelled(_)) => return Err(error.into()),
-            selected => selected.ok().flatten(),
-        };
+        answer.greedy = greedy(study, &record, &settings.without).ok().flatten();
         if trial < own.steadiness {
             let is_even = (own.like.as_ref()).is_none_or(|like| like.drive().is_uniform());
             let doubled = (is_even)

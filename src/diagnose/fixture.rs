@@ -1,0 +1,29 @@
+//! Records of the tanks that tests of several parts begin with.
+
+use crate::effect::{Catalogue, augment};
+use crate::record::Record;
+use crate::study::{RecordPlan, Study};
+use crate::twin::{Noise, Twin};
+use crate::twins::CascadedTanks;
+
+/// The tanks with so many samples a record, 4 s apart.
+pub(super) fn tanks(samples: usize) -> Study {
+    let plan = RecordPlan::levels(4.0, samples, 0.5, 3.0, 20);
+    Study::new("tanks", CascadedTanks, plan).unwrap()
+}
+
+/// A record of a twin under a drive of the study.
+pub(super) fn record(study: &Study, twin: &Twin, theta: &[f64], seed: u64) -> Record {
+    let drives = study.drives().unwrap();
+    let drive = drives.draw(Noise::new(seed, "drive", 0)).unwrap();
+    let outputs = twin.simulate(theta, &drive, Noise::new(seed, "record", 0));
+    Record::new(drive, outputs.unwrap()).unwrap()
+}
+
+/// A record of the study's twin at the centre of its prior, its sensor biased.
+pub(super) fn biased_record(study: &Study, bias: f64, seed: u64) -> Record {
+    let effect = Catalogue::default().effect("sensor-bias", "sensor");
+    let twin = augment(study.twin().clone(), vec![effect.unwrap()]).unwrap();
+    let theta = [study.twin().parameters().centre(), vec![bias]].concat();
+    record(study, &twin, &theta, seed)
+}
