@@ -54,12 +54,13 @@ const WRITERS: [&str; 8] = [
     "features r.csv --twin van-der-pol --out disk/new.npy",
     "estimate r.csv --estimator v.est --out disk/new",
     "diagnose r.csv --twin van-der-pol --out disk/new",
-    "withheld --twin van-der-pol --trials 4 --kinds none,outside --detection-only --out disk/new",
+    "withheld --study short.toml --trials 4 --kinds none,outside --detection-only --out disk/new",
     "reproduce --twin van-der-pol --estimator v.est --runs 2 --out disk/new",
 ];
 
-/// A record and an estimator.
+/// A study, a record and an estimator.
 fn prepare(at: &Path) {
+    crate::stop::short(at);
     for words in [
         "simulate --twin van-der-pol --theta nu=1 --out r.csv",
         "pretrain --twin van-der-pol --bank-size 300 --epochs 2 --out v.est",
@@ -174,10 +175,11 @@ fn outputs_that_take_nothing_are_no_panic() {
 fn two_processes_fill_one_folder() {
     let place = tempfile::tempdir().unwrap();
     let at = place.path();
+    crate::stop::short(at);
     for (words, part) in [
         ("bank --twin van-der-pol --size 6000", ""),
         (
-            "withheld --twin van-der-pol --trials 4 --kinds none,outside --detection-only",
+            "withheld --study short.toml --trials 4 --kinds none,outside --detection-only",
             "keys",
         ),
         (

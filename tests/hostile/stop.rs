@@ -18,6 +18,12 @@ fn start(folder: &Path, arguments: &str) -> std::process::Child {
         .unwrap()
 }
 
+/// A study of short records.
+pub fn short(folder: &Path) {
+    let study = "twin = 'van-der-pol'\n[record]\nsamples = 100\n";
+    fs::write(folder.join("short.toml"), study).unwrap();
+}
+
 fn entries(folder: &Path) -> usize {
     fs::read_dir(folder).map_or(0, |folder| folder.count())
 }
@@ -233,15 +239,16 @@ fn two_processes_do_not_pretrain_one_estimator() {
 fn trials_and_records_survive_kills_at_any_moment() {
     let place = tempfile::tempdir().unwrap();
     let at = place.path();
+    short(at);
     for (call, part, result, longest) in [
         (
-            "withheld --twin van-der-pol --trials 4 --kinds none,outside --detection-only",
+            "withheld --study short.toml --trials 4 --kinds none,outside --detection-only",
             "answers",
             "scorecard.json",
             2500,
         ),
         (
-            "reproduce --twin van-der-pol --runs 12 --bank-size 200 --epochs 2",
+            "reproduce --twin van-der-pol --runs 8 --bank-size 200 --epochs 2",
             "runs",
             "reproduce.json",
             2500,

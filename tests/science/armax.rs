@@ -1,13 +1,11 @@
 //! Information of ARMAX features on a black box with coloured noise, beside AR and ARX: Cramér–Rao bounds from simulated
-//! features. The table of docs/method.md: `cargo test --release --test science armax -- --nocapture`.
+//! features. The table of docs/method.md: `cargo test --release --test science armax -- --ignored --nocapture`.
 
 use nalgebra::{DMatrix, DVector};
 use truetwin::feature::{Ar, Armax, Arx, FeatureRecipe};
 use truetwin::record::{Drive, Quantity, Signal, Signals};
 use truetwin::study::RecordPlan;
 use truetwin::twin::{DigitalTwin, Noise, Parameter, ParameterSpace, SimulationError, Twin};
-
-const SIMULATIONS: u64 = 1000;
 
 /// A resonance driven by white noise, and by an input or none, seen through white noise of about its own size: what AR
 /// and ARX models take for white is coloured. A black box.
@@ -62,14 +60,20 @@ type Case<'a> = (&'a dyn FeatureRecipe, usize);
 /// Cramér–Rao bounds on the parameters' standard errors from features simulated at `theta`, one row a case: JᵀS⁻¹J, with S
 /// from simulations and J from central differences under common random numbers. Two halves of the simulations give two J,
 /// whose errors do not multiply.
-fn bounds(twin: Resonance, theta: &[f64], drive: &Drive, cases: &[Case]) -> Vec<Vec<f64>> {
+fn bounds(
+    twin: Resonance,
+    theta: &[f64],
+    drive: &Drive,
+    cases: &[Case],
+    simulations: u64,
+) -> Vec<Vec<f64>> {
     let twin = Twin::new(twin);
     (cases.iter())
         .map(|(recipe, left_out)| {
             let map = recipe.bind(&twin).unwrap();
-            let (n, m) = (map.dim() - left_out, SIMULATIONS as f64);
+            let (n, m) = (map.dim() - left_out, simulations as f64);
             let simulate = |theta: &[f64], purpose: &str| -> Vec<DVector<f64>> {
-                (0..SIMULATIONS)
+                (0..simulations)
                     .map(|i| {
                         let y = twin.simulate(theta, drive, Noise::new(1, purpose, i));
                         let x = map.extract(drive, &y.unwrap()).unwrap();
@@ -116,6 +120,16 @@ fn gain(first: &[f64], second: &[f64]) -> Vec<f64> {
 
 #[test]
 fn armax_features_say_more_with_as_many_numbers() {
+    compare(400);
+}
+
+#[test]
+#[ignore = "a minute; the table of docs/method.md"]
+fn armax_features_beside_others() {
+    compare(1000);
+}
+
+fn compare(simulations: u64) {
     let armax = |lags, inputs| Armax {
         outputs: lags,
         inputs,
@@ -132,6 +146,7 @@ fn armax_features_say_more_with_as_many_numbers() {
             (&Ar { order: 5 }, 0),
             (&Ar { order: 16 }, 0),
         ],
+        simulations,
     );
     let gain_over_ar = gain(&found[0], &found[2]);
     assert!(gain_over_ar.iter().all(|g| *g > 1.2), "{gain_over_ar:?}");
@@ -156,6 +171,7 @@ fn armax_features_say_more_with_as_many_numbers() {
             (&arx(8), 0),
             (&arx(16), 0),
         ],
+        simulations,
     );
     let gain_over_arx = gain(&found[0], &found[2]);
     assert!(gain_over_arx.iter().all(|g| *g > 1.15), "{gain_over_arx:?}");

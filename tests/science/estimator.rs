@@ -34,8 +34,8 @@ fn estimator() -> &'static Estimator {
     static ESTIMATOR: OnceLock<Estimator> = OnceLock::new();
     ESTIMATOR.get_or_init(|| {
         let options = PretrainOptions {
-            bank_size: Some(5000),
-            epochs: Some(80),
+            bank_size: Some(3000),
+            epochs: Some(60),
             seed: 1,
             ..PretrainOptions::default()
         };
@@ -135,7 +135,8 @@ fn records_of_one_system_are_weighed_together() {
 }
 
 /// Without trust in the prior the answer is the record's own: with one parameter alone outside its prior, 90 % intervals hold the truth
-/// in the records that the gate does not reject, too. Ten records; with the network's answers kept, k1 is missed in each.
+/// in the records that the gate does not reject, too. Ten records of a quarter of the features that tanks have by default; with the
+/// network's answers kept, k1 is missed in most.
 #[test]
 fn kept_answers_hold_outside_the_prior() {
     let options = PretrainOptions {
@@ -144,7 +145,9 @@ fn kept_answers_hold_outside_the_prior() {
         seed: 2,
         ..PretrainOptions::default()
     };
-    let study = &studies()[1];
+    let text = "twin = 'tanks'\n[features]\nkind = 'arx'\noutputs = 16\ninputs = 16";
+    let file = StudyFile::parse(text, "s.toml".as_ref()).unwrap();
+    let study = &studies()[1].configure(&file).unwrap();
     let (estimator, _) = pretrain(study, &options, &Progress::silent()).unwrap();
     let theta = [1.0, 0.6, 0.6, 1.0];
     let (mut agreed, mut own, mut trusting) = (0, 0, 0);

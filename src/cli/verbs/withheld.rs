@@ -134,7 +134,7 @@ fn kind(text: &str) -> Result<Kind, String> {
     known("kind", Kind::named(text), text, &Kind::ALL.map(Kind::id))
 }
 
-/// What was found by a name; else says which names there are.
+/// The value found by its name; else an error that lists the names.
 fn known<T>(what: &str, found: Option<T>, text: &str, names: &[&str]) -> Result<T, String> {
     found.ok_or_else(|| {
         let near = did_you_mean(text, names);

@@ -17,7 +17,7 @@ use truetwin::twin::{Noise, Twin};
 /// Records of the twin itself, half of them with θ outside the prior: alarms stay within the binomial bound.
 #[test]
 fn a_perfect_twin_is_rarely_accused() {
-    const RECORDS: u64 = 16;
+    const RECORDS: u64 = 12;
     let mut alarms = 0;
     for name in ["van-der-pol", "tanks"] {
         let study = study(name);

@@ -1,17 +1,19 @@
 use super::*;
-use crate::evaluate::paper::reference_studies;
 use crate::storage::files::sha256;
-use crate::study::StudyFile;
+use crate::study::{RecordPlan, StudyFile};
+use crate::twins::{CascadedTanks, VanDerPol};
 use std::fs;
 
+/// Short records: what is tested is the order of work.
 fn oscillator() -> Study {
-    reference_studies().unwrap().swap_remove(0)
+    Study::new("van-der-pol", VanDerPol, RecordPlan::autonomous(0.05, 120)).unwrap()
 }
 
 fn two() -> Settings {
     Settings {
         trials: 2,
         kinds: vec![Kind::None],
+        detection_only: true,
         ..Settings::default()
     }
 }
@@ -150,7 +152,8 @@ fn calls_that_cannot_be_made_are_refused_with_the_limit() {
 
 #[test]
 fn a_verdict_alone_is_the_verdict_of_the_whole() {
-    let study = reference_studies().unwrap().swap_remove(1);
+    let plan = RecordPlan::levels(4.0, 200, 0.5, 3.0, 20);
+    let study = Study::new("tanks", CascadedTanks, plan).unwrap();
     let place = tempfile::tempdir().unwrap();
     let card = |detection_only, name: &str| {
         let settings = Settings {
@@ -200,7 +203,6 @@ fn steadiness_asks_every_question_again() {
     let place = tempfile::tempdir().unwrap();
     let settings = Settings {
         steadiness: 1,
-        detection_only: true,
         ..two()
     };
     let sealed = sealed(&study, settings, &place.path().join("t")).unwrap();

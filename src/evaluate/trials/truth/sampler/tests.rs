@@ -5,6 +5,7 @@ use crate::evaluate::paper::reference_studies;
 use crate::evaluate::trials::information::Information;
 use crate::study::RecordPlan;
 use crate::twin::{Now, Outline, Parameter, StateSpace};
+use crate::twins::{CascadedTanks, VanDerPol};
 
 /// Three states, two outputs, one input: a heater, a wall, a room.
 pub(super) struct Rooms;
@@ -37,7 +38,11 @@ impl StateSpace for Rooms {
 }
 
 pub(super) fn rooms() -> Study {
-    let plan = RecordPlan::levels(0.1, 200, 0.0, 1.0, 25);
+    rooms_of(200)
+}
+
+fn rooms_of(samples: usize) -> Study {
+    let plan = RecordPlan::levels(0.1, samples, 0.0, 1.0, 25);
     Study::new("rooms", Rooms, plan).unwrap()
 }
 
@@ -89,7 +94,13 @@ fn holds(sampler: &TruthSampler<'_>, kind: Kind, trial: usize) {
 
 #[test]
 fn every_kind_can_be_drawn_of_the_reference_twins_and_repeats() {
-    for study in reference_studies().unwrap() {
+    let levels = RecordPlan::levels(4.0, 200, 0.5, 3.0, 20);
+    let autonomous = RecordPlan::autonomous(0.05, 200);
+    for study in [
+        Study::new("van-der-pol", VanDerPol, autonomous),
+        Study::new("tanks", CascadedTanks, levels),
+    ] {
+        let study = study.unwrap();
         let sampler = sampler(&study);
         for kind in Kind::ALL {
             sampler.check(kind).unwrap();
@@ -100,7 +111,7 @@ fn every_kind_can_be_drawn_of_the_reference_twins_and_repeats() {
 
 #[test]
 fn every_kind_can_be_drawn_of_a_twin_of_several_outputs() {
-    let study = rooms();
+    let study = rooms_of(120);
     let sampler = sampler(&study);
     let keys: Vec<&str> = sampler.listed.iter().map(|l| l.key.as_str()).collect();
     for key in [
