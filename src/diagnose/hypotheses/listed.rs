@@ -279,7 +279,10 @@ impl Library<'_> {
                 (grid, Axis { evidence, ..axis })
             }
             ("signal", Some(_)) if m.limits.low() >= 0.0 => {
-                linear(0.0, 2.0 * size, vec![0.2 * size, 0.6 * size])
+                // Beyond, a dead zone or a play of that width lets nothing pass.
+                let widest = 2.0 * low.abs().max(high.abs()).max(span);
+                let grid = [0.2, 0.6, 1.5, 3.0].map(|share| share * size);
+                linear(0.0, widest, grid.to_vec())
             }
             (_, Some(_)) => {
                 let found = twin.outline().and_then(|outline| {
@@ -367,4 +370,31 @@ fn product(lists: &[Vec<f64>]) -> Vec<Vec<f64>> {
             .flat_map(|head| list.iter().map(move |v| [&head[..], &[*v]].concat()))
             .collect()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::diagnose::DiagnoseSettings;
+    use crate::diagnose::base::Base;
+    use crate::diagnose::fixture::{biased_record, tanks};
+    use crate::likelihood::measured;
+
+    /// A dead zone or a play may be so wide that it swallows every command: a narrower limit would hide the law that is missing.
+    #[test]
+    fn widths_reach_over_the_whole_signal() {
+        let study = tanks(60);
+        let records = [biased_record(&study, 0.0, 5)];
+        let settings = DiagnoseSettings::default();
+        let measured = measured(study.twin(), &records, &study.beliefs()).unwrap();
+        let base = Base::new(&measured, &records, &settings).unwrap();
+        let terms = base.listed(&study, &settings).unwrap();
+        let inputs = records[0].drive().inputs();
+        let largest = inputs.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
+        for id in ["actuator-dead-zone", "actuator-backlash"] {
+            let term = terms.iter().find(|term| term.id == id).unwrap();
+            assert_eq!(term.axes[0].bounds.high(), 2.0 * largest, "{id}");
+            let widest = term.starts.iter().map(|start| start.m[0]);
+            assert!(widest.fold(0.0, f64::max) > 0.5 * largest, "{id}");
+        }
+    }
 }
