@@ -52,12 +52,11 @@ fn the_cascaded_tanks_are_followed_on_a_record_never_seen() {
     let Some((record, validation)) = tanks_records() else {
         return;
     };
-    let text = "twin = 'tanks'\n[features]\nkind = 'arx'\noutputs = 16\ninputs = 16";
-    let fewer = StudyFile::parse(text, "s.toml".as_ref()).unwrap();
-    let study = tanks().configure(&fewer).unwrap();
+    let study = tanks();
     let options = PretrainOptions {
         bank_size: Some(2000),
         epochs: Some(20),
+        // A training this short decides the gate by its seed: 2, 3 and 4 reject the record, 1, 5 and 6 keep the network's answer.
         seed: 2,
         ..PretrainOptions::default()
     };
