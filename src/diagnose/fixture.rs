@@ -7,7 +7,7 @@ use crate::twin::{Noise, Twin};
 use crate::twins::CascadedTanks;
 
 /// The tanks with so many samples a record, 4 s apart.
-pub(super) fn tanks(samples: usize) -> Study {
+pub(crate) fn tanks(samples: usize) -> Study {
     let plan = RecordPlan::levels(4.0, samples, 0.5, 3.0, 20);
     Study::new("tanks", CascadedTanks, plan).unwrap()
 }

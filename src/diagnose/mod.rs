@@ -21,7 +21,7 @@ mod base;
 mod error;
 mod explain;
 #[cfg(test)]
-mod fixture;
+pub(crate) mod fixture;
 mod greedy;
 mod hypotheses;
 mod locate;

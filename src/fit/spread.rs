@@ -42,13 +42,18 @@ impl Spread {
             .collect();
         first.sort_unstable();
         first.dedup();
-        let column = |j: usize| -> Vec<f64> { draws.iter().map(|theta| theta[j]).collect() };
-        let end = |j: usize, p: f64| quantile(&column(j), p).unwrap_or(f64::NAN);
         if first.len() >= LEAST_DRAWS {
+            let columns: Vec<Vec<f64>> = (0..d)
+                .map(|j| draws.iter().map(|theta| theta[j]).collect())
+                .collect();
+            let ends = |p: f64| -> Vec<f64> {
+                let end = |column: &Vec<f64>| quantile(column, p).unwrap_or(f64::NAN);
+                columns.iter().map(end).collect()
+            };
             return Self {
-                errors: (0..d).map(|j| deviation(&column(j))).collect(),
-                low: (0..d).map(|j| end(j, 0.5 - 0.5 * level)).collect(),
-                high: (0..d).map(|j| end(j, 0.5 + 0.5 * level)).collect(),
+                errors: columns.iter().map(|column| deviation(column)).collect(),
+                low: ends(0.5 - 0.5 * level),
+                high: ends(0.5 + 0.5 * level),
             };
         }
         let c = &problem.coordinates;

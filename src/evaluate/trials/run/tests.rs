@@ -1,7 +1,8 @@
 use super::*;
+use crate::diagnose::fixture::tanks;
 use crate::storage::files::sha256;
 use crate::study::{RecordPlan, StudyFile};
-use crate::twins::{CascadedTanks, VanDerPol};
+use crate::twins::VanDerPol;
 use std::fs;
 
 /// Short records: what is tested is the order of work.
@@ -152,8 +153,7 @@ fn calls_that_cannot_be_made_are_refused_with_the_limit() {
 
 #[test]
 fn a_verdict_alone_is_the_verdict_of_the_whole() {
-    let plan = RecordPlan::levels(4.0, 200, 0.5, 3.0, 20);
-    let study = Study::new("tanks", CascadedTanks, plan).unwrap();
+    let study = tanks(200);
     let place = tempfile::tempdir().unwrap();
     let card = |detection_only, name: &str| {
         let settings = Settings {
