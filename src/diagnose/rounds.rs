@@ -2,8 +2,8 @@
 
 use super::base::Base;
 use super::error::DiagnoseError;
-use super::explain::decide::{Chances, Findings};
 use super::explain::explore::{Known, Terms, explore};
+use super::explain::findings::{Chances, Findings};
 use super::explain::search::{Breadth, listed};
 use super::hypotheses::noise::kinds;
 use super::hypotheses::scales::Scales;

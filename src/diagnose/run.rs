@@ -2,8 +2,9 @@
 
 use super::base::{left_the_prior, verdict};
 use super::error::DiagnoseError;
-use super::explain::decide::{Chances, Conclusion, Findings, decide};
+use super::explain::decide::{Conclusion, decide};
 use super::explain::explore::absorbing;
+use super::explain::findings::{Chances, Findings};
 use super::locate::discover::discover;
 use super::locate::functions::{curve, told};
 use super::locate::maps::maps;

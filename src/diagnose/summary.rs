@@ -1,7 +1,8 @@
 //! Summary of fits for a report.
 
 use super::error::DiagnoseError;
-use super::explain::decide::{Chances, Conclusion, Findings};
+use super::explain::decide::Conclusion;
+use super::explain::findings::{Chances, Findings};
 use super::explain::search::Found;
 use super::hypotheses::term::{Part, Term};
 use super::model::Model;

@@ -7,8 +7,6 @@ pub(in crate::diagnose) struct Thresholds;
 
 /// Hypotheses.
 impl Thresholds {
-    /// Lags and delays that are tried, in samples: octaves.
-    pub const LAGS_TRIED: [f64; 8] = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 60.0];
     /// Delays of one sensor of several, in samples, a list for each register: the shorter the register, the faster the filter.
     pub const DELAYS: [&[f64]; 3] = [&[0.5, 1.5], &[3.0], &[5.5]];
     /// Samples that the registers of the delays hold. One of 16 takes five times as long where a delay is likely.

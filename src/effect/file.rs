@@ -3,7 +3,7 @@
 use super::catalogue::Catalogue;
 use super::error::EffectError;
 use super::placed::{Effect, EffectEntry};
-use crate::storage::untrusted::{MESSAGE, check_names, one_line, read_text};
+use crate::storage::untrusted::{check_names, message, read_text};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -42,13 +42,13 @@ impl Catalogue {
                 problem,
             })?;
         }
-        let at = |byte: usize, message: &str| {
-            let lines = message.lines().map(str::trim);
+        let at = |byte: usize, problem: &str| {
+            let lines = problem.lines().map(str::trim);
             let lines: Vec<_> = lines.filter(|line| !line.is_empty()).collect();
             EffectError::Text {
                 path: path.into(),
                 line: 1 + text.bytes().take(byte).filter(|b| *b == b'\n').count(),
-                problem: one_line(&lines.join(", "), MESSAGE),
+                problem: message(&lines.join(", ")),
             }
         };
         let file: EffectFile = toml::from_str(text)

@@ -7,7 +7,7 @@ use crate::progress::Cancelled;
 use crate::setting::SettingError;
 use crate::storage::StorageError;
 use crate::storage::files::with_remedy;
-use crate::storage::untrusted::{MESSAGE, one_line};
+use crate::storage::untrusted::message;
 use crate::study::StudyError;
 use crate::twin::SimulationError;
 use std::path::{Path, PathBuf};
@@ -110,13 +110,13 @@ impl EstimatorError {
     pub(crate) fn file(path: &Path, problem: impl ToString) -> Self {
         Self::File {
             path: path.into(),
-            problem: one_line(&problem.to_string(), MESSAGE),
+            problem: message(&problem.to_string()),
         }
     }
 
     /// A file that holds no bank, or a damaged one.
     pub(crate) fn no_bank(path: &Path, reason: &str, remedy: &str) -> Self {
-        let reason = one_line(reason, MESSAGE);
+        let reason = message(reason);
         Self::File {
             path: path.into(),
             problem: format!("no bank ({reason}); {remedy}"),

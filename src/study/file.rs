@@ -5,7 +5,7 @@ use crate::feature::FeatureRecipe;
 use crate::record::{Columns, Drive};
 use crate::setting::number;
 use crate::storage::files::folder;
-use crate::storage::untrusted::{MESSAGE, check_names, one_line, read_text};
+use crate::storage::untrusted::{check_names, message, read_text};
 use crate::study::error::StudyError;
 use crate::study::lines::{line, line_of, with_line};
 use crate::study::plan::InputPlan;
@@ -188,10 +188,10 @@ impl StudyFile {
 
     /// Parses the text of a study file; `path` is for messages.
     pub fn parse(text: &str, path: &Path) -> Result<Self, StudyError> {
-        let wrong = |line, message: &str| StudyError::Syntax {
+        let wrong = |line, problem: &str| StudyError::Syntax {
             path: path.into(),
             line,
-            message: one_line(message, MESSAGE),
+            message: message(problem),
         };
         // Not every text comes from a file of its own: an estimator holds one, too.
         if text.len() as u64 > MOST {
@@ -297,7 +297,7 @@ mod tests {
         for (text, expected) in [
             (
                 "twin = 'tanks'\nstep = 1\n",
-                "s.toml, line 2: unknown field `step`",
+                "s.toml, line 2: unknown key `step`",
             ),
             (
                 "twin = 'tanks'\n[prior]\nk1 = [0.8, 0.4]\n",
@@ -307,7 +307,7 @@ mod tests {
             ("twin = \n", "s.toml, line 1"),
             (
                 "twin = 'x'\n[record]\nhold = 'cubic'\n",
-                "s.toml, line 3: unknown variant `cubic`, expected `zero` or `linear`",
+                "s.toml, line 3: unknown value `cubic`, expected `zero` or `linear`",
             ),
             ("twin = 'x'\n[record]\nsubsteps = 1e9\n", "s.toml, line 3"),
             ("twin = 'x'\n[record]\nsubsteps = -1\n", "s.toml, line 3"),

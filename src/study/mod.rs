@@ -103,7 +103,7 @@ impl Study {
     }
 
     /// The study in the setting of a file about the same twin. θ becomes: the twin's parameters that are not fixed,
-    /// unknown noise levels, unknown starts, effects' magnitudes that are not given.
+    /// unknown noise levels, unknown starts, effects' magnitudes that are not given. Of a file before, the plan of records stays alone.
     pub fn configure(&self, file: &StudyFile) -> Result<Self, StudyError> {
         if file.twin != self.name {
             return Err(StudyError::Twin {

@@ -1,6 +1,6 @@
 //! The order of the search: single explanations, what they leave, pairs.
 
-use super::decide::{Findings, leaves_nothing};
+use super::findings::{Findings, leaves_nothing};
 use super::search::{Breadth, FEW, Found, listed, own_theta, sort, unknown};
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::scales::Scales;

@@ -2,6 +2,7 @@
 
 pub(in crate::diagnose) mod decide;
 pub(in crate::diagnose) mod explore;
+pub(in crate::diagnose) mod findings;
 pub(in crate::diagnose) mod refit;
 pub(in crate::diagnose) mod scan;
 pub(in crate::diagnose) mod search;

@@ -11,6 +11,9 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+/// Functions that are refitted, of those of one or two variables: what they promise says little of what a refit gains. With 5, the mean
+/// logarithm of the probability of the truth is −1.75 on open trials, with 12 −1.34, in 1.35 times the time.
+const FUNCTIONS: usize = 12;
 /// Functions that are refitted where it is known about what is missing.
 pub(super) const FEW: usize = 3;
 /// Nats that averaging over its size takes off an effect that nothing speaks for.
@@ -47,7 +50,7 @@ pub(in crate::diagnose) struct Breadth {
     pub listed: usize,
     /// Listed effects that are fitted from loud noise.
     pub annealed: usize,
-    /// Functions; of those of time, half as many.
+    /// Functions; of those of an output, of the past and of time, half as many.
     pub functions: usize,
     /// Nats that a screened hypothesis must promise.
     pub least: f64,
@@ -64,7 +67,7 @@ impl Breadth {
         Self {
             listed: 6,
             annealed: if few { 0 } else { usize::MAX },
-            functions: if few { 2 } else { 5 },
+            functions: if few { 2 } else { FUNCTIONS },
             least: 2.5,
             deep: false,
             pairs: !quick,
@@ -296,11 +299,8 @@ pub(in crate::diagnose) fn unknown<'a>(
     let mut all: Vec<Found<'a>> = vec![];
     let half = breadth.functions.div_ceil(2);
     for (natures, price, most) in [
-        (
-            &[Nature::Function, Nature::Past][..],
-            0.0,
-            breadth.functions,
-        ),
+        (&[Nature::Function], 0.0, breadth.functions),
+        (&[Nature::Past], 0.0, half),
         (&[Nature::Reading], 0.0, half),
         (&[Nature::Periodic], PRICE_OF_FREQUENCY, half),
     ] {

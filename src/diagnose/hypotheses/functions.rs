@@ -248,6 +248,63 @@ pub(super) fn of_past(target: &str, is_sensor: bool, name: &str, times: [f64; PA
     )
 }
 
+/// Value that a signal leaves behind.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Trace {
+    /// That of a first-order lag of so many seconds.
+    Lag(f64),
+    /// That of a play: it follows at this distance.
+    Play(f64),
+}
+
+impl Trace {
+    /// The value after z, the signal being s.
+    pub fn next(self, z: f64, s: f64, dt: f64) -> f64 {
+        match self {
+            Self::Lag(tau) => s + (-dt / tau).exp() * (z - s),
+            Self::Play(distance) => z.clamp(s - distance, s + distance),
+        }
+    }
+
+    /// The trace of a list of values.
+    pub fn of(self, values: &[f64], dt: f64) -> Vec<f64> {
+        let first = values.first().copied().unwrap_or(f64::NAN);
+        let follow = |z: &mut f64, s: &f64| {
+            *z = self.next(*z, *s, dt);
+            Some(*z)
+        };
+        values.iter().scan(first, follow).collect()
+    }
+}
+
+/// An unknown function of what a signal leaves behind: s + f(z); `variable` is z.
+pub(super) fn of_trace(
+    target: &str,
+    is_sensor: bool,
+    variable: &Variable,
+    largest: f64,
+    trace: Trace,
+) -> Term {
+    let id = format!("f({})", variable.name);
+    let ends = variable.ends();
+    let law = move |m: &[f64], now: crate::effect::Instant, memory: &mut [f64], s: f64| {
+        memory[0] = trace.next(memory[0], s, now.dt);
+        s + sum_of_one(m, memory[0], ends)
+    };
+    let kind = match is_sensor {
+        true => EffectKind::sensor(&id, "s + f(trace of s)", law),
+        false => EffectKind::actuator(&id, "u + f(trace of u)", law),
+    };
+    term(
+        with_coefficients(kind, TERMS).memory(1),
+        target,
+        Nature::Past,
+        weights(1),
+        largest,
+        vec![],
+    )
+}
+
 /// A wave of unknown size, phase and frequency: on a signal, a rate or, relative, a parameter.
 pub(super) fn wave(kind: &str, target: &str, largest: f64, frequency: Axis) -> Term {
     const ID: &str = "periodic";

@@ -251,12 +251,14 @@ impl Library<'_> {
                 )
             }
             ("s", Some(_)) => {
-                let (mut longest, grid) = ((duration / 8.0).max(0.6 * dt), Thresholds::LAGS_TRIED);
+                let mut longest = (duration / 8.0).max(0.6 * dt);
                 let (least, most) = effect.kind().memories();
                 if least < most {
                     longest = longest.min((most - 1) as f64 * dt);
                 }
-                logarithmic(0.3 * dt, longest, grid.map(|steps| steps * dt).to_vec())
+                let octaves = std::iter::successors(Some(0.5 * dt), |tau| Some(2.0 * tau));
+                let grid = octaves.take_while(|tau| *tau <= longest).collect();
+                logarithmic(0.3 * dt, longest, grid)
             }
             ("s", None) => {
                 let times = (1..=Thresholds::TIMES)
@@ -280,7 +282,7 @@ impl Library<'_> {
             }
             ("signal", Some(_)) if m.limits.low() >= 0.0 => {
                 // Beyond, a dead zone or a play of that width lets nothing pass.
-                let widest = 2.0 * low.abs().max(high.abs()).max(span);
+                let widest = (2.0 * low.abs().max(high.abs())).max(span);
                 let grid = [0.2, 0.6, 1.5, 3.0].map(|share| share * size);
                 linear(0.0, widest, grid.to_vec())
             }

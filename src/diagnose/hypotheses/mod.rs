@@ -13,7 +13,9 @@ pub(in crate::diagnose) mod term;
 
 use self::basis::Of;
 use self::entry::Entry;
-use self::functions::{PASTS, Variable, of_past, of_reading, of_signal, of_state, wave};
+use self::functions::{
+    PASTS, Trace, Variable, of_past, of_reading, of_signal, of_state, of_trace, wave,
+};
 use self::listed::Library;
 use self::scales::Scales;
 use self::term::{Nature, Part, Start, Term};
@@ -31,6 +33,8 @@ const TIMES: usize = 3;
 const SIZES: [f64; 5] = [0.01, 0.03, 0.1, 0.3, 1.0];
 /// Most states for which functions of any two are rivals; beyond, only those with the state's own value.
 const MOST_STATES: usize = 4;
+/// Widths of a play that a signal is seen through, in ranges of it.
+const PLAYS: [f64; 2] = [0.25, 0.5];
 
 /// Terms that several models hold.
 pub(in crate::diagnose) fn shared(terms: Vec<Term>) -> Vec<Arc<Term>> {
@@ -89,19 +93,8 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
     let outline = &scales.outline;
     let mut terms = vec![];
     let range = |kind: TargetKind, i: usize| {
-        let mut ends = (f64::INFINITY, f64::NEG_INFINITY);
-        for scales in std::iter::once(scales).chain(seen) {
-            let values = scales.columns(kind, i);
-            for (p, end) in [(0.005, &mut ends.0), (0.995, &mut ends.1)] {
-                let value = quantile(&values, p).unwrap_or(f64::NAN);
-                *end = if p < 0.5 {
-                    end.min(value)
-                } else {
-                    end.max(value)
-                };
-            }
-        }
-        (ends.0 < ends.1).then_some(ends)
+        let all = std::iter::once(scales).chain(seen);
+        ends(all.map(|scales| scales.columns(kind, i)))
     };
     let variable = |kind: TargetKind, of: Of, i: usize, name: &str| {
         let (low, high) = range(kind, i)?;
@@ -184,6 +177,22 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
             terms.push(of_signal(&target, is_sensor, &seen, size));
             if has_equations {
                 terms.push(of_past(&target, is_sensor, name, past));
+                let lags = past[1..].iter().map(|tau| ("lagged", Trace::Lag(*tau)));
+                let plays =
+                    PLAYS.map(|part| ("play of", Trace::Play(0.5 * part * (seen.high - seen.low))));
+                terms.extend(lags.chain(plays).filter_map(|(word, trace)| {
+                    let values = trace.of(&scales.columns(kind, j), scales.dt());
+                    let (low, high) = ends(std::iter::once(values))?;
+                    let name = format!("{word} {name}");
+                    let of = Of::Signal;
+                    let seen = Variable {
+                        name,
+                        of,
+                        low,
+                        high,
+                    };
+                    Some(of_trace(&target, is_sensor, &seen, size, trace))
+                }));
             }
             if has_equations && is_sensor {
                 let states = of_states.iter().map(|(_, state)| state);
@@ -275,6 +284,15 @@ fn disturbances(
             mark: 0.0,
         })
         .collect()
+}
+
+/// Range that lists of values cover, but for a hundredth of each; `None` where nothing moves.
+fn ends(all: impl Iterator<Item = Vec<f64>>) -> Option<(f64, f64)> {
+    let at = |values: &[f64], p| quantile(values, p).unwrap_or(f64::NAN);
+    let ends = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), values| {
+        (low.min(at(&values, 0.005)), high.max(at(&values, 0.995)))
+    });
+    (ends.0 < ends.1).then_some(ends)
 }
 
 /// Values from low to high, evenly in their logarithm.

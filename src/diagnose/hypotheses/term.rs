@@ -91,6 +91,16 @@ impl Term {
         }
     }
 
+    /// Returns whether this is a law of the library with a frequency.
+    pub fn is_listed_wave(&self) -> bool {
+        match &self.part {
+            Part::Effect { effect, .. } => {
+                self.nature == Nature::Listed && effect.magnitudes().iter().any(|m| m.unit == "Hz")
+            }
+            Part::Disturbance { .. } | Part::Reading { .. } => false,
+        }
+    }
+
     /// Names of an effect's free magnitudes in θ, in the order of the axes.
     pub fn names(&self) -> Vec<String> {
         match &self.part {

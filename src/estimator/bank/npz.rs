@@ -4,7 +4,7 @@
 //! other and with a limit, before memory is allocated.
 
 use super::npy;
-use crate::storage::untrusted::{MESSAGE, one_line};
+use crate::storage::untrusted::message;
 use ndarray::Array2;
 use std::io::{self, Cursor, Read, Seek};
 use zip::write::SimpleFileOptions;
@@ -50,6 +50,6 @@ impl<R: Read + Seek> Npz<R> {
             Ok(_) => Err("it is longer than the archive says".into()),
             Err(error) => Err(error.to_string()),
         }))
-        .map_err(|problem| format!("{name}: {}", one_line(&problem, MESSAGE)))
+        .map_err(|problem| format!("{name}: {}", message(&problem)))
     }
 }

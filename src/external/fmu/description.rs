@@ -1,7 +1,7 @@
 //! Model description, of either version of the standard.
 
 use crate::record::Quantity;
-use crate::storage::untrusted::{MESSAGE, one_line};
+use crate::storage::untrusted::message;
 use crate::study::{InputPlan, Levels, RecordPlan};
 use crate::twin::{Interval, Parameter};
 use roxmltree::{Document, Node};
@@ -97,7 +97,7 @@ fn attribute<'a>(node: Node<'a, '_>, name: &str) -> Result<&'a str, String> {
 impl ModelDescription {
     /// From the file's text; the error says what is missing.
     pub fn parse(text: &str) -> Result<Self, String> {
-        Self::read(text).map_err(|problem| one_line(&problem, MESSAGE))
+        Self::read(text).map_err(|problem| message(&problem))
     }
 
     fn read(text: &str) -> Result<Self, String> {

@@ -3,7 +3,7 @@
 use super::super::name;
 use crate::record::{Quantity, Signals};
 use crate::setting::number;
-use crate::storage::untrusted::{MESSAGE, one_line};
+use crate::storage::untrusted::message;
 use crate::study::{InputPlan, RecordPlan, RecordTable};
 use crate::twin::{Interval, Parameter, ParameterSpace};
 use serde::Deserialize;
@@ -59,7 +59,7 @@ impl Description {
     pub fn parse(line: &str) -> Result<Self, String> {
         let told: Told = serde_json::from_str(line).map_err(|error| {
             let problem = error.to_string();
-            one_line(&problem, MESSAGE)
+            message(&problem)
         })?;
         name::check(&told.name).map_err(|problem| format!("name: {problem}"))?;
         let names = |all: &[ToldQuantity]| all.iter().map(|q| q.name.clone()).collect();
@@ -166,7 +166,7 @@ mod tests {
     #[test]
     fn what_is_wrong_is_named() {
         for (from, to, part) in [
-            ("\"name\": \"lag\",", "", "missing field `name`"),
+            ("\"name\": \"lag\",", "", "missing key `name`"),
             ("\"lag\"", "\"a lag\"", "\"a lag\" holds ' '"),
             ("\"s\"", "\"\\u001b[2J\"", "the unit \"\\u{1b}[2J\" holds"),
             ("\"k\"", "\"tau\"", "parameters: tau stands there twice"),
@@ -181,7 +181,7 @@ mod tests {
                 "\"/etc/x.csv\"",
                 "study file",
             ),
-            ("\"outputs\"", "\"outptus\"", "unknown field `outptus`"),
+            ("\"outputs\"", "\"outptus\"", "unknown key `outptus`"),
         ] {
             assert!(GOOD.contains(from), "{from}");
             let message = Description::parse(&GOOD.replace(from, to)).unwrap_err();

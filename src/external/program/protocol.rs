@@ -2,7 +2,7 @@
 
 use crate::record::{Drive, Quantity, Signal, Signals};
 use crate::setting::number;
-use crate::storage::untrusted::{MESSAGE, excerpt, one_line};
+use crate::storage::untrusted::{excerpt, message};
 use serde::{Deserialize, Serialize, Serializer};
 use std::collections::BTreeMap;
 
@@ -104,7 +104,7 @@ pub(super) fn answer(
     let told: Told = match serde_json::from_str(line) {
         Ok(told) => told,
         Err(error) => serde_json::from_str(&finite_only(line)).map_err(|_| {
-            let error = one_line(&error.to_string(), MESSAGE);
+            let error = message(&error.to_string());
             format!("{error}; write answers alone to standard output, one line each, and all else to standard error")
         })?,
     };
@@ -277,7 +277,7 @@ mod tests {
                 "z is no output",
             ),
             (r#"{"id": 7}"#, "exactly one of"),
-            (r#"{"id": 7, "outptus": {}}"#, "unknown field `outptus`"),
+            (r#"{"id": 7, "outptus": {}}"#, "unknown key `outptus`"),
         ] {
             let message = read(line).unwrap_err();
             assert!(message.contains(part), "{message}");

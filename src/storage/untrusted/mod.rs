@@ -7,7 +7,7 @@ mod rows;
 mod show;
 
 pub(crate) use rows::Rows;
-pub(crate) use show::{check_names, excerpt, hidden, one_line, printable, quoted};
+pub(crate) use show::{check_names, excerpt, hidden, message, one_line, printable, quoted};
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -15,9 +15,6 @@ use std::path::Path;
 
 /// Most numbers that one file may hold, 4 GiB of them: what is larger is kept in shards, or in several records.
 pub(crate) const MOST_NUMBERS: usize = 1 << 29;
-
-/// Longest message of a parser, in characters: it may list what it knows.
-pub(crate) const MESSAGE: usize = 2000;
 
 /// The bytes of a file, `most` of them; a longer one is refused, also one that has no end.
 ///

@@ -4,6 +4,30 @@ use std::borrow::Cow;
 
 /// Longest piece that a message quotes, in characters.
 const QUOTED: usize = 160;
+/// Longest message of a parser, in characters: it may list what it knows.
+const MESSAGE: usize = 2000;
+/// Words of parsers, and those of their readers.
+const WORDS: [(&str, &str); 16] = [
+    ("invalid type: map", "found a table"),
+    ("invalid type: sequence", "found a list"),
+    ("invalid type: ", "found "),
+    ("expected f64", "expected a number"),
+    ("expected usize", "expected a whole number"),
+    ("expected u64", "expected a whole number"),
+    ("expected u32", "expected a whole number"),
+    ("expected a boolean", "expected true or false"),
+    ("expected a sequence", "expected a list"),
+    ("expected a map", "expected a table"),
+    (
+        "expected an array of length 2",
+        "expected two numbers, [low, high]",
+    ),
+    ("expected struct ", "expected a table of "),
+    ("wanted string or table", "expected a text or a table"),
+    ("unknown field", "unknown key"),
+    ("missing field", "missing key"),
+    ("unknown variant", "unknown value"),
+];
 /// Longest name or path in a study or effect file, in characters.
 const LONGEST: usize = 1000;
 
@@ -38,7 +62,13 @@ pub(crate) fn quoted(text: &str) -> String {
     excerpt(&text.chars().take(QUOTED + 1).map(shown).collect::<String>())
 }
 
-/// As [`excerpt`], with `most` characters: for messages of parsers, which list what they know.
+/// The message of a parser in one line, without the words of the language that this program is written in.
+pub(crate) fn message(text: &str) -> String {
+    let replace = |text: String, (theirs, ours): &(&str, &str)| text.replace(theirs, ours);
+    one_line(&WORDS.iter().fold(text.to_owned(), replace), MESSAGE)
+}
+
+/// As [`excerpt`], with `most` characters.
 pub(crate) fn one_line(text: &str, most: usize) -> String {
     let (mut line, mut length, mut space) = (String::new(), 0, false);
     for c in text.chars() {
@@ -105,6 +135,16 @@ mod tests {
         assert_eq!(excerpt("a\u{202e}b"), "a b");
         assert_eq!(excerpt(&" ".repeat(500)), "");
         assert_eq!(quoted("t\u{feff}1\u{a0}0"), "t\\u{feff}1\\u{a0}0");
+    }
+
+    #[test]
+    fn messages_have_no_words_of_rust() {
+        let number: Result<f64, _> = serde_json::from_str("\"a\"");
+        let told = message(&number.unwrap_err().to_string());
+        assert!(
+            told.starts_with("found string \"a\", expected a number"),
+            "{told}"
+        );
     }
 
     #[test]

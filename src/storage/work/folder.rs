@@ -4,7 +4,7 @@ use super::{Manifest, NewWork};
 use crate::storage::StorageError;
 use crate::storage::files::{folder, replace, write_new};
 use crate::storage::unfinished;
-use crate::storage::untrusted::{MESSAGE, check_folder, one_line, read_kept_text};
+use crate::storage::untrusted::{check_folder, message, read_kept_text};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -154,7 +154,7 @@ impl WorkFolder {
         };
         let wrong = |reason: String| StorageError::Piece {
             path: path.clone(),
-            reason: one_line(&reason, MESSAGE),
+            reason: message(&reason),
         };
         let piece: T = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
         fits(&piece).map_err(|reason| wrong(reason.into()))?;

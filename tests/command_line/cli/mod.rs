@@ -427,10 +427,7 @@ fn wrong_studies_are_refused_with_file_and_line() {
         "twin = 'tanks'\n[prior]\nk7 = [0.4, 0.8]\n",
         &["[prior] names k7", "k1, k2, k3, k4"],
     );
-    check(
-        "twin = 'tanks'\nsamples = 3\n",
-        &["line 2", "unknown field"],
-    );
+    check("twin = 'tanks'\nsamples = 3\n", &["line 2", "unknown key"]);
     for (key, parts) in [
         ("substeps = 0", ["substeps = 0", "between 1 and 1000"]),
         ("substeps = 1001", ["substeps = 1001", "between 1 and 1000"]),

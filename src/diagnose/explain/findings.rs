@@ -1,0 +1,318 @@
+//! Everything that was found, and posterior probabilities.
+//!
+//! ```text
+//! D     = log Σ w_h·Z_h − log Z_nothing               w: 0.6 shared by listed effects, 0.4 by unknown functions;  a gap if D > 3
+//! Z_nothing = Z_0 + mean_N Z_0(N)                     N: other kinds of noise, correlated or with outliers, and pairs of them
+//! r(E)  = max_U log Z(E + U) − log Z(E)               E leaves nothing to explain if r < 4
+//! ```
+
+use super::search::Found;
+use crate::diagnose::hypotheses::term::Nature;
+use crate::diagnose::model::Model;
+use crate::diagnose::outcome::Probabilities;
+use crate::diagnose::thresholds::Thresholds;
+use crate::fit::evidence::log_mean;
+use std::collections::BTreeMap;
+
+/// Everything that was found.
+#[derive(Default)]
+pub(in crate::diagnose) struct Findings<'a> {
+    /// Listed effects alone, best first.
+    pub listed: Vec<Found<'a>>,
+    /// Unknown functions alone, best first.
+    pub unknown: Vec<Found<'a>>,
+    /// Pairs of listed effects, best first.
+    pub several: Vec<Found<'a>>,
+    /// Sets of listed effects with what unknown functions add on top, best first.
+    pub beside: Vec<(Vec<String>, Vec<Found<'a>>)>,
+    /// Other kinds of noise alone, best first.
+    pub noise: Vec<Found<'a>>,
+    /// The likeliest kind of noise with each other one, best first.
+    pub noise_pairs: Vec<Found<'a>>,
+    /// Another kind of noise beside the best listed effect, which makes it likelier by these nats.
+    pub noise_beside: Option<(String, f64)>,
+}
+
+/// Posterior probabilities.
+#[derive(Debug, Clone, Default)]
+pub(in crate::diagnose) struct Chances {
+    /// Kinds of explanation.
+    pub kinds: Probabilities,
+    /// Listed effects by their keys: alone, as part of a set, or beside something unknown.
+    pub effects: BTreeMap<String, f64>,
+    /// Places.
+    pub places: BTreeMap<String, f64>,
+    /// log of the odds of a gap against none, prior odds even.
+    pub log_odds: f64,
+}
+
+impl<'a> Findings<'a> {
+    /// Notes what unknown functions add on top of a set; returns whether they add nothing of weight.
+    pub fn add(&mut self, found: &Found<'a>, on_top: Option<Vec<Found<'a>>>) -> bool {
+        let Some(on_top) = on_top else { return false };
+        let added = on_top.first().map_or(0.0, |f| f.gain - found.gain);
+        self.beside.retain(|(keys, _)| !same(keys, &found.keys()));
+        self.beside.push((found.keys(), on_top));
+        leaves_nothing(found.gain, added)
+    }
+
+    /// Nats that unknown functions add on top of a set; `None` where that was not asked.
+    pub fn left(&self, keys: &[String]) -> Option<f64> {
+        let (_, on_top) = self.beside(keys)?;
+        let own = self.gain(keys)?;
+        Some(on_top.first().map_or(0.0, |f| f.gain - own))
+    }
+
+    /// Unknown functions on top of a set, best first.
+    pub fn beside(&self, keys: &[String]) -> Option<(&[String], &[Found<'a>])> {
+        let found = self.beside.iter().find(|(k, _)| same(k, keys))?;
+        Some((&found.0, &found.1))
+    }
+
+    /// A set of listed effects.
+    fn set(&self, keys: &[String]) -> Option<&Found<'a>> {
+        (self.listed.iter().chain(&self.several)).find(|f| same(&f.keys(), keys))
+    }
+
+    /// The fitted model of a set.
+    pub fn model(&self, keys: &[String]) -> Option<&Model<'a>> {
+        self.set(keys)?.model.as_ref()
+    }
+
+    /// The model that explains most.
+    pub fn best(&self) -> Option<&Model<'a>> {
+        let on_top = self.beside.iter().flat_map(|(_, all)| all);
+        (self
+            .listed
+            .iter()
+            .chain(&self.several)
+            .chain(&self.unknown)
+            .chain(on_top))
+        .filter(|f| f.model.is_some())
+        .max_by(|a, b| a.gain.total_cmp(&b.gain))
+        .and_then(|f| f.model.as_ref())
+    }
+
+    /// The listed effects that explain most, where something is missing.
+    pub fn best_listed(&self) -> Option<&Model<'a>> {
+        let all = self.listed.iter().chain(&self.several);
+        let gain = |f: &&Found<'a>| f.gain - self.price(f.terms.len());
+        let best = all.max_by(|a, b| gain(a).total_cmp(&gain(b)))?;
+        best.model.as_ref().filter(|_| best.gain > Thresholds::GAP)
+    }
+
+    /// log of the evidence of a set over that of the twin.
+    pub fn gain(&self, keys: &[String]) -> Option<f64> {
+        self.set(keys).map(|f| f.gain)
+    }
+
+    /// Evidence of the best single effect.
+    pub fn top(&self) -> f64 {
+        self.listed.first().map_or(0.0, |f| f.gain)
+    }
+
+    /// Returns whether a pair explains more than any single effect, its price paid.
+    pub fn wins(&self, pair: &Found<'_>) -> bool {
+        pair.gain - self.price(2) > self.top()
+    }
+
+    /// Nats that so many effects together cost: one of all that could stand beside the first, in either order, and what could be the
+    /// first law's fine print.
+    pub fn price(&self, count: usize) -> f64 {
+        let pairs = 0.5 * (self.listed.len() as f64 - 1.0);
+        let top = self.top().max(0.0);
+        (pairs.max(1.0).ln() + Thresholds::FINE_PRINT * top) * (count - 1) as f64
+    }
+
+    /// The kind of noise that the records ask for: where something is missing beside it, where nothing is without it.
+    pub fn asks_for_noise(&self) -> Option<&Found<'a>> {
+        let key = match &self.noise_beside {
+            Some((key, nats)) if *nats > Thresholds::NOISE => key.clone(),
+            _ => {
+                let best = self.noise.first()?;
+                let explains = best.gain > Thresholds::NOISE;
+                let enough = self.chances().log_odds <= Thresholds::GAP;
+                (explains && enough).then(|| best.last().key())?
+            }
+        };
+        (self.noise.iter()).find(|f| f.model.is_some() && f.last().key() == key)
+    }
+
+    /// Unknown functions that are not the library's. A wave at another place is no rival of a listed wave that explains as much: it is
+    /// the same law with the same prior, which no evidence can tell from it.
+    pub fn rivals(&self) -> impl Iterator<Item = &Found<'a>> {
+        let wave = (self.listed.iter())
+            .filter(|f| f.last().is_listed_wave())
+            .map(|f| f.gain)
+            .fold(f64::NEG_INFINITY, f64::max);
+        (self.unknown.iter()).filter(move |f| {
+            f.last().nature != Nature::Periodic || f.gain > wave + Thresholds::RIVALS
+        })
+    }
+
+    /// log of the evidence of nothing missing, whatever the noise, over that of the twin.
+    fn nothing(&self) -> f64 {
+        let [alone, pairs] = [&self.noise, &self.noise_pairs]
+            .map(|all| log_mean(&all.iter().map(|f| f.gain).collect::<Vec<f64>>()));
+        // The best of n kinds makes n − 1 of the n(n − 1)/2 pairs.
+        let pairs = pairs - (0.5 * self.noise.len() as f64).ln();
+        let all: Vec<f64> = [0.0, alone, pairs]
+            .into_iter()
+            .filter(|z| z.is_finite())
+            .collect();
+        log_mean(&all) + (all.len() as f64).ln()
+    }
+
+    /// Posterior probabilities of all hypotheses.
+    pub fn chances(&self) -> Chances {
+        let (listed, unknown) = (
+            self.listed.len().max(1) as f64,
+            self.unknown.len().max(1) as f64,
+        );
+        let each = Thresholds::LISTED / listed;
+        let every = (1.0 - Thresholds::LISTED) / unknown;
+        let places = |found: &Found<'_>| -> Vec<String> {
+            found.terms.iter().map(|t| t.target.clone()).collect()
+        };
+        let mut all: Vec<Weighed> = vec![];
+        for found in self.listed.iter().chain(&self.several) {
+            all.push(Weighed {
+                log_weight: each.ln() + found.gain - self.price(found.terms.len()),
+                kind: Kind::Listed(found.keys()),
+                places: places(found),
+            });
+        }
+        for found in self.rivals() {
+            all.push(Weighed {
+                log_weight: every.ln() + found.gain,
+                kind: Kind::Unknown,
+                places: places(found),
+            });
+        }
+        for (keys, on_top) in &self.beside {
+            for found in on_top {
+                let second = Thresholds::SECOND.ln() + every.ln() - self.price(keys.len());
+                all.push(Weighed {
+                    log_weight: each.ln() + second + found.gain,
+                    kind: Kind::Partial,
+                    places: places(found),
+                });
+            }
+        }
+        let logs: Vec<f64> = all.iter().map(|h| h.log_weight).collect();
+        let sum = log_mean(&logs) + (logs.len() as f64).ln();
+        let nothing = self.nothing();
+        let log_odds = sum - nothing;
+        let whole = sum.max(nothing) + (-log_odds.abs()).exp().ln_1p();
+        let mut chances = Chances {
+            kinds: Probabilities {
+                nothing: (nothing - whole).exp(),
+                ..Probabilities::default()
+            },
+            log_odds,
+            ..Chances::default()
+        };
+        // Which set explains a part, the sets' own evidence says: what is beside them is not known well enough to choose by.
+        let top = (all.iter())
+            .filter(|h| matches!(h.kind, Kind::Listed(_)))
+            .map(|h| h.log_weight)
+            .fold(f64::NEG_INFINITY, f64::max);
+        // Each set, its probability alone, and its weight among them.
+        let mut sets: Vec<(Vec<String>, f64, f64)> = vec![];
+        let kinds = &mut chances.kinds;
+        for hypothesis in all {
+            let p = (hypothesis.log_weight - whole).exp();
+            for place in &hypothesis.places {
+                *chances.places.entry(place.clone()).or_default() +=
+                    p / hypothesis.places.len() as f64;
+            }
+            match hypothesis.kind {
+                Kind::Unknown => kinds.unknown += p,
+                Kind::Partial => kinds.partial += p,
+                Kind::Listed(keys) => {
+                    kinds.listed += p;
+                    sets.push((keys, p, (hypothesis.log_weight - top).exp()));
+                }
+            }
+        }
+        let shares: f64 = sets.iter().map(|(.., share)| share).sum();
+        for (keys, p, share) in sets {
+            for key in keys {
+                *chances.effects.entry(key).or_default() += p + kinds.partial * share / shares;
+            }
+        }
+        chances
+    }
+}
+
+/// A hypothesis and the log of its weight times its evidence, over those of nothing.
+struct Weighed {
+    log_weight: f64,
+    kind: Kind,
+    places: Vec<String>,
+}
+
+enum Kind {
+    /// Listed effects alone.
+    Listed(Vec<String>),
+    /// Listed effects beside something unknown.
+    Partial,
+    /// Something unknown alone.
+    Unknown,
+}
+
+/// Returns whether what an unknown function adds on top of a gain is no more than chance, or than a law's fine print.
+pub(in crate::diagnose) fn leaves_nothing(gain: f64, added: f64) -> bool {
+    added < Thresholds::ADEQUATE.max(Thresholds::FINE_PRINT * gain)
+}
+
+fn same(a: &[String], b: &[String]) -> bool {
+    a.len() == b.len() && a.iter().all(|key| b.contains(key))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::hypotheses::term::{Part, Term};
+    use crate::effect::Catalogue;
+    use std::sync::Arc;
+
+    fn wave(nature: Nature, target: &str, gain: f64) -> Found<'static> {
+        let effect = Catalogue::default().effect("periodic-disturbance", "h1");
+        let part = Part::Effect {
+            effect: effect.unwrap(),
+            held: BTreeMap::new(),
+            kept: None,
+        };
+        let term = Term {
+            id: "wave".into(),
+            target: target.into(),
+            nature,
+            part,
+            axes: vec![],
+            family: None,
+            starts: vec![],
+            variables: vec![],
+            mark: 0.0,
+        };
+        Found {
+            terms: vec![Arc::new(term)],
+            gain,
+            model: None,
+        }
+    }
+
+    /// A wave of the flow explains what a wave of the level does, and takes no probability from it, unless it explains more.
+    #[test]
+    fn the_same_wave_elsewhere_is_no_rival() {
+        for (gain, expected) in [(45.0, 0.0), (60.0, 1.0)] {
+            let findings = Findings {
+                listed: vec![wave(Nature::Listed, "h1", 44.0)],
+                unknown: vec![wave(Nature::Periodic, "actuator", gain)],
+                ..Findings::default()
+            };
+            let unknown = findings.chances().kinds.unknown;
+            assert!((unknown - expected).abs() < 1e-4, "{gain}: {unknown}");
+        }
+    }
+}
