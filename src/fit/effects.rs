@@ -4,7 +4,7 @@
 //! size makes is a direction, and the gain along it, θ free to answer, says how large the effect wants to be.
 
 use super::axis::{EvidencePrior, SMALL};
-use super::magnitude::duration;
+use super::magnitude::{LONGEST, duration};
 use super::problem::Problem;
 use super::reference::Reference;
 use crate::effect::{Effect, Magnitude};
@@ -21,6 +21,8 @@ const HIGHEST: f64 = 0.2;
 const MOST: usize = 2000;
 /// Starts of an effect.
 const KEPT: usize = 3;
+/// Factor from one lag or delay to the next.
+const FACTOR: f64 = 3.0;
 /// Times of a change, as shares of the record.
 const TIMES: usize = 9;
 
@@ -128,7 +130,9 @@ pub(super) fn values(m: &Magnitude, records: &[Record]) -> Vec<f64> {
         "s" if m.off.is_none() => (1..=TIMES)
             .map(|i| duration * i as f64 / (TIMES + 1) as f64)
             .collect(),
-        "s" => [1.0, 4.0, 12.0].map(|steps| steps * dt).to_vec(),
+        "s" => std::iter::successors(Some(dt), |v| Some(FACTOR * v))
+            .take_while(|v| *v <= LONGEST * duration)
+            .collect(),
         _ => {
             let (low, high) = ends(m.starts);
             match m.limits.is_finite() {

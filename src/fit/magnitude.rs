@@ -14,8 +14,9 @@ const SEEN: RangeInclusive<f64> = 1e-8..=0.1;
 /// Factor to a change that is seen from one that is not, and how often it is looked for.
 const FARTHER: f64 = 1e5;
 const LOOKS: usize = 5;
-/// Longest lag or delay, as a share of the record: a longer one is seen too rarely to be told from the twin's own motion.
-const LONGEST: f64 = 0.125;
+/// Longest lag or delay, as a share of the record: a longer one shows fewer than four times, and passes for the twin's own motion. At half
+/// of it, a delay of 0.15 records is told as two shorter ones.
+pub(crate) const LONGEST: f64 = 0.25;
 
 /// Kind of an effect's magnitude.
 pub(crate) enum Kind {

@@ -50,7 +50,13 @@ pub(crate) fn run(
     if !problem.is_simulated() {
         // Sizes of effects are known once states are: where the twin follows the record with loud noise.
         let kinds = kinds(subject.effects, records);
-        let begin = problem.begin(&problem.centre());
+        let mut begin = problem.begin(&problem.centre());
+        // A step that is beyond the records changes nothing, whatever its size.
+        for (value, parameter) in begin.iter_mut().zip(space.iter()) {
+            if let Some(Kind::Shape { low, high }) = kinds.get(&parameter.name) {
+                *value = parameter.bounds.clamp(0.5 * (low + high));
+            }
+        }
         let states = problem.states(&begin);
         if let Ok(states) = states {
             let mut axes = problem.axes[..space.len()].to_vec();

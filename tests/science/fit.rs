@@ -57,6 +57,25 @@ fn intervals_cover_and_noise_levels_are_found() {
     assert!(held >= 35, "{held} of {all}");
 }
 
+/// The flow through k4 grows by 60 % at two thirds of the record. Searches begin where the step promises most, not beyond the record.
+#[test]
+fn a_step_is_found_within_the_record() {
+    let text = "twin = 'tanks'\n[record]\nstep = 4.0\nsamples = 150\n[[effect]]\nid = 'parameter-step'\ntarget = 'k4'";
+    let file = StudyFile::parse(text, "step.toml".as_ref()).unwrap();
+    let study = tanks().configure(&file).unwrap();
+    let noise = Noise::new(4, "step", 0);
+    let drive = study.drives().unwrap().draw(noise).unwrap();
+    let theta = [&TRUTH[..], &[0.6, 400.0]].concat();
+    let outputs = study.twin().simulate(&theta, &drive, noise).unwrap();
+    let fit = fitted(&study, &[Record::new(drive, outputs).unwrap()]);
+    let (size, time) = (
+        value(&fit, "parameter-step@k4.size"),
+        value(&fit, "parameter-step@k4.time"),
+    );
+    assert!((size - 0.6).abs() < 0.3, "{size}");
+    assert!((time - 400.0).abs() < 40.0, "{time}");
+}
+
 /// One cell in ten is emptied: θ moves by less than its own errors.
 #[test]
 fn a_tenth_of_the_cells_may_be_missing() {

@@ -199,13 +199,13 @@ fn beside_each_other<'a>(
         }
     }
     stage.tick()?;
-    if let Some(several) = several {
-        findings.several = several;
-    } else if breadth.pairs {
-        findings.several = pairs(&findings, terms, origin, breadth, enough)?;
-        if let Some(found) = alone(base, &mut findings, terms, origin, breadth)? {
-            enough |= findings.add(&found, on_top(&found, terms, origin, few)?);
-        }
+    findings.several = match several {
+        Some(several) => several,
+        None if breadth.pairs => pairs(&findings, terms, origin, breadth, enough)?,
+        None => vec![],
+    };
+    if let Some(found) = alone(base, &mut findings, terms, origin, breadth)? {
+        enough |= findings.add(&found, on_top(&found, terms, origin, few)?);
     }
     for i in 0..findings.several.len().min(2) {
         let found = findings.several[i].clone();
@@ -344,8 +344,8 @@ fn pairs<'a>(
     Ok(all)
 }
 
-/// A pair may win since the fits of its effects alone stopped early: these begin again where the pair ended. Returns the best single
-/// effect if it is a new one.
+/// A pair may win since the fits of its effects alone stopped early, or since one of the two stood for a coarse step: these begin again
+/// where the pair ended. Returns the best single effect if it is a new one.
 fn alone<'a>(
     base: &Model<'a>,
     findings: &mut Findings<'a>,

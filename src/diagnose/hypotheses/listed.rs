@@ -6,7 +6,7 @@ use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::thresholds::Thresholds;
 use crate::effect::{Effect, Law, Magnitude, Mark, TargetKind, targets};
 use crate::fit::axis::{Axis, EvidencePrior};
-use crate::fit::magnitude::{largest, shape_axis, size_axis};
+use crate::fit::magnitude::{LONGEST, largest, shape_axis, size_axis};
 use crate::math::{ends, quantile};
 use crate::twin::{Interval, Parameter, Twin};
 use std::collections::BTreeMap;
@@ -251,13 +251,14 @@ impl Library<'_> {
                 )
             }
             ("s", Some(_)) => {
-                let mut longest = (duration / 8.0).max(0.6 * dt);
+                let mut longest = (LONGEST * duration).max(0.6 * dt);
                 let (least, most) = effect.kind().memories();
                 if least < most {
                     longest = longest.min((most - 1) as f64 * dt);
                 }
                 let octaves = std::iter::successors(Some(0.5 * dt), |tau| Some(2.0 * tau));
-                let grid = octaves.take_while(|tau| *tau <= longest).collect();
+                let octaves = octaves.take_while(|tau| *tau < longest);
+                let grid = octaves.chain([longest]).collect();
                 logarithmic(0.3 * dt, longest, grid)
             }
             ("s", None) => {
@@ -381,9 +382,9 @@ mod tests {
     use crate::diagnose::fixture::{biased_record, tanks};
     use crate::likelihood::measured;
 
-    /// A dead zone or a play may be so wide that it swallows every command: a narrower limit would hide the law that is missing.
+    /// A dead zone or a play may swallow every command, a lag may be long: a narrower search would hide the law that is missing.
     #[test]
-    fn widths_reach_over_the_whole_signal() {
+    fn widths_and_lags_are_looked_for_all_over_the_record() {
         let study = tanks(60);
         let records = [biased_record(&study, 0.0, 5)];
         let settings = DiagnoseSettings::default();
@@ -398,5 +399,9 @@ mod tests {
             let widest = term.starts.iter().map(|start| start.m[0]);
             assert!(widest.fold(0.0, f64::max) > 0.5 * largest, "{id}");
         }
+        let lag = terms.iter().find(|term| term.id == "actuator-lag").unwrap();
+        let longest = lag.starts.iter().map(|start| start.m[0]);
+        let duration = 4.0 * 60.0;
+        assert!(longest.fold(0.0, f64::max) > duration / 16.0);
     }
 }
