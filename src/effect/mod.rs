@@ -36,6 +36,7 @@ pub use key::{EffectKey, EffectPattern};
 pub use kind::{EffectKind, OtherState};
 pub use law::{ForcePoint, Instant};
 pub(crate) use law::{Law, TargetKind};
+pub(crate) use library::{clamp, lag};
 pub use magnitude::Magnitude;
 pub(crate) use marks::{Mark, clipped, rounded, stops};
 pub use placed::Effect;

@@ -11,7 +11,7 @@
 
 use super::basis::{Of, TERMS, pairs, sum_of_one, sum_of_two};
 use super::term::{Nature, Part, Start, Term};
-use crate::effect::{Effect, EffectKind, Magnitude};
+use crate::effect::{Effect, EffectKind, Instant, Magnitude, clamp, lag};
 use crate::fit::axis::{Axis, EvidencePrior};
 use crate::twin::{Interval, Parameter};
 use std::collections::BTreeMap;
@@ -176,20 +176,29 @@ pub(super) fn of_state(target: &str, variables: &[Variable], largest: f64) -> Te
     )
 }
 
+/// Kind of a law that a signal passes, of so many coefficients.
+fn passing(
+    id: &str,
+    is_sensor: bool,
+    [sensor, actuator]: [&'static str; 2],
+    count: usize,
+    law: impl Fn(&[f64], Instant, &mut [f64], f64) -> f64 + Send + Sync + 'static,
+) -> EffectKind {
+    let kind = match is_sensor {
+        true => EffectKind::sensor(id, sensor, law),
+        false => EffectKind::actuator(id, actuator, law),
+    };
+    with_coefficients(kind, count)
+}
+
 /// An unknown distortion f(s) of a signal.
 pub(super) fn of_signal(target: &str, is_sensor: bool, variable: &Variable, largest: f64) -> Term {
     let id = format!("f({})", variable.name);
     let ends = variable.ends();
-    let law = move |m: &[f64], _: crate::effect::Instant, _: &mut [f64], s: f64| {
-        s + sum_of_one(m, s, ends)
-    };
-    let kind = match is_sensor {
-        true => EffectKind::sensor(&id, "s + f(s)", law),
-        false => EffectKind::actuator(&id, "u + f(u)", law),
-    };
+    let law = move |m: &[f64], _: Instant, _: &mut [f64], s: f64| s + sum_of_one(m, s, ends);
     let seen = vec![(variable.name.clone(), ends.0, ends.1)];
     term(
-        with_coefficients(kind, TERMS),
+        passing(&id, is_sensor, ["s + f(s)", "u + f(u)"], TERMS, law),
         target,
         Nature::Function,
         weights(1),
@@ -224,22 +233,16 @@ pub(super) fn of_reading(target: &str, output: usize, variable: &Variable, large
 /// An unknown answer of a signal to its past: s + Σ β_k·(s seen through a first-order lag of τ_k − s).
 pub(super) fn of_past(target: &str, is_sensor: bool, name: &str, times: [f64; PASTS]) -> Term {
     let id = format!("past({name})");
-    let law = move |m: &[f64], now: crate::effect::Instant, memory: &mut [f64], s: f64| {
+    let law = move |m: &[f64], now: Instant, memory: &mut [f64], s: f64| {
         let mut sum = s;
         for ((m, z), tau) in m.iter().zip(memory).zip(times) {
-            let a = (-now.dt / tau).exp();
-            *z = a * *z + (1.0 - a) * s;
-            sum += m * (*z - s);
+            sum += m * (lag(tau, now.dt, z, s) - s);
         }
         sum
     };
-    let kind = match is_sensor {
-        true => EffectKind::sensor(&id, "s + Σ b·(lagged s − s)", law),
-        false => EffectKind::actuator(&id, "u + Σ b·(lagged u − u)", law),
-    };
-    let kind = with_coefficients(kind, PASTS).memory(PASTS);
+    let formulas = ["s + Σ b·(lagged s − s)", "u + Σ b·(lagged u − u)"];
     term(
-        kind,
+        passing(&id, is_sensor, formulas, PASTS, law).memory(PASTS),
         target,
         Nature::Past,
         vec![vec![1.0 / PASTS as f64; PASTS]],
@@ -259,10 +262,10 @@ pub(super) enum Trace {
 
 impl Trace {
     /// The value after z, the signal being s.
-    pub fn next(self, z: f64, s: f64, dt: f64) -> f64 {
+    pub fn next(self, mut z: f64, s: f64, dt: f64) -> f64 {
         match self {
-            Self::Lag(tau) => s + (-dt / tau).exp() * (z - s),
-            Self::Play(distance) => z.clamp(s - distance, s + distance),
+            Self::Lag(tau) => lag(tau, dt, &mut z, s),
+            Self::Play(distance) => clamp(z, s - distance, s + distance),
         }
     }
 
@@ -287,16 +290,13 @@ pub(super) fn of_trace(
 ) -> Term {
     let id = format!("f({})", variable.name);
     let ends = variable.ends();
-    let law = move |m: &[f64], now: crate::effect::Instant, memory: &mut [f64], s: f64| {
+    let law = move |m: &[f64], now: Instant, memory: &mut [f64], s: f64| {
         memory[0] = trace.next(memory[0], s, now.dt);
         s + sum_of_one(m, memory[0], ends)
     };
-    let kind = match is_sensor {
-        true => EffectKind::sensor(&id, "s + f(trace of s)", law),
-        false => EffectKind::actuator(&id, "u + f(trace of u)", law),
-    };
+    let formulas = ["s + f(trace of s)", "u + f(trace of u)"];
     term(
-        with_coefficients(kind, TERMS).memory(1),
+        passing(&id, is_sensor, formulas, TERMS, law).memory(1),
         target,
         Nature::Past,
         weights(1),
@@ -349,5 +349,19 @@ mod tests {
         }
         let lists = weights(1);
         assert!(lists[0][4] > 3.0 * lists[2][4]);
+    }
+
+    /// A filter's points may leave all bounds: a law then gives a number or NaN, and never ends the program.
+    #[test]
+    fn traces_follow_and_stand_nan() {
+        assert_eq!(
+            Trace::Play(0.5).of(&[1.0, 1.2, 2.0, 1.8], 0.1),
+            [1.0, 1.0, 1.5, 1.5]
+        );
+        let lagged = Trace::Lag(0.1).next(0.0, 1.0, 0.1);
+        assert!((lagged - (1.0 - (-1.0_f64).exp())).abs() < 1e-15);
+        for trace in [Trace::Lag(1.0), Trace::Play(0.5)] {
+            let _ = trace.next(1.0, f64::NAN, 0.1);
+        }
     }
 }

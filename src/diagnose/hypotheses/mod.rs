@@ -94,7 +94,7 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
     let mut terms = vec![];
     let range = |kind: TargetKind, i: usize| {
         let all = std::iter::once(scales).chain(seen);
-        ends(all.map(|scales| scales.columns(kind, i)))
+        visited(all.map(|scales| scales.columns(kind, i)))
     };
     let variable = |kind: TargetKind, of: Of, i: usize, name: &str| {
         let (low, high) = range(kind, i)?;
@@ -182,7 +182,7 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
                     PLAYS.map(|part| ("play of", Trace::Play(0.5 * part * (seen.high - seen.low))));
                 terms.extend(lags.chain(plays).filter_map(|(word, trace)| {
                     let values = trace.of(&scales.columns(kind, j), scales.dt());
-                    let (low, high) = ends(std::iter::once(values))?;
+                    let (low, high) = visited(std::iter::once(values))?;
                     let name = format!("{word} {name}");
                     let of = Of::Signal;
                     let seen = Variable {
@@ -287,7 +287,7 @@ fn disturbances(
 }
 
 /// Range that lists of values cover, but for a hundredth of each; `None` where nothing moves.
-fn ends(all: impl Iterator<Item = Vec<f64>>) -> Option<(f64, f64)> {
+fn visited(all: impl Iterator<Item = Vec<f64>>) -> Option<(f64, f64)> {
     let at = |values: &[f64], p| quantile(values, p).unwrap_or(f64::NAN);
     let ends = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), values| {
         (low.min(at(&values, 0.005)), high.max(at(&values, 0.995)))

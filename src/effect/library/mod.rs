@@ -7,6 +7,8 @@ mod sentences;
 mod shared;
 mod state;
 
+pub(crate) use shared::{clamp, lag};
+
 use super::kind::EffectKind;
 
 /// Every effect of the library, in the order of the table of `docs/choosing-effects.md`.

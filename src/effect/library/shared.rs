@@ -20,13 +20,13 @@ pub(super) fn sign(x: f64) -> f64 {
 }
 
 /// Unlike `f64::clamp`, no panic when a fit tries `low > high`, and NaN stays NaN.
-pub(super) fn clamp(value: f64, low: f64, high: f64) -> f64 {
+pub(crate) fn clamp(value: f64, low: f64, high: f64) -> f64 {
     let value = if value < low { low } else { value };
     if value > high { high } else { value }
 }
 
 /// z ← a·z + (1 − a)·value, a = exp(−Δt/τ); the value itself at τ = 0.
-pub(super) fn lag(tau: f64, dt: f64, z: &mut f64, value: f64) -> f64 {
+pub(crate) fn lag(tau: f64, dt: f64, z: &mut f64, value: f64) -> f64 {
     *z = if tau > 0.0 {
         let a = (-dt / tau).exp();
         a * *z + (1.0 - a) * value

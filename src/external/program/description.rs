@@ -26,7 +26,10 @@ pub(super) struct Description {
 
 /// As it stands in the line.
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "an object with name, parameters, outputs and record"
+)]
 struct Told {
     name: String,
     parameters: Vec<ToldParameter>,
@@ -37,7 +40,7 @@ struct Told {
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an object with name and prior")]
 struct ToldParameter {
     name: String,
     #[serde(default)]
@@ -47,7 +50,7 @@ struct ToldParameter {
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "an object with name")]
 struct ToldQuantity {
     name: String,
     #[serde(default)]
@@ -173,6 +176,11 @@ mod tests {
             ("[1, 3]", "[3, 1]", "invalid interval"),
             ("[0.1, 9]", "[2, 9]", "leaves its bounds"),
             ("[{\"name\": \"y\"}]", "[]", "no output"),
+            (
+                "[{\"name\": \"y\"}]",
+                "[\"y\"]",
+                "expected an object with name",
+            ),
             ("\"samples\": 60,", "", "step and samples are needed"),
             ("0.1, \"samples\"", "-1, \"samples\"", "step = -1"),
             ("\"hold\": 5", "\"hold\": 0", "hold = 0"),

@@ -86,7 +86,10 @@ pub(super) enum Answer {
 }
 
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "an object with id and outputs, diverged or error"
+)]
 struct Told {
     id: u64,
     outputs: Option<BTreeMap<String, Vec<Option<f64>>>>,
@@ -278,6 +281,7 @@ mod tests {
             ),
             (r#"{"id": 7}"#, "exactly one of"),
             (r#"{"id": 7, "outptus": {}}"#, "unknown key `outptus`"),
+            ("[7]", "expected an object with id and outputs"),
         ] {
             let message = read(line).unwrap_err();
             assert!(message.contains(part), "{message}");

@@ -7,7 +7,7 @@ const QUOTED: usize = 160;
 /// Longest message of a parser, in characters: it may list what it knows.
 const MESSAGE: usize = 2000;
 /// Words of parsers, and those of their readers.
-const WORDS: [(&str, &str); 16] = [
+const WORDS: [(&str, &str); 15] = [
     ("invalid type: map", "found a table"),
     ("invalid type: sequence", "found a list"),
     ("invalid type: ", "found "),
@@ -22,7 +22,6 @@ const WORDS: [(&str, &str); 16] = [
         "expected an array of length 2",
         "expected two numbers, [low, high]",
     ),
-    ("expected struct ", "expected a table of "),
     ("wanted string or table", "expected a text or a table"),
     ("unknown field", "unknown key"),
     ("missing field", "missing key"),
