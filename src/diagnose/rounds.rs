@@ -2,7 +2,7 @@
 
 use super::base::Base;
 use super::error::DiagnoseError;
-use super::explain::explore::{Known, Terms, explore};
+use super::explain::explore::{Terms, explore};
 use super::explain::findings::{Chances, Findings};
 use super::explain::search::{Breadth, listed};
 use super::hypotheses::noise::kinds;
@@ -18,8 +18,6 @@ use crate::record::Record;
 use crate::study::Study;
 use std::sync::Arc;
 
-/// Share of the best effect's evidence below which what a finer step explains does not change which effects stand out.
-const MINOR: f64 = 1.0 / 3.0;
 /// Most kinds of noise that are added to the twin's own.
 const ROUNDS: usize = 2;
 
@@ -33,81 +31,111 @@ pub(in crate::diagnose) struct Explored<'s, 'a> {
     pub not_tested: Vec<String>,
 }
 
-/// Fits the twin, searches for what explains the records beside it, and hands it all on.
+impl Explored<'_, '_> {
+    /// log of the evidence of all hypotheses together.
+    fn log_evidence(&self) -> f64 {
+        self.base.model.log_evidence + self.chances.log_evidence
+    }
+}
+
+/// Fits the twin, searches for what explains the records beside it, and hands it all on. Where its step shows, the same is done with a
+/// finer one, and the search whose explanations are together likelier counts.
 pub(in crate::diagnose) fn search<R>(
     study: &Study,
     records: &[Record],
     settings: &DiagnoseSettings,
     progress: &Progress,
-    then: impl FnOnce(Explored<'_, '_>) -> Result<R, DiagnoseError>,
+    then: impl Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
 ) -> Result<R, DiagnoseError> {
     let stage = progress.stage("fit", 1);
     let measured = measured(study.twin(), records, &settings.beliefs(study))?;
     let base = Base::new(&measured, records, settings)?;
     stage.tick()?;
-    match step_of(study, &base, settings)? {
-        Some(step) => with_step(study, &base, step, None, settings, progress, then),
-        None => explored(study, base, None, settings, ROUNDS, progress, then),
+    explored(study, base, settings, ROUNDS, progress, |own| {
+        if let Some(step) = finer(&own)? {
+            let found = with_step(own.base, step, study, settings, progress, |other| {
+                let wins = other.log_evidence() - own.log_evidence() > Thresholds::STEP_WINS;
+                wins.then(|| then(other)).transpose()
+            });
+            match found {
+                // A twin that its own step holds together may go nowhere with a finer one.
+                Ok(None) | Err(DiagnoseError::NoFit) => {}
+                Ok(Some(found)) => return Ok(found),
+                Err(error) => return Err(error),
+            }
+        }
+        then(own)
+    })
+}
+
+/// The finer step that the records may ask for: beside a gap, noise levels are fitted loud, and hide it, unless the gap is explained.
+fn finer(own: &Explored<'_, '_>) -> Result<Option<FinerStep>, DiagnoseError> {
+    let explained = own.findings.top().max(0.0);
+    match (
+        finer_step(&own.base.model, explained)?,
+        own.findings.best_listed(),
+    ) {
+        (None, Some(model)) => finer_step(model, explained),
+        (step, _) => Ok(step),
     }
 }
 
-/// The finer step that the records ask for. A gap may pass for one: an effect that is more probable, as one of all that are listed, is
-/// asked first.
-fn step_of(
-    study: &Study,
-    base: &Base<'_>,
-    settings: &DiagnoseSettings,
-) -> Result<Option<FinerStep>, DiagnoseError> {
-    let Some((step, gain)) = finer_step(&base.model)? else {
-        return Ok(None);
-    };
-    let model = &base.model;
-    let terms = base.listed(study, settings)?;
-    let breadth = Breadth::of(model, settings.quick);
-    let effects = listed(model, &terms, model.log_evidence, &[], breadth)?;
-    let price = (effects.len() as f64 / Thresholds::LISTED).ln();
-    let best = (effects.first()).filter(|effect| effect.gain - price > gain);
-    match best.and_then(|effect| effect.model.as_ref()) {
-        Some(beside) => Ok(finer_step(beside)?.map(|(step, _)| step)),
-        None => Ok(Some(step)),
-    }
-}
-
-/// Fits the twin with a finer step, and searches with it; where it matters little beside what was found, goes on from that.
+/// Fits the twin with a finer step and the same kinds of noise, and searches with it.
 fn with_step<R>(
-    study: &Study,
-    base: &Base<'_>,
+    own: &Base<'_>,
     step: FinerStep,
-    known: Option<Known<'_>>,
+    study: &Study,
     settings: &DiagnoseSettings,
     progress: &Progress,
-    then: impl FnOnce(Explored<'_, '_>) -> Result<R, DiagnoseError>,
+    then: impl Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
 ) -> Result<R, DiagnoseError> {
-    let records = base.model.problem.records;
+    let records = own.model.problem.records;
     let twin = step.of(study.twin());
     let twin = twin.as_ref().unwrap_or(study.twin());
     let measured = measured(twin, records, &settings.beliefs(study))?;
     let begin = DiagnoseSettings {
-        initial: Some(base.theta.clone()),
+        initial: Some(own.theta.clone()),
         ..settings.clone()
     };
     let base = Base {
         step: Some(step),
         ..Base::new(&measured, records, &begin)?
     };
-    explored(study, base, known, settings, ROUNDS, progress, then)
+    with_noises(&own.noises, study, base, settings, progress, then)
 }
 
-/// Searches for what explains the records beside a fitted twin, from what is known with another step where that is given; again where
-/// they ask for another kind of noise, or for a finer step.
+/// Adds kinds of noise to a fitted twin, and searches beside it.
+fn with_noises<R>(
+    noises: &[Arc<Term>],
+    study: &Study,
+    base: Base<'_>,
+    settings: &DiagnoseSettings,
+    progress: &Progress,
+    then: impl Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
+) -> Result<R, DiagnoseError> {
+    let rounds = ROUNDS - base.noises.len().min(ROUNDS);
+    if let Some((first, others)) = noises.split_first() {
+        let (model, first) = (&base.model, std::slice::from_ref(first));
+        let breadth = Breadth::of(model, settings.quick);
+        let found = listed(model, first, model.log_evidence, &[], breadth)?;
+        if let Some(model) = found.first().and_then(|found| found.model.as_ref()) {
+            let twin = model.problem.twin.clone();
+            if let Some(noisier) = base.with_noise(model, &twin)? {
+                return with_noises(others, study, noisier, settings, progress, then);
+            }
+        }
+    }
+    explored(study, base, settings, rounds, progress, then)
+}
+
+/// Searches for what explains the records beside a fitted twin; again where they ask for another kind of noise.
 fn explored<R>(
     study: &Study,
     base: Base<'_>,
-    known: Option<Known<'_>>,
     settings: &DiagnoseSettings,
     rounds: usize,
     progress: &Progress,
-    then: impl FnOnce(Explored<'_, '_>) -> Result<R, DiagnoseError>,
+    then: impl Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
 ) -> Result<R, DiagnoseError> {
     let library = base.library();
     let effects = base.listed(study, settings)?;
@@ -127,23 +155,12 @@ fn explored<R>(
     };
     let breadth = Breadth::of(&base.model, settings.quick);
     let explain = !settings.detection_only;
-    let findings = explore(&base.model, &terms, breadth, known, explain, progress)?;
+    let findings = explore(&base.model, &terms, breadth, explain, progress)?;
     if let Some(model) = findings.asks_for_noise().and_then(|f| f.model.as_ref()) {
         let twin = model.problem.twin.clone();
         if let Some(noisier) = base.with_noise(model, &twin)? {
-            return explored(study, noisier, None, settings, rounds - 1, progress, then);
+            return explored(study, noisier, settings, rounds - 1, progress, then);
         }
-    }
-    // Beside a gap, noise levels are fitted loud, and hide the step.
-    if let (None, Some(model)) = (base.step, findings.best_listed())
-        && let Some((step, gain)) = finer_step(model)?
-    {
-        let minor = gain < MINOR * findings.top() && base.noises.is_empty();
-        let known = minor.then_some(Known {
-            findings: &findings,
-            origin: base.model.log_evidence,
-        });
-        return with_step(study, &base, step, known, settings, progress, then);
     }
     then(Explored {
         study,

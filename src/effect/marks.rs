@@ -11,7 +11,8 @@ pub(crate) enum Mark {
     Present(Vec<f64>),
 }
 
-/// Equal values at an end that noise does not bring about, and how many times more often than a usual value they come.
+/// Equal values at an end that noise does not bring about, and how many times more often than a usual value, and than the next one, they
+/// come: a rounded oscillation is often at its ends, and hardly less often beside them.
 const TIES: usize = 4;
 const OFTEN: usize = 3;
 /// Samples for each multiple of the step within the signal's range, at least, where the step is one of digits: files round,
@@ -50,10 +51,14 @@ pub(crate) fn clipped(outputs: &[f64]) -> Mark {
     }
     let mut counts: Vec<usize> = values.iter().map(|(_, count)| *count).collect();
     counts.sort_unstable();
-    let least = TIES.max(OFTEN * counts[counts.len() / 2]);
-    let at = |(value, count): (f64, usize), off: f64| if count >= least { value } else { off };
-    let low = at(values[0], f64::NEG_INFINITY);
-    let high = at(values[values.len() - 1], f64::INFINITY);
+    let usual = counts[counts.len() / 2];
+    let at = |(value, count): (f64, usize), (_, next): (f64, usize), off: f64| {
+        let piled_up = count >= TIES.max(OFTEN * usual.max(next));
+        if piled_up { value } else { off }
+    };
+    let last = values.len() - 1;
+    let low = at(values[0], values[1], f64::NEG_INFINITY);
+    let high = at(values[last], values[last - 1], f64::INFINITY);
     if low.is_finite() || high.is_finite() {
         Mark::Present(vec![low, high])
     } else {
@@ -128,6 +133,11 @@ mod tests {
         assert_eq!(clipped(&digits), Mark::Absent);
         assert_eq!(rounded(&digits), Mark::Absent);
         assert_eq!(clipped(&[]), Mark::Absent);
+        // Nor are the turning points of a rounded oscillation.
+        let wave: Vec<f64> = (0..300)
+            .map(|k| ((0.13 * k as f64).sin() * 20.0).round() / 10.0)
+            .collect();
+        assert_eq!(clipped(&wave), Mark::Absent);
         assert_eq!(rounded(&[1.0; 50]), Mark::Absent);
     }
 

@@ -1,14 +1,13 @@
 //! The order of the search: single explanations, what they leave, pairs.
 
 use super::findings::{Findings, leaves_nothing};
-use super::search::{Breadth, FEW, Found, listed, own_theta, sort, unknown};
+use super::search::{Breadth, Found, listed, own_theta, sort, unknown};
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::scales::Scales;
 use crate::diagnose::hypotheses::term::{Part, Term};
 use crate::diagnose::model::Model;
 use crate::diagnose::thresholds::Thresholds;
 use crate::progress::{Progress, Stage};
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Steps of the search that are reported: functions, effects, functions of the corrected twin, what is left, pairs.
@@ -32,80 +31,17 @@ pub(in crate::diagnose) fn explore<'a>(
     base: &Model<'a>,
     terms: &Terms<'_>,
     breadth: Breadth,
-    known: Option<Known<'_>>,
     explain: bool,
     progress: &Progress,
 ) -> Result<Findings<'a>, DiagnoseError> {
     let stage = progress.stage("explain", STEPS);
-    let (findings, several) = match known {
-        Some(known) => carried_on(known, base, terms, breadth, &stage)?,
-        None => (one_by_one(base, terms, breadth, &stage)?, None),
-    };
+    let findings = one_by_one(base, terms, breadth, &stage)?;
     let findings = match explain {
-        true => beside_each_other(findings, base, terms, breadth, several, &stage)?,
+        true => beside_each_other(findings, base, terms, breadth, &stage)?,
         false => findings,
     };
     stage.finish();
     Ok(findings)
-}
-
-/// Findings beside the same twin with another step.
-#[derive(Clone, Copy)]
-pub(in crate::diagnose) struct Known<'k> {
-    pub findings: &'k Findings<'k>,
-    /// log Z of that twin.
-    pub origin: f64,
-}
-
-/// Carries the fits that are known with another step on from where they ended: single explanations, and pairs.
-fn carried_on<'a>(
-    known: Known<'_>,
-    base: &Model<'a>,
-    terms: &Terms<'_>,
-    breadth: Breadth,
-    stage: &Stage,
-) -> Result<(Findings<'a>, Option<Vec<Found<'a>>>), DiagnoseError> {
-    let old = known.findings;
-    let origin = base.log_evidence;
-    let kept = |found: &Found<'_>| Found {
-        terms: found.terms.clone(),
-        gain: found.gain + known.origin - origin,
-        model: None,
-    };
-    // What does not stand out keeps its evidence: another step does not help it more than the others.
-    let least = FIRST * old.top();
-    let carry = |found: &Found<'_>| -> Result<Found<'a>, DiagnoseError> {
-        let mut carried = kept(found);
-        if let Some(old) = found.model.as_ref().filter(|_| found.gain > least)
-            && let Some(new) = old.beside_twin(base)?
-        {
-            carried.gain += new.log_evidence - old.log_evidence;
-            carried.model = Some(new);
-        }
-        Ok(carried)
-    };
-    let carry_all = |all: &[Found<'_>]| -> Result<Vec<Found<'a>>, DiagnoseError> {
-        let mut all: Vec<Found<'a>> = all.par_iter().map(carry).collect::<Result<_, _>>()?;
-        sort(&mut all);
-        Ok(all)
-    };
-    let best: Vec<Arc<Term>> = (old.unknown.iter().take(FEW))
-        .filter_map(|found| found.terms.last().cloned())
-        .collect();
-    let mut functions = unknown(base, &best, origin, breadth.few())?;
-    let others = old.unknown.iter().filter(|found| {
-        let again = functions.iter().any(|f| f.keys() == found.keys());
-        !again
-    });
-    functions.extend(others.map(kept).collect::<Vec<_>>());
-    sort(&mut functions);
-    stage.tick()?;
-    let listed = carry_all(&old.listed)?;
-    stage.tick()?;
-    let findings = with_noise(base, terms, breadth, listed, functions)?;
-    let several = carry_all(&old.several)?;
-    stage.tick()?;
-    Ok((findings, Some(several)))
 }
 
 /// Unknown functions and effects alone, and other kinds of noise.
@@ -168,13 +104,12 @@ fn with_noise<'a>(
     })
 }
 
-/// Adds what single effects leave, pairs, which are searched unless they are given, and what these leave; stops where nothing is missing.
+/// Adds what single effects leave, pairs, and what these leave; stops where nothing is missing.
 fn beside_each_other<'a>(
     mut findings: Findings<'a>,
     base: &Model<'a>,
     terms: &Terms<'_>,
     breadth: Breadth,
-    several: Option<Vec<Found<'a>>>,
     stage: &Stage,
 ) -> Result<Findings<'a>, DiagnoseError> {
     let is_null = findings.chances().log_odds <= Thresholds::GAP;
@@ -199,13 +134,18 @@ fn beside_each_other<'a>(
         }
     }
     stage.tick()?;
-    findings.several = match several {
-        Some(several) => several,
-        None if breadth.pairs => pairs(&findings, terms, origin, breadth, enough)?,
-        None => vec![],
+    findings.several = match breadth.pairs {
+        true => pairs(&findings, terms, origin, breadth, enough)?,
+        false => vec![],
     };
     if let Some(found) = alone(base, &mut findings, terms, origin, breadth)? {
         enough |= findings.add(&found, on_top(&found, terms, origin, few)?);
+    }
+    if let Some(beside) = instead_of_second(&findings, terms.noise, origin, breadth.of_all())? {
+        findings.noise_beside = Some(beside);
+        if findings.asks_for_noise().is_some() {
+            return Ok(findings);
+        }
     }
     for i in 0..findings.several.len().min(2) {
         let found = findings.several[i].clone();
@@ -229,7 +169,7 @@ fn beside_each_other<'a>(
 }
 
 /// The outliers that are likeliest beside the best listed effect, at other sensors than its own. Correlated noise is not asked for here:
-/// it would pass for what an effect leaves.
+/// it would pass for what an effect leaves. It is a rival of a second effect alone.
 fn noise_beside<'a>(
     singles: &[Found<'a>],
     noise: &[Arc<Term>],
@@ -247,6 +187,31 @@ fn noise_beside<'a>(
         .collect();
     let found = listed(model, &outliers, origin, &[], breadth)?;
     Ok((found.first()).map(|f| (f.last().key(), f.gain - best.gain)))
+}
+
+/// The kind of noise that explains more beside one effect of the best pair than the other effect does, its price paid.
+fn instead_of_second(
+    findings: &Findings<'_>,
+    noise: &[Arc<Term>],
+    origin: f64,
+    breadth: Breadth,
+) -> Result<Option<(String, f64)>, DiagnoseError> {
+    let first = findings.several.first();
+    let Some(pair) = first.filter(|pair| findings.wins(pair)) else {
+        return Ok(None);
+    };
+    let keys = pair.keys();
+    let (mut most, mut best) = (pair.gain - findings.price(2), None);
+    for single in (findings.listed.iter()).filter(|f| keys.contains(&f.last().key())) {
+        let Some(model) = &single.model else { continue };
+        if let Some(found) = listed(model, noise, origin, &[], breadth)?.first()
+            && found.gain > most
+        {
+            most = found.gain;
+            best = Some((found.last().key(), found.gain - single.gain));
+        }
+    }
+    Ok(best)
 }
 
 /// Second kinds of noise beside the likeliest one.
@@ -344,8 +309,8 @@ fn pairs<'a>(
     Ok(all)
 }
 
-/// A pair may win since the fits of its effects alone stopped early, or since one of the two stood for a coarse step: these begin again
-/// where the pair ended. Returns the best single effect if it is a new one.
+/// A pair may win since the fits of its effects alone stopped early: these begin again where the pair ended. Returns the best single effect
+/// if it is a new one.
 fn alone<'a>(
     base: &Model<'a>,
     findings: &mut Findings<'a>,

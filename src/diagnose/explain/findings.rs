@@ -44,6 +44,8 @@ pub(in crate::diagnose) struct Chances {
     pub places: BTreeMap<String, f64>,
     /// log of the odds of a gap against none, prior odds even.
     pub log_odds: f64,
+    /// log of the evidence of all hypotheses over that of the twin.
+    pub log_evidence: f64,
 }
 
 impl<'a> Findings<'a> {
@@ -210,6 +212,7 @@ impl<'a> Findings<'a> {
                 ..Probabilities::default()
             },
             log_odds,
+            log_evidence: whole,
             ..Chances::default()
         };
         // Which set explains a part, the sets' own evidence says: what is beside them is not known well enough to choose by.

@@ -8,18 +8,8 @@ use truetwin::record::{Record, Signal};
 
 const SAMPLES: usize = 240;
 
-/// Parameters around 1e-9 and 1e9, outputs around 1e-6 and 1e6; and everything at once, steps of nanoseconds and of months included.
-const UNITS: [Units; 4] = [
-    Units {
-        parameters: 1e-9,
-        outputs: 1e6,
-        ..Units::PLAIN
-    },
-    Units {
-        parameters: 1e9,
-        outputs: 1e-6,
-        ..Units::PLAIN
-    },
+/// Everything at once: parameters around 1e-9 and 1e9, outputs around 1e-6 and 1e6, steps of nanoseconds and of months.
+const UNITS: [Units; 2] = [
     Units {
         parameters: 1e9,
         states: 1e-9,
