@@ -6,16 +6,20 @@ use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::scales::Scales;
 use crate::diagnose::hypotheses::term::{Part, Term};
 use crate::diagnose::model::Model;
+use crate::diagnose::settings::DiagnoseSettings;
 use crate::diagnose::thresholds::Thresholds;
 use crate::progress::{Progress, Stage};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Steps of the search that are reported: functions, effects, functions of the corrected twin, what is left, pairs.
 const STEPS: usize = 5;
 /// Single effects that are looked at for something left, or for a second one beside them.
 const SINGLES: usize = 3;
-/// Least share of the best single effect's evidence of a first of a pair.
+/// Least share of the best single effect's evidence of a first of a pair, and of what is fitted again with another step or noise.
 const FIRST: f64 = 1.0 / 3.0;
+/// Unknown functions that are fitted again with another step or noise.
+const FUNCTIONS: usize = 8;
 
 /// Terms of a diagnosis.
 pub(in crate::diagnose) struct Terms<'t> {
@@ -26,20 +30,72 @@ pub(in crate::diagnose) struct Terms<'t> {
     pub unknown: &'t dyn Fn(&[Scales<'_>]) -> Vec<Arc<Term>>,
 }
 
+/// Findings beside the same twin with another step or noise: what stood out is fitted again, the rest keeps its evidence.
+#[derive(Clone, Copy)]
+pub(in crate::diagnose) struct Known<'k> {
+    pub findings: &'k Findings<'k>,
+    /// log Z of that twin.
+    pub origin: f64,
+}
+
+impl Known<'_> {
+    /// Keys of what stood out: effects alone and in pairs, the best unknown functions.
+    fn stood_out(&self) -> BTreeSet<String> {
+        let old = self.findings;
+        let singles = (old.listed.iter()).filter(|found| found.gain > FIRST * old.top());
+        let functions = old.unknown.iter().take(FUNCTIONS);
+        (singles.chain(&old.several).chain(functions))
+            .flat_map(Found::keys)
+            .collect()
+    }
+
+    /// Adds the others with the evidence that they had.
+    fn add_others<'a>(&self, to: &mut Findings<'a>, stood_out: &BTreeSet<String>, origin: f64) {
+        let others = |all: &[Found<'_>]| -> Vec<Found<'a>> {
+            let others = all.iter().filter(|f| !stood_out.contains(&f.last().key()));
+            others
+                .map(|found| Found {
+                    terms: found.terms.clone(),
+                    gain: found.gain + self.origin - origin,
+                    model: None,
+                })
+                .collect()
+        };
+        to.listed.extend(others(&self.findings.listed));
+        to.unknown.extend(others(&self.findings.unknown));
+        sort(&mut to.listed);
+        sort(&mut to.unknown);
+    }
+}
+
 /// Finds out what explains the records beside the twin; stops early where nothing does.
 pub(in crate::diagnose) fn explore<'a>(
     base: &Model<'a>,
     terms: &Terms<'_>,
-    breadth: Breadth,
-    explain: bool,
+    known: Option<Known<'_>>,
+    settings: &DiagnoseSettings,
     progress: &Progress,
 ) -> Result<Findings<'a>, DiagnoseError> {
-    let stage = progress.stage("explain", STEPS);
-    let findings = one_by_one(base, terms, breadth, &stage)?;
-    let findings = match explain {
-        true => beside_each_other(findings, base, terms, breadth, &stage)?,
-        false => findings,
+    let stood_out = known.map(|known| known.stood_out());
+    let again = |mut all: Vec<Arc<Term>>| {
+        all.retain(|term| (stood_out.as_ref()).is_none_or(|keys| keys.contains(&term.key())));
+        all
     };
+    let terms = &Terms {
+        listed: &again(terms.listed.to_vec()),
+        noise: terms.noise,
+        unknown: &|seen: &[Scales<'_>]| again((terms.unknown)(seen)),
+    };
+    let stage = progress.stage("explain", STEPS);
+    let breadth = Breadth::of(base, settings.quick);
+    let mut findings = one_by_one(base, terms, breadth, &stage)?;
+    if let (Some(known), Some(keys)) = (known, &stood_out) {
+        known.add_others(&mut findings, keys, base.log_evidence);
+    }
+    findings.is_partial = settings.ends(stage.tick())?;
+    if !settings.detection_only {
+        findings = beside_each_other(findings, base, terms, breadth, settings, &stage)?;
+    }
     stage.finish();
     Ok(findings)
 }
@@ -79,9 +135,7 @@ fn one_by_one<'a>(
         }
         sort(&mut unknown_alone);
     }
-    let findings = with_noise(base, terms, breadth, singles, unknown_alone)?;
-    stage.tick()?;
-    Ok(findings)
+    with_noise(base, terms, breadth, singles, unknown_alone)
 }
 
 /// Adds other kinds of noise to what was found alone.
@@ -110,6 +164,7 @@ fn beside_each_other<'a>(
     base: &Model<'a>,
     terms: &Terms<'_>,
     breadth: Breadth,
+    settings: &DiagnoseSettings,
     stage: &Stage,
 ) -> Result<Findings<'a>, DiagnoseError> {
     let is_null = findings.chances().log_odds <= Thresholds::GAP;
@@ -132,8 +187,14 @@ fn beside_each_other<'a>(
             enough = true;
             break;
         }
+        if findings.is_partial {
+            break;
+        }
     }
-    stage.tick()?;
+    findings.is_partial |= settings.ends(stage.tick())?;
+    if findings.is_partial {
+        return Ok(findings);
+    }
     findings.several = match breadth.pairs {
         true => pairs(&findings, terms, origin, breadth, enough)?,
         false => vec![],
@@ -141,7 +202,7 @@ fn beside_each_other<'a>(
     if let Some(found) = alone(base, &mut findings, terms, origin, breadth)? {
         enough |= findings.add(&found, on_top(&found, terms, origin, few)?);
     }
-    if let Some(beside) = instead_of_second(&findings, terms.noise, origin, breadth.of_all())? {
+    if let Some(beside) = instead_of_second(&findings, terms, origin, breadth)? {
         findings.noise_beside = Some(beside);
         if findings.asks_for_noise().is_some() {
             return Ok(findings);
@@ -157,7 +218,7 @@ fn beside_each_other<'a>(
             break;
         }
     }
-    stage.tick()?;
+    findings.is_partial |= settings.ends(stage.tick())?;
     // What explains most may do so beside something unknown.
     if !enough
         && let Some(found) = findings.listed.first().cloned()
@@ -189,10 +250,11 @@ fn noise_beside<'a>(
     Ok((found.first()).map(|f| (f.last().key(), f.gain - best.gain)))
 }
 
-/// The kind of noise that explains more beside one effect of the best pair than the other effect does, its price paid.
+/// The kind of noise that explains more beside one effect of the best pair than the other effect does, its price paid, and leaves nothing:
+/// what remains beside an effect, noise would hide.
 fn instead_of_second(
     findings: &Findings<'_>,
-    noise: &[Arc<Term>],
+    terms: &Terms<'_>,
     origin: f64,
     breadth: Breadth,
 ) -> Result<Option<(String, f64)>, DiagnoseError> {
@@ -201,17 +263,27 @@ fn instead_of_second(
         return Ok(None);
     };
     let keys = pair.keys();
-    let (mut most, mut best) = (pair.gain - findings.price(2), None);
+    let mut best: Option<(Found<'_>, f64)> = None;
     for single in (findings.listed.iter()).filter(|f| keys.contains(&f.last().key())) {
         let Some(model) = &single.model else { continue };
-        if let Some(found) = listed(model, noise, origin, &[], breadth)?.first()
-            && found.gain > most
-        {
-            most = found.gain;
-            best = Some((found.last().key(), found.gain - single.gain));
+        let found = listed(model, terms.noise, origin, &[], breadth.of_all())?;
+        let Some(found) = found.into_iter().next() else {
+            continue;
+        };
+        if best.as_ref().is_none_or(|(best, _)| found.gain > best.gain) {
+            let gain = found.gain - single.gain;
+            best = Some((found, gain));
         }
     }
-    Ok(best)
+    let enough = pair.gain - findings.price(2);
+    let Some((found, gain)) = best.filter(|(found, _)| found.gain > enough) else {
+        return Ok(None);
+    };
+    let Some(on_top) = on_top(&found, terms, origin, breadth.few())? else {
+        return Ok(None);
+    };
+    let added = on_top.first().map_or(0.0, |f| f.gain - found.gain);
+    Ok(leaves_nothing(found.gain, added).then(|| (found.last().key(), gain)))
 }
 
 /// Second kinds of noise beside the likeliest one.

@@ -31,6 +31,8 @@ pub(in crate::diagnose) struct Findings<'a> {
     pub noise_pairs: Vec<Found<'a>>,
     /// Another kind of noise beside the best listed effect, which makes it likelier by these nats.
     pub noise_beside: Option<(String, f64)>,
+    /// True where the search was cancelled: what is here is all that was found until then.
+    pub is_partial: bool,
 }
 
 /// Posterior probabilities.
