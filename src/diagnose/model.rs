@@ -10,6 +10,9 @@ use crate::record::Signal;
 use crate::twin::Twin;
 use std::sync::Arc;
 
+/// Iterations of a fit that is carried on to its end.
+const TO_THE_END: usize = 40;
+
 /// A twin with terms, fitted.
 #[derive(Clone)]
 pub(in crate::diagnose) struct Model<'a> {
@@ -123,6 +126,20 @@ impl<'a> Model<'a> {
             entries,
             by_bic: self.by_bic,
         })
+    }
+
+    /// The model fitted to the end of a climb: a search stops before.
+    pub fn carried_on(&self) -> Result<Option<Self>, DiagnoseError> {
+        let fitted = climb(&self.problem, &self.fitted.theta, TO_THE_END)?;
+        Ok(fitted.and_then(|fitted| self.refitted(fitted)))
+    }
+
+    /// The terms beside another twin of the same parameters, fitted on from here.
+    pub fn beside_twin<'b>(&self, base: &Model<'b>) -> Result<Option<Model<'b>>, DiagnoseError> {
+        let extended = base.extend_by(&self.terms)?;
+        let fitted = climb(&extended.problem, &self.fitted.theta, TO_THE_END)?;
+        let problem = extended.problem.clone();
+        Ok(fitted.and_then(|fitted| extended.fitted(base.base, fitted, problem)))
     }
 
     /// Full θ of the extended model where the new term has these magnitudes.

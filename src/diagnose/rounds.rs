@@ -16,10 +16,9 @@ use crate::likelihood::measured;
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::study::Study;
-use std::cell::Cell;
 use std::sync::Arc;
 
-/// Share of the best effect's evidence below which what another step explains does not change which effects stand out.
+/// Share of the best effect's evidence below which what a finer step explains does not change which effects stand out.
 const MINOR: f64 = 1.0 / 3.0;
 /// Most kinds of noise that are added to the twin's own.
 const ROUNDS: usize = 2;
@@ -34,145 +33,87 @@ pub(in crate::diagnose) struct Explored<'s, 'a> {
     pub not_tested: Vec<String>,
 }
 
-impl Explored<'_, '_> {
-    /// log of the evidence of all hypotheses together.
-    fn log_evidence(&self) -> f64 {
-        self.base.model.log_evidence + self.chances.log_evidence
-    }
-}
-
-/// Fits the twin, searches for what explains the records beside it, and hands it all on. Where its step shows, the same is done with a
-/// finer one, and the search whose explanations are together likelier counts.
+/// Fits the twin, searches for what explains the records beside it, and hands it all on.
 pub(in crate::diagnose) fn search<R>(
     study: &Study,
     records: &[Record],
     settings: &DiagnoseSettings,
     progress: &Progress,
-    then: impl Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
+    then: impl FnOnce(Explored<'_, '_>) -> Result<R, DiagnoseError>,
 ) -> Result<R, DiagnoseError> {
     let stage = progress.stage("fit", 1);
     let measured = measured(study.twin(), records, &settings.beliefs(study))?;
     let base = Base::new(&measured, records, settings)?;
     stage.tick()?;
-    explored(study, base, None, settings, progress, &|mut own| {
-        if !own.findings.is_partial
-            && let Some(step) = finer(&own)?
-        {
-            let is_partial = Cell::new(false);
-            let found = with_step(&own, step, settings, progress, &|other| {
-                is_partial.set(other.findings.is_partial);
-                let wins = other.log_evidence() - own.log_evidence() > Thresholds::STEP_WINS;
-                wins.then(|| then(other)).transpose()
-            });
-            match found {
-                // A twin that its own step holds together may go nowhere with a finer one.
-                Ok(None) | Err(DiagnoseError::NoFit) => {}
-                Ok(Some(found)) => return Ok(found),
-                Err(DiagnoseError::Cancelled(_)) if settings.give_partial => is_partial.set(true),
-                Err(error) => return Err(error),
-            }
-            own.findings.is_partial = is_partial.get();
-        }
-        then(own)
-    })
-}
-
-/// The finer step that the records may ask for: beside a gap, noise levels are fitted loud, and hide it, unless the gap is explained.
-fn finer(own: &Explored<'_, '_>) -> Result<Option<FinerStep>, DiagnoseError> {
-    let explained = own.findings.top().max(0.0);
-    match (
-        finer_step(&own.base.model, explained)?,
-        own.findings.best_listed(),
-    ) {
-        (None, Some(model)) => finer_step(model, explained),
-        (step, _) => Ok(step),
+    match step_of(study, &base, settings)? {
+        Some(step) => with_step(study, &base, step, None, settings, progress, then),
+        None => explored(study, base, None, settings, ROUNDS, progress, then),
     }
 }
 
-/// Fits the twin with a finer step and the same kinds of noise, and searches with it; `None` where nothing is missing with its own step and
-/// a finer one explains no more.
+/// The finer step that the records ask for. A gap may pass for one: an effect that is more probable, as one of all that are listed, is
+/// asked first.
+fn step_of(
+    study: &Study,
+    base: &Base<'_>,
+    settings: &DiagnoseSettings,
+) -> Result<Option<FinerStep>, DiagnoseError> {
+    let Some((step, gain)) = finer_step(&base.model)? else {
+        return Ok(None);
+    };
+    let model = &base.model;
+    let terms = base.listed(study, settings)?;
+    let breadth = Breadth::of(model, settings.quick);
+    let effects = listed(model, &terms, model.log_evidence, &[], breadth)?;
+    let price = (effects.len() as f64 / Thresholds::LISTED).ln();
+    let best = (effects.first()).filter(|effect| effect.gain - price > gain);
+    match best.and_then(|effect| effect.model.as_ref()) {
+        Some(beside) => Ok(finer_step(beside)?.map(|(step, _)| step)),
+        None => Ok(Some(step)),
+    }
+}
+
+/// Fits the twin with a finer step, and searches with it; where it matters little beside what was found, goes on from that.
 fn with_step<R>(
-    own: &Explored<'_, '_>,
+    study: &Study,
+    base: &Base<'_>,
     step: FinerStep,
+    known: Option<Known<'_>>,
     settings: &DiagnoseSettings,
     progress: &Progress,
-    then: &dyn Fn(Explored<'_, '_>) -> Result<Option<R>, DiagnoseError>,
-) -> Result<Option<R>, DiagnoseError> {
-    let (study, model) = (own.study, &own.base.model);
-    let records = model.problem.records;
+    then: impl FnOnce(Explored<'_, '_>) -> Result<R, DiagnoseError>,
+) -> Result<R, DiagnoseError> {
+    let records = base.model.problem.records;
     let twin = step.of(study.twin());
     let twin = twin.as_ref().unwrap_or(study.twin());
     let measured = measured(twin, records, &settings.beliefs(study))?;
     let begin = DiagnoseSettings {
-        initial: Some(own.base.theta.clone()),
+        initial: Some(base.theta.clone()),
         ..settings.clone()
     };
     let base = Base {
         step: Some(step),
         ..Base::new(&measured, records, &begin)?
     };
-    let gained = base.model.log_evidence - model.log_evidence;
-    let (is_null, is_alone) = (
-        own.chances.log_odds <= Thresholds::GAP,
-        own.base.noises.is_empty(),
-    );
-    if is_null && is_alone && gained <= Thresholds::STEP_WINS {
-        return Ok(None);
-    }
-    let is_minor = gained.abs() < MINOR * own.findings.top() && is_alone;
-    let known = is_minor.then_some(Known {
-        findings: &own.findings,
-        origin: model.log_evidence,
-    });
-    with_noises(
-        &own.base.noises,
-        study,
-        base,
-        known,
-        settings,
-        progress,
-        then,
-    )
+    explored(study, base, known, settings, ROUNDS, progress, then)
 }
 
-/// Adds kinds of noise to a fitted twin, and searches beside it.
-fn with_noises<R>(
-    noises: &[Arc<Term>],
-    study: &Study,
-    base: Base<'_>,
-    known: Option<Known<'_>>,
-    settings: &DiagnoseSettings,
-    progress: &Progress,
-    then: &dyn Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
-) -> Result<R, DiagnoseError> {
-    if let Some((first, others)) = noises.split_first() {
-        let (model, first) = (&base.model, std::slice::from_ref(first));
-        let breadth = Breadth::of(model, settings.quick);
-        let found = listed(model, first, model.log_evidence, &[], breadth)?;
-        if let Some(model) = found.first().and_then(|found| found.model.as_ref()) {
-            let twin = model.problem.twin.clone();
-            if let Some(noisier) = base.with_noise(model, &twin)? {
-                return with_noises(others, study, noisier, known, settings, progress, then);
-            }
-        }
-    }
-    explored(study, base, known, settings, progress, then)
-}
-
-/// Searches for what explains the records beside a fitted twin; again where they ask for another kind of noise.
+/// Searches for what explains the records beside a fitted twin, from what is known with another step where that is given; again where
+/// they ask for another kind of noise, or for a finer step.
 fn explored<R>(
     study: &Study,
     base: Base<'_>,
     known: Option<Known<'_>>,
     settings: &DiagnoseSettings,
+    rounds: usize,
     progress: &Progress,
-    then: &dyn Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
+    then: impl FnOnce(Explored<'_, '_>) -> Result<R, DiagnoseError>,
 ) -> Result<R, DiagnoseError> {
     let library = base.library();
     let effects = base.listed(study, settings)?;
-    let mut noise = match base.noises.len() < ROUNDS {
-        false => vec![],
-        true => shared(kinds(study, &settings.without, &library, &base.noisy)?),
+    let mut noise = match rounds {
+        0 => vec![],
+        _ => shared(kinds(study, &settings.without, &library, &base.noisy)?),
     };
     noise.retain(|term| !base.noises.iter().any(|own| own.key() == term.key()));
     let unlisted = |seen: &[Scales<'_>]| match settings.lacks(Ablation::UnknownFunctions) {
@@ -184,25 +125,25 @@ fn explored<R>(
         noise: &noise,
         unknown: &unlisted,
     };
-    let mut findings = explore(&base.model, &terms, known, settings, progress)?;
-    let asked = findings.asks_for_noise().and_then(|f| f.model.clone());
-    if let Some(model) = asked.filter(|_| !findings.is_partial) {
+    let breadth = Breadth::of(&base.model, settings.quick);
+    let explain = !settings.detection_only;
+    let findings = explore(&base.model, &terms, breadth, known, explain, progress)?;
+    if let Some(model) = findings.asks_for_noise().and_then(|f| f.model.as_ref()) {
         let twin = model.problem.twin.clone();
-        if let Some(noisier) = base.with_noise(&model, &twin)? {
-            // Beside a gap, the effects that stood out without that noise do so with it.
-            let is_beside =
-                (findings.noise_beside.as_ref()).is_some_and(|(_, nats)| *nats > Thresholds::NOISE);
-            let known = is_beside.then_some(Known {
-                findings: &findings,
-                origin: base.model.log_evidence,
-            });
-            match explored(study, noisier, known, settings, progress, then) {
-                Err(DiagnoseError::Cancelled(_)) if settings.give_partial => {
-                    findings.is_partial = true;
-                }
-                found => return found,
-            }
+        if let Some(noisier) = base.with_noise(model, &twin)? {
+            return explored(study, noisier, None, settings, rounds - 1, progress, then);
         }
+    }
+    // Beside a gap, noise levels are fitted loud, and hide the step.
+    if let (None, Some(model)) = (base.step, findings.best_listed())
+        && let Some((step, gain)) = finer_step(model)?
+    {
+        let minor = gain < MINOR * findings.top() && base.noises.is_empty();
+        let known = minor.then_some(Known {
+            findings: &findings,
+            origin: base.model.log_evidence,
+        });
+        return with_step(study, &base, step, known, settings, progress, then);
     }
     then(Explored {
         study,
@@ -212,46 +153,4 @@ fn explored<R>(
         listed: &effects,
         not_tested: not_tested(study, &effects),
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use crate::diagnose::fixture::{biased_record, tanks};
-    use crate::diagnose::{DiagnoseError, DiagnoseSettings, Verdict, diagnose};
-    use crate::progress::{Listener, Progress};
-    use std::sync::Arc;
-    use std::sync::atomic::{AtomicBool, Ordering};
-
-    /// Stops the work once effects were tried one at a time.
-    #[derive(Default)]
-    struct Impatient(AtomicBool);
-
-    impl Listener for Impatient {
-        fn advanced(&self, stage: &str, done: u64, _: u64) {
-            self.0
-                .fetch_or(stage == "explain" && done >= 3, Ordering::Relaxed);
-        }
-        fn cancelled(&self) -> bool {
-            self.0.load(Ordering::Relaxed)
-        }
-    }
-
-    #[test]
-    fn a_cancelled_search_gives_what_was_found() {
-        let study = tanks(150);
-        let records = [biased_record(&study, 2.0, 5)];
-        let found = |give_partial| {
-            let settings = DiagnoseSettings {
-                give_partial,
-                ..DiagnoseSettings::default()
-            };
-            let progress = Progress::new(Arc::new(Impatient::default()));
-            diagnose(&study, &records, None, &settings, &progress)
-        };
-        let partial = found(true).unwrap();
-        assert!(partial.interrupted && partial.quick);
-        assert_eq!(partial.verdict, Verdict::StructuralGap);
-        assert!(partial.cause.effects.iter().any(|e| e.id == "sensor-bias"));
-        assert!(matches!(found(false), Err(DiagnoseError::Cancelled(_))));
-    }
 }

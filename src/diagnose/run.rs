@@ -87,14 +87,6 @@ fn report(
     settings: &DiagnoseSettings,
     progress: &Progress,
 ) -> Result<Diagnosis, DiagnoseError> {
-    // What is left to do for a partial answer takes seconds, and is done.
-    let hurried = DiagnoseSettings {
-        quick: true,
-        calibrate: 0,
-        ..settings.clone()
-    };
-    let is_partial = explored.findings.is_partial;
-    let settings = if is_partial { &hurried } else { settings };
     let noise = settings.noise();
     let Explored {
         study,
@@ -134,11 +126,7 @@ fn report(
             log_odds,
             noise.child("null"),
             &stage,
-        );
-        let p = match p {
-            Err(DiagnoseError::Cancelled(_)) if settings.give_partial => None,
-            p => p?,
-        };
+        )?;
         if let Some((p, at_floor)) = p {
             (detection.p_value, detection.at_floor) = (Some(p), at_floor);
         }
@@ -174,7 +162,7 @@ fn report(
         location.after = accepted.map(|m| maps(m, None)).transpose()?;
         discovery = discovered(findings, &conclusion, location.target.as_deref(), noise);
     }
-    settings.ends(stage.tick())?;
+    stage.tick()?;
     if !settings.detection_only {
         let is_class = conclusion.decision == Decision::Class && conclusion.accepted.len() == 1;
         if is_class && !settings.quick {
@@ -183,11 +171,11 @@ fn report(
                 .collect();
             next = next_input(&rivals, noise.child("next"))?;
         }
-        settings.ends(stage.tick())?;
+        stage.tick()?;
         if !settings.quick {
             visible = power(model, listed)?;
         }
-        settings.ends(stage.tick())?;
+        stage.tick()?;
         let validation = validation.map(std::slice::from_ref);
         let measures = Measures {
             base: model,
@@ -198,7 +186,7 @@ fn report(
             initial: settings.initial.as_deref(),
         };
         shrunk = shrinkage(&measures, noise)?;
-        settings.ends(stage.tick())?;
+        stage.tick()?;
     }
     let runs = |records: &[Record]| -> Result<FreeRuns, DiagnoseError> {
         let runner = |model: &Model<'_>| {
@@ -240,7 +228,6 @@ fn report(
             .map(|v| runs(std::slice::from_ref(v)))
             .transpose()?,
         quick: settings.quick,
-        interrupted: is_partial,
         integrator: base.step.map(|step| step.integrator),
         substeps: base.step.map(|step| step.substeps),
         candidates: findings.listed.len() + findings.unknown.len(),

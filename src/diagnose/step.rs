@@ -6,7 +6,6 @@ use super::thresholds::Thresholds;
 use crate::fit::reference::Reference;
 use crate::likelihood::kalman::recoverable;
 use crate::twin::{Integrator, MOST_SUBSTEPS, Twin};
-use nalgebra::DVector;
 
 /// A finer step than a twin's own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,12 +45,11 @@ impl FinerStep {
     }
 }
 
-/// The cheapest finer step from which an exact one cannot be told, beside a model that explains so many nats; `None` where its twin's own
-/// step cannot be told from an exact one, or by no more than integrators differ anyway, and for a black box.
+/// The cheapest step that explains a model's records as well as the best, where that is better than its twin's own, and how much better,
+/// in nats; `None` where the step does not show, or shows for the better, and for a black box.
 pub(in crate::diagnose) fn finer_step(
     model: &Model<'_>,
-    explained: f64,
-) -> Result<Option<FinerStep>, DiagnoseError> {
+) -> Result<Option<(FinerStep, f64)>, DiagnoseError> {
     let Some((integrator, stepping)) = model.base.integration() else {
         return Ok(None);
     };
@@ -59,36 +57,48 @@ pub(in crate::diagnose) fn finer_step(
     let Some(reference) = recoverable(Reference::new(&model.problem, theta))?.flatten() else {
         return Ok(None);
     };
-    let direction = |step: FinerStep| -> Result<_, DiagnoseError> {
+    let mut finer = vec![];
+    for step in FinerStep::candidates(integrator, stepping.substeps) {
         let Some(twin) = step.of(model.base) else {
             return Ok(None);
         };
-        let filtered = recoverable(model.problem_of(&twin)?.filtered(theta))?;
-        Ok(filtered.map(|filtered| reference.direction(&filtered)))
-    };
-    let least = Thresholds::STEP_SHOWS.max(Thresholds::FINE_PRINT * explained);
-    let shows = |direction: &DVector<f64>| 0.5 * reference.own(direction) > least;
-    let candidates = FinerStep::candidates(integrator, stepping.substeps);
-    let Some((&last, cheaper)) = candidates.split_last() else {
+        finer.push((model.problem_of(&twin)?, step));
+    }
+    let Some((exact, _)) = finer.last() else {
         return Ok(None);
     };
-    let Some(exact) = direction(last)?.filter(shows) else {
+    let Some(filtered) = recoverable(exact.filtered(theta))? else {
         return Ok(None);
     };
-    for &step in cheaper {
-        let there = direction(step)?;
-        if there.is_some_and(|there| !shows(&(&exact - there))) {
-            return Ok(Some(step));
+    if 0.5 * reference.own(&reference.direction(&filtered)) <= Thresholds::STEP_SHOWS {
+        return Ok(None);
+    }
+    // A search stops before the end of a climb: with its own step, too, the model is carried on.
+    let mut last = model.carried_on()?.unwrap_or_else(|| model.clone());
+    let own = last.log_evidence.max(model.log_evidence);
+    let mut fitted = vec![];
+    for (problem, step) in finer {
+        let begin = Model {
+            problem,
+            ..last.clone()
+        };
+        if let Some(model) = begin.carried_on()? {
+            fitted.push((step, model.log_evidence - own));
+            last = model;
         }
     }
-    Ok(Some(last))
+    let best = (fitted.iter()).fold(f64::NEG_INFINITY, |best, (_, gain)| best.max(*gain));
+    let enough = (best - Thresholds::STEP_SHOWS).max(Thresholds::STEP_WINS);
+    Ok((fitted.into_iter()).find(|(_, gain)| *gain > enough))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::base::Base;
     use crate::diagnose::fixture::{self, tanks};
     use crate::diagnose::{DiagnoseSettings, Verdict, diagnose};
+    use crate::likelihood::measured;
     use crate::progress::Progress;
     use crate::record::Record;
     use crate::study::Study;
@@ -98,23 +108,34 @@ mod tests {
         [fixture::record(study, twin, &theta, seed)]
     }
 
-    /// Records that were made with a finer step are told with one, and nothing is missing; the twin's own records keep its own.
+    /// A finer step is asked for where the records were made with one, and then nothing is missing; the twin's own records keep its own.
     #[test]
     fn a_step_that_shows_is_no_gap_and_an_own_one_stays() {
         let study = tanks(300);
         let exact = study.twin().stepped(|_, to| to.substeps = 64).unwrap();
-        let settings = DiagnoseSettings {
-            detection_only: true,
-            ..DiagnoseSettings::default()
+        let settings = DiagnoseSettings::default();
+        let asked = |records: &[Record]| {
+            let measured = measured(study.twin(), records, &study.beliefs()).unwrap();
+            let base = Base::new(&measured, records, &settings).unwrap();
+            finer_step(&base.model).unwrap()
         };
-        for (twin, is_finer) in [(&exact, true), (study.twin(), false)] {
-            for seed in 0..2 {
-                let records = record(twin, &study, seed);
-                let found =
-                    diagnose(&study, &records, None, &settings, &Progress::silent()).unwrap();
-                assert_ne!(found.verdict, Verdict::StructuralGap, "seed {seed}");
-                assert_eq!(found.substeps.is_some(), is_finer, "seed {seed}");
-            }
+        for seed in 0..3 {
+            assert!(
+                asked(&record(&exact, &study, seed)).is_some(),
+                "seed {seed}"
+            );
+            assert!(
+                asked(&record(study.twin(), &study, seed)).is_none(),
+                "seed {seed}"
+            );
         }
+        let records = record(&exact, &study, 0);
+        let verdict = DiagnoseSettings {
+            detection_only: true,
+            ..settings
+        };
+        let found = diagnose(&study, &records, None, &verdict, &Progress::silent()).unwrap();
+        assert_ne!(found.verdict, Verdict::StructuralGap);
+        assert!(found.substeps.is_some());
     }
 }

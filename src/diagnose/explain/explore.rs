@@ -1,25 +1,22 @@
 //! The order of the search: single explanations, what they leave, pairs.
 
 use super::findings::{Findings, leaves_nothing};
-use super::search::{Breadth, Found, listed, own_theta, sort, unknown};
+use super::search::{Breadth, FEW, Found, listed, own_theta, sort, unknown};
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::scales::Scales;
 use crate::diagnose::hypotheses::term::{Part, Term};
 use crate::diagnose::model::Model;
-use crate::diagnose::settings::DiagnoseSettings;
 use crate::diagnose::thresholds::Thresholds;
 use crate::progress::{Progress, Stage};
-use std::collections::BTreeSet;
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Steps of the search that are reported: functions, effects, functions of the corrected twin, what is left, pairs.
 const STEPS: usize = 5;
 /// Single effects that are looked at for something left, or for a second one beside them.
 const SINGLES: usize = 3;
-/// Least share of the best single effect's evidence of a first of a pair, and of what is fitted again with another step or noise.
+/// Least share of the best single effect's evidence of a first of a pair.
 const FIRST: f64 = 1.0 / 3.0;
-/// Unknown functions that are fitted again with another step or noise.
-const FUNCTIONS: usize = 8;
 
 /// Terms of a diagnosis.
 pub(in crate::diagnose) struct Terms<'t> {
@@ -30,7 +27,29 @@ pub(in crate::diagnose) struct Terms<'t> {
     pub unknown: &'t dyn Fn(&[Scales<'_>]) -> Vec<Arc<Term>>,
 }
 
-/// Findings beside the same twin with another step or noise: what stood out is fitted again, the rest keeps its evidence.
+/// Finds out what explains the records beside the twin; stops early where nothing does.
+pub(in crate::diagnose) fn explore<'a>(
+    base: &Model<'a>,
+    terms: &Terms<'_>,
+    breadth: Breadth,
+    known: Option<Known<'_>>,
+    explain: bool,
+    progress: &Progress,
+) -> Result<Findings<'a>, DiagnoseError> {
+    let stage = progress.stage("explain", STEPS);
+    let (findings, several) = match known {
+        Some(known) => carried_on(known, base, terms, breadth, &stage)?,
+        None => (one_by_one(base, terms, breadth, &stage)?, None),
+    };
+    let findings = match explain {
+        true => beside_each_other(findings, base, terms, breadth, several, &stage)?,
+        false => findings,
+    };
+    stage.finish();
+    Ok(findings)
+}
+
+/// Findings beside the same twin with another step.
 #[derive(Clone, Copy)]
 pub(in crate::diagnose) struct Known<'k> {
     pub findings: &'k Findings<'k>,
@@ -38,66 +57,55 @@ pub(in crate::diagnose) struct Known<'k> {
     pub origin: f64,
 }
 
-impl Known<'_> {
-    /// Keys of what stood out: effects alone and in pairs, the best unknown functions.
-    fn stood_out(&self) -> BTreeSet<String> {
-        let old = self.findings;
-        let singles = (old.listed.iter()).filter(|found| found.gain > FIRST * old.top());
-        let functions = old.unknown.iter().take(FUNCTIONS);
-        (singles.chain(&old.several).chain(functions))
-            .flat_map(Found::keys)
-            .collect()
-    }
-
-    /// Adds the others with the evidence that they had.
-    fn add_others<'a>(&self, to: &mut Findings<'a>, stood_out: &BTreeSet<String>, origin: f64) {
-        let others = |all: &[Found<'_>]| -> Vec<Found<'a>> {
-            let others = all.iter().filter(|f| !stood_out.contains(&f.last().key()));
-            others
-                .map(|found| Found {
-                    terms: found.terms.clone(),
-                    gain: found.gain + self.origin - origin,
-                    model: None,
-                })
-                .collect()
-        };
-        to.listed.extend(others(&self.findings.listed));
-        to.unknown.extend(others(&self.findings.unknown));
-        sort(&mut to.listed);
-        sort(&mut to.unknown);
-    }
-}
-
-/// Finds out what explains the records beside the twin; stops early where nothing does.
-pub(in crate::diagnose) fn explore<'a>(
+/// Carries the fits that are known with another step on from where they ended: single explanations, and pairs.
+fn carried_on<'a>(
+    known: Known<'_>,
     base: &Model<'a>,
     terms: &Terms<'_>,
-    known: Option<Known<'_>>,
-    settings: &DiagnoseSettings,
-    progress: &Progress,
-) -> Result<Findings<'a>, DiagnoseError> {
-    let stood_out = known.map(|known| known.stood_out());
-    let again = |mut all: Vec<Arc<Term>>| {
-        all.retain(|term| (stood_out.as_ref()).is_none_or(|keys| keys.contains(&term.key())));
-        all
+    breadth: Breadth,
+    stage: &Stage,
+) -> Result<(Findings<'a>, Option<Vec<Found<'a>>>), DiagnoseError> {
+    let old = known.findings;
+    let origin = base.log_evidence;
+    let kept = |found: &Found<'_>| Found {
+        terms: found.terms.clone(),
+        gain: found.gain + known.origin - origin,
+        model: None,
     };
-    let terms = &Terms {
-        listed: &again(terms.listed.to_vec()),
-        noise: terms.noise,
-        unknown: &|seen: &[Scales<'_>]| again((terms.unknown)(seen)),
+    // What does not stand out keeps its evidence: another step does not help it more than the others.
+    let least = FIRST * old.top();
+    let carry = |found: &Found<'_>| -> Result<Found<'a>, DiagnoseError> {
+        let mut carried = kept(found);
+        if let Some(old) = found.model.as_ref().filter(|_| found.gain > least)
+            && let Some(new) = old.beside_twin(base)?
+        {
+            carried.gain += new.log_evidence - old.log_evidence;
+            carried.model = Some(new);
+        }
+        Ok(carried)
     };
-    let stage = progress.stage("explain", STEPS);
-    let breadth = Breadth::of(base, settings.quick);
-    let mut findings = one_by_one(base, terms, breadth, &stage)?;
-    if let (Some(known), Some(keys)) = (known, &stood_out) {
-        known.add_others(&mut findings, keys, base.log_evidence);
-    }
-    findings.is_partial = settings.ends(stage.tick())?;
-    if !settings.detection_only {
-        findings = beside_each_other(findings, base, terms, breadth, settings, &stage)?;
-    }
-    stage.finish();
-    Ok(findings)
+    let carry_all = |all: &[Found<'_>]| -> Result<Vec<Found<'a>>, DiagnoseError> {
+        let mut all: Vec<Found<'a>> = all.par_iter().map(carry).collect::<Result<_, _>>()?;
+        sort(&mut all);
+        Ok(all)
+    };
+    let best: Vec<Arc<Term>> = (old.unknown.iter().take(FEW))
+        .filter_map(|found| found.terms.last().cloned())
+        .collect();
+    let mut functions = unknown(base, &best, origin, breadth.few())?;
+    let others = old.unknown.iter().filter(|found| {
+        let again = functions.iter().any(|f| f.keys() == found.keys());
+        !again
+    });
+    functions.extend(others.map(kept).collect::<Vec<_>>());
+    sort(&mut functions);
+    stage.tick()?;
+    let listed = carry_all(&old.listed)?;
+    stage.tick()?;
+    let findings = with_noise(base, terms, breadth, listed, functions)?;
+    let several = carry_all(&old.several)?;
+    stage.tick()?;
+    Ok((findings, Some(several)))
 }
 
 /// Unknown functions and effects alone, and other kinds of noise.
@@ -135,7 +143,9 @@ fn one_by_one<'a>(
         }
         sort(&mut unknown_alone);
     }
-    with_noise(base, terms, breadth, singles, unknown_alone)
+    let findings = with_noise(base, terms, breadth, singles, unknown_alone)?;
+    stage.tick()?;
+    Ok(findings)
 }
 
 /// Adds other kinds of noise to what was found alone.
@@ -158,13 +168,13 @@ fn with_noise<'a>(
     })
 }
 
-/// Adds what single effects leave, pairs, and what these leave; stops where nothing is missing.
+/// Adds what single effects leave, pairs, which are searched unless they are given, and what these leave; stops where nothing is missing.
 fn beside_each_other<'a>(
     mut findings: Findings<'a>,
     base: &Model<'a>,
     terms: &Terms<'_>,
     breadth: Breadth,
-    settings: &DiagnoseSettings,
+    several: Option<Vec<Found<'a>>>,
     stage: &Stage,
 ) -> Result<Findings<'a>, DiagnoseError> {
     let is_null = findings.chances().log_odds <= Thresholds::GAP;
@@ -187,26 +197,15 @@ fn beside_each_other<'a>(
             enough = true;
             break;
         }
-        if findings.is_partial {
-            break;
-        }
     }
-    findings.is_partial |= settings.ends(stage.tick())?;
-    if findings.is_partial {
-        return Ok(findings);
-    }
-    findings.several = match breadth.pairs {
-        true => pairs(&findings, terms, origin, breadth, enough)?,
-        false => vec![],
+    stage.tick()?;
+    findings.several = match several {
+        Some(several) => several,
+        None if breadth.pairs => pairs(&findings, terms, origin, breadth, enough)?,
+        None => vec![],
     };
     if let Some(found) = alone(base, &mut findings, terms, origin, breadth)? {
         enough |= findings.add(&found, on_top(&found, terms, origin, few)?);
-    }
-    if let Some(beside) = instead_of_second(&findings, terms, origin, breadth)? {
-        findings.noise_beside = Some(beside);
-        if findings.asks_for_noise().is_some() {
-            return Ok(findings);
-        }
     }
     for i in 0..findings.several.len().min(2) {
         let found = findings.several[i].clone();
@@ -218,7 +217,7 @@ fn beside_each_other<'a>(
             break;
         }
     }
-    findings.is_partial |= settings.ends(stage.tick())?;
+    stage.tick()?;
     // What explains most may do so beside something unknown.
     if !enough
         && let Some(found) = findings.listed.first().cloned()
@@ -230,7 +229,7 @@ fn beside_each_other<'a>(
 }
 
 /// The outliers that are likeliest beside the best listed effect, at other sensors than its own. Correlated noise is not asked for here:
-/// it would pass for what an effect leaves. It is a rival of a second effect alone.
+/// it would pass for what an effect leaves.
 fn noise_beside<'a>(
     singles: &[Found<'a>],
     noise: &[Arc<Term>],
@@ -248,42 +247,6 @@ fn noise_beside<'a>(
         .collect();
     let found = listed(model, &outliers, origin, &[], breadth)?;
     Ok((found.first()).map(|f| (f.last().key(), f.gain - best.gain)))
-}
-
-/// The kind of noise that explains more beside one effect of the best pair than the other effect does, its price paid, and leaves nothing:
-/// what remains beside an effect, noise would hide.
-fn instead_of_second(
-    findings: &Findings<'_>,
-    terms: &Terms<'_>,
-    origin: f64,
-    breadth: Breadth,
-) -> Result<Option<(String, f64)>, DiagnoseError> {
-    let first = findings.several.first();
-    let Some(pair) = first.filter(|pair| findings.wins(pair)) else {
-        return Ok(None);
-    };
-    let keys = pair.keys();
-    let mut best: Option<(Found<'_>, f64)> = None;
-    for single in (findings.listed.iter()).filter(|f| keys.contains(&f.last().key())) {
-        let Some(model) = &single.model else { continue };
-        let found = listed(model, terms.noise, origin, &[], breadth.of_all())?;
-        let Some(found) = found.into_iter().next() else {
-            continue;
-        };
-        if best.as_ref().is_none_or(|(best, _)| found.gain > best.gain) {
-            let gain = found.gain - single.gain;
-            best = Some((found, gain));
-        }
-    }
-    let enough = pair.gain - findings.price(2);
-    let Some((found, gain)) = best.filter(|(found, _)| found.gain > enough) else {
-        return Ok(None);
-    };
-    let Some(on_top) = on_top(&found, terms, origin, breadth.few())? else {
-        return Ok(None);
-    };
-    let added = on_top.first().map_or(0.0, |f| f.gain - found.gain);
-    Ok(leaves_nothing(found.gain, added).then(|| (found.last().key(), gain)))
 }
 
 /// Second kinds of noise beside the likeliest one.
@@ -381,8 +344,8 @@ fn pairs<'a>(
     Ok(all)
 }
 
-/// A pair may win since the fits of its effects alone stopped early: these begin again where the pair ended. Returns the best single effect
-/// if it is a new one.
+/// A pair may win since the fits of its effects alone stopped early, or since one of the two stood for a coarse step: these begin again
+/// where the pair ended. Returns the best single effect if it is a new one.
 fn alone<'a>(
     base: &Model<'a>,
     findings: &mut Findings<'a>,

@@ -31,8 +31,6 @@ pub(in crate::diagnose) struct Findings<'a> {
     pub noise_pairs: Vec<Found<'a>>,
     /// Another kind of noise beside the best listed effect, which makes it likelier by these nats.
     pub noise_beside: Option<(String, f64)>,
-    /// True where the search was cancelled: what is here is all that was found until then.
-    pub is_partial: bool,
 }
 
 /// Posterior probabilities.
@@ -46,8 +44,6 @@ pub(in crate::diagnose) struct Chances {
     pub places: BTreeMap<String, f64>,
     /// log of the odds of a gap against none, prior odds even.
     pub log_odds: f64,
-    /// log of the evidence of all hypotheses over that of the twin.
-    pub log_evidence: f64,
 }
 
 impl<'a> Findings<'a> {
@@ -214,7 +210,6 @@ impl<'a> Findings<'a> {
                 ..Probabilities::default()
             },
             log_odds,
-            log_evidence: whole,
             ..Chances::default()
         };
         // Which set explains a part, the sets' own evidence says: what is beside them is not known well enough to choose by.

@@ -18,7 +18,7 @@ const FUNCTIONS: usize = 12;
 /// Most iterations of the fits that are carried on: they end as soon as a step promises nothing, most of them after a few.
 const CARRIED: usize = 60;
 /// Functions that are refitted where it is known about what is missing.
-const FEW: usize = 3;
+pub(super) const FEW: usize = 3;
 /// Nats that averaging over its size takes off an effect that nothing speaks for.
 const AVERAGED: f64 = 2.0;
 /// Nats that the best of all frequencies is worth less than it looks, before a refit says how sharp it is.
