@@ -173,7 +173,7 @@ impl fmt::Debug for Effect {
 
 /// An `[[effect]]` table of a file, not yet looked up among the known kinds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table with id and target")]
 pub struct EffectEntry {
     /// Id of the kind.
     pub id: String,
