@@ -111,6 +111,19 @@ impl<'a> Base<'a> {
         Base::of(model, self.noisy.clone(), noises, self.step).map(Some)
     }
 
+    /// The twin fitted again from other θ; `None` where that is no better.
+    pub fn fitted_from(&self, thetas: &[Vec<f64>]) -> Result<Option<Base<'a>>, DiagnoseError> {
+        let problem = &self.model.problem;
+        let starts: Vec<Vec<f64>> = thetas.iter().map(|theta| problem.full(theta)).collect();
+        let fitted = fit(problem, &starts, ITERATIONS)?;
+        let better = (fitted.and_then(|fitted| self.model.refitted(fitted)))
+            .filter(|model| model.log_evidence > self.model.log_evidence + Thresholds::BETTER);
+        let Some(model) = better else {
+            return Ok(None);
+        };
+        Self::of(model, self.noisy.clone(), self.noises.clone(), self.step).map(Some)
+    }
+
     /// The fitted twin with its units, as terms are made from it.
     pub fn library(&self) -> Library<'_> {
         Library {

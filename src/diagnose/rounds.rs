@@ -2,7 +2,7 @@
 
 use super::base::Base;
 use super::error::DiagnoseError;
-use super::explain::explore::{Known, Terms, explore};
+use super::explain::explore::{Before, Terms, explore};
 use super::explain::findings::{Chances, Findings};
 use super::explain::search::{Breadth, listed};
 use super::hypotheses::noise::kinds;
@@ -39,15 +39,31 @@ pub(in crate::diagnose) fn search<R>(
     records: &[Record],
     settings: &DiagnoseSettings,
     progress: &Progress,
-    then: impl FnOnce(Explored<'_, '_>) -> Result<R, DiagnoseError>,
+    then: &dyn Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
 ) -> Result<R, DiagnoseError> {
     let stage = progress.stage("fit", 1);
     let measured = measured(study.twin(), records, &settings.beliefs(study))?;
     let base = Base::new(&measured, records, settings)?;
     stage.tick()?;
     match step_of(study, &base, settings)? {
-        Some(step) => with_step(study, &base, step, None, settings, progress, then),
-        None => explored(study, base, None, settings, ROUNDS, progress, then),
+        Some(step) => with_step(
+            study,
+            &base,
+            step,
+            Before::Nothing,
+            settings,
+            progress,
+            then,
+        ),
+        None => explored(
+            study,
+            base,
+            Before::Nothing,
+            settings,
+            ROUNDS,
+            progress,
+            then,
+        ),
     }
 }
 
@@ -78,10 +94,10 @@ fn with_step<R>(
     study: &Study,
     base: &Base<'_>,
     step: FinerStep,
-    known: Option<Known<'_>>,
+    before: Before<'_, '_>,
     settings: &DiagnoseSettings,
     progress: &Progress,
-    then: impl FnOnce(Explored<'_, '_>) -> Result<R, DiagnoseError>,
+    then: &dyn Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
 ) -> Result<R, DiagnoseError> {
     let records = base.model.problem.records;
     let twin = step.of(study.twin());
@@ -95,19 +111,19 @@ fn with_step<R>(
         step: Some(step),
         ..Base::new(&measured, records, &begin)?
     };
-    explored(study, base, known, settings, ROUNDS, progress, then)
+    explored(study, base, before, settings, ROUNDS, progress, then)
 }
 
 /// Searches for what explains the records beside a fitted twin, from what is known with another step where that is given; again where
 /// they ask for another kind of noise, or for a finer step.
-fn explored<R>(
+fn explored<'a, R>(
     study: &Study,
-    base: Base<'_>,
-    known: Option<Known<'_>>,
+    base: Base<'a>,
+    before: Before<'_, 'a>,
     settings: &DiagnoseSettings,
     rounds: usize,
     progress: &Progress,
-    then: impl FnOnce(Explored<'_, '_>) -> Result<R, DiagnoseError>,
+    then: &dyn Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
 ) -> Result<R, DiagnoseError> {
     let library = base.library();
     let effects = base.listed(study, settings)?;
@@ -125,25 +141,14 @@ fn explored<R>(
         noise: &noise,
         unknown: &unlisted,
     };
-    let breadth = Breadth::of(&base.model, settings.quick);
-    let explain = !settings.detection_only;
-    let findings = explore(&base.model, &terms, breadth, known, explain, progress)?;
-    if let Some(model) = findings.asks_for_noise().and_then(|f| f.model.as_ref()) {
-        let twin = model.problem.twin.clone();
-        if let Some(noisier) = base.with_noise(model, &twin)? {
-            return explored(study, noisier, None, settings, rounds - 1, progress, then);
+    let mut findings = explore(&base.model, &terms, before, settings, progress)?;
+    if !findings.is_partial {
+        match again(study, &base, &findings, settings, rounds, progress, then) {
+            Ok(Some(found)) => return Ok(found),
+            Ok(None) => {}
+            Err(DiagnoseError::Cancelled(_)) if settings.give_partial => findings.is_partial = true,
+            Err(error) => return Err(error),
         }
-    }
-    // Beside a gap, noise levels are fitted loud, and hide the step.
-    if let (None, Some(model)) = (base.step, findings.best_listed())
-        && let Some((step, gain)) = finer_step(model)?
-    {
-        let minor = gain < MINOR * findings.top() && base.noises.is_empty();
-        let known = minor.then_some(Known {
-            findings: &findings,
-            origin: base.model.log_evidence,
-        });
-        return with_step(study, &base, step, known, settings, progress, then);
     }
     then(Explored {
         study,
@@ -153,4 +158,83 @@ fn explored<R>(
         listed: &effects,
         not_tested: not_tested(study, &effects),
     })
+}
+
+/// Searches again where the fit of the twin had stopped early, or with the noise or the finer step that the findings ask for; `None` where
+/// nothing of that holds.
+fn again<'a, R>(
+    study: &Study,
+    base: &Base<'a>,
+    findings: &Findings<'a>,
+    settings: &DiagnoseSettings,
+    rounds: usize,
+    progress: &Progress,
+    then: &dyn Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
+) -> Result<Option<R>, DiagnoseError> {
+    if let Some(better) = base.fitted_from(&findings.thetas())? {
+        let before = Before::Worse(findings);
+        return explored(study, better, before, settings, rounds, progress, then).map(Some);
+    }
+    if let Some(model) = findings.asks_for_noise().and_then(|f| f.model.as_ref()) {
+        let twin = model.problem.twin.clone();
+        if let Some(noisier) = base.with_noise(model, &twin)? {
+            let before = Before::Nothing;
+            return explored(study, noisier, before, settings, rounds - 1, progress, then)
+                .map(Some);
+        }
+    }
+    // Beside a gap, noise levels are fitted loud, and hide the step.
+    if let (None, Some(model)) = (base.step, findings.best_listed())
+        && let Some((step, gain)) = finer_step(model)?
+    {
+        let minor = gain < MINOR * findings.top() && base.noises.is_empty();
+        let before = match minor {
+            true => Before::OtherStep(findings, base.model.log_evidence),
+            false => Before::Nothing,
+        };
+        return with_step(study, base, step, before, settings, progress, then).map(Some);
+    }
+    Ok(None)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::diagnose::fixture::{biased_record, tanks};
+    use crate::diagnose::{DiagnoseError, DiagnoseSettings, Verdict, diagnose};
+    use crate::progress::{Listener, Progress};
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    /// Stops the work once effects were tried one at a time.
+    #[derive(Default)]
+    struct Impatient(AtomicBool);
+
+    impl Listener for Impatient {
+        fn advanced(&self, stage: &str, done: u64, _: u64) {
+            self.0
+                .fetch_or(stage == "explain" && done >= 3, Ordering::Relaxed);
+        }
+        fn cancelled(&self) -> bool {
+            self.0.load(Ordering::Relaxed)
+        }
+    }
+
+    #[test]
+    fn a_cancelled_search_gives_what_was_found() {
+        let study = tanks(150);
+        let records = [biased_record(&study, 2.0, 5)];
+        let found = |give_partial| {
+            let settings = DiagnoseSettings {
+                give_partial,
+                ..DiagnoseSettings::default()
+            };
+            let progress = Progress::new(Arc::new(Impatient::default()));
+            diagnose(&study, &records, None, &settings, &progress)
+        };
+        let partial = found(true).unwrap();
+        assert!(partial.interrupted && partial.quick);
+        assert_eq!(partial.verdict, Verdict::StructuralGap);
+        assert!(partial.cause.effects.iter().any(|e| e.id == "sensor-bias"));
+        assert!(matches!(found(false), Err(DiagnoseError::Cancelled(_))));
+    }
 }

@@ -71,7 +71,7 @@ pub fn diagnose(
 ) -> Result<Diagnosis, DiagnoseError> {
     let clock = Instant::now();
     check(study, records, validation, settings)?;
-    let found = search(study, records, settings, progress, |explored| {
+    let found = search(study, records, settings, progress, &|explored| {
         report(explored, validation, settings, progress)
     })?;
     Ok(Diagnosis {
@@ -87,6 +87,14 @@ fn report(
     settings: &DiagnoseSettings,
     progress: &Progress,
 ) -> Result<Diagnosis, DiagnoseError> {
+    // What is left to do for a partial answer takes seconds, and is done.
+    let hurried = DiagnoseSettings {
+        quick: true,
+        calibrate: 0,
+        ..settings.clone()
+    };
+    let is_partial = explored.findings.is_partial;
+    let settings = if is_partial { &hurried } else { settings };
     let noise = settings.noise();
     let Explored {
         study,
@@ -114,7 +122,7 @@ fn report(
         };
         let log_odds = |records: &[Record]| {
             let silent = Progress::silent();
-            search(study, records, &alone, &silent, |found| {
+            search(study, records, &alone, &silent, &|found| {
                 Ok(found.chances.log_odds)
             })
         };
@@ -126,7 +134,11 @@ fn report(
             log_odds,
             noise.child("null"),
             &stage,
-        )?;
+        );
+        let p = match p {
+            Err(DiagnoseError::Cancelled(_)) if settings.give_partial => None,
+            p => p?,
+        };
         if let Some((p, at_floor)) = p {
             (detection.p_value, detection.at_floor) = (Some(p), at_floor);
         }
@@ -162,7 +174,7 @@ fn report(
         location.after = accepted.map(|m| maps(m, None)).transpose()?;
         discovery = discovered(findings, &conclusion, location.target.as_deref(), noise);
     }
-    stage.tick()?;
+    settings.ends(stage.tick())?;
     if !settings.detection_only {
         let is_class = conclusion.decision == Decision::Class && conclusion.accepted.len() == 1;
         if is_class && !settings.quick {
@@ -171,11 +183,11 @@ fn report(
                 .collect();
             next = next_input(&rivals, noise.child("next"))?;
         }
-        stage.tick()?;
+        settings.ends(stage.tick())?;
         if !settings.quick {
             visible = power(model, listed)?;
         }
-        stage.tick()?;
+        settings.ends(stage.tick())?;
         let validation = validation.map(std::slice::from_ref);
         let measures = Measures {
             base: model,
@@ -186,7 +198,7 @@ fn report(
             initial: settings.initial.as_deref(),
         };
         shrunk = shrinkage(&measures, noise)?;
-        stage.tick()?;
+        settings.ends(stage.tick())?;
     }
     let runs = |records: &[Record]| -> Result<FreeRuns, DiagnoseError> {
         let runner = |model: &Model<'_>| {
@@ -228,6 +240,7 @@ fn report(
             .map(|v| runs(std::slice::from_ref(v)))
             .transpose()?,
         quick: settings.quick,
+        interrupted: is_partial,
         integrator: base.step.map(|step| step.integrator),
         substeps: base.step.map(|step| step.substeps),
         candidates: findings.listed.len() + findings.unknown.len(),

@@ -2,6 +2,7 @@
 
 use crate::effect::EffectPattern;
 use crate::likelihood::Beliefs;
+use crate::progress::Cancelled;
 use crate::study::Study;
 use crate::twin::Noise;
 use serde::{Deserialize, Serialize};
@@ -49,6 +50,7 @@ impl Ablation {
 /// | `without` | none | ids, or `id@target` | effects that are not to be named |
 /// | `initial` | none | | θ that an estimator gave, a start of the fit |
 /// | `detection_only` | no | | stop after the verdict: neither where, nor which, nor how far |
+/// | `give_partial` | no | | when cancelled, give what was found instead of an error, once effects were tried one at a time |
 /// | `quick` | no | | effects one at a time, from few starts; no pairs, smallest visible effects or next input |
 /// | `ablated` | none | | parts taken out, to measure what they are worth |
 #[derive(Debug, Clone, PartialEq)]
@@ -67,6 +69,8 @@ pub struct DiagnoseSettings {
     pub detection_only: bool,
     /// Try effects one at a time, from few starts.
     pub quick: bool,
+    /// When cancelled, give what was found instead of an error, once effects were tried one at a time.
+    pub give_partial: bool,
     /// Parts that are taken out, to measure what they are worth.
     pub ablated: Vec<Ablation>,
 }
@@ -80,6 +84,14 @@ impl DiagnoseSettings {
     /// Returns true if a part is taken out.
     pub(in crate::diagnose) fn lacks(&self, part: Ablation) -> bool {
         self.ablated.contains(&part)
+    }
+
+    /// Passes a unit of work on; returns true if the work was cancelled and ends with what was found.
+    pub(in crate::diagnose) fn ends(&self, tick: Result<(), Cancelled>) -> Result<bool, Cancelled> {
+        match tick {
+            Err(Cancelled) if self.give_partial => Ok(true),
+            other => other.map(|()| false),
+        }
     }
 
     /// The study's word on noise and starts; levels that are not fitted are known.
@@ -105,6 +117,7 @@ impl Default for DiagnoseSettings {
             initial: None,
             detection_only: false,
             quick: false,
+            give_partial: false,
             ablated: vec![],
         }
     }

@@ -76,7 +76,7 @@ fn fit_of(model: &Model<'_>, term: &Term, probability: f64, log_evidence: f64) -
                 Some((m.name.to_owned(), value))
             })
             .collect(),
-        Part::Disturbance { .. } | Part::Reading { .. } => vec![],
+        Part::Disturbance { .. } | Part::Function(_) => vec![],
     };
     EffectFit {
         id: term.id.clone(),
@@ -188,7 +188,7 @@ pub(in crate::diagnose) fn nuisance(
 fn noise_names(term: &Term) -> Vec<String> {
     match &term.part {
         Part::Effect { .. } => term.names(),
-        Part::Disturbance { .. } | Part::Reading { .. } => vec![term.key()],
+        Part::Disturbance { .. } | Part::Function(_) => vec![term.key()],
     }
 }
 

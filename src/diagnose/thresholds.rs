@@ -84,6 +84,9 @@ impl Thresholds {
     pub const STEP_SHOWS: f64 = 1.0;
     /// Evidence from which a finer step becomes that of the twin: 7 to 1, as the user is then asked to change the study.
     pub const STEP_WINS: f64 = 2.0;
+    /// Evidence by which a fit of the twin from the θ of an explanation must be better than its own to count: fits end where they
+    /// promise a hundredth of it.
+    pub const BETTER: f64 = 1.0;
     /// Evidence from which noise of another kind becomes the noise of the twin: 20 to 1.
     pub const NOISE: f64 = 3.0;
     /// Prior share of listed effects among what could be missing; the rest belongs to unknown functions. At 0.4 or 0.8 evidence moves by 0.4.

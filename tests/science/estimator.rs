@@ -104,7 +104,7 @@ fn records_of_one_system_are_weighed_together() {
         (estimator().estimate_together(records, &options, &Progress::silent())).unwrap()
     };
     let (mut held, mut agreed, mut square) = (0, 0, 0.0);
-    const TRIALS: u64 = 6;
+    const TRIALS: u64 = 4;
     for i in 0..TRIALS {
         let mut records: Vec<Record> = (0..4).map(|r| record(3.0, 100 + 4 * i + r)).collect();
         let drive = Drive::autonomous(0.05, 150).unwrap();
@@ -128,17 +128,32 @@ fn records_of_one_system_are_weighed_together() {
         crate::binomial_bounds(TRIALS, 0.95, 0.99).contains(&agreed),
         "{agreed}"
     );
-    // χ² of six, over six, is below 2.8 in 99 of 100 cases.
-    assert!(square < 2.8, "{square}");
+    // χ² of four, over four, is below 3.3 in 99 of 100 cases.
+    assert!(square < 3.3, "{square}");
     let changed = all(&[record(3.0, 1), record(3.1, 2)]);
     assert!(changed.p_value < 0.01, "{}", changed.p_value);
 }
 
 /// Without trust in the prior the answer is the record's own: with one parameter alone outside its prior, 90 % intervals hold the truth
-/// in the records that the gate does not reject, too. Ten records of a quarter of the features that tanks have by default; with the
-/// network's answers kept, k1 is missed in most.
+/// in the records that the gate does not reject, too. With the network's answers kept, k1 is missed in most. Of five, fewer than 3 have a
+/// chance of 1 in 116.
 #[test]
 fn kept_answers_hold_outside_the_prior() {
+    let (own, trusting) = hold_outside_the_prior(5);
+    assert!(own >= 3 && trusting <= 2);
+}
+
+/// Of 30, fewer than 23 have a chance of 1 in 128.
+#[test]
+#[ignore = "minutes"]
+fn kept_answers_hold_outside_the_prior_in_thirty() {
+    let (own, trusting) = hold_outside_the_prior(30);
+    assert!(own >= 23 && trusting <= 15);
+}
+
+/// Of so many records, those whose interval holds k1 by themselves, and with the prior trusted; a quarter of the features that tanks have
+/// by default.
+fn hold_outside_the_prior(records: u64) -> (usize, usize) {
     let options = PretrainOptions {
         bank_size: Some(1000),
         epochs: Some(20),
@@ -151,7 +166,7 @@ fn kept_answers_hold_outside_the_prior() {
     let (estimator, _) = pretrain(study, &options, &Progress::silent()).unwrap();
     let theta = [1.0, 0.6, 0.6, 1.0];
     let (mut agreed, mut own, mut trusting) = (0, 0, 0);
-    for seed in 0..10 {
+    for seed in 0..records {
         let noise = Noise::new(seed, "outside", 0);
         let drive = study.drives().unwrap().draw(noise).unwrap();
         let outputs = study.twin().simulate(&theta, &drive, noise).unwrap();
@@ -170,10 +185,9 @@ fn kept_answers_hold_outside_the_prior() {
         );
     }
     eprintln!(
-        "k1 outside its prior: gate agrees with {agreed} of 10, intervals hold the truth in {own}, with the prior trusted in {trusting}"
+        "k1 outside its prior: gate agrees with {agreed} of {records}, intervals hold the truth in {own}, with the prior trusted in {trusting}"
     );
-    // 90 % of ten: fewer than 7 have a chance of 1 in 80.
-    assert!(own >= 7 && trusting <= 5);
+    (own, trusting)
 }
 
 /// Neither the number of threads nor a run before changes a bit.

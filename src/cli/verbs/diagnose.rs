@@ -4,7 +4,7 @@ use crate::cli::args::{FileColumns, Subject};
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::provenance::Provenance;
-use crate::cli::{output, records};
+use crate::cli::{output, records, stop};
 use crate::diagnose::{DiagnoseSettings, diagnose};
 use crate::effect::EffectPattern;
 use crate::estimator::Estimator;
@@ -79,6 +79,7 @@ impl Verb for Diagnose {
             seed: context.seed,
             calibrate: self.calibrate,
             quick: self.quick,
+            give_partial: true,
             without: self.without.clone(),
             initial,
             ..DiagnoseSettings::default()
@@ -116,7 +117,10 @@ impl Verb for Diagnose {
             folder.finish()?;
         }
         provenance.print(context, &json, || found.text(&study))?;
-        Ok(ExitCode::SUCCESS)
+        Ok(match found.interrupted {
+            true => ExitCode::from(stop::CODE),
+            false => ExitCode::SUCCESS,
+        })
     }
 }
 

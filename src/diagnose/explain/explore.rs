@@ -6,6 +6,7 @@ use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::scales::Scales;
 use crate::diagnose::hypotheses::term::{Part, Term};
 use crate::diagnose::model::Model;
+use crate::diagnose::settings::DiagnoseSettings;
 use crate::diagnose::thresholds::Thresholds;
 use crate::progress::{Progress, Stage};
 use rayon::prelude::*;
@@ -31,45 +32,48 @@ pub(in crate::diagnose) struct Terms<'t> {
 pub(in crate::diagnose) fn explore<'a>(
     base: &Model<'a>,
     terms: &Terms<'_>,
-    breadth: Breadth,
-    known: Option<Known<'_>>,
-    explain: bool,
+    before: Before<'_, 'a>,
+    settings: &DiagnoseSettings,
     progress: &Progress,
 ) -> Result<Findings<'a>, DiagnoseError> {
     let stage = progress.stage("explain", STEPS);
-    let (findings, several) = match known {
-        Some(known) => carried_on(known, base, terms, breadth, &stage)?,
-        None => (one_by_one(base, terms, breadth, &stage)?, None),
+    let breadth = Breadth::of(base, settings.quick);
+    let (mut findings, several) = match before {
+        Before::Nothing => (one_by_one(base, terms, &[], breadth, &stage)?, None),
+        Before::Worse(old) => (one_by_one(base, terms, &old.listed, breadth, &stage)?, None),
+        Before::OtherStep(old, origin) => carried_on(old, origin, base, terms, breadth, &stage)?,
     };
-    let findings = match explain {
-        true => beside_each_other(findings, base, terms, breadth, several, &stage)?,
-        false => findings,
-    };
+    findings.is_partial = settings.ends(stage.tick())?;
+    if !settings.detection_only && !findings.is_partial {
+        findings = beside_each_other(findings, base, terms, breadth, several, settings, &stage)?;
+    }
     stage.finish();
     Ok(findings)
 }
 
-/// Findings beside the same twin with another step.
+/// What is known from a search before.
 #[derive(Clone, Copy)]
-pub(in crate::diagnose) struct Known<'k> {
-    pub findings: &'k Findings<'k>,
-    /// log Z of that twin.
-    pub origin: f64,
+pub(in crate::diagnose) enum Before<'k, 'a> {
+    Nothing,
+    /// Findings beside a worse fit of the same twin: fits that are better than the new ones are kept.
+    Worse(&'k Findings<'a>),
+    /// Findings beside the same twin with another step, and log Z of that twin: their fits are carried on.
+    OtherStep(&'k Findings<'k>, f64),
 }
 
 /// Carries the fits that are known with another step on from where they ended: single explanations, and pairs.
 fn carried_on<'a>(
-    known: Known<'_>,
+    old: &Findings<'_>,
+    old_origin: f64,
     base: &Model<'a>,
     terms: &Terms<'_>,
     breadth: Breadth,
     stage: &Stage,
 ) -> Result<(Findings<'a>, Option<Vec<Found<'a>>>), DiagnoseError> {
-    let old = known.findings;
     let origin = base.log_evidence;
     let kept = |found: &Found<'_>| Found {
         terms: found.terms.clone(),
-        gain: found.gain + known.origin - origin,
+        gain: found.gain + old_origin - origin,
         model: None,
     };
     // What does not stand out keeps its evidence: another step does not help it more than the others.
@@ -103,15 +107,14 @@ fn carried_on<'a>(
     let listed = carry_all(&old.listed)?;
     stage.tick()?;
     let findings = with_noise(base, terms, breadth, listed, functions)?;
-    let several = carry_all(&old.several)?;
-    stage.tick()?;
-    Ok((findings, Some(several)))
+    Ok((findings, Some(carry_all(&old.several)?)))
 }
 
-/// Unknown functions and effects alone, and other kinds of noise.
+/// Unknown functions and effects alone, and other kinds of noise; `old` are fits of effects that may be better.
 fn one_by_one<'a>(
     base: &Model<'a>,
     terms: &Terms<'_>,
+    old: &[Found<'a>],
     breadth: Breadth,
     stage: &Stage,
 ) -> Result<Findings<'a>, DiagnoseError> {
@@ -130,6 +133,10 @@ fn one_by_one<'a>(
     if best <= Thresholds::NULL_LIKE && top > Thresholds::NULL_LIKE {
         singles = listed(base, terms.listed, origin, &[], breadth.of_all())?;
     }
+    for found in &mut singles {
+        found.keep_better(old, origin);
+    }
+    sort(&mut singles);
     let top = singles.first().map_or(0.0, |f| f.gain);
     stage.tick()?;
     if top > Thresholds::WIDER {
@@ -143,9 +150,7 @@ fn one_by_one<'a>(
         }
         sort(&mut unknown_alone);
     }
-    let findings = with_noise(base, terms, breadth, singles, unknown_alone)?;
-    stage.tick()?;
-    Ok(findings)
+    with_noise(base, terms, breadth, singles, unknown_alone)
 }
 
 /// Adds other kinds of noise to what was found alone.
@@ -175,6 +180,7 @@ fn beside_each_other<'a>(
     terms: &Terms<'_>,
     breadth: Breadth,
     several: Option<Vec<Found<'a>>>,
+    settings: &DiagnoseSettings,
     stage: &Stage,
 ) -> Result<Findings<'a>, DiagnoseError> {
     let is_null = findings.chances().log_odds <= Thresholds::GAP;
@@ -198,7 +204,10 @@ fn beside_each_other<'a>(
             break;
         }
     }
-    stage.tick()?;
+    findings.is_partial = settings.ends(stage.tick())?;
+    if findings.is_partial {
+        return Ok(findings);
+    }
     findings.several = match several {
         Some(several) => several,
         None if breadth.pairs => pairs(&findings, terms, origin, breadth, enough)?,
@@ -217,7 +226,7 @@ fn beside_each_other<'a>(
             break;
         }
     }
-    stage.tick()?;
+    findings.is_partial = settings.ends(stage.tick())?;
     // What explains most may do so beside something unknown.
     if !enough
         && let Some(found) = findings.listed.first().cloned()

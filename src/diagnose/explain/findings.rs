@@ -6,13 +6,16 @@
 //! r(E)  = max_U log Z(E + U) − log Z(E)               E leaves nothing to explain if r < 4
 //! ```
 
-use super::search::Found;
+use super::search::{Found, own_theta};
 use crate::diagnose::hypotheses::term::Nature;
 use crate::diagnose::model::Model;
 use crate::diagnose::outcome::Probabilities;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::evidence::log_mean;
 use std::collections::BTreeMap;
+
+/// Explanations of a kind from whose θ the twin is fitted again.
+const SINGLES: usize = 2;
 
 /// Everything that was found.
 #[derive(Default)]
@@ -31,6 +34,8 @@ pub(in crate::diagnose) struct Findings<'a> {
     pub noise_pairs: Vec<Found<'a>>,
     /// Another kind of noise beside the best listed effect, which makes it likelier by these nats.
     pub noise_beside: Option<(String, f64)>,
+    /// True where the search was cancelled: what is here is all that was found until then.
+    pub is_partial: bool,
 }
 
 /// Posterior probabilities.
@@ -91,6 +96,17 @@ impl<'a> Findings<'a> {
         .filter(|f| f.model.is_some())
         .max_by(|a, b| a.gain.total_cmp(&b.gain))
         .and_then(|f| f.model.as_ref())
+    }
+
+    /// θ of the twin beside the best single explanations: from there its own fit may go further than it went.
+    pub fn thetas(&self) -> Vec<Vec<f64>> {
+        let best = |all: &[Found<'a>]| -> Vec<Vec<f64>> {
+            (all.iter().take(SINGLES))
+                .filter(|found| found.gain > Thresholds::BETTER)
+                .filter_map(own_theta)
+                .collect()
+        };
+        [best(&self.listed), best(&self.unknown)].concat()
     }
 
     /// The listed effects that explain most, where something is missing.

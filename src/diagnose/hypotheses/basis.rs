@@ -18,15 +18,18 @@ pub(in crate::diagnose) enum Of {
     Input(usize),
     /// The signal that passes a sensor or actuator.
     Signal,
+    /// Time in seconds.
+    Time,
 }
 
 impl Of {
     /// The variable's value.
-    pub fn value(self, states: &[f64], inputs: &[f64], signal: f64) -> f64 {
+    pub fn value(self, time: f64, states: &[f64], inputs: &[f64], signal: f64) -> f64 {
         match self {
             Self::State(i) => states[i],
             Self::Input(i) => inputs[i],
             Self::Signal => signal,
+            Self::Time => time,
         }
     }
 }

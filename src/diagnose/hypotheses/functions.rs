@@ -10,6 +10,8 @@
 //! Source: Solin & Särkkä, "Hilbert space methods for reduced-rank Gaussian process regression", *Statistics and Computing* 30 (2020).
 
 use super::basis::{Of, TERMS, pairs, sum_of_one, sum_of_two};
+use super::entered::Entered;
+use super::entry::Entry;
 use super::term::{Nature, Part, Start, Term};
 use crate::effect::{Effect, EffectKind, Instant, Magnitude, clamp, lag};
 use crate::fit::axis::{Axis, EvidencePrior};
@@ -146,7 +148,7 @@ pub(super) fn of_state(target: &str, variables: &[Variable], largest: f64) -> Te
     let id = format!("f({})", names.join(","));
     let ends: Vec<(f64, f64)> = variables.iter().map(Variable::ends).collect();
     let of: Vec<Of> = variables.iter().map(|v| v.of).collect();
-    let value = |of: Of, at: &crate::effect::ForcePoint<'_>| of.value(at.states, at.u, at.x);
+    let value = |of: Of, at: &crate::effect::ForcePoint<'_>| of.value(at.t, at.states, at.u, at.x);
     let kind = match (of.as_slice(), ends.as_slice()) {
         (&[of], &[ends]) => with_coefficients(
             EffectKind::force(&id, "ẋ + f", move |m, at| {
@@ -191,14 +193,17 @@ fn passing(
     with_coefficients(kind, count)
 }
 
-/// An unknown distortion f(s) of a signal.
+/// An unknown distortion of a signal, a function of itself or of time.
 pub(super) fn of_signal(target: &str, is_sensor: bool, variable: &Variable, largest: f64) -> Term {
     let id = format!("f({})", variable.name);
     let ends = variable.ends();
-    let law = move |m: &[f64], _: Instant, _: &mut [f64], s: f64| s + sum_of_one(m, s, ends);
+    let of = variable.of;
+    let law = move |m: &[f64], now: Instant, _: &mut [f64], s: f64| {
+        s + sum_of_one(m, of.value(now.t, &[], &[], s), ends)
+    };
     let seen = vec![(variable.name.clone(), ends.0, ends.1)];
     term(
-        passing(&id, is_sensor, ["s + f(s)", "u + f(u)"], TERMS, law),
+        passing(&id, is_sensor, ["s + f(z)", "u + f(z)"], TERMS, law),
         target,
         Nature::Function,
         weights(1),
@@ -207,18 +212,21 @@ pub(super) fn of_signal(target: &str, is_sensor: bool, variable: &Variable, larg
     )
 }
 
-/// An unknown function of a state or an input that is added to an output.
-pub(super) fn of_reading(target: &str, output: usize, variable: &Variable, largest: f64) -> Term {
+/// An unknown function of a state, an input or time that is added to an output, or to the logarithm of a parameter.
+pub(super) fn entered(target: &str, entry: Entry, variable: &Variable, largest: f64) -> Term {
     let ends = variable.ends();
     Term {
         id: format!("f({})", variable.name),
         target: target.into(),
-        nature: Nature::Reading,
-        part: Part::Reading {
-            output,
+        nature: match entry {
+            Entry::Sensor(_) => Nature::Reading,
+            _ => Nature::Function,
+        },
+        part: Part::Function(Entered {
+            entry,
             of: variable.of,
             ends,
-        },
+        }),
         axes: vec![coefficient(largest); TERMS],
         family: Some((weights(1), largest)),
         starts: vec![Start {

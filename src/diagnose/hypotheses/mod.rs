@@ -3,18 +3,18 @@
 pub(in crate::diagnose) mod basis;
 pub(in crate::diagnose) mod disturbed_equations;
 mod disturbed_signals;
+mod entered;
 pub(in crate::diagnose) mod entry;
 pub(in crate::diagnose) mod functions;
 pub(in crate::diagnose) mod listed;
 pub(in crate::diagnose) mod noise;
-mod readings;
 pub(in crate::diagnose) mod scales;
 pub(in crate::diagnose) mod term;
 
 use self::basis::Of;
 use self::entry::Entry;
 use self::functions::{
-    PASTS, Trace, Variable, of_past, of_reading, of_signal, of_state, of_trace, wave,
+    PASTS, Trace, Variable, entered, of_past, of_signal, of_state, of_trace, wave,
 };
 use self::listed::Library;
 use self::scales::Scales;
@@ -23,6 +23,7 @@ use crate::diagnose::error::DiagnoseError;
 use crate::effect::{EffectPattern, TargetKind, targets};
 use crate::fit::axis::{Axis, EvidencePrior};
 use crate::math::quantile;
+use crate::record::Record;
 use crate::study::Study;
 use crate::twin::{Interval, Parameter, Role, is_memory};
 use std::sync::Arc;
@@ -127,6 +128,20 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
             )
         })
         .collect();
+    let instants = || {
+        let of_record = |record: &Record| -> Vec<f64> {
+            (0..record.samples())
+                .map(|k| record.drive().time(k))
+                .collect()
+        };
+        visited(scales.records.iter().map(of_record))
+    };
+    let time = instants().map(|(low, high)| Variable {
+        name: "t".to_owned(),
+        of: Of::Time,
+        low,
+        high,
+    });
     let times: [f64; TIMES] = spread(3.0 * scales.dt(), scales.duration() / 6.0);
     let frequency = |target: &str| {
         let parameter = Parameter::new(target, "Hz", 0.1, 1.0);
@@ -140,8 +155,8 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
         for (_, one) in &of_states {
             terms.push(of_state(target, std::slice::from_ref(one), largest));
         }
-        for input in &of_inputs {
-            terms.push(of_state(target, std::slice::from_ref(input), largest));
+        for one in of_inputs.iter().chain(&time) {
+            terms.push(of_state(target, std::slice::from_ref(one), largest));
         }
         for (a, (first, one)) in of_states.iter().enumerate() {
             for (second, two) in &of_states[a + 1..] {
@@ -174,7 +189,8 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
                 continue;
             };
             let size = scales.size(kind, j);
-            terms.push(of_signal(&target, is_sensor, &seen, size));
+            let both = std::iter::once(&seen).chain(&time);
+            terms.extend(both.map(|one| of_signal(&target, is_sensor, one, size)));
             if has_equations {
                 terms.push(of_past(&target, is_sensor, name, past));
                 let lags = past[1..].iter().map(|tau| ("lagged", Trace::Lag(*tau)));
@@ -197,7 +213,7 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
             if has_equations && is_sensor {
                 let states = of_states.iter().map(|(_, state)| state);
                 let others = states.chain(&of_inputs);
-                terms.extend(others.map(|other| of_reading(&target, j, other, size)));
+                terms.extend(others.map(|other| entered(&target, Entry::Sensor(j), other, size)));
             }
             if is_sensor || !has_equations {
                 let entry = if is_sensor {
@@ -213,6 +229,9 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
     for (i, parameter) in outline.parameters.iter().enumerate() {
         if parameter.role == Role::Parameter && has_equations {
             let target = &parameter.name;
+            let states = of_states.iter().map(|(_, state)| state);
+            let all = states.chain(&of_inputs).chain(&time);
+            terms.extend(all.map(|one| entered(target, Entry::Parameter(i), one, 1.0)));
             terms.extend(disturbances(
                 target,
                 Entry::Parameter(i),

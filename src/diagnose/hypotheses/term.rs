@@ -1,9 +1,8 @@
 //! One hypothesis of what a twin lacks: a term that is added to it.
 
-use super::basis::Of;
 use super::disturbed_equations::disturbed;
+use super::entered::{Entered, with_function};
 use super::entry::Entry;
-use super::readings::with_reading;
 use crate::diagnose::error::DiagnoseError;
 use crate::effect::{Effect, EffectKey, augment_short};
 use crate::fit::axis::Axis;
@@ -15,7 +14,7 @@ use std::collections::BTreeMap;
 pub(in crate::diagnose) enum Nature {
     /// An effect of the library.
     Listed,
-    /// An unknown function of states, inputs or signals.
+    /// An unknown function of states, inputs, signals or time.
     Function,
     /// An unknown function of a state or an input at an output.
     Reading,
@@ -40,12 +39,8 @@ pub(in crate::diagnose) enum Part {
     },
     /// A disturbance that keeps a share `memory` of itself at each step.
     Disturbance { entry: Entry, memory: f64 },
-    /// A function of a state or an input, drawn between `ends`, that is added to an output.
-    Reading {
-        output: usize,
-        of: Of,
-        ends: (f64, f64),
-    },
+    /// A function that enters at an output or in a parameter.
+    Function(Entered),
 }
 
 /// Values of a term's magnitudes at which a search looks.
@@ -87,7 +82,7 @@ impl Term {
         match &self.part {
             Part::Effect { effect, .. } => effect.law().is_noise(),
             Part::Disturbance { .. } => true,
-            Part::Reading { .. } => false,
+            Part::Function(_) => false,
         }
     }
 
@@ -97,7 +92,7 @@ impl Term {
             Part::Effect { effect, .. } => {
                 self.nature == Nature::Listed && effect.magnitudes().iter().any(|m| m.unit == "Hz")
             }
-            Part::Disturbance { .. } | Part::Reading { .. } => false,
+            Part::Disturbance { .. } | Part::Function(_) => false,
         }
     }
 
@@ -108,12 +103,12 @@ impl Term {
                 .filter(|m| !held.contains_key(m.name))
                 .map(|m| effect.key().magnitude(m.name))
                 .collect(),
-            Part::Disturbance { .. } | Part::Reading { .. } => vec![],
+            Part::Disturbance { .. } | Part::Function(_) => vec![],
         }
     }
 }
 
-/// The twin with terms: effects first, a disturbance or a function of an output last.
+/// The twin with terms: effects first, a disturbance or a function that is no effect last.
 pub(in crate::diagnose) fn with_terms<'t>(
     base: &Twin,
     terms: impl Iterator<Item = &'t Term> + Clone,
@@ -130,7 +125,7 @@ pub(in crate::diagnose) fn with_terms<'t>(
     let twin = fix(augment_short(base.clone(), effects, memories)?, &off)?;
     Ok(terms.fold(twin, |twin, term| match term.part {
         Part::Disturbance { entry, memory } => disturbed(twin, entry, memory),
-        Part::Reading { output, of, ends } => with_reading(twin, output, of, ends),
+        Part::Function(function) => with_function(twin, function),
         Part::Effect { .. } => twin,
     }))
 }

@@ -273,6 +273,8 @@ pub struct Diagnosis {
     pub discovery: Option<Discovery>,
     /// True for a quick look: effects were tried one at a time.
     pub quick: bool,
+    /// True if the search was cancelled: this is what was found until then.
+    pub interrupted: bool,
     /// Integrator that everything here is said with, where the records ask for a finer step than the twin's.
     pub integrator: Option<Integrator>,
     /// Its substeps of a sample.

@@ -71,7 +71,7 @@ fn first_magnitude(term: &Term) -> String {
         Part::Effect { effect, held, .. } => (effect.magnitudes().iter())
             .find(|m| !held.contains_key(m.name))
             .map_or_else(String::new, |m| m.name.to_owned()),
-        Part::Disturbance { .. } | Part::Reading { .. } => String::new(),
+        Part::Disturbance { .. } | Part::Function(_) => String::new(),
     }
 }
 

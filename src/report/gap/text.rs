@@ -90,10 +90,18 @@ pub(super) fn evidence_sentence(diagnosis: &Diagnosis) -> String {
     )
 }
 
-/// Returns what a quick look leaves out; none for a whole diagnosis.
+/// Returns what a quick look or an interrupted one leaves out; none for a whole diagnosis.
 pub(super) fn quick_sentence(diagnosis: &Diagnosis) -> Option<String> {
-    let said = "A quick look: effects one at a time, each from few starts. Without --quick, pairs are searched, and names are surer.";
-    diagnosis.quick.then(|| said.to_owned())
+    let said = match (diagnosis.interrupted, diagnosis.quick) {
+        (true, _) => {
+            "Interrupted: this was found until then. Pairs, other noise or a finer step may not have been tried."
+        }
+        (false, true) => {
+            "A quick look: effects one at a time, each from few starts. Without --quick, pairs are searched, and names are surer."
+        }
+        (false, false) => return None,
+    };
+    Some(said.to_owned())
 }
 
 /// Returns with which step everything is said; none where it is the twin's own.

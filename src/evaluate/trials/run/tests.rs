@@ -1,5 +1,4 @@
 use super::*;
-use crate::diagnose::fixture::tanks;
 use crate::storage::files::sha256;
 use crate::study::{RecordPlan, StudyFile};
 use crate::twins::VanDerPol;
@@ -153,7 +152,7 @@ fn calls_that_cannot_be_made_are_refused_with_the_limit() {
 
 #[test]
 fn a_verdict_alone_is_the_verdict_of_the_whole() {
-    let study = tanks(200);
+    let study = oscillator();
     let place = tempfile::tempdir().unwrap();
     let card = |detection_only, name: &str| {
         let settings = Settings {
