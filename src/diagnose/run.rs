@@ -315,8 +315,9 @@ fn discovered(
         Decision::Partial => findings.beside(&conclusion.accepted)?.1,
         _ => return None,
     };
-    // The best function of one variable, at the place that is named if there is one.
+    // The best function of one variable, at the place that is named if there is one. What a parameter follows is no law to be added.
     let drawn: Vec<_> = (all.iter())
+        .filter(|f| !f.last().is_in_parameter())
         .filter_map(|f| Some((f, curve(f.model.as_ref()?)?)))
         .collect();
     let there = drawn

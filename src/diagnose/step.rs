@@ -3,9 +3,11 @@
 use super::error::DiagnoseError;
 use super::model::Model;
 use super::thresholds::Thresholds;
+use crate::fit::problem::Problem;
 use crate::fit::reference::Reference;
 use crate::likelihood::kalman::recoverable;
 use crate::twin::{Integrator, MOST_SUBSTEPS, Twin};
+use nalgebra::DVector;
 
 /// A finer step than a twin's own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,8 +47,10 @@ impl FinerStep {
     }
 }
 
-/// The cheapest step that explains a model's records as well as the best, where that is better than its twin's own, and how much better,
-/// in nats; `None` where the step does not show, or shows for the better, and for a black box.
+/// The cheapest finer step from which an exact one cannot be told, where it explains a model's records better than its twin's own, and how
+/// much better, in nats; `None` where the step does not show, or shows for the better, and for a black box.
+///
+/// Which step, the innovations say, not evidence: an error of a coarser one may imitate what is missing.
 pub(in crate::diagnose) fn finer_step(
     model: &Model<'_>,
 ) -> Result<Option<(FinerStep, f64)>, DiagnoseError> {
@@ -57,39 +61,46 @@ pub(in crate::diagnose) fn finer_step(
     let Some(reference) = recoverable(Reference::new(&model.problem, theta))?.flatten() else {
         return Ok(None);
     };
-    let mut finer = vec![];
-    for step in FinerStep::candidates(integrator, stepping.substeps) {
-        let Some(twin) = step.of(model.base) else {
+    let problem = |step: FinerStep| -> Result<Option<Problem<'_>>, DiagnoseError> {
+        let twin = step.of(model.base);
+        twin.map(|twin| model.problem_of(&twin)).transpose()
+    };
+    let direction = |step: FinerStep| -> Result<Option<DVector<f64>>, DiagnoseError> {
+        let Some(problem) = problem(step)? else {
             return Ok(None);
         };
-        finer.push((model.problem_of(&twin)?, step));
-    }
-    let Some((exact, _)) = finer.last() else {
+        let filtered = recoverable(problem.filtered(theta))?;
+        Ok(filtered.map(|filtered| reference.direction(&filtered)))
+    };
+    let shows = |direction: &DVector<f64>| 0.5 * reference.own(direction) > Thresholds::STEP_SHOWS;
+    let candidates = FinerStep::candidates(integrator, stepping.substeps);
+    let Some((&last, cheaper)) = candidates.split_last() else {
         return Ok(None);
     };
-    let Some(filtered) = recoverable(exact.filtered(theta))? else {
+    let Some(exact) = direction(last)?.filter(shows) else {
         return Ok(None);
     };
-    if 0.5 * reference.own(&reference.direction(&filtered)) <= Thresholds::STEP_SHOWS {
-        return Ok(None);
-    }
-    // A search stops before the end of a climb: with its own step, too, the model is carried on.
-    let mut last = model.carried_on()?.unwrap_or_else(|| model.clone());
-    let own = last.log_evidence.max(model.log_evidence);
-    let mut fitted = vec![];
-    for (problem, step) in finer {
-        let begin = Model {
-            problem,
-            ..last.clone()
-        };
-        if let Some(model) = begin.carried_on()? {
-            fitted.push((step, model.log_evidence - own));
-            last = model;
+    let mut chosen = last;
+    for &step in cheaper {
+        let there = direction(step)?;
+        if there.is_some_and(|there| !shows(&(&exact - there))) {
+            chosen = step;
+            break;
         }
     }
-    let best = (fitted.iter()).fold(f64::NEG_INFINITY, |best, (_, gain)| best.max(*gain));
-    let enough = (best - Thresholds::STEP_SHOWS).max(Thresholds::STEP_WINS);
-    Ok((fitted.into_iter()).find(|(_, gain)| *gain > enough))
+    // A search stops before the end of a climb: with its own step, too, the model is carried on.
+    let own = model.carried_on()?.unwrap_or_else(|| model.clone());
+    let Some(problem) = problem(chosen)? else {
+        return Ok(None);
+    };
+    let finer = Model {
+        problem,
+        ..own.clone()
+    };
+    let gain = (finer.carried_on()?).map_or(f64::NEG_INFINITY, |finer| {
+        finer.log_evidence - own.log_evidence.max(model.log_evidence)
+    });
+    Ok((gain > Thresholds::STEP_WINS).then_some((chosen, gain)))
 }
 
 #[cfg(test)]

@@ -31,11 +31,12 @@ impl Units {
         (self.effects.iter()).find(|e| e.id() == id && e.target() == target)
     }
 
-    /// Returns the unit of a state, an input or an output.
+    /// Returns the unit of a state, an input, an output or time.
     pub(super) fn variable(&self, name: &str) -> &str {
         let signals = self.inputs.iter().chain(&self.outputs);
         let known = (self.states.iter().chain(signals)).find(|q| q.name == name);
-        known.map_or("", |q| &q.unit)
+        let other = if name == "t" { "s" } else { "" };
+        known.map_or(other, |q| &q.unit)
     }
 
     /// Tells whether the name is a state's: its equation gives a rate.
@@ -62,12 +63,12 @@ impl Units {
         }
     }
 
-    /// `rate of h1`, or `output y` of a sensor, or `input u` of an actuator.
+    /// What an unknown function joins: `rate of h1`, `output y` of a sensor, `input u` of an actuator, `logarithm of k1`.
     pub(super) fn place_name(&self, name: &str) -> String {
         match self.signal(name) {
             Some((kind, signal)) => format!("{kind} {}", signal.name),
             None if self.is_state(name) => format!("rate of {name}"),
-            None => name.into(),
+            None => format!("logarithm of {name}"),
         }
     }
 
@@ -219,7 +220,8 @@ mod tests {
         assert_eq!(tanks.place("h1"), "rate of h1 in V/s");
         assert_eq!(tanks.place("sensor"), "output y in V");
         assert_eq!(tanks.place("actuator"), "input u in V");
-        assert_eq!(tanks.place("k1"), "k1");
+        assert_eq!(tanks.place("k1"), "logarithm of k1");
+        assert_eq!(tanks.named("t"), "t in s");
         assert_eq!(tanks.named("h2"), "h2 in V");
         assert_eq!(oscillator.place("x1"), "rate of x1 in 1/s");
         assert_eq!(oscillator.place("x2"), "rate of x2 in (1/s)/s");

@@ -183,8 +183,8 @@ fn beside_each_other<'a>(
     settings: &DiagnoseSettings,
     stage: &Stage,
 ) -> Result<Findings<'a>, DiagnoseError> {
-    let is_null = findings.chances().log_odds <= Thresholds::GAP;
-    if is_null || findings.asks_for_noise().is_some() {
+    // Where another kind of noise explains as much as one effect, two may explain more.
+    if findings.log_odds_alone() <= Thresholds::GAP || findings.asks_beside() {
         return Ok(findings);
     }
     let (origin, top) = (base.log_evidence, findings.top());

@@ -140,10 +140,15 @@ impl<'a> Findings<'a> {
         (pairs.max(1.0).ln() + Thresholds::FINE_PRINT * top) * (count - 1) as f64
     }
 
+    /// Returns whether the records ask for another kind of noise beside the best listed effect.
+    pub fn asks_beside(&self) -> bool {
+        (self.noise_beside.as_ref()).is_some_and(|(_, nats)| *nats > Thresholds::NOISE)
+    }
+
     /// The kind of noise that the records ask for: where something is missing beside it, where nothing is without it.
     pub fn asks_for_noise(&self) -> Option<&Found<'a>> {
         let key = match &self.noise_beside {
-            Some((key, nats)) if *nats > Thresholds::NOISE => key.clone(),
+            Some((key, _)) if self.asks_beside() => key.clone(),
             _ => {
                 let best = self.noise.first()?;
                 let explains = best.gain > Thresholds::NOISE;
@@ -177,6 +182,11 @@ impl<'a> Findings<'a> {
             .filter(|z| z.is_finite())
             .collect();
         log_mean(&all) + (all.len() as f64).ln()
+    }
+
+    /// log of the odds of a gap against none, noise being of the twin's own kind.
+    pub fn log_odds_alone(&self) -> f64 {
+        self.chances().log_odds + self.nothing()
     }
 
     /// Posterior probabilities of all hypotheses.

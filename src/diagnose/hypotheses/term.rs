@@ -86,6 +86,11 @@ impl Term {
         }
     }
 
+    /// Returns whether this is an unknown function that a parameter follows.
+    pub fn is_in_parameter(&self) -> bool {
+        matches!(&self.part, Part::Function(function) if matches!(function.entry, Entry::Parameter(_)))
+    }
+
     /// Returns whether this is a law of the library with a frequency.
     pub fn is_listed_wave(&self) -> bool {
         match &self.part {

@@ -138,9 +138,9 @@ pub struct Band {
 /// An unknown function that was fitted together with θ and noise levels.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MissingFunction {
-    /// State whose rate it joins, or sensor or actuator whose signal it bends.
+    /// State whose rate it joins, sensor or actuator whose signal it bends, or parameter whose logarithm it joins.
     pub place: String,
-    /// State, input or signal that it depends on.
+    /// State, input or signal that it depends on, or `t`.
     pub variable: String,
     /// True on top of the accepted effects; false beside the twin alone.
     pub on_top: bool,
