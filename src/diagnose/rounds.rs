@@ -33,6 +33,13 @@ pub(in crate::diagnose) struct Explored<'s, 'a> {
     pub not_tested: Vec<String>,
 }
 
+impl Explored<'_, '_> {
+    /// log of the evidence of all hypotheses together.
+    fn log_evidence(&self) -> f64 {
+        self.base.model.log_evidence + self.chances.log_evidence
+    }
+}
+
 /// Fits the twin, searches for what explains the records beside it, and hands it all on.
 pub(in crate::diagnose) fn search<R>(
     study: &Study,
@@ -45,26 +52,50 @@ pub(in crate::diagnose) fn search<R>(
     let measured = measured(study.twin(), records, &settings.beliefs(study))?;
     let base = Base::new(&measured, records, settings)?;
     stage.tick()?;
-    match step_of(study, &base, settings)? {
-        Some(step) => with_step(
-            study,
-            &base,
-            step,
-            Before::Nothing,
-            settings,
-            progress,
-            then,
-        ),
-        None => explored(
-            study,
-            base,
-            Before::Nothing,
-            settings,
-            ROUNDS,
-            progress,
-            then,
-        ),
+    if let Some(step) = step_of(study, &base, settings)? {
+        let nothing = Before::Nothing;
+        return with_step(study, &base, step, nothing, settings, progress, then);
     }
+    let then = |mut own: Explored<'_, '_>| {
+        match likelier_with_step(&own, settings, progress, then) {
+            // A twin that its own step holds together may go nowhere with a finer one.
+            Ok(None) | Err(DiagnoseError::NoFit) => {}
+            Ok(Some(found)) => return Ok(found),
+            Err(DiagnoseError::Cancelled(_)) if settings.give_partial => {
+                own.findings.is_partial = true;
+            }
+            Err(error) => return Err(error),
+        }
+        then(own)
+    };
+    let nothing = Before::Nothing;
+    explored(study, base, nothing, settings, ROUNDS, progress, &then)
+}
+
+/// Searches with a finer step, too, where effects explain what the step may explain as well: they may imitate its error. `None` where the
+/// step does not show, or where its hypotheses are together no likelier.
+fn likelier_with_step<R>(
+    own: &Explored<'_, '_>,
+    settings: &DiagnoseSettings,
+    progress: &Progress,
+    then: &dyn Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
+) -> Result<Option<R>, DiagnoseError> {
+    if own.base.step.is_some() || own.findings.is_partial || own.chances.log_odds <= Thresholds::GAP
+    {
+        return Ok(None);
+    }
+    let Some((step, _)) = finer_step(&own.base.model, own.findings.top())? else {
+        return Ok(None);
+    };
+    let least = own.log_evidence() + Thresholds::STEP_WINS;
+    let then = |other: Explored<'_, '_>| {
+        let is_likelier = other.log_evidence() > least;
+        is_likelier.then(|| then(other)).transpose()
+    };
+    let nothing = Before::Nothing;
+    with_step(
+        own.study, own.base, step, nothing, settings, progress, &then,
+    )
 }
 
 /// The finer step that the records ask for. A gap may pass for one: an effect that is more probable, as one of all that are listed, is
@@ -74,7 +105,7 @@ fn step_of(
     base: &Base<'_>,
     settings: &DiagnoseSettings,
 ) -> Result<Option<FinerStep>, DiagnoseError> {
-    let Some((step, gain)) = finer_step(&base.model)? else {
+    let Some((step, gain)) = finer_step(&base.model, 0.0)? else {
         return Ok(None);
     };
     let model = &base.model;
@@ -84,7 +115,7 @@ fn step_of(
     let price = (effects.len() as f64 / Thresholds::LISTED).ln();
     let best = (effects.first()).filter(|effect| effect.gain - price > gain);
     match best.and_then(|effect| effect.model.as_ref()) {
-        Some(beside) => Ok(finer_step(beside)?.map(|(step, _)| step)),
+        Some(beside) => Ok(finer_step(beside, 0.0)?.map(|(step, _)| step)),
         None => Ok(Some(step)),
     }
 }
@@ -185,7 +216,7 @@ fn again<'a, R>(
     }
     // Beside a gap, noise levels are fitted loud, and hide the step.
     if let (None, Some(model)) = (base.step, findings.best_listed())
-        && let Some((step, gain)) = finer_step(model)?
+        && let Some((step, gain)) = finer_step(model, 0.0)?
     {
         let minor = gain < MINOR * findings.top() && base.noises.is_empty();
         let before = match minor {

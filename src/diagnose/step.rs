@@ -50,9 +50,10 @@ impl FinerStep {
 /// The cheapest finer step from which an exact one cannot be told, where it explains a model's records better than its twin's own, and how
 /// much better, in nats; `None` where the step does not show, or shows for the better, and for a black box.
 ///
-/// Which step, the innovations say, not evidence: an error of a coarser one may imitate what is missing.
+/// Beside a model that explains so many nats, a step does not show that differs by less than a law's fine print. Which step, the innovations say, not evidence: an error of a coarser one may imitate what is missing.
 pub(in crate::diagnose) fn finer_step(
     model: &Model<'_>,
+    explained: f64,
 ) -> Result<Option<(FinerStep, f64)>, DiagnoseError> {
     let Some((integrator, stepping)) = model.base.integration() else {
         return Ok(None);
@@ -72,7 +73,8 @@ pub(in crate::diagnose) fn finer_step(
         let filtered = recoverable(problem.filtered(theta))?;
         Ok(filtered.map(|filtered| reference.direction(&filtered)))
     };
-    let shows = |direction: &DVector<f64>| 0.5 * reference.own(direction) > Thresholds::STEP_SHOWS;
+    let least = Thresholds::STEP_SHOWS.max(Thresholds::FINE_PRINT * explained);
+    let shows = |direction: &DVector<f64>| 0.5 * reference.own(direction) > least;
     let candidates = FinerStep::candidates(integrator, stepping.substeps);
     let Some((&last, cheaper)) = candidates.split_last() else {
         return Ok(None);
@@ -128,7 +130,7 @@ mod tests {
         let asked = |records: &[Record]| {
             let measured = measured(study.twin(), records, &study.beliefs()).unwrap();
             let base = Base::new(&measured, records, &settings).unwrap();
-            finer_step(&base.model).unwrap()
+            finer_step(&base.model, 0.0).unwrap()
         };
         for seed in 0..3 {
             assert!(

@@ -11,8 +11,8 @@ pub(crate) enum Mark {
     Present(Vec<f64>),
 }
 
-/// Equal values at an end that noise does not bring about, and how many times more often than a usual value, and than the next one, they
-/// come: a rounded oscillation is often at its ends, and hardly less often beside them.
+/// Equal values at an end that noise does not bring about, and how many times more often they come than a usual value, and than those
+/// next to them. A rounded oscillation is often at its ends: at the top of a parabola, steps hold 1 : 0.41 : 0.32 of its time.
 const TIES: usize = 4;
 const OFTEN: usize = 3;
 /// Samples for each multiple of the step within the signal's range, at least, where the step is one of digits: files round,
@@ -52,13 +52,20 @@ pub(crate) fn clipped(outputs: &[f64]) -> Mark {
     let mut counts: Vec<usize> = values.iter().map(|(_, count)| *count).collect();
     counts.sort_unstable();
     let usual = counts[counts.len() / 2];
-    let at = |(value, count): (f64, usize), (_, next): (f64, usize), off: f64| {
-        let piled_up = count >= TIES.max(OFTEN * usual.max(next));
+    let at = |(value, count): (f64, usize), beside: [(f64, usize); 2], off: f64| {
+        let [(_, next), (_, second)] = beside;
+        // Only rounded values repeat.
+        let beside = if next > 1 { next + second } else { next };
+        let piled_up = count >= TIES.max(OFTEN * usual.max(beside));
         if piled_up { value } else { off }
     };
     let last = values.len() - 1;
-    let low = at(values[0], values[1], f64::NEG_INFINITY);
-    let high = at(values[last], values[last - 1], f64::INFINITY);
+    let low = at(values[0], [values[1], values[2]], f64::NEG_INFINITY);
+    let high = at(
+        values[last],
+        [values[last - 1], values[last - 2]],
+        f64::INFINITY,
+    );
     if low.is_finite() || high.is_finite() {
         Mark::Present(vec![low, high])
     } else {
@@ -134,10 +141,20 @@ mod tests {
         assert_eq!(rounded(&digits), Mark::Absent);
         assert_eq!(clipped(&[]), Mark::Absent);
         // Nor are the turning points of a rounded oscillation.
-        let wave: Vec<f64> = (0..300)
-            .map(|k| ((0.13 * k as f64).sin() * 20.0).round() / 10.0)
-            .collect();
-        assert_eq!(clipped(&wave), Mark::Absent);
+        let wave = |size: f64| -> Vec<f64> {
+            (0..300)
+                .map(|k| ((0.13 * k as f64).sin() * size).round() / 10.0)
+                .collect()
+        };
+        for size in [20.0, 20.4, 50.4, 110.4, 200.4] {
+            assert_eq!(clipped(&wave(size)), Mark::Absent, "{size}");
+        }
+        // The same behind a sensor that stops is marked.
+        let behind: Vec<f64> = wave(110.4).iter().map(|y| y.min(9.0)).collect();
+        assert_eq!(
+            clipped(&behind),
+            Mark::Present(vec![f64::NEG_INFINITY, 9.0])
+        );
         assert_eq!(rounded(&[1.0; 50]), Mark::Absent);
     }
 

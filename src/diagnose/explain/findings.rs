@@ -49,6 +49,8 @@ pub(in crate::diagnose) struct Chances {
     pub places: BTreeMap<String, f64>,
     /// log of the odds of a gap against none, prior odds even.
     pub log_odds: f64,
+    /// log of the evidence of all hypotheses over that of the twin.
+    pub log_evidence: f64,
 }
 
 impl<'a> Findings<'a> {
@@ -142,21 +144,29 @@ impl<'a> Findings<'a> {
 
     /// Returns whether the records ask for another kind of noise beside the best listed effect.
     pub fn asks_beside(&self) -> bool {
-        (self.noise_beside.as_ref()).is_some_and(|(_, nats)| *nats > Thresholds::NOISE)
+        self.beside_noise()
+            .is_some_and(|key| self.noise_of(key).is_some())
+    }
+
+    fn beside_noise(&self) -> Option<&str> {
+        let (key, nats) = self.noise_beside.as_ref()?;
+        (*nats > Thresholds::NOISE).then_some(key)
+    }
+
+    /// The fitted kind of noise of this key.
+    fn noise_of(&self, key: &str) -> Option<&Found<'a>> {
+        (self.noise.iter()).find(|f| f.model.is_some() && f.last().key() == key)
     }
 
     /// The kind of noise that the records ask for: where something is missing beside it, where nothing is without it.
     pub fn asks_for_noise(&self) -> Option<&Found<'a>> {
-        let key = match &self.noise_beside {
-            Some((key, _)) if self.asks_beside() => key.clone(),
-            _ => {
-                let best = self.noise.first()?;
-                let explains = best.gain > Thresholds::NOISE;
-                let enough = self.chances().log_odds <= Thresholds::GAP;
-                (explains && enough).then(|| best.last().key())?
-            }
-        };
-        (self.noise.iter()).find(|f| f.model.is_some() && f.last().key() == key)
+        if let Some(key) = self.beside_noise() {
+            return self.noise_of(key);
+        }
+        let best = self.noise.first()?;
+        let explains = best.gain > Thresholds::NOISE;
+        let enough = self.chances().log_odds <= Thresholds::GAP;
+        (explains && enough).then(|| self.noise_of(&best.last().key()))?
     }
 
     /// Unknown functions that are not the library's. A wave at another place is no rival of a listed wave that explains as much: it is
@@ -236,6 +246,7 @@ impl<'a> Findings<'a> {
                 ..Probabilities::default()
             },
             log_odds,
+            log_evidence: whole,
             ..Chances::default()
         };
         // Which set explains a part, the sets' own evidence says: what is beside them is not known well enough to choose by.
