@@ -162,6 +162,16 @@ mod tests {
     }
 
     #[test]
+    fn what_is_no_table_is_told_what_to_be() {
+        let error = Catalogue::default().parse("effect = [3]").unwrap_err();
+        let told = error.to_string();
+        assert!(
+            told.contains("expected a table with id and target"),
+            "{told}"
+        );
+    }
+
+    #[test]
     fn an_own_effect_is_offered_where_it_can_stand_and_known_to_files() {
         let tanks = Twin::new(CascadedTanks);
         let catalogue = Catalogue::default().with(magnet());

@@ -63,7 +63,7 @@ impl Units {
         }
     }
 
-    /// What an unknown function joins: `rate of h1`, `output y` of a sensor, `input u` of an actuator, `logarithm of k1`.
+    /// The quantity that an unknown function joins: `rate of h1`, `output y` of a sensor, `input u` of an actuator, `logarithm of k1`.
     pub(super) fn place_name(&self, name: &str) -> String {
         match self.signal(name) {
             Some((kind, signal)) => format!("{kind} {}", signal.name),

@@ -51,7 +51,7 @@ pub(in crate::diagnose) fn explore<'a>(
     Ok(findings)
 }
 
-/// What is known from a search before.
+/// Knowledge from a search before.
 #[derive(Clone, Copy)]
 pub(in crate::diagnose) enum Before<'k, 'a> {
     Nothing,

@@ -7,12 +7,14 @@ mod study_of_many;
 mod trials;
 
 use crate::binomial_bounds;
+use std::path::Path;
 use std::sync::Arc;
 use trials::*;
 use truetwin::diagnose::{Decision, DiagnoseSettings, Diagnosis, Verdict, diagnose};
 use truetwin::progress::{Listener, Progress};
 use truetwin::record::{Drive, Record, Signal};
-use truetwin::twin::{Noise, Twin};
+use truetwin::study::StudyFile;
+use truetwin::twin::{Integrator, Noise, Twin};
 
 /// Records of the twin itself, half of them with θ outside the prior: alarms stay within the binomial bound.
 #[test]
@@ -63,6 +65,32 @@ fn clear_effects_are_found_and_named() {
         assert_eq!(found.location.target.as_deref(), key.split('@').nth(1));
         let shares: f64 = found.location.targets.iter().map(|t| t.probability).sum();
         assert!(shares <= 1.0 + 1e-9);
+    }
+}
+
+/// Euler's error and a stiffer spring together, seen almost without noise: the spring alone is named, with a step that is no longer Euler's.
+/// Four of Euler's substeps leave an error that passes for a lag of the sensor.
+#[test]
+fn the_rest_of_a_coarse_step_is_not_named() {
+    let whole = study("van-der-pol");
+    let configured = |record: &str| {
+        let text = format!("twin = 'van-der-pol'\n{record}\n[noise]\ny = 0.01\n");
+        let file = StudyFile::parse(&text, Path::new("study.toml")).unwrap();
+        whole.configure(&file).unwrap()
+    };
+    let (coarse, fine) = (configured(""), configured("[record]\nsubsteps = 64"));
+    let spring = "[[effect]]\nid = 'cubic-stiffness'\ntarget = 'x2'\nfrom = 'x1'\nmagnitudes = { coefficient = 0.17 }\n";
+    for seed in 0..2 {
+        let noise = Noise::new(36, "coarse", seed);
+        let record = record(fine.twin(), spring, &[1.24], drive(&coarse, noise), noise);
+        let found = found(&coarse, record, None);
+        println!("{}", line("cubic-stiffness@x2", &found));
+        assert_eq!(found.cause.accepted, ["cubic-stiffness@x2"], "seed {seed}");
+        assert_eq!(
+            found.integrator,
+            Some(Integrator::RungeKutta4),
+            "seed {seed}"
+        );
     }
 }
 
