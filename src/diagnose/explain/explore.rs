@@ -216,6 +216,12 @@ fn beside_each_other<'a>(
     if let Some(found) = alone(base, &mut findings, terms, origin, breadth)? {
         enough |= findings.add(&found, on_top(&found, terms, origin, few)?);
     }
+    if let Some(beside) = instead_of_second(&findings, terms, origin, breadth)? {
+        findings.noise_beside = Some(beside);
+        if findings.asks_beside() {
+            return Ok(findings);
+        }
+    }
     for i in 0..findings.several.len().min(2) {
         let found = findings.several[i].clone();
         if !findings.wins(&found) || i > 0 && !may_suffice(&found) {
@@ -256,6 +262,42 @@ fn noise_beside<'a>(
         .collect();
     let found = listed(model, &outliers, origin, &[], breadth)?;
     Ok((found.first()).map(|f| (f.last().key(), f.gain - best.gain)))
+}
+
+/// The kind of noise that explains more beside one effect of the best pair than the other effect does, its price paid, and leaves nothing:
+/// what remains beside an effect, noise would hide.
+fn instead_of_second(
+    findings: &Findings<'_>,
+    terms: &Terms<'_>,
+    origin: f64,
+    breadth: Breadth,
+) -> Result<Option<(String, f64)>, DiagnoseError> {
+    let first = findings.several.first();
+    let Some(pair) = first.filter(|pair| findings.wins(pair)) else {
+        return Ok(None);
+    };
+    let keys = pair.keys();
+    let mut best: Option<(Found<'_>, f64)> = None;
+    for single in (findings.listed.iter()).filter(|f| keys.contains(&f.last().key())) {
+        let Some(model) = &single.model else { continue };
+        let found = listed(model, terms.noise, origin, &[], breadth.of_all())?;
+        let Some(found) = found.into_iter().next() else {
+            continue;
+        };
+        if best.as_ref().is_none_or(|(best, _)| found.gain > best.gain) {
+            let gain = found.gain - single.gain;
+            best = Some((found, gain));
+        }
+    }
+    let enough = pair.gain - findings.price(2);
+    let Some((found, gain)) = best.filter(|(found, _)| found.gain > enough) else {
+        return Ok(None);
+    };
+    let Some(on_top) = on_top(&found, terms, origin, breadth.few())? else {
+        return Ok(None);
+    };
+    let added = on_top.first().map_or(0.0, |f| f.gain - found.gain);
+    Ok(leaves_nothing(found.gain, added).then(|| (found.last().key(), gain)))
 }
 
 /// Second kinds of noise beside the likeliest one.
