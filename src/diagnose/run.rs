@@ -87,7 +87,7 @@ fn report(
     settings: &DiagnoseSettings,
     progress: &Progress,
 ) -> Result<Diagnosis, DiagnoseError> {
-    // What is left to do for a partial answer takes seconds, and is done.
+    // What is left to do for a partial answer is done as for a quick look.
     let hurried = DiagnoseSettings {
         quick: true,
         calibrate: 0,
