@@ -50,7 +50,8 @@ impl FinerStep {
 /// The cheapest finer step from which an exact one cannot be told, where it explains a model's records better than its twin's own, and how
 /// much better, in nats; `None` where the step does not show, or shows for the better, and for a black box.
 ///
-/// Beside a model that explains so many nats, a step does not show that differs by less than a law's fine print. Which step, the innovations say, not evidence: an error of a coarser one may imitate what is missing.
+/// Beside a model that explains so many nats, a step does not show that differs by less than a law's fine print. Which step, the
+/// innovations say, not evidence: an error of a coarser one may imitate what is missing.
 pub(in crate::diagnose) fn finer_step(
     model: &Model<'_>,
     explained: f64,

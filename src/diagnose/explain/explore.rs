@@ -1,6 +1,6 @@
 //! The order of the search: single explanations, what they leave, pairs.
 
-use super::findings::{Findings, leaves_nothing};
+use super::findings::{Findings, leaves_nothing, suffices};
 use super::search::{Breadth, FEW, Found, listed, own_theta, sort, unknown};
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::scales::Scales;
@@ -133,22 +133,22 @@ fn one_by_one<'a>(
     if best <= Thresholds::NULL_LIKE && top > Thresholds::NULL_LIKE {
         singles = listed(base, terms.listed, origin, &[], breadth.of_all())?;
     }
-    for found in &mut singles {
-        found.keep_better(old, origin);
-    }
-    sort(&mut singles);
+    let refitted = old.iter().filter_map(|found| {
+        let model = found.model.clone()?;
+        Some(Found {
+            terms: model.terms.clone(),
+            gain: model.log_evidence - origin,
+            model: Some(model),
+        })
+    });
+    improve(&mut singles, refitted);
     let top = singles.first().map_or(0.0, |f| f.gain);
     stage.tick()?;
     if top > Thresholds::WIDER {
         // The twin that is misfitted may not go where the corrected one goes.
         let seen = scales(&singles[..singles.len().min(2)])?;
-        for found in unknown(base, &(terms.unknown)(&seen), origin, breadth.few())? {
-            match unknown_alone.iter_mut().find(|f| f.keys() == found.keys()) {
-                Some(old) if found.gain > old.gain => *old = found,
-                _ => {}
-            }
-        }
-        sort(&mut unknown_alone);
+        let wider = unknown(base, &(terms.unknown)(&seen), origin, breadth.few())?;
+        improve(&mut unknown_alone, wider);
     }
     with_noise(base, terms, breadth, singles, unknown_alone)
 }
@@ -293,11 +293,9 @@ fn instead_of_second(
     let Some((found, gain)) = best.filter(|(found, _)| found.gain > enough) else {
         return Ok(None);
     };
-    let Some(on_top) = on_top(&found, terms, origin, breadth.few())? else {
-        return Ok(None);
-    };
-    let added = on_top.first().map_or(0.0, |f| f.gain - found.gain);
-    Ok(leaves_nothing(found.gain, added).then(|| (found.last().key(), gain)))
+    let on_top = on_top(&found, terms, origin, breadth.few())?;
+    let is_enough = on_top.is_some_and(|on_top| suffices(&found, &on_top));
+    Ok(is_enough.then(|| (found.last().key(), gain)))
 }
 
 /// Second kinds of noise beside the likeliest one.
@@ -415,14 +413,21 @@ fn alone<'a>(
         .cloned()
         .collect();
     let thetas: Vec<Vec<f64>> = own_theta(pair).into_iter().collect();
-    for found in listed(base, &own, origin, &thetas, breadth.of_all())? {
-        let old = (findings.listed.iter_mut()).find(|old| old.keys() == found.keys());
-        if let Some(old) = old.filter(|old| old.gain < found.gain) {
-            *old = found;
+    let again = listed(base, &own, origin, &thetas, breadth.of_all())?;
+    improve(&mut findings.listed, again);
+    Ok((findings.listed.first().cloned()).filter(|first| first.gain > top))
+}
+
+/// Takes the better ones of the same terms, and adds none; best first.
+fn improve<'a>(all: &mut [Found<'a>], others: impl IntoIterator<Item = Found<'a>>) {
+    for found in others {
+        let keys = found.keys();
+        let own = all.iter_mut().find(|own| own.keys() == keys);
+        if let Some(own) = own.filter(|own| own.gain < found.gain) {
+            *own = found;
         }
     }
-    sort(&mut findings.listed);
-    Ok((findings.listed.first().cloned()).filter(|first| first.gain > top))
+    sort(all);
 }
 
 /// Adds fitted pairs, of two of the same effects the better one; best first.

@@ -15,7 +15,7 @@ use crate::fit::evidence::log_mean;
 use std::collections::BTreeMap;
 
 /// Explanations of a kind from whose θ the twin is fitted again.
-const SINGLES: usize = 2;
+const STARTS: usize = 2;
 
 /// Everything that was found.
 #[derive(Default)]
@@ -57,10 +57,10 @@ impl<'a> Findings<'a> {
     /// Notes what unknown functions add on top of a set; returns whether they add nothing of weight.
     pub fn add(&mut self, found: &Found<'a>, on_top: Option<Vec<Found<'a>>>) -> bool {
         let Some(on_top) = on_top else { return false };
-        let added = on_top.first().map_or(0.0, |f| f.gain - found.gain);
+        let is_enough = suffices(found, &on_top);
         self.beside.retain(|(keys, _)| !same(keys, &found.keys()));
         self.beside.push((found.keys(), on_top));
-        leaves_nothing(found.gain, added)
+        is_enough
     }
 
     /// Nats that unknown functions add on top of a set; `None` where that was not asked.
@@ -103,7 +103,7 @@ impl<'a> Findings<'a> {
     /// θ of the twin beside the best single explanations: from there its own fit may go further than it went.
     pub fn thetas(&self) -> Vec<Vec<f64>> {
         let best = |all: &[Found<'a>]| -> Vec<Vec<f64>> {
-            (all.iter().take(SINGLES))
+            (all.iter().take(STARTS))
                 .filter(|found| found.gain > Thresholds::BETTER)
                 .filter_map(own_theta)
                 .collect()
@@ -301,6 +301,12 @@ enum Kind {
 /// Returns whether what an unknown function adds on top of a gain is no more than chance, or than a law's fine print.
 pub(in crate::diagnose) fn leaves_nothing(gain: f64, added: f64) -> bool {
     added < Thresholds::ADEQUATE.max(Thresholds::FINE_PRINT * gain)
+}
+
+/// Returns whether unknown functions on top of a set, best first, leave nothing that is worth a word.
+pub(in crate::diagnose) fn suffices(found: &Found<'_>, on_top: &[Found<'_>]) -> bool {
+    let added = on_top.first().map_or(0.0, |f| f.gain - found.gain);
+    leaves_nothing(found.gain, added)
 }
 
 fn same(a: &[String], b: &[String]) -> bool {

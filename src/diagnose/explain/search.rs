@@ -34,23 +34,10 @@ pub(in crate::diagnose) struct Found<'a> {
     pub model: Option<Model<'a>>,
 }
 
-impl<'a> Found<'a> {
+impl Found<'_> {
     /// Keys of the terms.
     pub fn keys(&self) -> Vec<String> {
         self.terms.iter().map(|t| t.key()).collect()
-    }
-
-    /// Takes the fit of the same terms from among these where that is better.
-    pub fn keep_better(&mut self, old: &[Self], origin: f64) {
-        let own = self.keys();
-        let same = old.iter().find(|found| found.keys() == own);
-        if let Some(model) = same.and_then(|found| found.model.as_ref())
-            && model.log_evidence - origin > self.gain
-        {
-            self.gain = model.log_evidence - origin;
-            self.model = Some(model.clone());
-            self.terms.clone_from(&model.terms);
-        }
     }
 
     /// The term that was added last.

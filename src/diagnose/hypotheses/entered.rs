@@ -68,6 +68,20 @@ impl WithFunction {
         })
     }
 
+    /// Changes each x, θ being as it is beside the value before.
+    fn each_bent(
+        &self,
+        now: &Now<'_>,
+        at: Layout,
+        x: &mut [f64],
+        change: impl Fn(&Now<'_>, &mut [f64]),
+    ) {
+        for x in at.each_mut(x) {
+            let seen: SmallVec<[f64; 16]> = SmallVec::from_slice(x);
+            self.bent(now, &seen, |now| change(now, x));
+        }
+    }
+
     /// Returns whether θ is the same beside all states.
     fn is_common(&self) -> bool {
         !matches!(
@@ -96,9 +110,15 @@ impl Modify for WithFunction {
         }
     }
     fn observe_each(&self, now: &Now<'_>, at: Layout, p: usize, x: &[f64], y: &mut [f64]) {
-        for (x, y) in at.each(x).zip(y.chunks_exact_mut(p)) {
-            self.bent(now, x, |now| self.base.observe(now, x, y));
-            if let Entry::Sensor(j) = self.function.entry {
+        if self.is_common() {
+            self.bent(now, &[], |now| self.base.observe_each(now, at, p, x, y));
+        } else {
+            for (x, y) in at.each(x).zip(y.chunks_exact_mut(p)) {
+                self.bent(now, x, |now| self.base.observe(now, x, y));
+            }
+        }
+        if let Entry::Sensor(j) = self.function.entry {
+            for (x, y) in at.each(x).zip(y.chunks_exact_mut(p)) {
                 y[j] += self.value(now, x, y[j]);
             }
         }
@@ -107,19 +127,13 @@ impl Modify for WithFunction {
         if self.is_common() {
             return self.bent(now, &[], |now| self.base.constrain_each(now, at, x));
         }
-        for x in at.each_mut(x) {
-            let seen: SmallVec<[f64; 16]> = SmallVec::from_slice(x);
-            self.bent(now, &seen, |now| self.base.constrain(now, x));
-        }
+        self.each_bent(now, at, x, |now, x| self.base.constrain(now, x));
     }
     fn update_each(&self, now: &Now<'_>, at: Layout, x: &mut [f64]) {
         if self.is_common() {
             return self.bent(now, &[], |now| self.base.update_each(now, at, x));
         }
-        for x in at.each_mut(x) {
-            let seen: SmallVec<[f64; 16]> = SmallVec::from_slice(x);
-            self.bent(now, &seen, |now| self.base.update(now, x));
-        }
+        self.each_bent(now, at, x, |now, x| self.base.update(now, x));
     }
 }
 

@@ -128,15 +128,12 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
             )
         })
         .collect();
-    let instants = || {
-        let of_record = |record: &Record| -> Vec<f64> {
-            (0..record.samples())
-                .map(|k| record.drive().time(k))
-                .collect()
-        };
-        visited(scales.records.iter().map(of_record))
+    let instants = |record: &Record| -> Vec<f64> {
+        (0..record.samples())
+            .map(|k| record.drive().time(k))
+            .collect()
     };
-    let time = instants().map(|(low, high)| Variable {
+    let time = visited(scales.records.iter().map(instants)).map(|(low, high)| Variable {
         name: "t".to_owned(),
         of: Of::Time,
         low,
