@@ -129,6 +129,15 @@ impl EffectKind {
         Self::new(id, formula, Law::ProcessNoise(Arc::new(law)))
     }
 
+    /// Creates rounding of an output, halves upwards: `law(m)` is its step. A filter takes what is read for all that rounds to it.
+    pub fn rounding(
+        id: &str,
+        formula: &str,
+        law: impl Fn(&[f64]) -> f64 + Send + Sync + 'static,
+    ) -> Self {
+        Self::new(id, formula, Law::Rounding(Arc::new(law))).order(90)
+    }
+
     /// Creates rare large errors of an output: `law(m)` is their frequency and size.
     pub fn outliers(
         id: &str,

@@ -37,7 +37,7 @@ pub struct ForcePoint<'a> {
 pub(crate) type SignalLaw = dyn Fn(&[f64], Instant, &mut [f64], f64) -> f64 + Send + Sync;
 /// A parameter at a time, from magnitudes, time and the value without the effect.
 pub(crate) type ParameterLaw = dyn Fn(&[f64], f64, f64) -> f64 + Send + Sync;
-/// A standard deviation that joins the twin's own in quadrature.
+/// A standard deviation that joins the twin's own in quadrature, or a step of rounding.
 pub(crate) type NoiseLaw = dyn Fn(&[f64]) -> f64 + Send + Sync;
 /// Frequency and size of rare large errors.
 pub(crate) type OutlierLaw = dyn Fn(&[f64]) -> Outliers + Send + Sync;
@@ -61,6 +61,8 @@ pub enum Law {
     MeasurementNoise(Arc<NoiseLaw>),
     /// The noise of a state.
     ProcessNoise(Arc<NoiseLaw>),
+    /// Rounding of an output, after its noise: the law is the step.
+    Rounding(Arc<NoiseLaw>),
     /// Rare large errors of an output, after everything else.
     Outliers(Arc<OutlierLaw>),
 }
@@ -69,7 +71,9 @@ impl Law {
     /// Returns the kind of target.
     pub fn target(&self) -> TargetKind {
         match self {
-            Self::Sensor(_) | Self::MeasurementNoise(_) | Self::Outliers(_) => TargetKind::Sensor,
+            Self::Sensor(_) | Self::MeasurementNoise(_) | Self::Rounding(_) | Self::Outliers(_) => {
+                TargetKind::Sensor
+            }
             Self::Actuator(_) => TargetKind::Actuator,
             Self::Force | Self::Limit | Self::ProcessNoise(_) => TargetKind::State,
             Self::Parameter(_) => TargetKind::Parameter,
@@ -95,6 +99,7 @@ impl fmt::Debug for Law {
             Self::Parameter(_) => "Parameter",
             Self::MeasurementNoise(_) => "MeasurementNoise",
             Self::ProcessNoise(_) => "ProcessNoise",
+            Self::Rounding(_) => "Rounding",
             Self::Outliers(_) => "Outliers",
         })
     }

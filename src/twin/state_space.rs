@@ -90,7 +90,7 @@ pub trait StateSpace: Advance + Send + Sync {
     /// Moves states that change at samples only (memories), before the motion starts; none by default.
     fn update(&self, _now: &Now<'_>, _x: &mut [f64]) {}
 
-    /// Changes the outputs after their noise (saturation, quantisation); leaves them alone by default.
+    /// Changes the outputs after their noise (saturation); leaves them alone by default.
     fn readout(&self, _now: &Now<'_>, _y: &mut [f64]) {}
 
     /// Checks once before a run that θ can be simulated at this step; every θ can by default.
@@ -98,8 +98,14 @@ pub trait StateSpace: Advance + Send + Sync {
         Ok(())
     }
 
-    /// Corrupts the finished outputs of a run (outliers); leaves them alone by default.
+    /// Changes the finished outputs of a run (rounding, outliers); leaves them alone by default.
     fn corrupt_outputs(&self, _theta: &[f64], _noise: Noise, _outputs: &mut Signal) {}
+
+    /// Steps to which [`corrupt_outputs`](Self::corrupt_outputs) rounds, for filters, by output, 0 for none; empty without any. A filter
+    /// takes an output for all signals that are rounded to it, whatever the offset of the steps.
+    fn rounding(&self, _theta: &[f64]) -> Vec<f64> {
+        vec![]
+    }
 
     /// Probability and size of the outliers of [`corrupt_outputs`](Self::corrupt_outputs) for filters, by output; empty
     /// without any.

@@ -57,6 +57,39 @@ fn intervals_cover_and_noise_levels_are_found() {
     assert!(held >= 35, "{held} of {all}");
 }
 
+/// Beside steps of five times the noise, intervals of 20 records hold the truth as often as they say, and the step itself is found.
+#[test]
+fn a_rounded_sensor_leaves_intervals_that_cover() {
+    let parsed = |magnitudes: &str| {
+        let twin =
+            "twin = 'van-der-pol'\n[noise]\ny = 0.01\n[record]\nintegrator = 'runge-kutta-4'";
+        let effect = "[[effect]]\nid = 'sensor-quantization'\ntarget = 'sensor'";
+        let text = format!("{twin}\n{effect}\n{magnitudes}");
+        let file = StudyFile::parse(&text, "rounded.toml".as_ref()).unwrap();
+        let mut all = reference_studies().unwrap().into_iter();
+        let oscillator = all.find(|study| study.name() == "van-der-pol").unwrap();
+        oscillator.configure(&file).unwrap()
+    };
+    let known = parsed("magnitudes = { step = 0.05 }");
+    let rounded = |seed: u64| {
+        let noise = Noise::new(seed, "rounded", 0);
+        let drive = known.drives().unwrap().draw(noise).unwrap();
+        let outputs = known.twin().simulate(&[1.3], &drive, noise).unwrap();
+        [Record::new(drive, outputs).unwrap()]
+    };
+    let mut held = 0;
+    for seed in 0..20 {
+        let fit = fitted(&known, &rounded(seed));
+        let nu = &fit.parameters[0];
+        held += usize::from((nu.low..=nu.high).contains(&1.3));
+    }
+    // 18 ± 1.3.
+    assert!((14..=20).contains(&held), "{held} of 20");
+    let fit = fitted(&parsed(""), &rounded(0));
+    let step = value(&fit, "sensor-quantization@sensor.step");
+    assert!((0.03..0.06).contains(&step), "{step}");
+}
+
 /// The flow through k4 grows by 60 % at two thirds of the record. A step that begins beyond the record would be left off.
 #[test]
 fn a_step_that_a_study_adds_is_not_left_off() {

@@ -41,7 +41,7 @@ impl Library<'_> {
             return Ok(vec![]);
         }
         let mark = match effect.law() {
-            Law::Sensor(_) => effect.kind().marks(&values),
+            Law::Sensor(_) | Law::Rounding(_) => effect.kind().marks(&values),
             _ => Mark::Unmarked,
         };
         if mark == Mark::Absent {

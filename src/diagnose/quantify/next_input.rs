@@ -229,7 +229,9 @@ fn first_statistics(
             let (problem, theta) = at(rival);
             let d = problem.dimension();
             let known = rival.information.view((0, 0), (d, d)).into_owned();
-            let Some(reference) = Reference::knowing(&problem, &theta, &known)? else {
+            // One rival's filter may not follow what another one made.
+            let reference = recoverable(Reference::knowing(&problem, &theta, &known))?.flatten();
+            let Some(reference) = reference else {
                 return Ok(0.0);
             };
             least = least.min(0.5 * reference.own(&reference.direction(&own)));

@@ -1,7 +1,7 @@
 //! A black box with effects on its signals.
 
 use super::Slots;
-use super::outliers::strike;
+use super::finish::finish;
 use crate::effect::law::Law;
 use crate::record::{Drive, Signal, Signals};
 use crate::twin::{DigitalTwin, Noise, ParameterSpace, SimulationError};
@@ -38,7 +38,7 @@ impl DigitalTwin for AugmentedBlackBox {
         let actuated = self.slots.actuated(theta, drive)?;
         let acting = actuated.as_ref().unwrap_or(drive);
         let mut outputs = (self.base).simulate(&theta[..self.slots.base], acting, noise)?;
-        // `all` is sorted along the signal: sensors, noise, saturation, outliers.
+        // `all` is sorted along the signal: sensors, noise, saturation, rounding, outliers.
         for slot in &self.slots.all {
             match slot.effect.law() {
                 Law::Sensor(law) => slot.pass(law.as_ref(), theta, drive, &mut outputs),
@@ -50,7 +50,7 @@ impl DigitalTwin for AugmentedBlackBox {
                         *value += level * source.normal();
                     }
                 }
-                Law::Outliers(_) => strike(slot, theta, noise, &mut outputs),
+                Law::Rounding(_) | Law::Outliers(_) => finish(slot, theta, noise, &mut outputs),
                 _ => {}
             }
         }

@@ -1,6 +1,6 @@
 //! A state-space twin with effects.
 
-use super::outliers::strike;
+use super::finish::finish;
 use super::{Place, Placed, Slots};
 use crate::effect::batch::{Batch, Channel, ForceBatch, LimitBatch, SensorBatch};
 use crate::effect::law::{ForcePoint, Instant, Law, NOISE_ENTERS, NoiseLaw, ParameterLaw};
@@ -370,12 +370,25 @@ impl Modify for AugmentedEquations {
         all
     }
 
+    fn rounding(&self, theta: &[f64]) -> Vec<f64> {
+        let mut all = self.theta(theta, |theta| self.base.rounding(theta));
+        for slot in &self.slots.all {
+            let Law::Rounding(law) = slot.effect.law() else {
+                continue;
+            };
+            all.resize(self.outline.outputs.len(), 0.0);
+            let step = &mut all[slot.place.target];
+            *step = step.max(law(slot.place.m(theta)));
+        }
+        all
+    }
+
     fn corrupt_outputs(&self, theta: &[f64], noise: Noise, outputs: &mut Signal) {
         self.theta(theta, |theta| {
             self.base.corrupt_outputs(theta, noise, outputs);
         });
         for slot in &self.slots.all {
-            strike(slot, theta, noise, outputs);
+            finish(slot, theta, noise, outputs);
         }
     }
 }

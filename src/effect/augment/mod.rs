@@ -2,7 +2,7 @@
 
 mod black_box;
 mod equations;
-mod outliers;
+mod finish;
 
 use super::batch::Pair;
 use super::check::{check_effects, targets};

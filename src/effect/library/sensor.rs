@@ -78,20 +78,9 @@ pub(super) fn rows() -> Vec<EffectKind> {
         .mark(clipped)
         .order(80),
         // Rounding to a multiple of the step, halves upwards.
-        EffectKind::sensor(
-            "sensor-quantization",
-            "step·⌊s/step + ½⌋",
-            |m, _, _, s| {
-                if m[0] > 0.0 {
-                    m[0] * (s / m[0] + 0.5).floor()
-                } else {
-                    s
-                }
-            },
-        )
-        .magnitude(Magnitude::positive("step", "signal", &[0.02, 0.1, 0.5]))
-        .mark(rounded)
-        .order(90),
+        EffectKind::rounding("sensor-quantization", "step·⌊s/step + ½⌋", |m| m[0])
+            .magnitude(Magnitude::positive("step", "signal", &[0.02, 0.1, 0.5]))
+            .mark(rounded),
         // Rare large errors, after everything else.
         EffectKind::outliers(
             "sensor-outliers",

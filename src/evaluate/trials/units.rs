@@ -72,6 +72,10 @@ impl Modify for Rescaled {
         self.0.corrupt_outputs(theta, noise, outputs);
         *outputs *= FACTOR;
     }
+    fn rounding(&self, theta: &[f64]) -> Vec<f64> {
+        let steps = self.0.rounding(theta);
+        steps.into_iter().map(|step| FACTOR * step).collect()
+    }
     fn outliers(&self, theta: &[f64]) -> Vec<Outliers> {
         let scaled = |o: Outliers| Outliers {
             scale: FACTOR * o.scale,

@@ -1,7 +1,7 @@
 //! A filter bound to one twin and one record.
 
-use super::clip::clip;
 use super::gaussian::Gaussian;
+use super::normal::clip::clip;
 use super::{FilterError, FilterSettings};
 use crate::record::Record;
 use crate::twin::{Interval, ParameterSpace, StateSpace, TwinError};

@@ -38,10 +38,10 @@
 //!
 //! The state is described by a mean and a covariance: distributions with two humps are not. Noise levels must not
 //! depend on the state. Outliers ([`StateSpace::outliers`](crate::twin::StateSpace::outliers)) make the density of a row
-//! a mixture; what follows from it for the state is again a mean and a covariance.
+//! a mixture, rounding ([`StateSpace::rounding`](crate::twin::StateSpace::rounding)) its mean over a cell; what follows from either for the
+//! state is again a mean and a covariance.
 
 mod bound;
-mod clip;
 mod coordinates;
 mod error;
 mod filtered;
@@ -50,13 +50,13 @@ mod lanes;
 mod likelihood;
 mod linearised;
 mod moments;
+mod normal;
 mod pass;
 mod score;
 mod settings;
 mod size;
 mod smooth;
 mod start;
-mod tail;
 mod update;
 
 #[cfg(test)]

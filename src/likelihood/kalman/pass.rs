@@ -108,6 +108,7 @@ pub(super) struct Pass<'k, S: Size> {
     predicted: S::Vector,
     scale: S::Vector,
     copy: State<S>,
+    rounding: Vec<f64>,
     outliers: Vec<Outliers>,
     likelihood: LogLikelihood,
 }
@@ -129,6 +130,7 @@ impl<'k, S: Size> Pass<'k, S> {
             r: S::Vector::zeros(p),
             predicted: S::Vector::zeros(p),
             scale: S::Vector::zeros(n),
+            rounding: twin.rounding(theta),
             outliers: twin.outliers(theta),
             likelihood: LogLikelihood::NONE,
         }
@@ -211,6 +213,7 @@ impl<'k, S: Size> Pass<'k, S> {
             predicted,
             noise: &self.r.as_ref()[..p],
             floor: &self.kalman.floor[..p],
+            rounding: &self.rounding,
             outliers: &self.outliers,
         };
         let (at, state) = ((self.kalman.twin, &self.now), (mean, cov));

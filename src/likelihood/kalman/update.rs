@@ -3,6 +3,7 @@
 use super::gaussian::Columns;
 use super::likelihood::LogLikelihood;
 use super::moments::{add_outer, outer};
+use super::normal::cell::Cell;
 use super::size::{Numbers, Size};
 use crate::twin::{Now, Outliers, StateSpace};
 
@@ -38,7 +39,7 @@ pub(super) struct Update<S: Size> {
     pub standardised: S::Vector,
     /// Squares of C's diagonal: variance of each output given those before it.
     pub pivots: S::Vector,
-    /// Nats by which the density of the row exceeds that of N(ȳ, S): outliers make it a mixture.
+    /// Nats by which the density of the row exceeds that of N(ȳ, S): outliers make it a mixture, rounding the mean over a cell.
     pub excess: f64,
     /// C, row-major, lower.
     factor: S::Matrix,
@@ -61,6 +62,8 @@ pub(super) struct Measured<'w> {
     pub noise: &'w [f64],
     /// Least variances.
     pub floor: &'w [f64],
+    /// Steps by output; empty for none.
+    pub rounding: &'w [f64],
     /// By output; empty for none.
     pub outliers: &'w [Outliers],
 }
@@ -107,8 +110,8 @@ impl<S: Size> Update<S> {
             self.bend((twin, now), row, outputs);
             self.spread(outputs);
         }
-        if !row.outliers.is_empty() {
-            self.struck(row.outliers);
+        if !(row.rounding.is_empty() && row.outliers.is_empty()) {
+            self.finished(row.rounding, row.outliers, |_| true);
             likelihood.shift(self.excess);
         }
         self.standardise(likelihood, |_| true)?;
@@ -148,17 +151,8 @@ impl<S: Size> Update<S> {
             outputs.iter_mut().skip(j).step_by(p).for_each(|y| *y = 0.0);
         }
         self.spread(outputs);
-        self.excess = 0.0;
-        if !row.outliers.is_empty() {
-            let outliers: Vec<Outliers> = (row.outliers.iter().enumerate())
-                .map(|(j, outlier)| match missing(j) {
-                    true => Outliers::default(),
-                    false => *outlier,
-                })
-                .collect();
-            self.struck(&outliers);
-            likelihood.shift(self.excess);
-        }
+        self.finished(row.rounding, row.outliers, |j| !missing(j));
+        likelihood.shift(self.excess);
         self.standardise(likelihood, |j| !missing(j))?;
         // A row without any output leaves the state to the bit.
         if !(0..p).all(missing) {
@@ -209,7 +203,7 @@ impl<S: Size> Update<S> {
         }
     }
 
-    /// A sensor that bends its signal after the noise (saturation, quantisation) is replaced by the line that is best
+    /// A sensor that bends its signal after the noise (saturation) is replaced by the line that is best
     /// for N(ȳ, S); what the line misses joins the noise. The noise itself is never taken off: a saturated sensor
     /// says little, but not with certainty. Returns whether anything is bent.
     #[inline(always)]
@@ -280,6 +274,55 @@ impl<S: Size> Update<S> {
         }
     }
 
+    /// Takes outputs that count for rounded ones, and for outliers. Off, no bit changes.
+    #[cold]
+    fn finished(
+        &mut self,
+        rounding: &[f64],
+        outliers: &[Outliers],
+        counts: impl Fn(usize) -> bool,
+    ) {
+        self.excess = 0.0;
+        for (j, step) in rounding.iter().enumerate() {
+            if *step > 0.0 && counts(j) {
+                self.round(j, *step);
+            }
+        }
+        for (j, outlier) in outliers.iter().enumerate() {
+            if outlier.probability > 0.0 && counts(j) {
+                self.strike(j, *outlier);
+            }
+        }
+    }
+
+    /// Where an output is rounded, its density is the mean of N(ȳ, S) over a cell, and the signal is known to lie in it. Innovation and noise
+    /// are changed such that the state moves as the signal does:
+    ///
+    /// ```text
+    /// z | cell ~ (μ, v) for z ~ N(0, 1),   S ← S/(1 − v),   y − ȳ ← √S·μ/(1 − v)
+    /// ```
+    ///
+    /// Exact in density, mean and variance for one output; for several, each is taken for itself.
+    fn round(&mut self, j: usize, step: f64) {
+        let p = self.size.outputs();
+        let (beside, covariance) = (self.beside.as_mut(), self.covariance.as_mut());
+        let innovation = &mut self.innovation.as_mut()[j];
+        let s = covariance[j * p + j];
+        // What is no number stays none, and ends the pass.
+        if !innovation.is_finite() {
+            return;
+        }
+        let cell = Cell::new(*innovation / s.sqrt(), step / s.sqrt());
+        // A cell that holds everything says nothing.
+        let known = (1.0 - cell.variance).max(1e-9);
+        let seen = s / known;
+        *innovation = s.sqrt() * cell.mean / known;
+        let log = -0.5 * (seen.ln() + *innovation * *innovation / seen);
+        self.excess += cell.log_density - 0.5 * s.ln() - log;
+        beside[j * p + j] += seen - s;
+        covariance[j * p + j] = seen;
+    }
+
     /// Where an output may be an outlier, its density is a mixture, and so is what it says about the state. The noise is
     /// widened such that the gain is the mixture's:
     ///
@@ -288,30 +331,22 @@ impl<S: Size> Update<S> {
     /// ```
     ///
     /// Exact in density and mean for one output; for several, each is taken for itself.
-    #[cold]
-    fn struck(&mut self, outliers: &[Outliers]) {
+    fn strike(&mut self, j: usize, outlier: Outliers) {
         let p = self.size.outputs();
         let (beside, covariance) = (self.beside.as_mut(), self.covariance.as_mut());
-        self.excess = 0.0;
-        for (j, outlier) in outliers.iter().enumerate() {
-            // Off, no bit changes.
-            if outlier.probability <= 0.0 {
-                continue;
-            }
-            let s = covariance[j * p + j];
-            let wide = s + outlier.scale * outlier.scale;
-            let square = self.innovation.as_ref()[j].powi(2);
-            let log = |variance: f64| -0.5 * (variance.ln() + square / variance);
-            let probability = outlier.probability.min(1.0);
-            let plain = (1.0 - probability).ln() + log(s);
-            let struck = probability.ln() + log(wide);
-            let density = plain.max(struck) + (-(plain - struck).abs()).exp().ln_1p();
-            let w = (struck - density).exp();
-            let seen = ((1.0 - w) / s + w / wide).recip();
-            self.excess += density - log(seen);
-            beside[j * p + j] += seen - s;
-            covariance[j * p + j] = seen;
-        }
+        let s = covariance[j * p + j];
+        let wide = s + outlier.scale * outlier.scale;
+        let square = self.innovation.as_ref()[j].powi(2);
+        let log = |variance: f64| -0.5 * (variance.ln() + square / variance);
+        let probability = outlier.probability.min(1.0);
+        let plain = (1.0 - probability).ln() + log(s);
+        let struck = probability.ln() + log(wide);
+        let density = plain.max(struck) + (-(plain - struck).abs()).exp().ln_1p();
+        let w = (struck - density).exp();
+        let seen = ((1.0 - w) / s + w / wide).recip();
+        self.excess += density - log(seen);
+        beside[j * p + j] += seen - s;
+        covariance[j * p + j] = seen;
     }
 
     /// C.

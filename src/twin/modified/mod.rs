@@ -113,6 +113,10 @@ pub(crate) trait Modify: Send + Sync + Sized + 'static {
         });
     }
 
+    fn rounding(&self, theta: &[f64]) -> Vec<f64> {
+        self.theta(theta, |theta| self.base().rounding(theta))
+    }
+
     fn outliers(&self, theta: &[f64]) -> Vec<Outliers> {
         self.theta(theta, |theta| self.base().outliers(theta))
     }
@@ -183,6 +187,9 @@ impl<M: Modify> StateSpace for Modified<M> {
     }
     fn corrupt_outputs(&self, theta: &[f64], noise: Noise, outputs: &mut Signal) {
         self.0.corrupt_outputs(theta, noise, outputs);
+    }
+    fn rounding(&self, theta: &[f64]) -> Vec<f64> {
+        self.0.rounding(theta)
     }
     fn outliers(&self, theta: &[f64]) -> Vec<Outliers> {
         self.0.outliers(theta)

@@ -1,7 +1,7 @@
 //! Limits on the states of all lanes; see the scalar form for the formulas.
 
-use super::super::clip::UNFELT;
-use super::super::tail::polynomial;
+use super::super::normal::clip::UNFELT;
+use super::super::normal::tail::polynomial;
 use crate::math::Lanes;
 use crate::twin::Interval;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -80,5 +80,5 @@ fn tail(z: Lanes) -> (Lanes, Lanes) {
     }
     let half = scale * 0.5 * p / (x * 2.0 + 1.0);
     let share = z.below(Lanes::ZERO).select(Lanes::all(1.0) - half, half);
-    (share, scale * super::super::tail::DENSITY)
+    (share, scale * super::super::normal::tail::DENSITY)
 }

@@ -49,7 +49,9 @@ pub(super) fn together(jobs: &[(&Kalman<'_>, &[f64])]) -> Option<Together> {
         .map(|&(kalman, theta)| {
             let acting = kalman.acting(theta).ok()?;
             let alike = kalman.fits_lanes() && kalman.runs_beside(first);
-            (alike && kalman.twin.outliers(theta).is_empty()).then_some(Job {
+            let plain =
+                kalman.twin.outliers(theta).is_empty() && kalman.twin.rounding(theta).is_empty();
+            (alike && plain).then_some(Job {
                 kalman,
                 theta,
                 acting,

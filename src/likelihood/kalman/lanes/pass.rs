@@ -1,7 +1,7 @@
 //! One pass over the rows for eight pairs of parameters and record at once.
 //!
 //! The recursion is that of the scalar pass, for one output. Lanes never branch apart: a column without pivot is zero, a limit
-//! that some lane feels is computed in all. What needs more (readouts that bend, outliers) is left to the scalar pass.
+//! that some lane feels is computed in all. What needs more (readouts that bend, rounding, outliers) is left to the scalar pass.
 
 use super::super::Kalman;
 use super::super::likelihood::LOG_TWO_PI;

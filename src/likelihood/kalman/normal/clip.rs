@@ -4,7 +4,7 @@ use super::tail::Tail;
 use crate::twin::Interval;
 
 /// Beyond this many standard deviations a limit is not felt: its share is below 2e-12.
-pub(super) const UNFELT: f64 = 7.0;
+pub(in crate::likelihood::kalman) const UNFELT: f64 = 7.0;
 
 /// Moments of c = clamp(x, a, b), x ~ N(m, s²):
 ///
@@ -17,7 +17,7 @@ pub(super) const UNFELT: f64 = 7.0;
 ///
 /// Source: Stein's lemma; the rectified normal is in Socci, Lee & Seung, "The rectified Gaussian distribution" (1997).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Clipped {
+pub(in crate::likelihood::kalman) struct Clipped {
     /// Mean.
     pub mean: f64,
     /// Variance; at least Z²·s².
@@ -28,7 +28,11 @@ pub(super) struct Clipped {
 
 /// Moments of N(`mean`, `variance`) held in `limit`; `None` where the limit is not felt.
 #[inline(always)]
-pub(super) fn clipped(mean: f64, variance: f64, limit: Interval) -> Option<Clipped> {
+pub(in crate::likelihood::kalman) fn clipped(
+    mean: f64,
+    variance: f64,
+    limit: Interval,
+) -> Option<Clipped> {
     let (low, high) = (limit.low() - mean, limit.high() - mean);
     let reach = UNFELT * UNFELT * variance;
     if low < 0.0 && low * low > reach && high > 0.0 && high * high > reach {
@@ -75,7 +79,7 @@ fn held(mean: f64, variance: f64, limit: Interval) -> Clipped {
 /// Holds each state in its interval; `scale` gets the factors of the covariances, if any limit is felt. Non-negative:
 /// the result is D·P·D plus what the variances have more than that.
 #[inline(always)]
-pub(super) fn clip(
+pub(in crate::likelihood::kalman) fn clip(
     mean: &mut [f64],
     cov: &mut [f64],
     limits: &[Interval],

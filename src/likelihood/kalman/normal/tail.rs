@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Tail probability of a standard normal number, and its density there.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Tail {
+pub(in crate::likelihood::kalman) struct Tail {
     /// Φ(−z).
     pub share: f64,
     /// φ(z).
@@ -12,7 +12,7 @@ pub(super) struct Tail {
 }
 
 /// 1/√(2π).
-pub(super) const DENSITY: f64 = 0.398_942_280_401_432_7;
+pub(in crate::likelihood::kalman) const DENSITY: f64 = 0.398_942_280_401_432_7;
 
 /// (1 + 2·x)·erfcx(x) on [0, 5] by powers of s = 2.2 − 9.6/(x + 3), by Chebyshev interpolation; relative error
 /// 5e-17.
@@ -61,7 +61,7 @@ impl Tail {
 
 /// By Estrin's scheme, whose products do not wait for each other.
 #[inline(always)]
-pub(super) fn polynomial(s: f64) -> f64 {
+pub(in crate::likelihood::kalman) fn polynomial(s: f64) -> f64 {
     let c = &SCALED;
     let (s2, s4, s8) = (s * s, (s * s) * (s * s), (s * s * s * s) * (s * s * s * s));
     let four = |i: usize| (c[i] + c[i + 1] * s) + (c[i + 2] + c[i + 3] * s) * s2;
