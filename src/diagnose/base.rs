@@ -3,7 +3,7 @@
 use super::error::DiagnoseError;
 use super::hypotheses::listed::Library;
 use super::hypotheses::scales::Scales;
-use super::hypotheses::term::Term;
+use super::hypotheses::term::{Part, Term};
 use super::hypotheses::{listed, shared};
 use super::model::Model;
 use super::outcome::Verdict;
@@ -43,6 +43,14 @@ pub(in crate::diagnose) struct Base<'a> {
 }
 
 impl<'a> Base<'a> {
+    /// Places of the kinds of noise that the records asked for.
+    pub fn noise_at(&self, is_kind: impl Fn(&Part) -> bool) -> Vec<String> {
+        (self.noises.iter())
+            .filter(|term| is_kind(&term.part))
+            .map(|term| term.target.clone())
+            .collect()
+    }
+
     /// Fits the twin.
     pub fn new(
         measured: &'a Measured,

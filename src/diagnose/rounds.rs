@@ -84,7 +84,9 @@ fn likelier_with_step<R>(
     {
         return Ok(None);
     }
-    let Some((step, _)) = finer_step(&own.base.model, own.findings.top())? else {
+    let top = own.findings.top();
+    let least = Thresholds::STEP_SHOWS.max(Thresholds::FINE_PRINT * top);
+    let Some((step, _)) = finer_step(&own.base.model, least, top)? else {
         return Ok(None);
     };
     let least = own.log_evidence() + Thresholds::STEP_WINS;
@@ -105,7 +107,8 @@ fn step_of(
     base: &Base<'_>,
     settings: &DiagnoseSettings,
 ) -> Result<Option<FinerStep>, DiagnoseError> {
-    let Some((step, gain)) = finer_step(&base.model, 0.0)? else {
+    let least = Thresholds::STEP_SHOWS;
+    let Some((step, gain)) = finer_step(&base.model, least, 0.0)? else {
         return Ok(None);
     };
     let model = &base.model;
@@ -115,7 +118,7 @@ fn step_of(
     let price = (effects.len() as f64 / Thresholds::LISTED).ln();
     let best = (effects.first()).filter(|effect| effect.gain - price > gain);
     match best.and_then(|effect| effect.model.as_ref()) {
-        Some(beside) => Ok(finer_step(beside, 0.0)?.map(|(step, _)| step)),
+        Some(beside) => Ok(finer_step(beside, least, 0.0)?.map(|(step, _)| step)),
         None => Ok(Some(step)),
     }
 }
@@ -216,7 +219,7 @@ fn again<'a, R>(
     }
     // Beside a gap, noise levels are fitted loud, and hide the step.
     if let (None, Some(model)) = (base.step, findings.best_listed())
-        && let Some((step, gain)) = finer_step(model, 0.0)?
+        && let Some((step, gain)) = finer_step(model, Thresholds::STEP_SHOWS, findings.top())?
     {
         let minor = gain < MINOR * findings.top() && base.noises.is_empty();
         let before = match minor {

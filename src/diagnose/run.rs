@@ -5,6 +5,7 @@ use super::error::DiagnoseError;
 use super::explain::decide::{Conclusion, decide};
 use super::explain::explore::absorbing;
 use super::explain::findings::{Chances, Findings};
+use super::hypotheses::term::Part;
 use super::locate::discover::discover;
 use super::locate::functions::{curve, told};
 use super::locate::maps::maps;
@@ -87,7 +88,7 @@ fn report(
     settings: &DiagnoseSettings,
     progress: &Progress,
 ) -> Result<Diagnosis, DiagnoseError> {
-    // What is left to do for a partial answer is done as for a quick look.
+    // What is left to do for a partial answer is done as for a quick look, without a share: that takes longest.
     let hurried = DiagnoseSettings {
         quick: true,
         calibrate: 0,
@@ -197,7 +198,9 @@ fn report(
             validation,
             initial: settings.initial.as_deref(),
         };
-        shrunk = shrinkage(&measures, noise)?;
+        if !is_partial {
+            shrunk = shrinkage(&measures, noise)?;
+        }
         settings.ends(stage.tick())?;
     }
     let runs = |records: &[Record]| -> Result<FreeRuns, DiagnoseError> {
@@ -239,6 +242,8 @@ fn report(
         validation_runs: validation
             .map(|v| runs(std::slice::from_ref(v)))
             .transpose()?,
+        correlated_noise: base.noise_at(|part| !matches!(part, Part::Effect { .. })),
+        outliers: base.noise_at(|part| matches!(part, Part::Effect { .. })),
         quick: settings.quick,
         interrupted: is_partial,
         integrator: base.step.map(|step| step.integrator),
@@ -286,8 +291,11 @@ fn located(
         .collect();
     targets.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let accepted = findings.model(&conclusion.accepted);
-    let accepted = accepted.map(|model| model.terms[0].target.clone());
-    let target = accepted.or_else(|| targets.first().map(|t| t.target.clone()));
+    // The most probable place of what is accepted.
+    let is_accepted = |t: &&TargetShare| {
+        accepted.is_none_or(|m| m.terms.iter().any(|term| term.target == t.target))
+    };
+    let target = (targets.iter().find(is_accepted)).map(|t| t.target.clone());
     let mut functions = told(&findings.unknown, target.as_deref(), false, 0.0);
     if let Some((keys, on_top)) = findings.beside(&conclusion.accepted) {
         let floor = findings.gain(keys).unwrap_or(0.0);

@@ -50,10 +50,11 @@ impl FinerStep {
 /// The cheapest finer step from which an exact one cannot be told, where it explains a model's records better than its twin's own, and how
 /// much better, in nats; `None` where the step does not show, or shows for the better, and for a black box.
 ///
-/// Beside a model that explains so many nats, a step does not show that differs by less than a law's fine print. Which step, the
-/// innovations say, not evidence: an error of a coarser one may imitate what is missing.
+/// A step shows from `least` nats on. Which finer one, the innovations say, not evidence: an error of a coarser one may imitate what is
+/// missing. Beside a model that explains so many nats, an error below a law's fine print is none.
 pub(in crate::diagnose) fn finer_step(
     model: &Model<'_>,
+    least: f64,
     explained: f64,
 ) -> Result<Option<(FinerStep, f64)>, DiagnoseError> {
     let Some((integrator, stepping)) = model.base.integration() else {
@@ -74,19 +75,19 @@ pub(in crate::diagnose) fn finer_step(
         let filtered = recoverable(problem.filtered(theta))?;
         Ok(filtered.map(|filtered| reference.direction(&filtered)))
     };
-    let least = Thresholds::STEP_SHOWS.max(Thresholds::FINE_PRINT * explained);
-    let shows = |direction: &DVector<f64>| 0.5 * reference.own(direction) > least;
+    let nats = |direction: &DVector<f64>| 0.5 * reference.own(direction);
+    let near = Thresholds::STEP_SHOWS.max(Thresholds::FINE_PRINT * explained);
     let candidates = FinerStep::candidates(integrator, stepping.substeps);
     let Some((&last, cheaper)) = candidates.split_last() else {
         return Ok(None);
     };
-    let Some(exact) = direction(last)?.filter(shows) else {
+    let Some(exact) = direction(last)?.filter(|exact| nats(exact) > least) else {
         return Ok(None);
     };
     let mut chosen = last;
     for &step in cheaper {
         let there = direction(step)?;
-        if there.is_some_and(|there| !shows(&(&exact - there))) {
+        if there.is_some_and(|there| nats(&(&exact - there)) <= near) {
             chosen = step;
             break;
         }
@@ -131,7 +132,7 @@ mod tests {
         let asked = |records: &[Record]| {
             let measured = measured(study.twin(), records, &study.beliefs()).unwrap();
             let base = Base::new(&measured, records, &settings).unwrap();
-            finer_step(&base.model, 0.0).unwrap()
+            finer_step(&base.model, Thresholds::STEP_SHOWS, 0.0).unwrap()
         };
         for seed in 0..3 {
             assert!(

@@ -74,13 +74,19 @@ impl ParameterRow {
         ]
     }
 
+    /// Returns whether no value of the interval is in the prior.
+    fn is_outside(&self) -> bool {
+        let [low, high] = self.interval;
+        high < self.prior.low() || low > self.prior.high()
+    }
+
     /// Remark on the value; empty where there is nothing to remark.
     pub fn note(&self, role: Role) -> &'static str {
         match (self.at_bound, role) {
             (Some("low"), _) => "at its lower bound",
             (Some(_), _) => "at its upper bound",
             (None, Role::Parameter) if self.prior_share >= 1.0 => "not identified",
-            (None, Role::Parameter) if !self.prior.contains(self.value) => "outside prior",
+            (None, Role::Parameter) if self.is_outside() => "outside prior",
             (None, _) => "",
         }
     }
@@ -128,6 +134,7 @@ mod tests {
         assert_eq!(note(0.5, 0.01), "");
         assert_eq!(note(0.5, 0.3), "not identified");
         assert_eq!(note(1.5, 0.01), "outside prior");
+        assert_eq!(note(1.05, 0.1), "");
         assert_eq!(note(2.0, 0.01), "at its upper bound");
         assert_eq!(note(0.0, 0.01), "at its lower bound");
     }

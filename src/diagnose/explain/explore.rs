@@ -208,6 +208,8 @@ fn beside_each_other<'a>(
     if findings.is_partial {
         return Ok(findings);
     }
+    // What noise does in a second effect's place, a step before has told.
+    let asks_for_noise = several.is_none();
     findings.several = match several {
         Some(several) => several,
         None if breadth.pairs => pairs(&findings, terms, origin, breadth, enough)?,
@@ -216,7 +218,7 @@ fn beside_each_other<'a>(
     if let Some(found) = alone(base, &mut findings, terms, origin, breadth)? {
         enough |= findings.add(&found, on_top(&found, terms, origin, few)?);
     }
-    if let Some(beside) = instead_of_second(&findings, terms, origin, breadth)? {
+    if asks_for_noise && let Some(beside) = instead_of_second(&findings, terms, origin, breadth)? {
         findings.noise_beside = Some(beside);
         if findings.asks_beside() {
             return Ok(findings);

@@ -271,6 +271,10 @@ pub struct Diagnosis {
     pub shrinkage: Option<Shrinkage>,
     /// Sparse law for the missing function, where something unknown is missing.
     pub discovery: Option<Discovery>,
+    /// Sensors and states whose noise is correlated, as the records ask for.
+    pub correlated_noise: Vec<String>,
+    /// Sensors whose noise has outliers, as the records ask for.
+    pub outliers: Vec<String>,
     /// True for a quick look: effects were tried one at a time.
     pub quick: bool,
     /// True if the search was cancelled: this is what was found until then.

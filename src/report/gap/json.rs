@@ -17,7 +17,8 @@ pub const NEXT_INPUT: &str = "next-input.csv";
 /// | `shrinkage` | free-run errors on held-out data |
 ///
 /// Beyond the contract: `parameters[].prior`, of `where` all but target, targets, windows and regions, `windows[].record`,
-/// `shrinkage.controls`, `discovery`, `quick`, `interrupted`, `integrator`, `substeps`, `power`, `candidates`, `not_tested`, `seconds`.
+/// `shrinkage.controls`, `discovery`, `correlated_noise`, `outliers`, `quick`, `interrupted`, `integrator`, `substeps`, `power`,
+/// `candidates`, `not_tested`, `seconds`.
 ///
 /// All keys are always there; what was skipped is null, and so are numbers that are not finite.
 pub fn gap_json(diagnosis: &Diagnosis) -> Value {

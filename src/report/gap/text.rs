@@ -83,11 +83,31 @@ pub(super) fn evidence_sentence(diagnosis: &Diagnosis) -> String {
         Some(p) => format!("; {p}"),
         None => String::new(),
     };
+    let noise = match noise_sentence(diagnosis) {
+        Some(told) => format!(" {told}"),
+        None => String::new(),
+    };
     format!(
-        "Evidence for a gap: {} nats; probability that nothing is missing: {}{calibrated}.",
+        "Evidence for a gap: {} nats; probability that nothing is missing: {}{calibrated}.{noise}",
         short(diagnosis.detection.log_evidence),
         chance(diagnosis.cause.probabilities.nothing)
     )
+}
+
+/// Returns which kinds of noise beside the twin's own everything is said with; none where its own is enough.
+fn noise_sentence(diagnosis: &Diagnosis) -> Option<String> {
+    let correlated = diagnosis.correlated_noise.join(" and ");
+    let outliers = diagnosis.outliers.join(" and ");
+    match (correlated.is_empty(), outliers.is_empty()) {
+        (true, true) => None,
+        (true, false) => Some(format!("The noise has outliers at {outliers}.")),
+        (false, true) => Some(format!(
+            "The noise is correlated at {correlated}: something weak and slow may pass for it."
+        )),
+        (false, false) => Some(format!(
+            "The noise is correlated at {correlated}, and has outliers at {outliers}: something weak and slow may pass for it."
+        )),
+    }
 }
 
 /// Returns what a quick look or an interrupted one leaves out; none for a whole diagnosis.
@@ -203,6 +223,9 @@ pub(super) fn closed_sentence(s: &Shrinkage) -> String {
 
 /// Returns the reason for missing errors on held-out data.
 pub(super) fn no_share(diagnosis: &Diagnosis) -> String {
+    if diagnosis.interrupted {
+        return "No share of the gap closed: the work was interrupted before.".into();
+    }
     if diagnosis.validation_runs.is_none() && diagnosis.free_runs.times.len() < SHORTEST_SPLIT {
         return format!(
             "No share of the gap closed: the record is too short to hold data back. Give --validation, or a record of at least {SHORTEST_SPLIT} samples."
@@ -275,6 +298,20 @@ mod tests {
             "{named}"
         );
         assert!(named.contains("Where: "), "{named}");
+    }
+
+    #[test]
+    fn another_kind_of_noise_is_told() {
+        let mut diagnosis = made::tanks_class();
+        diagnosis.outliers = vec!["sensor".into()];
+        let text = gap_text(&diagnosis);
+        assert!(text.contains("The noise has outliers at sensor."), "{text}");
+        diagnosis.correlated_noise = vec!["h1".into(), "h2".into()];
+        let text = gap_text(&diagnosis);
+        assert!(
+            text.contains("is correlated at h1 and h2, and has outliers at sensor: something weak"),
+            "{text}"
+        );
     }
 
     #[test]
