@@ -290,12 +290,19 @@ fn located(
         })
         .collect();
     targets.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    let accepted = findings.model(&conclusion.accepted);
+    let accepted: Vec<&str> = (findings.model(&conclusion.accepted).iter())
+        .flat_map(|m| &m.terms)
+        .map(|term| term.target.as_str())
+        .collect();
     // The most probable place of what is accepted.
-    let is_accepted = |t: &&TargetShare| {
-        accepted.is_none_or(|m| m.terms.iter().any(|term| term.target == t.target))
-    };
+    let is_accepted =
+        |t: &&TargetShare| accepted.is_empty() || accepted.contains(&t.target.as_str());
     let target = (targets.iter().find(is_accepted)).map(|t| t.target.clone());
+    let several = accepted.iter().any(|place| *place != accepted[0]);
+    let class = match &target {
+        Some(target) if !several => TargetShare::alike(&targets, target),
+        _ => vec![],
+    };
     let mut functions = told(&findings.unknown, target.as_deref(), false, 0.0);
     if let Some((keys, on_top)) = findings.beside(&conclusion.accepted) {
         let floor = findings.gain(keys).unwrap_or(0.0);
@@ -305,6 +312,7 @@ fn located(
     Ok(Location {
         maps: maps(model, best)?,
         target,
+        class,
         targets,
         functions,
         ..Location::default()

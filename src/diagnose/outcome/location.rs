@@ -13,6 +13,9 @@ pub struct Location {
     pub onset: Option<Onset>,
     /// Place of the first accepted effect, or else the most probable one.
     pub target: Option<String>,
+    /// Target and the other places within 3 nats of the most probable one: the records cannot tell which. Empty where there are none,
+    /// and where effects at several places are accepted.
+    pub class: Vec<String>,
     /// All places, most probable first.
     pub targets: Vec<TargetShare>,
     /// Missing functions of the twin alone, and on top of the accepted effects; clearest first.
@@ -28,6 +31,21 @@ pub struct TargetShare {
     pub target: String,
     /// Posterior probability of what explains the records there, given a gap.
     pub probability: f64,
+}
+
+impl TargetShare {
+    /// The target and the places that the records cannot tell from it, most probable first; empty where there are none.
+    pub(in crate::diagnose) fn alike(targets: &[Self], target: &str) -> Vec<String> {
+        let most = targets.first().map_or(0.0, |t| t.probability);
+        let least = most * (-Thresholds::RIVALS).exp();
+        let others = (targets.iter())
+            .filter(|t| t.probability >= least && t.target != target)
+            .map(|t| t.target.as_str());
+        let class: Vec<String> = (std::iter::once(target).chain(others))
+            .map(str::to_owned)
+            .collect();
+        if class.len() > 1 { class } else { vec![] }
+    }
 }
 
 /// Innovations cut in several ways: a description, not a test. Shares add up to at most one in each list. Serialised are the cells that
@@ -202,4 +220,22 @@ fn notable<C: Cell + Serialize, S: Serializer>(
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(cells.iter().filter(|cell| cell.is_notable()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_are_alike_within_three_nats_of_the_most_probable() {
+        let share = |(target, probability): (&str, f64)| TargetShare {
+            target: target.into(),
+            probability,
+        };
+        let targets = [("h1", 0.6), ("h2", 0.31), ("sensor", 0.06), ("k4", 0.02)].map(share);
+        assert_eq!(TargetShare::alike(&targets, "h1"), ["h1", "h2", "sensor"]);
+        assert_eq!(TargetShare::alike(&targets, "h2"), ["h2", "h1", "sensor"]);
+        let clear = [("h1", 0.97), ("h2", 0.03)].map(share);
+        assert!(TargetShare::alike(&clear, "h1").is_empty());
+    }
 }

@@ -49,6 +49,10 @@ pub(crate) struct Outcome {
     pub decision: Decision,
     /// The place that it names.
     pub target: Option<String>,
+    /// Probability of that place, given a gap.
+    pub target_probability: Option<f64>,
+    /// The place and those that it cannot tell from it.
+    pub places: Vec<String>,
     /// Effects, best first.
     pub effects: Vec<Named>,
     /// Effects added to the twin, as `id@target`.
@@ -139,6 +143,13 @@ impl Outcome {
             verdict: found.verdict,
             p_value: found.detection.p_value,
             decision: found.cause.decision,
+            target_probability: (found.location.targets.iter())
+                .find(|t| Some(&t.target) == found.location.target.as_ref())
+                .map(|t| t.probability),
+            places: match found.location.class.is_empty() {
+                true => found.location.target.iter().cloned().collect(),
+                false => found.location.class.clone(),
+            },
             target: found.location.target.clone(),
             effects: (found.cause.effects.iter())
                 .map(|e| Named {

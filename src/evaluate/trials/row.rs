@@ -149,6 +149,12 @@ impl Row {
         target.is_some_and(|target| self.targets.contains(target))
     }
 
+    /// Returns true if a true place is the one that is stated, or is among those that are told as its rivals.
+    pub fn places_hold_it(&self) -> bool {
+        let places = self.outcome.as_ref().map_or(&[][..], |o| &o.places);
+        places.iter().any(|place| self.targets.contains(place))
+    }
+
     /// Returns the worth of the answer.
     pub fn fate(&self) -> Fate {
         match &self.outcome {

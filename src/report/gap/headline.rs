@@ -1,6 +1,6 @@
 //! The answer in one sentence.
 
-use crate::diagnose::{Cause, Decision, Diagnosis, Verdict};
+use crate::diagnose::{Cause, Decision, Diagnosis, Location, Verdict};
 
 /// Characters of a headline: two lines of a page.
 const LONGEST: usize = 140;
@@ -42,12 +42,15 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
                 }),
             )
         }
-        _ => match &diagnosis.location.target {
-            Some(target) => format!(
-                "Structural gap outside the library: no listed effect explains it; the missing law acts on {target}."
-            ),
-            None => "Structural gap outside the library: no listed effect explains it.".into(),
-        },
+        _ => {
+            let unlisted = "Structural gap outside the library: no listed effect explains it";
+            match somewhere(&diagnosis.location) {
+                None => format!("{unlisted}."),
+                Some(places) => short_enough(
+                    places.map(|place| format!("{unlisted}; the missing law acts on {place}.")),
+                ),
+            }
+        }
     }
 }
 
@@ -93,6 +96,36 @@ fn one_of(cause: &Cause) -> String {
         format!("Structural gap: the twin lacks {before}one of {count} effects{lead}; {APART}.");
     let last = format!("Structural gap: the twin lacks one of {count} effects; {APART}.");
     short_enough(named.into_iter().chain([counted, last]))
+}
+
+/// Different places of the accepted effects.
+pub(super) fn accepted_places(diagnosis: &Diagnosis) -> Vec<&str> {
+    let mut places: Vec<&str> = vec![];
+    for effect in &diagnosis.cause.effects {
+        if diagnosis.cause.accepted.contains(&effect.key()) && !places.contains(&&*effect.target) {
+            places.push(&effect.target);
+        }
+    }
+    places
+}
+
+/// The place of a gap, or the few that the records cannot tell apart, each by name; then in fewer words. None where it is not known.
+pub(super) fn somewhere(location: &Location) -> Option<[String; 2]> {
+    let target = location.target.as_ref()?;
+    let Some((last, first)) = location.class.split_last() else {
+        return Some([target.clone(), target.clone()]);
+    };
+    let is_likely = (location.targets.iter()).any(|t| t.target == *target && t.probability >= SAID);
+    let lead = match is_likely {
+        true => format!(", most likely {target}"),
+        false => String::new(),
+    };
+    let counted = format!("one of {} places{lead}", location.class.len());
+    let named = match location.class.len() <= MOST_NAMES {
+        true => format!("{} or {last}", first.join(", ")),
+        false => counted.clone(),
+    };
+    Some([named, counted])
 }
 
 /// The first sentence that is short enough, or else the last.

@@ -1,12 +1,11 @@
 //! A diagnosis on the terminal.
 
-use super::headline::headline;
+use super::headline::{accepted_places, headline};
 use super::json::NEXT_INPUT;
 use super::step::step_setting;
 use super::story::{effects, next};
 use crate::diagnose::{
-    Cause, Detection, Diagnosis, Discovery, EffectFit, Location, NextInput, SHORTEST_SPLIT,
-    Shrinkage,
+    Cause, Detection, Diagnosis, Discovery, EffectFit, NextInput, SHORTEST_SPLIT, Shrinkage,
 };
 use crate::report::digits::{Digits, chance, error, percent, probability, short, unit_suffix};
 use crate::report::parameters::ParameterRow;
@@ -46,7 +45,7 @@ pub fn gap_text(study: &Study, diagnosis: &Diagnosis) -> String {
         })
         .collect();
     lines.push(parameters.join(", "));
-    lines.extend(place(&diagnosis.location));
+    lines.extend(place(diagnosis));
     if !diagnosis.cause.effects.is_empty() {
         lines.push("  probability   nats   effect".into());
         for effect in diagnosis.cause.effects.iter().take(SHOWN) {
@@ -143,12 +142,24 @@ pub(super) fn calibration(d: &Detection) -> Option<String> {
 }
 
 /// Returns the place of the gap, in the twin, in time and by values; none where it is not known.
-fn place(location: &Location) -> Option<String> {
+fn place(diagnosis: &Diagnosis) -> Option<String> {
+    let location = &diagnosis.location;
     let target = location.target.as_ref()?;
-    let mut line = format!("Where: {target}");
-    if let Some(share) = location.targets.iter().find(|t| t.target == *target) {
-        line.push_str(&format!(" (probability {})", chance(share.probability)));
-    }
+    let of = |place: &str| {
+        let share = location.targets.iter().find(|t| t.target == place);
+        let probability = share.map(|t| format!(" (probability {})", chance(t.probability)));
+        format!("{place}{}", probability.unwrap_or_default())
+    };
+    let together = accepted_places(diagnosis);
+    let places = match location.class.is_empty() {
+        _ if together.len() > 1 => together.join(" and "),
+        true => of(target),
+        false => {
+            let class: Vec<String> = location.class.iter().map(|place| of(place)).collect();
+            class.join(" or ")
+        }
+    };
+    let mut line = format!("Where: {places}");
     if let Some(onset) = &location.onset {
         line.push_str(&format!(
             "; {} changes at {} s",
@@ -346,6 +357,34 @@ mod tests {
             assert!(text.lines().count() <= LINES, "{text}");
             assert!(text.ends_with("explanations, 5.20 s.\n"), "{text}");
         }
+    }
+
+    #[test]
+    fn places_that_cannot_be_told_apart_are_all_told() {
+        let mut diagnosis = made::oscillator_none();
+        let all = ["x2", "x1", "sensor", "actuator"];
+        for (count, headline, line) in [
+            (0, "acts on x2.", "Where: x2 (probability 0.97)"),
+            (
+                3,
+                "acts on x2, x1 or sensor.",
+                "Where: x2 (probability 0.97) or x1 or sensor",
+            ),
+            (
+                4,
+                "acts on one of 4 places, most likely x2.",
+                "Where: x2 (probability 0.97) or x1 or sensor or actuator",
+            ),
+        ] {
+            diagnosis.location.class = all[..count].iter().map(|p| (*p).to_owned()).collect();
+            let text = gap_text(&diagnosis);
+            assert!(text.contains(headline) && text.contains(line), "{text}");
+        }
+        let pair = gap_text(&made::rig_pair());
+        assert!(
+            pair.contains("Where: a_state_with_a_name_that_is_long and sensor2"),
+            "{pair}"
+        );
     }
 
     #[test]

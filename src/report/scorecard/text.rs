@@ -48,6 +48,7 @@ pub fn scorecard_text(card: &Scorecard) -> String {
         ),
         ("Mean Brier score", card.probabilities.brier, ""),
         ("Mean size of a class", card.mean_class_size, ""),
+        ("Mean number of places told", card.mean_places, ""),
         ("Mean time of a diagnosis", card.seconds_per_record, "s"),
     ] {
         if let Some(value) = value {
@@ -137,6 +138,11 @@ pub(super) fn named_scores(card: &Scorecard) -> Vec<(String, Count)> {
             precision.no_gap_or_faint,
         ),
         ("place: right".into(), precision.place),
+        ("place at 0.9 or more: right".into(), precision.place_90),
+        (
+            "place: right, or one of its rivals".into(),
+            precision.place_class,
+        ),
         (
             "90 % intervals of θ that hold it, nothing missing".into(),
             card.coverage.nulls,

@@ -8,6 +8,7 @@ use super::said::{
     reliability,
 };
 use crate::diagnose::Ablation;
+use crate::evaluate::trials::answer::Outcome;
 use crate::evaluate::trials::row::{Fate, Row};
 use crate::evaluate::trials::{Families, Kind};
 use serde::Serialize;
@@ -113,6 +114,8 @@ pub struct Scorecard {
     pub(crate) coverage: Coverage,
     /// Mean number of members of a class.
     pub(crate) mean_class_size: Option<f64>,
+    /// Mean number of places that a stated gap is told to be at, one or several.
+    pub(crate) mean_places: Option<f64>,
     /// Answers that stay.
     pub(crate) steadiness: Vec<Steadiness>,
     /// The diagnosis beside simple answers.
@@ -135,12 +138,15 @@ impl Scorecard {
     pub(crate) fn new(setup: Setup, rows: Vec<Row>) -> Self {
         let over =
             |of: &dyn Fn(&Row) -> bool, count: &dyn Fn(&Row) -> bool| Count::over(&rows, of, count);
-        let classes: Vec<f64> = (rows.iter())
-            .filter(|row| row.called())
-            .filter_map(|row| row.outcome.as_ref())
-            .map(|o| o.class.len() as f64)
-            .filter(|size| *size > 0.0)
-            .collect();
+        let mean_size = |size: fn(&Outcome) -> usize| {
+            let sizes: Vec<f64> = (rows.iter())
+                .filter(|row| row.called())
+                .filter_map(|row| row.outcome.as_ref())
+                .map(|o| size(o) as f64)
+                .filter(|size| *size > 0.0)
+                .collect();
+            mean(&sizes)
+        };
         let seconds: Vec<f64> = rows.iter().map(|row| row.seconds).collect();
         let right = |row: &Row| matches!(row.fate(), Fate::Delivered | Fate::Quiet);
         Self {
@@ -164,7 +170,8 @@ impl Scorecard {
             probabilities: probabilities(&rows),
             reliability: reliability(&rows),
             coverage: coverage(&rows),
-            mean_class_size: mean(&classes),
+            mean_class_size: mean_size(|o| o.class.len()),
+            mean_places: mean_size(|o| o.places.len()),
             steadiness: steadiness(&rows),
             baselines: baselines(&rows),
             seconds_per_record: mean(&seconds),

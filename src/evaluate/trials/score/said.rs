@@ -30,6 +30,12 @@ pub(crate) struct Precision {
     /// Places of stated gaps that are true ones.
     #[serde(rename = "where")]
     pub place: Count,
+    /// The same of places whose probability is at least 0.9.
+    #[serde(rename = "where_90")]
+    pub place_90: Count,
+    /// Stated gaps of which a true place is the stated one or one of its rivals.
+    #[serde(rename = "where_class")]
+    pub place_class: Count,
 }
 
 /// Scores of the probabilities of the effects and of "none of these", over gaps with one departure.
@@ -72,6 +78,12 @@ pub(super) fn precision(rows: &[Row]) -> Precision {
         })
     };
     let quiet = |row: &Row| row.outcome.is_some() && !row.called() && !row.is_coarse();
+    let placed = |least: f64| {
+        move |row: &Row| {
+            let probability = row.outcome.as_ref().and_then(|o| o.target_probability);
+            row.called() && probability.is_some_and(|p| p >= least)
+        }
+    };
     let is_faint = |row: &Row| row.information.is_some_and(|nats| nats < FAINT);
     Precision {
         stated_90: stated(0.9),
@@ -84,11 +96,9 @@ pub(super) fn precision(rows: &[Row]) -> Precision {
         ),
         no_gap: Count::over(rows, quiet, Row::is_null),
         no_gap_or_faint: Count::over(rows, quiet, |row| row.is_null() || is_faint(row)),
-        place: Count::over(
-            rows,
-            |row| row.called() && row.outcome.as_ref().is_some_and(|o| o.target.is_some()),
-            Row::place_is_right,
-        ),
+        place: Count::over(rows, placed(0.0), Row::place_is_right),
+        place_90: Count::over(rows, placed(0.9), Row::place_is_right),
+        place_class: Count::over(rows, placed(0.0), Row::places_hold_it),
     }
 }
 

@@ -37,6 +37,8 @@ fn row(kind: Kind, truth: &[&str], accepted: &[&str], probability: f64) -> Row {
                 false => Decision::NotNeeded,
             },
             target: accepted.first().map(target),
+            target_probability: accepted.first().map(|_| probability),
+            places: accepted.iter().map(target).collect(),
             effects: (accepted.iter())
                 .map(|key| Named {
                     key: (*key).into(),

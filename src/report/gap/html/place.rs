@@ -2,6 +2,7 @@
 
 use crate::diagnose::{Diagnosis, Location, Maps, Verdict, Window};
 use crate::report::digits::{chance, percent, short, unit_suffix};
+use crate::report::gap::headline::{accepted_places, somewhere};
 use crate::report::gap::pictures;
 use crate::report::page::Column::{self, Number, Text};
 use crate::report::page::{Section, figure, folded, paragraph, subheading, table};
@@ -20,8 +21,18 @@ pub(super) fn section_of(study: &Study, diagnosis: &Diagnosis) -> Section {
 }
 
 fn body(study: &Study, diagnosis: &Diagnosis) -> String {
-    let mut body = match &diagnosis.location.target {
-        Some(target) => paragraph(&format!("The missing law acts on {target}.")),
+    let together = accepted_places(diagnosis);
+    let mut body = match somewhere(&diagnosis.location) {
+        Some(_) if together.len() > 1 => paragraph(&format!(
+            "The missing laws act on {}.",
+            together.join(" and ")
+        )),
+        Some([place, _]) if diagnosis.location.class.is_empty() => {
+            paragraph(&format!("The missing law acts on {place}."))
+        }
+        Some([places, _]) => paragraph(&format!(
+            "The missing law acts on {places}: this record cannot tell which."
+        )),
         None => String::new(),
     };
     body.push_str(&targets(diagnosis));

@@ -3,6 +3,7 @@
 use crate::diagnose::{Decision, Diagnosis, EffectFit, NextInput, Verdict};
 use crate::math::six_digits;
 use crate::report::digits::short;
+use crate::report::gap::headline::somewhere;
 use crate::report::gap::json::NEXT_INPUT;
 use crate::report::gap::pictures;
 use crate::report::page::{Section, figure, list, paragraph, preformatted, subheading};
@@ -91,7 +92,10 @@ fn steps(diagnosis: &Diagnosis) -> Vec<String> {
             let remains = which.remains.as_ref().map(|r| r.place.as_str());
             steps.extend(unlisted(diagnosis, remains));
         }
-        _ => steps.extend(unlisted(diagnosis, diagnosis.location.target.as_deref())),
+        _ => {
+            let places = somewhere(&diagnosis.location).map(|[named, _]| named);
+            steps.extend(unlisted(diagnosis, places.as_deref()));
+        }
     }
     let vague: Vec<&str> = (diagnosis.parameters.iter())
         .filter(|p| !p.identified)
