@@ -23,6 +23,12 @@ const MINOR: f64 = 1.0 / 3.0;
 /// Most kinds of noise that are added to the twin's own.
 const ROUNDS: usize = 2;
 
+/// A finer step, and θ beside explanations without it.
+struct Finer {
+    step: FinerStep,
+    thetas: Vec<Vec<f64>>,
+}
+
 /// Everything that is known once the search is over.
 pub(in crate::diagnose) struct Explored<'s, 'a> {
     pub study: &'s Study,
@@ -53,8 +59,9 @@ pub(in crate::diagnose) fn search<R>(
     let base = Base::new(&measured, records, settings)?;
     stage.tick()?;
     if let Some(step) = step_of(study, &base, settings)? {
-        let nothing = Before::Nothing;
-        return with_step(study, &base, step, nothing, settings, progress, then);
+        let (nothing, thetas) = (Before::Nothing, vec![]);
+        let finer = Finer { step, thetas };
+        return with_step(study, &base, finer, nothing, settings, progress, then);
     }
     let then = |mut own: Explored<'_, '_>| {
         match likelier_with_step(&own, settings, progress, then) {
@@ -94,9 +101,10 @@ fn likelier_with_step<R>(
         let is_likelier = other.log_evidence() > least;
         is_likelier.then(|| then(other)).transpose()
     };
-    let nothing = Before::Nothing;
+    let (nothing, thetas) = (Before::Nothing, own.findings.thetas());
+    let finer = Finer { step, thetas };
     with_step(
-        own.study, own.base, step, nothing, settings, progress, &then,
+        own.study, own.base, finer, nothing, settings, progress, &then,
     )
 }
 
@@ -127,14 +135,14 @@ fn step_of(
 fn with_step<R>(
     study: &Study,
     base: &Base<'_>,
-    step: FinerStep,
+    finer: Finer,
     before: Before<'_, '_>,
     settings: &DiagnoseSettings,
     progress: &Progress,
     then: &dyn Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
 ) -> Result<R, DiagnoseError> {
     let records = base.model.problem.records;
-    let twin = step.of(study.twin());
+    let twin = finer.step.of(study.twin());
     let twin = twin.as_ref().unwrap_or(study.twin());
     let measured = measured(twin, records, &settings.beliefs(study))?;
     let begin = DiagnoseSettings {
@@ -142,9 +150,11 @@ fn with_step<R>(
         ..settings.clone()
     };
     let base = Base {
-        step: Some(step),
+        step: Some(finer.step),
         ..Base::new(&measured, records, &begin)?
     };
+    let better = base.fitted_from(&finer.thetas)?;
+    let base = better.unwrap_or(base);
     explored(study, base, before, settings, ROUNDS, progress, then)
 }
 
@@ -226,7 +236,9 @@ fn again<'a, R>(
             true => Before::OtherStep(findings, base.model.log_evidence),
             false => Before::Nothing,
         };
-        return with_step(study, base, step, before, settings, progress, then).map(Some);
+        let thetas = findings.thetas();
+        let finer = Finer { step, thetas };
+        return with_step(study, base, finer, before, settings, progress, then).map(Some);
     }
     Ok(None)
 }

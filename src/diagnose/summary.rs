@@ -3,7 +3,7 @@
 use super::error::DiagnoseError;
 use super::explain::decide::Conclusion;
 use super::explain::findings::{Chances, Findings};
-use super::explain::search::Found;
+use super::explain::found::Found;
 use super::hypotheses::term::{Part, Term};
 use super::model::Model;
 use super::outcome::{Decision, EffectFit, FittedParameter, Onset, Remains};

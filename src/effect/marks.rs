@@ -1,5 +1,7 @@
 //! Marks that signal effects leave on measured outputs.
 
+use crate::record::{distinct, step_of};
+
 /// The mark of an effect on measured outputs, whatever the twin: values that pile up at its ends or steps.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Mark {
@@ -15,33 +17,6 @@ pub(crate) enum Mark {
 /// next to them. A rounded oscillation is often at its ends: at the top of a parabola, steps hold 1 : 0.41 : 0.32 of its time.
 const TIES: usize = 4;
 const OFTEN: usize = 3;
-/// Samples for each multiple of the step within the signal's range, at least, where the step is one of digits: files round,
-/// too.
-const REPEATS: f64 = 2.0;
-/// Distinct values that tell a step from chance.
-const DISTINCT: usize = 8;
-/// Largest distance of a rounded value from a multiple of the step, in steps.
-const TOLERANCE: f64 = 0.01;
-
-/// Distinct values and how often each comes, ascending.
-fn distinct(outputs: &[f64]) -> Vec<(f64, usize)> {
-    let mut sorted: Vec<f64> = (outputs.iter().copied())
-        .filter(|v| v.is_finite())
-        .collect();
-    sorted.sort_by(f64::total_cmp);
-    let span = match (sorted.first(), sorted.last()) {
-        (Some(low), Some(high)) => high - low,
-        _ => 0.0,
-    };
-    let mut values: Vec<(f64, usize)> = Vec::new();
-    for v in sorted {
-        match values.last_mut() {
-            Some((last, count)) if v - *last <= 1e-9 * span => *count += 1,
-            _ => values.push((v, 1)),
-        }
-    }
-    values
-}
 
 /// Mark of a limited range, as (low, high): many samples exactly at the least or the greatest value.
 pub(crate) fn clipped(outputs: &[f64]) -> Mark {
@@ -73,48 +48,22 @@ pub(crate) fn clipped(outputs: &[f64]) -> Mark {
     }
 }
 
+/// Returns whether values are rounded so coarsely that most of them repeat.
+pub(crate) fn on_levels(outputs: &[f64]) -> bool {
+    step_of(outputs).is_some() && 2 * distinct(outputs).len() <= outputs.len()
+}
+
 /// Returns whether outputs stop at an end of their range: many samples exactly there.
 pub(crate) fn stops(outputs: &[f64]) -> bool {
     matches!(clipped(outputs), Mark::Present(_))
 }
 
-/// Mark of rounding, as its step: all distances are multiples of the least one, and there are few values or the step is none of
-/// digits.
+/// Mark of rounding, as its step.
 pub(crate) fn rounded(outputs: &[f64]) -> Mark {
-    let values = distinct(outputs);
-    if values.len() < 2 {
-        return Mark::Absent;
+    match step_of(outputs) {
+        Some(step) => Mark::Present(vec![step]),
+        None => Mark::Absent,
     }
-    let step = (values.windows(2))
-        .map(|w| w[1].0 - w[0].0)
-        .fold(f64::INFINITY, f64::min);
-    let span = values[values.len() - 1].0 - values[0].0;
-    let steps = (span / step).round();
-    // All of them know the step better than two.
-    let step = span / steps;
-    let fine = REPEATS * steps > outputs.len() as f64;
-    if fine && (values.len() < DISTINCT || is_of_digits(step)) {
-        return Mark::Absent;
-    }
-    let low = values[0].0;
-    let off = |v: f64| {
-        let level = (v - low) / step;
-        (level - level.round()).abs()
-    };
-    if values.iter().all(|(v, _)| off(*v) <= TOLERANCE) {
-        Mark::Present(vec![step])
-    } else {
-        Mark::Absent
-    }
-}
-
-/// Returns whether the step is one that numbers have in files and machines: a power of ten or of two, or ten over two, four, five.
-fn is_of_digits(step: f64) -> bool {
-    let whole = |v: f64| (v - v.round()).abs() < 1e-4;
-    [1.0, 2.0, 2.5, 5.0]
-        .iter()
-        .any(|first| whole((step / first).log10()))
-        || whole(step.log2())
 }
 
 #[cfg(test)]

@@ -38,6 +38,6 @@ pub use law::{ForcePoint, Instant};
 pub(crate) use law::{Law, TargetKind};
 pub(crate) use library::{clamp, lag};
 pub use magnitude::Magnitude;
-pub(crate) use marks::{Mark, clipped, rounded, stops};
+pub(crate) use marks::{Mark, clipped, on_levels, rounded, stops};
 pub use placed::Effect;
 pub(crate) use placed::EffectEntry;

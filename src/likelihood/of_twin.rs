@@ -45,38 +45,44 @@ pub(crate) fn likelihood_of(twin: &Twin) -> Arc<dyn Likelihood> {
 
 struct Filter(Arc<dyn StateSpace>, FilterSettings);
 
+impl Filter {
+    fn kalman<'a>(
+        &'a self,
+        record: &'a Record,
+        settings: &'a FilterSettings,
+    ) -> Result<Kalman<'a>, FilterError> {
+        Ok(Kalman::new(self.0.as_ref(), record, settings)?.of_cells())
+    }
+}
+
 impl Likelihood for Filter {
     fn outline(&self) -> Outline {
         self.0.outline()
     }
     fn filtered(&self, theta: &[f64], record: &Record) -> Result<Filtered, FilterError> {
-        Kalman::new(self.0.as_ref(), record, &self.1)?.filter(theta)
+        self.kalman(record, &self.1)?.filter(theta)
     }
     fn states(&self, theta: &[f64], record: &Record) -> Result<(Filtered, Signal), FilterError> {
         let settings = FilterSettings {
             keep_states: true,
             ..self.1.clone()
         };
-        let mut filtered = Kalman::new(self.0.as_ref(), record, &settings)?.filter(theta)?;
+        let mut filtered = self.kalman(record, &settings)?.filter(theta)?;
         let states = (filtered.states.take()).map_or_else(|| Signal::zeros((0, 0)), |s| s.means);
         Ok((filtered, states))
     }
     fn smoothed(&self, theta: &[f64], record: &Record) -> Result<Option<Smoothed>, FilterError> {
-        Kalman::new(self.0.as_ref(), record, &self.1)?
-            .smooth(theta)
-            .map(Some)
+        self.kalman(record, &self.1)?.smooth(theta).map(Some)
     }
     fn predicted(&self, theta: &[f64], record: &Record) -> Result<Option<Signal>, FilterError> {
-        Kalman::new(self.0.as_ref(), record, &self.1)?
-            .predictions(theta)
-            .map(Some)
+        self.kalman(record, &self.1)?.predictions(theta).map(Some)
     }
     fn log_likelihood(
         &self,
         theta: &[f64],
         record: &Record,
     ) -> Result<(f64, Option<Filtered>), FilterError> {
-        let kalman = Kalman::new(self.0.as_ref(), record, &self.1)?;
+        let kalman = self.kalman(record, &self.1)?;
         Ok((kalman.log_likelihood(theta)?, None))
     }
     fn score(
@@ -85,7 +91,7 @@ impl Likelihood for Filter {
         record: &Record,
         coordinates: &Coordinates,
     ) -> Result<Option<Score>, FilterError> {
-        let kalman = Kalman::new(self.0.as_ref(), record, &self.1)?;
+        let kalman = self.kalman(record, &self.1)?;
         Score::forward(&kalman, theta, coordinates).map(Some)
     }
     fn is_simulated(&self) -> bool {

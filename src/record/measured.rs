@@ -2,8 +2,9 @@
 
 use super::channels::column_names;
 use crate::math::six_digits;
-use crate::record::{Drive, RecordError, Signal, Signals};
+use crate::record::{Drive, RecordError, Signal, Signals, step_of};
 use ndarray::s;
+use std::sync::OnceLock;
 
 /// Inputs and outputs measured on one time grid. An output that is NaN is missing: it was not measured.
 ///
@@ -19,6 +20,8 @@ use ndarray::s;
 pub struct Record {
     drive: Drive,
     outputs: Signal,
+    /// Step of each output whose values are rounded, once it was asked for.
+    steps: OnceLock<Vec<Option<f64>>>,
 }
 
 impl Record {
@@ -48,7 +51,11 @@ impl Record {
                 return Err(RecordError::TooFewValues(full));
             }
         }
-        Ok(Self { drive, outputs })
+        Ok(Self {
+            drive,
+            outputs,
+            steps: OnceLock::new(),
+        })
     }
 
     /// As [`new`](Self::new), of simulated outputs, none of which may be missing.
@@ -65,6 +72,14 @@ impl Record {
     /// Outputs, N × channels.
     pub fn outputs(&self) -> &Signal {
         &self.outputs
+    }
+
+    /// Step of each output whose values are rounded.
+    pub(crate) fn steps(&self) -> &[Option<f64>] {
+        self.steps.get_or_init(|| {
+            let columns = self.outputs.columns().into_iter();
+            columns.map(|y| step_of(&y.to_vec())).collect()
+        })
     }
 
     /// Number of samples N.

@@ -1,7 +1,8 @@
 //! The order of the search: single explanations, what they leave, pairs.
 
 use super::findings::{Findings, leaves_nothing, suffices};
-use super::search::{Breadth, FEW, Found, listed, own_theta, sort, unknown};
+use super::found::{Found, own_theta, sort};
+use super::search::{Breadth, FEW, listed, unknown};
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::scales::Scales;
 use crate::diagnose::hypotheses::term::{Part, Term};
@@ -104,9 +105,15 @@ fn carried_on<'a>(
     functions.extend(others.map(kept).collect::<Vec<_>>());
     sort(&mut functions);
     stage.tick()?;
-    let listed = carry_all(&old.listed)?;
+    let mut singles = carry_all(&old.listed)?;
+    // Those that stand out are fitted afresh, too: the other step's error may have led them astray.
+    let best: Vec<Arc<Term>> = (singles.iter().take(SINGLES))
+        .filter(|found| found.gain > least)
+        .filter_map(|found| found.terms.last().cloned())
+        .collect();
+    improve(&mut singles, listed(base, &best, origin, &[], breadth)?);
     stage.tick()?;
-    let findings = with_noise(base, terms, breadth, listed, functions)?;
+    let findings = with_noise(base, terms, breadth, singles, functions)?;
     Ok((findings, Some(carry_all(&old.several)?)))
 }
 

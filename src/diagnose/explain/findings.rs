@@ -6,7 +6,7 @@
 //! r(E)  = max_U log Z(E + U) − log Z(E)               E leaves nothing to explain if r < 4
 //! ```
 
-use super::search::{Found, own_theta};
+use super::found::{Found, own_theta};
 use crate::diagnose::hypotheses::term::Nature;
 use crate::diagnose::model::Model;
 use crate::diagnose::outcome::Probabilities;

@@ -3,6 +3,8 @@
 pub(in crate::diagnose) mod decide;
 pub(in crate::diagnose) mod explore;
 pub(in crate::diagnose) mod findings;
+pub(in crate::diagnose) mod found;
 pub(in crate::diagnose) mod refit;
 pub(in crate::diagnose) mod scan;
 pub(in crate::diagnose) mod search;
+mod valleys;

@@ -24,6 +24,9 @@ pub(in crate::diagnose) struct Effort {
 const HELD: usize = 6;
 const RELEASED: usize = 40;
 
+/// Most iterations of the fits that are carried on: they end as soon as a step promises nothing, most of them after a few.
+pub(super) const CARRIED: usize = 60;
+
 /// Fits a promise beside a model from its best starts, with θ as it answers them and with those given; `None` where it works at none.
 pub(in crate::diagnose) fn fit_promise<'a>(
     model: &Model<'a>,
@@ -33,8 +36,17 @@ pub(in crate::diagnose) fn fit_promise<'a>(
 ) -> Result<Option<Model<'a>>, DiagnoseError> {
     let extended = model.extend(&promise.term)?;
     let chosen: Vec<&Beginning> = promise.starts.iter().take(effort.starts).collect();
+    // Times and delays stay until θ and the size have answered them: a small size would let them go anywhere.
+    let held = (extended.problem).holding(|j| extended.entries.iter().skip(1).any(|e| *e == j));
     let mut from: Vec<Vec<f64>> = (chosen.iter())
-        .map(|start| begin(model, &extended, start))
+        .map(|start| {
+            let theta = begin(model, &extended, start)?;
+            if !start.scales || extended.entries.len() < 2 {
+                return Ok(theta);
+            }
+            let settled = climb(&held, &theta, HELD)?;
+            Ok(settled.map_or(theta, |settled| settled.theta))
+        })
         .collect::<Result<_, DiagnoseError>>()?;
     if let Some(first) = chosen.first() {
         let first = model.beside(&extended, &first.m);

@@ -4,7 +4,7 @@ use super::scales::Scales;
 use super::term::{Nature, Part, Start, Term, with_terms};
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::thresholds::Thresholds;
-use crate::effect::{Effect, Law, Magnitude, Mark, TargetKind, targets};
+use crate::effect::{Effect, Law, Magnitude, Mark, TargetKind, on_levels, targets};
 use crate::fit::axis::{Axis, EvidencePrior};
 use crate::fit::magnitude::{LONGEST, largest, shape_axis, size_axis};
 use crate::math::{ends, quantile};
@@ -111,6 +111,7 @@ impl Library<'_> {
         if free.is_empty() {
             return Ok(None);
         }
+        let rounds = matches!(effect.law(), Law::Rounding(_));
         let mut term = Term {
             id: effect.id().into(),
             target: effect.target().into(),
@@ -126,6 +127,8 @@ impl Library<'_> {
             variables: vec![],
             mark: match mark {
                 Mark::Unmarked | Mark::Absent => 0.0,
+                // Values on few levels repeat at an end without a limit there.
+                Mark::Present(_) if !rounds && on_levels(values) => 0.0,
                 Mark::Present(_) => Thresholds::MARK_PRESENT,
             },
         };

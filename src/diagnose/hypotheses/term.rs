@@ -101,6 +101,32 @@ impl Term {
         }
     }
 
+    /// Names of the free magnitudes of an effect of which more than the size is to be found, as a time or a delay.
+    pub fn shape(&self) -> Option<Vec<&'static str>> {
+        let Part::Effect { effect, held, .. } = &self.part else {
+            return None;
+        };
+        let free: Vec<&str> = (effect.magnitudes().iter())
+            .map(|m| m.name)
+            .filter(|name| !held.contains_key(*name))
+            .collect();
+        let is_size = free.len() == 1 && self.starts.iter().all(|start| start.scales);
+        (!is_size).then_some(free)
+    }
+
+    /// Entries of the free magnitudes that are times in the record.
+    pub fn times(&self) -> Vec<usize> {
+        let Part::Effect { effect, held, .. } = &self.part else {
+            return vec![];
+        };
+        (effect.magnitudes().iter())
+            .filter(|m| !held.contains_key(m.name))
+            .enumerate()
+            .filter(|(_, m)| m.unit == "s" && m.off.is_none())
+            .map(|(i, _)| i)
+            .collect()
+    }
+
     /// Names of an effect's free magnitudes in θ, in the order of the axes.
     pub fn names(&self) -> Vec<String> {
         match &self.part {

@@ -1,6 +1,6 @@
 //! Missing functions as they were fitted: values, errors, the range that the records show.
 
-use crate::diagnose::explain::search::Found;
+use crate::diagnose::explain::found::Found;
 use crate::diagnose::hypotheses::basis::basis;
 use crate::diagnose::hypotheses::term::Nature;
 use crate::diagnose::model::Model;

@@ -3,7 +3,7 @@
 use super::free_run::{Runner, root};
 use super::horizon::{HeldOutRows, Predictor, compare};
 use crate::diagnose::error::DiagnoseError;
-use crate::diagnose::explain::search::Found;
+use crate::diagnose::explain::found::Found;
 use crate::diagnose::model::{Model, keys};
 use crate::diagnose::outcome::Shrinkage;
 use crate::diagnose::thresholds::Thresholds;

@@ -92,8 +92,9 @@ fn forces() -> Vec<EffectKind> {
             &[-0.1, 0.03, 0.1, 0.3],
         ))
         .magnitude(
+            // Below a quarter, over a decade of x a factor of 1.8, the law is Coulomb friction.
             Magnitude::positive("exponent", "1", &[0.5, 1.5, 2.5])
-                .within(0.0, 4.0)
+                .within(0.25, 4.0)
                 .shape(),
         ),
         // Vibration, mains hum, tides.

@@ -31,5 +31,5 @@ pub(crate) fn predictor(
     record: &Record,
 ) -> Result<Predictor, FilterError> {
     let ensemble = Ensemble::new(twin, theta, record.drive())?;
-    Ok(Predictor::new(&ensemble, record.outputs()))
+    Ok(Predictor::new(&ensemble, record))
 }

@@ -17,7 +17,7 @@ use super::runs::Ensemble;
 use super::tail::Tail;
 use crate::likelihood::kalman::Filtered;
 use crate::math::quantile;
-use crate::record::Signal;
+use crate::record::{Record, Signal};
 use nalgebra::{DMatrix, DVector};
 use ndarray::{Array1, Array3};
 
@@ -43,18 +43,21 @@ pub(crate) struct Predictor {
 }
 
 impl Predictor {
-    /// Fits all rows to the runs; `outputs` give the scale of each output, and which cells are missing.
-    pub(crate) fn new(ensemble: &Ensemble, outputs: &Signal) -> Self {
+    /// Fits all rows to the runs; the record gives the scale of each output, what it is rounded to, and which cells are missing.
+    pub(crate) fn new(ensemble: &Ensemble, record: &Record) -> Self {
+        let outputs = record.outputs();
         let p = ensemble.outputs();
         let m = ensemble.runs;
         let lags = LAGS.min(m / RUNS_EACH / p).max(1);
-        let floors: Vec<f64> = (outputs.columns().into_iter())
-            .map(|y| {
+        let floors: Vec<f64> = (outputs.columns().into_iter().zip(record.steps()))
+            .map(|(y, step)| {
                 let y: Array1<f64> = y.iter().copied().filter(|v| !v.is_nan()).collect();
                 let size = y
                     .std(0.0)
                     .max(1e-3 * y.iter().fold(0.0, |a, v| v.abs().max(a)));
-                (FLOOR * size).max(1e-150).powi(2)
+                // No density is above one per cell of what values are rounded to.
+                let cell = step.map_or(0.0, |q| q * q / std::f64::consts::TAU);
+                (FLOOR * size).max(1e-150).powi(2).max(cell)
             })
             .collect();
         let mut rows: Vec<Row> = (0..ensemble.mean.nrows())
@@ -178,7 +181,7 @@ mod tests {
             let best = kalman.filter(&theta).unwrap();
             let ours = {
                 let ensemble = Ensemble::new(&CascadedTanks, &theta, record.drive()).unwrap();
-                Predictor::new(&ensemble, record.outputs()).filter(record.outputs())
+                Predictor::new(&ensemble, &record).filter(record.outputs())
             };
             lost += (best.log_likelihood - ours.log_likelihood) / 5.0;
             square += ours.standardised.mapv(|v| v * v).mean().unwrap() / 5.0;

@@ -55,7 +55,10 @@ pub struct Kalman<'a> {
     pub(super) gaps: bool,
     /// Limits of the states.
     pub(super) limits: Vec<Interval>,
+    /// Least variances of the measurement noise.
     pub(super) floor: Vec<f64>,
+    /// The same where the record's values are rounded, and the twin's are not.
+    pub(super) unrounded: Vec<f64>,
     pub(super) start_covariance: Option<Vec<f64>>,
 }
 
@@ -80,7 +83,7 @@ impl<'a> Kalman<'a> {
             outputs: outline.outputs,
         })?;
         let limits = twin.limits();
-        let floor = (record.outputs().columns().into_iter())
+        let floor: Vec<f64> = (record.outputs().columns().into_iter())
             .map(|y| settings.noise_floor * scale(y.iter().copied().filter(|v| !v.is_nan())))
             .collect();
         Ok(Self {
@@ -93,10 +96,24 @@ impl<'a> Kalman<'a> {
             channels: record.outputs().ncols(),
             gaps: !record.is_complete(),
             limits,
+            unrounded: floor.clone(),
             floor,
             start_covariance: (settings.start_covariance.as_ref())
                 .map(|p| p.transpose().as_slice().to_vec()),
         })
+    }
+
+    /// Gives no row more than one density per cell of what the record's values are rounded to, unless the twin rounds them itself: a quiet
+    /// twin could otherwise be as likely as it likes where a value repeats.
+    ///
+    /// ```text
+    /// r² ≥ q²/2π:   N(ȳ; ȳ, r²) ≤ 1/q
+    /// ```
+    pub(in crate::likelihood) fn of_cells(mut self) -> Self {
+        for (least, step) in self.unrounded.iter_mut().zip(self.record.steps()) {
+            *least = least.max(step.map_or(0.0, |q| q * q / std::f64::consts::TAU));
+        }
+        self
     }
 
     /// The parameters of the twin.
@@ -139,4 +156,55 @@ fn scale(y: impl Iterator<Item = f64> + Clone) -> f64 {
         .into_iter()
         .find(|v| *v > 0.0)
         .unwrap_or(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{Drive, Signal};
+    use crate::twin::{Now, Outline, Parameter};
+
+    /// Shows its input, without noise.
+    struct Through;
+    impl StateSpace for Through {
+        fn outline(&self) -> Outline {
+            Outline::new()
+                .parameter(Parameter::new("none", "1", 0.5, 1.5))
+                .state("x", "V")
+                .input("u", "V")
+                .output("y", "V")
+        }
+        fn drift(&self, _: &Now<'_>, _: &[f64], dx: &mut [f64]) {
+            dx.fill(0.0);
+        }
+        fn observe(&self, now: &Now<'_>, _: &[f64], y: &mut [f64]) {
+            y[0] = now.u[0];
+        }
+    }
+
+    /// A twin that meets rounded values exactly is no likelier than one that is sure of every cell; unrounded values have no cells.
+    #[test]
+    fn no_row_has_more_than_one_density_per_cell() {
+        let settings = FilterSettings::default();
+        let log_likelihood = |values: &dyn Fn(usize) -> f64| {
+            let u = Signal::from_shape_fn((200, 1), |(k, _)| values(k));
+            let record = Record::new(Drive::new(0.5, u.clone()).unwrap(), u).unwrap();
+            let bare = Kalman::new(&Through, &record, &settings).unwrap();
+            let bare = bare.log_likelihood(&[1.0]).unwrap();
+            let kalman = Kalman::new(&Through, &record, &settings)
+                .unwrap()
+                .of_cells();
+            (bare, kalman.log_likelihood(&[1.0]).unwrap())
+        };
+        let wave = |k: usize| 3.0 * (0.7 * k as f64).sin();
+        let (bare, of_cells) = log_likelihood(&|k| (wave(k) / 0.4).round() * 0.4);
+        let bound = -200.0 * 0.4f64.ln();
+        assert!(
+            (of_cells - bound).abs() < 1e-6 * bound.abs(),
+            "{of_cells} {bound}"
+        );
+        assert!(bare > 2.0 * bound, "{bare}");
+        let (bare, of_cells) = log_likelihood(&wave);
+        assert_eq!(bare, of_cells);
+    }
 }

@@ -108,6 +108,7 @@ pub(super) struct Pass<'k, S: Size> {
     predicted: S::Vector,
     scale: S::Vector,
     copy: State<S>,
+    floor: S::Vector,
     rounding: Vec<f64>,
     outliers: Vec<Outliers>,
     likelihood: LogLikelihood,
@@ -117,6 +118,15 @@ impl<'k, S: Size> Pass<'k, S> {
     pub fn new(size: S, kalman: &'k Kalman<'k>, acting: &'k Acting<'k>, theta: &'k [f64]) -> Self {
         let (n, p) = (size.states(), size.outputs());
         let (twin, method) = (kalman.twin, kalman.settings.method);
+        let rounding = twin.rounding(theta);
+        let mut floor = S::Vector::zeros(p);
+        for j in 0..p {
+            let rounds = rounding.get(j).is_some_and(|step| *step > 0.0);
+            floor.as_mut()[j] = match rounds {
+                true => kalman.floor[j],
+                false => kalman.unrounded[j],
+            };
+        }
         Self {
             size,
             kalman,
@@ -130,7 +140,8 @@ impl<'k, S: Size> Pass<'k, S> {
             r: S::Vector::zeros(p),
             predicted: S::Vector::zeros(p),
             scale: S::Vector::zeros(n),
-            rounding: twin.rounding(theta),
+            floor,
+            rounding,
             outliers: twin.outliers(theta),
             likelihood: LogLikelihood::NONE,
         }
@@ -212,7 +223,7 @@ impl<'k, S: Size> Pass<'k, S> {
             y: &self.kalman.outputs[k * p..(k + 1) * p],
             predicted,
             noise: &self.r.as_ref()[..p],
-            floor: &self.kalman.floor[..p],
+            floor: &self.floor.as_ref()[..p],
             rounding: &self.rounding,
             outliers: &self.outliers,
         };

@@ -107,14 +107,30 @@ fn found_in_tanks(key: &str, magnitudes: &str) -> Diagnosis {
     found
 }
 
-/// Steps of a converter that louder noise could pass for are told by the values themselves.
+/// Steps of a converter that louder noise could pass for are told by the values themselves; few levels are no limited range, and no twin that
+/// is quiet at one of them is any likelier.
 #[test]
 fn a_rounded_sensor_is_known_by_its_values() {
     let key = "sensor-quantization@sensor";
-    let found = found_in_tanks(key, "step=0.4");
-    assert_eq!(found.verdict, Verdict::StructuralGap);
-    assert_eq!(found.cause.effects[0].key(), key);
-    assert!(found.cause.effects[0].probability > 0.9);
+    for step in ["0.4", "2.5"] {
+        let found = found_in_tanks(key, &format!("step={step}"));
+        assert_eq!(found.verdict, Verdict::StructuralGap);
+        assert_eq!(found.cause.accepted, [key], "step {step}");
+        assert!(found.cause.effects[0].probability > 0.9);
+    }
+}
+
+/// A parameter that jumps late in a record: the likelihood as a function of the time has a valley at each sample and a plateau before.
+#[test]
+fn a_step_is_found_at_its_time() {
+    for (i, time, size) in [(0, 119.0, "-0.5"), (1, 150.0, "0.7"), (2, 60.0, "0.5")] {
+        let key = "parameter-step@k3";
+        let found = found_in_tanks(key, &format!("size={size},time={time:.1}"));
+        assert_eq!(found.cause.effects[0].key(), key, "{i}");
+        let (name, at) = &found.cause.effects[0].magnitudes[1];
+        assert_eq!(name, "time");
+        assert!((at - time).abs() < 5.0, "{at} s in place of {time} s");
+    }
 }
 
 /// A delay of thirty samples, far longer than any register of a filter: actuators are computed before it.

@@ -44,12 +44,12 @@ impl<const N: usize, const P: usize> Kernel for Pass<'_, N, P> {
         let mut nows = begin(jobs);
         let mut mean = [Lanes::ZERO; N];
         let mut cov = [[Lanes::ZERO; N]; N];
-        let mut floor = Lanes::all(first.floor[0]);
+        let mut floor = Lanes::all(first.unrounded[0]);
         for lane in 0..LANES {
             let job = &jobs[if lane < jobs.len() { lane } else { 0 }];
             let (mut m, mut p) = ([0.0; N], vec![0.0; N * N]);
             (job.kalman).start(&nows[lane], &mut m, &mut p, &mut [0.0; N]);
-            floor.0[lane] = job.kalman.floor[0];
+            floor.0[lane] = job.kalman.unrounded[0];
             for i in 0..N {
                 mean[i].0[lane] = m[i];
                 for j in 0..N {

@@ -37,7 +37,7 @@ fn thetas(centre: &[f64]) -> Vec<Vec<f64>> {
 }
 
 fn agree(twin: &dyn StateSpace, centre: &[f64], record: &Record, settings: &FilterSettings) {
-    let kalman = Kalman::new(twin, record, settings).unwrap();
+    let kalman = Kalman::new(twin, record, settings).unwrap().of_cells();
     let thetas = thetas(centre);
     let jobs: Vec<_> = thetas.iter().map(|theta| (&kalman, &theta[..])).collect();
     let lanes = together(&jobs).unwrap();
@@ -79,6 +79,10 @@ fn lanes_are_the_scalar_pass() {
     });
     let gaps = Record::new(tanks_drive(), outputs).unwrap();
     agree(&CascadedTanks, &CENTRE, &gaps, &settings);
+    // Values on levels, which hold the noise up.
+    let levels = measured.outputs().mapv(|y| (y / 0.7).round() * 0.7);
+    let rounded = Record::new(tanks_drive(), levels).unwrap();
+    agree(&CascadedTanks, &CENTRE, &rounded, &settings);
 }
 
 /// A ceiling acts on some lanes and not on others; a lag adds a state; a forces law acts on each point.

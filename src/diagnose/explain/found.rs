@@ -1,0 +1,48 @@
+//! One explanation of the records.
+
+use crate::diagnose::hypotheses::term::Term;
+use crate::diagnose::model::Model;
+use std::sync::Arc;
+
+/// One explanation beside a model.
+#[derive(Clone)]
+pub(in crate::diagnose) struct Found<'a> {
+    pub terms: Vec<Arc<Term>>,
+    /// log Z over that of the twin, in nats: one term's may be used in several ways, which share its prior.
+    pub gain: f64,
+    /// The fit, where it was worth one.
+    pub model: Option<Model<'a>>,
+}
+
+impl Found<'_> {
+    /// Keys of the terms.
+    pub fn keys(&self) -> Vec<String> {
+        self.terms.iter().map(|t| t.key()).collect()
+    }
+
+    /// Fitted magnitudes of the effect that was added last.
+    pub(super) fn magnitudes(&self) -> Option<Vec<f64>> {
+        let model = self.model.as_ref()?;
+        let (theta, space) = (model.theta(), model.problem.twin.parameters());
+        (self.last().names().iter())
+            .map(|name| Some(theta[space.position(name).ok()?]))
+            .collect()
+    }
+
+    /// The term that was added last.
+    pub fn last(&self) -> &Term {
+        &self.terms[self.terms.len() - 1]
+    }
+}
+
+/// Best first.
+pub(in crate::diagnose) fn sort(all: &mut [Found<'_>]) {
+    all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+}
+
+/// Fitted θ of the twin alone.
+pub(in crate::diagnose) fn own_theta(found: &Found<'_>) -> Option<Vec<f64>> {
+    let model = found.model.as_ref()?;
+    let d = model.base.parameters().len();
+    Some(model.theta()[..d].to_vec())
+}

@@ -1,0 +1,103 @@
+//! Effects whose time, delay or frequency ended in a valley of its own.
+
+use super::found::{Found, own_theta};
+use super::refit::CARRIED;
+use crate::diagnose::error::DiagnoseError;
+use crate::diagnose::hypotheses::term::Term;
+use crate::diagnose::model::Model;
+use crate::diagnose::thresholds::Thresholds;
+use crate::fit::climb::{climb, fit};
+use rayon::prelude::*;
+
+/// Places from which the same law begins again elsewhere.
+const PLACES: usize = 2;
+/// Iterations before a new start is compared with the old end.
+const ITERATIONS: usize = 12;
+/// Samples by which a time moves: the likelihood has a kink at each.
+const MOVES: [f64; 4] = [-1.0, -0.5, 0.5, 1.0];
+
+/// Fits effects again that may be better, `all` being sorted, best first: from where the same law ended at places where it explains more,
+/// with either sign of its size; the best ones from times nearby.
+pub(super) fn leave_valleys<'a>(
+    model: &Model<'a>,
+    all: &mut [Found<'a>],
+    floor: f64,
+) -> Result<(), DiagnoseError> {
+    let top = all.first().map_or(floor, |f| f.gain);
+    let least = (top - Thresholds::CANDIDATES).max(floor + Thresholds::NULL_LIKE);
+    let better: Vec<Option<Found<'a>>> = (0..all.len())
+        .into_par_iter()
+        .map(|i| again(model, &all[i], &all[..i], least))
+        .collect::<Result<_, DiagnoseError>>()?;
+    for (old, new) in all.iter_mut().zip(better) {
+        if let Some(new) = new.filter(|new| new.gain > old.gain) {
+            *old = new;
+        }
+    }
+    Ok(())
+}
+
+/// One effect fitted again; `None` where no start leads further. Only effects of at least so many nats are looked at.
+fn again<'a>(
+    model: &Model<'a>,
+    found: &Found<'a>,
+    before: &[Found<'a>],
+    least: f64,
+) -> Result<Option<Found<'a>>, DiagnoseError> {
+    let (Some(own), Some(shape)) = (&found.model, found.last().shape()) else {
+        return Ok(None);
+    };
+    let term = &found.terms[found.terms.len() - 1];
+    let alike = (before.iter())
+        .filter(|other| other.gain > least && other.last().shape().as_ref() == Some(&shape))
+        .filter_map(|other| Some((own_theta(other)?, other.magnitudes()?)));
+    let mut starts: Vec<(Vec<f64>, Vec<f64>)> = vec![];
+    for (theta, m) in alike.take(PLACES) {
+        if term.starts.iter().all(|start| start.scales) {
+            let mut opposite = m.clone();
+            opposite[0] = -opposite[0];
+            starts.push((theta.clone(), opposite));
+        }
+        starts.push((theta, m));
+    }
+    if found.gain > least {
+        starts.extend(nearby(found, term));
+    }
+    if starts.is_empty() {
+        return Ok(None);
+    }
+    let extended = model.extend(term)?;
+    let from: Vec<Vec<f64>> = (starts.iter())
+        .map(|(theta, m)| extended.from(theta, model.beside(&extended, m)))
+        .collect();
+    let begun = fit(&own.problem, &from, ITERATIONS)?;
+    let Some(begun) = begun.filter(|begun| begun.objective > own.fitted.objective) else {
+        return Ok(None);
+    };
+    let carried = climb(&own.problem, &begun.theta, CARRIED)?;
+    let better = own.refitted(carried.unwrap_or(begun));
+    Ok(better.map(|m| Found {
+        terms: m.terms.clone(),
+        gain: found.gain + m.log_evidence - own.log_evidence,
+        model: Some(m),
+    }))
+}
+
+/// θ of the twin and magnitudes with each time moved.
+fn nearby(found: &Found<'_>, term: &Term) -> Vec<(Vec<f64>, Vec<f64>)> {
+    let (Some(theta), Some(m), Some(model)) =
+        (own_theta(found), found.magnitudes(), found.model.as_ref())
+    else {
+        return vec![];
+    };
+    let dt = model.problem.records[0].drive().dt();
+    let mut all = vec![];
+    for i in term.times() {
+        for samples in MOVES {
+            let mut m = m.clone();
+            m[i] += samples * dt;
+            all.push((theta.clone(), m));
+        }
+    }
+    all
+}
