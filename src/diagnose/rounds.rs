@@ -227,10 +227,13 @@ fn again<'a, R>(
                 .map(Some);
         }
     }
-    // Beside a gap, noise levels are fitted loud, and hide the step.
-    if let (None, Some(model)) = (base.step, findings.best_listed())
-        && let Some((step, gain)) = finer_step(model, Thresholds::STEP_SHOWS, findings.top())?
-    {
+    // Beside a gap, noise levels are fitted loud, and hide the step, or that a finer one is still too long. A second effect may imitate
+    // its error.
+    for model in findings.best_listed() {
+        let finer = finer_step(model, Thresholds::STEP_SHOWS, findings.top())?;
+        let Some((step, gain)) = finer.filter(|(step, _)| base.step != Some(*step)) else {
+            continue;
+        };
         let minor = gain < MINOR * findings.top() && base.noises.is_empty();
         let before = match minor {
             true => Before::OtherStep(findings, base.model.log_evidence),

@@ -26,7 +26,7 @@ impl FinerStep {
                 (RungeKutta4, own.div_ceil(4)),
                 (Euler, 4 * own),
                 (Euler, 16 * own),
-                (RungeKutta4, 16 * own),
+                (RungeKutta4, own.max(16)),
             ],
             rule => vec![(rule, 2 * own), (rule, 4 * own), (rule, 16 * own)],
         };

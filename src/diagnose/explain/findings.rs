@@ -111,12 +111,16 @@ impl<'a> Findings<'a> {
         [best(&self.listed), best(&self.unknown)].concat()
     }
 
-    /// The listed effects that explain most, where something is missing.
-    pub fn best_listed(&self) -> Option<&Model<'a>> {
-        let all = self.listed.iter().chain(&self.several);
+    /// The listed effects that explain most, where something is missing; then the best one alone, if these are several.
+    pub fn best_listed(&self) -> Vec<&Model<'a>> {
         let gain = |f: &&Found<'a>| f.gain - self.price(f.terms.len());
-        let best = all.max_by(|a, b| gain(a).total_cmp(&gain(b)))?;
-        best.model.as_ref().filter(|_| best.gain > Thresholds::GAP)
+        let all = self.listed.iter().chain(&self.several);
+        let best = all.max_by(|a, b| gain(a).total_cmp(&gain(b)));
+        let single = (self.listed.first()).filter(|_| best.is_some_and(|f| f.terms.len() > 1));
+        (best.into_iter().chain(single))
+            .filter(|found| found.gain > Thresholds::GAP)
+            .filter_map(|found| found.model.as_ref())
+            .collect()
     }
 
     /// log of the evidence of a set over that of the twin.

@@ -1,11 +1,12 @@
 //! A diagnosis on the terminal.
 
-use super::headline::{accepted_places, headline};
+use super::headline::{accepted_places, few, headline, rivals};
 use super::json::NEXT_INPUT;
 use super::step::step_setting;
 use super::story::{effects, next};
 use crate::diagnose::{
-    Cause, Detection, Diagnosis, Discovery, EffectFit, NextInput, SHORTEST_SPLIT, Shrinkage,
+    Cause, Decision, Detection, Diagnosis, Discovery, EffectFit, NextInput, RIVALS, SHORTEST_SPLIT,
+    Shrinkage,
 };
 use crate::report::digits::{Digits, chance, error, percent, probability, short, unit_suffix};
 use crate::report::parameters::ParameterRow;
@@ -189,7 +190,7 @@ pub(super) fn remains_sentence(cause: &Cause) -> Option<String> {
         [] => "the best listed effect".into(),
         accepted => accepted.join(" and "),
     };
-    Some(if remains.log_evidence > 0.0 {
+    let said = if remains.log_evidence > 0.0 {
         format!(
             "What remains: beside {effects}, an unknown function at {} adds {} nats ({} of all).",
             remains.place,
@@ -198,7 +199,14 @@ pub(super) fn remains_sentence(cause: &Cause) -> Option<String> {
         )
     } else {
         format!("What remains: beside {effects}, no unknown function adds evidence.")
-    })
+    };
+    // A class says so itself.
+    let rivals = rivals(cause);
+    let alike = match (cause.decision, rivals.is_empty()) {
+        (Decision::Partial, false) => format!(" Within {RIVALS} nats of these: {}.", few(&rivals)),
+        _ => String::new(),
+    };
+    Some(said + &alike)
 }
 
 /// Returns the name of the measure with its horizon.
@@ -348,6 +356,14 @@ mod tests {
         let partial = gap_text(&made::rig_pair());
         let lacks = "lacks state-ceiling@a_state_with_a_name_that_is_long and sensor-quantization@sensor2; something remains.";
         assert!(partial.contains(lacks), "{partial}");
+        let mut rivalled = made::rig_pair();
+        rivalled.cause.class.push("sensor-lag@sensor2".into());
+        let rivalled = gap_text(&rivalled);
+        assert!(
+            rivalled.contains("nats of these: sensor-lag@sensor2.")
+                && !partial.contains("nats of these"),
+            "{rivalled}"
+        );
         let no_gap = gap_text(&made::oscillator_no_gap());
         let evidence = "Evidence for a gap: −2.30 nats; probability that nothing is missing: 0.91; p = 0.440 (100 simulations).";
         assert!(no_gap.contains(evidence), "{no_gap}");

@@ -94,6 +94,24 @@ fn the_rest_of_a_coarse_step_is_not_named() {
     }
 }
 
+/// A delay of a sensor without noise: once it is known, the step that looked fine enough is not, and its error passes for a lag.
+#[test]
+fn a_finer_step_is_asked_for_as_often_as_it_shows() {
+    let study = study("van-der-pol");
+    let text = "twin = 'van-der-pol'\n[record]\nsubsteps = 64\n";
+    let file = StudyFile::parse(text, Path::new("study.toml")).unwrap();
+    let exact = study.configure(&file).unwrap();
+    let delay =
+        "[[effect]]\nid = 'sensor-delay'\ntarget = 'sensor'\nmagnitudes = { delay = 0.75 }\n";
+    let noise = Noise::new(37, "late", 0);
+    let record = record(exact.twin(), delay, &[1.1], drive(&study, noise), noise);
+    let found = found(&study, record, None);
+    println!("{}", line("sensor-delay@sensor", &found));
+    assert_eq!(found.cause.accepted, ["sensor-delay@sensor"]);
+    let (_, delay) = found.cause.effects[0].magnitudes[0];
+    assert!((delay - 0.75).abs() < 0.02, "{delay}");
+}
+
 /// The diagnosis of a record of the tanks at the centre of the prior, with an effect.
 fn found_in_tanks(key: &str, magnitudes: &str) -> Diagnosis {
     let study = study("tanks");
