@@ -153,7 +153,11 @@ impl Setting<'_> {
             Ok(again) if again == *first => {
                 Finding::pass("repeatable", "the same arguments give the same bits")
             }
-            _ => Finding::failure(
+            Err(error) => Finding::failure(
+                "repeatable",
+                format!("a second run with the same arguments failed: {error}"),
+            ),
+            Ok(_) => Finding::failure(
                 "repeatable",
                 "two runs with the same arguments differ; take all randomness from `noise` and keep no state between runs",
             ),

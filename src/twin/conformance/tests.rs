@@ -13,6 +13,7 @@ struct Flawed(Flaw, AtomicU64);
 enum Flaw {
     None,
     KeepsState,
+    RunsOnce,
     DrawsDependOnTheta,
     Diverges,
     Product,
@@ -42,6 +43,9 @@ impl DigitalTwin for Flawed {
             return Err(SimulationError::Diverged { at: 1.0 });
         }
         let calls = self.1.fetch_add(1, Ordering::Relaxed) as f64;
+        if self.0 == Flaw::RunsOnce && calls > 0.0 {
+            return Err(SimulationError::Diverged { at: 1.0 });
+        }
         let shift = if self.0 == Flaw::KeepsState {
             calls
         } else {
@@ -60,10 +64,13 @@ impl DigitalTwin for Flawed {
     }
 }
 
-fn worst(flaw: Flaw) -> Vec<(&'static str, Severity)> {
+fn checked(flaw: Flaw) -> Vec<Finding> {
     let drive = Drive::autonomous(0.1, 30).unwrap();
     check(&Flawed(flaw, AtomicU64::new(0)), &drive, 1)
-        .into_iter()
+}
+
+fn worst(flaw: Flaw) -> Vec<(&'static str, Severity)> {
+    (checked(flaw).into_iter())
         .filter(|f| f.severity > Severity::Pass)
         .map(|f| (f.check, f.severity))
         .collect()
@@ -78,6 +85,10 @@ fn each_flaw_is_found_and_a_good_twin_passes() {
         ("paired", Severity::Failure)
     );
     assert_eq!(worst(Flaw::Diverges), [("finite", Severity::Warning)]);
+    // A run that fails is not one that differs.
+    let once = checked(Flaw::RunsOnce);
+    let again = once.iter().find(|f| f.check == "repeatable").unwrap();
+    assert!(again.message.contains("a second run"), "{}", again.message);
 }
 
 /// ẋ = −k·(x − u) from 0, y₁ = x with noise, y₂ = x without.
