@@ -2,9 +2,10 @@
 
 use super::base::Base;
 use super::error::DiagnoseError;
-use super::explain::explore::{Before, Terms, explore};
+use super::explain::explore::{Before, explore};
 use super::explain::findings::{Chances, Findings};
 use super::explain::search::{Breadth, listed};
+use super::explain::terms::Terms;
 use super::hypotheses::noise::kinds;
 use super::hypotheses::scales::Scales;
 use super::hypotheses::term::Term;

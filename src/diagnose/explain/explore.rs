@@ -1,11 +1,13 @@
 //! The order of the search: single explanations, what they leave, pairs.
 
-use super::findings::{Findings, leaves_nothing, suffices};
-use super::found::{Found, own_theta, sort};
+use super::findings::Findings;
+use super::found::{Found, improve, sort};
+use super::noise::{instead_of_second, with_noise};
+use super::pairs::{FIRST, SINGLES, alone, pairs};
 use super::search::{Breadth, FEW, listed, unknown};
+use super::terms::{Terms, on_top, scales};
 use crate::diagnose::error::DiagnoseError;
-use crate::diagnose::hypotheses::scales::Scales;
-use crate::diagnose::hypotheses::term::{Part, Term};
+use crate::diagnose::hypotheses::term::Term;
 use crate::diagnose::model::Model;
 use crate::diagnose::settings::DiagnoseSettings;
 use crate::diagnose::thresholds::Thresholds;
@@ -15,19 +17,6 @@ use std::sync::Arc;
 
 /// Steps of the search that are reported: functions, effects, functions of the corrected twin, what is left, pairs.
 const STEPS: usize = 5;
-/// Single effects that are looked at for something left, or for a second one beside them.
-const SINGLES: usize = 3;
-/// Least share of the best single effect's evidence of a first of a pair.
-const FIRST: f64 = 1.0 / 3.0;
-
-/// Terms of a diagnosis.
-pub(in crate::diagnose) struct Terms<'t> {
-    pub listed: &'t [Arc<Term>],
-    /// Kinds of noise other than the twin's.
-    pub noise: &'t [Arc<Term>],
-    /// Unknown functions whose range covers these models' states as well.
-    pub unknown: &'t dyn Fn(&[Scales<'_>]) -> Vec<Arc<Term>>,
-}
 
 /// Finds out what explains the records beside the twin; stops early where nothing does.
 pub(in crate::diagnose) fn explore<'a>(
@@ -160,26 +149,6 @@ fn one_by_one<'a>(
     with_noise(base, terms, breadth, singles, unknown_alone)
 }
 
-/// Adds other kinds of noise to what was found alone.
-fn with_noise<'a>(
-    base: &Model<'a>,
-    terms: &Terms<'_>,
-    breadth: Breadth,
-    singles: Vec<Found<'a>>,
-    unknown: Vec<Found<'a>>,
-) -> Result<Findings<'a>, DiagnoseError> {
-    let (origin, every) = (base.log_evidence, breadth.of_all());
-    let noise = listed(base, terms.noise, origin, &[], every)?;
-    Ok(Findings {
-        noise_pairs: noise_pairs(&noise, terms.noise, origin, every)?,
-        noise,
-        noise_beside: noise_beside(&singles, terms.noise, origin, every)?,
-        listed: singles,
-        unknown,
-        ..Findings::default()
-    })
-}
-
 /// Adds what single effects leave, pairs, which are searched unless they are given, and what these leave; stops where nothing is missing.
 fn beside_each_other<'a>(
     mut findings: Findings<'a>,
@@ -252,207 +221,6 @@ fn beside_each_other<'a>(
     Ok(findings)
 }
 
-/// The outliers that are likeliest beside the best listed effect, at other sensors than its own. Correlated noise is not asked for here:
-/// it would pass for what an effect leaves.
-fn noise_beside<'a>(
-    singles: &[Found<'a>],
-    noise: &[Arc<Term>],
-    origin: f64,
-    breadth: Breadth,
-) -> Result<Option<(String, f64)>, DiagnoseError> {
-    let best = singles.first().filter(|f| f.gain > Thresholds::WIDER);
-    let Some((best, model)) = best.and_then(|f| Some((f, f.model.as_ref()?))) else {
-        return Ok(None);
-    };
-    let outliers: Vec<Arc<Term>> = (noise.iter())
-        .filter(|term| matches!(term.part, Part::Effect { .. }))
-        .filter(|term| term.target != best.last().target)
-        .cloned()
-        .collect();
-    let found = listed(model, &outliers, origin, &[], breadth)?;
-    Ok((found.first()).map(|f| (f.last().key(), f.gain - best.gain)))
-}
-
-/// The kind of noise that explains more beside one effect of the best pair than the other effect does, its price paid, and leaves nothing:
-/// what remains beside an effect, noise would hide.
-fn instead_of_second(
-    findings: &Findings<'_>,
-    terms: &Terms<'_>,
-    origin: f64,
-    breadth: Breadth,
-) -> Result<Option<(String, f64)>, DiagnoseError> {
-    let first = findings.several.first();
-    let Some(pair) = first.filter(|pair| findings.wins(pair)) else {
-        return Ok(None);
-    };
-    let keys = pair.keys();
-    let mut best: Option<(Found<'_>, f64)> = None;
-    for single in (findings.listed.iter()).filter(|f| keys.contains(&f.last().key())) {
-        let Some(model) = &single.model else { continue };
-        let found = listed(model, terms.noise, origin, &[], breadth.of_all())?;
-        let Some(found) = found.into_iter().next() else {
-            continue;
-        };
-        if best.as_ref().is_none_or(|(best, _)| found.gain > best.gain) {
-            let gain = found.gain - single.gain;
-            best = Some((found, gain));
-        }
-    }
-    let enough = pair.gain - findings.price(2);
-    let Some((found, gain)) = best.filter(|(found, _)| found.gain > enough) else {
-        return Ok(None);
-    };
-    let on_top = on_top(&found, terms, origin, breadth.few())?;
-    let is_enough = on_top.is_some_and(|on_top| suffices(&found, &on_top));
-    Ok(is_enough.then(|| (found.last().key(), gain)))
-}
-
-/// Second kinds of noise beside the likeliest one.
-fn noise_pairs<'a>(
-    noise: &[Found<'a>],
-    terms: &[Arc<Term>],
-    origin: f64,
-    breadth: Breadth,
-) -> Result<Vec<Found<'a>>, DiagnoseError> {
-    let best = noise.first().filter(|f| f.gain > Thresholds::NOISE);
-    let Some((best, model)) = best.and_then(|f| Some((f, f.model.as_ref()?))) else {
-        return Ok(vec![]);
-    };
-    let others: Vec<Arc<Term>> = (terms.iter())
-        .filter(|term| term.key() != best.last().key())
-        .cloned()
-        .collect();
-    listed(model, &others, origin, &[], breadth)
-}
-
-/// Unknown functions on top of fitted effects.
-fn on_top<'a>(
-    found: &Found<'a>,
-    terms: &Terms<'_>,
-    origin: f64,
-    breadth: Breadth,
-) -> Result<Option<Vec<Found<'a>>>, DiagnoseError> {
-    let Some(model) = &found.model else {
-        return Ok(None);
-    };
-    let seen = scales(std::slice::from_ref(found))?;
-    Ok(Some(unknown(
-        model,
-        &(terms.unknown)(&seen),
-        origin,
-        breadth,
-    )?))
-}
-
-/// Second effects on top of the best singles.
-fn pairs<'a>(
-    findings: &Findings<'a>,
-    terms: &Terms<'_>,
-    origin: f64,
-    breadth: Breadth,
-    enough: bool,
-) -> Result<Vec<Found<'a>>, DiagnoseError> {
-    let thetas: Vec<Vec<f64>> = findings
-        .listed
-        .iter()
-        .take(2)
-        .filter_map(own_theta)
-        .collect();
-    let mut all: Vec<Found<'a>> = vec![];
-    let adequate = |f: &&Found<'a>| {
-        let left = findings.left(&f.keys());
-        left.is_some_and(|left| leaves_nothing(f.gain, left))
-    };
-    let stands_out = |f: &&Found<'a>| f.gain > FIRST * findings.top();
-    let sources: Vec<&Found<'a>> = match enough {
-        true => findings.listed.iter().find(adequate).into_iter().collect(),
-        false => (findings.listed.iter().take(SINGLES))
-            .filter(stands_out)
-            .collect(),
-    };
-    for first in sources {
-        let Some(model) = &first.model else { continue };
-        let others: Vec<Arc<Term>> = (terms.listed.iter())
-            .filter(|t| !first.terms.iter().any(|own| own.key() == t.key()))
-            .cloned()
-            .collect();
-        let count = if enough { 4 } else { 8 };
-        let seconds = Breadth {
-            listed: count,
-            annealed: count.min(breadth.annealed),
-            least: 3.0,
-            ..breadth
-        };
-        keep(&mut all, listed(model, &others, origin, &thetas, seconds)?);
-    }
-    // A pair that wins has rivals: the second effect beside the rivals of the first.
-    if let Some(pair) = all.first().filter(|pair| findings.wins(pair)).cloned() {
-        let second = &pair.terms[pair.terms.len() - 1..];
-        let (keys, first) = (
-            pair.keys(),
-            findings.gain(&pair.keys()[..1]).unwrap_or(findings.top()),
-        );
-        let rivals = (findings.listed.iter())
-            .filter(|f| f.gain > first - Thresholds::RIVALS && !keys.contains(&f.last().key()));
-        for model in rivals.filter_map(|f| f.model.as_ref()).take(SINGLES) {
-            keep(&mut all, listed(model, second, origin, &thetas, breadth)?);
-        }
-    }
-    all.truncate(Thresholds::PAIRS);
-    Ok(all)
-}
-
-/// A pair may win since the fits of its effects alone stopped early, or since one of the two stood for a coarse step: these begin again
-/// where the pair ended. Returns the best single effect if it is a new one.
-fn alone<'a>(
-    base: &Model<'a>,
-    findings: &mut Findings<'a>,
-    terms: &Terms<'_>,
-    origin: f64,
-    breadth: Breadth,
-) -> Result<Option<Found<'a>>, DiagnoseError> {
-    let top = findings.top();
-    let first = findings.several.first();
-    let Some(pair) = first.filter(|pair| findings.wins(pair)) else {
-        return Ok(None);
-    };
-    let keys = pair.keys();
-    let own: Vec<Arc<Term>> = (terms.listed.iter())
-        .filter(|term| keys.contains(&term.key()))
-        .cloned()
-        .collect();
-    let thetas: Vec<Vec<f64>> = own_theta(pair).into_iter().collect();
-    let again = listed(base, &own, origin, &thetas, breadth.of_all())?;
-    improve(&mut findings.listed, again);
-    Ok((findings.listed.first().cloned()).filter(|first| first.gain > top))
-}
-
-/// Takes the better ones of the same terms, and adds none; best first.
-fn improve<'a>(all: &mut [Found<'a>], others: impl IntoIterator<Item = Found<'a>>) {
-    for found in others {
-        let keys = found.keys();
-        let own = all.iter_mut().find(|own| own.keys() == keys);
-        if let Some(own) = own.filter(|own| own.gain < found.gain) {
-            *own = found;
-        }
-    }
-    sort(all);
-}
-
-/// Adds fitted pairs, of two of the same effects the better one; best first.
-fn keep<'a>(all: &mut Vec<Found<'a>>, found: Vec<Found<'a>>) {
-    for pair in found.into_iter().filter(|f| f.model.is_some()) {
-        let keys = pair.keys();
-        let same = |p: &&mut Found<'a>| p.keys().iter().all(|k| keys.contains(k));
-        match all.iter_mut().find(same) {
-            Some(old) if old.gain >= pair.gain => {}
-            Some(old) => *old = pair,
-            None => all.push(pair),
-        }
-    }
-    sort(all);
-}
-
 /// Listed effects that explain a parameter gap with θ inside the prior, as well as θ outside does: best first.
 pub(in crate::diagnose) fn absorbing<'a>(
     free: &Model<'a>,
@@ -468,19 +236,4 @@ pub(in crate::diagnose) fn absorbing<'a>(
             .is_some_and(|m| m.fitted.log_likelihood >= best)
     };
     Ok(found.into_iter().filter(explains).collect())
-}
-
-/// Sizes of the states along fitted models.
-fn scales<'a>(found: &[Found<'a>]) -> Result<Vec<Scales<'a>>, DiagnoseError> {
-    let mut all = vec![];
-    for model in found.iter().filter_map(|f| f.model.as_ref()) {
-        all.push(Scales {
-            records: model.problem.records,
-            states: model.states()?,
-            outline: model.problem.outline(),
-            rates: vec![],
-            defined: vec![],
-        });
-    }
-    Ok(all)
 }

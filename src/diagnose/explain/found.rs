@@ -46,3 +46,29 @@ pub(in crate::diagnose) fn own_theta(found: &Found<'_>) -> Option<Vec<f64>> {
     let d = model.base.parameters().len();
     Some(model.theta()[..d].to_vec())
 }
+
+/// Takes the better ones of the same terms, and adds none; best first.
+pub(super) fn improve<'a>(all: &mut [Found<'a>], others: impl IntoIterator<Item = Found<'a>>) {
+    for found in others {
+        let keys = found.keys();
+        let own = all.iter_mut().find(|own| own.keys() == keys);
+        if let Some(own) = own.filter(|own| own.gain < found.gain) {
+            *own = found;
+        }
+    }
+    sort(all);
+}
+
+/// Adds fitted pairs, of two of the same effects the better one; best first.
+pub(super) fn keep<'a>(all: &mut Vec<Found<'a>>, found: Vec<Found<'a>>) {
+    for pair in found.into_iter().filter(|f| f.model.is_some()) {
+        let keys = pair.keys();
+        let same = |p: &&mut Found<'a>| p.keys().iter().all(|k| keys.contains(k));
+        match all.iter_mut().find(same) {
+            Some(old) if old.gain >= pair.gain => {}
+            Some(old) => *old = pair,
+            None => all.push(pair),
+        }
+    }
+    sort(all);
+}

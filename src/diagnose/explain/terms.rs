@@ -1,0 +1,51 @@
+//! Terms that are searched, and unknown functions beside what was found of them.
+
+use super::found::Found;
+use super::search::{Breadth, unknown};
+use crate::diagnose::error::DiagnoseError;
+use crate::diagnose::hypotheses::scales::Scales;
+use crate::diagnose::hypotheses::term::Term;
+use std::sync::Arc;
+
+/// Terms of a diagnosis.
+pub(in crate::diagnose) struct Terms<'t> {
+    pub listed: &'t [Arc<Term>],
+    /// Kinds of noise other than the twin's.
+    pub noise: &'t [Arc<Term>],
+    /// Unknown functions whose range covers these models' states as well.
+    pub unknown: &'t dyn Fn(&[Scales<'_>]) -> Vec<Arc<Term>>,
+}
+
+/// Unknown functions on top of fitted effects.
+pub(super) fn on_top<'a>(
+    found: &Found<'a>,
+    terms: &Terms<'_>,
+    origin: f64,
+    breadth: Breadth,
+) -> Result<Option<Vec<Found<'a>>>, DiagnoseError> {
+    let Some(model) = &found.model else {
+        return Ok(None);
+    };
+    let seen = scales(std::slice::from_ref(found))?;
+    Ok(Some(unknown(
+        model,
+        &(terms.unknown)(&seen),
+        origin,
+        breadth,
+    )?))
+}
+
+/// Sizes of the states along fitted models.
+pub(super) fn scales<'a>(found: &[Found<'a>]) -> Result<Vec<Scales<'a>>, DiagnoseError> {
+    let mut all = vec![];
+    for model in found.iter().filter_map(|f| f.model.as_ref()) {
+        all.push(Scales {
+            records: model.problem.records,
+            states: model.states()?,
+            outline: model.problem.outline(),
+            rates: vec![],
+            defined: vec![],
+        });
+    }
+    Ok(all)
+}
