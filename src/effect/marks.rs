@@ -60,10 +60,7 @@ pub(crate) fn stops(outputs: &[f64]) -> bool {
 
 /// Mark of rounding, as its step.
 pub(crate) fn rounded(outputs: &[f64]) -> Mark {
-    match step_of(outputs) {
-        Some(step) => Mark::Present(vec![step]),
-        None => Mark::Absent,
-    }
+    step_of(outputs).map_or(Mark::Absent, |step| Mark::Present(vec![step]))
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use super::channels::column_names;
 use crate::math::six_digits;
 use crate::record::{Drive, RecordError, Signal, Signals, step_of};
 use ndarray::s;
+use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
 /// Inputs and outputs measured on one time grid. An output that is NaN is missing: it was not measured.
@@ -20,8 +21,8 @@ use std::sync::OnceLock;
 pub struct Record {
     drive: Drive,
     outputs: Signal,
-    /// Step of each output whose values are rounded, once it was asked for.
-    steps: OnceLock<Vec<Option<f64>>>,
+    /// Least variances of the outputs, once they were asked for: see [`cells`](Self::cells).
+    cells: OnceLock<Vec<f64>>,
 }
 
 impl Record {
@@ -54,7 +55,7 @@ impl Record {
         Ok(Self {
             drive,
             outputs,
-            steps: OnceLock::new(),
+            cells: OnceLock::new(),
         })
     }
 
@@ -74,11 +75,14 @@ impl Record {
         &self.outputs
     }
 
-    /// Step of each output whose values are rounded.
-    pub(crate) fn steps(&self) -> &[Option<f64>] {
-        self.steps.get_or_init(|| {
+    /// Least variance of each output with which no density is above one per cell of what the values are rounded to: q²/2π, 0 where they are
+    /// not rounded.
+    pub(crate) fn cells(&self) -> &[f64] {
+        self.cells.get_or_init(|| {
             let columns = self.outputs.columns().into_iter();
-            columns.map(|y| step_of(&y.to_vec())).collect()
+            columns
+                .map(|y| step_of(&y.to_vec()).map_or(0.0, |q| q * q / TAU))
+                .collect()
         })
     }
 

@@ -37,14 +37,15 @@ pub(in crate::diagnose) fn fit_promise<'a>(
     let extended = model.extend(&promise.term)?;
     let chosen: Vec<&Beginning> = promise.starts.iter().take(effort.starts).collect();
     // Times and delays stay until θ and the size have answered them: a small size would let them go anywhere.
-    let held = (extended.problem).holding(|j| extended.entries.iter().skip(1).any(|e| *e == j));
+    let shape = extended.entries.get(1..).unwrap_or_default();
+    let held = (!shape.is_empty()).then(|| extended.problem.holding(|j| shape.contains(&j)));
     let mut from: Vec<Vec<f64>> = (chosen.iter())
         .map(|start| {
             let theta = begin(model, &extended, start)?;
-            if !start.scales || extended.entries.len() < 2 {
+            let Some(held) = held.as_ref().filter(|_| start.scales) else {
                 return Ok(theta);
-            }
-            let settled = climb(&held, &theta, HELD)?;
+            };
+            let settled = climb(held, &theta, HELD)?;
             Ok(settled.map_or(theta, |settled| settled.theta))
         })
         .collect::<Result<_, DiagnoseError>>()?;

@@ -4,7 +4,7 @@ use super::disturbed_equations::disturbed;
 use super::entered::{Entered, with_function};
 use super::entry::Entry;
 use crate::diagnose::error::DiagnoseError;
-use crate::effect::{Effect, EffectKey, augment_short};
+use crate::effect::{Effect, EffectKey, Magnitude, augment_short};
 use crate::fit::axis::Axis;
 use crate::twin::{Twin, fix};
 use std::collections::BTreeMap;
@@ -101,27 +101,26 @@ impl Term {
         }
     }
 
+    /// Free magnitudes of an effect, in the order of the axes; none of other terms.
+    fn free(&self) -> Vec<&Magnitude> {
+        match &self.part {
+            Part::Effect { effect, held, .. } => (effect.magnitudes().iter())
+                .filter(|m| !held.contains_key(m.name))
+                .collect(),
+            Part::Disturbance { .. } | Part::Function(_) => vec![],
+        }
+    }
+
     /// Names of the free magnitudes of an effect of which more than the size is to be found, as a time or a delay.
     pub fn shape(&self) -> Option<Vec<&'static str>> {
-        let Part::Effect { effect, held, .. } = &self.part else {
-            return None;
-        };
-        let free: Vec<&str> = (effect.magnitudes().iter())
-            .map(|m| m.name)
-            .filter(|name| !held.contains_key(*name))
-            .collect();
+        let free = self.free();
         let is_size = free.len() == 1 && self.starts.iter().all(|start| start.scales);
-        (!is_size).then_some(free)
+        (!free.is_empty() && !is_size).then(|| free.iter().map(|m| m.name).collect())
     }
 
     /// Entries of the free magnitudes that are times in the record.
     pub fn times(&self) -> Vec<usize> {
-        let Part::Effect { effect, held, .. } = &self.part else {
-            return vec![];
-        };
-        (effect.magnitudes().iter())
-            .filter(|m| !held.contains_key(m.name))
-            .enumerate()
+        (self.free().iter().enumerate())
             .filter(|(_, m)| m.unit == "s" && m.off.is_none())
             .map(|(i, _)| i)
             .collect()
@@ -130,8 +129,7 @@ impl Term {
     /// Names of an effect's free magnitudes in θ, in the order of the axes.
     pub fn names(&self) -> Vec<String> {
         match &self.part {
-            Part::Effect { effect, held, .. } => (effect.magnitudes().iter())
-                .filter(|m| !held.contains_key(m.name))
+            Part::Effect { effect, .. } => (self.free().iter())
                 .map(|m| effect.key().magnitude(m.name))
                 .collect(),
             Part::Disturbance { .. } | Part::Function(_) => vec![],

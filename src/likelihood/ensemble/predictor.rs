@@ -49,15 +49,13 @@ impl Predictor {
         let p = ensemble.outputs();
         let m = ensemble.runs;
         let lags = LAGS.min(m / RUNS_EACH / p).max(1);
-        let floors: Vec<f64> = (outputs.columns().into_iter().zip(record.steps()))
-            .map(|(y, step)| {
+        let floors: Vec<f64> = (outputs.columns().into_iter().zip(record.cells()))
+            .map(|(y, cell)| {
                 let y: Array1<f64> = y.iter().copied().filter(|v| !v.is_nan()).collect();
                 let size = y
                     .std(0.0)
                     .max(1e-3 * y.iter().fold(0.0, |a, v| v.abs().max(a)));
-                // No density is above one per cell of what values are rounded to.
-                let cell = step.map_or(0.0, |q| q * q / std::f64::consts::TAU);
-                (FLOOR * size).max(1e-150).powi(2).max(cell)
+                (FLOOR * size).max(1e-150).powi(2).max(*cell)
             })
             .collect();
         let mut rows: Vec<Row> = (0..ensemble.mean.nrows())

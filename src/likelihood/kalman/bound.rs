@@ -110,8 +110,8 @@ impl<'a> Kalman<'a> {
     /// r² ≥ q²/2π:   N(ȳ; ȳ, r²) ≤ 1/q
     /// ```
     pub(in crate::likelihood) fn of_cells(mut self) -> Self {
-        for (least, step) in self.unrounded.iter_mut().zip(self.record.steps()) {
-            *least = least.max(step.map_or(0.0, |q| q * q / std::f64::consts::TAU));
+        for (least, cell) in self.unrounded.iter_mut().zip(self.record.cells()) {
+            *least = least.max(*cell);
         }
         self
     }
