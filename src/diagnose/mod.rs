@@ -6,6 +6,7 @@
 //! | `rounds.rs` | the search, again with another kind of noise or a finer step |
 //! | `model.rs` | a twin with terms, fitted |
 //! | `greedy.rs` | a baseline: forward selection by BIC |
+//! | `known.rs` | the share that effects close which are known to be there |
 //! | `step.rs` | whether a finer step of the integrator explains the records better |
 //! | `hypotheses/` | what could be missing: listed effects, unknown functions |
 //! | `explain/` | which of them: screened, refitted, weighed, decided |
@@ -24,6 +25,7 @@ mod explain;
 pub(crate) mod fixture;
 mod greedy;
 mod hypotheses;
+mod known;
 mod locate;
 mod model;
 mod outcome;
@@ -38,6 +40,7 @@ mod thresholds;
 
 pub use error::DiagnoseError;
 pub(crate) use greedy::greedy;
+pub(crate) use known::share_of;
 pub(crate) use outcome::Cell;
 pub use outcome::{
     Band, Cause, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit, FittedParameter,

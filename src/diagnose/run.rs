@@ -255,7 +255,9 @@ fn report(
 }
 
 /// The accepted model, its fit carried on to its end: the search stops where a hypothesis is known well enough to be compared.
-fn finished<'a>(accepted: Option<&Model<'a>>) -> Result<Option<Model<'a>>, DiagnoseError> {
+pub(super) fn finished<'a>(
+    accepted: Option<&Model<'a>>,
+) -> Result<Option<Model<'a>>, DiagnoseError> {
     let Some(model) = accepted else {
         return Ok(None);
     };

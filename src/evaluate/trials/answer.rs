@@ -61,6 +61,8 @@ pub(crate) struct Outcome {
     pub class: Vec<String>,
     /// The twin's parameters, refitted.
     pub parameters: Vec<Refitted>,
+    /// Share of the gap that the accepted effects close.
+    pub closed: Option<f64>,
 }
 
 /// An effect with its probability.
@@ -166,6 +168,7 @@ impl Outcome {
                     interval: p.interval,
                 })
                 .collect(),
+            closed: found.shrinkage.as_ref().and_then(|share| share.closed),
         }
     }
 

@@ -17,6 +17,8 @@ const LEFT_OUT: &str = "left-out.json";
 const RECORDS: &str = "records";
 /// Answers of the diagnoser.
 pub(super) const ANSWERS: &str = "answers";
+/// Shares that true effects close.
+pub(super) const SHARES: &str = "shares";
 
 /// A folder of trials: what every [`WorkFolder`] has, and
 ///
@@ -27,6 +29,7 @@ pub(super) const ANSWERS: &str = "answers";
 /// | `left-out.json` | the effects that each trial's library does without, where the call asks for that |
 /// | `records/0000.csv`, `records/0000-validation.csv`, `records/0000-doubled.csv` | what the diagnoser sees |
 /// | `answers/0000.json` | what it said |
+/// | `shares/0000.json` | the share that the true effects close, measured once the keys are open |
 /// | `scorecard.json`, `scorecard.html` | made of all that |
 #[derive(Debug, Clone)]
 pub(super) struct Folder {
@@ -91,7 +94,7 @@ impl Folder {
         manifest: &Manifest,
         fill: impl FnOnce(&Filling<'_>) -> Result<(), EvaluateError>,
     ) -> Result<Self, EvaluateError> {
-        let parts = [RECORDS, ANSWERS];
+        let parts = [RECORDS, ANSWERS, SHARES];
         let work = WorkFolder::open(path, manifest, &parts, |new| fill(&Filling(new)))?;
         let seal = work.read(SEAL)?.trim().into();
         Ok(Self { work, seal })

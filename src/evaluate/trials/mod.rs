@@ -39,6 +39,7 @@ mod row;
 mod run;
 mod scene;
 mod score;
+mod shares;
 mod steadiness;
 mod truth;
 mod units;
@@ -54,3 +55,5 @@ pub use score::Scorecard;
 #[cfg(test)]
 pub(crate) use score::Setup;
 pub(crate) use score::{Baseline, Bin, Count};
+#[cfg(test)]
+pub(crate) use shares::TrueShare;

@@ -2,6 +2,7 @@
 
 use super::Kind;
 use super::answer::{Answer, Outcome, Repeat};
+use super::shares::TrueShare;
 use super::truth::Truth;
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
@@ -79,6 +80,8 @@ pub(crate) struct Row {
     pub correlated: Option<String>,
     pub greedy: Option<Vec<String>>,
     pub repeats: Vec<Repeat>,
+    /// Share that the true effects close, where that was measured.
+    pub true_share: Option<TrueShare>,
 }
 
 impl Row {
@@ -86,6 +89,7 @@ impl Row {
     pub(super) fn new(
         truth: &Truth,
         answer: &Answer,
+        true_share: Option<TrueShare>,
         parameters: &[String],
         without: bool,
     ) -> Self {
@@ -115,6 +119,7 @@ impl Row {
             correlated: answer.correlated.clone(),
             greedy: answer.greedy.clone(),
             repeats: answer.repeats.clone(),
+            true_share,
         }
     }
 
@@ -211,7 +216,7 @@ impl Row {
 
 impl Serialize for Row {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut object = serializer.serialize_struct("Row", 15)?;
+        let mut object = serializer.serialize_struct("Row", 17)?;
         object.serialize_field("trial", &self.trial)?;
         object.serialize_field("kind", &self.kind)?;
         object.serialize_field("truth", &self.truth)?;
@@ -225,6 +230,8 @@ impl Serialize for Row {
         let outcome = self.outcome.as_ref();
         object.serialize_field("stated", &outcome.and_then(Outcome::stated))?;
         object.serialize_field("target", &outcome.and_then(|o| o.target.clone()))?;
+        object.serialize_field("closed", &outcome.and_then(|o| o.closed))?;
+        object.serialize_field("true_closed", &self.true_share.and_then(|s| s.closed))?;
         object.serialize_field("failure", &self.failure)?;
         object.serialize_field("redraws", &self.redraws)?;
         object.serialize_field("seconds", &self.seconds)?;

@@ -3,12 +3,13 @@
 use super::answer::Answer;
 use super::correlation::correlated;
 use super::draft::index;
-use super::folder::{ANSWERS, Filling, Folder, Which};
+use super::folder::{ANSWERS, Filling, Folder, SHARES, Which};
 use super::kind::assign_kinds;
 use super::row::Row;
 use super::score::Setup;
+use super::shares::TrueShare;
 use super::steadiness::repeats;
-use super::truth::{Drawn, Extra, TruthSampler};
+use super::truth::{Drawn, Extra, Truth, TruthSampler};
 use super::{Families, Kind, Scorecard};
 use crate::diagnose::{Ablation, DiagnoseSettings, greedy};
 use crate::evaluate::EvaluateError;
@@ -26,7 +27,7 @@ use serde_json::json;
 use std::path::Path;
 
 /// Layout of the folder; raised when it changes.
-const LAYOUT: u32 = 6;
+const LAYOUT: u32 = 7;
 /// Most trials of a folder; their keys are in memory.
 const MOST: usize = 1_000_000;
 /// Trials that are drawn before their records are written.
@@ -240,8 +241,12 @@ impl Sealed<'_> {
         let keys = self.folder.keys(settings.trials)?;
         let sampler = &self.trials.sampler;
         let parameters = sampler.parameters();
+        let mut shares = self.true_shares(&keys, progress)?.into_iter();
         let rows = (keys.iter().zip(&answers))
-            .map(|(truth, answer)| Row::new(truth, answer, &parameters, settings.without))
+            .map(|(truth, answer)| {
+                let share = shares.next();
+                Row::new(truth, answer, share, &parameters, settings.without)
+            })
             .collect();
         let setup = Setup {
             twin: sampler.study().name().into(),
@@ -275,6 +280,37 @@ impl Sealed<'_> {
         )
     }
 
+    /// Shares that the true effects close; none where diagnoses do without effects, or without a part.
+    fn true_shares(
+        &self,
+        keys: &[Truth],
+        progress: &Progress,
+    ) -> Result<Vec<TrueShare>, EvaluateError> {
+        let own = &self.trials.settings;
+        if own.without || own.detection_only || !own.ablated.is_empty() {
+            return Ok(vec![]);
+        }
+        let study = self.trials.sampler.study();
+        self.pieces(SHARES, Share::WHOLE).all(
+            &progress.stage("shares", own.trials),
+            |_: &TrueShare| Ok(()),
+            |trial| {
+                let (record, validation) = self.given(trial)?;
+                let settings = self.diagnosis(trial, vec![]);
+                let given = (&record, validation.as_ref());
+                Ok(TrueShare::of(&keys[trial], study, given, &settings))
+            },
+        )
+    }
+
+    /// A trial's record, and that which validates.
+    fn given(&self, trial: usize) -> Result<(Record, Option<Record>), EvaluateError> {
+        let validation = (self.trials.settings.validation)
+            .then(|| self.folder.record(trial, Which::Validation))
+            .transpose()?;
+        Ok((self.folder.record(trial, Which::Own)?, validation))
+    }
+
     /// Diagnoses one trial.
     fn one(
         &self,
@@ -283,10 +319,7 @@ impl Sealed<'_> {
         progress: &Progress,
     ) -> Result<Answer, EvaluateError> {
         let (study, own) = (self.trials.sampler.study(), &self.trials.settings);
-        let record = self.folder.record(trial, Which::Own)?;
-        let validation = (own.validation)
-            .then(|| self.folder.record(trial, Which::Validation))
-            .transpose()?;
+        let (record, validation) = self.given(trial)?;
         let settings = self.diagnosis(trial, left_out);
         let given = (&record, validation.as_ref());
         let mut answer = Answer::of(trial, study, given, &settings, progress)?;

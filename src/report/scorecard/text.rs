@@ -49,6 +49,11 @@ pub fn scorecard_text(card: &Scorecard) -> String {
         ("Mean Brier score", card.probabilities.brier, ""),
         ("Mean size of a class", card.mean_class_size, ""),
         ("Mean number of places told", card.mean_places, ""),
+        (
+            "Median share that the true effects close",
+            card.closed.true_median,
+            "",
+        ),
         ("Mean time of a diagnosis", card.seconds_per_record, "s"),
     ] {
         if let Some(value) = value {
@@ -150,6 +155,14 @@ pub(super) fn named_scores(card: &Scorecard) -> Vec<(String, Count)> {
         (
             "90 % intervals of θ that hold it, beside a right effect".into(),
             card.coverage.delivered,
+        ),
+        (
+            "90 % intervals of the share that the true effects close: hold 1".into(),
+            card.closed.true_holds_one,
+        ),
+        (
+            "share closed beside a right effect: −0.1 to 1.1".into(),
+            card.closed.delivered_within,
         ),
         ("diagnoses that failed".into(), card.failed),
     ];

@@ -2,6 +2,7 @@
 
 use super::baselines::{Baseline, baselines};
 use super::bins::{Bin, bins};
+use super::closed::{Closed, closed};
 use super::count::{Count, LEVEL};
 use super::said::{
     Coverage, Precision, Probabilities, Reliability, coverage, mean, precision, probabilities,
@@ -112,6 +113,8 @@ pub struct Scorecard {
     pub(crate) reliability: Vec<Reliability>,
     /// Coverage of θ.
     pub(crate) coverage: Coverage,
+    /// Shares of the gap that are told to close.
+    pub(crate) closed: Closed,
     /// Mean number of members of a class.
     pub(crate) mean_class_size: Option<f64>,
     /// Mean number of places that a stated gap is told to be at, one or several.
@@ -170,6 +173,7 @@ impl Scorecard {
             probabilities: probabilities(&rows),
             reliability: reliability(&rows),
             coverage: coverage(&rows),
+            closed: closed(&rows),
             mean_class_size: mean_size(|o| o.class.len()),
             mean_places: mean_size(|o| o.places.len()),
             steadiness: steadiness(&rows),

@@ -3,6 +3,7 @@
 mod baselines;
 mod bins;
 mod card;
+mod closed;
 mod count;
 mod said;
 

@@ -1,7 +1,7 @@
 use super::*;
 use crate::diagnose::{Decision, Verdict};
 use crate::evaluate::trials::row::{Fate, Row};
-use crate::evaluate::trials::{Families, Kind, Named, Outcome, Refitted, Repeat};
+use crate::evaluate::trials::{Families, Kind, Named, Outcome, Refitted, Repeat, TrueShare};
 
 /// A trial in which `truth` was there and these effects were accepted, the first with this probability.
 fn row(kind: Kind, truth: &[&str], accepted: &[&str], probability: f64) -> Row {
@@ -52,12 +52,14 @@ fn row(kind: Kind, truth: &[&str], accepted: &[&str], probability: f64) -> Row {
                 value: 1.1,
                 interval: [0.95, 1.25],
             }],
+            closed: None,
         }),
         failure: None,
         seconds: 2.0,
         correlated: None,
         greedy: None,
         repeats: vec![],
+        true_share: None,
     }
 }
 
@@ -233,4 +235,32 @@ fn what_is_left_out_is_abstained_from() {
     let card = card(vec![left_out]);
     assert_eq!(card.by_information[0].delivered, count(1, 1));
     assert_eq!(card.precision.none_of_these, count(1, 1));
+}
+
+/// Shares of the true effects count whatever was answered, those of answers only where they are right.
+#[test]
+fn shares_are_those_of_the_truth_and_of_right_answers() {
+    let told = |kind, accepted: &[&str], closed, of_truth: Option<f64>| {
+        let mut row = row(kind, &["a@s"], accepted, 0.9);
+        row.true_share = Some(TrueShare {
+            trial: 0,
+            is_listed: kind == Kind::Listed,
+            closed: of_truth,
+            interval: of_truth.map(|share| [share - 0.1, share + 0.1]),
+        });
+        row.outcome.as_mut().unwrap().closed = closed;
+        row
+    };
+    let closed = card(vec![
+        told(Kind::Listed, &["a@s"], Some(1.0), Some(0.95)),
+        told(Kind::Listed, &["a@s"], Some(1.9), Some(0.8)),
+        told(Kind::Listed, &["b@s"], Some(1.9), Some(1.05)),
+        told(Kind::Listed, &[], None, None),
+        told(Kind::Random, &[], None, None),
+    ])
+    .closed;
+    assert_eq!(closed.true_told, count(3, 4));
+    assert_eq!(closed.true_median, Some(0.95));
+    assert_eq!(closed.true_holds_one, count(2, 3));
+    assert_eq!(closed.delivered_within, count(1, 2));
 }
