@@ -2,7 +2,7 @@
 
 use super::base::Base;
 use super::error::DiagnoseError;
-use super::explain::explore::{Before, explore};
+use super::explain::explore::{Before, explore, what_is_left};
 use super::explain::findings::{Chances, Findings};
 use super::explain::search::{Breadth, listed};
 use super::explain::terms::Terms;
@@ -194,6 +194,9 @@ fn explored<'a, R>(
             Err(DiagnoseError::Cancelled(_)) if settings.give_partial => findings.is_partial = true,
             Err(error) => return Err(error),
         }
+    }
+    if !findings.is_partial {
+        findings = what_is_left(findings, &base.model, &terms, settings, progress)?;
     }
     then(Explored {
         study,

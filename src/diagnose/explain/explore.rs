@@ -15,7 +15,7 @@ use crate::progress::{Progress, Stage};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Steps of the search that are reported: functions, effects, functions of the corrected twin, what is left, pairs.
+/// Steps of the search that are reported: functions, effects, noise, what effects leave, pairs.
 const STEPS: usize = 5;
 
 /// Finds out what explains the records beside the twin; stops early where nothing does.
@@ -129,14 +129,8 @@ fn one_by_one<'a>(
     if best <= Thresholds::NULL_LIKE && top > Thresholds::NULL_LIKE {
         singles = listed(base, terms.listed, origin, &[], breadth.of_all())?;
     }
-    let refitted = old.iter().filter_map(|found| {
-        let model = found.model.clone()?;
-        Some(Found {
-            terms: model.terms.clone(),
-            gain: model.log_evidence - origin,
-            model: Some(model),
-        })
-    });
+    let refitted =
+        (old.iter().filter_map(|found| found.model.clone())).map(|model| Found::of(model, origin));
     improve(&mut singles, refitted);
     let top = singles.first().map_or(0.0, |f| f.gain);
     stage.tick()?;
@@ -149,7 +143,7 @@ fn one_by_one<'a>(
     with_noise(base, terms, breadth, singles, unknown_alone)
 }
 
-/// Adds what single effects leave, pairs, which are searched unless they are given, and what these leave; stops where nothing is missing.
+/// Adds what single effects leave, and pairs, which are searched unless they are given; stops where nothing is missing.
 fn beside_each_other<'a>(
     mut findings: Findings<'a>,
     base: &Model<'a>,
@@ -159,16 +153,13 @@ fn beside_each_other<'a>(
     settings: &DiagnoseSettings,
     stage: &Stage,
 ) -> Result<Findings<'a>, DiagnoseError> {
-    // Where another kind of noise explains as much as one effect, two may explain more.
-    if findings.log_odds_alone() <= Thresholds::GAP || findings.asks_beside() {
+    if explains_nothing_more(&findings) {
         return Ok(findings);
     }
     let (origin, top) = (base.log_evidence, findings.top());
-    // What an unknown function alone explains better leaves something.
-    let best = findings.unknown.first().map_or(0.0, |f| f.gain);
-    let breadth = breadth.for_gap(best);
+    let may_suffice = may_suffice(&findings);
+    let breadth = breadth.for_gap(findings.best_unknown());
     let few = breadth.few();
-    let may_suffice = |found: &Found<'_>| found.gain > best - Thresholds::CANDIDATES;
     let mut enough = false;
     for i in 0..findings.listed.len().min(SINGLES) {
         let found = findings.listed[i].clone();
@@ -191,18 +182,41 @@ fn beside_each_other<'a>(
         None if breadth.pairs => pairs(&findings, terms, origin, breadth, enough)?,
         None => vec![],
     };
-    if let Some(found) = alone(base, &mut findings, terms, origin, breadth)? {
-        enough |= findings.add(&found, on_top(&found, terms, origin, few)?);
-    }
+    alone(base, &mut findings, terms, origin, breadth)?;
     if asks_for_noise && let Some(beside) = instead_of_second(&findings, terms, origin, breadth)? {
         findings.noise_beside = Some(beside);
-        if findings.asks_beside() {
-            return Ok(findings);
-        }
     }
+    findings.is_partial = settings.ends(stage.tick())?;
+    Ok(findings)
+}
+
+/// Adds what pairs leave, and the best effect if that is not yet known: the last step, once the twin stays as it is.
+pub(in crate::diagnose) fn what_is_left<'a>(
+    mut findings: Findings<'a>,
+    base: &Model<'a>,
+    terms: &Terms<'_>,
+    settings: &DiagnoseSettings,
+    progress: &Progress,
+) -> Result<Findings<'a>, DiagnoseError> {
+    if settings.detection_only || explains_nothing_more(&findings) {
+        return Ok(findings);
+    }
+    let stage = progress.stage("what is left", 1);
+    let origin = base.log_evidence;
+    let may_suffice = may_suffice(&findings);
+    let few = (Breadth::of(base, settings.quick).for_gap(findings.best_unknown())).few();
+    let mut enough = findings.some_suffices();
+    let is_new = |findings: &Findings<'a>| {
+        (findings.listed.first().cloned()).filter(|best| findings.left(&best.keys()).is_none())
+    };
+    if let Some(best) = is_new(&findings).filter(&may_suffice) {
+        enough |= findings.add(&best, on_top(&best, terms, origin, few)?);
+    }
+    let best_pair = findings.several.first().map_or(0.0, |pair| pair.gain);
     for i in 0..findings.several.len().min(2) {
         let found = findings.several[i].clone();
-        if !findings.wins(&found) || i > 0 && !may_suffice(&found) {
+        let is_near = may_suffice(&found) && found.gain > best_pair - Thresholds::CANDIDATES;
+        if !findings.wins(&found) || i > 0 && !is_near {
             break;
         }
         if findings.add(&found, on_top(&found, terms, origin, few)?) {
@@ -210,15 +224,28 @@ fn beside_each_other<'a>(
             break;
         }
     }
-    findings.is_partial = settings.ends(stage.tick())?;
     // What explains most may do so beside something unknown.
+    let is_outdone = best_pair - findings.price(2) > findings.top() + Thresholds::CANDIDATES;
     if !enough
-        && let Some(found) = findings.listed.first().cloned()
-        && findings.left(&found.keys()).is_none()
+        && !is_outdone
+        && let Some(best) = is_new(&findings)
     {
-        findings.add(&found, on_top(&found, terms, origin, few)?);
+        findings.add(&best, on_top(&best, terms, origin, few)?);
     }
+    findings.is_partial = settings.ends(stage.tick())?;
     Ok(findings)
+}
+
+/// Returns whether the search ends with single explanations: nothing is missing, or another kind of noise comes first. Where that explains
+/// as much as one effect, two may explain more.
+fn explains_nothing_more(findings: &Findings<'_>) -> bool {
+    findings.log_odds_alone() <= Thresholds::GAP || findings.asks_beside()
+}
+
+/// Tells effects that may leave nothing: what an unknown function alone explains better leaves something.
+fn may_suffice(findings: &Findings<'_>) -> impl Fn(&Found<'_>) -> bool + use<> {
+    let least = findings.best_unknown() - Thresholds::CANDIDATES;
+    move |found| found.gain > least
 }
 
 /// Listed effects that explain a parameter gap with θ inside the prior, as well as θ outside does: best first.

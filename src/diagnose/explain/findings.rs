@@ -63,6 +63,17 @@ impl<'a> Findings<'a> {
         is_enough
     }
 
+    /// Evidence of the best unknown function alone.
+    pub fn best_unknown(&self) -> f64 {
+        self.unknown.first().map_or(0.0, |f| f.gain)
+    }
+
+    /// Returns whether a set is known that leaves nothing of weight.
+    pub fn some_suffices(&self) -> bool {
+        (self.beside.iter())
+            .any(|(keys, on_top)| self.set(keys).is_some_and(|found| suffices(found, on_top)))
+    }
+
     /// Nats that unknown functions add on top of a set; `None` where that was not asked.
     pub fn left(&self, keys: &[String]) -> Option<f64> {
         let (_, on_top) = self.beside(keys)?;

@@ -14,7 +14,16 @@ pub(in crate::diagnose) struct Found<'a> {
     pub model: Option<Model<'a>>,
 }
 
-impl Found<'_> {
+impl<'a> Found<'a> {
+    /// A fit beside a twin of this log Z.
+    pub fn of(model: Model<'a>, origin: f64) -> Self {
+        Self {
+            terms: model.terms.clone(),
+            gain: model.log_evidence - origin,
+            model: Some(model),
+        }
+    }
+
     /// Keys of the terms.
     pub fn keys(&self) -> Vec<String> {
         self.terms.iter().map(|t| t.key()).collect()
@@ -30,7 +39,7 @@ impl Found<'_> {
     }
 
     /// The term that was added last.
-    pub fn last(&self) -> &Term {
+    pub fn last(&self) -> &Arc<Term> {
         &self.terms[self.terms.len() - 1]
     }
 }

@@ -74,18 +74,17 @@ pub(super) fn pairs<'a>(
 }
 
 /// A pair may win since the fits of its effects alone stopped early, or since one of the two stood for a coarse step: these begin again
-/// where the pair ended. Returns the best single effect if it is a new one.
+/// where the pair ended.
 pub(super) fn alone<'a>(
     base: &Model<'a>,
     findings: &mut Findings<'a>,
     terms: &Terms<'_>,
     origin: f64,
     breadth: Breadth,
-) -> Result<Option<Found<'a>>, DiagnoseError> {
-    let top = findings.top();
+) -> Result<(), DiagnoseError> {
     let first = findings.several.first();
     let Some(pair) = first.filter(|pair| findings.wins(pair)) else {
-        return Ok(None);
+        return Ok(());
     };
     let keys = pair.keys();
     let own: Vec<Arc<Term>> = (terms.listed.iter())
@@ -95,5 +94,5 @@ pub(super) fn alone<'a>(
     let thetas: Vec<Vec<f64>> = own_theta(pair).into_iter().collect();
     let again = listed(base, &own, origin, &thetas, breadth.of_all())?;
     improve(&mut findings.listed, again);
-    Ok((findings.listed.first().cloned()).filter(|first| first.gain > top))
+    Ok(())
 }

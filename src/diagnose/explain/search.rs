@@ -2,7 +2,7 @@
 
 use super::found::{Found, own_theta, sort};
 use super::refit::{CARRIED, Effort, fit_annealed, fit_function, fit_promise, loudly};
-use super::scan::{functions, scan};
+use super::scan::{Promise, functions, scan};
 use super::valleys::leave_valleys;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::term::{Nature, Term};
@@ -126,110 +126,23 @@ pub(in crate::diagnose) fn listed<'a>(
         return Ok(vec![]);
     }
     let promises = scan(model, terms)?;
-    let chosen: Vec<_> = (promises.iter().enumerate())
-        .filter(|(i, p)| *i < breadth.listed && p.nats() > breadth.least)
-        .map(|(_, p)| p)
-        .collect();
-    let loud = if breadth.deep { loudly(model)? } else { None };
-    let louder = match &loud {
-        Some(loud) => scan(loud, terms)?,
-        None => vec![],
-    };
-    let found = |m: Model<'a>| Found {
-        terms: m.terms.clone(),
-        gain: m.log_evidence - origin,
-        model: Some(m),
-    };
-    let mut fits: Vec<Option<Found<'a>>> = (chosen.par_iter())
-        .map(|promise| {
-            let effort = Effort {
-                starts: 2,
-                iterations: 6,
-            };
-            Ok(fit_promise(model, promise, thetas, effort)?.map(found))
-        })
-        .collect::<Result<_, DiagnoseError>>()?;
-    if let Some(loud) = &loud {
-        let again: Vec<Option<Found<'a>>> = (louder.par_iter())
-            .take(breadth.annealed)
-            .filter(|p| p.nats() > breadth.least)
-            .map(|promise| Ok(fit_annealed(model, loud, promise, 2)?.map(found)))
-            .collect::<Result<_, DiagnoseError>>()?;
-        for other in again.into_iter().flatten() {
-            let own = |f: &Option<Found<'a>>| {
-                f.as_ref().is_some_and(|f| {
-                    Arc::ptr_eq(
-                        &f.terms[f.terms.len() - 1],
-                        &other.terms[other.terms.len() - 1],
-                    )
-                })
-            };
-            match fits.iter_mut().find(|f| own(f)) {
-                Some(Some(old)) if old.gain >= other.gain => {}
-                Some(old) => *old = Some(other),
-                None => fits.push(Some(other)),
+    let found = |models: Vec<Model<'a>>| models.into_iter().map(|model| Found::of(model, origin));
+    let mut all: Vec<Found<'a>> = found(first_fits(model, &promises, thetas, breadth)?).collect();
+    if breadth.deep
+        && let Some(loud) = loudly(model)?
+    {
+        for other in found(annealed_fits(model, &loud, terms, breadth)?) {
+            let is_same = |own: &&mut Found<'a>| Arc::ptr_eq(own.last(), other.last());
+            match all.iter_mut().find(is_same) {
+                Some(own) if own.gain >= other.gain => {}
+                Some(own) => *own = other,
+                None => all.push(other),
             }
         }
     }
-    let mut all: Vec<Found<'a>> = fits.into_iter().flatten().collect();
     sort(&mut all);
-    // Those near the best get more starts and carry on.
-    let top = all.first().map_or(0.0, |f| f.gain);
     let floor = model.log_evidence - origin;
-    let again: Vec<usize> = (0..all.len())
-        .filter(|&i| (i < 5 || all[i].gain > top - 4.0) && (all[i].gain > floor + 1.0 || i < 2))
-        .collect();
-    let best: Vec<Vec<f64>> = all.iter().take(2).filter_map(own_theta).collect();
-    let better: Vec<Option<Found<'a>>> = (again.par_iter())
-        .map(|&i| {
-            let found = &all[i];
-            let term = &found.terms[found.terms.len() - 1];
-            let promise = promises.iter().find(|p| Arc::ptr_eq(&p.term, term));
-            let thetas: Vec<Vec<f64>> = best
-                .iter()
-                .filter(|t| own_theta(found).as_ref() != Some(t))
-                .cloned()
-                .collect();
-            let effort = Effort {
-                starts: match term.shape() {
-                    Some(_) => STARTS_OF_SHAPE,
-                    None => 3,
-                },
-                iterations: 12,
-            };
-            let fitted = match promise {
-                Some(promise) => fit_promise(model, promise, &thetas, effort)?,
-                None => None,
-            };
-            let on = match &found.model {
-                Some(m) => climb(&m.problem, &m.fitted.theta, CARRIED)?,
-                None => None,
-            };
-            let carried = match (&found.model, on) {
-                (Some(m), Some(fitted)) => m.refitted(fitted),
-                _ => None,
-            };
-            let best = [fitted, carried].into_iter().flatten().reduce(|a, b| {
-                if b.fitted.objective > a.fitted.objective {
-                    b
-                } else {
-                    a
-                }
-            });
-            Ok(best.map(|m| Found {
-                terms: m.terms.clone(),
-                gain: m.log_evidence - origin,
-                model: Some(m),
-            }))
-        })
-        .collect::<Result<_, DiagnoseError>>()?;
-    for (i, found) in again.into_iter().zip(better) {
-        if let Some(found) = found
-            && found.gain > all[i].gain
-        {
-            all[i] = found;
-        }
-    }
+    fit_on(model, &promises, &mut all, origin)?;
     sort(&mut all);
     leave_valleys(model, &mut all, floor)?;
     // A filter sees rounding by its first two moments, and may be worse off with it than with louder noise; the values bear its mark
@@ -242,20 +155,109 @@ pub(in crate::diagnose) fn listed<'a>(
     }
     // What was not refitted is no better than its promise.
     for promise in &promises {
-        if !all
-            .iter()
-            .any(|f| Arc::ptr_eq(&f.terms[f.terms.len() - 1], &promise.term))
-        {
-            let terms: Vec<Arc<Term>> =
-                model.terms.iter().chain([&promise.term]).cloned().collect();
+        if !all.iter().any(|f| Arc::ptr_eq(f.last(), &promise.term)) {
             all.push(Found {
-                terms,
+                terms: (model.terms.iter().chain([&promise.term]))
+                    .cloned()
+                    .collect(),
                 gain: floor + (promise.nats() - AVERAGED).min(-0.5),
                 model: None,
             });
         }
     }
     Ok(merged(all, &ways(terms)))
+}
+
+/// Short fits of the terms that promise most.
+fn first_fits<'a>(
+    model: &Model<'a>,
+    promises: &[Promise],
+    thetas: &[Vec<f64>],
+    breadth: Breadth,
+) -> Result<Vec<Model<'a>>, DiagnoseError> {
+    let chosen: Vec<&Promise> = (promises.iter().take(breadth.listed))
+        .filter(|promise| promise.nats() > breadth.least)
+        .collect();
+    let effort = Effort {
+        starts: 2,
+        iterations: 6,
+    };
+    let fits: Vec<Option<Model<'a>>> = (chosen.par_iter())
+        .map(|promise| fit_promise(model, promise, thetas, effort))
+        .collect::<Result<_, DiagnoseError>>()?;
+    Ok(fits.into_iter().flatten().collect())
+}
+
+/// The same from loud noise, of the terms that promise most there.
+fn annealed_fits<'a>(
+    model: &Model<'a>,
+    loud: &Model<'a>,
+    terms: &[Arc<Term>],
+    breadth: Breadth,
+) -> Result<Vec<Model<'a>>, DiagnoseError> {
+    let promises = scan(loud, terms)?;
+    let fits: Vec<Option<Model<'a>>> = (promises.par_iter())
+        .take(breadth.annealed)
+        .filter(|promise| promise.nats() > breadth.least)
+        .map(|promise| fit_annealed(model, loud, promise, 2))
+        .collect::<Result<_, DiagnoseError>>()?;
+    Ok(fits.into_iter().flatten().collect())
+}
+
+/// Gives those near the best more starts, and carries them on.
+fn fit_on<'a>(
+    model: &Model<'a>,
+    promises: &[Promise],
+    all: &mut [Found<'a>],
+    origin: f64,
+) -> Result<(), DiagnoseError> {
+    let top = all.first().map_or(0.0, |f| f.gain);
+    let floor = model.log_evidence - origin;
+    let is_near = |i: usize, gain: f64| i < 5 || gain > top - 4.0;
+    let is_worth = |i: usize, gain: f64| i < 2 || gain > floor + 1.0;
+    let best: Vec<Vec<f64>> = all.iter().take(2).filter_map(own_theta).collect();
+    let better: Vec<Option<Found<'a>>> = (all.par_iter().enumerate())
+        .map(|(i, found)| {
+            if !is_near(i, found.gain) || !is_worth(i, found.gain) {
+                return Ok(None);
+            }
+            let own = own_theta(found);
+            let thetas: Vec<Vec<f64>> = (best.iter())
+                .filter(|theta| own.as_ref() != Some(theta))
+                .cloned()
+                .collect();
+            let effort = Effort {
+                starts: match found.last().shape() {
+                    Some(_) => STARTS_OF_SHAPE,
+                    None => 3,
+                },
+                iterations: 12,
+            };
+            let promise = promises.iter().find(|p| Arc::ptr_eq(&p.term, found.last()));
+            let fitted = match promise {
+                Some(promise) => fit_promise(model, promise, &thetas, effort)?,
+                None => None,
+            };
+            let carried = match &found.model {
+                Some(m) => climb(&m.problem, &m.fitted.theta, CARRIED)?
+                    .and_then(|fitted| m.refitted(fitted)),
+                None => None,
+            };
+            let best = [fitted, carried].into_iter().flatten().reduce(|a, b| {
+                match b.fitted.objective > a.fitted.objective {
+                    true => b,
+                    false => a,
+                }
+            });
+            Ok(best.map(|model| Found::of(model, origin)))
+        })
+        .collect::<Result<_, DiagnoseError>>()?;
+    for (own, better) in all.iter_mut().zip(better) {
+        if let Some(better) = better.filter(|better| better.gain > own.gain) {
+            *own = better;
+        }
+    }
+    Ok(())
 }
 
 /// Unknown functions beside a model; best first.

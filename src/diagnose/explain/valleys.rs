@@ -47,7 +47,7 @@ fn again<'a>(
     let (Some(own), Some(shape)) = (&found.model, found.last().shape()) else {
         return Ok(None);
     };
-    let term = &found.terms[found.terms.len() - 1];
+    let term = found.last();
     let alike = (before.iter())
         .filter(|other| other.gain > least && other.last().shape().as_ref() == Some(&shape))
         .filter_map(|other| Some((own_theta(other)?, other.magnitudes()?)));

@@ -4,6 +4,7 @@ use super::Kind;
 use super::answer::{Answer, Outcome, Repeat};
 use super::shares::TrueShare;
 use super::truth::Truth;
+use crate::effect::EffectKey;
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 use std::fmt;
@@ -148,16 +149,26 @@ impl Row {
         self.right.iter().flatten().any(|right| right == key)
     }
 
+    /// Returns true if a departure acts at this place, or if a right answer does.
+    pub fn is_true_place(&self, place: &str) -> bool {
+        let of_right = |key: &String| {
+            let key = key.parse::<EffectKey>();
+            key.is_ok_and(|key| key.target == place)
+        };
+        self.targets.iter().any(|target| target == place)
+            || self.right.iter().flatten().any(of_right)
+    }
+
     /// Returns true if the place that is stated is a true one.
     pub fn place_is_right(&self) -> bool {
         let target = self.outcome.as_ref().and_then(|o| o.target.as_ref());
-        target.is_some_and(|target| self.targets.contains(target))
+        target.is_some_and(|target| self.is_true_place(target))
     }
 
     /// Returns true if a true place is the one that is stated, or is among those that are told as its rivals.
     pub fn places_hold_it(&self) -> bool {
         let places = self.outcome.as_ref().map_or(&[][..], |o| &o.places);
-        places.iter().any(|place| self.targets.contains(place))
+        places.iter().any(|place| self.is_true_place(place))
     }
 
     /// Returns the worth of the answer.

@@ -41,7 +41,7 @@ pub(super) fn baselines(rows: &[Row]) -> Vec<Baseline> {
     let is_gap = commonest.as_deref().is_some_and(|truth| truth != "nothing");
     let correlated = |row: &Row| {
         let place = row.correlated.as_ref();
-        place.is_some_and(|place| row.targets.contains(place))
+        place.is_some_and(|place| row.is_true_place(place))
     };
     vec![
         Baseline {

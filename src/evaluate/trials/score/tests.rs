@@ -237,6 +237,16 @@ fn what_is_left_out_is_abstained_from() {
     assert_eq!(card.precision.none_of_these, count(1, 1));
 }
 
+/// An effect elsewhere that imitates the true one is a right answer, and its place a true one.
+#[test]
+fn the_place_of_a_right_answer_is_a_true_one() {
+    let mut imitated = row(Kind::Listed, &["a@s"], &["b@t"], 0.9);
+    assert!(!imitated.place_is_right());
+    imitated.right[0].push("b@t".into());
+    assert!(imitated.place_is_right() && imitated.places_hold_it());
+    assert!(!imitated.is_true_place("u"));
+}
+
 /// Shares of the true effects count whatever was answered, those of answers only where they are right.
 #[test]
 fn shares_are_those_of_the_truth_and_of_right_answers() {
