@@ -1,8 +1,9 @@
-//! Horizontal bars with their names on the left and their numbers on the right.
+//! Horizontal bars with their names on the left, their numbers on the right, and a scale below.
 
 use super::frame::{EDGE, LINE, ROOM, TEXT, WIDTH};
 use super::picture::Picture;
 use super::text::{BOLD, clipped, text, width};
+use super::ticks::Ticks;
 use std::fmt::Write;
 
 /// Height of a row and of the bar inside it.
@@ -12,6 +13,8 @@ const BAR: f64 = 15.0;
 const GAP: f64 = 8.0;
 /// Most room for names.
 const NAMES: f64 = 0.46 * ROOM;
+/// Room for one tick of a scale.
+const TICK: f64 = 64.0;
 
 /// Groups of bars. Scales begin at zero.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,6 +34,8 @@ pub struct BarGroup {
     pub label: String,
     /// The value that takes all the room; if none, the largest of all groups without.
     pub full: Option<f64>,
+    /// The scale is in per cent.
+    pub per_cent: bool,
     /// Ordered from top to bottom.
     pub bars: Vec<Bar>,
 }
@@ -56,7 +61,16 @@ impl BarGroup {
         Self {
             label: label.into(),
             full,
+            per_cent: false,
             bars,
+        }
+    }
+
+    /// The scale in per cent.
+    pub fn per_cent(self) -> Self {
+        Self {
+            per_cent: true,
+            ..self
         }
     }
 }
@@ -101,43 +115,91 @@ impl BarChart {
             .fold(0.0, f64::max);
         let mut picture = Picture::new(&self.title, &self.description);
         let mut y = picture.top() + 4.0;
-        for group in &self.groups {
+        for (i, group) in self.groups.iter().enumerate() {
             if !group.label.is_empty() {
                 y += LINE;
                 let label = clipped(&group.label, TEXT * BOLD, ROOM);
                 text(picture.body(), (EDGE, y), "start", TEXT, true, &label);
                 y += 4.0;
             }
-            let full = group.full.unwrap_or(shared);
-            let per_unit = if full > 0.0 {
-                (right - left) / full
-            } else {
-                0.0
-            };
             let scale = Scale {
                 left,
                 right,
-                per_unit,
+                full: group.full.unwrap_or(shared),
+                per_cent: group.per_cent,
             };
+            let bottom = y + ROW * group.bars.len() as f64;
+            scale.draw_lines(picture.body(), (y, bottom));
             for bar in &group.bars {
                 bar.draw(picture.body(), &scale, names, y);
                 y += ROW;
+            }
+            let next = self.groups.get(i + 1);
+            if next.is_none_or(|next| (next.full, next.per_cent) != (group.full, group.per_cent)) {
+                y = scale.draw_labels(picture.body(), bottom);
             }
         }
         picture.svg(y + EDGE)
     }
 }
 
-/// Scale from values to positions.
+/// Scale from values to positions; it begins at zero.
 struct Scale {
     left: f64,
     right: f64,
-    per_unit: f64,
+    /// The value at the right end; nothing is drawn where it is not positive.
+    full: f64,
+    per_cent: bool,
 }
 
 impl Scale {
     fn x(&self, value: f64) -> f64 {
-        (self.left + value * self.per_unit).clamp(self.left, self.right)
+        let share = match self.full > 0.0 {
+            true => value / self.full,
+            false => 0.0,
+        };
+        (self.left + share * (self.right - self.left)).clamp(self.left, self.right)
+    }
+
+    /// Positions and labels of its ticks.
+    fn ticks(&self) -> Vec<(f64, String)> {
+        let unit = if self.per_cent { 100.0 } else { 1.0 };
+        let wanted = ((self.right - self.left) / TICK) as usize;
+        let end = unit * self.full;
+        if wanted == 0 || !(end > 0.0 && end.is_finite()) {
+            return vec![];
+        }
+        (Ticks::new((0.0, end), wanted).labelled())
+            .map(|(value, label)| (self.x(value / unit), label))
+            .collect()
+    }
+
+    /// Draws a line for each tick.
+    fn draw_lines(&self, out: &mut String, (top, bottom): (f64, f64)) {
+        for (x, _) in self.ticks() {
+            let _ = writeln!(
+                out,
+                r##"<path d="M{x:.1} {top:.1}V{bottom:.1}" stroke="#e4e4e4"/>"##
+            );
+        }
+    }
+
+    /// Names the ticks below; returns where that ends.
+    fn draw_labels(&self, out: &mut String, top: f64) -> f64 {
+        let ticks = self.ticks();
+        if ticks.is_empty() {
+            return top;
+        }
+        for (x, label) in ticks {
+            let label = if self.per_cent {
+                format!("{label} %")
+            } else {
+                label
+            };
+            let at = (x, top + LINE - 4.0);
+            text(out, at, "middle", 0.85 * TEXT, false, &label);
+        }
+        top + LINE
     }
 }
 

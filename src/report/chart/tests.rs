@@ -101,6 +101,7 @@ fn bars_keep_inside_and_name_what_they_cannot_draw() {
     let groups = [None, Some(1.0)].map(|full| BarGroup {
         label: "a & b".into(),
         full,
+        per_cent: full.is_some(),
         bars: bars.to_vec(),
     });
     let chart = |groups: Vec<BarGroup>| BarChart {
@@ -119,6 +120,26 @@ fn bars_keep_inside_and_name_what_they_cannot_draw() {
     // One rectangle is the paper; two bars of each group are positive.
     assert_eq!(svg.matches("<rect").count(), 1 + 2 * 2);
     assert!(chart(vec![]).svg().ends_with("</svg>\n"));
+}
+
+/// Groups of one scale share it, others have their own.
+#[test]
+fn bars_have_scales() {
+    let group = |full| BarGroup::new("", full, vec![Bar::new("a", 0.5, "half")]);
+    let groups = vec![
+        group(Some(1.0)),
+        group(Some(1.0)),
+        group(Some(1.0)).per_cent(),
+    ];
+    let chart = BarChart {
+        title: "bars".into(),
+        description: "of a half".into(),
+        groups,
+    };
+    let svg = chart.svg();
+    assert_inside(&svg);
+    assert_eq!(svg.matches(">0.4<").count(), 1);
+    assert_eq!(svg.matches(">40 %<").count(), 1);
 }
 
 /// Fails where a text reaches beyond the picture.

@@ -22,6 +22,7 @@ pub(super) fn delivered_svg(card: &Scorecard) -> Option<String> {
         .map(|(truths, label)| BarGroup {
             label: format!("{label}: share of right answers, 95 % interval"),
             full: Some(1.0),
+            per_cent: true,
             bars: (card.by_information.iter())
                 .filter(|bin| bin.truths == truths)
                 .map(bar)

@@ -32,7 +32,7 @@ pub fn terms(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
             first.name,
             percent(first.inclusion)
         ),
-        groups: vec![BarGroup::new(&label, Some(1.0), bars)],
+        groups: vec![BarGroup::new(&label, Some(1.0), bars).per_cent()],
     };
     Some(chart.svg())
 }

@@ -39,7 +39,7 @@ pub fn extent(diagnosis: &Diagnosis) -> Option<String> {
                 .clear(true)
                 .interval(Some(ends)),
         ];
-        groups.push(BarGroup::new("Share of the gap", Some(1.0), bars));
+        groups.push(BarGroup::new("Share of the gap", Some(1.0), bars).per_cent());
     }
     let after = s
         .after

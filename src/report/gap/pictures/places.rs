@@ -64,7 +64,7 @@ pub fn regions(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
                 let label = format!("{} … {}{unit}", short(r.low), short(r.high));
                 bar(&label, *r)
             };
-            BarGroup::new(variable, None, own.iter().map(bar).collect())
+            BarGroup::new(variable, None, own.iter().map(bar).collect()).per_cent()
         })
         .collect();
     let chart = BarChart {
@@ -97,7 +97,7 @@ pub fn channels(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
             clearest.channel,
             percent(clearest.share)
         ),
-        groups: vec![BarGroup::new("", Some(1.0), bars)],
+        groups: vec![BarGroup::new("", Some(1.0), bars).per_cent()],
     };
     Some(chart.svg())
 }
@@ -117,7 +117,7 @@ pub fn lags(diagnosis: &Diagnosis) -> Option<String> {
         .map(|((channel, signal), mut own)| {
             own.sort_by(|a, b| a.from.total_cmp(&b.from));
             let bars = own.iter().map(|l| bar(&between(l), *l)).collect();
-            BarGroup::new(&past(channel, signal), None, bars)
+            BarGroup::new(&past(channel, signal), None, bars).per_cent()
         })
         .collect();
     let chart = BarChart {
@@ -151,7 +151,7 @@ pub fn bands(diagnosis: &Diagnosis) -> Option<String> {
         .map(|(channel, mut own)| {
             own.sort_by(|a, b| a.low.total_cmp(&b.low));
             let bars = own.iter().map(|b| bar(&between(b), *b)).collect();
-            BarGroup::new(channel, None, bars)
+            BarGroup::new(channel, None, bars).per_cent()
         })
         .collect();
     let chart = BarChart {
