@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! named : the largest log Z of what leaves nothing;  a larger set must be 2 nats better, an unknown function alone must not be better
-//! partial: the largest log Z, where it leaves a third at most;  an unknown function alone must not be better by 15 %
+//! partial: the largest log Z, where it leaves a third at most;  an unknown function alone must not be better by 15 %, nor all of them more
+//!          probable
 //! ```
 
 use super::findings::{Chances, Findings, leaves_nothing};
@@ -77,12 +78,20 @@ pub(in crate::diagnose) fn decide(
     if let Some((keys, _, _)) = chosen {
         return named(findings, chances, keys, Decision::Named);
     }
-    // Listed effects that explain most, beside something unknown. What is inside a black box has no functions to stand for it.
+    // Listed effects that explain most, beside something unknown, or with so little left that chance may have made it. What is inside a
+    // black box has no functions to stand for it.
     let best = (candidates.iter()).max_by(|a, b| a.1.total_cmp(&b.1));
+    let kinds = &chances.kinds;
     if let Some((keys, own, left)) = best
         && has_equations
         && *own > (1.0 - Thresholds::OUTDONE) * best_unknown
-        && chances.kinds.partial > chances.kinds.unknown
+        && kinds.partial
+            + if leaves_nothing(*own, *left) {
+                0.0
+            } else {
+                kinds.listed
+            }
+            > kinds.unknown
         && *left < Thresholds::REST * (own + left)
     {
         return named(findings, chances, keys, Decision::Partial);

@@ -149,12 +149,13 @@ impl<'a> Findings<'a> {
         pair.gain - self.price(2) > self.top()
     }
 
-    /// Nats that so many effects together cost: one of all that could stand beside the first, in either order, and what could be the
-    /// first law's fine print.
+    /// Nats that so many effects together cost: that something else is missing beside the first, one of all that are listed, in either
+    /// order; and what could be the first law's fine print.
     pub fn price(&self, count: usize) -> f64 {
         let pairs = 0.5 * (self.listed.len() as f64 - 1.0);
+        let second = Thresholds::SECOND * Thresholds::LISTED / pairs.max(1.0);
         let top = self.top().max(0.0);
-        (pairs.max(1.0).ln() + Thresholds::FINE_PRINT * top) * (count - 1) as f64
+        (Thresholds::FINE_PRINT * top - second.ln()) * (count - 1) as f64
     }
 
     /// Returns whether the records ask for another kind of noise beside the best listed effect.
