@@ -85,13 +85,11 @@ pub(in crate::diagnose) fn decide(
     if let Some((keys, own, left)) = best
         && has_equations
         && *own > (1.0 - Thresholds::OUTDONE) * best_unknown
-        && kinds.partial
-            + if leaves_nothing(*own, *left) {
-                0.0
-            } else {
-                kinds.listed
+        && kinds.unknown
+            < match leaves_nothing(*own, *left) {
+                true => kinds.partial,
+                false => kinds.partial + kinds.listed,
             }
-            > kinds.unknown
         && *left < Thresholds::REST * (own + left)
     {
         return named(findings, chances, keys, Decision::Partial);
@@ -135,5 +133,30 @@ fn named(
         decision,
         accepted: keys.to_vec(),
         class,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::explain::findings::fixture::wave;
+    use crate::diagnose::hypotheses::term::Nature;
+
+    /// An effect that leaves a little is told as a part while it and the rest are more probable than what is unknown alone.
+    #[test]
+    fn an_effect_that_leaves_little_is_a_part() {
+        let decided = |unknown: f64| {
+            let effect = wave(Nature::Listed, "h1", 50.0);
+            let mut findings = Findings {
+                unknown: (0..40).map(|_| wave(Nature::Function, "h2", 0.0)).collect(),
+                ..Findings::default()
+            };
+            findings.unknown[0].gain = unknown;
+            findings.add(&effect, Some(vec![wave(Nature::Function, "h2", 55.2)]));
+            findings.listed.push(effect);
+            decide(&findings, &findings.chances(), 2, true).decision
+        };
+        assert_eq!(decided(53.0), Decision::Partial);
+        assert_eq!(decided(56.0), Decision::NoneOfThese);
     }
 }

@@ -330,13 +330,14 @@ fn same(a: &[String], b: &[String]) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod fixture {
     use super::*;
     use crate::diagnose::hypotheses::term::{Part, Term};
     use crate::effect::Catalogue;
     use std::sync::Arc;
 
-    fn wave(nature: Nature, target: &str, gain: f64) -> Found<'static> {
+    /// An explanation of this nature that was not fitted.
+    pub fn wave(nature: Nature, target: &str, gain: f64) -> Found<'static> {
         let effect = Catalogue::default().effect("periodic-disturbance", "h1");
         let part = Part::Effect {
             effect: effect.unwrap(),
@@ -359,6 +360,26 @@ mod tests {
             gain,
             model: None,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::fixture::wave;
+    use super::*;
+
+    /// All pairs of n effects together are as probable as something else beside one of n, of the listed kind.
+    #[test]
+    fn a_second_effect_has_the_prior_of_something_else() {
+        let n = 21;
+        let findings = Findings {
+            listed: (0..n).map(|_| wave(Nature::Listed, "h1", 0.0)).collect(),
+            ..Findings::default()
+        };
+        let pairs = 0.5 * (n * (n - 1)) as f64;
+        let share = pairs * (-findings.price(2)).exp() / n as f64;
+        assert!((share - Thresholds::SECOND * Thresholds::LISTED).abs() < 1e-12);
+        assert_eq!(findings.price(1), 0.0);
     }
 
     /// A wave of the flow explains what a wave of the level does, and takes no probability from it, unless it explains more.
