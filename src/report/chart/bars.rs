@@ -197,7 +197,7 @@ impl Scale {
                 label
             };
             let at = (x, top + LINE - 4.0);
-            text(out, at, "middle", 0.85 * TEXT, false, &label);
+            text(out, at, "middle", TEXT, false, &label);
         }
         top + LINE
     }
