@@ -1,7 +1,7 @@
 //! A twin with terms, fitted to the records.
 
 use super::error::DiagnoseError;
-use super::hypotheses::term::{Term, with_terms};
+use super::hypotheses::term::{Term, marks, with_terms};
 use crate::fit::axis::{EvidencePrior, Family};
 use crate::fit::climb::{Fitted, climb};
 use crate::fit::evidence::{CREDIT, Laplace, laplace};
@@ -59,13 +59,12 @@ impl<'a> Model<'a> {
             true => bic(&problem, &fitted),
             false => laplace(&problem, &fitted, CREDIT)?.0,
         };
-        let mark: f64 = terms.iter().map(|t| t.mark).sum();
         log_evidence.is_finite().then_some(Self {
             base,
+            log_evidence: log_evidence + marks(&terms),
             terms,
             problem,
             fitted,
-            log_evidence: log_evidence + mark,
             by_bic,
         })
     }

@@ -122,16 +122,13 @@ impl<'a> Findings<'a> {
         [best(&self.listed), best(&self.unknown)].concat()
     }
 
-    /// The listed effects that explain most, where something is missing; then the best one alone, if these are several.
-    pub fn best_listed(&self) -> Vec<&Model<'a>> {
-        let gain = |f: &&Found<'a>| f.gain - self.price(f.terms.len());
-        let all = self.listed.iter().chain(&self.several);
-        let best = all.max_by(|a, b| gain(a).total_cmp(&gain(b)));
-        let single = (self.listed.first()).filter(|_| best.is_some_and(|f| f.terms.len() > 1));
-        (best.into_iter().chain(single))
-            .filter(|found| found.gain > Thresholds::GAP)
-            .filter_map(|found| found.model.as_ref())
-            .collect()
+    /// Listed effects that may be what is missing: the best pair where it explains more than any single one, then all single ones near the
+    /// best.
+    pub fn candidates(&self) -> impl Iterator<Item = &Found<'a>> {
+        let pair = (self.several.first()).filter(|pair| self.wins(pair));
+        let near = self.top() - Thresholds::CANDIDATES;
+        let singles = (self.listed.iter()).filter(move |found| found.gain > near);
+        (pair.into_iter().chain(singles)).filter(|found| found.gain > Thresholds::GAP)
     }
 
     /// log of the evidence of a set over that of the twin.
@@ -150,12 +147,12 @@ impl<'a> Findings<'a> {
     }
 
     /// Nats that so many effects together cost: that something else is missing beside the first, one of all that are listed, in either
-    /// order; and what could be the first law's fine print.
+    /// order; and what the first law's own form may leave.
     pub fn price(&self, count: usize) -> f64 {
         let pairs = 0.5 * (self.listed.len() as f64 - 1.0);
         let second = Thresholds::SECOND * Thresholds::LISTED / pairs.max(1.0);
         let top = self.top().max(0.0);
-        (Thresholds::FINE_PRINT * top - second.ln()) * (count - 1) as f64
+        (Thresholds::SECOND_SHARE * top - second.ln()) * (count - 1) as f64
     }
 
     /// Returns whether the records ask for another kind of noise beside the best listed effect.
@@ -332,31 +329,13 @@ fn same(a: &[String], b: &[String]) -> bool {
 #[cfg(test)]
 pub(super) mod fixture {
     use super::*;
-    use crate::diagnose::hypotheses::term::{Part, Term};
-    use crate::effect::Catalogue;
+    use crate::diagnose::hypotheses::term::fixture;
     use std::sync::Arc;
 
     /// An explanation of this nature that was not fitted.
     pub fn wave(nature: Nature, target: &str, gain: f64) -> Found<'static> {
-        let effect = Catalogue::default().effect("periodic-disturbance", "h1");
-        let part = Part::Effect {
-            effect: effect.unwrap(),
-            held: BTreeMap::new(),
-            kept: None,
-        };
-        let term = Term {
-            id: "wave".into(),
-            target: target.into(),
-            nature,
-            part,
-            axes: vec![],
-            family: None,
-            starts: vec![],
-            variables: vec![],
-            mark: 0.0,
-        };
         Found {
-            terms: vec![Arc::new(term)],
+            terms: vec![Arc::new(fixture::wave(nature, target, 0.0))],
             gain,
             model: None,
         }
@@ -380,6 +359,25 @@ mod tests {
         let share = pairs * (-findings.price(2)).exp() / n as f64;
         assert!((share - Thresholds::SECOND * Thresholds::LISTED).abs() < 1e-12);
         assert_eq!(findings.price(1), 0.0);
+    }
+
+    /// A second effect has to add a tenth of what the first one explains, and its prior; what may imitate the step's error is asked about
+    /// it, the nearest rivals, too.
+    #[test]
+    fn a_second_effect_adds_a_share() {
+        let found = |pair: f64| {
+            let single = |gain| wave(Nature::Listed, "h1", gain);
+            let mut several = single(pair);
+            several.terms.extend(several.terms.clone());
+            let findings = Findings {
+                listed: vec![single(200.0), single(197.0), single(190.0)],
+                several: vec![several],
+                ..Findings::default()
+            };
+            findings.candidates().map(|f| f.gain).collect::<Vec<f64>>()
+        };
+        assert_eq!(found(221.0), [200.0, 197.0]);
+        assert_eq!(found(223.0), [223.0, 200.0, 197.0]);
     }
 
     /// A wave of the flow explains what a wave of the level does, and takes no probability from it, unless it explains more.

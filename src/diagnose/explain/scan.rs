@@ -4,7 +4,7 @@
 //! listed effect. An unknown function's coefficients have a score each, so that its evidence has a closed form.
 
 use crate::diagnose::error::DiagnoseError;
-use crate::diagnose::hypotheses::term::{Start, Term};
+use crate::diagnose::hypotheses::term::{Start, Term, marks};
 use crate::diagnose::model::{Extended, Model};
 use crate::fit::evidence::{Laplace, laplace};
 use crate::fit::reference::Reference;
@@ -16,6 +16,8 @@ use std::sync::Arc;
 /// A term and its best starts.
 pub(in crate::diagnose) struct Promise {
     pub term: Arc<Term>,
+    /// Nats that the outputs themselves speak for it, beside what they speak for the model.
+    pub mark: f64,
     /// Best first.
     pub starts: Vec<Beginning>,
 }
@@ -37,7 +39,7 @@ impl Promise {
     /// The best gain in nats, that of a mark on the outputs included.
     pub fn nats(&self) -> f64 {
         let best = self.starts.first().map_or(0.0, |start| start.nats);
-        best + self.term.mark
+        best + self.mark
     }
 }
 
@@ -63,6 +65,7 @@ pub(in crate::diagnose) fn scan(
             starts.sort_by(|a, b| b.nats.total_cmp(&a.nats));
             Ok(Promise {
                 term: term.clone(),
+                mark: marks(model.terms.iter().chain([term])) - marks(&model.terms),
                 starts,
             })
         })
@@ -143,7 +146,7 @@ pub(in crate::diagnose) fn functions<'a>(
                 else {
                     continue;
                 };
-                let gain = log_evidence - model.log_evidence;
+                let gain = log_evidence + marks(&model.terms) - model.log_evidence;
                 if best.as_ref().is_none_or(|(b, ..)| gain > *b) {
                     best = Some((gain, found, theta));
                 }

@@ -5,7 +5,7 @@ use super::refit::{CARRIED, Effort, fit_annealed, fit_function, fit_promise, lou
 use super::scan::{Promise, functions, scan};
 use super::valleys::leave_valleys;
 use crate::diagnose::error::DiagnoseError;
-use crate::diagnose::hypotheses::term::{Nature, Term};
+use crate::diagnose::hypotheses::term::{Nature, Term, marks};
 use crate::diagnose::model::Model;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::climb::climb;
@@ -148,7 +148,7 @@ pub(in crate::diagnose) fn listed<'a>(
     // A filter sees rounding by its first two moments, and may be worse off with it than with louder noise; the values bear its mark
     // all the same.
     for found in &mut all {
-        let mark = found.last().mark;
+        let mark = marks(&found.terms) - marks(&model.terms);
         if mark > 0.0 {
             found.gain = found.gain.max(floor + mark);
         }

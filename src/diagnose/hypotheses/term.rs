@@ -8,6 +8,7 @@ use crate::effect::{Effect, EffectKey, Magnitude, augment_short};
 use crate::fit::axis::Axis;
 use crate::twin::{Twin, fix};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Kind of hypothesis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,6 +70,16 @@ pub(in crate::diagnose) struct Term {
     pub variables: Vec<(String, f64, f64)>,
     /// Nats that the outputs themselves speak for it.
     pub mark: f64,
+}
+
+/// Nats that the outputs themselves speak for terms together. Repeated values are one mark of a sensor, whatever limits or rounds it.
+pub(in crate::diagnose) fn marks<'t>(terms: impl IntoIterator<Item = &'t Arc<Term>>) -> f64 {
+    let mut clearest: BTreeMap<&str, f64> = BTreeMap::new();
+    for term in terms {
+        let mark = clearest.entry(&term.target).or_default();
+        *mark = mark.max(term.mark);
+    }
+    clearest.values().sum()
 }
 
 impl Term {
@@ -157,4 +168,45 @@ pub(in crate::diagnose) fn with_terms<'t>(
         Part::Function(function) => with_function(twin, function),
         Part::Effect { .. } => twin,
     }))
+}
+
+#[cfg(test)]
+pub(in crate::diagnose) mod fixture {
+    use super::*;
+    use crate::effect::Catalogue;
+
+    /// A term of this nature without magnitudes, which outputs speak for by so many nats.
+    pub fn wave(nature: Nature, target: &str, mark: f64) -> Term {
+        let effect = Catalogue::default().effect("periodic-disturbance", "h1");
+        let part = Part::Effect {
+            effect: effect.unwrap(),
+            held: BTreeMap::new(),
+            kept: None,
+        };
+        Term {
+            id: "wave".into(),
+            target: target.into(),
+            nature,
+            part,
+            axes: vec![],
+            family: None,
+            starts: vec![],
+            variables: vec![],
+            mark,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A rounded output repeats its highest value, too: that counts once, for rounding or for a limit.
+    #[test]
+    fn a_sensor_bears_one_mark() {
+        let term = |target, mark| Arc::new(fixture::wave(Nature::Listed, target, mark));
+        let terms = [term("a", 12.0), term("a", 12.0), term("b", 5.0)];
+        assert_eq!(marks(&terms), 17.0);
+        assert_eq!(marks(&terms[..1]), 12.0);
+    }
 }

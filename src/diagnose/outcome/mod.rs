@@ -328,7 +328,7 @@ pub struct Shrinkage {
     pub after: Option<f64>,
     /// Error by noise alone: what records simulated from the accepted twin have.
     pub floor: Option<f64>,
-    /// Share of the expected squared error that closes ([`Horizon::closed`]).
+    /// Share of the expected squared error that closes ([`Horizon::closed`]); none where its interval is too wide for one number.
     pub closed: Option<f64>,
     /// 90 % interval of the share, from records that the accepted twin simulates; not clamped.
     pub interval: Option<[f64; 2]>,
@@ -358,7 +358,7 @@ impl Shrinkage {
 
     /// Errors after and of noise alone, where these are too close for a share.
     pub(crate) fn hidden_by_noise(&self) -> Option<(f64, f64)> {
-        self.after.zip(self.floor).filter(|_| self.closed.is_none())
+        (self.after.zip(self.floor)).filter(|_| self.interval.is_none())
     }
 }
 

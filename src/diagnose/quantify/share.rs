@@ -239,6 +239,10 @@ pub(in crate::diagnose) fn shrinkage(
         result.horizon = horizon.seconds;
     }
     result.interval = compared.interval(&before, &after, &draws, rows, noise.child("share"))?;
+    let is_narrow = |[low, high]: [f64; 2]| high - low < Thresholds::WIDEST;
+    result.closed = result
+        .closed
+        .filter(|_| result.interval.is_some_and(is_narrow));
     let error = |p: &Predictor<'_>| compared.error(shown, p, rows);
     result.unfitted = match &unfitted {
         Some(unfitted) => error(unfitted)?,

@@ -4,6 +4,7 @@ mod headline;
 mod html;
 mod json;
 mod pictures;
+mod share;
 mod step;
 mod story;
 mod text;

@@ -2,6 +2,7 @@
 
 use super::headline::{SAID, headline};
 use super::json::NEXT_INPUT;
+use super::share::share_with_interval;
 use super::step::step_setting;
 use crate::diagnose::{Decision, Diagnosis, EffectFit, Verdict};
 use crate::report::digits::{chance, percent, short, unit_suffix};
@@ -96,17 +97,11 @@ fn how_far(diagnosis: &Diagnosis) -> Option<String> {
     if s.hidden_by_noise().is_some() {
         return Some("Noise hides how much of the gap closes.".to_owned());
     }
-    let (closed, [low, high]) = (s.closed?, s.interval?);
     let ahead = match s.horizon {
         Some(seconds) => format!("{} s ahead", short(seconds)),
         None => "of the free run".to_owned(),
     };
-    Some(format!(
-        "{} of the gap {ahead} closes ({} to {}).",
-        percent(closed),
-        percent(low),
-        percent(high)
-    ))
+    Some(share_with_interval(s, &format!(" of the gap {ahead} closes"))? + ".")
 }
 
 /// Advice on what to do.

@@ -2,11 +2,11 @@
 
 use super::headline::{accepted_places, few, headline, rivals};
 use super::json::NEXT_INPUT;
+use super::share::{closed_sentence, no_share};
 use super::step::step_setting;
 use super::story::{effects, next};
 use crate::diagnose::{
-    Cause, Decision, Detection, Diagnosis, Discovery, EffectFit, NextInput, RIVALS, SHORTEST_SPLIT,
-    Shrinkage,
+    Cause, Decision, Detection, Diagnosis, Discovery, EffectFit, NextInput, RIVALS,
 };
 use crate::report::digits::{Digits, chance, error, percent, probability, short, unit_suffix};
 use crate::report::parameters::ParameterRow;
@@ -207,50 +207,6 @@ pub(super) fn remains_sentence(cause: &Cause) -> Option<String> {
         _ => String::new(),
     };
     Some(said + &alike)
-}
-
-/// Returns the name of the measure with its horizon.
-pub(super) fn measure(s: &Shrinkage) -> String {
-    match (s.metric, s.horizon) {
-        (Shrinkage::LOG_SCORE, _) => "Log density of a sample, in nats".into(),
-        (_, Some(seconds)) => format!("Error of predictions {} s ahead", short(seconds)),
-        (_, None) => "Error of the free run".into(),
-    }
-}
-
-/// Returns errors on held-out data before and after, and the share of the gap closed.
-pub(super) fn closed_sentence(s: &Shrinkage) -> String {
-    let mut text = format!("{}, {}: {}", measure(s), s.held_out, short(s.before));
-    if let Some(after) = s.after {
-        text.push_str(&format!(" → {}", short(after)));
-    }
-    if s.metric != Shrinkage::LOG_SCORE {
-        text.push_str(" deviations of the output");
-    }
-    if let Some(floor) = s.floor {
-        text.push_str(&format!(", noise alone {}", short(floor)));
-    }
-    if let (Some(closed), Some(ends)) = (s.closed, s.interval) {
-        let (closed, [low, high]) = (percent(closed), ends.map(percent));
-        text.push_str(&format!("; {closed} of the gap closed ({low} to {high})"));
-    }
-    if s.hidden_by_noise().is_some() {
-        text.push_str("; too near to noise for a share of the gap");
-    }
-    text + "."
-}
-
-/// Returns the reason for missing errors on held-out data.
-pub(super) fn no_share(diagnosis: &Diagnosis) -> String {
-    if diagnosis.interrupted {
-        return "No share of the gap closed: the work was interrupted before.".into();
-    }
-    if diagnosis.validation_runs.is_none() && diagnosis.free_runs.times.len() < SHORTEST_SPLIT {
-        return format!(
-            "No share of the gap closed: the record is too short to hold data back. Give --validation, or a record of at least {SHORTEST_SPLIT} samples."
-        );
-    }
-    "No share of the gap closed: the free run on the held-out data diverges.".into()
 }
 
 /// Returns the first terms of the missing function.

@@ -3,7 +3,7 @@
 use crate::diagnose::{Diagnosis, Shrinkage};
 use crate::report::digits::short;
 use crate::report::gap::pictures;
-use crate::report::gap::text::{closed_sentence, no_share};
+use crate::report::gap::share::{closed_sentence, no_share};
 use crate::report::page::{Section, figure, paragraph};
 
 pub(super) fn section_of(diagnosis: &Diagnosis) -> Section {

@@ -3,8 +3,8 @@
 use crate::diagnose::{Diagnosis, Shrinkage};
 use crate::math::median;
 use crate::report::chart::{Bar, BarChart, BarGroup};
-use crate::report::digits::{percent, short};
-use crate::report::gap::text::measure;
+use crate::report::digits::short;
+use crate::report::gap::share::{measure, share_with_interval};
 
 /// Errors on held-out data at the headline's horizon, and the share of the gap that closes; `None` without such data, and for effects
 /// that move no prediction.
@@ -31,11 +31,9 @@ pub fn extent(diagnosis: &Diagnosis) -> Option<String> {
         None,
         bars,
     )];
-    if let (Some(closed), Some(ends)) = (s.closed, s.interval) {
-        let [low, high] = ends.map(percent);
-        let note = format!("{} ({low} to {high})", percent(closed));
+    if let (Some(note), Some(ends)) = (share_with_interval(s, ""), s.interval) {
         let bars = vec![
-            Bar::new("closed, 90 % interval", closed, &note)
+            Bar::new("closed, 90 % interval", s.closed.unwrap_or(f64::NAN), &note)
                 .clear(true)
                 .interval(Some(ends)),
         ];
