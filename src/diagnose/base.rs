@@ -13,7 +13,7 @@ use super::step::FinerStep;
 use super::thresholds::Thresholds;
 use crate::effect::{TargetKind, targets};
 use crate::fit::axis::Axis;
-use crate::fit::climb::{Fitted, fit};
+use crate::fit::climb::{Fitted, climb, fit};
 use crate::fit::problem::Problem;
 use crate::fit::starts::{base_fit, polish, search};
 use crate::likelihood::Measured;
@@ -132,6 +132,20 @@ impl<'a> Base<'a> {
         Self::of(model, self.noisy.clone(), self.noises.clone(), self.step).map(Some)
     }
 
+    /// The twin where its fit inside the prior ends, if its own has left that: what is missing may have driven it out. `None` for a black
+    /// box, whose fits cost too much.
+    pub fn inside(&self) -> Result<Option<Model<'a>>, DiagnoseError> {
+        let problem = &self.model.problem;
+        if problem.is_simulated() || beyond(&self.model) == 0 {
+            return Ok(None);
+        }
+        let Some(fitted) = fitted_inside(&self.model)? else {
+            return Ok(None);
+        };
+        let fitted = climb(problem, &fitted.theta, 0)?;
+        Ok(fitted.and_then(|fitted| self.model.refitted(fitted)))
+    }
+
     /// The fitted twin with its units, as terms are made from it.
     pub fn library(&self) -> Library<'_> {
         Library {
@@ -195,29 +209,40 @@ fn inside<'a>(problem: &Problem<'a>) -> Problem<'a> {
     Problem::new(problem.twin.clone(), axes, problem.records)
 }
 
+/// Number of the twin's own parameters outside their prior.
+fn beyond(model: &Model<'_>) -> usize {
+    let theta = model.theta();
+    let space = model.problem.twin.parameters();
+    (space.iter().zip(&theta))
+        .filter(|(p, v)| p.role == Role::Parameter && !p.prior.contains(**v))
+        .count()
+}
+
+/// The best fit with the twin's own parameters within their prior box.
+fn fitted_inside(model: &Model<'_>) -> Result<Option<Fitted>, DiagnoseError> {
+    let boxed = inside(&model.problem);
+    let starts = [model.fitted.theta.clone(), boxed.centre()];
+    Ok(fit(&boxed, &starts, INSIDE)?)
+}
+
 /// Tests whether θ lies outside its prior box: likelihood ratio of the best θ anywhere over the best inside. Returns the model inside as
 /// well.
 pub(in crate::diagnose) fn left_the_prior<'a>(
     model: &Model<'a>,
     alpha: f64,
 ) -> Result<(bool, Option<Model<'a>>), DiagnoseError> {
-    let (problem, fitted) = (&model.problem, &model.fitted);
-    let space = problem.twin.parameters();
-    let theta = model.theta();
-    let own = || (space.iter().zip(&theta)).filter(|(p, _)| p.role == Role::Parameter);
-    let beyond = own().filter(|(p, v)| !p.prior.contains(**v)).count();
+    let beyond = beyond(model);
     if beyond == 0 {
         return Ok((false, None));
     }
-    let boxed = inside(problem);
-    let starts = [fitted.theta.clone(), boxed.centre()];
-    let within: Option<Fitted> = fit(&boxed, &starts, INSIDE)?;
+    let within = fitted_inside(model)?;
     let ratio = within.as_ref().map_or(f64::INFINITY, |w| {
-        2.0 * (fitted.log_likelihood - w.log_likelihood)
+        2.0 * (model.fitted.log_likelihood - w.log_likelihood)
     });
     // As many bounds as bind are what chance can gain from.
     let limit =
         ChiSquared::new(beyond as f64).map_or(f64::INFINITY, |c| c.inverse_cdf(1.0 - alpha));
+    let boxed = inside(&model.problem);
     let within = within.and_then(|w| Model::bare(model.base, boxed, w, model.by_bic));
     Ok((ratio > limit, within))
 }

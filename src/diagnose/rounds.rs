@@ -186,7 +186,14 @@ fn explored<'a, R>(
         noise: &noise,
         unknown: &unlisted,
     };
-    let mut findings = explore(&base.model, &terms, before, settings, progress)?;
+    let mut findings = explore(
+        &base.model,
+        base.inside()?.as_ref(),
+        &terms,
+        before,
+        settings,
+        progress,
+    )?;
     if !findings.is_partial {
         match again(study, &base, &findings, settings, rounds, progress, then) {
             Ok(Some(found)) => return Ok(found),

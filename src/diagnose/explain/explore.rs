@@ -1,7 +1,7 @@
 //! The order of the search: single explanations, what they leave, pairs.
 
 use super::findings::Findings;
-use super::found::{Found, improve, sort};
+use super::found::{Found, fitted, improve, sort};
 use super::noise::{instead_of_second, with_noise};
 use super::pairs::{FIRST, SINGLES, alone, pairs};
 use super::search::{Breadth, FEW, listed, unknown};
@@ -18,9 +18,11 @@ use std::sync::Arc;
 /// Steps of the search that are reported: functions, effects, noise, what effects leave, pairs.
 const STEPS: usize = 5;
 
-/// Finds out what explains the records beside the twin; stops early where nothing does.
+/// Finds out what explains the records beside the twin; stops early where nothing does. `inside` is the twin with θ inside its prior, if
+/// its fit has left it.
 pub(in crate::diagnose) fn explore<'a>(
     base: &Model<'a>,
+    inside: Option<&Model<'a>>,
     terms: &Terms<'_>,
     before: Before<'_, 'a>,
     settings: &DiagnoseSettings,
@@ -29,8 +31,11 @@ pub(in crate::diagnose) fn explore<'a>(
     let stage = progress.stage("explain", STEPS);
     let breadth = Breadth::of(base, settings.quick);
     let (mut findings, several) = match before {
-        Before::Nothing => (one_by_one(base, terms, &[], breadth, &stage)?, None),
-        Before::Worse(old) => (one_by_one(base, terms, &old.listed, breadth, &stage)?, None),
+        Before::Nothing => (one_by_one(base, inside, terms, &[], breadth, &stage)?, None),
+        Before::Worse(old) => (
+            one_by_one(base, inside, terms, &old.listed, breadth, &stage)?,
+            None,
+        ),
         Before::OtherStep(old, origin) => carried_on(old, origin, base, terms, breadth, &stage)?,
     };
     findings.is_partial = settings.ends(stage.tick())?;
@@ -109,6 +114,7 @@ fn carried_on<'a>(
 /// Unknown functions and effects alone, and other kinds of noise; `old` are fits of effects that may be better.
 fn one_by_one<'a>(
     base: &Model<'a>,
+    inside: Option<&Model<'a>>,
     terms: &Terms<'_>,
     old: &[Found<'a>],
     breadth: Breadth,
@@ -117,6 +123,10 @@ fn one_by_one<'a>(
     let origin = base.log_evidence;
     let first = (terms.unknown)(&[]);
     let mut unknown_alone = unknown(base, &first, origin, breadth)?;
+    if let Some(inside) = inside {
+        let others = unknown(inside, &first, origin, breadth.few())?;
+        improve(&mut unknown_alone, fitted(others));
+    }
     stage.tick()?;
     let best = unknown_alone.first().map_or(0.0, |f| f.gain);
     let breadth = breadth.for_gap(best);
@@ -124,10 +134,18 @@ fn one_by_one<'a>(
         true => breadth.of_all(),
         false => breadth,
     };
-    let mut singles = listed(base, terms.listed, origin, &[], looked)?;
+    let alone = |breadth: Breadth| -> Result<Vec<Found<'a>>, DiagnoseError> {
+        let mut all = listed(base, terms.listed, origin, &[], breadth.afresh())?;
+        if let Some(inside) = inside {
+            let others = listed(inside, terms.listed, origin, &[], breadth)?;
+            improve(&mut all, fitted(others));
+        }
+        Ok(all)
+    };
+    let mut singles = alone(looked)?;
     let top = singles.first().map_or(0.0, |f| f.gain);
     if best <= Thresholds::NULL_LIKE && top > Thresholds::NULL_LIKE {
-        singles = listed(base, terms.listed, origin, &[], breadth.of_all())?;
+        singles = alone(breadth.of_all())?;
     }
     let refitted =
         (old.iter().filter_map(|found| found.model.clone())).map(|model| Found::of(model, origin));

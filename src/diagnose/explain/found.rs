@@ -56,6 +56,11 @@ pub(in crate::diagnose) fn own_theta(found: &Found<'_>) -> Option<Vec<f64>> {
     Some(model.theta()[..d].to_vec())
 }
 
+/// Those that were fitted, of fits from another θ: what those promise counts what θ gains on its way back.
+pub(super) fn fitted<'a>(all: Vec<Found<'a>>) -> impl Iterator<Item = Found<'a>> {
+    all.into_iter().filter(|found| found.model.is_some())
+}
+
 /// Takes the better ones of the same terms, and adds none; best first.
 pub(super) fn improve<'a>(all: &mut [Found<'a>], others: impl IntoIterator<Item = Found<'a>>) {
     for found in others {

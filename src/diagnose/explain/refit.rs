@@ -24,6 +24,10 @@ pub(in crate::diagnose) struct Effort {
 const HELD: usize = 6;
 const RELEASED: usize = 40;
 
+/// Iterations of a fit from the prior's centre, and starts of a term with a time, a delay or a shape.
+const AFRESH: usize = 10;
+const AFRESH_SHAPES: usize = 4;
+
 /// Most iterations of the fits that are carried on: they end as soon as a step promises nothing, most of them after a few.
 pub(super) const CARRIED: usize = 60;
 
@@ -56,6 +60,25 @@ pub(in crate::diagnose) fn fit_promise<'a>(
     let best = fit(&extended.problem, &from, effort.iterations)?;
     let problem = extended.problem.clone();
     Ok(best.and_then(|fitted| extended.fitted(model.base, fitted, problem)))
+}
+
+/// Fits a promise from the prior's centre with loud noise: the fit of the model alone may have gone where the term is of no use.
+pub(in crate::diagnose) fn fit_afresh<'a>(
+    model: &Model<'a>,
+    promise: &Promise,
+) -> Result<Option<Model<'a>>, DiagnoseError> {
+    let extended = model.extend(&promise.term)?;
+    let problem = extended.problem.clone();
+    let centre = problem.begin(&problem.centre());
+    let starts = match promise.term.shape() {
+        Some(_) => AFRESH_SHAPES,
+        None => 1,
+    };
+    let from: Vec<Vec<f64>> = (promise.starts.iter().take(starts))
+        .map(|start| model.beside_at(&extended, &centre, &start.m))
+        .collect();
+    let fitted = fit(&problem, &from, AFRESH)?;
+    Ok(fitted.and_then(|fitted| extended.fitted(model.base, fitted, problem)))
 }
 
 /// The model with its noise held loud, θ fitted to that: predictions then hardly reach beyond a row, and the likelihood has no narrow

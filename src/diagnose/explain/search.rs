@@ -1,7 +1,7 @@
 //! Search for what a model lacks: all hypotheses are screened, the promising ones refitted.
 
 use super::found::{Found, own_theta, sort};
-use super::refit::{CARRIED, Effort, fit_annealed, fit_function, fit_promise, loudly};
+use super::refit::{CARRIED, Effort, fit_afresh, fit_annealed, fit_function, fit_promise, loudly};
 use super::scan::{Promise, functions, scan};
 use super::valleys::leave_valleys;
 use crate::diagnose::error::DiagnoseError;
@@ -40,6 +40,8 @@ pub(in crate::diagnose) struct Breadth {
     pub least: f64,
     /// True where much is missing, so that fits begin with loud noise, too.
     pub deep: bool,
+    /// True if fits of listed effects begin at the prior's centre, too.
+    pub afresh: bool,
     /// True if pairs of effects are searched.
     pub pairs: bool,
 }
@@ -54,6 +56,7 @@ impl Breadth {
             functions: if few { 2 } else { FUNCTIONS },
             least: 2.5,
             deep: false,
+            afresh: false,
             pairs: !quick,
         }
     }
@@ -62,6 +65,14 @@ impl Breadth {
     pub fn for_gap(self, nats: f64) -> Self {
         Self {
             deep: nats > Thresholds::DEEP && self.annealed > 0,
+            ..self
+        }
+    }
+
+    /// The same, fits from the prior's centre as well, where a likelihood is cheap.
+    pub fn afresh(self) -> Self {
+        Self {
+            afresh: self.annealed > 0,
             ..self
         }
     }
@@ -128,16 +139,21 @@ pub(in crate::diagnose) fn listed<'a>(
     let promises = scan(model, terms)?;
     let found = |models: Vec<Model<'a>>| models.into_iter().map(|model| Found::of(model, origin));
     let mut all: Vec<Found<'a>> = found(first_fits(model, &promises, thetas, breadth)?).collect();
+    let mut others = match breadth.afresh {
+        true => fresh_fits(model, &promises)?,
+        false => vec![],
+    };
     if breadth.deep
         && let Some(loud) = loudly(model)?
     {
-        for other in found(annealed_fits(model, &loud, terms, breadth)?) {
-            let is_same = |own: &&mut Found<'a>| Arc::ptr_eq(own.last(), other.last());
-            match all.iter_mut().find(is_same) {
-                Some(own) if own.gain >= other.gain => {}
-                Some(own) => *own = other,
-                None => all.push(other),
-            }
+        others.extend(annealed_fits(model, &loud, terms, breadth)?);
+    }
+    for other in found(others) {
+        let is_same = |own: &&mut Found<'a>| Arc::ptr_eq(own.last(), other.last());
+        match all.iter_mut().find(is_same) {
+            Some(own) if own.gain >= other.gain => {}
+            Some(own) => *own = other,
+            None => all.push(other),
         }
     }
     sort(&mut all);
@@ -184,6 +200,17 @@ fn first_fits<'a>(
     };
     let fits: Vec<Option<Model<'a>>> = (chosen.par_iter())
         .map(|promise| fit_promise(model, promise, thetas, effort))
+        .collect::<Result<_, DiagnoseError>>()?;
+    Ok(fits.into_iter().flatten().collect())
+}
+
+/// Fits of all terms from the prior's centre: beside the twin where it is, the right one may promise nothing.
+fn fresh_fits<'a>(
+    model: &Model<'a>,
+    promises: &[Promise],
+) -> Result<Vec<Model<'a>>, DiagnoseError> {
+    let fits: Vec<Option<Model<'a>>> = (promises.par_iter())
+        .map(|promise| fit_afresh(model, promise))
         .collect::<Result<_, DiagnoseError>>()?;
     Ok(fits.into_iter().flatten().collect())
 }

@@ -13,8 +13,11 @@ use rayon::prelude::*;
 const PLACES: usize = 2;
 /// Iterations before a new start is compared with the old end.
 const ITERATIONS: usize = 12;
-/// Samples by which a time moves: the likelihood has a kink at each.
-const MOVES: [f64; 4] = [-1.0, -0.5, 0.5, 1.0];
+/// Samples of the first move of a time, doubled up to a quarter of the distance between the times that are tried: the likelihood has a
+/// kink at each sample, and θ moves with the time.
+const MOVE: f64 = 0.5;
+/// Most times that the best effects move on.
+const ROUNDS: usize = 6;
 
 /// Fits effects again that may be better, `all` being sorted, best first: from where the same law ended at places where it explains more,
 /// with either sign of its size; the best ones from times nearby.
@@ -44,7 +47,7 @@ fn again<'a>(
     before: &[Found<'a>],
     least: f64,
 ) -> Result<Option<Found<'a>>, DiagnoseError> {
-    let (Some(own), Some(shape)) = (&found.model, found.last().shape()) else {
+    let Some(shape) = found.last().shape() else {
         return Ok(None);
     };
     let term = found.last();
@@ -66,7 +69,30 @@ fn again<'a>(
     if starts.is_empty() {
         return Ok(None);
     }
-    let extended = model.extend(term)?;
+    let mut best = begun_again(model, found, &starts)?;
+    for _ in 1..ROUNDS {
+        let Some(old) = best.as_ref().filter(|old| old.gain > least) else {
+            break;
+        };
+        let next = begun_again(model, old, &nearby(old, term))?;
+        match next.filter(|next| next.gain > old.gain + Thresholds::BETTER) {
+            Some(next) => best = Some(next),
+            None => break,
+        }
+    }
+    Ok(best)
+}
+
+/// The best fit from these θ and magnitudes; `None` where none is better than its own.
+fn begun_again<'a>(
+    model: &Model<'a>,
+    found: &Found<'a>,
+    starts: &[(Vec<f64>, Vec<f64>)],
+) -> Result<Option<Found<'a>>, DiagnoseError> {
+    let Some(own) = &found.model else {
+        return Ok(None);
+    };
+    let extended = model.extend(found.last())?;
     let from: Vec<Vec<f64>> = (starts.iter())
         .map(|(theta, m)| extended.from(theta, model.beside(&extended, m)))
         .collect();
@@ -90,12 +116,16 @@ fn nearby(found: &Found<'_>, term: &Term) -> Vec<(Vec<f64>, Vec<f64>)> {
     else {
         return vec![];
     };
-    let dt = model.problem.records[0].drive().dt();
+    let record = &model.problem.records[0];
+    let longest = 0.25 * record.samples() as f64 / (Thresholds::TIMES + 1) as f64;
+    let moves: Vec<f64> = std::iter::successors(Some(MOVE), |samples| Some(2.0 * samples))
+        .take_while(|samples| *samples <= longest.max(2.0 * MOVE))
+        .collect();
     let mut all = vec![];
     for i in term.times() {
-        for samples in MOVES {
+        for samples in moves.iter().flat_map(|samples| [-samples, *samples]) {
             let mut m = m.clone();
-            m[i] += samples * dt;
+            m[i] += samples * record.drive().dt();
             all.push((theta.clone(), m));
         }
     }
