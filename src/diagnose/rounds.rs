@@ -2,7 +2,7 @@
 
 use super::base::Base;
 use super::error::DiagnoseError;
-use super::explain::explore::{Before, explore, what_is_left};
+use super::explain::explore::{Before, STEPS, explore, singles, what_is_left};
 use super::explain::findings::{Chances, Findings};
 use super::explain::search::{Breadth, listed};
 use super::explain::terms::Terms;
@@ -10,6 +10,7 @@ use super::hypotheses::noise::kinds;
 use super::hypotheses::scales::Scales;
 use super::hypotheses::term::Term;
 use super::hypotheses::{not_tested, shared, unknown};
+use super::model::Model;
 use super::settings::{Ablation, DiagnoseSettings};
 use super::step::{FinerStep, finer_step};
 use super::thresholds::Thresholds;
@@ -17,10 +18,13 @@ use crate::likelihood::measured;
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::study::Study;
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Share of the best effect's evidence below which what a finer step explains does not change which effects stand out.
 const MINOR: f64 = 1.0 / 3.0;
+/// Explanations of each kind that are carried on with a finer step before a search with it.
+const CARRIED: usize = 3;
 /// Most kinds of noise that are added to the twin's own.
 const ROUNDS: usize = 2;
 
@@ -97,6 +101,9 @@ fn likelier_with_step<R>(
     let Some((step, _)) = finer_step(&own.base.model, least, top)? else {
         return Ok(None);
     };
+    if !helps_explanations(own, step)? {
+        return Ok(None);
+    }
     let least = own.log_evidence() + Thresholds::STEP_WINS;
     let then = |other: Explored<'_, '_>| {
         let is_likelier = other.log_evidence() > least;
@@ -107,6 +114,36 @@ fn likelier_with_step<R>(
     with_step(
         own.study, own.base, finer, nothing, settings, progress, &then,
     )
+}
+
+/// Returns whether the twin or one of the best explanations, each carried on with a finer step, is likelier than all are with their own.
+fn helps_explanations(own: &Explored<'_, '_>, step: FinerStep) -> Result<bool, DiagnoseError> {
+    let model = &own.base.model;
+    let Some(twin) = step.of(model.base) else {
+        return Ok(false);
+    };
+    let findings = &own.findings;
+    let all = [&findings.listed, &findings.unknown, &findings.several];
+    let best =
+        (all.iter()).flat_map(|all| all.iter().filter_map(|f| f.model.clone()).take(CARRIED));
+    let known: Vec<Model<'_>> = std::iter::once(model.clone()).chain(best).collect();
+    let log_evidence = |model: &Model<'_>| model.log_evidence;
+    let least = known
+        .iter()
+        .map(log_evidence)
+        .fold(f64::NEG_INFINITY, f64::max);
+    let finer: Vec<bool> = (known.par_iter())
+        .map(|model| {
+            let problem = model.problem_of(&twin)?;
+            let finer = Model {
+                problem,
+                ..model.clone()
+            }
+            .carried_on()?;
+            Ok(finer.is_some_and(|finer| finer.log_evidence > least))
+        })
+        .collect::<Result<_, DiagnoseError>>()?;
+    Ok(finer.contains(&true))
 }
 
 /// The finer step that the records ask for. A gap may pass for one: an effect that is more probable, as one of all that are listed, is
@@ -122,7 +159,10 @@ fn step_of(
     };
     let model = &base.model;
     let terms = base.listed(study, settings)?;
-    let breadth = Breadth::of(model, settings.quick);
+    let breadth = Breadth {
+        listed: 2,
+        ..Breadth::of(model, settings.quick)
+    };
     let effects = listed(model, &terms, model.log_evidence, &[], breadth)?;
     let price = (effects.len() as f64 / Thresholds::LISTED).ln();
     let best = (effects.first()).filter(|effect| effect.gain - price > gain);
@@ -186,14 +226,24 @@ fn explored<'a, R>(
         noise: &noise,
         unknown: &unlisted,
     };
-    let mut findings = explore(
+    let stage = progress.stage("explain", STEPS);
+    let inside = base.inside()?;
+    let alone = singles(
         &base.model,
-        base.inside()?.as_ref(),
+        inside.as_ref(),
         &terms,
         before,
         settings,
-        progress,
+        &stage,
     )?;
+    // Beside an explanation the twin's own fit may have gone further than it went.
+    if let Some(better) = base.fitted_from(&alone.findings.thetas())? {
+        stage.finish();
+        let before = Before::Worse(&alone.findings, base.model.log_evidence);
+        return explored(study, better, before, settings, rounds, progress, then);
+    }
+    let mut findings = explore(alone, &base.model, &terms, settings, &stage)?;
+    stage.finish();
     if !findings.is_partial {
         match again(study, &base, &findings, settings, rounds, progress, then) {
             Ok(Some(found)) => return Ok(found),
@@ -227,7 +277,7 @@ fn again<'a, R>(
     then: &dyn Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
 ) -> Result<Option<R>, DiagnoseError> {
     if let Some(better) = base.fitted_from(&findings.thetas())? {
-        let before = Before::Worse(findings);
+        let before = Before::Worse(findings, base.model.log_evidence);
         return explored(study, better, before, settings, rounds, progress, then).map(Some);
     }
     if let Some(model) = findings.asks_for_noise().and_then(|f| f.model.as_ref()) {
@@ -241,7 +291,7 @@ fn again<'a, R>(
     // Beside a gap, noise levels are fitted loud, and hide the step, or that a finer one is still too long. A second effect may imitate
     // its error, and so may an effect that explains a little more than the right one.
     for model in findings.candidates().filter_map(|f| f.model.as_ref()) {
-        let finer = finer_step(model, Thresholds::STEP_SHOWS, findings.top())?;
+        let finer = finer_step(model, Thresholds::STEP_SHOWS, 0.0)?;
         let Some((step, gain)) = finer.filter(|(step, _)| base.step != Some(*step)) else {
             continue;
         };

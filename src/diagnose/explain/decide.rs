@@ -1,7 +1,7 @@
 //! Decision by posterior odds.
 //!
 //! ```text
-//! named : the largest log Z of what leaves nothing;  a larger set must be 2 nats better, an unknown function alone must not be better
+//! named : the largest log Z of what leaves nothing;  a larger set must be 2 nats better, an unknown function alone must not be better by 3
 //! partial: the largest log Z, where it leaves a third at most;  an unknown function alone must not be better by 15 %, nor all of them more
 //!          probable
 //! ```
@@ -72,15 +72,24 @@ pub(in crate::diagnose) fn decide(
             chosen = Some(best);
         }
     }
-    if chosen.is_some_and(|c| best_unknown > c.1) {
+    // A function of the effect's own variable holds the effect: it refutes its form only if it is clearly better.
+    if chosen.is_some_and(|c| best_unknown > c.1 + Thresholds::RIVALS) {
         chosen = None;
     }
+    let mut most = most_effects;
     if let Some((keys, _, _)) = chosen {
-        return named(findings, chances, keys, Decision::Named);
+        let conclusion = named(findings, chances, keys, Decision::Named);
+        if conclusion.decision != Decision::NoneOfThese || keys.len() == 1 {
+            return conclusion;
+        }
+        // A second effect that is no more probable than something unknown in its place: the first may explain most.
+        most = keys.len() - 1;
     }
     // Listed effects that explain most, beside something unknown, or with so little left that chance may have made it. What is inside a
     // black box has no functions to stand for it.
-    let best = (candidates.iter()).max_by(|a, b| a.1.total_cmp(&b.1));
+    let best = (candidates.iter())
+        .filter(|c| c.0.len() <= most)
+        .max_by(|a, b| a.1.total_cmp(&b.1));
     let kinds = &chances.kinds;
     if let Some((keys, own, left)) = best
         && has_equations
@@ -122,7 +131,7 @@ fn named(
         .sum();
     let alone = |key: &String| chances.effects.get(key).copied().unwrap_or(0.0);
     let refuted = keys.iter().any(|key| alone(key) < Thresholds::REFUTED);
-    if refuted || together < Thresholds::SAID * keys.len() as f64 {
+    if refuted || together < keys.len() as f64 - 1.0 + Thresholds::SAID {
         return Conclusion::none_of_these();
     }
     let decision = match decision {

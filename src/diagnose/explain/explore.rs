@@ -5,7 +5,7 @@ use super::found::{Found, fitted, improve, sort};
 use super::noise::{instead_of_second, with_noise};
 use super::pairs::{FIRST, SINGLES, alone, pairs};
 use super::search::{Breadth, FEW, listed, unknown};
-use super::terms::{Terms, on_top, scales};
+use super::terms::{Terms, of_keys, on_top, scales};
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::term::Term;
 use crate::diagnose::model::Model;
@@ -16,44 +16,105 @@ use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Steps of the search that are reported: functions, effects, noise, what effects leave, pairs.
-const STEPS: usize = 5;
+pub(in crate::diagnose) const STEPS: usize = 5;
 
-/// Finds out what explains the records beside the twin; stops early where nothing does. `inside` is the twin with θ inside its prior, if
-/// its fit has left it.
-pub(in crate::diagnose) fn explore<'a>(
+/// Looks for what explains the records alone: unknown functions, listed effects. `inside` is the twin with θ inside its prior, if its fit has
+/// left it.
+pub(in crate::diagnose) fn singles<'a>(
     base: &Model<'a>,
     inside: Option<&Model<'a>>,
     terms: &Terms<'_>,
     before: Before<'_, 'a>,
     settings: &DiagnoseSettings,
-    progress: &Progress,
-) -> Result<Findings<'a>, DiagnoseError> {
-    let stage = progress.stage("explain", STEPS);
+    stage: &Stage,
+) -> Result<Singles<'a>, DiagnoseError> {
     let breadth = Breadth::of(base, settings.quick);
-    let (mut findings, several) = match before {
-        Before::Nothing => (one_by_one(base, inside, terms, &[], breadth, &stage)?, None),
-        Before::Worse(old) => (
-            one_by_one(base, inside, terms, &old.listed, breadth, &stage)?,
-            None,
+    match before {
+        Before::Nothing => one_by_one(base, inside, terms, breadth, stage),
+        Before::Worse(old, origin) => beside_better(old, origin, base, terms, breadth, stage),
+        Before::OtherStep(old, origin) => carried_on(old, origin, base, terms, breadth, stage),
+    }
+}
+
+/// Adds other kinds of noise to single explanations, what those leave, and pairs; stops early where nothing is missing.
+pub(in crate::diagnose) fn explore<'a>(
+    found: Singles<'a>,
+    base: &Model<'a>,
+    terms: &Terms<'_>,
+    settings: &DiagnoseSettings,
+    stage: &Stage,
+) -> Result<Findings<'a>, DiagnoseError> {
+    let breadth = Breadth::of(base, settings.quick);
+    let Singles { findings, carried } = found;
+    let (mut findings, several) = match carried {
+        Some(carried) => (
+            Findings {
+                noise: carried.noise,
+                ..findings
+            },
+            Some(carried.several),
         ),
-        Before::OtherStep(old, origin) => carried_on(old, origin, base, terms, breadth, &stage)?,
+        None => {
+            let mut findings = findings;
+            wider(base, terms, breadth, &mut findings)?;
+            (with_noise(base, terms, breadth, findings)?, None)
+        }
     };
     findings.is_partial = settings.ends(stage.tick())?;
     if !settings.detection_only && !findings.is_partial {
-        findings = beside_each_other(findings, base, terms, breadth, several, settings, &stage)?;
+        findings = beside_each_other(findings, base, terms, breadth, several, settings, stage)?;
     }
-    stage.finish();
     Ok(findings)
+}
+
+/// Single explanations.
+pub(in crate::diagnose) struct Singles<'a> {
+    pub findings: Findings<'a>,
+    /// Those that a search with another step found beside them.
+    carried: Option<Carried<'a>>,
+}
+
+/// Pairs, and other kinds of noise.
+struct Carried<'a> {
+    several: Vec<Found<'a>>,
+    noise: Vec<Found<'a>>,
 }
 
 /// Knowledge from a search before.
 #[derive(Clone, Copy)]
 pub(in crate::diagnose) enum Before<'k, 'a> {
     Nothing,
-    /// Findings beside a worse fit of the same twin: fits that are better than the new ones are kept.
-    Worse(&'k Findings<'a>),
+    /// Findings beside a worse fit of the same twin, and log Z of that: its fits are kept unless new ones are better.
+    Worse(&'k Findings<'a>, f64),
     /// Findings beside the same twin with another step, and log Z of that twin: their fits are carried on.
     OtherStep(&'k Findings<'k>, f64),
+}
+
+/// Single explanations beside a better fit of the twin: fits from the prior's centre and from loud noise stay as they are, the others are begun
+/// again.
+fn beside_better<'a>(
+    old: &Findings<'a>,
+    old_origin: f64,
+    base: &Model<'a>,
+    terms: &Terms<'_>,
+    breadth: Breadth,
+    stage: &Stage,
+) -> Result<Singles<'a>, DiagnoseError> {
+    let origin = base.log_evidence;
+    let kept = |all: &[Found<'a>]| -> Vec<Found<'a>> {
+        let shifted = all.iter().cloned().map(|found| Found {
+            gain: found.gain + old_origin - origin,
+            ..found
+        });
+        fitted(shifted.collect()).collect()
+    };
+    let mut functions = unknown(base, &(terms.unknown)(&[]), origin, breadth.few())?;
+    improve(&mut functions, kept(&old.unknown));
+    stage.tick()?;
+    let mut effects = listed(base, terms.listed, origin, &[], breadth)?;
+    improve(&mut effects, kept(&old.listed));
+    stage.tick()?;
+    Ok(Singles::alone(functions, effects))
 }
 
 /// Carries the fits that are known with another step on from where they ended: single explanations, and pairs.
@@ -64,7 +125,7 @@ fn carried_on<'a>(
     terms: &Terms<'_>,
     breadth: Breadth,
     stage: &Stage,
-) -> Result<(Findings<'a>, Option<Vec<Found<'a>>>), DiagnoseError> {
+) -> Result<Singles<'a>, DiagnoseError> {
     let origin = base.log_evidence;
     let kept = |found: &Found<'_>| Found {
         terms: found.terms.clone(),
@@ -88,9 +149,10 @@ fn carried_on<'a>(
         sort(&mut all);
         Ok(all)
     };
-    let best: Vec<Arc<Term>> = (old.unknown.iter().take(FEW))
-        .filter_map(|found| found.terms.last().cloned())
-        .collect();
+    let last = |all: &[Found<'_>]| all.iter().map(|f| f.last().key()).collect::<Vec<String>>();
+    let best = last(&old.unknown[..old.unknown.len().min(FEW)]);
+    let seen = scales(&old.listed[..old.listed.len().min(2)])?;
+    let best = of_keys(&(terms.unknown)(&seen), &best);
     let mut functions = unknown(base, &best, origin, breadth.few())?;
     let others = old.unknown.iter().filter(|found| {
         let again = functions.iter().any(|f| f.keys() == found.keys());
@@ -99,27 +161,45 @@ fn carried_on<'a>(
     functions.extend(others.map(kept).collect::<Vec<_>>());
     sort(&mut functions);
     stage.tick()?;
-    let mut singles = carry_all(&old.listed)?;
+    let mut effects = carry_all(&old.listed)?;
     // Those that stand out are fitted afresh, too: the other step's error may have led them astray.
-    let best: Vec<Arc<Term>> = (singles.iter().take(SINGLES))
+    let near: Vec<Found<'a>> = (effects.iter().take(SINGLES))
         .filter(|found| found.gain > least)
-        .filter_map(|found| found.terms.last().cloned())
+        .cloned()
         .collect();
-    improve(&mut singles, listed(base, &best, origin, &[], breadth)?);
+    let best = of_keys(terms.listed, &last(&near));
+    improve(&mut effects, listed(base, &best, origin, &[], breadth)?);
     stage.tick()?;
-    let findings = with_noise(base, terms, breadth, singles, functions)?;
-    Ok((findings, Some(carry_all(&old.several)?)))
+    Ok(Singles {
+        carried: Some(Carried {
+            several: carry_all(&old.several)?,
+            noise: old.noise.iter().map(kept).collect(),
+        }),
+        ..Singles::alone(functions, effects)
+    })
 }
 
-/// Unknown functions and effects alone, and other kinds of noise; `old` are fits of effects that may be better.
+impl<'a> Singles<'a> {
+    fn alone(unknown: Vec<Found<'a>>, listed: Vec<Found<'a>>) -> Self {
+        Self {
+            findings: Findings {
+                listed,
+                unknown,
+                ..Findings::default()
+            },
+            carried: None,
+        }
+    }
+}
+
+/// Unknown functions and effects alone.
 fn one_by_one<'a>(
     base: &Model<'a>,
     inside: Option<&Model<'a>>,
     terms: &Terms<'_>,
-    old: &[Found<'a>],
     breadth: Breadth,
     stage: &Stage,
-) -> Result<Findings<'a>, DiagnoseError> {
+) -> Result<Singles<'a>, DiagnoseError> {
     let origin = base.log_evidence;
     let first = (terms.unknown)(&[]);
     let mut unknown_alone = unknown(base, &first, origin, breadth)?;
@@ -134,31 +214,43 @@ fn one_by_one<'a>(
         true => breadth.of_all(),
         false => breadth,
     };
-    let alone = |breadth: Breadth| -> Result<Vec<Found<'a>>, DiagnoseError> {
-        let mut all = listed(base, terms.listed, origin, &[], breadth.afresh())?;
+    // A fit that has nothing to answer for is where it should be.
+    let afresh = |breadth: Breadth, top: f64| match top > Thresholds::NULL_LIKE {
+        true => breadth.afresh(),
+        false => breadth,
+    };
+    let alone = |breadth: Breadth, top: f64| -> Result<Vec<Found<'a>>, DiagnoseError> {
+        let mut all = listed(base, terms.listed, origin, &[], afresh(breadth, top))?;
         if let Some(inside) = inside {
             let others = listed(inside, terms.listed, origin, &[], breadth)?;
             improve(&mut all, fitted(others));
         }
         Ok(all)
     };
-    let mut singles = alone(looked)?;
-    let top = singles.first().map_or(0.0, |f| f.gain);
+    let mut effects = alone(looked, best)?;
+    let top = effects.first().map_or(0.0, |f| f.gain);
     if best <= Thresholds::NULL_LIKE && top > Thresholds::NULL_LIKE {
-        singles = alone(breadth.of_all())?;
+        effects = alone(breadth.of_all(), top)?;
     }
-    let refitted =
-        (old.iter().filter_map(|found| found.model.clone())).map(|model| Found::of(model, origin));
-    improve(&mut singles, refitted);
-    let top = singles.first().map_or(0.0, |f| f.gain);
     stage.tick()?;
-    if top > Thresholds::WIDER {
-        // The twin that is misfitted may not go where the corrected one goes.
-        let seen = scales(&singles[..singles.len().min(2)])?;
-        let wider = unknown(base, &(terms.unknown)(&seen), origin, breadth.few())?;
-        improve(&mut unknown_alone, wider);
+    Ok(Singles::alone(unknown_alone, effects))
+}
+
+/// Functions of the range that the corrected twin goes through, which the misfitted one may not.
+fn wider<'a>(
+    base: &Model<'a>,
+    terms: &Terms<'_>,
+    breadth: Breadth,
+    findings: &mut Findings<'a>,
+) -> Result<(), DiagnoseError> {
+    if findings.top() <= Thresholds::WIDER {
+        return Ok(());
     }
-    with_noise(base, terms, breadth, singles, unknown_alone)
+    let seen = scales(&findings.listed[..findings.listed.len().min(2)])?;
+    let terms = (terms.unknown)(&seen);
+    let wider = unknown(base, &terms, base.log_evidence, breadth.few())?;
+    improve(&mut findings.unknown, fitted(wider));
+    Ok(())
 }
 
 /// Adds what single effects leave, and pairs, which are searched unless they are given; stops where nothing is missing.
@@ -179,7 +271,9 @@ fn beside_each_other<'a>(
     let breadth = breadth.for_gap(findings.best_unknown());
     let few = breadth.few();
     let mut enough = false;
-    for i in 0..findings.listed.len().min(SINGLES) {
+    // With pairs known, what is left is asked at the end alone.
+    let asked = if several.is_none() { SINGLES } else { 0 };
+    for i in 0..findings.listed.len().min(asked) {
         let found = findings.listed[i].clone();
         if found.gain < top - Thresholds::CANDIDATES || !may_suffice(&found) {
             break;
@@ -242,13 +336,14 @@ pub(in crate::diagnose) fn what_is_left<'a>(
             break;
         }
     }
-    // What explains most may do so beside something unknown.
-    let is_outdone = best_pair - findings.price(2) > findings.top() + Thresholds::CANDIDATES;
-    if !enough
-        && !is_outdone
-        && let Some(best) = is_new(&findings)
-    {
+    // What explains most may do so beside something unknown, which is also a rival of the second effect of a pair.
+    if let Some(best) = is_new(&findings).filter(|_| !enough) {
         findings.add(&best, on_top(&best, terms, origin, few)?);
+    }
+    let pair = (findings.several.first()).filter(|pair| findings.wins(pair));
+    let first = pair.and_then(|pair| findings.likelier_of(pair)).cloned();
+    if let Some(first) = first.filter(|first| findings.left(&first.keys()).is_none()) {
+        findings.add(&first, on_top(&first, terms, origin, few)?);
     }
     findings.is_partial = settings.ends(stage.tick())?;
     Ok(findings)

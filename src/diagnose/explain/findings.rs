@@ -146,6 +146,12 @@ impl<'a> Findings<'a> {
         pair.gain - self.price(2) > self.top()
     }
 
+    /// The effect of a pair that explains more alone.
+    pub fn likelier_of(&self, pair: &Found<'_>) -> Option<&Found<'a>> {
+        let keys = pair.keys();
+        self.listed.iter().find(|f| keys.contains(&f.last().key()))
+    }
+
     /// Nats that so many effects together cost: that something else is missing beside the first, one of all that are listed, in either
     /// order; and what the first law's own form may leave.
     pub fn price(&self, count: usize) -> f64 {
@@ -243,7 +249,7 @@ impl<'a> Findings<'a> {
                 let second = Thresholds::SECOND.ln() + every.ln() - self.price(keys.len());
                 all.push(Weighed {
                     log_weight: each.ln() + second + found.gain,
-                    kind: Kind::Partial,
+                    kind: Kind::Partial(keys.len()),
                     places: places(found),
                 });
             }
@@ -262,13 +268,14 @@ impl<'a> Findings<'a> {
             log_evidence: whole,
             ..Chances::default()
         };
-        // Which set explains a part, the sets' own evidence says: what is beside them is not known well enough to choose by.
         let top = (all.iter())
             .filter(|h| matches!(h.kind, Kind::Listed(_)))
             .map(|h| h.log_weight)
             .fold(f64::NEG_INFINITY, f64::max);
         // Each set, its probability alone, and its weight among them.
         let mut sets: Vec<(Vec<String>, f64, f64)> = vec![];
+        // Probability of something unknown beside sets of each number of effects.
+        let mut beside: BTreeMap<usize, f64> = BTreeMap::new();
         let kinds = &mut chances.kinds;
         for hypothesis in all {
             let p = (hypothesis.log_weight - whole).exp();
@@ -278,17 +285,26 @@ impl<'a> Findings<'a> {
             }
             match hypothesis.kind {
                 Kind::Unknown => kinds.unknown += p,
-                Kind::Partial => kinds.partial += p,
+                Kind::Partial(count) => {
+                    kinds.partial += p;
+                    *beside.entry(count).or_default() += p;
+                }
                 Kind::Listed(keys) => {
                     kinds.listed += p;
                     sets.push((keys, p, (hypothesis.log_weight - top).exp()));
                 }
             }
         }
-        let shares: f64 = sets.iter().map(|(.., share)| share).sum();
-        for (keys, p, share) in sets {
+        // Which set of so many explains a part, the sets' own evidence says: what is beside them is not known well enough to choose by. What
+        // is unknown beside one effect says nothing for a second one.
+        for (keys, p, share) in &sets {
+            let alike = sets.iter().filter(|(other, ..)| other.len() == keys.len());
+            let shares: f64 = alike.map(|(.., share)| share).sum();
+            let part = beside
+                .get(&keys.len())
+                .map_or(0.0, |beside| beside * share / shares);
             for key in keys {
-                *chances.effects.entry(key).or_default() += p + kinds.partial * share / shares;
+                *chances.effects.entry(key.clone()).or_default() += p + part;
             }
         }
         chances
@@ -305,8 +321,8 @@ struct Weighed {
 enum Kind {
     /// Listed effects alone.
     Listed(Vec<String>),
-    /// Listed effects beside something unknown.
-    Partial,
+    /// So many listed effects beside something unknown.
+    Partial(usize),
     /// Something unknown alone.
     Unknown,
 }
@@ -378,6 +394,26 @@ mod tests {
         };
         assert_eq!(found(221.0), [200.0, 197.0]);
         assert_eq!(found(223.0), [223.0, 200.0, 197.0]);
+    }
+
+    /// A function beside the first effect is no reason to believe in the second.
+    #[test]
+    fn what_is_beside_one_effect_is_not_credited_to_a_pair() {
+        let single = |target: &str, gain| wave(Nature::Listed, target, gain);
+        let (first, second) = (single("h1", 50.0), single("h2", 10.0));
+        let mut pair = first.clone();
+        pair.terms.extend(second.terms.clone());
+        pair.gain = 66.0;
+        let mut findings = Findings {
+            several: vec![pair],
+            ..Findings::default()
+        };
+        findings.add(&first, Some(vec![wave(Nature::Function, "h2", 75.0)]));
+        let key = second.last().key();
+        findings.listed = vec![first, second];
+        let chances = findings.chances();
+        assert!(chances.kinds.partial > 0.9);
+        assert!(chances.effects[&key] < 0.1, "{}", chances.effects[&key]);
     }
 
     /// A wave of the flow explains what a wave of the level does, and takes no probability from it, unless it explains more.

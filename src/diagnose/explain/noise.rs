@@ -15,18 +15,15 @@ pub(super) fn with_noise<'a>(
     base: &Model<'a>,
     terms: &Terms<'_>,
     breadth: Breadth,
-    singles: Vec<Found<'a>>,
-    unknown: Vec<Found<'a>>,
+    findings: Findings<'a>,
 ) -> Result<Findings<'a>, DiagnoseError> {
     let (origin, every) = (base.log_evidence, breadth.of_all());
     let noise = listed(base, terms.noise, origin, &[], every)?;
     Ok(Findings {
         noise_pairs: noise_pairs(&noise, terms.noise, origin, every)?,
         noise,
-        noise_beside: noise_beside(&singles, terms.noise, origin, every)?,
-        listed: singles,
-        unknown,
-        ..Findings::default()
+        noise_beside: noise_beside(&findings.listed, terms.noise, origin, every)?,
+        ..findings
     })
 }
 
@@ -67,7 +64,7 @@ pub(super) fn instead_of_second(
     let mut best: Option<(Found<'_>, f64)> = None;
     for single in (findings.listed.iter()).filter(|f| keys.contains(&f.last().key())) {
         let Some(model) = &single.model else { continue };
-        let found = listed(model, terms.noise, origin, &[], breadth.of_all())?;
+        let found = listed(model, terms.noise, origin, &[], breadth.shallow().of_all())?;
         let Some(found) = found.into_iter().next() else {
             continue;
         };

@@ -3,7 +3,7 @@
 use super::findings::{Findings, leaves_nothing};
 use super::found::{Found, improve, keep, own_theta};
 use super::search::{Breadth, listed};
-use super::terms::Terms;
+use super::terms::{Terms, of_keys};
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::term::Term;
 use crate::diagnose::model::Model;
@@ -58,7 +58,7 @@ pub(super) fn pairs<'a>(
     }
     // A pair that wins has rivals: the second effect beside the rivals of the first.
     if let Some(pair) = all.first().filter(|pair| findings.wins(pair)).cloned() {
-        let second = &pair.terms[pair.terms.len() - 1..];
+        let second = of_keys(terms.listed, &[pair.last().key()]);
         let (keys, first) = (
             pair.keys(),
             findings.gain(&pair.keys()[..1]).unwrap_or(findings.top()),
@@ -66,7 +66,7 @@ pub(super) fn pairs<'a>(
         let rivals = (findings.listed.iter())
             .filter(|f| f.gain > first - Thresholds::RIVALS && !keys.contains(&f.last().key()));
         for model in rivals.filter_map(|f| f.model.as_ref()).take(SINGLES) {
-            keep(&mut all, listed(model, second, origin, &thetas, breadth)?);
+            keep(&mut all, listed(model, &second, origin, &thetas, breadth)?);
         }
     }
     all.truncate(Thresholds::PAIRS);
@@ -87,10 +87,7 @@ pub(super) fn alone<'a>(
         return Ok(());
     };
     let keys = pair.keys();
-    let own: Vec<Arc<Term>> = (terms.listed.iter())
-        .filter(|term| keys.contains(&term.key()))
-        .cloned()
-        .collect();
+    let own = of_keys(terms.listed, &keys);
     let thetas: Vec<Vec<f64>> = own_theta(pair).into_iter().collect();
     let again = listed(base, &own, origin, &thetas, breadth.of_all())?;
     improve(&mut findings.listed, again);

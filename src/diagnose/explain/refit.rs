@@ -96,25 +96,23 @@ pub(in crate::diagnose) fn loudly<'a>(
     }))
 }
 
-/// Fits a promise beside the loud model, the noise let down in steps to that of the model and then free.
-pub(in crate::diagnose) fn fit_annealed<'a>(
-    model: &Model<'a>,
-    loud: &Model<'a>,
+/// Fits a promise beside the loud model from its best starts, the noise let down half-way to that of the model.
+pub(in crate::diagnose) fn anneal(
+    model: &Model<'_>,
+    loud: &Model<'_>,
     promise: &Promise,
     starts: usize,
-) -> Result<Option<Model<'a>>, DiagnoseError> {
+) -> Result<Vec<Fitted>, DiagnoseError> {
     let held = loud.extend(&promise.term)?;
-    let free = model.extend(&promise.term)?;
+    let c = &held.problem.coordinates;
+    let quiet = (model.problem.coordinates).of(&model.fitted.theta);
+    let loudest = (loud.problem.coordinates).of(&loud.fitted.theta);
     let fits: Vec<Option<Fitted>> = (promise.starts.par_iter().take(starts))
         .map(|start| {
             let mut theta = begin(loud, &held, start)?;
+            let mut last = None;
             for share in [0.0, 0.5] {
-                let c = &held.problem.coordinates;
-                let (mut phi, quiet) = (
-                    c.of(&theta),
-                    model.problem.coordinates.of(&model.fitted.theta),
-                );
-                let loudest = loud.problem.coordinates.of(&loud.fitted.theta);
+                let mut phi = c.of(&theta);
                 for (j, axis) in loud.problem.axes.iter().enumerate() {
                     if axis.begin.is_some() {
                         phi[j] = (1.0 - share) * loudest[j] + share * quiet[j];
@@ -123,11 +121,25 @@ pub(in crate::diagnose) fn fit_annealed<'a>(
                 let Some(fitted) = climb(&held.problem, &c.theta(&phi), HELD)? else {
                     return Ok(None);
                 };
-                theta = fitted.theta;
+                theta.clone_from(&fitted.theta);
+                last = Some(fitted);
             }
-            Ok(climb(&free.problem, &theta, RELEASED)?)
+            Ok(last)
         })
         .collect::<Result<_, DiagnoseError>>()?;
+    Ok(fits.into_iter().flatten().collect())
+}
+
+/// Fits a promise from where its noise was let down half-way, noise free.
+pub(in crate::diagnose) fn release<'a>(
+    model: &Model<'a>,
+    promise: &Promise,
+    begun: &[Fitted],
+) -> Result<Option<Model<'a>>, DiagnoseError> {
+    let free = model.extend(&promise.term)?;
+    let fits: Vec<Option<Fitted>> = (begun.par_iter())
+        .map(|begun| climb(&free.problem, &begun.theta, RELEASED))
+        .collect::<Result<_, _>>()?;
     let best =
         (fits.into_iter().flatten()).reduce(|a, b| if b.objective > a.objective { b } else { a });
     let problem = free.problem.clone();

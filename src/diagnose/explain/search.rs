@@ -1,15 +1,18 @@
 //! Search for what a model lacks: all hypotheses are screened, the promising ones refitted.
 
 use super::found::{Found, own_theta, sort};
-use super::refit::{CARRIED, Effort, fit_afresh, fit_annealed, fit_function, fit_promise, loudly};
+use super::refit::{
+    CARRIED, Effort, anneal, fit_afresh, fit_function, fit_promise, loudly, release,
+};
 use super::scan::{Promise, functions, scan};
 use super::valleys::leave_valleys;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::term::{Nature, Term, marks};
 use crate::diagnose::model::Model;
 use crate::diagnose::thresholds::Thresholds;
-use crate::fit::climb::climb;
+use crate::fit::climb::{Fitted, climb};
 use crate::fit::evidence::log_mean;
+use crate::math::median;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -26,6 +29,9 @@ pub(super) const FEW: usize = 3;
 const AVERAGED: f64 = 2.0;
 /// Nats that the best of all frequencies is worth less than it looks, before a refit says how sharp it is.
 const PRICE_OF_FREQUENCY: f64 = 2.5;
+
+/// Nats below the best, with noise half-way down, from which an effect is given up: loud noise makes differences smaller than they will be.
+const LOST: f64 = 25.0;
 
 /// Numbers of hypotheses that are refitted.
 #[derive(Clone, Copy)]
@@ -73,6 +79,14 @@ impl Breadth {
     pub fn afresh(self) -> Self {
         Self {
             afresh: self.annealed > 0,
+            ..self
+        }
+    }
+
+    /// The same without fits from loud noise: what changes the noise itself has no valley that loud noise would fill.
+    pub fn shallow(self) -> Self {
+        Self {
+            deep: false,
             ..self
         }
     }
@@ -215,18 +229,29 @@ fn fresh_fits<'a>(
     Ok(fits.into_iter().flatten().collect())
 }
 
-/// The same from loud noise, of the terms that promise most there.
+/// The same from loud noise, of the terms that promise most there. Noise is let down to that of the model for those that are near the best by
+/// then.
 fn annealed_fits<'a>(
     model: &Model<'a>,
     loud: &Model<'a>,
     terms: &[Arc<Term>],
     breadth: Breadth,
 ) -> Result<Vec<Model<'a>>, DiagnoseError> {
-    let promises = scan(loud, terms)?;
-    let fits: Vec<Option<Model<'a>>> = (promises.par_iter())
+    let promises: Vec<Promise> = (scan(loud, terms)?.into_iter())
         .take(breadth.annealed)
         .filter(|promise| promise.nats() > breadth.least)
-        .map(|promise| fit_annealed(model, loud, promise, 2))
+        .collect();
+    let begun: Vec<Vec<Fitted>> = (promises.par_iter())
+        .map(|promise| anneal(model, loud, promise, 2))
+        .collect::<Result<_, DiagnoseError>>()?;
+    let best = (begun.iter().flatten())
+        .map(|fitted| fitted.objective)
+        .fold(f64::NEG_INFINITY, f64::max);
+    let fits: Vec<Option<Model<'a>>> = (promises.par_iter().zip(begun))
+        .map(|(promise, mut begun)| {
+            begun.retain(|fitted| fitted.objective > best - LOST);
+            release(model, promise, &begun)
+        })
         .collect::<Result<_, DiagnoseError>>()?;
     Ok(fits.into_iter().flatten().collect())
 }
@@ -323,15 +348,17 @@ pub(in crate::diagnose) fn unknown<'a>(
                 Ok((terms, gain, fitted))
             })
             .collect::<Result<_, DiagnoseError>>()?;
-        // What was not refitted is no better than the best that was.
-        let best = (fits.iter())
-            .filter_map(|(.., m)| Some(m.as_ref()?.log_evidence - model.log_evidence))
-            .fold(breadth.least, f64::max);
-        all.extend(fits.into_iter().map(|(terms, gain, model)| Found {
-            gain: (model.as_ref()).map_or(floor + gain.min(best), |m| m.log_evidence - origin),
-            terms,
-            model,
-        }));
+        let refits: Vec<(f64, Option<f64>)> = (fits.iter())
+            .map(|(_, gain, m)| (*gain, added(model, m.as_ref())))
+            .collect();
+        let estimates = of_promises(&refits, breadth.least);
+        all.extend(
+            (fits.into_iter().zip(estimates)).map(|((terms, _, model), gain)| Found {
+                gain: floor + gain,
+                terms,
+                model,
+            }),
+        );
     }
     let promises = scan(model, &of(&[Nature::Time]))?;
     // The starts of a disturbance are sizes from its prior: their mean likelihood is the evidence, but for what θ answers.
@@ -356,20 +383,62 @@ pub(in crate::diagnose) fn unknown<'a>(
             Ok((i, fitted))
         })
         .collect::<Result<_, DiagnoseError>>()?;
-    let best = (fits.iter())
-        .filter_map(|(_, m)| Some(m.as_ref()?.log_evidence - model.log_evidence))
-        .fold(breadth.least, f64::max);
-    all.extend(fits.into_iter().map(|(i, fitted)| {
-        Found {
-            terms: model
-                .terms
-                .iter()
-                .chain([&promises[i].term])
+    let refits: Vec<(f64, Option<f64>)> = (fits.iter())
+        .map(|(i, m)| (rough[*i], added(model, m.as_ref())))
+        .collect();
+    let estimates = of_promises(&refits, breadth.least);
+    all.extend(
+        (fits.into_iter().zip(estimates)).map(|((i, fitted), gain)| Found {
+            terms: (model.terms.iter().chain([&promises[i].term]))
                 .cloned()
                 .collect(),
-            gain: (fitted.as_ref()).map_or(floor + rough[i].min(best), |m| m.log_evidence - origin),
+            gain: floor + gain,
             model: fitted,
-        }
-    }));
+        }),
+    );
     Ok(merged(all, &ways(terms)))
+}
+
+/// Evidence that a fit beside a model adds to it.
+fn added(model: &Model<'_>, fitted: Option<&Model<'_>>) -> Option<f64> {
+    Some(fitted?.log_evidence - model.log_evidence)
+}
+
+/// Nats of hypotheses that promise nats and of which the best were refitted: of the others the share of their promise that the refits kept,
+/// by the median, and no more than the best refit. A promise counts what a step far beyond the quadratic's reach would gain.
+fn of_promises(all: &[(f64, Option<f64>)], least: f64) -> Vec<f64> {
+    let refits = || {
+        all.iter()
+            .filter_map(|(gain, refit)| Some((*gain, (*refit)?)))
+    };
+    let shares: Vec<f64> = refits()
+        .filter(|(gain, _)| *gain > 0.0)
+        .map(|(gain, refit)| refit / gain)
+        .collect();
+    let share = median(&shares).unwrap_or(1.0).clamp(0.0, 1.0);
+    let best = refits().map(|(_, refit)| refit).fold(least, f64::max);
+    (all.iter())
+        .map(|(gain, refit)| {
+            refit.unwrap_or((gain * if *gain > 0.0 { share } else { 1.0 }).min(best))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three refits kept a half, so the fourth is worth half its promise; what promises a loss keeps it.
+    #[test]
+    fn what_is_not_refitted_is_no_better_than_the_refits_tell() {
+        let all = [
+            (40.0, Some(20.0)),
+            (30.0, Some(18.0)),
+            (20.0, Some(8.0)),
+            (16.0, None),
+            (-1.0, None),
+        ];
+        assert_eq!(of_promises(&all, 2.5), [20.0, 18.0, 8.0, 8.0, -1.0]);
+        assert_eq!(of_promises(&[(5.0, None)], 2.5), [2.5]);
+    }
 }

@@ -16,6 +16,14 @@ pub(in crate::diagnose) struct Terms<'t> {
     pub unknown: &'t dyn Fn(&[Scales<'_>]) -> Vec<Arc<Term>>,
 }
 
+/// Terms of these hypotheses, in every way that they may be used: a hypothesis pays for all its ways.
+pub(super) fn of_keys(terms: &[Arc<Term>], keys: &[String]) -> Vec<Arc<Term>> {
+    (terms.iter())
+        .filter(|term| keys.contains(&term.key()))
+        .cloned()
+        .collect()
+}
+
 /// Unknown functions on top of fitted effects.
 pub(super) fn on_top<'a>(
     found: &Found<'a>,

@@ -78,31 +78,38 @@ impl<'a> Expansion<'a> {
     /// Laplace over all sizes: log Z, and the approximation at the most probable sizes.
     pub(super) fn laplace(&self, blocks: &[Block]) -> Option<(f64, Laplace)> {
         let mut chosen: Vec<usize> = blocks.iter().map(|b| b.options.len() / 2).collect();
-        let at = |chosen: &[usize]| self.at_sizes(blocks, chosen);
-        // Others at their best: sizes of different effects hardly know of each other.
-        for _ in 0..2 {
-            for b in 0..blocks.len() {
-                let value = |i: usize| {
-                    let mut tried = chosen.clone();
-                    tried[b] = i;
-                    at(&tried).map_or(f64::NEG_INFINITY, |l| l.log_evidence)
-                };
-                let best =
-                    (0..blocks[b].options.len()).max_by(|a, b| value(*a).total_cmp(&value(*b)));
-                chosen[b] = best.unwrap_or(chosen[b]);
-            }
-        }
-        let best = at(&chosen)?;
-        let mut log = best.log_evidence;
-        for b in 0..blocks.len() {
-            let all: Vec<f64> = (0..blocks[b].options.len())
+        let values = |chosen: &[usize], b: usize| -> Vec<f64> {
+            let mut tried = chosen.to_vec();
+            (0..blocks[b].options.len())
                 .map(|i| {
-                    let mut tried = chosen.clone();
                     tried[b] = i;
-                    at(&tried).map_or(f64::NEG_INFINITY, |l| l.log_evidence)
+                    let found = self.at_sizes(blocks, &tried);
+                    found.map_or(f64::NEG_INFINITY, |l| l.log_evidence)
+                })
+                .collect()
+        };
+        // log Z of each block's sizes, others at their best: sizes of different effects hardly know of each other.
+        let mut rows: Vec<Vec<f64>> = vec![];
+        for pass in 0..=2 {
+            let before = chosen.clone();
+            rows = (0..blocks.len())
+                .map(|b| {
+                    let row = values(&chosen, b);
+                    if pass < 2 {
+                        let best = (0..row.len()).max_by(|i, j| row[*i].total_cmp(&row[*j]));
+                        chosen[b] = best.unwrap_or(chosen[b]);
+                    }
+                    row
                 })
                 .collect();
-            log += log_mean(&all) - best.log_evidence;
+            if chosen == before {
+                break;
+            }
+        }
+        let best = self.at_sizes(blocks, &chosen)?;
+        let mut log = best.log_evidence;
+        for row in &rows {
+            log += log_mean(row) - best.log_evidence;
         }
         log.is_finite().then_some((log, best))
     }
