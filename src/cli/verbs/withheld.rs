@@ -27,7 +27,7 @@ pub(in crate::cli) struct Withheld {
     #[command(flatten)]
     subject: Subject,
     /// Number of trials, one record each.
-    #[arg(long, value_parser = at_least_one)]
+    #[arg(long, value_parser = number_of_trials)]
     trials: usize,
     /// Output folder; rerunning the same command resumes it.
     #[arg(long, value_name = "DIR")]
@@ -118,6 +118,17 @@ impl Verb for Withheld {
     }
 }
 
+/// Parses a number of trials. A number that is too large is refused with the limit, however it is written.
+fn number_of_trials(text: &str) -> Result<usize, String> {
+    let is_large = text
+        .parse::<f64>()
+        .is_ok_and(|number| number > trials::MOST as f64);
+    match is_large {
+        true => Err(format!("choose at most {}", trials::MOST)),
+        false => at_least_one(text),
+    }
+}
+
 /// Parses a half of the families.
 fn families(text: &str) -> Result<Families, String> {
     text.parse()
@@ -141,4 +152,20 @@ fn known<T>(what: &str, found: Option<T>, text: &str, names: &[&str]) -> Result<
         let all = names.join(", ");
         format!("no {what} is called \"{text}\"{near}; there are {all}")
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn too_many_trials_are_refused_with_the_limit() {
+        for text in ["1e12", "1000001", "99999999999999999999999", "inf"] {
+            let refused = number_of_trials(text).unwrap_err();
+            assert_eq!(refused, "choose at most 1000000", "{text}");
+        }
+        assert_eq!(number_of_trials("1000000"), Ok(1_000_000));
+        assert!(number_of_trials("0").unwrap_err().contains("at least 1"));
+        assert!(number_of_trials("many").is_err());
+    }
 }

@@ -4,6 +4,7 @@ use super::law::{
     Departure, Family, ForceLaw, Law, ParameterLaw, Place, RandomLaw, SignalLaw, Wave,
 };
 use super::scene::{Scene, Size};
+use super::variant::{Variant, is_one_sided};
 use crate::twin::Source;
 use std::f64::consts::{PI, TAU};
 
@@ -37,7 +38,9 @@ struct Listed {
     form: Form,
     /// 1 or −1.
     sign: f64,
-    /// Uniform in [0, 1): times, frequencies, exponents.
+    /// Exponent of a power law.
+    exponent: f64,
+    /// Uniform in [0, 1): times, frequencies, ends of a range.
     shapes: [f64; 3],
 }
 
@@ -73,21 +76,6 @@ const IDS: [&str; 26] = [
 /// This one needs a state to spill into.
 const CEILING: &str = "state-ceiling";
 
-/// Laws without shapes, of which a size and a sign say everything.
-const SHAPELESS: [&str; 11] = [
-    "sensor-bias",
-    "sensor-gain",
-    "sensor-drift",
-    "actuator-gain",
-    "actuator-bias",
-    "constant-forcing",
-    "linear-loss",
-    "cross-coupling",
-    "quadratic-drag",
-    "cubic-stiffness",
-    "parameter-drift",
-];
-
 impl Draft {
     /// Returns true for the id of a law that is written here.
     pub fn knows(id: &str) -> bool {
@@ -102,28 +90,41 @@ impl Draft {
         form: Form,
         source: &mut Source,
     ) -> Option<Self> {
-        Self::knows(id).then(|| Self {
+        if !Self::knows(id) {
+            return None;
+        }
+        let sign = if source.happens(0.5) { -1.0 } else { 1.0 };
+        let shapes = [(); 3].map(|()| source.uniform());
+        // A spring that softens or a power law that pushes runs away.
+        let is_kept = ["cubic-stiffness", "power-law"].contains(&id) || is_one_sided(id);
+        Some(Self {
             place,
             kind: Kind::Listed(Listed {
                 id: id.into(),
                 other,
                 form,
-                sign: if source.happens(0.5) { -1.0 } else { 1.0 },
-                shapes: [(); 3].map(|()| source.uniform()),
+                sign: if is_kept { 1.0 } else { sign },
+                // Away from one and two, which have names of their own.
+                exponent: match shapes[0] {
+                    shape if shape < 0.5 => 1.3 + 0.8 * shape,
+                    shape => 2.0 + shape,
+                },
+                shapes,
             }),
         })
     }
 
-    /// A listed law of which size and sign say everything; `None` for others.
-    pub fn shapeless(id: &str, place: Place, other: Option<usize>) -> Option<Self> {
-        SHAPELESS.contains(&id).then(|| Self {
+    /// A listed law of a given sign and shape; `None` for an id that is not written here.
+    pub fn variant(id: &str, place: Place, other: Option<usize>, of: Variant) -> Option<Self> {
+        Self::knows(id).then(|| Self {
             place,
             kind: Kind::Listed(Listed {
                 id: id.into(),
                 other,
                 form: Form::Listed,
-                sign: 1.0,
-                shapes: [0.5; 3],
+                sign: of.sign,
+                exponent: of.exponent,
+                shapes: [of.shape; 3],
             }),
         })
     }
@@ -310,7 +311,7 @@ impl Listed {
         let signed = self.sign * rate;
         let rms = |of: usize| scene.states[of].rms.max(1e-9);
         let power = |exponent: f64, of: usize| ForceLaw::Power {
-            coefficient: rate / rms(of).powf(exponent),
+            coefficient: signed / rms(of).powf(exponent),
             exponent,
             of,
             rounding: self.soft(0.03 * rms(of)),
@@ -326,22 +327,15 @@ impl Listed {
                 onset: self.soft(0.02 * scene.duration),
             },
             "coulomb-friction" => ForceLaw::Friction {
-                force: rate,
+                force: signed,
                 of: on,
                 width: self.soft(0.03 * rms(on)),
             },
-            "linear-loss" => linear(-rate, on),
+            "linear-loss" => linear(-signed, on),
             "cross-coupling" => linear(signed, self.other?),
             "quadratic-drag" => power(2.0, on),
             "cubic-stiffness" => power(3.0, self.other?),
-            // Away from one and two, which have names of their own.
-            "power-law" => power(
-                match self.shapes[0] {
-                    shape if shape < 0.5 => 1.3 + 0.8 * shape,
-                    shape => 2.0 + shape,
-                },
-                on,
-            ),
+            "power-law" => power(self.exponent, on),
             "periodic-disturbance" => ForceLaw::Periodic {
                 amplitude: rate,
                 frequency: (3.0 + 9.0 * self.shapes[0]) / scene.duration,

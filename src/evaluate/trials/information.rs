@@ -43,13 +43,29 @@ const ITERATIONS: usize = 30;
 /// Whitened change of the innovations of two records.
 pub(super) struct Change([DVector<f64>; 2]);
 
+/// Match of one change by a multiple of another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Match {
+    pub multiple: f64,
+    /// Share of the information that is left.
+    pub unexplained: f64,
+}
+
+impl Match {
+    /// Nothing in common.
+    pub const NONE: Self = Self {
+        multiple: 0.0,
+        unexplained: 1.0,
+    };
+}
+
 /// Filter at the truth of one record without departures.
 pub(super) struct Information<'a> {
     problem: Problem<'a>,
     theta: Vec<f64>,
     first: Reference,
     again: Reference,
-    /// Log-likelihood of the best fit without departures, mean over both signs of the noise.
+    /// Log-likelihood of the best fit without departures, mean over both signs of the noise; 0 for a black box.
     alone: f64,
 }
 
@@ -133,10 +149,13 @@ impl<'a> Information<'a> {
             problem,
             theta,
         };
-        let Some(alone) = information.best([&record[0], &mirrored[0]])? else {
-            return Ok(None);
-        };
-        information.alone = alone;
+        // A fit of a black box costs ensembles, and nothing asks for it.
+        if !information.problem.is_simulated() {
+            let Some(alone) = information.best([&record[0], &mirrored[0]])? else {
+                return Ok(None);
+            };
+            information.alone = alone;
+        }
         Ok(Some(information))
     }
 
@@ -183,14 +202,28 @@ impl<'a> Information<'a> {
 
     /// Share of a change's information that no multiple of another one explains.
     pub fn unexplained(&self, change: &Change, by: &Change) -> f64 {
+        self.matched(change, by).unexplained
+    }
+
+    /// Returns the best multiple of one change in place of another, and what that leaves.
+    pub fn matched(&self, change: &Change, by: &Change) -> Match {
         let own = |a: &Change| self.product(&a.0[0], &a.0[1]).max(0.0);
         let (a, b) = (own(change), own(by));
         if a == 0.0 || b == 0.0 {
-            return 1.0;
+            return Match::NONE;
         }
         let both =
             0.5 * (self.product(&change.0[0], &by.0[1]) + self.product(&change.0[1], &by.0[0]));
-        (1.0 - both * both / (a * b)).max(0.0)
+        Match {
+            multiple: both / b,
+            unexplained: (1.0 - both * both / (a * b)).max(0.0),
+        }
+    }
+
+    /// Nats of the difference of two changes: what one in place of the other leaves.
+    pub fn left(&self, change: &Change, by: &Change) -> f64 {
+        let [own, again] = [0, 1].map(|i| &change.0[i] - &by.0[i]);
+        0.5 * self.product(&own, &again).max(0.0)
     }
 
     /// Product of two directions without what θ and noise levels imitate.
@@ -211,5 +244,64 @@ impl<'a> Information<'a> {
             let direction = self.first.direction(&there);
             0.5 * self.first.own(&direction)
         }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{Drive, Signal};
+    use crate::study::RecordPlan;
+    use crate::twin::{DigitalTwin, Noise, Parameter, ParameterSpace, SimulationError};
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    /// Runs of the simulator so far.
+    static RUNS: AtomicU64 = AtomicU64::new(0);
+
+    /// y = gain·u, with runs counted.
+    struct Counted;
+    impl DigitalTwin for Counted {
+        fn parameters(&self) -> ParameterSpace {
+            ParameterSpace::new([Parameter::new("gain", "1", 0.5, 1.5).within(0.2, 3.0)])
+        }
+        fn simulate(
+            &self,
+            theta: &[f64],
+            drive: &Drive,
+            _: Noise,
+        ) -> Result<Signal, SimulationError> {
+            RUNS.fetch_add(1, Ordering::Relaxed);
+            Ok(drive.inputs() * theta[0])
+        }
+    }
+
+    /// No record of a black box is fitted for its information: each fit costs ensembles.
+    #[test]
+    fn a_black_box_is_filtered_and_not_fitted() {
+        let plan = RecordPlan::levels(0.1, 60, 0.0, 1.0, 5);
+        let study = Study::new("counted", Counted, plan).unwrap();
+        let drive = study.drives().unwrap().draw(Noise::new(1, "b", 0)).unwrap();
+        let mut conditions = Conditions::declared();
+        conditions.added = vec![0.05];
+        let record = |seed| {
+            let mut source = Noise::new(seed, "b", 0).source("v");
+            let outputs = drive.inputs().mapv(|u| u + 0.05 * source.normal());
+            [Record::new(drive.clone(), outputs).unwrap()]
+        };
+        let [a, b, c] = [1, 2, 3].map(record);
+        RUNS.store(0, Ordering::Relaxed);
+        let information = Information::new(&study, &[1.0], &conditions, [&a, &b, &c]);
+        let information = information.unwrap().unwrap();
+        let filtered = RUNS.load(Ordering::Relaxed);
+        assert_eq!(
+            information.lost([&a[0], &c[0]]).unwrap(),
+            Some(f64::INFINITY)
+        );
+        // A fit filters many times.
+        RUNS.store(0, Ordering::Relaxed);
+        information.best([&a[0], &c[0]]).unwrap();
+        let fitted = RUNS.load(Ordering::Relaxed);
+        assert!(filtered < fitted, "{filtered} {fitted}");
+        assert_eq!(information.alone, 0.0);
     }
 }

@@ -41,8 +41,10 @@ mod scene;
 mod score;
 mod shares;
 mod steadiness;
+mod structure;
 mod truth;
 mod units;
+mod variant;
 mod world;
 
 #[cfg(test)]
@@ -50,6 +52,7 @@ pub(crate) use answer::{Named, Outcome, Refitted, Repeat};
 pub use families::Families;
 pub use kind::Kind;
 pub(crate) use row::Row;
+pub(crate) use run::MOST;
 pub use run::{Sealed, Settings, Withheld};
 pub use score::Scorecard;
 #[cfg(test)]

@@ -3,7 +3,8 @@
 use super::Kind;
 use super::answer::{Answer, Outcome, Repeat};
 use super::shares::TrueShare;
-use super::truth::Truth;
+use super::truth::{Rival, Truth};
+use crate::diagnose::Decision;
 use crate::effect::EffectKey;
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
@@ -11,6 +12,8 @@ use std::fmt;
 
 /// A twin whose own step shows by more nats than this is no null: its integrator is the gap.
 const COARSE: f64 = 1.0;
+/// A record decides for the truth where every wrong name leaves more nats than this: odds of 20 to 1.
+const CLEAR: f64 = 3.0;
 
 /// Worth of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
@@ -22,6 +25,8 @@ pub(crate) enum Fate {
     FalseAlarm,
     /// The accepted answer is right, complete, and holds nothing false beside it; or nothing listed is right, and none was accepted.
     Delivered,
+    /// Everything accepted is right and complete, but more was said to be missing.
+    Partial,
     /// Everything accepted is right, but one of two effects lacks.
     Incomplete,
     /// A false effect was accepted, one of a class of rivals; the class that was stated holds a right one.
@@ -44,6 +49,7 @@ impl fmt::Display for Fate {
             Self::Quiet => "quiet",
             Self::FalseAlarm => "false alarm",
             Self::Delivered => "delivered",
+            Self::Partial => "partial",
             Self::Incomplete => "incomplete",
             Self::InClass => "in class",
             Self::WrongName => "wrong name",
@@ -55,15 +61,37 @@ impl fmt::Display for Fate {
     }
 }
 
+/// Departures of a trial by name.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Missing {
+    /// Labels of the departures, or `nothing`.
+    pub name: String,
+    /// The nearest listed effect that is no right answer.
+    pub rival: Option<Rival>,
+    /// Places that mean the same as those of the departures.
+    pub places: Vec<String>,
+}
+
+impl From<&str> for Missing {
+    /// Creates departures with no rival and no other place.
+    fn from(name: &str) -> Self {
+        Self {
+            name: name.into(),
+            rival: None,
+            places: vec![],
+        }
+    }
+}
+
 /// One trial.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Row {
     pub trial: usize,
     pub kind: Kind,
-    /// Name of what is missing.
-    pub truth: String,
+    pub truth: Missing,
     /// For each departure the effects of the trial's library that are a right answer.
     pub right: Vec<Vec<String>>,
+    /// Places of the departures.
     pub targets: Vec<String>,
     /// Expected information in nats.
     pub information: Option<f64>,
@@ -101,9 +129,13 @@ impl Row {
         Self {
             trial: truth.trial,
             kind: truth.kind,
-            truth: match truth.labels.is_empty() {
-                true => "nothing".into(),
-                false => truth.labels.join(" + "),
+            truth: Missing {
+                name: match truth.labels.is_empty() {
+                    true => "nothing".into(),
+                    false => truth.labels.join(" + "),
+                },
+                rival: truth.rival.clone(),
+                places: truth.places.clone(),
             },
             right,
             targets: truth.targets.clone(),
@@ -129,6 +161,13 @@ impl Row {
         self.outcome.as_ref().is_some_and(Outcome::is_structural)
     }
 
+    /// Returns true if a structural gap was stated, and that nothing listed explains it all.
+    pub fn says_unknown(&self) -> bool {
+        let decision = self.outcome.as_ref().map(|o| o.decision);
+        let unknown = [Decision::NoneOfThese, Decision::Partial];
+        self.called() && decision.is_some_and(|decision| unknown.contains(&decision))
+    }
+
     /// Returns true if nothing is missing.
     pub fn is_null(&self) -> bool {
         !self.kind.is_structural()
@@ -137,6 +176,17 @@ impl Row {
     /// Returns true if nothing is missing but a finer integration step.
     pub fn is_coarse(&self) -> bool {
         self.is_null() && self.step > COARSE
+    }
+
+    /// Returns true if the twin's own step shows beside a departure.
+    pub fn is_coarse_gap(&self) -> bool {
+        !self.is_null() && self.step > COARSE
+    }
+
+    /// Returns true if the record decides: every listed effect that is wrong leaves more than 3 nats. False where that is not known.
+    pub fn is_clear(&self) -> bool {
+        let rival = self.truth.rival.as_ref();
+        rival.is_some_and(|rival| rival.nats > CLEAR)
     }
 
     /// Returns true if something is missing and nothing that the library lists is right.
@@ -149,14 +199,14 @@ impl Row {
         self.right.iter().flatten().any(|right| right == key)
     }
 
-    /// Returns true if a departure acts at this place, or if a right answer does.
+    /// Returns true if a departure acts at this place or at one that means the same, or if a right answer does.
     pub fn is_true_place(&self, place: &str) -> bool {
         let of_right = |key: &String| {
             let key = key.parse::<EffectKey>();
             key.is_ok_and(|key| key.target == place)
         };
-        self.targets.iter().any(|target| target == place)
-            || self.right.iter().flatten().any(of_right)
+        let mut places = self.targets.iter().chain(&self.truth.places);
+        places.any(|true_place| true_place == place) || self.right.iter().flatten().any(of_right)
     }
 
     /// Returns true if the place that is stated is a true one.
@@ -180,8 +230,13 @@ impl Row {
                     outcome.top().is_some_and(|top| self.is_right(&top.key))
                 });
                 let holds = outcome.rivals().iter().any(|key| self.is_right(key));
+                let says_more = outcome.decision == Decision::Partial;
                 match fate {
                     Fate::WrongName if holds => Fate::InClass,
+                    // Where one of two departures has no listed name, more is missing indeed.
+                    Fate::Delivered if says_more && !self.right.iter().any(Vec::is_empty) => {
+                        Fate::Partial
+                    }
                     fate => fate,
                 }
             }
@@ -227,12 +282,14 @@ impl Row {
 
 impl Serialize for Row {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut object = serializer.serialize_struct("Row", 17)?;
+        let mut object = serializer.serialize_struct("Row", 19)?;
         object.serialize_field("trial", &self.trial)?;
         object.serialize_field("kind", &self.kind)?;
-        object.serialize_field("truth", &self.truth)?;
+        object.serialize_field("truth", &self.truth.name)?;
         object.serialize_field("right", &self.right)?;
+        object.serialize_field("rival", &self.truth.rival)?;
         object.serialize_field("targets", &self.targets)?;
+        object.serialize_field("places", &self.truth.places)?;
         object.serialize_field("information", &self.information)?;
         object.serialize_field("step_information", &self.step)?;
         object.serialize_field("nuisance", &self.nuisance)?;

@@ -27,9 +27,9 @@ use serde_json::json;
 use std::path::Path;
 
 /// Layout of the folder; raised when it changes.
-const LAYOUT: u32 = 7;
+const LAYOUT: u32 = 8;
 /// Most trials of a folder; their keys are in memory.
-const MOST: usize = 1_000_000;
+pub(crate) const MOST: usize = 1_000_000;
 /// Trials that are drawn before their records are written.
 const PART: usize = 64;
 

@@ -5,8 +5,10 @@ use crate::evaluate::EvaluateError;
 use crate::record::{Drive, Record, Signal};
 use crate::study::{Study, StudyFile};
 use crate::twin::{
-    Layout, Modified, Modify, Noise, Now, Outliers, Outline, SimulationError, StateSpace,
+    Layout, Modified, Modify, Noise, NoiseLevel, Now, Outliers, Outline, SimulationError,
+    StateSpace,
 };
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// New units in one old one: from metres to millimetres.
@@ -15,8 +17,8 @@ const FACTOR: f64 = 1000.0;
 /// Equations whose outputs are read in other units.
 struct Rescaled(Arc<dyn StateSpace>);
 
-/// The study and its records with outputs in other units; `None` for a black box, or where the study declares noise or starts in
-/// the old ones.
+/// The study and its records with outputs in other units; `None` for a black box, and for a study with starts, effects, or noise that is
+/// to be estimated.
 pub(super) fn rescaled(
     study: &Study,
     record: &Record,
@@ -26,11 +28,15 @@ pub(super) fn rescaled(
     let World::Equations(twin) = World::new(study.twin()) else {
         return Ok(None);
     };
-    if !file.noise.is_empty() || !file.start.is_empty() || !file.effect.is_empty() {
+    if !file.start.is_empty() || !file.effect.is_empty() {
         return Ok(None);
     }
+    let Some(noise) = noise(file, &twin.outline()) else {
+        return Ok(None);
+    };
     let same = StudyFile {
         twin: study.name().into(),
+        noise,
         library: file.library.clone(),
         ..StudyFile::default()
     };
@@ -40,6 +46,20 @@ pub(super) fn rescaled(
     let scaled = |record: &Record| Record::new(record.drive().clone(), record.outputs() * FACTOR);
     let validation = validation.map(scaled).transpose()?;
     Ok(Some((new.configure(&same)?, scaled(record)?, validation)))
+}
+
+/// Returns the declared noise levels in the new units; `None` where one is to be estimated, and so is a parameter in the old ones.
+fn noise(file: &StudyFile, outline: &Outline) -> Option<BTreeMap<String, NoiseLevel>> {
+    let scaled = |(name, level): (&String, &NoiseLevel)| {
+        let is_output = outline.outputs.iter().any(|output| output.name == *name);
+        let mut level = *level;
+        let NoiseLevel::Declared { std, .. } = &mut level else {
+            return None;
+        };
+        *std *= if is_output { FACTOR } else { 1.0 };
+        Some((name.clone(), level))
+    };
+    file.noise.iter().map(scaled).collect()
 }
 
 impl Modify for Rescaled {
@@ -98,9 +118,21 @@ mod tests {
     use super::*;
     use crate::evaluate::paper::reference_studies;
 
+    fn configured(text: &str) -> Study {
+        let file = StudyFile::parse(text, "s.toml".as_ref()).unwrap();
+        let studies = reference_studies().unwrap();
+        let mut named = studies.into_iter().filter(|s| s.name() == file.twin);
+        named.next().unwrap().configure(&file).unwrap()
+    }
+
     #[test]
     fn a_rescaled_twin_makes_rescaled_records() {
-        for study in reference_studies().unwrap() {
+        let mut studies = reference_studies().unwrap();
+        studies.push(configured("twin = 'van-der-pol'\n[noise]\ny = 0.01"));
+        studies.push(configured(
+            "twin = 'tanks'\n[noise]\ny = { std = 0.3, known = true }\nh1 = 0.2",
+        ));
+        for study in studies {
             let noise = Noise::new(1, "units", 0);
             let theta = study.twin().parameters().draw_prior(noise);
             let drive = study.drives().unwrap().draw(noise).unwrap();
@@ -112,6 +144,25 @@ mod tests {
                 assert!((a - b).abs() < 1e-9 * b.abs().max(1.0));
             }
             assert_eq!(new.candidates().len(), study.candidates().len());
+            assert_eq!(new.beliefs().known, study.beliefs().known);
+        }
+    }
+
+    #[test]
+    fn what_stands_in_the_old_units_is_not_rescaled() {
+        let record = Record::new(
+            Drive::new(1.0, Signal::zeros((9, 1))).unwrap(),
+            Signal::zeros((9, 1)),
+        );
+        for table in [
+            "[noise]\ny = 'estimate'",
+            "[noise]\nh1 = 'estimate'",
+            "[start]\nh1 = 1.0",
+            "[[effect]]\nid = 'sensor-lag'\ntarget = 'sensor'",
+        ] {
+            let study = configured(&format!("twin = 'tanks'\n{table}"));
+            let rescaled = rescaled(&study, record.as_ref().unwrap(), None).unwrap();
+            assert!(rescaled.is_none(), "{table}");
         }
     }
 }

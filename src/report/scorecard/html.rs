@@ -2,7 +2,7 @@
 
 use super::figures::{delivered_svg, reliability_svg};
 use super::text::{BIN_HEAD, bin_cells, named_scores, of, rule};
-use crate::evaluate::trials::{Baseline, Count, Row, Scorecard};
+use crate::evaluate::trials::{Baseline, Bin, Count, Row, Scorecard};
 use crate::report::chart::escaped;
 use crate::report::digits::{percent, short};
 use crate::report::page::Column::{Number, Text};
@@ -32,10 +32,11 @@ fn lead(card: &Scorecard) -> String {
         _ => of(count),
     };
     let verdict = format!(
-        "False alarms: {}. Gaps detected: {}. Effects stated at 0.9 or more that are right: {}.",
+        "False alarms: {}. Gaps detected: {}. Effects stated at 0.9 or more that are right: {}. Diagnoses that failed: {}.",
         called(card.false_alarms),
         called(card.detected),
-        called(card.precision.stated_90)
+        called(card.precision.stated_90),
+        called(card.failed)
     );
     let setup = &card.setup;
     format!(
@@ -84,21 +85,30 @@ fn bins(card: &Scorecard) -> String {
     let head: Vec<_> = (BIN_HEAD.iter().enumerate())
         .map(|(i, name)| (*name, if i < 2 { Text } else { Number }))
         .collect();
-    let rows: Vec<Vec<String>> = card.by_information.iter().map(bin_cells).collect();
+    let cells = |bins: &[Bin]| -> Vec<Vec<String>> { bins.iter().map(bin_cells).collect() };
+    let all = table(
+        "Every trial with a gap, by its expected information. Missed and failed ones are the rest of the trials. Partial: right and \
+         complete, but more was said to be missing. Abstained or partial: of trials in which nothing listed is right.",
+        &head,
+        &cells(&card.by_information),
+    );
+    let clear = table(
+        "The same of the records that decide: every listed effect that is wrong leaves more than 3 nats of the departure.",
+        &head,
+        &cells(&card.clear_by_information),
+    );
     figure(
         &svg,
         "Right and complete answers, by how much the best possible diagnoser could learn of the departure from such a record.",
-    ) + &table(
-        "Every trial with a gap, by its expected information. Missed and failed ones are the rest of the trials.",
-        &head,
-        &rows,
-    )
+    ) + &all
+        + &clear
 }
 
 fn kinds(card: &Scorecard) -> String {
     let rows: Vec<Vec<String>> = (card.by_kind.iter())
         .map(|k| {
-            let cells = [k.kind.id(), rule(k.kind), &of(k.called_structural)];
+            let failed = k.failed.count.to_string();
+            let cells = [k.kind.id(), rule(k.kind), &of(k.called_structural), &failed];
             counted(&cells, k.right)
         })
         .collect();
@@ -106,6 +116,7 @@ fn kinds(card: &Scorecard) -> String {
         ("kind", Text),
         ("right answer", Text),
         ("called structural", Number),
+        ("failed", Number),
         ("right", Number),
         ("share", Number),
         ("95 % interval", Number),
@@ -191,7 +202,7 @@ fn confusion(card: &Scorecard) -> String {
         } else {
             id(&answer).to_owned()
         };
-        *(counts.entry(id(&row.truth)).or_default().entry(short)).or_insert(0) += 1;
+        *(counts.entry(id(&row.truth.name)).or_default().entry(short)).or_insert(0) += 1;
     }
     if counts.is_empty() {
         return paragraph("No trials with one listed effect.");
@@ -231,6 +242,7 @@ fn trials(card: &Scorecard) -> String {
         ("truth", Text),
         ("nuisance", Text),
         ("information, nats", Number),
+        ("nearest wrong effect leaves, nats", Number),
         ("answer", Text),
         ("stated", Number),
         ("worth", Text),
@@ -247,9 +259,10 @@ fn trial(row: &Row) -> Vec<String> {
     vec![
         row.trial.to_string(),
         row.kind.id().into(),
-        row.truth.clone(),
+        row.truth.name.clone(),
         row.nuisance.clone(),
         or_dash(row.information),
+        or_dash(row.truth.rival.as_ref().map(|rival| rival.nats)),
         row.answer(),
         stated.map_or("–".into(), |p| format!("{p:.2}")),
         row.fate().to_string(),
@@ -283,7 +296,7 @@ mod tests {
     fn many_trials_are_drawn_and_counted() {
         let page = scorecard_html(&made_scores::scorecard());
         for text in [
-            "False alarms: 0 of 30. Gaps detected: 72 of 90.",
+            "False alarms: 0 of 29. Gaps detected: 72 of 90.",
             "<title>Right answers, by expected information</title>",
             "<title>How often the effect on top is right</title>",
             ">as stated<",

@@ -27,8 +27,14 @@ pub fn scorecard_text(card: &Scorecard) -> String {
             k.right.count.to_string(),
         ]
     }));
-    let mut bins = vec![cells(&BIN_HEAD)];
-    bins.extend(card.by_information.iter().map(bin_cells));
+    let bins = |head: &[&str], bins: &[Bin]| -> String {
+        let mut rows = vec![cells(head)];
+        rows.extend(bins.iter().map(bin_cells));
+        table(&rows)
+    };
+    let clear: Vec<&str> = (["truth, clear"].into_iter())
+        .chain(BIN_HEAD.into_iter().skip(1))
+        .collect();
     let mut baselines = vec![cells(&[
         "answers of",
         "verdict right",
@@ -67,7 +73,8 @@ pub fn scorecard_text(card: &Scorecard) -> String {
     tail.push(format!("Draws of truths given up: {}", card.redraws));
     let parts = [
         table(&scores),
-        table(&bins),
+        bins(&BIN_HEAD, &card.by_information),
+        bins(&clear, &card.clear_by_information),
         table(&kinds),
         table(&baselines),
     ];
@@ -75,36 +82,44 @@ pub fn scorecard_text(card: &Scorecard) -> String {
 }
 
 /// Columns of fates by expected information.
-pub(super) const BIN_HEAD: [&str; 11] = [
+pub(super) const BIN_HEAD: [&str; 13] = [
     "truth",
     "information",
     "trials",
     "called",
     "delivered",
+    "partial",
     "incomplete",
     "in class",
     "wrong name",
     "refused",
     "abstained",
+    "abstained or partial",
     "place right",
 ];
 
 /// One bin as a row of [`BIN_HEAD`].
 pub(super) fn bin_cells(bin: &Bin) -> Vec<String> {
-    let counts = [
-        bin.called_structural,
-        bin.delivered,
-        bin.incomplete,
-        bin.in_class,
-        bin.wrong_name,
-        bin.refused,
-        bin.abstained,
-        bin.place,
-    ];
-    [bin.truths.into(), nats(bin), bin.delivered.of.to_string()]
-        .into_iter()
-        .chain(counts.map(|count| count.count.to_string()))
-        .collect()
+    let plain = |count: Count| count.count.to_string();
+    vec![
+        bin.truths.into(),
+        nats(bin),
+        bin.delivered.of.to_string(),
+        plain(bin.called_structural),
+        plain(bin.delivered),
+        plain(bin.partial),
+        plain(bin.incomplete),
+        plain(bin.in_class),
+        plain(bin.wrong_name),
+        plain(bin.refused),
+        plain(bin.abstained),
+        // Of those alone in which nothing listed is right.
+        match bin.abstained_or_partial.of {
+            0 => "–".into(),
+            _ => of(bin.abstained_or_partial),
+        },
+        plain(bin.place),
+    ]
 }
 
 /// Range of a bin.
@@ -129,10 +144,18 @@ pub(super) fn named_scores(card: &Scorecard) -> Vec<(String, Count)> {
             card.false_alarms,
         ),
         (
+            "nothing missing, diagnosis failed".into(),
+            card.nulls_failed,
+        ),
+        (
             "nothing missing but a finer step, called structural".into(),
             card.coarse_called_structural,
         ),
         ("gaps, called structural".into(), card.detected),
+        (
+            "gaps beside a coarse step, delivered".into(),
+            card.coarse_delivered,
+        ),
         ("stated at 0.9 or more: right".into(), precision.stated_90),
         ("stated at 0.7 or more: right".into(), precision.stated_70),
         ("stated at 0.5 or more: right".into(), precision.stated_50),
@@ -218,6 +241,8 @@ mod tests {
         assert!(text.contains("stated at 0.9 or more: right"), "{text}");
         assert!(text.contains("3 … 100 %"), "{text}");
         assert!(text.contains("10 … 30 nats"), "{text}");
+        assert!(text.contains("truth, clear"), "{text}");
+        assert!(text.contains("nothing missing, diagnosis failed"), "{text}");
         assert!(text.contains("always no gap"), "{text}");
         assert!(scorecard_text(&empty).contains("0 withheld trials"));
     }

@@ -78,7 +78,7 @@ fn selected(row: &Row) -> &[String] {
 fn commonest(rows: &[Row]) -> Option<String> {
     let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
     for row in rows.iter().filter(|row| !row.is_coarse()) {
-        *counts.entry(&row.truth).or_default() += 1;
+        *counts.entry(&row.truth.name).or_default() += 1;
     }
     let most = counts.iter().max_by_key(|(_, count)| **count);
     most.map(|(truth, _)| (*truth).to_owned())

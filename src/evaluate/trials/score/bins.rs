@@ -20,6 +20,7 @@ pub(crate) struct Bin {
     pub high: f64,
     pub called_structural: Count,
     pub delivered: Count,
+    pub partial: Count,
     pub incomplete: Count,
     pub in_class: Count,
     pub wrong_name: Count,
@@ -27,6 +28,10 @@ pub(crate) struct Bin {
     pub abstained: Count,
     pub missed: Count,
     pub failed: Count,
+    /// "None of these", or more said to be missing than was accepted: of trials in which nothing listed is right.
+    pub abstained_or_partial: Count,
+    /// Delivered, of trials whose twin takes a step so coarse that it shows beside the departure.
+    pub coarse_delivered: Count,
     /// The place that is stated is a true one.
     #[serde(rename = "where")]
     pub place: Count,
@@ -36,8 +41,8 @@ fn finite<S: serde::Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::
     value.is_finite().then_some(*value).serialize(serializer)
 }
 
-/// Bins of listed truths, then of random ones; empty bins are left out.
-pub(super) fn bins(rows: &[Row]) -> Vec<Bin> {
+/// Bins of listed truths, then of random ones, over the rows that are asked for; empty bins are left out.
+pub(super) fn bins(rows: &[Row], asked: impl Fn(&Row) -> bool) -> Vec<Bin> {
     let mut all = Vec::new();
     for truths in ["listed", "random"] {
         let of_group = |row: &Row| match row.kind {
@@ -48,6 +53,7 @@ pub(super) fn bins(rows: &[Row]) -> Vec<Bin> {
         for (low, high) in NATS.iter().zip(&NATS[1..]) {
             let inside = |row: &Row| {
                 of_group(row)
+                    && asked(row)
                     && row
                         .information
                         .is_some_and(|nats| *low <= nats && nats < *high)
@@ -59,6 +65,7 @@ pub(super) fn bins(rows: &[Row]) -> Vec<Bin> {
                 high: *high,
                 called_structural: Count::over(rows, inside, Row::called),
                 delivered: fate(Fate::Delivered),
+                partial: fate(Fate::Partial),
                 incomplete: fate(Fate::Incomplete),
                 in_class: fate(Fate::InClass),
                 wrong_name: fate(Fate::WrongName),
@@ -66,6 +73,16 @@ pub(super) fn bins(rows: &[Row]) -> Vec<Bin> {
                 abstained: fate(Fate::Abstained),
                 missed: fate(Fate::Missed),
                 failed: fate(Fate::Failed),
+                abstained_or_partial: Count::over(
+                    rows,
+                    |row| inside(row) && row.must_abstain(),
+                    Row::says_unknown,
+                ),
+                coarse_delivered: Count::over(
+                    rows,
+                    |row| inside(row) && row.is_coarse_gap(),
+                    |row| row.fate() == Fate::Delivered,
+                ),
                 place: Count::over(rows, inside, |row| row.called() && row.place_is_right()),
             };
             if bin.delivered.of > 0 {

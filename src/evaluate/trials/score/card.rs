@@ -22,19 +22,21 @@ pub(crate) struct KindScore {
     pub called_structural: Count,
     /// Delivered, or rightly quiet.
     pub right: Count,
+    /// Diagnoses that ended in an error.
+    pub failed: Count,
 }
 
 /// The trials under one nuisance.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct NuisanceScore {
     pub nuisance: String,
-    /// Called structural, of nulls.
+    /// Called structural, of nulls with an answer.
     pub false_alarms: Count,
     /// Delivered, of gaps.
     pub delivered: Count,
 }
 
-/// Answers that stay what they were when the question is asked otherwise.
+/// Answers that stay what they were when the question is asked otherwise: accepted effects and decision.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Steadiness {
     pub change: String,
@@ -93,14 +95,20 @@ pub struct Scorecard {
     pub trials: usize,
     /// Level of the Clopper–Pearson intervals.
     pub interval_level: f64,
-    /// Called structural, of trials in which nothing is missing.
+    /// Called structural, of trials in which nothing is missing. A failed diagnosis is neither called nor right: it is left out here.
     pub(crate) false_alarms: Count,
-    /// The same, of those whose twin takes a step so coarse that it shows.
+    /// Diagnoses that failed, of trials in which nothing is missing.
+    pub(crate) nulls_failed: Count,
+    /// Called structural, of trials in which nothing is missing but whose twin takes a step so coarse that it shows.
     pub(crate) coarse_called_structural: Count,
-    /// Called structural, of trials with a gap.
+    /// Called structural, of trials with a gap. A failed diagnosis is not called.
     pub(crate) detected: Count,
+    /// Delivered, of gaps of a twin whose step is so coarse that it shows, too.
+    pub(crate) coarse_delivered: Count,
     /// By expected information.
     pub(crate) by_information: Vec<Bin>,
+    /// The same of trials whose record decides: every wrong listed effect leaves more than 3 nats.
+    pub(crate) clear_by_information: Vec<Bin>,
     /// By kind of truth.
     pub(crate) by_kind: Vec<KindScore>,
     /// By nuisance.
@@ -152,19 +160,24 @@ impl Scorecard {
         };
         let seconds: Vec<f64> = rows.iter().map(|row| row.seconds).collect();
         let right = |row: &Row| matches!(row.fate(), Fate::Delivered | Fate::Quiet);
+        let is_fine = |row: &Row| row.is_null() && !row.is_coarse();
         Self {
             setup,
             trials: rows.len(),
             interval_level: LEVEL,
-            false_alarms: over(&|row| row.is_null() && !row.is_coarse(), &Row::called),
-            coarse_called_structural: over(&Row::is_coarse, &Row::called),
+            false_alarms: over(&|row| is_fine(row) && answered(row), &Row::called),
+            nulls_failed: over(&is_fine, &|row| !answered(row)),
+            coarse_called_structural: over(&|row| row.is_coarse() && answered(row), &Row::called),
             detected: over(&|row| !row.is_null(), &Row::called),
-            by_information: bins(&rows),
+            coarse_delivered: over(&Row::is_coarse_gap, &|row| row.fate() == Fate::Delivered),
+            by_information: bins(&rows, |_| true),
+            clear_by_information: bins(&rows, Row::is_clear),
             by_kind: (Kind::ALL.into_iter())
                 .map(|kind| KindScore {
                     kind,
                     called_structural: over(&|row| row.kind == kind, &Row::called),
                     right: over(&|row| row.kind == kind, &right),
+                    failed: over(&|row| row.kind == kind, &|row| !answered(row)),
                 })
                 .filter(|score| score.right.of > 0)
                 .collect(),
@@ -179,12 +192,17 @@ impl Scorecard {
             steadiness: steadiness(&rows),
             baselines: baselines(&rows),
             seconds_per_record: mean(&seconds),
-            failed: over(&|_| true, &|row| row.failure.is_some()),
+            failed: over(&|_| true, &|row| !answered(row)),
             redraws: rows.iter().map(|row| row.redraws).sum(),
             confusion: confusion(&rows),
             rows,
         }
     }
+}
+
+/// Returns true if the diagnosis ended without an error.
+fn answered(row: &Row) -> bool {
+    row.outcome.is_some()
 }
 
 fn by_nuisance(rows: &[Row]) -> Vec<NuisanceScore> {
@@ -194,7 +212,11 @@ fn by_nuisance(rows: &[Row]) -> Vec<NuisanceScore> {
             let with = |row: &Row| row.nuisance == nuisance && !row.is_coarse();
             NuisanceScore {
                 nuisance: nuisance.into(),
-                false_alarms: Count::over(rows, |row| with(row) && row.is_null(), Row::called),
+                false_alarms: Count::over(
+                    rows,
+                    |row| with(row) && row.is_null() && answered(row),
+                    Row::called,
+                ),
                 delivered: Count::over(
                     rows,
                     |row| with(row) && !row.is_null(),
@@ -209,8 +231,9 @@ fn steadiness(rows: &[Row]) -> Vec<Steadiness> {
     let mut changes: BTreeMap<&str, Vec<bool>> = BTreeMap::new();
     for row in rows {
         for repeat in &row.repeats {
-            let again = repeat.outcome.as_ref().map(|o| o.text());
-            let same = again == row.outcome.as_ref().map(|o| o.text());
+            // Two failures agree about nothing.
+            let same = (repeat.outcome.as_ref().zip(row.outcome.as_ref()))
+                .is_some_and(|(a, b)| (a.text(), a.decision) == (b.text(), b.decision));
             changes.entry(&repeat.change).or_default().push(same);
         }
     }
@@ -225,7 +248,9 @@ fn steadiness(rows: &[Row]) -> Vec<Steadiness> {
 fn confusion(rows: &[Row]) -> Vec<Confusion> {
     let mut counts = BTreeMap::new();
     for row in rows {
-        *counts.entry((row.truth.clone(), row.answer())).or_insert(0) += 1;
+        *counts
+            .entry((row.truth.name.clone(), row.answer()))
+            .or_insert(0) += 1;
     }
     (counts.into_iter())
         .map(|((truth, answer), count)| Confusion {

@@ -12,7 +12,7 @@ const LEAST: f64 = 1e-3;
 /// Expected information that a diagnosis need not see.
 const FAINT: f64 = 3.0;
 
-/// Share of statements that are right.
+/// Share of statements that are right. A failed diagnosis states nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct Precision {
     /// Accepted answers whose stated probability is at least 0.9 and hold nothing false.
@@ -63,7 +63,7 @@ pub(crate) struct Reliability {
 pub(crate) struct Coverage {
     /// Where nothing is missing and nothing was said to be.
     pub nulls: Count,
-    /// Where the answer is right and an effect was accepted.
+    /// Where the answer is right and complete, and an effect was accepted.
     pub delivered: Count,
 }
 
@@ -74,7 +74,10 @@ pub(super) fn precision(rows: &[Row]) -> Precision {
             row.called() && stated.is_some_and(|p| p >= least)
         };
         Count::over(rows, of, |row| {
-            matches!(row.fate(), Fate::Delivered | Fate::Incomplete)
+            matches!(
+                row.fate(),
+                Fate::Delivered | Fate::Partial | Fate::Incomplete
+            )
         })
     };
     let quiet = |row: &Row| row.outcome.is_some() && !row.called() && !row.is_coarse();

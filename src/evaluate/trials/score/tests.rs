@@ -1,6 +1,7 @@
 use super::*;
 use crate::diagnose::{Decision, Verdict};
 use crate::evaluate::trials::row::{Fate, Row};
+use crate::evaluate::trials::truth::Rival;
 use crate::evaluate::trials::{Families, Kind, Named, Outcome, Refitted, Repeat, TrueShare};
 
 /// A trial in which `truth` was there and these effects were accepted, the first with this probability.
@@ -17,7 +18,7 @@ fn row(kind: Kind, truth: &[&str], accepted: &[&str], probability: f64) -> Row {
         kind,
         truth: match truth.is_empty() {
             true => "nothing".into(),
-            false => truth.join(" + "),
+            false => truth.join(" + ").as_str().into(),
         },
         right: truth.iter().map(right).collect(),
         targets: truth.iter().map(target).collect(),
@@ -71,6 +72,28 @@ fn abstaining(mut row: Row) -> Row {
     row
 }
 
+fn failed(kind: Kind, truth: &[&str]) -> Row {
+    Row {
+        outcome: None,
+        failure: Some("no fit".into()),
+        ..row(kind, truth, &[], 0.0)
+    }
+}
+
+fn partial(mut row: Row) -> Row {
+    row.outcome.as_mut().unwrap().decision = Decision::Partial;
+    row
+}
+
+/// A row whose nearest wrong effect leaves so many nats.
+fn rivalled(mut row: Row, nats: f64) -> Row {
+    row.truth.rival = Some(Rival {
+        effect: "r@s".into(),
+        nats,
+    });
+    row
+}
+
 fn card(rows: Vec<Row>) -> Scorecard {
     let setup = Setup {
         twin: "twin".into(),
@@ -92,11 +115,8 @@ fn count(count: u64, of: u64) -> Count {
 
 #[test]
 fn every_answer_has_one_fate() {
-    let failed = Row {
-        outcome: None,
-        failure: Some("no fit".into()),
-        ..row(Kind::Listed, &["a@s"], &[], 0.0)
-    };
+    let mut unlisted = partial(row(Kind::Pair, &["a@s", "b@t"], &["a@s"], 0.9));
+    unlisted.right[1].clear();
     let mut refused = abstaining(row(Kind::Listed, &["a@s"], &["a@s"], 0.4));
     refused.outcome.as_mut().unwrap().accepted.clear();
     let mut class = row(Kind::Listed, &["a@s"], &["b@s"], 0.4);
@@ -119,7 +139,21 @@ fn every_answer_has_one_fate() {
             Fate::Abstained,
         ),
         (refused, Fate::Refused),
-        (failed, Fate::Failed),
+        (failed(Kind::Listed, &["a@s"]), Fate::Failed),
+        (
+            partial(row(Kind::Listed, &["a@s"], &["a@s"], 0.9)),
+            Fate::Partial,
+        ),
+        (
+            partial(row(Kind::Listed, &["a@s"], &["b@s"], 0.9)),
+            Fate::WrongName,
+        ),
+        (
+            partial(row(Kind::Pair, &["a@s", "b@t"], &["a@s"], 0.9)),
+            Fate::Incomplete,
+        ),
+        // The other departure has no listed name: more is missing indeed.
+        (unlisted, Fate::Delivered),
         (
             abstaining(row(Kind::Random, &["odd@s"], &[], 0.0)),
             Fate::Delivered,
@@ -137,7 +171,7 @@ fn every_answer_has_one_fate() {
             Fate::Incomplete,
         ),
     ] {
-        assert_eq!(row.fate(), fate, "{}: {}", row.truth, row.answer());
+        assert_eq!(row.fate(), fate, "{}: {}", row.truth.name, row.answer());
     }
 }
 
@@ -273,4 +307,86 @@ fn shares_are_those_of_the_truth_and_of_right_answers() {
     assert_eq!(closed.true_median, Some(0.95));
     assert_eq!(closed.true_holds_one, count(2, 3));
     assert_eq!(closed.delivered_within, count(1, 2));
+}
+
+/// A failed diagnosis improves no rate: of nulls it is left out and stated beside, of gaps it is not detected.
+#[test]
+fn failures_are_no_right_answers() {
+    let card = card(vec![
+        row(Kind::None, &[], &["a@s"], 0.9),
+        row(Kind::None, &[], &[], 0.0),
+        failed(Kind::None, &[]),
+        failed(Kind::Listed, &["a@s"]),
+        row(Kind::Listed, &["a@s"], &["a@s"], 0.9),
+    ]);
+    assert_eq!(card.false_alarms, count(1, 2));
+    assert_eq!(card.nulls_failed, count(1, 3));
+    assert_eq!(card.by_nuisance[0].false_alarms, count(1, 2));
+    assert_eq!(card.detected, count(1, 2));
+    assert_eq!(card.failed, count(2, 5));
+    let none = card.by_kind[0];
+    assert_eq!((none.right, none.failed), (count(1, 3), count(1, 3)));
+    assert_eq!(card.precision.no_gap, count(1, 1));
+}
+
+/// Answers stay if effects and decision do; two failures agree about nothing.
+#[test]
+fn steadiness_compares_decisions_and_no_failures() {
+    let again = |outcome| Repeat {
+        change: "seed".into(),
+        outcome,
+    };
+    let named = || row(Kind::Listed, &["a@s"], &["a@s"], 0.9);
+    let steady = Row {
+        repeats: vec![again(named().outcome), again(partial(named()).outcome)],
+        ..named()
+    };
+    let lost = Row {
+        repeats: vec![again(None)],
+        ..failed(Kind::Listed, &["a@s"])
+    };
+    assert_eq!(card(vec![steady, lost]).steadiness[0].same, count(1, 3));
+}
+
+/// Bins of clear records leave out those with a rival within 3 nats, and those of which that is not known.
+#[test]
+fn clear_records_have_bins_of_their_own() {
+    let named = || row(Kind::Listed, &["a@s"], &["a@s"], 0.9);
+    let coarse = Row {
+        step: 2.0,
+        ..rivalled(named(), 8.0)
+    };
+    let card = card(vec![
+        rivalled(row(Kind::Listed, &["a@s"], &["b@s"], 0.9), 0.5),
+        named(),
+        coarse,
+        rivalled(partial(row(Kind::Random, &["odd@s"], &["a@s"], 0.6)), 9.0),
+        rivalled(abstaining(row(Kind::Random, &["odd@s"], &[], 0.0)), 9.0),
+        rivalled(row(Kind::Random, &["odd@s"], &["b@s"], 0.6), 9.0),
+    ]);
+    let [listed, random] = &card.by_information[..] else {
+        panic!("{:?}", card.by_information)
+    };
+    assert_eq!(listed.delivered, count(2, 3));
+    assert_eq!(listed.coarse_delivered, count(1, 1));
+    assert_eq!(card.coarse_delivered, count(1, 1));
+    assert_eq!(listed.abstained_or_partial, count(0, 0));
+    assert_eq!(random.abstained_or_partial, count(2, 3));
+    assert_eq!(
+        (random.delivered, random.wrong_name),
+        (count(1, 3), count(2, 3))
+    );
+    let clear = &card.clear_by_information;
+    assert_eq!(clear[0].delivered, count(1, 1));
+    assert_eq!(clear[1].delivered, count(1, 3));
+}
+
+/// A place that means the same as that of the departure is a true one; effects there are no right answers for that.
+#[test]
+fn places_of_the_same_meaning_are_true_ones() {
+    let mut elsewhere = row(Kind::Listed, &["a@k"], &["b@x"], 0.9);
+    assert!(!elsewhere.place_is_right());
+    elsewhere.truth.places = vec!["k".into(), "x".into()];
+    assert!(elsewhere.place_is_right());
+    assert_eq!(elsewhere.fate(), Fate::WrongName);
 }

@@ -3,10 +3,18 @@
 //! | file | does |
 //! |---|---|
 //! | `prior.rs` | draws θ and the conditions of a record |
+//! | `listed.rs` | lists the effects that worlds can have |
 //! | `sizing.rs` | finds the size at which a departure has the information that it is to have |
+//! | `imitators.rs` | finds the listed effects that a record cannot tell from a departure |
+//! | `reject.rs` | names the reasons for which a draw is given up |
 //! | `sampler.rs` | draws a whole truth |
 
+#[cfg(test)]
+mod fixture;
+mod imitators;
+mod listed;
 mod prior;
+mod reject;
 mod sampler;
 mod sizing;
 
@@ -16,6 +24,16 @@ use super::Kind;
 use super::law::Departure;
 use super::world::Conditions;
 use serde::{Deserialize, Serialize};
+
+/// A listed effect that is no right answer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Rival {
+    /// `id@target`.
+    pub effect: String,
+    /// Nats of the departure that it leaves at best.
+    pub nats: f64,
+}
 
 /// Difference between system and twin in a trial: the key that is sealed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -35,9 +53,14 @@ pub(super) struct Truth {
     pub effects: Vec<String>,
     /// For each departure the listed effects that are a right answer.
     pub right: Vec<Vec<String>>,
+    /// The listed effect nearest to a departure that is no right answer; none for a black box, and where nothing is missing.
+    pub rival: Option<Rival>,
     /// Places where the twin is wrong.
     pub targets: Vec<String>,
-    /// Expected information in nats; of two departures, that of the weaker one. None where nothing is missing.
+    /// These, and the places that mean the same by the structure of the equations.
+    pub places: Vec<String>,
+    /// Expected information in nats; of two departures, that of the weaker one without what the other explains. None where nothing is
+    /// missing.
     pub information: Option<f64>,
     /// Nats by which the twin's own integration step shows.
     pub step: f64,

@@ -1,14 +1,17 @@
 //! Draws truths and their records.
 
 use super::Truth;
+use super::imitators::Imitators;
+use super::listed::Listed;
 use super::prior::{conditions, has_room, nuisances, theta};
-use super::sizing::{Sized, Stage};
+use super::reject::Reject;
+use super::sizing::{LEAST, Sized, Stage};
 use crate::evaluate::EvaluateError;
 use crate::evaluate::trials::draft::{Draft, Form, index};
 use crate::evaluate::trials::information::Information;
-use crate::evaluate::trials::law::Place;
 use crate::evaluate::trials::places::Places;
 use crate::evaluate::trials::scene::Scene;
+use crate::evaluate::trials::structure::Structure;
 use crate::evaluate::trials::world::{Conditions, Draws, System, World};
 use crate::evaluate::trials::{Families, Kind};
 use crate::record::{Drive, Record, Signal};
@@ -20,8 +23,6 @@ use std::collections::BTreeMap;
 const ATTEMPTS: u64 = 60;
 /// Least and largest expected information that is asked for, in nats.
 const INFORMATION: [f64; 2] = [1.0, 300.0];
-/// Another effect is a right answer too if it leaves less than this share of the information, and less than this in nats.
-const IMITATES: (f64, f64) = (0.02, 1.0);
 
 /// A truth with its records.
 pub(in crate::evaluate::trials) struct Drawn {
@@ -30,14 +31,6 @@ pub(in crate::evaluate::trials) struct Drawn {
     pub validation: Option<Record>,
     /// The same system, twice as long; none where steps vary.
     pub doubled: Option<Record>,
-}
-
-/// A listed effect that worlds can have.
-struct Listed {
-    key: String,
-    id: String,
-    place: Place,
-    other: Option<usize>,
 }
 
 /// Inputs and gaps of records.
@@ -52,28 +45,6 @@ enum Plan {
 pub(in crate::evaluate::trials) struct Extra {
     pub validation: bool,
     pub doubled: bool,
-}
-
-/// Why a draw was given up.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Reject {
-    Diverged,
-    Still,
-    NoFilter,
-    NoLaw,
-    TooWeak,
-}
-
-impl Reject {
-    fn text(self) -> &'static str {
-        match self {
-            Self::Diverged => "diverged",
-            Self::Still => "had an output that never moves",
-            Self::NoFilter => "could not be filtered",
-            Self::NoLaw => "had no law that could be made",
-            Self::TooWeak => "did not show in the outputs, or diverged before they did",
-        }
-    }
 }
 
 /// Source of truths and their records.
@@ -97,18 +68,6 @@ impl<'a> TruthSampler<'a> {
     ) -> Result<Self, EvaluateError> {
         let twin = study.twin();
         let places = Places::new(twin);
-        let state = |name: &str| places.states.iter().position(|s| s == name);
-        let listed = (study.candidates().iter())
-            .filter(|effect| Draft::knows(effect.id()))
-            .filter_map(|effect| {
-                Some(Listed {
-                    key: effect.key().to_string(),
-                    id: effect.id().into(),
-                    place: places.find(effect.id(), effect.target())?,
-                    other: effect.other().and_then(state),
-                })
-            })
-            .collect();
         let plan = match like {
             Some(record) => {
                 record.check_channels(&twin.signals())?;
@@ -120,9 +79,9 @@ impl<'a> TruthSampler<'a> {
             study,
             world: World::new(twin),
             space: twin.parameters(),
+            listed: Listed::all(study, &places),
             places,
             plan,
-            listed,
             families,
             is_silent: false,
         };
@@ -256,34 +215,48 @@ impl<'a> TruthSampler<'a> {
             formulas: vec![],
             effects: vec![],
             right: vec![],
+            rival: None,
             targets: vec![],
+            places: vec![],
             information: None,
             step: information.step(self.study, &conditions)?,
             redraws: 0,
         };
-        for (draft, effect) in match self.drafts(kind, &scene, source) {
-            Some(drafts) => drafts,
-            None => return Ok(Err(Reject::NoLaw)),
-        } {
+        let Some(drafts) = self.drafts(kind, &scene, source) else {
+            return Ok(Err(Reject::NoLaw));
+        };
+        let mut all: Vec<Sized> = Vec::with_capacity(drafts.len());
+        for (draft, effect) in drafts {
             let [low, high] = INFORMATION;
             let wanted = low * (high / low).powf(source.uniform());
             let Some(sized) = stage.sized(&draft, wanted, &information)? else {
                 return Ok(Err(Reject::TooWeak));
             };
-            let mut right = self.imitators(&stage, &sized, &information)?;
-            right.extend(effect.clone());
-            right.sort();
-            right.dedup();
-            let target = self.places.name(draft.place).to_owned();
+            let target = self.places.name(sized.departure.place).to_owned();
             truth.labels.push(draft.label(&target));
             truth.formulas.extend(draft.formula());
             truth.effects.extend(effect);
-            truth.right.push(right);
             truth.targets.push(target);
-            let least = truth.information.map_or(sized.nats, |n| n.min(sized.nats));
-            truth.information = Some(least);
-            truth.departures.push(sized.departure);
+            truth.departures.push(sized.departure.clone());
+            all.push(sized);
         }
+        // What one departure of a pair explains of the other, no record tells.
+        if let [first, second] = &mut all[..] {
+            first.nats *= information.unexplained(&first.change, &second.change);
+            second.nats *= information.unexplained(&second.change, &first.change);
+        }
+        if all.iter().any(|sized| sized.nats < LEAST) {
+            return Ok(Err(Reject::TooAlike));
+        }
+        truth.information = all.iter().map(|sized| sized.nats).reduce(f64::min);
+        for (i, sized) in all.iter().enumerate() {
+            let own = truth.effects.get(i);
+            let found = Imitators::of(sized, own, &self.listed, &stage, &information)?;
+            truth.right.push(found.right);
+            let nearest = [truth.rival.take(), found.rival];
+            truth.rival = (nearest.into_iter().flatten()).min_by(|a, b| a.nats.total_cmp(&b.nats));
+        }
+        truth.places = self.true_places(&truth, &scene);
         Ok(self.drawn(truth, &drive, extra, noise, &scene))
     }
 
@@ -359,32 +332,21 @@ impl<'a> TruthSampler<'a> {
         })
     }
 
-    /// Listed effects without shapes that no record of this length tells from a departure.
-    fn imitators(
-        &self,
-        stage: &Stage<'_>,
-        sized: &Sized,
-        information: &Information<'_>,
-    ) -> Result<Vec<String>, EvaluateError> {
-        let (share, nats) = IMITATES;
-        let mut keys = Vec::new();
-        // A simulator answers too slowly to be asked about every effect.
-        if self.world.is_black_box() {
-            return Ok(keys);
-        }
-        for effect in &self.listed {
-            let Some(draft) = Draft::shapeless(&effect.id, effect.place, effect.other) else {
-                continue;
-            };
-            let Some(direction) = stage.direction(&draft, information)? else {
-                continue;
-            };
-            let left = information.unexplained(&sized.change, &direction);
-            if left < share && left * sized.nats < nats {
-                keys.push(effect.key.clone());
+    /// Places of the departures, and those that mean the same by the structure of the equations.
+    fn true_places(&self, truth: &Truth, scene: &Scene) -> Vec<String> {
+        let mut all = truth.targets.clone();
+        if let Some(twin) = self.world.equations() {
+            let structure = Structure::of(twin, &truth.theta, scene);
+            for departure in &truth.departures {
+                let same = structure.same_as(departure.place).into_iter();
+                all.extend(same.map(|place| self.places.name(place).to_owned()));
             }
         }
-        Ok(keys)
+        // A state that another one defines has no name as a place.
+        all.retain(|name| !name.is_empty());
+        all.sort();
+        all.dedup();
+        all
     }
 
     /// The record of a truth under an input; `None` where it diverges.

@@ -8,15 +8,16 @@ use crate::evaluate::trials::scene::Scene;
 use crate::evaluate::trials::world::{Conditions, Draws, System, World};
 use crate::record::{Drive, Record};
 
-/// First size that is tried, and tries in all.
-const FIRST: f64 = 0.03;
+/// First size that is tried: small.
+pub(super) const FIRST: f64 = 0.03;
+/// Tries in all.
 const TRIES: usize = 10;
 /// A size is taken within this distance of the wanted information, as a logarithm.
 const NEAR: f64 = 0.15;
 /// Farthest that is taken where no nearer one was found.
 const FAR: f64 = 1.0;
 /// Less than this is no departure.
-const LEAST: f64 = 0.5;
+pub(super) const LEAST: f64 = 0.5;
 
 /// Everything of a trial but its departures.
 pub(super) struct Stage<'a> {
@@ -86,14 +87,15 @@ impl Stage<'_> {
         }))
     }
 
-    /// A departure of a small size: the direction in which it goes.
-    pub fn direction(
+    /// The change that a departure of a size makes; `None` where it cannot be made or diverges.
+    pub fn changed(
         &self,
         draft: &Draft,
+        size: f64,
         information: &Information<'_>,
     ) -> Result<Option<Change>, EvaluateError> {
-        let small = draft.of_size(FIRST, self.scene);
-        let Some(pair) = small.and_then(|small| self.pair(&[small])) else {
+        let departure = draft.of_size(size, self.scene);
+        let Some(pair) = departure.and_then(|departure| self.pair(&[departure])) else {
             return Ok(None);
         };
         Ok(information.change(pair)?)

@@ -4,6 +4,9 @@ use super::*;
 use crate::diagnose::fixture::tanks;
 use crate::evaluate::paper::reference_studies;
 use crate::evaluate::trials::information::Information;
+use crate::evaluate::trials::law::Place;
+use crate::evaluate::trials::truth::fixture::{on_stage, plain};
+use crate::evaluate::trials::truth::sizing::FIRST;
 use crate::study::RecordPlan;
 use crate::twin::{Now, Outline, Parameter, StateSpace};
 use crate::twins::VanDerPol;
@@ -157,27 +160,13 @@ fn information_is_that_of_theory() {
         }
     }
     let study = Study::new("level", Level, RecordPlan::levels(0.1, 400, -1.0, 1.0, 5)).unwrap();
-    let world = World::new(study.twin());
-    let conditions = Conditions::declared();
-    let noise = Noise::new(1, "theory", 0);
-    let drive = study.drives().unwrap().draw(noise).unwrap();
-    let theta = [1.0];
-    let draws = Draws::of(noise);
-    let scene = Scene::new(&world, &theta, &drive, draws).unwrap();
-    let stage = Stage {
-        world: &world,
-        theta: &theta,
-        conditions: &conditions,
-        drive: &drive,
-        draws,
-        scene: &scene,
-    };
-    let plain = stage.records(&[]).unwrap();
-    let plain = plain.each_ref().map(std::slice::from_ref);
-    let information = Information::new(&study, &theta, &conditions, plain);
-    let information = information.unwrap().unwrap();
-    let draft = Draft::shapeless("sensor-bias", Place::Sensor(0), None).unwrap();
-    let departure = draft.of_size(0.05, &scene).unwrap();
+    on_stage(&study, &[1.0], bias_has_its_information);
+}
+
+fn bias_has_its_information(stage: &Stage<'_>, information: &Information<'_>) {
+    let scene = stage.scene;
+    let draft = plain("sensor-bias", Place::Sensor(0));
+    let departure = draft.of_size(0.05, scene).unwrap();
     let bias = 0.05 * scene.outputs[0].deviation;
     let [own, again, mirrored] = stage.records(&[departure]).unwrap();
     let lost = information.lost([&own, &mirrored]).unwrap().unwrap();
@@ -191,14 +180,14 @@ fn information_is_that_of_theory() {
     let absorbed = 0.5 * 400.0 * (1.0 + (bias / 0.1).powi(2)).ln();
     assert!((lost / absorbed - 1.0).abs() < 0.15, "{lost} {absorbed}");
     // The gain of the actuator is what θ does; the bias is no gain.
-    let gain = Draft::shapeless("actuator-gain", Place::Actuator(0), None).unwrap();
-    let gain = stage.direction(&gain, &information).unwrap().unwrap();
+    let gain = plain("actuator-gain", Place::Actuator(0));
+    let gain = stage.changed(&gain, FIRST, information).unwrap().unwrap();
     assert!(
         information.nats(&gain) < 0.05 * nats,
         "{}",
         information.nats(&gain)
     );
-    let same = stage.direction(&draft, &information).unwrap().unwrap();
+    let same = stage.changed(&draft, FIRST, information).unwrap().unwrap();
     assert!(information.unexplained(&change, &same) < 0.01);
 }
 
@@ -289,4 +278,50 @@ fn records_are_like_a_measured_one() {
     for k in 20..40 {
         assert!(made.record.outputs()[[k, 1]].is_nan());
     }
+}
+
+/// A push on the upper tank and a bias of its pump are one departure: nothing of one remains beside the other.
+#[test]
+fn departures_that_are_alike_have_no_information_beside_each_other() {
+    on_stage(&tanks(250), &[0.6, 0.5, 0.55, 1.0], |stage, information| {
+        let changed = |id, place| {
+            let change = stage.changed(&plain(id, place), 0.1, information);
+            change.unwrap().unwrap()
+        };
+        let push = changed("constant-forcing", Place::State(0));
+        let bias = changed("actuator-bias", Place::Actuator(0));
+        let lag = changed("sensor-lag", Place::Sensor(0));
+        assert!(information.unexplained(&push, &bias) < 0.01);
+        assert!(information.unexplained(&push, &lag) > 0.1);
+    });
+    // What a pair is drawn with is what remains, and is not nothing.
+    let study = tanks(250);
+    let sampler = sampler(&study);
+    for trial in 0..3 {
+        let truth = draw(&sampler, Kind::Pair, trial).truth;
+        assert!(truth.information.unwrap() >= LEAST, "{truth:?}");
+    }
+}
+
+/// A drift of the pump's gain is as well one of the pump, and of the tank that it fills.
+#[test]
+fn places_of_the_same_meaning_are_in_the_key() {
+    let study = tanks(250);
+    let sampler = sampler(&study);
+    let places = |trial| {
+        let truth = draw(&sampler, Kind::Listed, trial).truth;
+        (truth.targets[0].clone(), truth.places)
+    };
+    let mut seen = 0;
+    for (target, places) in (0..30).map(places) {
+        let expected: &[&str] = match target.as_str() {
+            "k1" => &["h1", "k1"],
+            "k4" | "actuator" => &["actuator", "h1", "k4"],
+            "k2" | "k3" => &["h2", target.as_str()],
+            _ => &[target.as_str()],
+        };
+        assert_eq!(places, expected);
+        seen += usize::from(expected.len() > 1);
+    }
+    assert!(seen > 3, "{seen}");
 }

@@ -1,0 +1,267 @@
+//! Places that mean the same by the structure of a twin's equations.
+//!
+//! | where | means the same as |
+//! |---|---|
+//! | a parameter or an actuator that enters the rate of one state alone | that state |
+//! | a parameter or an actuator that enters one output alone | that sensor |
+//! | a parameter by which one input alone is multiplied | that actuator, and the reverse |
+//!
+//! A law missing at the first place is as well a law missing at the second: no record tells which.
+
+use super::law::Place;
+use super::scene::{Scene, Size};
+use crate::twin::{Now, StateSpace};
+
+/// Moments of the record at which equations are compared.
+const MOMENTS: usize = 6;
+/// Step of a difference, as a share of a parameter's prior or of an input's range.
+const STEP: f64 = 1e-3;
+/// Step to another value of a state or input, as a share of its range.
+const OTHER: f64 = 0.1;
+/// Relative change of a slope that rounding makes.
+const SAME: f64 = 1e-6;
+
+/// States and outputs that something enters.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Entered {
+    states: Vec<usize>,
+    outputs: Vec<usize>,
+}
+
+impl Entered {
+    /// The state or sensor, where it is the only one.
+    fn only(&self) -> Option<Place> {
+        match (&self.states[..], &self.outputs[..]) {
+            ([state], []) => Some(Place::State(*state)),
+            ([], [output]) => Some(Place::Sensor(*output)),
+            _ => None,
+        }
+    }
+}
+
+/// Entries of a twin's parameters and inputs into its equations.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Structure {
+    parameters: Vec<Entered>,
+    inputs: Vec<Entered>,
+    /// Input that each parameter is the gain of.
+    gains: Vec<Option<usize>>,
+}
+
+/// One moment of a record: time, step, states, inputs, parameters.
+#[derive(Debug, Clone)]
+struct At {
+    t: f64,
+    dt: f64,
+    x: Vec<f64>,
+    u: Vec<f64>,
+    theta: Vec<f64>,
+}
+
+impl At {
+    fn rates(&self, twin: &dyn StateSpace) -> Vec<f64> {
+        let now = Now::new(self.t, self.dt, &self.u, &self.theta);
+        let mut rates = vec![0.0; self.x.len()];
+        twin.drift(&now, &self.x, &mut rates);
+        rates
+    }
+
+    fn outputs(&self, twin: &dyn StateSpace, outputs: usize) -> Vec<f64> {
+        let now = Now::new(self.t, self.dt, &self.u, &self.theta);
+        let mut y = vec![0.0; outputs];
+        twin.observe(&now, &self.x, &mut y);
+        y
+    }
+
+    /// With one parameter moved.
+    fn moved(&self, parameter: usize, by: f64) -> Self {
+        let mut at = self.clone();
+        at.theta[parameter] += by;
+        at
+    }
+}
+
+impl Structure {
+    /// Compares the equations of a twin at some moments of a record at θ. What does not enter leaves every digit as it is.
+    pub fn of(twin: &dyn StateSpace, theta: &[f64], scene: &Scene) -> Self {
+        let outline = twin.outline();
+        let outputs = outline.outputs.len();
+        let (run, samples) = (&scene.run, scene.run.drive.samples());
+        let moments: Vec<At> = (0..MOMENTS.min(samples))
+            .map(|m| (2 * m + 1) * samples / (2 * MOMENTS))
+            .map(|k| At {
+                t: run.drive.time(k),
+                dt: scene.dt,
+                x: run.states.row(k).to_vec(),
+                u: run.drive.input(k).to_vec(),
+                theta: theta.to_vec(),
+            })
+            .collect();
+        let entered = |change: &dyn Fn(&mut At)| {
+            let changes = |values: &dyn Fn(&At) -> Vec<f64>, n: usize| -> Vec<usize> {
+                let mut changed = vec![false; n];
+                for at in &moments {
+                    let mut moved = at.clone();
+                    change(&mut moved);
+                    for (i, (own, there)) in values(at).iter().zip(values(&moved)).enumerate() {
+                        changed[i] |= own.to_bits() != there.to_bits();
+                    }
+                }
+                (0..n).filter(|i| changed[*i]).collect()
+            };
+            Entered {
+                states: changes(&|at| at.rates(twin), outline.states.len()),
+                outputs: changes(&|at| at.outputs(twin, outputs), outputs),
+            }
+        };
+        let steps: Vec<f64> = (outline.parameters.iter())
+            .map(|p| STEP * p.prior.width())
+            .collect();
+        let parameters: Vec<Entered> = (steps.iter().enumerate())
+            .map(|(p, step)| entered(&|at: &mut At| at.theta[p] += step))
+            .collect();
+        let inputs: Vec<Entered> = (scene.inputs.iter().enumerate())
+            .map(|(j, size)| entered(&|at: &mut At| at.u[j] += OTHER * size.span()))
+            .collect();
+        let gains = (steps.iter().enumerate())
+            .map(|(p, step)| {
+                let gain = gain(twin, scene, &moments, (p, *step), &parameters[p])?;
+                (inputs[gain] == parameters[p]).then_some(gain)
+            })
+            .collect();
+        Self {
+            parameters,
+            inputs,
+            gains,
+        }
+    }
+
+    /// Returns the other places that mean the same as this one.
+    pub fn same_as(&self, place: Place) -> Vec<Place> {
+        match place {
+            Place::Parameter(p) => {
+                let gain = self.gains.get(p).copied().flatten();
+                let only = self.parameters.get(p).and_then(Entered::only);
+                only.into_iter().chain(gain.map(Place::Actuator)).collect()
+            }
+            Place::Actuator(j) => {
+                let only = self.inputs.get(j).and_then(Entered::only);
+                let gains = (self.gains.iter().enumerate())
+                    .filter(|(_, gain)| **gain == Some(j))
+                    .map(|(p, _)| Place::Parameter(p));
+                only.into_iter().chain(gains).collect()
+            }
+            Place::State(_) | Place::Sensor(_) => vec![],
+        }
+    }
+}
+
+/// Input that alone decides the slope of the rates in a parameter; none where a state or the time does, too.
+fn gain(
+    twin: &dyn StateSpace,
+    scene: &Scene,
+    moments: &[At],
+    (p, step): (usize, f64),
+    entered: &Entered,
+) -> Option<usize> {
+    if entered.states.is_empty() || !entered.outputs.is_empty() {
+        return None;
+    }
+    let slope = |at: &At| -> Vec<f64> {
+        let [low, high] = [-step, step].map(|by| at.moved(p, by).rates(twin));
+        high.iter().zip(low).map(|(high, low)| high - low).collect()
+    };
+    let slopes: Vec<Vec<f64>> = moments.iter().map(slope).collect();
+    let most = (slopes.iter().flatten()).fold(0.0_f64, |most, s| most.max(s.abs()));
+    let decides = |change: &dyn Fn(&mut At)| {
+        moments.iter().zip(&slopes).any(|(at, own)| {
+            let mut moved = at.clone();
+            change(&mut moved);
+            let there = slope(&moved);
+            // A slope that is no number is nobody's gain.
+            !(own.iter().zip(there)).all(|(own, there)| (own - there).abs() <= SAME * most)
+        })
+    };
+    let by_state =
+        |(i, size): (usize, &Size)| decides(&|at: &mut At| at.x[i] += OTHER * size.span());
+    if decides(&|at: &mut At| at.t += OTHER * scene.duration)
+        || scene.states.iter().enumerate().any(by_state)
+    {
+        return None;
+    }
+    let mut deciding = (scene.inputs.iter().enumerate())
+        .filter(|(j, size)| decides(&|at: &mut At| at.u[*j] += OTHER * size.span()))
+        .map(|(j, _)| j);
+    deciding.next().filter(|_| deciding.next().is_none())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluate::trials::world::{Draws, World};
+    use crate::record::Drive;
+    use crate::twin::{Noise, Outline, Parameter, Twin};
+    use crate::twins::{CascadedTanks, VanDerPol};
+
+    fn structure(twin: Twin, theta: &[f64]) -> Structure {
+        let inputs = twin.signals().inputs.len();
+        let levels = crate::record::Signal::from_shape_fn((80, inputs), |(k, _)| {
+            1.0 + (0.2 * k as f64).sin()
+        });
+        let world = World::new(&twin);
+        let drive = Drive::new(0.1, levels).unwrap();
+        let scene = Scene::new(&world, theta, &drive, Draws::of(Noise::new(1, "s", 0))).unwrap();
+        Structure::of(world.equations().unwrap(), theta, &scene)
+    }
+
+    /// k4 multiplies the pump's input, which enters the upper tank alone; k1 is that tank's, k2 and k3 the lower one's.
+    #[test]
+    fn tanks_have_one_gain_and_parameters_of_one_tank_each() {
+        let tanks = structure(Twin::new(CascadedTanks), &[0.6, 0.5, 0.55, 1.0]);
+        let [upper, lower] = [0, 1].map(Place::State);
+        let pump = Place::Actuator(0);
+        assert_eq!(tanks.same_as(Place::Parameter(0)), [upper]);
+        assert_eq!(tanks.same_as(Place::Parameter(1)), [lower]);
+        assert_eq!(tanks.same_as(Place::Parameter(2)), [lower]);
+        assert_eq!(tanks.same_as(Place::Parameter(3)), [upper, pump]);
+        assert_eq!(tanks.same_as(pump), [upper, Place::Parameter(3)]);
+        assert_eq!(tanks.same_as(upper), []);
+        assert_eq!(tanks.same_as(Place::Sensor(0)), []);
+        let oscillator = structure(Twin::new(VanDerPol), &[1.5]);
+        assert_eq!(oscillator.same_as(Place::Parameter(0)), [Place::State(1)]);
+    }
+
+    /// ẋ₁ = −a·x₁ + b·u·x₂ + u, ẋ₂ = −a·x₂, y = c·x₁: a enters two rates, b·u depends on a state, c is the sensor's.
+    struct Mixed;
+    impl StateSpace for Mixed {
+        fn outline(&self) -> Outline {
+            Outline::new()
+                .parameter(Parameter::new("a", "1/s", 0.2, 2.0))
+                .parameter(Parameter::new("b", "1/s", 0.2, 2.0))
+                .parameter(Parameter::new("c", "1", 0.2, 2.0))
+                .state("x1", "m")
+                .state("x2", "m")
+                .input("u", "m/s")
+                .output("y", "m")
+        }
+        fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+            dx[0] = -now.theta[0] * x[0] + now.theta[1] * now.u[0] * x[1] + now.u[0];
+            dx[1] = -now.theta[0] * x[1];
+        }
+        fn observe(&self, now: &Now<'_>, x: &[f64], y: &mut [f64]) {
+            y[0] = now.theta[2] * x[0];
+        }
+        fn start(&self, _: &Now<'_>, x: &mut [f64]) {
+            x.fill(1.0);
+        }
+    }
+
+    #[test]
+    fn parameters_of_several_rates_or_of_a_state_are_no_gains() {
+        let mixed = structure(Twin::new(Mixed), &[0.7, 0.8, 0.9]);
+        assert_eq!(mixed.same_as(Place::Parameter(0)), []);
+        assert_eq!(mixed.same_as(Place::Parameter(1)), [Place::State(0)]);
+        assert_eq!(mixed.same_as(Place::Parameter(2)), [Place::Sensor(0)]);
+        assert_eq!(mixed.same_as(Place::Actuator(0)), [Place::State(0)]);
+    }
+}

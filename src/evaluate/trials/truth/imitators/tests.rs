@@ -1,0 +1,96 @@
+//! Exact equivalents are right answers, and the same with the other sign are not.
+
+use super::*;
+use crate::evaluate::trials::law::Place;
+use crate::evaluate::trials::places::Places;
+use crate::evaluate::trials::truth::fixture::on_stage;
+use crate::study::{RecordPlan, Study};
+use crate::twin::{Now, Outline, Parameter, StateSpace, Stepping};
+
+/// A leaking vessel whose level and input are never near zero: ḣ = u − k·h, u from 1 to 3.
+struct Vessel;
+
+impl StateSpace for Vessel {
+    fn outline(&self) -> Outline {
+        Outline::new()
+            .parameter(Parameter::new("k", "1/s", 0.3, 1.5).within(0.1, 4.0))
+            .state("h", "m")
+            .input("u", "m/s")
+            .output("y", "m")
+    }
+    fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+        dx[0] = now.u[0] - now.theta[0] * x[0];
+    }
+    fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+        y[0] = x[0];
+    }
+    fn start(&self, _: &Now<'_>, x: &mut [f64]) {
+        x[0] = 2.0;
+    }
+    fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+        (process[0], measurement[0]) = (0.01, 0.02);
+    }
+    fn stepping(&self) -> Stepping {
+        Stepping {
+            substeps: 10,
+            ..Stepping::default()
+        }
+    }
+}
+
+/// Right answers to a departure of about 40 nats; its rival is none of them and leaves less than all.
+fn right(id: &str, place: Place, sign: f64) -> Vec<String> {
+    let plan = RecordPlan::levels(0.3, 200, 1.0, 3.0, 10);
+    let study = Study::new("vessel", Vessel, plan).unwrap();
+    let listed = Listed::all(&study, &Places::new(study.twin()));
+    let variant = *Variant::of(id).last().unwrap();
+    let variant = Variant { sign, ..variant };
+    on_stage(&study, &[0.7], |stage, information| {
+        let draft = Draft::variant(id, place, None, variant).unwrap();
+        let sized = stage.sized(&draft, 40.0, information).unwrap().unwrap();
+        let all = Imitators::of(&sized, None, &listed, stage, information).unwrap();
+        let rival = all.rival.as_ref().unwrap();
+        assert!(!all.right.contains(&rival.effect), "{all:?}");
+        assert!((0.2..=sized.nats * 1.01).contains(&rival.nats), "{all:?}");
+        all.right
+    })
+}
+
+fn holds(right: &[String], key: &str) -> bool {
+    right.iter().any(|r| r == key)
+}
+
+/// A push against a level that is never negative is friction, and a bias of the input; a push upwards is no friction.
+#[test]
+fn a_negative_push_on_a_level_is_friction() {
+    let down = right("constant-forcing", Place::State(0), -1.0);
+    let up = right("constant-forcing", Place::State(0), 1.0);
+    for key in ["constant-forcing@h", "actuator-bias@actuator"] {
+        assert!(holds(&down, key) && holds(&up, key), "{down:?} {up:?}");
+    }
+    let friction = "coulomb-friction@h";
+    assert!(holds(&down, friction), "{down:?}");
+    assert!(!holds(&up, friction), "{up:?}");
+}
+
+/// A power law of exponent 2 is a quadratic drag, which is no push.
+#[test]
+fn a_quadratic_drag_is_a_power_law() {
+    let drag = right("quadratic-drag", Place::State(0), 1.0);
+    assert!(holds(&drag, "power-law@h"), "{drag:?}");
+    assert!(!holds(&drag, "sensor-lag@sensor"), "{drag:?}");
+}
+
+/// Where the input stays beyond it, a dead zone is a bias of half its width. A lag is nothing of the kind.
+#[test]
+fn a_dead_zone_that_is_never_entered_is_a_bias() {
+    let zone = right("actuator-dead-zone", Place::Actuator(0), 1.0);
+    for key in [
+        "actuator-dead-zone@actuator",
+        "actuator-bias@actuator",
+        "coulomb-friction@h",
+    ] {
+        assert!(holds(&zone, key), "{zone:?}");
+    }
+    assert!(!holds(&zone, "actuator-lag@actuator"), "{zone:?}");
+}

@@ -1,0 +1,26 @@
+//! Draws that are given up.
+
+/// Reason for which a draw was given up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Reject {
+    Diverged,
+    Still,
+    NoFilter,
+    NoLaw,
+    TooWeak,
+    TooAlike,
+}
+
+impl Reject {
+    /// Returns what became of the draw, after its count.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Diverged => "diverged",
+            Self::Still => "had an output that never moves",
+            Self::NoFilter => "could not be filtered",
+            Self::NoLaw => "had no law that could be made",
+            Self::TooWeak => "did not show in the outputs, or diverged before they did",
+            Self::TooAlike => "had two departures that no record tells apart",
+        }
+    }
+}
