@@ -232,7 +232,7 @@ impl Refinement<'_> {
             self.drive,
             size,
             |i| noise.sample(i),
-            &self.progress.unseen(),
+            &self.progress.unshown().stage("whitening", 0),
         )?;
         let whitening = self.gate.whiten(&features)?;
         let spread = (whitening.squared_distances(&features).iter())

@@ -41,17 +41,6 @@ impl MonteCarlo {
         Draws::new(study, &self.benchmark, self.scenario)
     }
 
-    /// True parameters and record number `run`, from 0.
-    #[cfg(test)]
-    pub fn record(
-        &self,
-        study: &Study,
-        run: usize,
-    ) -> Result<(Vec<f64>, crate::record::Record), EvaluateError> {
-        let simulated = simulated(study, &self.draws(study)?, self.seed, run)?;
-        Ok((simulated.truth, simulated.record))
-    }
-
     /// Runs every stage of `estimator`, and the baselines, on simulated records, in order. Records are independent:
     /// run i depends on (seed, i) alone, and on no number of threads.
     ///

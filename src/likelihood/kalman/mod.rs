@@ -69,4 +69,3 @@ pub(crate) use error::recoverable;
 pub use filtered::{Filtered, States};
 pub use score::Score;
 pub use settings::{FilterSettings, Method};
-pub use smooth::Smoothed;
