@@ -7,10 +7,6 @@ use std::io::{self, Write};
 use std::path::Path;
 
 /// Writes a new file.
-///
-/// # Errors
-///
-/// The system's; [`io::ErrorKind::AlreadyExists`] if the path is taken.
 pub(crate) fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let file = filled(path, bytes)?.persist_noclobber(path);
     file.map(|_| ()).map_err(|error| error.error)

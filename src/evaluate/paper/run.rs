@@ -46,10 +46,6 @@ pub struct Answer {
 
 impl Run {
     /// Runs every method. A method that fails leaves no answer: its row says that it cannot be relied on.
-    ///
-    /// # Errors
-    ///
-    /// [`EvaluateError::Cancelled`] alone.
     pub(super) fn new(
         estimator: &Estimator,
         run: usize,
