@@ -43,7 +43,7 @@
 //!
 //! // The measured record, here of a tank with k = 1.5, outside the prior.
 //! let noise = Noise::new(7, "measured", 0);
-//! let drive = study.drives()?.draw(noise)?;
+//! let drive = study.drive(noise)?;
 //! let outputs = Tank.simulate(&[1.5], &drive, noise)?;
 //! let record = Record::new(drive, outputs)?;
 //!

@@ -76,16 +76,6 @@ impl Progress {
         }
     }
 
-    /// A stage that is not shown, but ends when the listener asks to stop.
-    pub(crate) fn unseen(&self) -> Stage {
-        Stage {
-            progress: self.clone(),
-            name: "",
-            done: AtomicU64::new(0),
-            total: 0,
-        }
-    }
-
     /// For parts of a piece of work that is itself one unit: shows nothing, but ends when the listener asks to stop.
     pub(crate) fn unshown(&self) -> Self {
         Self::new(Arc::new(Unshown(self.clone())))
@@ -133,9 +123,7 @@ impl Stage {
     /// One unit is done. Fails where the listener asks to stop.
     pub fn tick(&self) -> Result<(), Cancelled> {
         let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
-        if let Some(listener) = &self.progress.0
-            && !self.name.is_empty()
-        {
+        if let Some(listener) = &self.progress.0 {
             listener.advanced(self.name, done, self.total);
         }
         self.progress.checkpoint()
@@ -145,7 +133,6 @@ impl Stage {
     pub fn skip(&self, done: usize) {
         let done = self.done.fetch_add(done as u64, Ordering::Relaxed) + done as u64;
         if let Some(listener) = &self.progress.0
-            && !self.name.is_empty()
             && done > 0
         {
             listener.advanced(self.name, done, self.total);

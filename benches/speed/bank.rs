@@ -30,14 +30,14 @@ fn bank(clock: &Clock) {
         ("tanks, ARX(64, 64)", &tanks, &arx(64)),
     ];
     for (name, study, features) in cases {
-        let (twin, drives) = (study.twin(), study.drives().expect("the plan is sound"));
+        let twin = study.twin();
         let (space, map) = (
             twin.parameters(),
             features.bind(twin).expect("fits the twin"),
         );
         let row = |i| {
             let noise = Noise::new(1, "bench", i);
-            let drive = drives.draw(noise).ok()?;
+            let drive = study.drive(noise).ok()?;
             let outputs = twin
                 .simulate(&space.draw_prior(noise), &drive, noise)
                 .ok()?;
@@ -73,8 +73,8 @@ fn by_hand(theta: &[f64; 4], drive: &Drive, noise: Noise) -> Vec<f64> {
 
 fn simulators(clock: &Clock) {
     let plan = RecordPlan::levels(0.5, 400, 0.0, 3.0, 30);
-    let source = plan.prepare(&CascadedTanks.signals());
-    let drive = (source.expect("a plan of the tanks").draw(Noise::OFF)).expect("levels are finite");
+    let drive = plan.drive(&CascadedTanks.signals(), Noise::OFF);
+    let drive = drive.expect("a plan of the tanks");
     for (noises, noise) in [
         ("noise", Noise::new(1, "bench", 0)),
         ("no noise", Noise::OFF),
@@ -99,8 +99,8 @@ const BATCH: u64 = 512;
 /// Batches of tanks records on pools of threads, by the generic simulator and by hand.
 fn threads(clock: &Clock) {
     let plan = RecordPlan::levels(0.5, 400, 0.0, 3.0, 30);
-    let source = plan.prepare(&CascadedTanks.signals());
-    let drive = (source.expect("a plan of the tanks").draw(Noise::OFF)).expect("levels are finite");
+    let drive = plan.drive(&CascadedTanks.signals(), Noise::OFF);
+    let drive = drive.expect("a plan of the tanks");
     let most = std::thread::available_parallelism().map_or(1, usize::from);
     for threads in (0..).map(|i| 1 << i).take_while(|n| *n <= most) {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();

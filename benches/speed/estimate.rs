@@ -18,7 +18,7 @@ fn outside(study: &Study) -> Result<Record, Box<dyn std::error::Error>> {
         _ => &[1.2, 1.2, 0.9, 1.0],
     };
     let noise = Noise::new(1, "record", 0);
-    let drive = study.drives()?.draw(noise)?;
+    let drive = study.drive(noise)?;
     let outputs = study.twin().simulate(theta, &drive, noise)?;
     Ok(Record::new(drive, outputs)?)
 }

@@ -33,8 +33,7 @@ pub fn run(clock: &Clock) {
     for (study, recipes) in studies.iter().zip([autonomous, driven]) {
         let twin = study.twin().clone();
         let noise = Noise::new(1, "bench", 0);
-        let drives = study.drives().expect("the plan fits the twin");
-        let drive = drives.draw(noise).expect("levels are finite");
+        let drive = study.drive(noise).expect("the plan fits the twin");
         let centre = twin.parameters().centre();
         let outputs = twin.simulate(&centre, &drive, noise).expect("it is stable");
         for recipe in recipes {

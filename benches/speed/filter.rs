@@ -8,7 +8,9 @@ use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
 use truetwin::effect::{Catalogue, augment};
-use truetwin::likelihood::kalman::{Coordinates, FilterSettings, Kalman, Method, Score};
+use truetwin::likelihood::kalman::{
+    Coordinates, FilterError, FilterSettings, Kalman, Method, Score,
+};
 use truetwin::record::{Drive, Record, Signal};
 use truetwin::twin::{DigitalTwin, Interval, Noise, Now, Outline, Parameter, StateSpace};
 use truetwin::twins::{CascadedTanks, VanDerPol};
@@ -80,46 +82,19 @@ fn ratios(clock: &Clock) {
         return;
     }
     let (settings, drive) = (FilterSettings::default(), levels(400));
-    let records: Vec<Record> = (0..8)
-        .map(|run| simulated(&CascadedTanks, &TANKS, &drive, run))
-        .collect();
-    let kalmans: Vec<Kalman<'_>> = (records.iter())
-        .map(|record| Kalman::new(&CascadedTanks, record, &settings).expect("it fits"))
-        .collect();
-    let all: Vec<&Kalman<'_>> = kalmans.iter().collect();
-    let coordinates = Coordinates::new(kalmans[0].parameters());
-    let one_by_one = |kalman: &Kalman<'_>| {
-        black_box(Score::forward_one_by_one(
-            kalman,
-            black_box(&TANKS),
-            &coordinates,
-        ))
-        .is_ok()
+    let record = simulated(&CascadedTanks, &TANKS, &drive, 0);
+    let kalman = Kalman::new(&CascadedTanks, &record, &settings).expect("it fits");
+    let coordinates = Coordinates::new(kalman.parameters());
+    let score = |of: fn(&Kalman<'_>, &[f64], &Coordinates) -> Result<Score, FilterError>| {
+        assert!(black_box(of(&kalman, black_box(&TANKS), &coordinates)).is_ok());
     };
-    let [single, lanes, eight, batch] = in_turn([
-        &mut || assert!(one_by_one(&kalmans[0])),
-        &mut || {
-            drop(black_box(Score::forward(
-                &kalmans[0],
-                black_box(&TANKS),
-                &coordinates,
-            )))
-        },
-        &mut || assert!(kalmans.iter().all(one_by_one)),
-        &mut || {
-            drop(black_box(Score::forward_each(
-                &all,
-                black_box(&TANKS),
-                &coordinates,
-            )))
-        },
-    ]);
-    for (what, before, now) in [("one record", single, lanes), ("8 records", eight, batch)] {
-        let ratio = before / now;
-        println!(
-            "filter: ratios, score of {what}: {before:.1} µs one by one, {now:.1} µs side by side: {ratio:.2}"
-        );
-    }
+    let [before, now] = in_turn([&mut || score(Score::forward_one_by_one), &mut || {
+        score(Score::forward)
+    }]);
+    let ratio = before / now;
+    println!(
+        "filter: ratios, score: {before:.1} µs one by one, {now:.1} µs side by side: {ratio:.2}"
+    );
     let library = Catalogue::default();
     let listed = |id, target| library.effect(id, target).expect("it is listed");
     for (effect, magnitudes) in [
@@ -131,9 +106,9 @@ fn ratios(clock: &Clock) {
         let twin = augment(Arc::new(CascadedTanks), vec![effect]).expect("it stands there");
         let twin = twin.equations().expect("a twin with equations");
         let theta = [&TANKS[..], magnitudes].concat();
-        let kalman = Kalman::new(twin, &records[0], &settings).expect("it fits");
+        let kalman = Kalman::new(twin, &record, &settings).expect("it fits");
         let [bare, augmented] = in_turn([
-            &mut || drop(black_box(kalmans[0].log_likelihood(black_box(&TANKS)))),
+            &mut || drop(black_box(kalman.log_likelihood(black_box(&TANKS)))),
             &mut || drop(black_box(kalman.log_likelihood(black_box(&theta)))),
         ]);
         let ratio = augmented / bare;

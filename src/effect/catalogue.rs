@@ -6,7 +6,7 @@ use super::key::EffectPattern;
 use super::kind::{EffectKind, OtherState};
 use super::library;
 use super::placed::{Effect, EffectEntry};
-use crate::twin::{Noise, Now, Outline, ParameterSpace, Role, StateSpace, Twin, is_memory};
+use crate::twin::{Outline, ParameterSpace, Role, StateSpace, Twin, is_memory};
 use std::sync::{Arc, LazyLock};
 
 static LIBRARY: LazyLock<Vec<Arc<EffectKind>>> =
@@ -110,35 +110,13 @@ fn own(mut outline: Outline) -> Outline {
     outline
 }
 
-/// Finds pairs (rate, of): the drift of the second state is the first state, at every one of a few random points.
+/// Pairs (rate, of) of states by name.
 fn rates(twin: &dyn StateSpace) -> Vec<(String, String)> {
-    const POINTS: u64 = 5;
-    let (outline, limits) = (twin.outline(), twin.limits());
-    let states = &outline.states;
-    let mut pairs: Vec<(usize, usize)> = (0..states.len())
-        .flat_map(|i| (0..states.len()).map(move |j| (i, j)))
-        .filter(|(i, j)| i != j)
-        .collect();
-    for point in 0..POINTS {
-        let mut source = Noise::new(0, "rates", point).source("point");
-        let x: Vec<f64> = (limits.iter())
-            .map(|limit| {
-                if limit.is_finite() {
-                    limit.low() + source.uniform() * limit.width()
-                } else {
-                    limit.clamp(source.normal())
-                }
-            })
-            .collect();
-        let u: Vec<f64> = outline.inputs.iter().map(|_| source.uniform()).collect();
-        let theta = outline.parameters.draw_prior(Noise::new(0, "rates", point));
-        let now = Now::new(0.0, 1.0, &u, &theta);
-        let mut dx = vec![0.0; x.len()];
-        twin.drift(&now, &x, &mut dx);
-        pairs.retain(|&(i, j)| dx[j] == x[i]);
-    }
+    let states = twin.outline().states;
     let name = |i: usize| states[i].name.clone();
-    pairs.into_iter().map(|(i, j)| (name(i), name(j))).collect()
+    (crate::twin::rates(twin).into_iter())
+        .map(|(i, j)| (name(i), name(j)))
+        .collect()
 }
 
 #[cfg(test)]

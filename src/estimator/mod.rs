@@ -1,6 +1,6 @@
 //! The Two-Stage estimator: pretrained on simulations, tested, refined, tuned.
 //!
-//! [`pretrain`] makes an [`Estimator`] ([`Pretraining`] so that it can be interrupted); [`Estimator::estimate`] takes a record
+//! [`pretrain`] makes an [`Estimator`]; [`Estimator::estimate`] takes a record
 //! through gate, Gauss–Newton, cloud and tuned heads; [`Estimator::save`] and [`Estimator::load`] keep it in one file.
 //!
 //! Source: Lakshminarayanan, Guerrero & Rojas, "Fine-Tuning a Simulation-Driven Estimator".
@@ -62,7 +62,8 @@ pub use estimate::{Estimate, EstimateOptions, Together, Tracking};
 pub use estimator::Estimator;
 pub use gate::{GateForm, GateOutcome, GateSettings};
 pub(crate) use pretrain::GivenBank;
-pub use pretrain::{PretrainOptions, Pretraining, pretrain};
+pub(crate) use pretrain::Pretraining;
+pub use pretrain::{PretrainOptions, pretrain};
 pub use project::Project;
 pub(crate) use readout::INTERVAL_LEVEL;
 pub use recipe::PresetName;

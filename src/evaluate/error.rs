@@ -20,9 +20,6 @@ pub enum EvaluateError {
         "the paper has no test points for twin \"{0}\"; take --scenario 0 (θ from the prior) or --scenario uniform (θ from the bounds)"
     )]
     NoPoint(String),
-    /// A grid of points cannot be laid.
-    #[error("no grid of parameters: {0}; give finite [bounds] in a study file")]
-    Grid(String),
     /// A published test point lies outside the study's bounds.
     #[error(
         "the paper's test point {name} = {} lies outside the study's bounds {bounds}; widen [bounds], or take --scenario 0 (θ from the prior) or --scenario uniform (θ from the bounds)",

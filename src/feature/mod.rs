@@ -13,6 +13,7 @@
 mod ar;
 mod armax;
 mod arx;
+mod centred;
 mod deviation;
 mod regression;
 mod score;
@@ -20,6 +21,7 @@ mod score;
 pub use ar::Ar;
 pub use armax::Armax;
 pub use arx::Arx;
+pub(crate) use centred::Centred;
 pub use deviation::Deviation;
 pub use score::Score;
 
@@ -28,7 +30,6 @@ use crate::math::MathError;
 use crate::record::{Drive, Record, RecordError, Signal};
 use crate::setting::number;
 use crate::twin::{Noise, SimulationError, Twin};
-use nalgebra::DMatrix;
 use std::fmt::Debug;
 use std::sync::Arc;
 
@@ -38,8 +39,8 @@ use std::sync::Arc;
 ///
 /// ```
 /// use std::sync::Arc;
-/// use truetwin::feature::{Centred, FeatureMap, FeatureRecipe, Score};
-/// use truetwin::record::{Drive, Record};
+/// use truetwin::feature::{FeatureMap, FeatureRecipe, Score};
+/// use truetwin::record::Drive;
 /// use truetwin::twin::{DigitalTwin, Noise, Twin};
 /// use truetwin::twins::VanDerPol;
 ///
@@ -48,11 +49,6 @@ use std::sync::Arc;
 /// let outputs = twin.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
 /// let map: Arc<dyn FeatureMap> = Score::default().bind(&twin)?;
 /// assert_eq!(map.extract(&drive, &outputs)?.len(), map.dim());
-///
-/// // Score features find the record's own reference; most others have none.
-/// let record = Record::new(drive, outputs)?;
-/// let centred: Option<Centred> = map.centred(&record, &[1.2], Noise::new(1, "search", 0))?;
-/// assert!((centred.ok_or("there is one")?.theta[0] - 1.5).abs() < 0.1);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait FeatureMap: Send + Sync {
@@ -64,10 +60,7 @@ pub trait FeatureMap: Send + Sync {
 
     /// The map centred on one record, for features that are best near a reference and can find it without simulations;
     /// `None` for all others. `initial` is an estimate at hand, `noise` draws whatever the search needs.
-    ///
-    /// # Errors
-    ///
-    /// A search that cannot work on this record at all.
+    #[doc(hidden)]
     fn centred(
         &self,
         _record: &Record,
@@ -77,20 +70,6 @@ pub trait FeatureMap: Send + Sync {
         Ok(None)
     }
 }
-
-/// A map centred on a record, and where the record puts θ.
-#[derive(Clone)]
-#[non_exhaustive]
-pub struct Centred {
-    /// Features about the new reference; as many as before.
-    pub map: Arc<dyn FeatureMap>,
-    /// The reference.
-    pub theta: Vec<f64>,
-    /// Columns: principal axes of θ's uncertainty, one standard deviation long, in parameter units.
-    pub axes: DMatrix<f64>,
-}
-
-debug_by_name!(Centred);
 
 /// Feature map as study and estimator files hold it: `{ kind = "ar", order = 5 }`.
 ///

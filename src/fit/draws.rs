@@ -2,7 +2,7 @@
 
 use super::posterior::Draws;
 use super::problem::{Problem, of_record};
-use crate::likelihood::kalman::{FilterError, Smoothed};
+use crate::likelihood::kalman::{FilterError, States};
 use crate::math::to_matrix;
 use crate::twin::{Noise, Role, is_memory};
 use nalgebra::DVector;
@@ -105,9 +105,9 @@ pub(super) fn table(
 }
 
 /// A first state, given the record.
-fn drawn(smoothed: &Smoothed, noise: Noise) -> Vec<f64> {
+fn drawn(smoothed: &States, noise: Noise) -> Vec<f64> {
     let mean = DVector::from_vec(smoothed.first());
-    let covariance = to_matrix(&smoothed.states.covariances.slice(s![0, .., ..]));
+    let covariance = to_matrix(&smoothed.covariances.slice(s![0, .., ..]));
     let mut source = noise.source("start");
     let z = DVector::from_fn(mean.len(), |_, _| source.normal());
     // A state that is known has no variance: no root by Cholesky.

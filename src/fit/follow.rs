@@ -2,23 +2,23 @@
 
 use super::outcome::FittedStart;
 use super::problem::Problem;
-use crate::likelihood::kalman::Smoothed;
+use crate::likelihood::kalman::States;
 use crate::record::Signal;
 use crate::twin::begun;
 
 /// States at the first sample of each record, given the whole record.
-pub(crate) fn starts(problem: &Problem<'_>, smoothed: &[Smoothed]) -> Vec<FittedStart> {
+pub(crate) fn starts(problem: &Problem<'_>, smoothed: &[States]) -> Vec<FittedStart> {
     let states = problem.outline().states;
     (smoothed.iter().enumerate())
         .flat_map(|(r, smoothed)| {
-            let deviations = smoothed.states.standard_deviations();
+            let deviations = smoothed.standard_deviations();
             (states.iter().enumerate())
                 .filter(|(_, state)| !crate::twin::is_memory(&state.name))
                 .map(|(i, state)| FittedStart {
                     record: r + 1,
                     name: state.name.clone(),
                     unit: state.unit.clone(),
-                    value: smoothed.states.means[[0, i]],
+                    value: smoothed.means[[0, i]],
                     std_error: deviations[[0, i]],
                 })
                 .collect::<Vec<_>>()
@@ -30,7 +30,7 @@ pub(crate) fn starts(problem: &Problem<'_>, smoothed: &[Smoothed]) -> Vec<Fitted
 pub(crate) fn free_runs(
     problem: &Problem<'_>,
     theta: &[f64],
-    smoothed: &[Smoothed],
+    smoothed: &[States],
 ) -> Vec<Option<Signal>> {
     (problem.records.iter().enumerate())
         .map(|(r, record)| {

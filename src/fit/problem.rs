@@ -1,7 +1,7 @@
 //! A twin and the records that it is fitted to.
 
 use crate::fit::axis::{Axis, Family};
-use crate::likelihood::kalman::{Coordinates, FilterError, Filtered, Score, Smoothed};
+use crate::likelihood::kalman::{Coordinates, FilterError, Filtered, Score, States};
 use crate::likelihood::{Likelihood, Measured, likelihood_of};
 use crate::record::{Record, Signal};
 use crate::twin::{Outline, Parameter, ParameterSpace, Role, Twin};
@@ -286,7 +286,7 @@ impl<'a> Problem<'a> {
     }
 
     /// States of each record given all of it; empty for a black box.
-    pub fn smoothed(&self, theta: &[f64]) -> Result<Vec<Smoothed>, FilterError> {
+    pub fn smoothed(&self, theta: &[f64]) -> Result<Vec<States>, FilterError> {
         (self.records.iter().enumerate())
             .map(|(r, record)| self.likelihood.smoothed(&self.of_record(r, theta), record))
             .filter_map(Result::transpose)

@@ -1,7 +1,7 @@
 //! Likelihood of a record under a twin of either kind, chosen once.
 
 use super::ensemble;
-use super::kalman::{Coordinates, FilterError, FilterSettings, Filtered, Kalman, Score, Smoothed};
+use super::kalman::{Coordinates, FilterError, FilterSettings, Filtered, Kalman, Score, States};
 use crate::record::{Record, Signal};
 use crate::twin::{DigitalTwin, Outline, StateSpace, Twin};
 use std::sync::Arc;
@@ -15,7 +15,7 @@ pub(crate) trait Likelihood: Send + Sync {
     /// Innovations with the filtered states.
     fn states(&self, theta: &[f64], record: &Record) -> Result<(Filtered, Signal), FilterError>;
     /// States given the whole record; `None` where there are none.
-    fn smoothed(&self, theta: &[f64], record: &Record) -> Result<Option<Smoothed>, FilterError>;
+    fn smoothed(&self, theta: &[f64], record: &Record) -> Result<Option<States>, FilterError>;
     /// Outputs predicted from the rows before, over missing rows as far ahead as these last; `None` where only free runs are known.
     fn predicted(&self, theta: &[f64], record: &Record) -> Result<Option<Signal>, FilterError>;
     /// Log-likelihood, with the innovations where they come at no extra cost.
@@ -71,7 +71,7 @@ impl Likelihood for Filter {
         let states = (filtered.states.take()).map_or_else(|| Signal::zeros((0, 0)), |s| s.means);
         Ok((filtered, states))
     }
-    fn smoothed(&self, theta: &[f64], record: &Record) -> Result<Option<Smoothed>, FilterError> {
+    fn smoothed(&self, theta: &[f64], record: &Record) -> Result<Option<States>, FilterError> {
         self.kalman(record, &self.1)?.smooth(theta).map(Some)
     }
     fn predicted(&self, theta: &[f64], record: &Record) -> Result<Option<Signal>, FilterError> {
@@ -120,7 +120,7 @@ impl Likelihood for Ensemble {
         let predicted = filtered.held_predictions(record.outputs());
         Ok((filtered, predicted))
     }
-    fn smoothed(&self, _: &[f64], _: &Record) -> Result<Option<Smoothed>, FilterError> {
+    fn smoothed(&self, _: &[f64], _: &Record) -> Result<Option<States>, FilterError> {
         Ok(None)
     }
     fn predicted(&self, _: &[f64], _: &Record) -> Result<Option<Signal>, FilterError> {

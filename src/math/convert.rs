@@ -27,21 +27,3 @@ pub fn one_row(values: &[f64]) -> Array2<f64> {
 pub fn one_column(values: &[f64]) -> DMatrix<f64> {
     DMatrix::from_column_slice(values.len(), 1, values)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use ndarray::array;
-
-    #[test]
-    fn entries_stay_where_they_are() {
-        let plain = array![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]];
-        let matrix = to_matrix(&plain);
-        assert_eq!((matrix.shape(), matrix[(0, 2)]), ((2, 3), 3.0));
-        assert_eq!(to_array(&matrix), plain);
-        assert_eq!(to_matrix(&plain.t()), matrix.transpose());
-        assert_eq!(to_vector(&plain.column(1)).as_slice(), [2.0, 5.0]);
-        assert_eq!(one_row(&[7.0, 8.0]), array![[7.0, 8.0]]);
-        assert_eq!(one_column(&[7.0, 8.0]).shape(), (2, 1));
-    }
-}

@@ -30,11 +30,7 @@ pub struct LaggedSignals {
 }
 
 impl LaggedSignals {
-    /// Lags of `signals` from sample `start` on.
-    ///
-    /// # Panics
-    ///
-    /// Where signals differ in length, or `start` is smaller than a number of lags or larger than the length.
+    /// Lags of `signals`, all of one length, from sample `start` on, which is at least the largest number of lags.
     pub fn new(mut signals: Vec<Lagged>, start: usize) -> Self {
         signals.retain(|s| s.lags > 0);
         let samples = signals.first().map_or(start, |s| s.values.len());
@@ -184,24 +180,6 @@ mod tests {
     use super::*;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
-
-    #[test]
-    fn the_example() -> Result<(), Box<dyn std::error::Error>> {
-        use crate::math::{Lagged, LaggedSignals, LeastSquares};
-
-        // y(t) = ½·y(t − 1).
-        let phi = LaggedSignals::new(
-            vec![Lagged {
-                values: vec![8.0, 4.0, 2.0, 1.0],
-                lags: 1,
-            }],
-            1,
-        );
-        let fit = LeastSquares::with_gram(&phi, &phi.gram())?
-            .solve(&nalgebra::dmatrix![4.0; 2.0; 1.0])?;
-        assert!((fit.coefficients[0] - 0.5).abs() < 1e-12);
-        Ok(())
-    }
 
     fn random(n: usize, seed: u64) -> Vec<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

@@ -1,6 +1,6 @@
 //! Networks whose types are no longer known: the face that the estimator sees.
 
-use super::samples::{Matrices, Samples};
+use super::samples::Samples;
 use super::{Checkpoints, History, NamedTensor, NetworkError, Training};
 use crate::progress::Progress;
 use ndarray::Array2;
@@ -15,38 +15,14 @@ pub trait Architecture: Send + Sync + Debug {
     /// The most features that it takes.
     fn max_features(&self) -> usize;
 
-    /// Trains a new network on `features` (samples × n) and `targets` (samples × d), both standardised by the caller.
+    /// Trains a new network on samples that the caller has standardised, by Adam on the loss of [`Training`]. The same
+    /// arguments give the same bits. Ticks the stage `train` once an epoch.
     ///
-    /// Minimises the loss of [`Training`] by Adam. The same arguments give the same bits. Ticks the stage `train` once
-    /// an epoch.
+    /// Of samples of more than 64 MiB that come in several parts, no more than that are held at a time. The last parts are
+    /// held out then; each epoch has the others in an order of its own, rows in an order of their own among those that are in
+    /// memory together.
     ///
-    /// # Errors
-    ///
-    /// A wrong setting, sizes that do not fit each other or the architecture, numbers that are not finite, a loss that
-    /// diverges, or a listener that cancels.
-    fn train(
-        &self,
-        features: &Array2<f64>,
-        targets: &Array2<f64>,
-        settings: &Training,
-        seed: u64,
-        progress: &Progress,
-    ) -> Result<(Arc<dyn Network>, History), NetworkError> {
-        let samples = Matrices { features, targets };
-        self.train_on(&samples, settings, seed, &Checkpoints::none(), progress)
-    }
-
-    /// As [`train`](Self::train), on samples that need not fit into memory: of samples of more than 64 MiB that come in
-    /// several parts, no more than that are held at a time. The last parts are held out then; each epoch has the others in
-    /// an order of its own, rows in an order of their own among those that are in memory together. Fewer samples are trained
-    /// on as in [`train`](Self::train), to the same bits.
-    ///
-    /// A training that was interrupted goes on with what `checkpoints` have kept of it, to the same bits, too.
-    ///
-    /// # Errors
-    ///
-    /// As [`train`](Self::train), [`NetworkError::Samples`] for a part that cannot be read, and
-    /// [`NetworkError::Checkpoint`] where the state cannot be written.
+    /// A training that was interrupted goes on with what `checkpoints` have kept of it, to the same bits.
     fn train_on(
         &self,
         samples: &dyn Samples,
@@ -56,11 +32,8 @@ pub trait Architecture: Send + Sync + Debug {
         progress: &Progress,
     ) -> Result<(Arc<dyn Network>, History), NetworkError>;
 
-    /// Puts a network of `inputs` features and `outputs` heads together from [`Network::weights`].
-    ///
-    /// # Errors
-    ///
-    /// Names the first tensor that is missing, surplus, of another shape, or not finite.
+    /// Puts a network of `inputs` features and `outputs` heads together from [`Network::weights`]. The error names the first
+    /// tensor that is missing, surplus, of another shape, or not finite.
     fn restore(
         &self,
         inputs: usize,
@@ -80,27 +53,15 @@ pub trait Network: Send + Sync + Debug {
     /// Predictions (samples × d) from `features` (samples × n), without dropout.
     ///
     /// A sample's prediction may differ in its last bits (1e-6) with the number of samples that come along.
-    ///
-    /// # Errors
-    ///
-    /// Features of another width, or not finite.
     fn predict(&self, features: &Array2<f64>) -> Result<Array2<f64>, NetworkError>;
 
     /// The trunk's outputs (samples × hidden width), without dropout.
-    ///
-    /// # Errors
-    ///
-    /// Features of another width, or not finite.
     fn hidden(&self, features: &Array2<f64>) -> Result<Array2<f64>, NetworkError>;
 
     /// A network with the same trunk, and heads trained further on `features` and `targets`.
     ///
     /// The trunk is evaluated once, without dropout; then only the heads train, on its output, starting where they are.
     /// Ticks the stage `tune` once an epoch.
-    ///
-    /// # Errors
-    ///
-    /// As [`train`](Architecture::train).
     fn tune_heads(
         &self,
         features: &Array2<f64>,

@@ -8,15 +8,6 @@ use dfdx::prelude::{Const, ConstDim, Cpu, Tensor};
 ///
 /// Implemented for dfdx's `Linear`, [`Dense`](super::Dense), [`NormDense`](super::NormDense), and tuples, nested too,
 /// that begin with one of them.
-///
-/// ```
-/// use dfdx::prelude::{BuildOnDevice, Const, Cpu};
-/// use truetwin::network::FirstWeight;
-/// use truetwin::network::layers::{Linear, Tanh};
-///
-/// fn qualifies<T: BuildOnDevice<Cpu, f32, Built: FirstWeight<Const<8>>>>() {}
-/// qualifies::<(Linear<8, 4>, Tanh, Linear<4, 1>)>();
-/// ```
 pub trait FirstWeight<I: ConstDim> {
     /// Rows of the weight: outputs of the first layer.
     type Rows: ConstDim;

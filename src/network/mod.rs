@@ -39,6 +39,7 @@ mod face;
 mod feed;
 mod first_weight;
 mod fused;
+mod layer;
 mod loss;
 mod model;
 mod multi_head;
@@ -55,18 +56,16 @@ pub use architectures::{Compact, Deep};
 pub(crate) use checkpoints::Checkpoints;
 pub use error::NetworkError;
 pub(crate) use face::{Architecture, Network};
-pub use first_weight::FirstWeight;
-pub use fused::{Activation, Dense, Leaky, NormDense};
+use first_weight::FirstWeight;
 pub(crate) use fused::{BuiltDense, BuiltNormDense};
+pub use fused::{Dense, Leaky, NormDense};
 pub(crate) use multi_head::architecture;
 pub(crate) use samples::{Part, Samples};
 pub use settings::{History, Schedule, Training};
 pub(crate) use tensors::{NamedTensor, bytes_of, values_of};
 
-use dfdx::prelude::{
-    BuildOnDevice, Const, ConstDim, Cpu, CpuError, Module, ModuleMut, NoneTape, OwnedTape, Tensor,
-    TensorCollection,
-};
+use dfdx::prelude::{BuildOnDevice, Const, ConstDim, Cpu, NoneTape, OwnedTape, Tensor};
+use layer::Layers;
 
 /// Layers of an architecture; `use truetwin::network::layers::*` needs no dfdx of your own.
 ///
@@ -80,6 +79,7 @@ pub mod layers {
 /// Training without an estimator, for the bench. Not part of the library's interface.
 #[doc(hidden)]
 pub mod untyped {
+    pub use super::checkpoints::Checkpoints;
     pub use super::face::{Architecture, Network};
     pub use super::multi_head::architecture;
 }
@@ -89,40 +89,6 @@ pub(crate) type Batch<C> = Tensor<(usize, C), f32, Cpu, NoneTape>;
 
 /// A batch of rows of width `C` whose gradients are recorded.
 pub(crate) type TapedBatch<C> = Tensor<(usize, C), f32, Cpu, OwnedTape<f32, Cpu>>;
-
-/// Layers on a device that map rows of width `I` to rows of width `O`, with and without a tape.
-///
-/// Implemented for all that qualifies: dfdx layers, fused layers and tuples of them.
-///
-/// ```
-/// use dfdx::prelude::{Const, Cpu};
-/// use truetwin::network::Layers;
-///
-/// /// An own layer qualifies where this compiles.
-/// fn qualifies<T: Layers<Const<4>, Const<2>>>() {}
-/// qualifies::<dfdx::nn::modules::Linear<4, 2, f32, Cpu>>();
-/// ```
-pub trait Layers<I: ConstDim, O: ConstDim>:
-    TensorCollection<f32, Cpu, To<f32, Cpu> = Self>
-    + Clone
-    + Send
-    + Sync
-    + Module<Batch<I>, Output = Batch<O>, Error = CpuError>
-    + ModuleMut<TapedBatch<I>, Output = TapedBatch<O>, Error = CpuError>
-    + 'static
-{
-}
-
-impl<I: ConstDim, O: ConstDim, T> Layers<I, O> for T where
-    T: TensorCollection<f32, Cpu, To<f32, Cpu> = T>
-        + Clone
-        + Send
-        + Sync
-        + Module<Batch<I>, Output = Batch<O>, Error = CpuError>
-        + ModuleMut<TapedBatch<I>, Output = TapedBatch<O>, Error = CpuError>
-        + 'static
-{
-}
 
 /// A network's static shape: what an author writes. See the [module](self) for an example.
 ///
@@ -137,7 +103,7 @@ pub trait HeadArchitecture: Send + Sync + 'static {
     type Hidden: ConstDim;
     /// From features to hidden.
     type Trunk: BuildOnDevice<Cpu, f32, Built: Layers<Self::Features, Self::Hidden>>;
-    /// From hidden to one target. Its first layer must have a weight that [`FirstWeight`] reaches.
+    /// From hidden to one target. Its first layer is a `Linear`, a [`Dense`] or a [`NormDense`], nested tuples included.
     type Head: BuildOnDevice<Cpu, f32, Built: Layers<Self::Hidden, Const<1>> + FirstWeight<Self::Hidden>>;
     /// Probability of every dropout, in plain and fused layers alike; at least 0 and below 1, checked at compile time.
     const DROPOUT: f64 = 0.0;

@@ -21,33 +21,24 @@ pub trait Samples: Sync {
     fn parts(&self) -> Vec<usize>;
 
     /// Part number `index`; it is asked for once an epoch.
-    ///
-    /// # Errors
-    ///
-    /// What keeps it from being read.
     fn part(&self, index: usize) -> Result<Part<'_>, Box<dyn Error + Send + Sync>>;
 }
 
 /// Samples in memory.
-pub(super) struct Matrices<'a> {
-    pub features: &'a Array2<f64>,
-    pub targets: &'a Array2<f64>,
-}
-
-impl Samples for Matrices<'_> {
+impl Samples for (&Array2<f64>, &Array2<f64>) {
     fn features(&self) -> usize {
-        self.features.ncols()
+        self.0.ncols()
     }
 
     fn targets(&self) -> usize {
-        self.targets.ncols()
+        self.1.ncols()
     }
 
     fn parts(&self) -> Vec<usize> {
-        vec![self.features.nrows()]
+        vec![self.0.nrows()]
     }
 
     fn part(&self, _: usize) -> Result<Part<'_>, Box<dyn Error + Send + Sync>> {
-        Ok((Cow::Borrowed(self.features), Cow::Borrowed(self.targets)))
+        Ok((Cow::Borrowed(self.0), Cow::Borrowed(self.1)))
     }
 }

@@ -1,5 +1,7 @@
 //! Seeds of a training, derived from one.
 
+use crate::twin::mix;
+
 /// Use of a number drawn from the seed; each has draws of its own.
 #[derive(Clone, Copy)]
 pub(super) enum Purpose {
@@ -11,14 +13,8 @@ pub(super) enum Purpose {
 
 /// Derives a seed for `purpose` and `counter`, which may be the epoch or the step.
 pub(super) fn derive(seed: u64, purpose: Purpose, counter: u64) -> u64 {
-    // The finaliser of SplitMix64; the seed passes it too, lest neighbouring seeds meet at neighbouring counters.
-    let scramble = |state: u64| {
-        let mut z = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    };
-    scramble(scramble(scramble(seed) ^ purpose as u64) ^ counter)
+    // The seed is mixed, too, lest neighbouring seeds meet at neighbouring counters.
+    mix(mix(mix(seed) ^ purpose as u64) ^ counter)
 }
 
 #[cfg(test)]

@@ -3,7 +3,6 @@
 mod training;
 
 use super::layers::*;
-use super::samples::Matrices;
 use super::*;
 use crate::progress::Progress;
 use ndarray::{Array2, Axis, concatenate, s};
@@ -63,7 +62,8 @@ fn train_one<A: HeadArchitecture>(
     settings: &Training,
     seed: u64,
 ) -> Result<(Arc<dyn Network>, History), NetworkError> {
-    architecture::<A>().train(features, targets, settings, seed, &Progress::silent())
+    let (samples, nowhere) = ((features, targets), Checkpoints::none());
+    architecture::<A>().train_on(&samples, settings, seed, &nowhere, &Progress::silent())
 }
 
 #[test]

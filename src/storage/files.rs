@@ -7,10 +7,6 @@ use std::io::{self, Write};
 use std::path::Path;
 
 /// Writes a new file.
-///
-/// # Errors
-///
-/// The system's; [`io::ErrorKind::AlreadyExists`] if the path is taken.
 pub(crate) fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let file = filled(path, bytes)?.persist_noclobber(path);
     file.map(|_| ()).map_err(|error| error.error)
@@ -33,16 +29,18 @@ fn filled(path: &Path, bytes: &[u8]) -> io::Result<tempfile::NamedTempFile> {
 
 /// Returns the SHA-256 of bytes, in hexadecimal digits.
 pub(crate) fn sha256(bytes: &[u8]) -> String {
-    let digest = Sha256::digest(bytes);
-    digest.iter().map(|byte| format!("{byte:02x}")).collect()
+    hexadecimal(&Sha256::digest(bytes))
 }
 
 /// Returns the SHA-256 of a file, without reading it into memory.
 pub(crate) fn sha256_of(path: &Path) -> io::Result<String> {
     let mut hash = Sha256::new();
     io::copy(&mut std::fs::File::open(path)?, &mut hash)?;
-    let digest = hash.finalize();
-    Ok(digest.iter().map(|byte| format!("{byte:02x}")).collect())
+    Ok(hexadecimal(&hash.finalize()))
+}
+
+fn hexadecimal(digest: &[u8]) -> String {
+    digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]

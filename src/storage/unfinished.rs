@@ -135,10 +135,6 @@ impl NewFolder {
     }
 
     /// Creates the folder for `place` that one process at a time may have.
-    ///
-    /// # Errors
-    ///
-    /// [`StorageError::Busy`] if another process has it, [`StorageError::Io`].
     pub fn claim(place: &Path) -> Result<Self, StorageError> {
         loop {
             sweep(folder(place));

@@ -23,7 +23,7 @@ impl Study {
     ///
     /// let study = Study::new("tanks", CascadedTanks, RecordPlan::levels(0.5, 300, 0.0, 3.0, 30))?;
     /// let noise = Noise::new(1, "measured", 0);
-    /// let drive = study.drives()?.draw(noise)?;
+    /// let drive = study.drive(noise)?;
     /// let outputs = CascadedTanks.simulate(&[0.6, 0.5, 0.55, 1.0], &drive, noise)?;
     /// let record = Record::new(drive, outputs)?;
     /// let fit = study.fit(&[record], &FitSettings::default(), &Progress::silent())?;

@@ -10,10 +10,6 @@ use serde_json::{Value, json};
 impl Study {
     /// A manifest of a folder that `verb` makes, with the twin, its parameters, the study file, records and inputs (an input
     /// file by its checksum), and the checksum of one simulation, which tells a twin whose equations have changed since.
-    ///
-    /// # Errors
-    ///
-    /// An input file that cannot be read.
     pub fn manifest(&self, verb: &'static str, layout: u32) -> Result<Manifest, StorageError> {
         let space = self.twin().parameters();
         let parameters: Vec<Value> = (space.iter())

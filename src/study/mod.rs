@@ -13,19 +13,20 @@ mod suitability;
 pub use error::StudyError;
 pub use file::StudyFile;
 pub(crate) use file::{Library, RecordTable};
+pub(crate) use plan::DriveSource;
 pub(crate) use plan::InputPlan;
 #[cfg(feature = "fmi")]
 pub(crate) use plan::Levels;
-pub use plan::{DriveSource, RecordPlan};
+pub use plan::RecordPlan;
 
 use crate::effect::{
     Catalogue, Effect, EffectError, EffectKey, EffectKind, EffectPattern, augment,
 };
-use crate::record::Record;
+use crate::record::{Drive, Record};
 use crate::setting::did_you_mean;
 use crate::twin::{
-    Adaptation, DigitalTwin, Integrator, MOST_SUBSTEPS, Role, Stepping, Twin, TwinError, adapt,
-    check_twin, fix,
+    Adaptation, DigitalTwin, Integrator, MOST_SUBSTEPS, Noise, Role, Stepping, Twin, TwinError,
+    adapt, check_twin, fix,
 };
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -303,8 +304,13 @@ impl Study {
         &self.file
     }
 
+    /// Draws the input of a record; a fixed one is the same for any noise.
+    pub fn drive(&self, noise: Noise) -> Result<Drive, StudyError> {
+        self.plan.drive(&self.twin.signals(), noise)
+    }
+
     /// Prepares the source of drives.
-    pub fn drives(&self) -> Result<DriveSource, StudyError> {
+    pub(crate) fn drives(&self) -> Result<DriveSource, StudyError> {
         self.plan.prepare(&self.twin.signals())
     }
 

@@ -111,8 +111,13 @@ impl RecordPlan {
         Ok(())
     }
 
+    /// Draws the input of a record of a twin with these channels; a fixed one is the same for any noise.
+    pub fn drive(&self, signals: &Signals, noise: Noise) -> Result<Drive, StudyError> {
+        Ok(self.prepare(signals)?.draw(noise)?)
+    }
+
     /// Makes ready what drives are drawn from; reads the input file, if one is named.
-    pub fn prepare(&self, signals: &Signals) -> Result<DriveSource, StudyError> {
+    pub(crate) fn prepare(&self, signals: &Signals) -> Result<DriveSource, StudyError> {
         self.check(signals)?;
         let channels = signals.inputs.len();
         let fixed = match &self.input {

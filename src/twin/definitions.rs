@@ -1,42 +1,45 @@
 //! States whose rate another state is by definition.
 
-use super::{Now, StateSpace};
+use super::{Noise, Now, StateSpace};
 
 /// Points at which equations are compared: a definition holds at any.
-const POINTS: usize = 4;
+const POINTS: u64 = 5;
 
-/// Returns for each state whether its rate is another state, whatever θ, inputs and time: a position, whose rate its velocity is called.
-/// No law can be missing there.
-pub(super) fn defined_states(twin: &dyn StateSpace) -> Vec<bool> {
-    let outline = twin.outline();
+/// Finds pairs (rate, of): the rate of the second state is the first one at every one of a few random points, as of a
+/// position and its velocity.
+pub(crate) fn rates(twin: &dyn StateSpace) -> Vec<(usize, usize)> {
+    let (outline, limits) = (twin.outline(), twin.limits());
     let n = outline.states.len();
-    let mut same = vec![vec![true; n]; n];
+    let mut pairs: Vec<(usize, usize)> = (0..n)
+        .flat_map(|i| (0..n).map(move |j| (i, j)))
+        .filter(|(i, j)| i != j)
+        .collect();
     for point in 0..POINTS {
-        // Values of either sign, no two alike.
-        let value = |i: usize| {
-            let turn = (1 + i + 13 * point) as f64 * std::f64::consts::E;
-            (0.3 + turn.fract())
-                * if (i + point).is_multiple_of(2) {
-                    1.0
-                } else {
-                    -1.0
-                }
-        };
-        let x: Vec<f64> = (0..n).map(value).collect();
-        let u: Vec<f64> = (0..outline.inputs.len()).map(|j| value(n + j)).collect();
-        let share = value(2 * n).abs().fract();
-        let theta: Vec<f64> = (outline.parameters.iter())
-            .map(|p| p.bounds.clamp(p.prior.low() + share * p.prior.width()))
+        let mut source = Noise::new(0, "rates", point).source("point");
+        let x: Vec<f64> = (limits.iter())
+            .map(|limit| match (limit.low(), limit.high()) {
+                (low, high) if limit.is_finite() => low + source.uniform() * (high - low),
+                (low, _) if low.is_finite() => low + source.normal().abs(),
+                (_, high) if high.is_finite() => high - source.normal().abs(),
+                _ => source.normal(),
+            })
             .collect();
-        let mut rate = vec![0.0; n];
-        twin.drift(&Now::new(point as f64, 0.1, &u, &theta), &x, &mut rate);
-        for i in 0..n {
-            for j in 0..n {
-                same[i][j] &= i != j && rate[i] == x[j];
-            }
-        }
+        let u: Vec<f64> = outline.inputs.iter().map(|_| source.uniform()).collect();
+        let theta = outline.parameters.draw_prior(Noise::new(0, "rates", point));
+        let mut dx = vec![0.0; x.len()];
+        twin.drift(&Now::new(0.0, 1.0, &u, &theta), &x, &mut dx);
+        pairs.retain(|&(i, j)| dx[j] == x[i]);
     }
-    same.iter().map(|row| row.contains(&true)).collect()
+    pairs
+}
+
+/// Returns for each state whether its rate is another state, whatever θ, inputs and time: no law can be missing there.
+pub(super) fn defined_states(twin: &dyn StateSpace) -> Vec<bool> {
+    let mut defined = vec![false; twin.outline().states.len()];
+    for (_, of) in rates(twin) {
+        defined[of] = true;
+    }
+    defined
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ fn allocations(twin: &dyn DigitalTwin, plan: &RecordPlan, samples: usize, theta:
     let mut plan = plan.clone();
     plan.samples = samples;
     let noise = Noise::new(1, "allocations", 0);
-    let drive = plan.prepare(&twin.signals()).unwrap().draw(noise).unwrap();
+    let drive = plan.drive(&twin.signals(), noise).unwrap();
     let (outputs, count) = memory::allocations(|| twin.simulate(theta, &drive, noise));
     outputs.unwrap();
     count

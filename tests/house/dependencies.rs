@@ -1,6 +1,7 @@
 //! Dependencies: licences of deny.toml alone, and crates.io alone. Needs nothing but cargo; `cargo deny check` says more.
 
 use serde_json::Value;
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Command;
 
@@ -126,6 +127,33 @@ fn licences_are_those_of_deny_toml() {
         "licences that deny.toml does not allow:\n{}",
         wrong.join("\n")
     );
+}
+
+/// Crates that a program builds which embeds the library without its command line.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_embedding_program_builds_few_crates() {
+    const MOST: usize = 110;
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let output = Command::new(cargo)
+        .current_dir(root())
+        .args(["tree", "--locked", "--offline", "--edges", "normal"])
+        .args([
+            "--no-default-features",
+            "--prefix",
+            "none",
+            "--format",
+            "{p}",
+        ])
+        .output()
+        .expect("cargo runs");
+    let text = String::from_utf8(output.stdout).unwrap();
+    let crates: BTreeSet<Vec<&str>> = (text.lines())
+        .map(|line| line.split(' ').take(2).collect())
+        .filter(|name: &Vec<&str>| name[0] != "truetwin")
+        .collect();
+    println!("{} crates of at most {MOST}", crates.len());
+    assert!((50..=MOST).contains(&crates.len()), "{crates:?}");
 }
 
 /// Cargo.lock names every package, whatever the features and the platform.

@@ -121,9 +121,16 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
             std::iter::repeat_n(source.file.display().to_string(), count)
         })
         .collect();
+    let lines = (sources.sources.values())
+        .flat_map(|source| {
+            let file = source.file.display().to_string();
+            std::iter::repeat_n(file, source.text.lines().count())
+        })
+        .collect();
     vec![
-        Ratchet::new("public items (aim 150)", 158, items.collect()),
+        Ratchet::new("public items", 150, items.collect()),
         Ratchet::new("error types", 15, errors),
+        Ratchet::new("lines of src", 76_000, lines),
         Ratchet::new("folders with more than 18 files", 0, crowded(sources, 18)),
         Ratchet::new("questions for equations", 8, questions(sources)),
         Ratchet::new(
@@ -146,10 +153,12 @@ fn counts_do_not_grow() {
             places.iter().for_each(|place| println!("  {place}"));
         }
         if places.len() > most {
+            let mut files = places.clone();
+            files.dedup();
             grown.push(format!(
                 "{name}: {} > {most}: {}",
                 places.len(),
-                places.join(", ")
+                files.join(", ")
             ));
         }
     }

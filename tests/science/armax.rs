@@ -157,9 +157,8 @@ fn compare(simulations: u64) {
     };
     let twin = Resonance { driven: true };
     let plan = RecordPlan::levels(1.0, 300, -3.0, 3.0, 20);
-    let drive = (plan.prepare(&twin.signals()).unwrap())
-        .draw(Noise::new(5, "input", 0))
-        .unwrap();
+    let noise = Noise::new(5, "input", 0);
+    let drive = plan.drive(&twin.signals(), noise).unwrap();
     let found = bounds(
         twin,
         &[0.08, 0.97, 1.0],

@@ -168,7 +168,7 @@ fn hold_outside_the_prior(records: u64) -> (usize, usize) {
     let (mut agreed, mut own, mut trusting) = (0, 0, 0);
     for seed in 0..records {
         let noise = Noise::new(seed, "outside", 0);
-        let drive = study.drives().unwrap().draw(noise).unwrap();
+        let drive = study.drive(noise).unwrap();
         let outputs = study.twin().simulate(&theta, &drive, noise).unwrap();
         let record = Record::new(drive, outputs).unwrap();
         let estimate =
@@ -362,7 +362,7 @@ fn an_estimate_in_a_corner_of_the_bounds_stands() {
     };
     let (estimator, _) = pretrain(study, &options, &Progress::silent()).unwrap();
     let noise = Noise::new(5, "corner", 0);
-    let drive = study.drives().unwrap().draw(noise).unwrap();
+    let drive = study.drive(noise).unwrap();
     let outputs = (study
         .twin()
         .simulate(&[1.45, 0.15, 1.4, 0.55], &drive, noise))
@@ -417,7 +417,7 @@ fn study_of_the_parts() {
             for i in 0..RECORDS {
                 let noise = Noise::new(35, study.name(), i);
                 let theta = space.draw_bounds(noise);
-                let drive = study.drives().unwrap().draw(noise).unwrap();
+                let drive = study.drive(noise).unwrap();
                 let outputs = study.twin().simulate(&theta, &drive, noise).unwrap();
                 let record = Record::new(drive, outputs).unwrap();
                 let options = EstimateOptions {

@@ -23,7 +23,7 @@ fn tanks() -> Study {
 
 fn simulated(seed: u64) -> Record {
     let noise = Noise::new(seed, "fit", 0);
-    let drive = tanks().drives().unwrap().draw(noise).unwrap();
+    let drive = tanks().drive(noise).unwrap();
     let outputs = CascadedTanks.simulate(&TRUTH, &drive, noise).unwrap();
     Record::new(drive, outputs).unwrap()
 }
@@ -73,7 +73,7 @@ fn a_rounded_sensor_leaves_intervals_that_cover() {
     let known = parsed("magnitudes = { step = 0.05 }");
     let rounded = |seed: u64| {
         let noise = Noise::new(seed, "rounded", 0);
-        let drive = known.drives().unwrap().draw(noise).unwrap();
+        let drive = known.drive(noise).unwrap();
         let outputs = known.twin().simulate(&[1.3], &drive, noise).unwrap();
         [Record::new(drive, outputs).unwrap()]
     };
@@ -99,7 +99,7 @@ fn a_step_that_a_study_adds_is_not_left_off() {
     let (plain, with_step) = (parsed(text), parsed(&format!("{text}{effect}")));
     let study = tanks().configure(&with_step).unwrap();
     let noise = Noise::new(4, "step", 0);
-    let drive = study.drives().unwrap().draw(noise).unwrap();
+    let drive = study.drive(noise).unwrap();
     let theta = [&TRUTH[..], &[0.6, 400.0]].concat();
     let outputs = study.twin().simulate(&theta, &drive, noise).unwrap();
     let records = [Record::new(drive, outputs).unwrap()];
@@ -160,7 +160,7 @@ fn a_coarser_log_tells_the_same_physics() {
             .unwrap()
     };
     let noise = Noise::new(5, "thinned", 0);
-    let drive = study(fine).drives().unwrap().draw(noise).unwrap();
+    let drive = study(fine).drive(noise).unwrap();
     let outputs = study(fine).twin().simulate(&TRUTH, &drive, noise).unwrap();
     let fits: Vec<Fit> = [2, 4, 8]
         .map(|every| {

@@ -42,7 +42,7 @@ fn both_tanks() -> Study {
 fn record(study: &Study, seed: u64, change: impl Fn(f64) -> f64) -> Record {
     let noise = Noise::new(seed, "suitability test", 0);
     let theta = study.twin().parameters().draw_prior(noise);
-    let drive = study.drives().unwrap().draw(noise).unwrap();
+    let drive = study.drive(noise).unwrap();
     let drive = Drive::new(drive.dt(), drive.inputs().mapv(change)).unwrap();
     let outputs = study.twin().simulate(&theta, &drive, noise).unwrap();
     Record::new(drive, outputs).unwrap()

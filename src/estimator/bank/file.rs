@@ -41,10 +41,6 @@ fn form(path: &Path) -> Result<Form, EstimatorError> {
 }
 
 /// Writes a new file of features alone, one record a row: `.npy`, `.npz` (array `features`) or `.csv` (`x1` … `xn`).
-///
-/// # Errors
-///
-/// As [`write()`].
 pub(crate) fn write_features(path: &Path, features: &Array2<f64>) -> Result<(), EstimatorError> {
     let bytes = match path.extension().and_then(|e| e.to_str()) {
         Some("npy") => {
@@ -61,10 +57,6 @@ pub(crate) fn write_features(path: &Path, features: &Array2<f64>) -> Result<(), 
 }
 
 /// The CSV text of [`write_features`].
-///
-/// # Errors
-///
-/// Out of memory alone.
 pub(crate) fn features_csv_text(features: &Array2<f64>) -> io::Result<String> {
     let bytes = csv_text(&features_alone(features), &[])?;
     String::from_utf8(bytes).map_err(io::Error::other)
@@ -84,10 +76,6 @@ pub(crate) fn is_named(path: &Path) -> bool {
 }
 
 /// Writes a new file in the form that its name ends with; `names` are the parameters'.
-///
-/// # Errors
-///
-/// A place that is taken or cannot be written, a name of no form.
 pub fn write(path: &Path, draws: &Draws, names: &[&str]) -> Result<(), EstimatorError> {
     let bytes = match form(path)? {
         Form::Npz => npz(draws),
@@ -99,10 +87,6 @@ pub fn write(path: &Path, draws: &Draws, names: &[&str]) -> Result<(), Estimator
 }
 
 /// Writes a new `.npz` archive of these matrices.
-///
-/// # Errors
-///
-/// A place that is taken or cannot be written.
 pub(crate) fn write_matrices(
     path: &Path,
     matrices: &[(&str, &Array2<f64>)],
@@ -113,10 +97,6 @@ pub(crate) fn write_matrices(
 }
 
 /// Reads a file in the form that its name ends with, of a twin with these parameters.
-///
-/// # Errors
-///
-/// A file that cannot be read, holds something else, other parameters, or numbers that are not finite.
 pub fn read(path: &Path, names: &[&str]) -> Result<Draws, EstimatorError> {
     let form = form(path)?;
     let file = File::open(path).map_err(|error| EstimatorError::io(path, error))?;

@@ -12,10 +12,6 @@ pub trait Bank: Sync {
     fn parts(&self) -> Vec<usize>;
 
     /// Part number `index`.
-    ///
-    /// # Errors
-    ///
-    /// A part that cannot be read, or is not what it was.
     fn part(&self, index: usize) -> Result<Cow<'_, Draws>, EstimatorError>;
 
     /// All rows.

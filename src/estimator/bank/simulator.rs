@@ -20,10 +20,6 @@ debug_by_name!(FeatureSimulator);
 
 impl FeatureSimulator {
     /// Couples a twin with features, which are bound to it here.
-    ///
-    /// # Errors
-    ///
-    /// Features that this twin cannot have.
     pub fn new(twin: impl Into<Twin>, features: &dyn FeatureRecipe) -> Result<Self, FeatureError> {
         let calls = Arc::new(AtomicUsize::new(0));
         let twin = counted(&twin.into(), &calls);
@@ -36,10 +32,6 @@ impl FeatureSimulator {
 
     /// The simulator with another twin over the same θ and signals. Its features stay those of the first twin, unless they are given
     /// to be bound anew. Calls are counted together.
-    ///
-    /// # Errors
-    ///
-    /// Features that this twin cannot have.
     pub(in crate::estimator) fn of(
         &self,
         twin: &Twin,
@@ -77,10 +69,6 @@ impl FeatureSimulator {
 
     /// The simulator with its features centred on a record, and where the record puts θ; `None` for features that do not
     /// centre themselves. Calls are counted together.
-    ///
-    /// # Errors
-    ///
-    /// As [`FeatureMap::centred`].
     pub fn centred(
         &self,
         record: &Record,

@@ -74,10 +74,6 @@ impl<'a> Pretraining<'a> {
     ///
     /// An estimator that is there already is written again only where the folder of this very pretraining is still there: what
     /// made it was interrupted before it had cleared up.
-    ///
-    /// # Errors
-    ///
-    /// [`EstimatorError`]; among them a path that is taken, another process at work, and a folder of another pretraining.
     pub fn write(
         &self,
         path: &Path,

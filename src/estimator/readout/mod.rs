@@ -45,10 +45,6 @@ pub struct Layer {
 
 impl Readout {
     /// θ (rows: samples) from features, bounds not applied.
-    ///
-    /// # Errors
-    ///
-    /// Features of another width, or not finite.
     pub fn predict(&self, features: &Array2<f64>) -> Result<Array2<f64>, NetworkError> {
         let z = self.inputs.apply(features);
         let said = self.network.predict(&z)?;

@@ -32,10 +32,6 @@ impl Standardiser {
     }
 
     /// Zero mean and unit covariance, largest |z| `limit`.
-    ///
-    /// # Errors
-    ///
-    /// Fails where the samples are too few, not finite, or do not vary.
     pub fn principal(samples: &Array2<f64>, limit: f64) -> Result<Self, MathError> {
         let whitening = Whitening::calibrated(samples)?;
         let (mean, axes) = (whitening.mean(), whitening.matrix());

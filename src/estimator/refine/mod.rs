@@ -232,7 +232,7 @@ impl Refinement<'_> {
             self.drive,
             size,
             |i| noise.sample(i),
-            &self.progress.unseen(),
+            &self.progress.unshown().stage("whitening", 0),
         )?;
         let whitening = self.gate.whiten(&features)?;
         let spread = (whitening.squared_distances(&features).iter())
@@ -352,7 +352,6 @@ fn bounds(space: &ParameterSpace) -> Result<Bounds, MathError> {
         side(crate::twin::Interval::low),
         side(crate::twin::Interval::high),
     )
-    .map_err(|error| MathError::Fatal(error.into()))
 }
 
 /// θ_init, then space-filling points in the bounds.
@@ -362,6 +361,6 @@ fn starts(
     count: usize,
 ) -> Result<Vec<DVector<f64>>, EstimatorError> {
     let mut all = vec![initial.clone()];
-    all.extend(space_filling(&bounds(space)?, count - 1, 0)?);
+    all.extend(space_filling(&bounds(space)?, count - 1, 0));
     Ok(all)
 }

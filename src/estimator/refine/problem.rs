@@ -68,7 +68,7 @@ impl FeatureResidual<'_> {
         let values: Vec<DVector<f64>> = (stencil.points().par_iter())
             .map(|point| self.mean_features(&DVector::from_column_slice(point)))
             .collect::<Result<_, _>>()?;
-        stencil.assemble(&values)
+        Ok(stencil.assemble(&values))
     }
 
     fn whitening(&self) -> Result<&Whitening, MathError> {

@@ -247,10 +247,6 @@ pub struct ShardedBank {
 
 impl ShardedBank {
     /// The bank in a folder.
-    ///
-    /// # Errors
-    ///
-    /// [`EstimatorError`]: no folder of a bank, shards that are missing or are not those of the manifest.
     pub fn open(path: &Path) -> Result<Self, EstimatorError> {
         let (folder, manifest) = WorkFolder::find(path, VERB)?;
         let seed = manifest.get("seed").and_then(Value::as_u64);
@@ -285,10 +281,6 @@ impl ShardedBank {
     }
 
     /// All rows, in memory.
-    ///
-    /// # Errors
-    ///
-    /// [`EstimatorError`]: a shard that cannot be read, or is not what it was.
     pub fn read(&self) -> Result<Draws, EstimatorError> {
         let parts = (0..self.shards.of).map(|index| self.part(index));
         Draws::stacked(self.size(), parts, |index| self.shards.odd(index))

@@ -15,10 +15,6 @@ const NAMED: usize = 10;
 /// Puts the shards of several folders of one call together in a folder of their own; returns how many there are.
 ///
 /// Every shard is read and checked. Nothing is written before all are known to be there; `out` goes where one of them is not what it was.
-///
-/// # Errors
-///
-/// [`EstimatorError`]: folders of different calls, shards that are missing, differ between folders, or are not what they were.
 pub fn merge(from: &[PathBuf], out: &Path, progress: &Progress) -> Result<usize, EstimatorError> {
     let all = listed(from)?;
     let Some(first) = all.first() else {
@@ -50,10 +46,6 @@ pub fn merge(from: &[PathBuf], out: &Path, progress: &Progress) -> Result<usize,
 /// Puts the shards of several folders, or those of one whole bank, into one `.npz` or `.csv` file; returns the number of rows.
 ///
 /// All rows are in memory at once.
-///
-/// # Errors
-///
-/// As [`merge`] and [`file::write`].
 pub fn merge_into_file(
     from: &[PathBuf],
     out: &Path,

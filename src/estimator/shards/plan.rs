@@ -44,10 +44,6 @@ impl BankPlan {
     ///
     /// Shards that are there are read once: one that is not what it was is made again. Several processes may fill one
     /// folder; each shard appears whole.
-    ///
-    /// # Errors
-    ///
-    /// [`EstimatorError`]: a folder of another call, a place that cannot be written, a twin that fails, a stop.
     pub fn fill(
         &self,
         path: &Path,
@@ -88,10 +84,6 @@ impl BankPlan {
     }
 
     /// Returns the progress of the folder; a complete one gets the checksums of its shards.
-    ///
-    /// # Errors
-    ///
-    /// [`EstimatorError`]: no folder of this call.
     pub fn finish(&self, path: &Path) -> Result<Filled, EstimatorError> {
         finish(path, self.manifest()?)
     }
@@ -108,10 +100,6 @@ impl BankPlan {
     }
 
     /// Checks whether a bank was made as this plan says.
-    ///
-    /// # Errors
-    ///
-    /// [`EstimatorError::File`] names what is different.
     pub fn check(&self, bank: &ShardedBank) -> Result<(), EstimatorError> {
         match self.manifest()?.differs(bank.manifest()) {
             None => Ok(()),

@@ -22,10 +22,6 @@ debug_by_name!(Prior);
 
 impl Prior {
     /// Creates the prior of a study, seen through features.
-    ///
-    /// # Errors
-    ///
-    /// Features that the twin cannot have.
     pub fn new(study: &Study, features: &dyn FeatureRecipe) -> Result<Self, EstimatorError> {
         Ok(Self {
             simulator: FeatureSimulator::new(study.twin().clone(), features)?,
@@ -40,10 +36,6 @@ impl Prior {
     }
 
     /// Rows `rows` of what `purpose` names: row i depends on (seed, purpose, i) alone.
-    ///
-    /// # Errors
-    ///
-    /// As [`FeatureSimulator::draws`].
     pub fn rows(
         &self,
         rows: Range<u64>,

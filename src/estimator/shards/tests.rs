@@ -3,8 +3,8 @@
 #[path = "../../../tests/common/files.rs"]
 mod files;
 
-use super::{BankPlan, ShardedBank, merge, merge_into_file};
-use crate::estimator::bank::{Bank, file};
+use super::{BankPlan, ShardedBank, merge};
+use crate::estimator::bank::Bank;
 use crate::estimator::{EstimatorError, PresetName};
 use crate::progress::{Listener, Progress};
 use crate::storage::work::Share;
@@ -160,14 +160,6 @@ fn what_does_not_belong_together_is_refused() {
     );
     let error = refused(merge(&[at("half"), at("other")], &at("out"), &silent));
     assert!(error.contains("size was 41, now it is 40"), "{error}");
-    let error = refused(merge(&[at("nowhere")], &at("out"), &silent));
-    assert!(error.contains("no folder of `truetwin bank`"), "{error}");
-    let error = ShardedBank::open(&at("half")).unwrap_err().to_string();
-    assert!(error.contains("1 of 3 shards"), "{error}");
-    let error = fill(&plan(&study, 42), &at("other"), "1/1")
-        .unwrap_err()
-        .to_string();
-    assert!(error.contains("size was 41, now it is 42"), "{error}");
     assert!(!at("out").exists());
     // The same numbers, other rows: as from a machine that computes otherwise.
     fill(&plan(&study, 40), &at("whole"), "1/1").unwrap();
@@ -188,28 +180,5 @@ fn what_does_not_belong_together_is_refused() {
     assert!(
         error.contains("record was [0.05,60], now it is [0.05,61]"),
         "{error}"
-    );
-}
-
-#[test]
-fn a_bank_becomes_one_file() {
-    let (study, place) = (oscillator(), tempfile::tempdir().unwrap());
-    let at = |name: &str| place.path().join(name);
-    fill(&plan(&study, 40), &at("bank"), "1/1").unwrap();
-    for name in ["bank.npz", "bank.csv"] {
-        let rows = merge_into_file(&[at("bank")], &at(name), &Progress::silent());
-        assert_eq!(rows.unwrap(), 40);
-        let one = file::read(&at(name), &["nu"]).unwrap();
-        let bank = ShardedBank::open(&at("bank")).unwrap();
-        assert_eq!(
-            one.theta.row(39),
-            bank.part(2).unwrap().theta.row(7),
-            "{name}"
-        );
-    }
-    assert_eq!(
-        fs::read_dir(place.path()).unwrap().count(),
-        3,
-        "nothing is left over"
     );
 }

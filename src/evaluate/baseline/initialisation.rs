@@ -32,10 +32,6 @@ impl Initialisation {
 
     /// θ within the bounds, where `truth` is the true θ and `initial` is θ_init; `noise` is read by good starts, from
     /// its source `start`.
-    ///
-    /// # Errors
-    ///
-    /// [`TwinError`] for a truth or θ_init of another length, or a truth outside the bounds.
     pub fn theta(
         self,
         space: &ParameterSpace,

@@ -23,10 +23,6 @@ pub enum Origin<'a> {
 impl MonteCarlo {
     /// A folder for the runs of this plan over `study`, a new one or the one of the same call: `runs/0000.json`, … hold a
     /// [`Run`](super::Run) each; `estimator.est` is for an estimator that is trained for the study.
-    ///
-    /// # Errors
-    ///
-    /// [`StorageError`]: a path that is taken, a folder of another call, an estimator or input file that cannot be read.
     pub(crate) fn folder(
         &self,
         path: &Path,

@@ -13,8 +13,6 @@
 mod folder;
 mod free_runs;
 mod invariant;
-#[cfg(test)]
-mod limits;
 mod method;
 mod monte_carlo;
 mod presets;

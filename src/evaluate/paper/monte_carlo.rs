@@ -41,17 +41,6 @@ impl MonteCarlo {
         Draws::new(study, &self.benchmark, self.scenario)
     }
 
-    /// True parameters and record number `run`, from 0.
-    #[cfg(test)]
-    pub fn record(
-        &self,
-        study: &Study,
-        run: usize,
-    ) -> Result<(Vec<f64>, crate::record::Record), EvaluateError> {
-        let simulated = simulated(study, &self.draws(study)?, self.seed, run)?;
-        Ok((simulated.truth, simulated.record))
-    }
-
     /// Runs every stage of `estimator`, and the baselines, on simulated records, in order. Records are independent:
     /// run i depends on (seed, i) alone, and on no number of threads.
     ///
@@ -163,54 +152,6 @@ mod tests {
     }
 
     #[test]
-    fn threads_change_nothing() {
-        let plan = plan(Scenario::Uniform, 3);
-        let on = |threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            let runs = || {
-                plan.run_in(oscillator(), None, &Progress::silent())
-                    .unwrap()
-            };
-            answers(pool.unwrap().install(runs))
-        };
-        let one = on(1);
-        assert_eq!(one, on(2));
-        assert_eq!(one, on(5));
-        assert!(one[0].truth != one[1].truth && one[2].run == 2);
-    }
-
-    #[test]
-    fn a_folder_is_gone_on_with_where_it_stopped() {
-        let place = tempfile::tempdir().unwrap();
-        let path = place.path().join("study");
-        let plan = plan(Scenario::First, 3);
-        let run = || {
-            let folder = open(&path, &plan).unwrap();
-            plan.run_in(oscillator(), Some(&folder), &Progress::silent())
-        };
-        let first = run().unwrap();
-        assert_eq!(
-            first,
-            plan_again(&plan, &first),
-            "kept runs are read as they were"
-        );
-        assert_eq!(first, run().unwrap(), "times included");
-        fs::remove_file(path.join("runs/0001.json")).unwrap();
-        let second = run().unwrap();
-        assert_eq!((&first[0], &first[2]), (&second[0], &second[2]));
-        assert_eq!(answers(first), answers(second));
-        fs::write(path.join("runs/0001.json"), "{ \"run\": 1, ").unwrap();
-        let error = run().unwrap_err().to_string();
-        assert!(
-            error.contains("0001.json") && error.contains("remove it"),
-            "{error}"
-        );
-        fs::copy(path.join("runs/0000.json"), path.join("runs/0001.json")).unwrap();
-        let error = run().unwrap_err().to_string();
-        assert!(error.contains("holds another number"), "{error}");
-    }
-
-    #[test]
     fn shares_make_the_whole_and_each_keeps_to_its_own() {
         let place = tempfile::tempdir().unwrap();
         let plan = plan(Scenario::First, 3);
@@ -225,31 +166,10 @@ mod tests {
         let runs = plan.run_in(oscillator(), Some(&folder), &Progress::silent());
         let alone = plan.run_in(oscillator(), None, &Progress::silent());
         assert_eq!(answers(runs.unwrap()), answers(alone.unwrap()));
-    }
-
-    /// The same study without a folder, with the times of `timed`.
-    fn plan_again(plan: &MonteCarlo, timed: &[Run]) -> Vec<Run> {
-        let mut runs = plan
-            .run_in(oscillator(), None, &Progress::silent())
-            .unwrap();
-        for (run, timed) in runs.iter_mut().zip(timed) {
-            for (answer, timed) in run.answers.iter_mut().zip(&timed.answers) {
-                answer.ms = timed.ms;
-            }
-        }
-        runs
-    }
-
-    #[test]
-    fn another_plan_is_refused() {
-        let place = tempfile::tempdir().unwrap();
-        let path = place.path().join("study");
-        open(&path, &plan(Scenario::First, 3)).unwrap();
-        let error = open(&path, &plan(Scenario::First, 4)).unwrap_err();
-        assert!(
-            error.to_string().contains("runs was 3, now it is 4"),
-            "{error}"
-        );
+        fs::copy(folder.file("runs/0000.json"), folder.file("runs/0001.json")).unwrap();
+        let error = plan.run_in(oscillator(), Some(&folder), &Progress::silent());
+        let error = error.unwrap_err().to_string();
+        assert!(error.contains("holds another number"), "{error}");
     }
 
     struct Stopped;

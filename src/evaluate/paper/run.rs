@@ -4,7 +4,7 @@ use super::Method;
 use super::record::Simulated;
 use crate::estimator::{Contributions, Estimate, EstimateOptions, Estimator};
 use crate::evaluate::EvaluateError;
-use crate::evaluate::baseline::{DualFilter, Initialisation, PredictionErrorMethod};
+use crate::evaluate::baseline::{Initialisation, dual_filter, prediction_error};
 use crate::progress::Progress;
 use crate::twin::Twin;
 use serde::{Deserialize, Serialize};
@@ -46,10 +46,6 @@ pub struct Answer {
 
 impl Run {
     /// Runs every method. A method that fails leaves no answer: its row says that it cannot be relied on.
-    ///
-    /// # Errors
-    ///
-    /// [`EvaluateError::Cancelled`] alone.
     pub(super) fn new(
         estimator: &Estimator,
         run: usize,
@@ -87,22 +83,16 @@ impl Run {
             let clock = Instant::now();
             let (theta, seconds) = match method {
                 Method::PredictionError(from) => {
-                    let fit = start(from).and_then(|start| {
-                        PredictionErrorMethod::default()
-                            .fit(twin, record, &start)
-                            .ok()
-                    });
-                    (fit.map(|fit| fit.theta), None)
+                    let fit = |start: Vec<f64>| prediction_error(twin, record, &start).ok();
+                    (start(from).and_then(fit), None)
                 }
                 Method::DualFilter(from) => {
-                    let run = match twin {
-                        Twin::Equations(equations) => start(from).and_then(|start| {
-                            let filter = DualFilter::default();
-                            filter.run(equations.as_ref(), record, &start).ok()
-                        }),
+                    let theta = match twin {
+                        Twin::Equations(equations) => start(from)
+                            .and_then(|start| dual_filter(equations.as_ref(), record, &start).ok()),
                         Twin::BlackBox(_) => None,
                     };
-                    (run.map(|run| run.theta), None)
+                    (theta, None)
                 }
                 stage => match &estimate {
                     Some(estimate) => of_stage(stage, estimate),

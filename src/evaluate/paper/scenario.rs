@@ -186,11 +186,9 @@ fn grid(space: &ParameterSpace) -> Result<Vec<Vec<f64>>, EvaluateError> {
         let side = |end: fn(Interval) -> f64| {
             DVector::from_iterator(space.len(), space.iter().map(|p| end(of(p))))
         };
-        let bounds = Bounds::new(side(Interval::low), side(Interval::high))
-            .map_err(|error| EvaluateError::Grid(error.to_string()))?;
-        let points = space_filling(&bounds, count, 0);
-        let points = points.map_err(|error| EvaluateError::Grid(error.to_string()))?;
-        Ok::<Vec<Vec<f64>>, EvaluateError>(points.iter().map(|p| p.as_slice().to_vec()).collect())
+        let bounds = Bounds::new(side(Interval::low), side(Interval::high))?;
+        let points = space_filling(&bounds, count, 0).into_iter();
+        Ok::<_, EvaluateError>(points.map(|p| p.as_slice().to_vec()).collect::<Vec<_>>())
     };
     let mut all = points(&|p| p.prior, POINTS)?;
     let outside = points(&|p| p.bounds, LOOKED_AT)?;

@@ -24,9 +24,6 @@ struct State {
 }
 
 impl Health {
-    /// # Errors
-    ///
-    /// The fatal error that was met before.
     pub fn check(&self) -> Result<(), SimulationError> {
         match &self.lock().broken {
             Some(reason) => Err(SimulationError::fatal(reason.clone())),

@@ -1,6 +1,6 @@
 //! Pieces of foreign text, fit for a one-line message.
 
-use crate::storage::untrusted::hidden;
+use crate::storage::untrusted::one_line;
 
 /// Longest end of standard error that a message quotes, in characters.
 const LAST_WORDS: usize = 400;
@@ -8,7 +8,7 @@ const LAST_WORDS: usize = 400;
 /// The end of what a program wrote to standard error, in one line; its lines are parted by ` | `.
 pub(super) fn last_words(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);
-    let lines: Vec<String> = (text.lines().map(one_line))
+    let lines: Vec<String> = (text.lines().map(|line| one_line(line, usize::MAX)))
         .filter(|line| !line.is_empty())
         .collect();
     let joined = lines.join(" | ");
@@ -17,13 +17,6 @@ pub(super) fn last_words(bytes: &[u8]) -> String {
         Some((from, _)) if surplus > 0 => format!("… {}", &joined[from..]),
         _ => joined,
     }
-}
-
-fn one_line(text: &str) -> String {
-    let plain: String = (text.chars())
-        .map(|c| if hidden(c) { ' ' } else { c })
-        .collect();
-    plain.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]

@@ -133,12 +133,4 @@ mod tests {
         );
         assert_eq!(p.unwrap(), dvector![0.0, 0.0]);
     }
-
-    #[test]
-    fn without_a_face_in_the_way_it_is_the_truncated_step() {
-        let far = dvector![1e9, 1e9];
-        let j = DMatrix::from_row_slice(2, 2, &[1.0, 1.0, 1.0, 1.0]);
-        let p = box_step(&dvector![2.0, 2.0], &j, &-&far, &far, 1e-9).unwrap();
-        assert!((p - dvector![-1.0, -1.0]).amax() < 1e-12);
-    }
 }

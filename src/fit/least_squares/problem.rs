@@ -9,17 +9,9 @@ pub trait ResidualProblem {
     /// d, the number of parameters.
     fn dimension(&self) -> usize;
 
-    /// r(θ).
-    ///
-    /// # Errors
-    ///
-    /// [`MathError::Rejected`] where θ has no residual, [`MathError::Fatal`] to stop.
+    /// r(θ); [`MathError::Rejected`] where θ has no residual, [`MathError::Fatal`] to stop.
     fn residual(&self, theta: &DVector<f64>) -> Result<DVector<f64>, MathError>;
 
     /// ∂r/∂θ; [`Stencil`](crate::math::Stencil) has finite differences.
-    ///
-    /// # Errors
-    ///
-    /// As [`residual`](Self::residual).
     fn jacobian(&self, theta: &DVector<f64>) -> Result<DMatrix<f64>, MathError>;
 }

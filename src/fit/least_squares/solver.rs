@@ -5,7 +5,7 @@ use argmin::core::{
 use nalgebra::{DMatrix, DVector};
 
 use super::box_step::box_step;
-use super::settings::StopReason;
+use super::settings::{GRADIENT_TOLERANCE, MAX_HALVINGS};
 use super::{Bounds, GaussNewton, ResidualProblem};
 
 /// Armijo's constant: the part of the slope that a step must deliver.
@@ -53,10 +53,6 @@ pub(super) struct DampedGaussNewton<'a> {
     pub bounds: &'a Bounds,
     pub scale: &'a DVector<f64>,
     pub settings: &'a GaussNewton,
-    /// Steps that were accepted.
-    pub steps: usize,
-    /// Why it stopped; none while running or when argmin counted to the last iteration.
-    pub reason: Option<StopReason>,
 }
 
 impl DampedGaussNewton<'_> {
@@ -98,15 +94,14 @@ impl DampedGaussNewton<'_> {
         };
         (0..jacobian.ncols()).map(cosine).fold(0.0, f64::max)
     }
+}
 
-    fn stop(&mut self, state: GaussNewtonState, reason: StopReason) -> GaussNewtonState {
-        self.reason = Some(reason);
-        state.terminate_with(if reason.converged() {
-            TerminationReason::SolverConverged
-        } else {
-            TerminationReason::SolverExit(reason.to_string())
-        })
-    }
+/// The end of a search at which a tolerance is met.
+const CONVERGED: TerminationReason = TerminationReason::SolverConverged;
+
+/// The end of a search that cannot go on.
+fn stuck(reason: &str) -> TerminationReason {
+    TerminationReason::SolverExit(reason.into())
 }
 
 /// A rejected point is no value rather than an error.
@@ -154,17 +149,11 @@ where
         let cost = state.get_cost();
         let Some(jacobian) = tolerate(problem.jacobian(&theta))? else {
             let state = state.param(theta).residuals(residual).cost(cost);
-            return Ok((self.stop(state, StopReason::NoJacobian), None));
+            return Ok((
+                state.terminate_with(stuck("no Jacobian at this point")),
+                None,
+            ));
         };
-        if jacobian.shape() != (residual.len(), theta.len()) {
-            let (rows, columns) = jacobian.shape();
-            return Err(MathError::fatal(format!(
-                "the Jacobian is {rows} × {columns}, for {} residuals and {} parameters",
-                residual.len(),
-                theta.len()
-            ))
-            .into());
-        }
         let (low, high, jacobian) = self.in_scale(&theta, jacobian);
         let stay = |state: GaussNewtonState| {
             state
@@ -173,8 +162,8 @@ where
                 .cost(cost)
         };
 
-        if Self::optimality(&residual, &jacobian, &low, &high) <= self.settings.gradient_tolerance {
-            return Ok((self.stop(stay(state), StopReason::Gradient), None));
+        if Self::optimality(&residual, &jacobian, &low, &high) <= GRADIENT_TOLERANCE {
+            return Ok((stay(state).terminate_with(CONVERGED), None));
         }
         let cutoff = self.settings.relative_cutoff;
         let mut step =
@@ -183,7 +172,7 @@ where
         let slope = residual.dot(&model);
         let predicted = -slope - model.norm_squared() / 2.0;
         if predicted <= self.settings.tolerance * cost {
-            return Ok((self.stop(stay(state), StopReason::Decrease), None));
+            return Ok((stay(state).terminate_with(CONVERGED), None));
         }
         let full = step.amax();
         let shortened = self
@@ -193,7 +182,7 @@ where
         step *= shortened;
 
         let mut fraction = 1.0;
-        for _ in 0..=self.settings.max_halvings {
+        for _ in 0..=MAX_HALVINGS {
             let moved = &theta + (&step * fraction).component_mul(self.scale);
             let moved = self.bounds.project(&moved);
             let found = tolerate(problem.apply(&moved))?;
@@ -203,24 +192,23 @@ where
             if let Some(found) = found
                 && merit <= cost + SUFFICIENT * fraction * shortened * slope
             {
-                if found.len() != residual.len() {
-                    return Err(MathError::fatal("the number of residuals changed").into());
-                }
-                self.steps += 1;
                 let state = state.param(moved).residuals(found).cost(merit);
                 // A step that was cut short says nothing about what is left to gain.
                 let whole = fraction * shortened == 1.0;
-                let state = if whole && cost - merit <= self.settings.tolerance * cost {
-                    self.stop(state, StopReason::Decrease)
-                } else if whole && full <= self.settings.step_tolerance {
-                    self.stop(state, StopReason::Step)
-                } else {
-                    state
-                };
-                return Ok((state, None));
+                let gained = cost - merit > self.settings.tolerance * cost;
+                let done = whole && (!gained || full <= self.settings.step_tolerance);
+                return Ok((
+                    match done {
+                        true => state.terminate_with(CONVERGED),
+                        false => state,
+                    },
+                    None,
+                ));
             }
             fraction /= 2.0;
         }
-        Ok((self.stop(stay(state), StopReason::NoDescent), None))
+        // Rounding or noise is reached, the Jacobian is wrong, or points were rejected.
+        let reason = stuck("no fraction of the step lowers the cost");
+        Ok((stay(state).terminate_with(reason), None))
     }
 }

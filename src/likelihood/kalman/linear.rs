@@ -162,7 +162,7 @@ fn agrees_with_the_exact_filter(twin: &Chain, record: &Record) {
                 .unwrap();
             for (states, expected) in [
                 (found.states.unwrap(), &expected.filtered),
-                (smoothed.states, &expected.smoothed),
+                (smoothed, &expected.smoothed),
             ] {
                 for (k, (m, p)) in expected.iter().enumerate() {
                     for i in 0..2 {
@@ -244,17 +244,13 @@ fn a_missing_output_has_no_score() {
         let score = Score::at(&kalman, &[1.2, 0.3]).unwrap();
         let empty = |k: usize| record.outputs().row(k).iter().all(|y| y.is_nan());
         assert!((0..record.samples()).any(empty));
-        for k in (0..record.samples()).filter(|&k| empty(k)) {
-            assert!(score.samples.row(k).iter().all(|g| *g == 0.0));
-        }
         let known = DMatrix::identity(2, 2) * 1e-18;
         let value = |c: f64| exact(&twin, &[1.2, c], &record, &known).log_likelihood;
         let h = 1e-5;
         let expected = (value(0.3 + h) - value(0.3 - h)) / (2.0 * h);
         let (error, scale) = (score.gradient[1] - expected, score.fisher[(1, 1)].sqrt());
         assert!(error.abs() < 1e-3 * scale, "{error} of {scale}");
-        let rows = (0..record.samples()).filter(|&k| !empty(k)).count() as f64;
-        assert!(scale.is_finite() && score.outer[(1, 1)] < 100.0 * rows * score.fisher[(1, 1)]);
+        assert!(scale.is_finite());
     }
 }
 
@@ -302,8 +298,6 @@ fn the_score_is_the_derivative_of_the_log_likelihood() {
             let scale = score.fisher[(j, j)].sqrt();
             assert!(error < 1e-3 * scale, "{j}: {error} of {scale}");
         }
-        let sum = score.samples.row_sum_tr() - &score.gradient;
-        assert!(sum.amax() < 1e-9);
         let fast = kalman.log_likelihood(&theta).unwrap();
         assert_eq!(score.log_likelihood, fast);
     }
@@ -333,7 +327,7 @@ fn exact_likelihood(twin: &Chain, theta: &[f64], record: &Record, start: &DMatri
     sum
 }
 
-/// Over records, the score's covariance, the OPG's mean and the expected information agree; also with two outputs.
+/// Over records, the score's covariance and the expected information agree; also with two outputs.
 #[test]
 fn information_is_the_covariance_of_the_score() {
     let theta = [1.2, 0.3];
@@ -341,7 +335,7 @@ fn information_is_the_covariance_of_the_score() {
         let twin = Chain::new(outputs);
         let settings = FilterSettings::default();
         let n = 400u32;
-        let [mut outer, mut fisher, mut squares] = [(); 3].map(|()| DMatrix::<f64>::zeros(2, 2));
+        let [mut fisher, mut squares] = [(); 2].map(|()| DMatrix::<f64>::zeros(2, 2));
         for run in 0..n {
             let drive = record(&twin, &theta).drive().clone();
             let noise = Noise::new(4, "information", run.into());
@@ -349,15 +343,13 @@ fn information_is_the_covariance_of_the_score() {
             let record = Record::new(drive, outputs).unwrap();
             let kalman = Kalman::new(&twin, &record, &settings).unwrap();
             let score = Score::at(&kalman, &theta).unwrap();
-            outer += &score.outer / f64::from(n);
             fisher += &score.fisher / f64::from(n);
             squares += &score.gradient * score.gradient.transpose() / f64::from(n);
         }
         for j in 0..2 {
             // Relative sd of a mean of n squares: √(2/n) = 0.07.
-            let of = |m: &DMatrix<f64>| m[(j, j)] / fisher[(j, j)];
-            assert!((of(&squares) - 1.0).abs() < 0.3, "{squares} {fisher}");
-            assert!((of(&outer) - 1.0).abs() < 0.1, "{outer} {fisher}");
+            let ratio = squares[(j, j)] / fisher[(j, j)];
+            assert!((ratio - 1.0).abs() < 0.3, "{squares} {fisher}");
         }
     }
 }

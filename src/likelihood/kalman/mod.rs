@@ -10,7 +10,7 @@
 //! | get the likelihood | [`Kalman::log_likelihood`] |
 //! | see innovations and filtered states | [`Kalman::filter`] |
 //! | see the states given the whole record | [`Kalman::smooth`] |
-//! | have the gradient, and the outer product of gradients | [`Score`] |
+//! | have the gradient and the expected information | [`Score`] |
 //! | step in log θ where θ is positive | [`Coordinates`] |
 //! | choose the approximation | [`FilterSettings`], [`Method`] |
 //!
@@ -69,4 +69,3 @@ pub(crate) use error::recoverable;
 pub use filtered::{Filtered, States};
 pub use score::Score;
 pub use settings::{FilterSettings, Method};
-pub use smooth::Smoothed;

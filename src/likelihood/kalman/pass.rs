@@ -3,7 +3,7 @@
 use super::gaussian::{Belief, Columns, Root, regular};
 use super::likelihood::{LOG_TWO_PI, LogLikelihood};
 use super::moments::Moments;
-use super::size::{Any, Fixed, Numbers, Size, Wide};
+use super::size::{Any, Fixed, Numbers, Size};
 use super::start::spread_start;
 use super::update::{Measured, Update};
 use super::{FilterError, Kalman};
@@ -373,7 +373,6 @@ impl Kalman<'_> {
             (8, 1) => Pass::new(Fixed::<8>, self, &acting, theta).run(sink),
             (9, 1) => Pass::new(Fixed::<9>, self, &acting, theta).run(sink),
             (10, 1) => Pass::new(Fixed::<10>, self, &acting, theta).run(sink),
-            (states, 1) => Pass::new(Wide { states }, self, &acting, theta).run(sink),
             (states, outputs) => Pass::new(Any { states, outputs }, self, &acting, theta).run(sink),
         }
     }

@@ -10,13 +10,13 @@ use nalgebra::{DMatrix, DMatrixView, DVector};
 /// parameters, N samples.
 ///
 /// ```text
-/// g_k = ∂ log p(y_k | y_0 … y_{k−1}) / ∂φ,   s = Σ g_k,   OPG = Σ g_k g_kᵀ
+/// s = Σ ∂ log p(y_k | y_0 … y_{k−1}) / ∂φ
 /// fisher = Σ ∂e_kᵀ S_k⁻¹ ∂e_k + ½·tr(S_k⁻¹ ∂S_k S_k⁻¹ ∂S_k)             e, S: innovations and their covariances
 /// ```
 ///
-/// Where the twin is right at θ, s has mean zero, and OPG and fisher both have the Fisher information as their mean.
-/// Far from it the OPG is much too large, and steps by it too short: search with `fisher`. Takes 2·d + 1 passes over
-/// the record.
+/// Where the twin is right at θ, s has mean zero, and fisher has the Fisher information as its mean. (The outer product of
+/// the rows' gradients has the same mean there, but is much too large elsewhere, and steps by it too short.) Takes
+/// 2·d + 1 passes over the record.
 ///
 /// Source: Alsing & Wandelt, "Generalized massive optimal data compression" (2018), for the score as a summary.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,12 +25,8 @@ pub struct Score {
     pub log_likelihood: f64,
     /// s, in nats per unit of φ (d).
     pub gradient: DVector<f64>,
-    /// OPG, the outer product of gradients (d × d).
-    pub outer: DMatrix<f64>,
     /// Information expected from the innovations' derivatives (d × d).
     pub fisher: DMatrix<f64>,
-    /// g_k (N × d).
-    pub samples: DMatrix<f64>,
 }
 
 /// Steps of one-sided differences over those of central ones.
@@ -90,23 +86,9 @@ impl Score {
         theta: &[f64],
         coordinates: &Coordinates,
     ) -> Result<Self, FilterError> {
-        match side_by_side(&[kalman], theta, coordinates) {
-            Some(mut scores) => Ok(scores.swap_remove(0)),
+        match side_by_side(kalman, theta, coordinates) {
+            Some(score) => Ok(score),
             None => Self::forward_one_by_one(kalman, theta, coordinates),
-        }
-    }
-
-    /// As [`forward`](Self::forward), of several records at the same θ: side by side where twin, times and length agree.
-    pub fn forward_each(
-        kalmans: &[&Kalman<'_>],
-        theta: &[f64],
-        coordinates: &Coordinates,
-    ) -> Vec<Result<Self, FilterError>> {
-        match side_by_side(kalmans, theta, coordinates) {
-            Some(scores) => scores.into_iter().map(Ok).collect(),
-            None => (kalmans.iter())
-                .map(|kalman| Self::forward(kalman, theta, coordinates))
-                .collect(),
         }
     }
 
@@ -133,16 +115,14 @@ impl Score {
     /// From derivatives of log-densities and of innovations and variances, both in standard deviations.
     fn of_one_output(
         log_likelihood: f64,
-        samples: DMatrix<f64>,
+        samples: &DMatrix<f64>,
         changes: [&DMatrix<f64>; 2],
     ) -> Self {
         let [shift, spread] = changes;
         Self {
             log_likelihood,
             gradient: samples.row_sum_tr(),
-            outer: samples.tr_mul(&samples),
             fisher: shift.tr_mul(shift) + spread.tr_mul(spread) * 0.5,
-            samples,
         }
     }
 
@@ -160,11 +140,8 @@ impl Score {
             let shift =
                 DMatrix::from_fn(n, d, |k, j| jacobian[(k * width + 1, j)] / scale(k).sqrt());
             let change = DMatrix::from_fn(n, d, |k, j| jacobian[(k * width + 2, j)] / scale(k));
-            return Ok(Self::of_one_output(
-                log_likelihood,
-                samples,
-                [&shift, &change],
-            ));
+            let changes = [&shift, &change];
+            return Ok(Self::of_one_output(log_likelihood, &samples, changes));
         } else {
             let mut fisher = DMatrix::zeros(d, d);
             for k in 0..n {
@@ -183,20 +160,14 @@ impl Score {
         Ok(Self {
             log_likelihood,
             gradient: samples.row_sum_tr(),
-            outer: samples.tr_mul(&samples),
             fisher,
-            samples,
         })
     }
 }
 
-/// One-sided scores of several records at θ by lanes; `None` where these cannot hold them.
-fn side_by_side(
-    kalmans: &[&Kalman<'_>],
-    theta: &[f64],
-    coordinates: &Coordinates,
-) -> Option<Vec<Score>> {
-    kalmans.first()?.check(theta).ok()?;
+/// One-sided score by lanes; `None` where these cannot hold the filter.
+fn side_by_side(kalman: &Kalman<'_>, theta: &[f64], coordinates: &Coordinates) -> Option<Score> {
+    kalman.check(theta).ok()?;
     let phi = coordinates.of(theta);
     let moves: Vec<_> = (0..phi.len())
         .map(|j| {
@@ -204,45 +175,40 @@ fn side_by_side(
             (coordinates.theta(&moved), distance)
         })
         .collect();
-    let thetas = || std::iter::once(theta).chain(moves.iter().map(|(theta, _)| &theta[..]));
-    let jobs: Vec<(&Kalman<'_>, &[f64])> = (kalmans.iter())
-        .flat_map(|kalman| thetas().map(|theta| (*kalman, theta)))
+    let moved = moves.iter().map(|(theta, _)| &theta[..]);
+    let thetas: Vec<&[f64]> = std::iter::once(theta).chain(moved).collect();
+    let runs: Vec<Together> = (thetas.chunks(LANES))
+        .map(|thetas| together(kalman, thetas))
+        .collect::<Option<_>>()?;
+    let lane = |job: usize| (&runs[job / LANES], job % LANES);
+    let (centre, c) = lane(0);
+    let (n, d) = (centre.rows.len(), moves.len());
+    let [mut samples, mut shifts, mut spreads] = [(); 3].map(|()| DMatrix::zeros(n, d));
+    // Reciprocals of variance and deviation.
+    let scales: Vec<[f64; 2]> = (centre.rows.iter())
+        .map(|[_, s]| [1.0 / s.0[c], 1.0 / s.0[c].sqrt()])
         .collect();
-    let runs: Vec<Together> = (jobs.chunks(LANES)).map(together).collect::<Option<_>>()?;
-    let scores = (0..kalmans.len()).map(|record| {
-        let lane = |j: usize| {
-            let job = record * (moves.len() + 1) + j;
-            (&runs[job / LANES], job % LANES)
-        };
-        let (centre, c) = lane(0);
-        let (n, d) = (centre.rows.len(), moves.len());
-        let [mut samples, mut shifts, mut spreads] = [(); 3].map(|()| DMatrix::zeros(n, d));
-        // Reciprocals of variance and deviation.
-        let scales: Vec<[f64; 2]> = (centre.rows.iter())
-            .map(|[_, s]| [1.0 / s.0[c], 1.0 / s.0[c].sqrt()])
-            .collect();
-        for (j, (_, distance)) in moves.iter().enumerate() {
-            let (moved, m) = lane(j + 1);
-            let rows = (centre.rows.iter().zip(&moved.rows)).zip(&scales);
-            let [samples, shifts, spreads] = [&mut samples, &mut shifts, &mut spreads]
-                .map(|of| of.as_mut_slice()[j * n..(j + 1) * n].iter_mut());
-            let to = samples.zip(shifts).zip(spreads);
-            let per_distance = 1.0 / distance;
-            for (([[e, _], [e_moved, s_moved]], [per_s, per_sd]), ((sample, shift), spread)) in
-                rows.map(|((a, b), scale)| ([a, b], scale)).zip(to)
-            {
-                let (e, e_moved, s_moved) = (e.0[c], e_moved.0[m], s_moved.0[m]);
-                let ratio = s_moved * per_s;
-                let square = e_moved * e_moved / s_moved - e * e * per_s;
-                *sample = -0.5 * (ln_near_one(ratio) + square) * per_distance;
-                *shift = (e_moved - e) * per_distance * per_sd;
-                *spread = (ratio - 1.0) * per_distance;
-            }
+    for (j, (_, distance)) in moves.iter().enumerate() {
+        let (moved, m) = lane(j + 1);
+        let rows = (centre.rows.iter().zip(&moved.rows)).zip(&scales);
+        let [samples, shifts, spreads] = [&mut samples, &mut shifts, &mut spreads]
+            .map(|of| of.as_mut_slice()[j * n..(j + 1) * n].iter_mut());
+        let to = samples.zip(shifts).zip(spreads);
+        let per_distance = 1.0 / distance;
+        for (([[e, _], [e_moved, s_moved]], [per_s, per_sd]), ((sample, shift), spread)) in
+            rows.map(|((a, b), scale)| ([a, b], scale)).zip(to)
+        {
+            let (e, e_moved, s_moved) = (e.0[c], e_moved.0[m], s_moved.0[m]);
+            let ratio = s_moved * per_s;
+            let square = e_moved * e_moved / s_moved - e * e * per_s;
+            *sample = -0.5 * (ln_near_one(ratio) + square) * per_distance;
+            *shift = (e_moved - e) * per_distance * per_sd;
+            *spread = (ratio - 1.0) * per_distance;
         }
-        let log_likelihood = centre.log_likelihoods.0[c];
-        Score::of_one_output(log_likelihood, samples, [&shifts, &spreads])
-    });
-    Some(scores.collect())
+    }
+    let log_likelihood = centre.log_likelihoods.0[c];
+    let changes = [&shifts, &spreads];
+    Some(Score::of_one_output(log_likelihood, &samples, changes))
 }
 
 /// ln, by its series where it is short.

@@ -63,29 +63,6 @@ macro_rules! fixed {
 
 fixed!(1, 2, 3, 4, 5, 6, 7, 8, 9, 10);
 
-/// Any number of states, and one output.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Wide {
-    pub states: usize,
-}
-
-impl Size for Wide {
-    type Vector = Vec<f64>;
-    type Matrix = Vec<f64>;
-    type Points = Vec<f64>;
-
-    const KNOWN: bool = false;
-
-    #[inline(always)]
-    fn states(self) -> usize {
-        self.states
-    }
-    #[inline(always)]
-    fn outputs(self) -> usize {
-        1
-    }
-}
-
 /// Any number of states and outputs.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Any {

@@ -4,32 +4,6 @@ use super::gaussian::{Belief, Gaussian, Root};
 use super::pass::Sink;
 use super::{FilterError, Kalman, States};
 
-/// States given the whole record, by the backward pass of Rauch, Tung & Striebel:
-///
-/// ```text
-/// G_k = cov(x_k, x_{k+1}) · P⁻_{k+1}⁻¹
-/// m_k ← m_k + G_k·(m_{k+1} − m⁻_{k+1}),   P_k ← P_k + G_k·(P_{k+1} − P⁻_{k+1})·G_kᵀ
-/// ```
-///
-/// The cross-covariances come from the filter's own points. Limited states are held in their limits at the end.
-///
-/// Source: Särkkä, *Bayesian Filtering and Smoothing* (2013), chapter 9.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub struct Smoothed {
-    /// log p(y | θ), in nats.
-    pub log_likelihood: f64,
-    /// States given the whole record.
-    pub states: States,
-}
-
-impl Smoothed {
-    /// Means of the states at the first sample.
-    pub(crate) fn first(&self) -> Vec<f64> {
-        self.states.means.row(0).to_vec()
-    }
-}
-
 struct Tape {
     filtered: Vec<Gaussian>,
     carried: Vec<(Gaussian, Vec<f64>)>,
@@ -48,18 +22,27 @@ impl Sink for Tape {
 }
 
 impl Kalman<'_> {
-    /// States at each sample given the whole record.
+    /// States at each sample given the whole record, by the backward pass of Rauch, Tung & Striebel:
+    ///
+    /// ```text
+    /// G_k = cov(x_k, x_{k+1}) · P⁻_{k+1}⁻¹
+    /// m_k ← m_k + G_k·(m_{k+1} − m⁻_{k+1}),   P_k ← P_k + G_k·(P_{k+1} − P⁻_{k+1})·G_kᵀ
+    /// ```
+    ///
+    /// The cross-covariances come from the filter's own points. Limited states are held in their limits at the end.
+    ///
+    /// Source: Särkkä, *Bayesian Filtering and Smoothing* (2013), chapter 9.
     ///
     /// # Errors
     ///
     /// As [`log_likelihood`](Self::log_likelihood).
-    pub fn smooth(&self, theta: &[f64]) -> Result<Smoothed, FilterError> {
+    pub fn smooth(&self, theta: &[f64]) -> Result<States, FilterError> {
         let samples = self.record.samples();
         let mut tape = Tape {
             filtered: Vec::with_capacity(samples),
             carried: Vec::with_capacity(samples),
         };
-        let log_likelihood = self.run(theta, &mut tape)?;
+        self.run(theta, &mut tape)?;
         let n = self.states;
         let mut states = States::new(samples, n);
         let mut root = <Root>::new(n);
@@ -93,10 +76,7 @@ impl Kalman<'_> {
             states.set(k, self.told(state.clone()).as_belief());
             later = state;
         }
-        Ok(Smoothed {
-            log_likelihood,
-            states,
-        })
+        Ok(states)
     }
 }
 

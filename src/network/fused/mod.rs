@@ -5,7 +5,7 @@ mod dense;
 mod gemm;
 pub(super) mod kernel;
 
-pub use activation::{Activation, Leaky};
+pub use activation::Leaky;
 pub(super) use dense::numbers;
 pub(crate) use dense::{BuiltDense, BuiltNormDense};
 pub use dense::{Dense, NormDense};

@@ -49,7 +49,8 @@ fn a_listener_counts_the_epochs_and_cancels() {
     let (features, targets) = samples(40, 3, 1);
     let listener = Arc::new(StopAt(4, AtomicU64::new(0)));
     let progress = Progress::new(listener.clone());
-    let result = architecture::<Mixed>().train(&features, &targets, &quick(50), 1, &progress);
+    let (samples, nowhere) = ((&features, &targets), Checkpoints::none());
+    let result = architecture::<Mixed>().train_on(&samples, &quick(50), 1, &nowhere, &progress);
     assert_eq!(result.unwrap_err(), NetworkError::Cancelled(Cancelled));
     assert_eq!(listener.1.load(Ordering::Relaxed), 4);
 }
@@ -113,10 +114,7 @@ fn the_penalty_turns_the_heads_apart() {
 #[test]
 fn a_state_that_is_damaged_or_of_another_network_counts_as_none() {
     let (features, targets) = samples(64, 3, 1);
-    let samples = Matrices {
-        features: &features,
-        targets: &targets,
-    };
+    let samples = (&features, &targets);
     let place = tempfile::tempdir().unwrap();
     let path = place.path().join("training");
     let kept = || Checkpoints::new(&path, Duration::ZERO);
@@ -145,10 +143,7 @@ fn a_state_that_is_damaged_or_of_another_network_counts_as_none() {
 fn a_state_that_cannot_be_kept_is_said() {
     let (features, targets) = samples(64, 3, 1);
     let nowhere = Checkpoints::new("/nowhere/training", Duration::ZERO);
-    let samples = Matrices {
-        features: &features,
-        targets: &targets,
-    };
+    let samples = (&features, &targets);
     let error = architecture::<Mixed>()
         .train_on(&samples, &quick(1), 1, &nowhere, &Progress::silent())
         .unwrap_err();

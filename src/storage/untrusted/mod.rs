@@ -17,39 +17,23 @@ use std::path::Path;
 pub(crate) const MOST_NUMBERS: usize = 1 << 29;
 
 /// The bytes of a file, `most` of them; a longer one is refused, also one that has no end.
-///
-/// # Errors
-///
-/// What the system says; [`io::ErrorKind::FileTooLarge`].
 pub(crate) fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     whole(File::open(path)?, most)
 }
 
 /// As [`read`], for text.
-///
-/// # Errors
-///
-/// As [`read`]; [`io::ErrorKind::InvalidData`] for what is no UTF-8.
 pub(crate) fn read_text(path: &Path, most: u64) -> io::Result<String> {
     text(read(path, most)?)
 }
 
 /// As [`read`], for files that this program keeps in a folder of its own: only a plain file is one of them, and no link leads
 /// out of the folder.
-///
-/// # Errors
-///
-/// As [`read`]; [`io::ErrorKind::Unsupported`] for what is no plain file.
 pub(crate) fn read_kept(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     check_file(path)?;
     read(path, most)
 }
 
 /// Checks whether a file of a folder of our own is a plain file, and no link out of it.
-///
-/// # Errors
-///
-/// As [`check_folder`].
 pub(crate) fn check_file(path: &Path) -> io::Result<()> {
     match path.symlink_metadata()?.is_file() {
         true => Ok(()),
@@ -58,19 +42,11 @@ pub(crate) fn check_file(path: &Path) -> io::Result<()> {
 }
 
 /// As [`read_kept`], for text.
-///
-/// # Errors
-///
-/// As [`read_kept`] and [`read_text`].
 pub(crate) fn read_kept_text(path: &Path, most: u64) -> io::Result<String> {
     text(read_kept(path, most)?)
 }
 
 /// Checks whether a part of a folder of our own is a folder, and no link out of it.
-///
-/// # Errors
-///
-/// What the system says; [`io::ErrorKind::Unsupported`] for what is no folder.
 pub(crate) fn check_folder(path: &Path) -> io::Result<()> {
     match path.symlink_metadata()?.is_dir() {
         true => Ok(()),

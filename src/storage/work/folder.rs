@@ -31,10 +31,6 @@ impl WorkFolder {
     /// Resumes the folder of the same call; or makes it, with a folder for each of `parts` and the files that `fill` adds.
     ///
     /// The folder appears complete. If several processes make it at once, one wins, and all continue with its folder.
-    ///
-    /// # Errors
-    ///
-    /// [`StorageError`]: a path that is taken, a folder of another call, a place that cannot be written; and those of `fill`.
     pub(crate) fn open<E: From<StorageError>>(
         path: &Path,
         manifest: &Manifest,
@@ -63,10 +59,6 @@ impl WorkFolder {
     }
 
     /// Opens the folder of the same call.
-    ///
-    /// # Errors
-    ///
-    /// [`StorageError::Taken`], [`StorageError::OtherCall`].
     pub(crate) fn resume(path: &Path, manifest: &Manifest) -> Result<Self, StorageError> {
         let verb = manifest.verb();
         let path = path.to_owned();
@@ -80,10 +72,6 @@ impl WorkFolder {
     }
 
     /// Opens the folder at a path, whatever call of `verb` made it.
-    ///
-    /// # Errors
-    ///
-    /// [`StorageError::Foreign`].
     pub(crate) fn find(path: &Path, verb: &'static str) -> Result<(Self, Manifest), StorageError> {
         let path = path.to_owned();
         match read_manifest(&path, verb) {
@@ -136,10 +124,6 @@ impl WorkFolder {
     }
 
     /// Reads piece `number` of a part, if it was kept; `fits` refuses a wrong one with a reason.
-    ///
-    /// # Errors
-    ///
-    /// [`StorageError::Io`], [`StorageError::Piece`].
     pub(crate) fn kept<T: DeserializeOwned>(
         &self,
         part: &str,

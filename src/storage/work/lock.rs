@@ -17,10 +17,6 @@ pub(crate) struct Lock {
 
 impl WorkFolder {
     /// Keeps other processes out. On a file system without locks two processes may do the same work, to the same bits.
-    ///
-    /// # Errors
-    ///
-    /// [`StorageError::Busy`] if another process works on the folder, [`StorageError::Io`].
     pub(crate) fn lock(&self) -> Result<Lock, StorageError> {
         let path = self.file(FILE);
         if path.symlink_metadata().is_ok() {

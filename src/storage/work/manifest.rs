@@ -73,10 +73,6 @@ impl Manifest {
     }
 
     /// Parses the folder's text.
-    ///
-    /// # Errors
-    ///
-    /// A text that is no manifest of this verb, in words.
     pub(super) fn parse(verb: &'static str, text: &str) -> Result<Self, String> {
         let entries: Map<String, Value> = serde_json::from_str(text).map_err(|error| {
             format!(

@@ -39,11 +39,7 @@ fn the_example_is_a_sound_twin() {
         .unwrap()
         .into_study()
         .unwrap();
-    let drive = study
-        .drives()
-        .unwrap()
-        .draw(Noise::new(1, "input", 0))
-        .unwrap();
+    let drive = study.drive(Noise::new(1, "input", 0)).unwrap();
     for finding in check(study.twin(), &drive, 1) {
         assert_eq!(finding.severity, Severity::Pass, "{finding:?}");
     }

@@ -225,11 +225,7 @@ fn failures_cost_their_run() {
 fn a_check_finds_nothing_but_that_there_is_no_noise() {
     for path in all() {
         let study = open(&path).into_study().unwrap();
-        let drive = study
-            .drives()
-            .unwrap()
-            .draw(Noise::new(1, "input", 0))
-            .unwrap();
+        let drive = study.drive(Noise::new(1, "input", 0)).unwrap();
         let findings = check(study.twin(), &drive, 1);
         assert!(
             findings.iter().all(|f| f.severity < Severity::Failure),

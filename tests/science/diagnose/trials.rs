@@ -59,7 +59,7 @@ pub fn theta(study: &Study, outside: bool, noise: Noise) -> Vec<f64> {
 }
 
 pub fn drive(study: &Study, noise: Noise) -> Drive {
-    study.drives().unwrap().draw(noise).unwrap()
+    study.drive(noise).unwrap()
 }
 
 /// A record of `twin` with the effects of a text.

@@ -4,7 +4,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use truetwin::record::Record;
-use truetwin::twin::{Now, StateSpace, Workspace};
+use truetwin::twin::{Now, StateSpace};
 
 /// log p(y | θ) with `count` particles, for one output with measurement noise; resampled systematically at each row.
 pub fn log_likelihood(
@@ -25,7 +25,7 @@ pub fn log_likelihood(
     let mut x = start.repeat(count);
     let mut chosen = x.clone();
     let mut weights = vec![0.0; count];
-    let mut work = Workspace::new(twin);
+    let mut slope = vec![0.0; n];
     let (mut total, mut y) = (0.0, [0.0]);
     for k in 0..record.samples() {
         (now.t, now.u) = (drive.time(k), drive.input(k));
@@ -55,10 +55,10 @@ pub fn log_likelihood(
                 reached += weights[from] / sum;
             }
             to.copy_from_slice(&x[from * n..(from + 1) * n]);
-            twin.advance(&now, to, &mut work);
-            for (x, q) in to.iter_mut().zip(&q) {
+            twin.drift(&now, to, &mut slope);
+            for ((x, q), slope) in to.iter_mut().zip(&q).zip(&slope) {
                 let z: f64 = StandardNormal.sample(&mut rng);
-                *x += q * z;
+                *x += drive.dt() * slope + q * z;
             }
             twin.constrain(&now, to);
             for (x, limit) in to.iter_mut().zip(&limits) {

@@ -85,7 +85,7 @@ fn smoothed_speeds_are_differences_of_positions() {
     let y = record.outputs();
     for k in 0..299 {
         let speed = (y[[k + 1, 0]] - y[[k, 0]]) / DT;
-        let error = (smoothed.states.means[[k, 1]] - speed).abs();
+        let error = (smoothed.means[[k, 1]] - speed).abs();
         assert!(error < 1e-4, "row {k}: {error}");
     }
 }

@@ -59,7 +59,7 @@ impl Chain {
     /// A record at rates that are `factor` times those of the middle of the prior.
     pub fn record(&self, factor: f64, samples: usize, seed: u64) -> Record {
         let noise = Noise::new(seed, "record", 0);
-        let drive = self.study(samples).drives().unwrap().draw(noise).unwrap();
+        let drive = self.study(samples).drive(noise).unwrap();
         let theta: Vec<f64> = (0..self.tanks).map(|i| factor * self.rate(i)).collect();
         let outputs = self.simulate(&theta, &drive, noise).unwrap();
         Record::new(drive, outputs).unwrap()

@@ -1,7 +1,7 @@
 use crate::math::MathError;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use argmin::core::State;
+use argmin::core::{Executor, State};
 use argmin::solver::gaussnewton::GaussNewtonLS;
 use argmin::solver::linesearch::{BacktrackingLineSearch, condition::ArmijoCondition};
 use nalgebra::{DMatrix, dmatrix, dvector};
@@ -42,13 +42,25 @@ fn unit(dimension: usize) -> DVector<f64> {
 /// The effort is a result too.
 #[test]
 fn rosenbrock_takes_few_evaluations() {
-    let free = Bounds::unbounded(2);
+    let (residuals, jacobians) = (AtomicU64::new(0), AtomicU64::new(0));
+    let (valley, free) = (rosenbrock(), Bounds::unbounded(2));
+    let counted = Closures(
+        2,
+        |x: &DVector<f64>| {
+            residuals.fetch_add(1, Ordering::Relaxed);
+            valley.residual(x)
+        },
+        |x: &DVector<f64>| {
+            jacobians.fetch_add(1, Ordering::Relaxed);
+            valley.jacobian(x)
+        },
+    );
     let minimum = GaussNewton::default()
-        .minimise(&rosenbrock(), &dvector![-1.2, 1.0], &free, &unit(2))
+        .minimise(&counted, &dvector![-1.2, 1.0], &free, &unit(2))
         .unwrap();
     assert!((&minimum.theta - unit(2)).amax() < 1e-12);
-    assert!(minimum.reason.converged() && minimum.cost < 1e-24);
-    assert_eq!((minimum.evaluations, minimum.jacobians), (33, 11));
+    assert!(minimum.converged && minimum.cost < 1e-24);
+    assert_eq!((residuals.into_inner(), jacobians.into_inner()), (33, 11));
 }
 
 /// On x₀ ≤ ½ Rosenbrock's minimum is (½, ¼), where 1 − x₀ = ½ remains.
@@ -61,7 +73,7 @@ fn an_active_bound_is_kept() {
             .unwrap();
         assert_eq!(minimum.theta[0], 0.5, "exactly on the face");
         assert!((minimum.theta[1] - 0.25).abs() < 1e-9);
-        assert!((minimum.cost - 0.125).abs() < 1e-12 && minimum.reason.converged());
+        assert!((minimum.cost - 0.125).abs() < 1e-12 && minimum.converged);
     }
 }
 
@@ -106,7 +118,6 @@ fn an_unidentified_direction_does_not_move() {
         )
         .unwrap();
     assert!((milli.theta[1] / 1e3 - plain.theta[1]).abs() < 1e-9);
-    assert_eq!(milli.iterations, plain.iterations);
 }
 
 /// √x − 2 has no value below zero, where the first Gauss–Newton step from 100 would go.
@@ -148,11 +159,7 @@ fn a_search_that_cannot_go_on_keeps_what_it_has() {
     let minimum = GaussNewton::default()
         .minimise(&broken, &dvector![1.0], &Bounds::unbounded(1), &unit(1))
         .unwrap();
-    assert_eq!(
-        (minimum.reason, minimum.theta[0]),
-        (StopReason::NoDescent, 1.0)
-    );
-    assert_eq!(minimum.evaluations, 32, "the start and 31 fractions");
+    assert_eq!((minimum.converged, minimum.theta[0]), (false, 1.0));
 
     let flat = Closures(
         1,
@@ -162,11 +169,7 @@ fn a_search_that_cannot_go_on_keeps_what_it_has() {
     let minimum = GaussNewton::default()
         .minimise(&flat, &dvector![3.0], &Bounds::unbounded(1), &unit(1))
         .unwrap();
-    assert_eq!(
-        (minimum.reason, minimum.cost),
-        (StopReason::NoJacobian, 4.5)
-    );
-    assert!(!minimum.reason.converged());
+    assert_eq!((minimum.converged, minimum.cost), (false, 4.5));
 }
 
 #[test]
@@ -206,10 +209,7 @@ fn a_step_is_no_longer_than_allowed() {
             &dvector![10.0],
         )
         .unwrap();
-    assert_eq!(
-        (minimum.theta[0], minimum.reason),
-        (85.0, StopReason::MaxIterations)
-    );
+    assert_eq!((minimum.theta[0], minimum.converged), (85.0, false));
 }
 
 /// Why there is a solver of our own: with ‖r‖ above 1e4 (Armijo's 1e-4 ‖r‖² exceeds ‖r‖), argmin's takes no step and calls it convergence.
@@ -243,45 +243,5 @@ fn argmin_stops_where_it_starts_and_ours_arrives() {
         .minimise(&large, &start, &Bounds::unbounded(2), &unit(2))
         .unwrap();
     assert!((ours.theta - dvector![1.0, 2.0]).amax() < 1e-6);
-    assert!((ours.cost - 1.25e9).abs() < 1.0 && ours.reason.converged());
-}
-
-#[test]
-fn settings_come_from_files_and_are_checked() {
-    let settings: GaussNewton = toml::from_str("max_iterations = 7").unwrap();
-    assert_eq!(
-        settings,
-        GaussNewton {
-            max_iterations: 7,
-            ..GaussNewton::default()
-        }
-    );
-    assert!(toml::from_str::<GaussNewton>("iterations = 7").is_err());
-    let json = serde_json::to_string(&settings).unwrap();
-    assert_eq!(
-        serde_json::from_str::<GaussNewton>(&json).unwrap(),
-        settings
-    );
-
-    let run = |settings: GaussNewton, scale: DVector<f64>| {
-        settings
-            .minimise(
-                &rosenbrock(),
-                &dvector![0.0, 0.0],
-                &Bounds::unbounded(2),
-                &scale,
-            )
-            .unwrap_err()
-            .to_string()
-    };
-    let cutoff = GaussNewton {
-        relative_cutoff: 1.0,
-        ..GaussNewton::default()
-    };
-    assert!(run(cutoff, unit(2)).starts_with("relative_cutoff = 1; it must lie in [0, 1)"));
-    assert!(run(GaussNewton::default(), unit(3)).starts_with("scale has 3 entries for 2"));
-    assert!(
-        run(GaussNewton::default(), dvector![1.0, 0.0])
-            .starts_with("scale = 0; it must be positive")
-    );
+    assert!((ours.cost - 1.25e9).abs() < 1.0 && ours.converged);
 }

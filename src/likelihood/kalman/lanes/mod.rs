@@ -1,7 +1,7 @@
-//! The filter at eight parameters, or on eight records, at once.
+//! The filter at eight parameters at once.
 //!
-//! Each number of the recursion is eight numbers side by side ([`Lanes`]), one for each pair of parameters and record, which the
-//! processor handles together. The twin's equations stay plain f64 and are called for one lane after the other.
+//! Each number of the recursion is eight numbers side by side ([`Lanes`]), one for each θ, which the processor handles
+//! together. The twin's equations stay plain f64 and are called for one lane after the other.
 
 #![allow(clippy::needless_range_loop)] // indices, as in the formulas
 
@@ -27,40 +27,28 @@ impl Kalman<'_> {
             && self.channels == 1
             && self.settings.method == Method::Points
     }
-
-    /// Returns whether both can run side by side: the same twin, times and gaps.
-    pub(super) fn runs_beside(&self, other: &Self) -> bool {
-        let same = std::ptr::eq(self.record, other.record) || {
-            let (a, b) = (self.record.drive(), other.record.drive());
-            let regular = a.is_uniform() && b.is_uniform() && a.dt() == b.dt();
-            let whole = !self.gaps && !other.gaps;
-            regular && whole && a.samples() == b.samples()
-        };
-        same && std::ptr::addr_eq(self.twin, other.twin)
-            && self.limits == other.limits
-            && self.settings == other.settings
-    }
 }
 
-/// Runs up to eight filters side by side; `None` where one of them fails or needs more than lanes offer, to be run one by one.
-pub(super) fn together(jobs: &[(&Kalman<'_>, &[f64])]) -> Option<Together> {
-    let first = jobs.first()?.0;
-    let jobs: Vec<Job<'_>> = (jobs.iter())
-        .map(|&(kalman, theta)| {
+/// Runs a filter at up to eight θ side by side; `None` where one of them fails or needs more than lanes offer, to be run one by one.
+pub(super) fn together(kalman: &Kalman<'_>, thetas: &[&[f64]]) -> Option<Together> {
+    if !kalman.fits_lanes() {
+        return None;
+    }
+    let jobs: Vec<Job<'_>> = (thetas.iter())
+        .map(|&theta| {
             let acting = kalman.acting(theta).ok()?;
-            let alike = kalman.fits_lanes() && kalman.runs_beside(first);
             let plain =
                 kalman.twin.outliers(theta).is_empty() && kalman.twin.rounding(theta).is_empty();
-            (alike && plain).then_some(Job {
+            plain.then_some(Job {
                 kalman,
                 theta,
                 acting,
             })
         })
         .collect::<Option<_>>()?;
-    let mut rows = Vec::with_capacity(first.record.samples());
+    let mut rows = Vec::with_capacity(kalman.record.samples());
     let (jobs, to) = (&jobs[..jobs.len().min(LANES)], &mut rows);
-    let log_likelihoods = match first.states {
+    let log_likelihoods = match kalman.states {
         1 => widest(Pass::<1, 5> { jobs, rows: to }),
         2 => widest(Pass::<2, 18> { jobs, rows: to }),
         3 => widest(Pass::<3, 39> { jobs, rows: to }),
