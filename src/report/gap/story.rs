@@ -9,7 +9,7 @@ use crate::report::digits::{chance, percent, short, unit_suffix};
 use crate::report::units::Units;
 
 /// Words of the story: with the heading and the caption of the first picture there are at most 60 on the first screen.
-const WORDS: usize = 46;
+const WORDS: usize = 44;
 
 /// Headline and further sentences, at most [`WORDS`] words together.
 pub(super) fn story(units: &Units, diagnosis: &Diagnosis) -> (String, Vec<String>) {
@@ -142,7 +142,7 @@ pub(super) fn next(diagnosis: &Diagnosis) -> String {
         (_, Decision::Partial) if naming(cause).is_complete => return add("diagnose again"),
         (_, Decision::Class) if cause.next_input.is_some() => {
             const { assert!(NEXT_INPUT.len() == 14) };
-            "Next: measure next-input.csv, which can tell them apart."
+            "Next: measure next-input.csv to tell them apart."
         }
         (_, Decision::Class | Decision::Named | Decision::Partial) => {
             "Next: another record, with other inputs, may tell them apart."

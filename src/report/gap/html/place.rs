@@ -26,7 +26,8 @@ fn body(study: &Study, diagnosis: &Diagnosis) -> String {
     let together: Vec<String> = (accepted_places(diagnosis).into_iter())
         .map(|place| units.in_words(place))
         .collect();
-    let mut body = match somewhere(&units, &diagnosis.location) {
+    let mut body = targets(diagnosis);
+    body.push_str(&match somewhere(&units, &diagnosis.location) {
         Some(_) if together.len() > 1 => paragraph(&format!(
             "The missing laws act on {}.",
             joined(&together, "and")
@@ -38,8 +39,7 @@ fn body(study: &Study, diagnosis: &Diagnosis) -> String {
             "The missing law acts on {places}: this record cannot tell which."
         )),
         None => String::new(),
-    };
-    body.push_str(&targets(diagnosis));
+    });
     body.push_str(&time(diagnosis));
     body.push_str(&functions(study, diagnosis));
     if let Some(svg) = pictures::regions(study, diagnosis) {

@@ -3,8 +3,8 @@
 use crate::diagnose::{Diagnosis, Horizon};
 use crate::report::chart::{Chart, Mark, Panel, Series, Style};
 
-/// Half the length of the line of a free run, and its distance from the longest horizon, over that horizon.
-const FREE_RUN: [f64; 2] = [0.04, 0.15];
+/// Beside the curve: the mark of the free run, and the ends of its lines, beyond the longest horizon and over it.
+const FREE_RUN: [f64; 3] = [0.08, 0.12, 0.3];
 
 /// Errors of twin, accepted twin and floor by how far ahead predictions reach, the free run at the end; `None` where fewer than two
 /// horizons were looked at.
@@ -18,14 +18,12 @@ pub fn horizons(diagnosis: &Diagnosis) -> Option<String> {
         return None;
     }
     let free = s.horizons.iter().find(|h| h.samples.is_none());
-    let [half, beyond] = FREE_RUN;
+    let [beside, from, to] = FREE_RUN.map(|beyond| longest * (1.0 + beyond));
     let line = |label: &str, style: Style, value: fn(&Horizon) -> f64| {
         let mut points: Vec<(f64, f64)> = ahead.iter().map(|(t, h)| (*t, value(h))).collect();
-        // Beside the curve: a free run has no horizon.
+        // A free run has no horizon.
         if let Some(h) = free {
-            points.push((longest * (1.0 + beyond / 2.0), f64::NAN));
-            let ends = [beyond - half, beyond + half];
-            points.extend(ends.map(|at| (longest * (1.0 + at), value(h))));
+            points.extend([(beside, f64::NAN), (from, value(h)), (to, value(h))]);
         }
         Series::new(label, style, points)
     };
@@ -35,7 +33,7 @@ pub fn horizons(diagnosis: &Diagnosis) -> Option<String> {
         line("floor, noise alone", Style::OTHERS[2], |h| h.floor),
     ];
     let mark = free.map(|_| Mark {
-        x: longest * (1.0 + beyond / 2.0),
+        x: beside,
         label: "free run".into(),
     });
     let and = if free.is_some() {
