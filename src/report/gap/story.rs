@@ -18,11 +18,7 @@ pub(super) fn story(units: &Units, diagnosis: &Diagnosis) -> (String, Vec<String
     rest.extend(how_far(diagnosis));
     rest.push(next(diagnosis));
     let mut left = WORDS.saturating_sub(words(&headline) + words(&rest.join(" ")));
-    // What the record cannot tell from others is not told as a fact.
-    let mut sentences = match diagnosis.cause.decision {
-        Decision::Class => vec![],
-        _ => effects(units, diagnosis),
-    };
+    let mut sentences = effects(units, diagnosis);
     sentences.retain(|sentence| {
         let count = words(sentence);
         let has_room = count <= left;
@@ -39,9 +35,12 @@ fn words(text: &str) -> usize {
     text.split_whitespace().filter(is_word).count()
 }
 
-/// Sentences of the accepted effects that are more probable than not.
+/// Sentences of the accepted effects that are more probable than not; none of a class, which is not told as a fact.
 pub(super) fn effects(units: &Units, diagnosis: &Diagnosis) -> Vec<String> {
     let cause = &diagnosis.cause;
+    if cause.decision == Decision::Class {
+        return vec![];
+    }
     let told = (cause.effects.iter())
         .filter(|effect| cause.accepted.contains(&effect.key()) && effect.probability >= SAID);
     told.filter_map(|effect| sentence(units, effect)).collect()

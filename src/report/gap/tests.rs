@@ -88,7 +88,7 @@ fn probabilities_add_up_to_one() {
         let json = gap_json(&diagnosis);
         let kinds = json["which"]["probabilities"].as_object().unwrap();
         let keys: Vec<&str> = kinds.keys().map(String::as_str).collect();
-        assert_eq!(keys, ["listed", "nothing", "partial", "unknown"]);
+        assert_eq!(keys, ["listed", "partial", "unknown", "nothing"]);
         let sum: f64 = kinds.values().map(|p| p.as_f64().unwrap()).sum();
         assert!((sum - 1.0).abs() < 1e-9, "{sum}");
         // The bars of the picture are the same four.
