@@ -4,6 +4,7 @@ use super::args::Subject;
 use super::context::Context;
 use super::failure::Failure;
 use super::output;
+use super::say::say;
 use crate::report::with_footer;
 use crate::storage::files::sha256_of;
 use serde::Serialize;
@@ -40,7 +41,7 @@ pub(super) struct Provenance {
 /// A file that a result was made from.
 #[derive(Debug, Clone, Serialize)]
 struct File {
-    /// `record`, `validation`, `study` or `estimator`.
+    /// `record`, `validation`, `study`, `estimator`, `input` or `effect`.
     role: &'static str,
     path: PathBuf,
     /// SHA-256 of its bytes; none where it cannot be read again.
@@ -84,7 +85,19 @@ impl Provenance {
     /// The text with a last line on where it comes from.
     fn below(&self, text: &str) -> String {
         let ends = if text.ends_with('\n') { "" } else { "\n" };
-        format!("{text}{ends}{}\n", self.line(SHORT))
+        format!("{text}{ends}{}\n", self.last_line())
+    }
+
+    /// Version, seed, files and call in one line.
+    fn last_line(&self) -> String {
+        format!("{}; call: {}", self.line(SHORT), self.call)
+    }
+
+    /// Tells where a result comes from on standard error, which no script reads; nothing with `--json`.
+    pub fn tell(&self, context: &Context<'_>) {
+        if !context.json {
+            say(&self.last_line());
+        }
     }
 
     /// Prints a result: its JSON, which has its provenance, or else its text with the last line.
@@ -167,6 +180,26 @@ fn date(epoch: i64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The last line of a text repeats the result: version, seed, files with their checksums, call.
+    #[test]
+    fn the_last_line_has_the_call() {
+        let provenance = Provenance {
+            version: "0.1.0",
+            call: "truetwin fit R.csv --study S.toml".into(),
+            seed: 7,
+            files: vec![File {
+                role: "record",
+                path: "R.csv".into(),
+                sha256: Some("0123456789abcdef0123".into()),
+            }],
+            date: None,
+        };
+        assert_eq!(
+            provenance.below("fitted"),
+            "fitted\ntruetwin 0.1.0, seed 7, R.csv (sha256 0123456789ab); call: truetwin fit R.csv --study S.toml\n"
+        );
+    }
 
     #[test]
     fn options_that_change_nothing_are_left_out() {

@@ -21,6 +21,7 @@ use super::settings::DiagnoseSettings;
 use super::summary::{effects, nuisance, onset, parameters, remains};
 use super::thresholds::Thresholds;
 use crate::fit::climb::climb;
+use crate::likelihood::kalman::recoverable;
 use crate::math::six_digits;
 use crate::progress::Progress;
 use crate::record::Record;
@@ -173,7 +174,7 @@ fn report(
     if verdict == Verdict::StructuralGap && !settings.detection_only {
         location = located(findings, chances, &conclusion, model)?;
         location.after = accepted.map(|m| maps(m, None)).transpose()?;
-        discovery = discovered(findings, &conclusion, location.target.as_deref(), noise);
+        discovery = discovered(findings, &conclusion, &location, noise);
     }
     settings.ends(stage.tick())?;
     if !settings.detection_only {
@@ -211,11 +212,21 @@ fn report(
         let (base, grown) = (runner(model)?, accepted.map(runner).transpose()?.flatten());
         Ok(free_runs(&records[0], base.as_ref(), grown.as_ref()))
     };
+    let parameters = parameters(last, &base.theta, settings)?;
+    let filtered = recoverable(last.problem.filtered(&last.fitted.theta))?;
     Ok(Diagnosis {
         twin: study.name().into(),
         verdict,
         detection,
-        parameters: parameters(last, &base.theta, settings)?,
+        warnings: warnings(
+            study.twin(),
+            records,
+            validation,
+            &parameters,
+            base.step.is_some(),
+        ),
+        residuals: Residuals::of(records, filtered.unwrap_or_default()),
+        parameters,
         nuisance: nuisance(last, &base.noises)?,
         location: Location {
             onset: accepted.and_then(onset),
@@ -325,27 +336,25 @@ fn located(
 fn discovered(
     findings: &Findings<'_>,
     conclusion: &Conclusion,
-    place: Option<&str>,
+    location: &Location,
     noise: Noise,
 ) -> Option<Discovery> {
-    let all = match conclusion.decision {
-        Decision::NoneOfThese => &findings.unknown,
-        Decision::Partial => findings.beside(&conclusion.accepted)?.1,
+    // The place that the answer states: of the gap, or of what remains beside the accepted effects.
+    let (all, place) = match conclusion.decision {
+        Decision::NoneOfThese => (&findings.unknown[..], location.target.clone()?),
+        Decision::Partial => (
+            findings.beside(&conclusion.accepted)?.1,
+            remains(findings, conclusion)?.place,
+        ),
         _ => return None,
     };
-    // The best function of one variable, at the place that is named if there is one. What a parameter follows is no law to be added.
-    let drawn: Vec<_> = (all.iter())
-        .filter(|f| !f.last().is_in_parameter())
-        .filter_map(|f| Some((f, curve(f.model.as_ref()?)?)))
-        .collect();
-    let there = drawn
-        .iter()
-        .find(|(f, _)| Some(f.last().target.as_str()) == place);
-    let (found, curve) = there.or(drawn.first())?;
-    let term = found.last();
+    // The best function of one variable there. What a parameter follows is no law to be added.
+    let (found, curve) = (all.iter())
+        .filter(|f| f.last().target == place && !f.last().is_in_parameter())
+        .find_map(|f| Some((f, curve(f.model.as_ref()?)?)))?;
     discover(
-        (&term.target, &term.variables[0].0),
-        curve,
+        (&place, &found.last().variables[0].0),
+        &curve,
         noise.child("discover"),
     )
 }

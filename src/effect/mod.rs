@@ -26,6 +26,7 @@ mod library;
 mod magnitude;
 mod marks;
 mod placed;
+mod unit;
 
 pub use augment::augment;
 pub(crate) use augment::augment_short;
@@ -41,3 +42,4 @@ pub use magnitude::Magnitude;
 pub(crate) use marks::{Mark, clipped, on_levels, rounded, stops};
 pub use placed::Effect;
 pub(crate) use placed::EffectEntry;
+pub(crate) use unit::{channel, magnitude_unit};

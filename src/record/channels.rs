@@ -9,6 +9,9 @@ pub struct Quantity {
     pub name: String,
     /// Unit, for people.
     pub unit: String,
+    /// Noun for reports, such as `upper tank`; empty where there is none.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub description: String,
 }
 
 impl Quantity {
@@ -17,6 +20,7 @@ impl Quantity {
         Self {
             name: name.into(),
             unit: unit.into(),
+            description: String::new(),
         }
     }
 }

@@ -1,24 +1,15 @@
 //! The page of an estimate or a fit: record and twin, parameters, draws, residuals, warnings.
 
-use super::chart::{Area, Dot, Dots, Panel, Series, Style};
-use super::chart::{Chart, Curves};
 use super::estimate::{estimate_text, overlay_svg, rows};
 use super::fit::{described, posterior_svg};
-use super::page::{Section, escaped, figure, page, paragraph, preformatted};
+use super::page::{Section, escaped, figure, page, preformatted};
 use super::parameters::{Line, ParameterRow, parameter_table};
+use super::residuals::{Left, residual_figures};
 use crate::estimator::Estimate;
 use crate::fit::{Fit, Posterior, Warning};
-use crate::record::{Record, Signal};
+use crate::record::Record;
 use crate::study::Study;
 use crate::twin::{Parameter, Role};
-use statrs::distribution::{ContinuousCDF, Normal};
-
-/// Lags of the correlations.
-const LAGS: usize = 20;
-/// Standard deviations of 95 % of white noise.
-const BAND: f64 = 1.96;
-/// Points of a quantile plot: more only blot.
-const QUANTILES: usize = 200;
 
 /// The page of an estimate.
 pub(crate) fn estimate_html(study: &Study, record: &Record, estimate: &Estimate) -> String {
@@ -39,8 +30,13 @@ pub(crate) fn estimate_html(study: &Study, record: &Record, estimate: &Estimate)
         pictures: picture.into_iter().collect(),
         lines,
         posterior: estimate.posterior.as_ref(),
-        residuals: residuals.as_ref(),
-        of_what: "record − free run",
+        residuals: (residuals.iter())
+            .map(|outputs| Left {
+                inputs: record.drive().inputs(),
+                outputs,
+            })
+            .collect(),
+        of_what: "record − twin",
         warnings: &estimate.warnings,
         text,
     };
@@ -67,7 +63,12 @@ pub(crate) fn fit_html(study: &Study, records: &[Record], fit: &Fit) -> String {
             .map(|p| described(p, &space))
             .collect(),
         posterior: fit.posterior.as_ref(),
-        residuals: fit.residuals.first(),
+        residuals: (records.iter().zip(&fit.residuals))
+            .map(|(record, outputs)| Left {
+                inputs: record.drive().inputs(),
+                outputs,
+            })
+            .collect(),
         of_what: "one-step errors over their standard deviation",
         warnings: &fit.warnings,
         text: super::fit::fit_text(study, fit),
@@ -82,7 +83,7 @@ struct Answer<'a> {
     pictures: Vec<String>,
     lines: Vec<(Parameter, ParameterRow)>,
     posterior: Option<&'a Posterior>,
-    residuals: Option<&'a Signal>,
+    residuals: Vec<Left<'a>>,
     of_what: &'static str,
     warnings: &'a [Warning],
     text: String,
@@ -124,12 +125,9 @@ impl Answer<'_> {
         if !others.is_empty() {
             sections.push(Section::new("records", "Further records", others));
         }
-        if let Some(residuals) = self.residuals {
-            sections.push(Section::new(
-                "residuals",
-                "Residuals",
-                self.residual_figures(study, residuals),
-            ));
+        if !self.residuals.is_empty() {
+            let body = residual_figures(study, self.of_what, &self.residuals);
+            sections.push(Section::new("residuals", "Residuals", body));
         }
         let text = preformatted(&self.text);
         sections.push(Section::new("text", "As on the terminal", text));
@@ -149,108 +147,6 @@ impl Answer<'_> {
         let caption = "Prior: the range that was trained on or expected. Not identified: the record says no more than the prior.";
         parameter_table(caption, &[], &lines)
     }
-
-    fn residual_figures(&self, study: &Study, residuals: &Signal) -> String {
-        let names: Vec<String> = (study.twin().signals().outputs.into_iter())
-            .map(|output| output.name)
-            .collect();
-        let what = format!("Of {}.", self.of_what);
-        let lags = figure(
-            &correlations(&names, residuals),
-            &format!(
-                "{what} Band: 95 % of white noise. Residuals of a right twin's predictions are white."
-            ),
-        );
-        let quantiles = figure(
-            &quantiles(&names, residuals),
-            &format!(
-                "{what} Sorted, against those of a normal distribution of the same size: on the line if they are normal."
-            ),
-        );
-        paragraph("What the twin leaves, over time and by size.") + &lags + &quantiles
-    }
-}
-
-/// Auto-correlations of the residuals of each output.
-fn correlations(names: &[String], residuals: &Signal) -> String {
-    let panels = names.iter().enumerate().map(|(j, name)| {
-        let values = present(residuals, j);
-        let n = values.len().max(1) as f64;
-        let mean = values.iter().sum::<f64>() / n;
-        let at = |lag: usize| -> f64 {
-            let product = |i: usize| (values[i] - mean) * (values[i + lag] - mean);
-            (0..values.len().saturating_sub(lag)).map(product).sum()
-        };
-        let all = at(0).max(f64::MIN_POSITIVE);
-        let reach = BAND / n.sqrt();
-        let dots = (1..=LAGS).map(|lag| {
-            let (x, y) = (lag as f64, at(lag) / all);
-            Dot {
-                x,
-                y,
-                low: y.min(0.0),
-                high: y.max(0.0),
-            }
-        });
-        let ends = [(0.5, -reach, reach), (LAGS as f64 + 0.5, -reach, reach)];
-        let zero = ends.map(|(x, ..)| (x, 0.0));
-        Panel::new(
-            &format!("correlation of {name}"),
-            vec![Series::new("", Style::ZERO, zero)],
-        )
-        .height(120.0)
-        .area(Area {
-            label: "95 % of white noise".into(),
-            points: ends.to_vec(),
-        })
-        .dots(Dots {
-            label: String::new(),
-            points: dots.collect(),
-        })
-    });
-    Chart {
-        title: "Residuals against themselves".into(),
-        description: format!("Auto-correlations of the residuals at lags 1 to {LAGS}."),
-        x: "lag in samples".into(),
-        panels: panels.collect(),
-    }
-    .svg()
-}
-
-/// Quantiles of the residuals of each output against normal ones.
-fn quantiles(names: &[String], residuals: &Signal) -> String {
-    let normal = Normal::standard();
-    let panels = names.iter().enumerate().map(|(j, name)| {
-        let mut values = present(residuals, j);
-        values.sort_unstable_by(f64::total_cmp);
-        let n = values.len().max(1) as f64;
-        let size = (values.iter().map(|v| v * v).sum::<f64>() / n).sqrt();
-        let every = values.len().div_ceil(QUANTILES).max(1);
-        let points: Vec<(f64, f64)> = (values.iter().enumerate().step_by(every))
-            .map(|(i, v)| (normal.inverse_cdf((i as f64 + 0.5) / n), *v))
-            .collect();
-        let ends = [points.first(), points.last()].into_iter().flatten();
-        let line: Vec<(f64, f64)> = ends.map(|(x, _)| (*x, x * size)).collect();
-        let lines = vec![
-            Series::new("normal", Style::ZERO, line),
-            Series::new("residuals", Style::AFTER, points),
-        ];
-        (
-            "normal quantile".to_owned(),
-            Panel::new(&format!("residual of {name}"), lines),
-        )
-    });
-    Curves {
-        title: "Sizes of residuals".into(),
-        description: "Sorted residuals against quantiles of a normal distribution.".into(),
-        panels: panels.collect(),
-    }
-    .svg()
-}
-
-fn present(residuals: &Signal, output: usize) -> Vec<f64> {
-    let values = residuals.column(output);
-    values.iter().copied().filter(|v| v.is_finite()).collect()
 }
 
 #[cfg(test)]

@@ -39,6 +39,7 @@ mod gap;
 mod page;
 mod parameters;
 mod reproduce;
+mod residuals;
 mod scorecard;
 mod table;
 mod units;

@@ -15,7 +15,8 @@ h1{font-size:1.5rem;line-height:1.25;margin:.5rem 0}h2{font-size:1.25rem;line-he
 border-top:1px solid #ccc;padding-top:1rem}h3{font-size:1rem;margin:1.4rem 0 .3rem}\
 p,li{max-width:44rem}.verdict{font-size:1.25rem;line-height:1.35;font-weight:600;overflow-wrap:anywhere;margin:.6rem 0;\
 border-left:4px solid #0072b2;padding-left:.7rem}\
-.first figure{margin:0}@media (min-width:50rem){.first{display:grid;grid-template-columns:minmax(0,1fr) minmax(0,1.25fr);gap:1.2rem}}\
+.first figure{margin:0}@media (min-width:50rem){.first{display:grid;grid-template-columns:minmax(0,1fr) minmax(0,1.5fr);gap:1.2rem;\
+min-height:56vh;align-content:start}}\
 a{color:#00538a}a:focus-visible,summary:focus-visible,.wide:focus-visible,main:focus-visible{outline:3px solid #b34700;\
 outline-offset:2px}main:focus{outline:none}\
 .skip{position:absolute;left:.5rem;top:-4rem;background:#fff;padding:.4rem .8rem;border:1px solid #222}.skip:focus{top:.5rem}\

@@ -2,25 +2,22 @@
 
 use super::digits::{named, short, unit_suffix};
 use crate::diagnose::EffectFit;
-use crate::effect::{Effect, TargetKind};
-use crate::record::Quantity;
+use crate::effect::{Effect, channel, magnitude_unit};
+use crate::record::{Quantity, Signals};
 use crate::study::Study;
 
 /// The quantities of a twin, and the effects that it may lack.
 pub(super) struct Units {
-    pub(super) inputs: Vec<Quantity>,
-    pub(super) outputs: Vec<Quantity>,
+    pub(super) signals: Signals,
     states: Vec<Quantity>,
     effects: Vec<Effect>,
 }
 
 impl Units {
     pub(super) fn of(study: &Study) -> Self {
-        let signals = study.twin().signals();
         let outline = study.twin().outline();
         Self {
-            inputs: signals.inputs,
-            outputs: signals.outputs,
+            signals: study.twin().signals(),
             states: outline.map_or_else(Vec::new, |outline| outline.states),
             effects: study.effects(),
         }
@@ -33,7 +30,7 @@ impl Units {
 
     /// Returns the unit of a state, an input, an output or time.
     pub(super) fn variable(&self, name: &str) -> &str {
-        let signals = self.inputs.iter().chain(&self.outputs);
+        let signals = self.signals.inputs.iter().chain(&self.signals.outputs);
         let known = (self.states.iter().chain(signals)).find(|q| q.name == name);
         let other = if name == "t" { "s" } else { "" };
         known.map_or(other, |q| &q.unit)
@@ -42,6 +39,11 @@ impl Units {
     /// Tells whether the name is a state's: its equation gives a rate.
     fn is_state(&self, name: &str) -> bool {
         self.states.iter().any(|q| q.name == name)
+    }
+
+    /// Tells whether the name is a parameter's: no state, sensor or actuator has it.
+    pub(super) fn is_parameter(&self, name: &str) -> bool {
+        !self.is_state(name) && self.signal(name).is_none()
     }
 
     /// `h1 in V`.
@@ -80,14 +82,30 @@ impl Units {
         ))
     }
 
+    /// `the upper tank (h1)`, `the sensor of y`, or the name alone of what is not described.
+    pub(super) fn in_words(&self, place: &str) -> String {
+        let described = |q: &Quantity| match q.description.as_str() {
+            "" => q.name.clone(),
+            text => format!("the {text} ({})", q.name),
+        };
+        match self.signal(place) {
+            Some(("output", signal)) => format!("the sensor of {}", described(signal)),
+            Some((_, signal)) => format!("the actuator of {}", described(signal)),
+            None => match self.states.iter().find(|q| q.name == place) {
+                Some(state) => described(state),
+                None => place.to_owned(),
+            },
+        }
+    }
+
     /// Returns the signal of a sensor or an actuator, and its kind.
     pub(super) fn signal(&self, place: &str) -> Option<(&'static str, &Quantity)> {
         if self.is_state(place) {
             return None;
         }
         match place.trim_end_matches(|c: char| c.is_ascii_digit()) {
-            "sensor" => Some(("output", channel(&self.outputs, place)?)),
-            "actuator" => Some(("input", channel(&self.inputs, place)?)),
+            "sensor" => Some(("output", channel(&self.signals.outputs, place)?)),
+            "actuator" => Some(("input", channel(&self.signals.inputs, place)?)),
             _ => None,
         }
     }
@@ -96,7 +114,12 @@ impl Units {
     pub(super) fn of_magnitude(&self, id: &str, target: &str, name: &str) -> Option<String> {
         let effect = self.effect(id, target)?;
         let known = effect.magnitudes().iter().find(|m| m.name == name)?;
-        Some(self.magnitude(effect, known.unit))
+        Some(magnitude_unit(
+            effect,
+            known.unit,
+            &self.states,
+            &self.signals,
+        ))
     }
 
     /// `level 3.00 V, spill 0.500`; values held at infinity are left out.
@@ -112,41 +135,6 @@ impl Units {
             .collect();
         all.join(", ")
     }
-
-    /// A unit of the library in those of the twin: its words `signal`, `state` and `from` stand for the unit of what is
-    /// bent, and of the other state.
-    fn magnitude(&self, effect: &Effect, unit: &str) -> String {
-        let bent = match effect.law().target() {
-            TargetKind::Sensor => unit_of(channel(&self.outputs, effect.target())),
-            TargetKind::Actuator => unit_of(channel(&self.inputs, effect.target())),
-            TargetKind::State => self.variable(effect.target()),
-            TargetKind::Parameter => "",
-        };
-        let other = effect.other().map_or("", |name| self.variable(name));
-        let inside = |word: &str, own: &str| match own {
-            "" | "-" | "1" => "1".to_owned(),
-            own if unit == word || own.chars().all(char::is_alphanumeric) => own.to_owned(),
-            own => format!("({own})"),
-        };
-        let text = (unit.replace("signal", &inside("signal", bent)))
-            .replace("state", &inside("state", bent))
-            .replace("from", &inside("from", other));
-        match text.replace("1·", "").replace("·1", "").as_str() {
-            "1" | "1/1" => String::new(),
-            text => text.replace("/(1/s)", "·s").replace("(s)", "s"),
-        }
-    }
-}
-
-/// The channel of `sensor`, or of `sensor2`.
-fn channel<'a>(channels: &'a [Quantity], target: &str) -> Option<&'a Quantity> {
-    let number = target.trim_start_matches(|c: char| !c.is_ascii_digit());
-    let index = number.parse().unwrap_or(1_usize).saturating_sub(1);
-    channels.get(index)
-}
-
-fn unit_of(channel: Option<&Quantity>) -> &str {
-    channel.map_or("", |q| &q.unit)
 }
 
 #[cfg(test)]

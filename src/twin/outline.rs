@@ -61,6 +61,18 @@ impl Outline {
         self
     }
 
+    /// Describes a state, an input or an output for reports: `describe("h1", "upper tank")` is told as "the upper tank (h1)".
+    #[must_use]
+    pub fn describe(mut self, name: &str, description: &str) -> Self {
+        let channels = self.inputs.iter_mut().chain(&mut self.outputs);
+        for quantity in self.states.iter_mut().chain(channels) {
+            if quantity.name == name {
+                quantity.description = description.into();
+            }
+        }
+        self
+    }
+
     /// Input and output channels.
     pub(crate) fn signals(self) -> Signals {
         Signals {

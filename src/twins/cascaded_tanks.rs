@@ -31,6 +31,10 @@ impl StateSpace for CascadedTanks {
             .state("h2", "V")
             .input("u", "V")
             .output("y", "V")
+            .describe("h1", "upper tank")
+            .describe("h2", "lower tank")
+            .describe("u", "pump")
+            .describe("y", "lower level")
     }
 
     #[inline]

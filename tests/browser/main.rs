@@ -17,15 +17,19 @@ use std::path::{Path, PathBuf};
 use truetwin::diagnose::{
     Band, Cause, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit, FittedParameter,
     FreeRuns, Horizon, Lag, Location, Maps, MissingFunction, NextInput, Onset, Probabilities,
-    Region, Remains, Shrinkage, TargetShare, Term, Verdict, Visible, Window,
+    Region, Remains, Residuals, Shrinkage, TargetShare, Term, Verdict, Visible, Window,
 };
+use truetwin::estimator::{EstimateOptions, PretrainOptions, pretrain};
 use truetwin::evaluate::paper::reference_studies;
 use truetwin::evaluate::trials::{Scorecard, Settings, Withheld};
-use truetwin::fit::Nuisance;
+use truetwin::fit::{FitSettings, Nuisance};
 use truetwin::progress::Progress;
-use truetwin::record::{Drive, Quantity, Signal};
+use truetwin::record::{Drive, Quantity, Record, Signal};
 use truetwin::study::{RecordPlan, Study};
-use truetwin::twin::{Interval, Now, Outline, Parameter, ParameterSpace, StateSpace};
+use truetwin::twin::{
+    DigitalTwin, Interval, Noise, Now, Outline, Parameter, ParameterSpace, StateSpace,
+};
+use truetwin::twins::VanDerPol;
 
 /// Phone, tablet, desktop.
 const WIDTHS: [u32; 3] = [360, 800, 1280];
@@ -33,6 +37,19 @@ const WIDTHS: [u32; 3] = [360, 800, 1280];
 const HEIGHT: u64 = 800;
 /// A sheet of A4 between its margins, in CSS pixels.
 const SHEET: u32 = 718;
+/// Words of the method that a first-time reader does not know.
+const JARGON: [&str; 8] = [
+    "nat",
+    "innovation",
+    "onset",
+    "placebo",
+    "floor",
+    "class",
+    "omnibus",
+    "absorbed",
+];
+/// Words in the first 800 px: headings, sentences and captions, without those inside pictures and the list of links.
+const FIRST_SCREEN: &str = include_str!("first_screen.js");
 const MEASURE: &str = include_str!("measure.js");
 
 /// The browser; `None` where the test is to be skipped.
@@ -105,7 +122,44 @@ fn pages() -> Vec<(&'static str, String)> {
         ("no-gap", made::oscillator_no_gap().html(oscillator)),
         ("partial", made::rig_pair().html(&rig)),
         ("scorecard", scorecard(oscillator).html()),
+        ("fit", fit()),
+        ("estimate", estimate()),
     ]
+}
+
+/// A record of the oscillator, so many samples of it.
+fn oscillation(sample: u64, samples: usize) -> Record {
+    let drive = Drive::autonomous(0.05, samples).unwrap();
+    let noise = Noise::new(7, "browser", sample);
+    let outputs = VanDerPol.simulate(&[1.5], &drive, noise).unwrap();
+    Record::new(drive, outputs).unwrap()
+}
+
+/// The page of a fit to two records, with draws.
+fn fit() -> String {
+    let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 200)).unwrap();
+    let records = [0, 1].map(|sample| oscillation(sample, 200));
+    let settings = FitSettings {
+        draws: 50,
+        ..FitSettings::default()
+    };
+    let fit = study.fit(&records, &settings, &Progress::silent()).unwrap();
+    fit.html(&study, &records)
+}
+
+/// The page of an estimate of a small estimator.
+fn estimate() -> String {
+    let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 200)).unwrap();
+    let options = PretrainOptions {
+        bank_size: Some(100),
+        epochs: Some(2),
+        ..PretrainOptions::default()
+    };
+    let silent = Progress::silent();
+    let (estimator, _) = pretrain(&study, &options, &silent).unwrap();
+    let record = oscillation(2, 200);
+    let estimate = estimator.estimate(&record, &EstimateOptions::default(), &silent);
+    estimate.unwrap().html(&study, &record)
 }
 
 /// A page in a file.
@@ -207,6 +261,32 @@ fn every_page_is_whole_at_every_width_and_in_print() {
         }
     }
     assert!(all.is_empty(), "{}", all.join("\n"));
+}
+
+/// A diagnosis is answered on the first screen of a desktop, in few words and without those of the method.
+#[test]
+fn the_first_screen_answers_in_sixty_words() {
+    let Some(mut browser) = browser() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    browser.media("screen");
+    browser.resize(1280, HEIGHT);
+    let is_diagnosis =
+        |(name, _): &(&str, String)| ["class", "none", "no-gap", "partial"].contains(name);
+    for (name, page) in pages().into_iter().filter(is_diagnosis) {
+        browser.open(&written(folder.path(), name, &page));
+        let shown = browser.evaluate(FIRST_SCREEN);
+        let words: Vec<String> = serde_json::from_value(shown).unwrap();
+        let text = words.join(" ");
+        assert!(words.len() <= 60, "{name}: {} words: {text}", words.len());
+        assert!(words.len() > 15, "{name}: {text}");
+        for jargon in JARGON {
+            let is_there = words
+                .iter()
+                .any(|word| word.to_lowercase().starts_with(jargon));
+            assert!(!is_there, "{name}: {jargon}: {text}");
+        }
+        assert!(!text.contains("free run"), "{name}: {text}");
+    }
 }
 
 /// The test sees what it is to see: pages broken on purpose.

@@ -4,6 +4,7 @@ use crate::cli::args::{PresetArgument, Subject, at_least_one};
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
+use crate::cli::provenance::Provenance;
 use crate::estimator::shards::BankPlan;
 use crate::storage::work::Share;
 use clap::Args;
@@ -102,6 +103,7 @@ impl Verb for Bank {
                 filled.there, filled.of, filled.rows, self.size,
             ))?;
         }
+        Provenance::new(context, Some(&self.subject), []).tell(context);
         Ok(ExitCode::SUCCESS)
     }
 }

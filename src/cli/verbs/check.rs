@@ -68,6 +68,7 @@ impl Verb for Check {
             })))?;
         } else {
             output::print(&lines(&findings))?;
+            Provenance::new(context, Some(&self.subject), []).tell(context);
         }
         Ok(if failed {
             ExitCode::FAILURE
@@ -95,6 +96,7 @@ impl Check {
             })))?;
         } else {
             output::print(&lines(&result.findings))?;
+            Provenance::new(context, Some(&self.subject), [("record", path)]).tell(context);
         }
         Ok(ExitCode::SUCCESS)
     }

@@ -3,6 +3,7 @@
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
+use crate::cli::provenance::Provenance;
 use crate::estimator::bank::file;
 use crate::estimator::shards::{merge, merge_into_file};
 use clap::Args;
@@ -57,6 +58,7 @@ impl Verb for Merge {
         } else {
             output::print(&format!("{out}: {count} {what}"))?
         }
+        Provenance::new(context, None, []).tell(context);
         Ok(ExitCode::SUCCESS)
     }
 }

@@ -4,6 +4,7 @@ use crate::cli::args::{PresetArgument, Subject, seconds};
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
+use crate::cli::provenance::Provenance;
 use crate::estimator::bank::{Bank, file};
 use crate::estimator::shards::{BankPlan, ShardedBank};
 use crate::estimator::{GivenBank, PretrainOptions, Pretraining, Project};
@@ -101,6 +102,7 @@ impl Verb for Pretrain {
                 self.out.display(),
             ))?;
         }
+        Provenance::new(context, Some(&self.subject), []).tell(context);
         Ok(ExitCode::SUCCESS)
     }
 }

@@ -4,6 +4,7 @@ use crate::cli::args::FileColumns;
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
+use crate::cli::provenance::Provenance;
 use crate::math::six_digits;
 use crate::record::{InputRule, Record, resample};
 use crate::setting::number;
@@ -88,6 +89,7 @@ impl Verb for Resample {
             short(new.longest_gap)
         ));
         output::print(&lines.join("\n"))?;
+        Provenance::new(context, None, [("record", self.record.as_path())]).tell(context);
         Ok(ExitCode::SUCCESS)
     }
 }

@@ -4,6 +4,7 @@ use crate::cli::args::{FileColumns, Subject};
 use crate::cli::context::{Context, Verb};
 use crate::cli::failure::Failure;
 use crate::cli::output;
+use crate::cli::provenance::Provenance;
 use crate::effect::{Effect, augment};
 use crate::record::{Drive, Record, record_csv_text};
 use crate::setting::{did_you_mean, number};
@@ -93,6 +94,11 @@ impl Verb for Simulate {
                 "y": if self.out.is_none() { Some(record.outputs().rows().into_iter().map(|r| r.to_vec()).collect::<Vec<_>>()) } else { None },
             }))?;
         }
+        let files = [("input", &self.input), ("effect", &self.effect)];
+        let files = files
+            .into_iter()
+            .filter_map(|(role, path)| Some((role, path.as_deref()?)));
+        Provenance::new(context, Some(&self.subject), files).tell(context);
         Ok(ExitCode::SUCCESS)
     }
 }

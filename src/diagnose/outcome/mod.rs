@@ -1,13 +1,18 @@
 //! Results of a diagnosis.
 
 mod location;
+mod residuals;
+mod warnings;
 
 pub(crate) use location::Cell;
 pub use location::{
     Band, Channel, Lag, Location, Maps, MissingFunction, Onset, Region, TargetShare, Window,
 };
 
-use crate::fit::Nuisance;
+pub use residuals::Residuals;
+pub(in crate::diagnose) use warnings::warnings;
+
+use crate::fit::{Nuisance, Warning};
 use crate::record::{Drive, Signal};
 use crate::twin::{Integrator, Interval};
 use serde::ser::{SerializeStruct, Serializer};
@@ -277,9 +282,9 @@ pub struct Diagnosis {
     pub outliers: Vec<String>,
     /// True for a quick look: effects were tried one at a time.
     pub quick: bool,
-    /// True if the search was cancelled: this is what was found until then.
+    /// True if the search was cancelled before its end.
     pub interrupted: bool,
-    /// Integrator that everything here is said with, where the records ask for a finer step than the twin's.
+    /// Integrator that the diagnosis used, where the records ask for a finer step than the twin's.
     pub integrator: Option<Integrator>,
     /// Its substeps of a sample.
     pub substeps: Option<usize>,
@@ -289,8 +294,13 @@ pub struct Diagnosis {
     pub candidates: usize,
     /// Effects of this twin that were not tested, as `id@target`.
     pub not_tested: Vec<String>,
+    /// Reasons to doubt the result.
+    pub warnings: Vec<Warning>,
     /// Wall-clock seconds.
     pub seconds: f64,
+    /// One-step residuals of the twin with the accepted effects, a record each.
+    #[serde(skip)]
+    pub residuals: Vec<Residuals>,
     /// Free runs beside the first record.
     #[serde(skip)]
     pub free_runs: FreeRuns,

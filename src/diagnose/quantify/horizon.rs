@@ -11,7 +11,8 @@
 //!
 //! If the accepted twin is right, A is one more of the Aᵢ, errors of estimation included, and the true system scores 1 in expectation.
 //! The headline is the horizon with the largest (B − F)/s, s the standard deviation of the Aᵢ: where twin and floor differ most clearly.
-//! A does not take part in the choice. Its interval is that of (B − δBᵢ − A + δAᵢ)/(B − δBᵢ − F), δ the deviations of simulated records
+//! A does not take part in the choice. A free run has a share only where it can follow: noise alone must leave it half of the variance of y,
+//! F < ½. Its interval is that of (B − δBᵢ − A + δAᵢ)/(B − δBᵢ − F), δ the deviations of simulated records
 //! from their mean: what another record of the same system would have given.
 
 use super::free_run::{Runner, mean, scaled, variances};
@@ -47,6 +48,16 @@ enum Reach {
     Samples(usize),
     /// From the start, inputs alone.
     FreeRun,
+}
+
+/// Largest floor of a free run that has a share, over the variance of y: beyond, noise alone drives a right twin away.
+const FOLLOWS: f64 = 0.5;
+
+impl Reach {
+    /// Tells whether a share can be measured at this reach, the floor being so large.
+    fn can_measure(self, floor: f64) -> bool {
+        self != Self::FreeRun || floor < FOLLOWS
+    }
 }
 
 impl Predictor<'_> {
@@ -156,8 +167,8 @@ pub(in crate::diagnose) fn compare(
         let floors: Vec<f64> = floors.into_iter().flatten().collect();
         let (floor, spread) = (mean(&floors), deviation(&floors));
         let clear = (mean(&b) - floor) / spread.max(f64::MIN_POSITIVE);
-        let is_clear = clear.is_finite() && clear > Thresholds::CLEAR;
-        if clear > clearest {
+        let is_clear = clear.is_finite() && clear > Thresholds::CLEAR && reach.can_measure(floor);
+        if is_clear && clear > clearest {
             (compared.headline, clearest) = (Some(compared.horizons.len()), clear);
         }
         let samples = match reach {
@@ -260,6 +271,13 @@ fn share(before: f64, after: f64, floor: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_free_run_that_noise_drives_away_has_no_share() {
+        assert!(Reach::FreeRun.can_measure(0.3));
+        assert!(!Reach::FreeRun.can_measure(0.6));
+        assert!(Reach::Samples(10).can_measure(0.6));
+    }
 
     #[test]
     fn half_of_a_gap_is_half() {

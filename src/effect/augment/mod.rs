@@ -10,7 +10,8 @@ use super::error::EffectError;
 use super::kind::EffectKind;
 use super::law::{Instant, Law, SignalLaw};
 use super::placed::Effect;
-use crate::record::{Drive, RecordError, Signal};
+use super::unit::magnitude_unit;
+use crate::record::{Drive, Quantity, RecordError, Signal, Signals};
 use crate::twin::{Interval, Modified, Parameter, ParameterSpace, Role, SimulationError, Twin};
 use black_box::AugmentedBlackBox;
 use equations::AugmentedEquations;
@@ -148,6 +149,7 @@ impl Slots {
     fn of(base: &Twin, effects: &[Effect], memories: &[usize]) -> Self {
         let outline = base.outline();
         let signals = base.signals();
+        let states = outline.as_ref().map_or(&[][..], |o| &o.states);
         let base = base.parameters().len();
         let mut parameters = Vec::new();
         let mut all: Vec<Slot> = Vec::new();
@@ -155,7 +157,7 @@ impl Slots {
             let known = targets(effect.law().target(), outline.as_ref(), &signals);
             let index = |name: &str| known.iter().position(|k| k == name);
             let from = base + parameters.len();
-            parameters.extend(magnitude_parameters(effect));
+            parameters.extend(magnitude_parameters(effect, states, &signals));
             let (least, most) = effect.kind().memories();
             let only = signals.outputs.len() == 1 && matches!(effect.law(), Law::Sensor(_));
             let late = memory == 0 && least < most && only && outline.is_some();
@@ -230,8 +232,8 @@ impl Slots {
 /// them; fits start within the prior ([`Parameter::start_range`]).
 const WIDE: f64 = 1e15;
 
-/// Returns the magnitudes as parameters.
-fn magnitude_parameters(effect: &Effect) -> Vec<Parameter> {
+/// Returns the magnitudes as parameters, their units those of the twin.
+fn magnitude_parameters(effect: &Effect, states: &[Quantity], signals: &Signals) -> Vec<Parameter> {
     (effect.magnitudes().iter())
         .map(|m| {
             let reach = m.starts.iter().fold(1e-6, |a: f64, s| a.max(s.abs()));
@@ -251,7 +253,10 @@ fn magnitude_parameters(effect: &Effect) -> Vec<Parameter> {
             };
             Parameter {
                 name: effect.key().magnitude(m.name),
-                unit: m.unit.into(),
+                unit: match magnitude_unit(effect, m.unit, states, signals) {
+                    unit if unit.is_empty() => "-".into(),
+                    unit => unit,
+                },
                 prior: if prior.check().is_ok() { prior } else { bounds },
                 bounds,
                 role: Role::Magnitude,
@@ -355,11 +360,45 @@ mod tests {
         assert!((rate(1.0) - rate(0.0) - expected).abs() < 1e-12);
     }
 
+    /// Magnitudes have the units of the twin, not the placeholders of the library.
+    #[test]
+    fn magnitudes_have_units_of_the_twin() {
+        let library = Catalogue::default();
+        let effects = [
+            "state-ceiling@h1",
+            "quadratic-drag@h2",
+            "sensor-drift@sensor",
+        ];
+        let placed = |key: &&str| {
+            let (id, target) = key.split_once('@').unwrap();
+            library.effect(id, target).unwrap()
+        };
+        let effects = effects.iter().map(placed);
+        let effects = effects.map(|effect| match effect.id() {
+            "state-ceiling" => effect.with_other("h2"),
+            _ => effect,
+        });
+        let twin = augment(Twin::new(CascadedTanks), effects.collect()).unwrap();
+        let units: Vec<String> = (twin.parameters().iter().skip(4))
+            .map(|p| format!("{} {}", p.name, p.unit))
+            .collect();
+        assert_eq!(
+            units,
+            [
+                "state-ceiling@h1.level V",
+                "state-ceiling@h1.spill -",
+                "quadratic-drag@h2.coefficient 1/(V·s)",
+                "sensor-drift@sensor.rate V/s",
+            ]
+        );
+    }
+
     /// A sensor in pascals has a bias of thousands; a fraction stays a fraction.
     #[test]
     fn bounds_of_magnitudes_are_the_limits_of_their_law() {
         let library = Catalogue::default();
-        let of = |id| magnitude_parameters(&library.effect(id, "sensor").unwrap());
+        let signals = Twin::new(CascadedTanks).signals();
+        let of = |id| magnitude_parameters(&library.effect(id, "sensor").unwrap(), &[], &signals);
         assert!(of("sensor-bias")[0].bounds.contains(-1e5));
         let drift = &of("sensor-drift")[0];
         assert!(drift.bounds.contains(1e3) && drift.start_range() == drift.prior);

@@ -1,6 +1,9 @@
 //! The answer in one sentence.
 
+use super::words::{effect, effects, few, joined};
 use crate::diagnose::{Cause, Decision, Diagnosis, Location, Verdict};
+use crate::report::digits::chance;
+use crate::report::units::Units;
 
 /// Characters of a headline: two lines of a page.
 const LONGEST: usize = 140;
@@ -8,43 +11,32 @@ const LONGEST: usize = 140;
 const MOST_NAMES: usize = 3;
 /// Probability below which no effect is named alone.
 pub(super) const SAID: f64 = 0.5;
+/// Probability of several effects together from which no more of them are told.
+const TOGETHER: f64 = 0.8;
+const APART: &str = "this record cannot tell which";
 
 /// Returns the answer in one sentence, of at most [`LONGEST`] characters where names allow it.
-pub fn headline(diagnosis: &Diagnosis) -> String {
+pub(super) fn headline(units: &Units, diagnosis: &Diagnosis) -> String {
     let cause = &diagnosis.cause;
-    let lacks = || (cause.accepted.join(" and "), others(&cause.accepted));
     match (diagnosis.verdict, cause.decision) {
         (Verdict::NoGap, _) => {
             "No gap: the twin explains the record with parameters inside the prior.".into()
         }
         (Verdict::ParameterGap, Decision::Absorbed) => format!(
             "Parameter gap: parameters outside the prior explain the record; so would {} with parameters inside.",
-            cause.class.first().cloned().unwrap_or_default()
+            match cause.class.as_slice() {
+                [only] => effect(units, only),
+                several => format!("one of {} effects", several.len()),
+            }
         ),
         (Verdict::ParameterGap, _) => {
             "Parameter gap: the twin explains the record with parameters outside the prior.".into()
         }
-        (_, Decision::Named) => {
-            let (all, few) = lacks();
-            short_enough([all, few].map(|names| format!("Structural gap: the twin lacks {names}.")))
-        }
-        (_, Decision::Class) => one_of(cause),
-        (_, Decision::Partial) => {
-            let (all, few) = lacks();
-            let somewhere = "something remains".to_owned();
-            let place = match &cause.remains {
-                Some(remains) => format!("something remains at {}", remains.place),
-                None => somewhere.clone(),
-            };
-            short_enough(
-                [(&all, &place), (&all, &somewhere), (&few, &somewhere)].map(|(names, remains)| {
-                    format!("Structural gap: the twin lacks {names}; {remains}.")
-                }),
-            )
-        }
+        (_, Decision::Named | Decision::Partial) => accepted(units, cause),
+        (_, Decision::Class) => one_of(units, cause),
         _ => {
             let unlisted = "Structural gap outside the library: no listed effect explains it";
-            match somewhere(&diagnosis.location) {
+            match somewhere(units, &diagnosis.location) {
                 None => format!("{unlisted}."),
                 Some(places) => short_enough(
                     places.map(|place| format!("{unlisted}; the missing law acts on {place}.")),
@@ -54,48 +46,143 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// The first name, and how many more there are.
-fn others(names: &[String]) -> String {
-    match names {
-        [] => "nothing".into(),
-        [one] => one.clone(),
-        [first, more @ ..] => format!("{first} and {} more", more.len()),
+/// Accepted effects, divided by probability.
+pub(super) struct Naming<'c> {
+    /// Those that are more probable than not.
+    pub sure: Vec<&'c str>,
+    /// Keys of effects one of which stands for the others; empty where that is not more probable than not.
+    pub one_of: Vec<String>,
+    /// Their probability together.
+    pub together: f64,
+    /// True where every accepted effect is sure.
+    pub is_complete: bool,
+}
+
+/// Divides the accepted effects: no name is told whose probability is below a half.
+pub(super) fn naming(cause: &Cause) -> Naming<'_> {
+    let probability = |key: &str| {
+        let fit = cause.effects.iter().find(|fit| fit.key() == key);
+        fit.map_or(0.0, |fit| fit.probability)
+    };
+    let keys = cause.accepted.iter().map(String::as_str);
+    let sure: Vec<&str> = keys.filter(|key| probability(key) >= SAID).collect();
+    let open = cause.accepted.len() - sure.len();
+    let mut all: Vec<(String, f64)> = (cause.effects.iter())
+        .map(|fit| (fit.key(), fit.probability))
+        .filter(|(key, _)| !sure.contains(&key.as_str()))
+        .collect();
+    all.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let (mut one_of, mut together) = (vec![], 0.0);
+    for (key, p) in all.into_iter().take(MOST_NAMES) {
+        if together < TOGETHER {
+            one_of.push(key);
+            together += p;
+        }
+    }
+    if open != 1 || together < SAID || one_of.len() < 2 {
+        one_of.clear();
+    }
+    Naming {
+        sure,
+        one_of,
+        together: together.min(1.0),
+        is_complete: open == 0,
     }
 }
 
+/// Effects that are accepted, as far as they can be named.
+fn accepted(units: &Units, cause: &Cause) -> String {
+    let is_partial = cause.decision == Decision::Partial;
+    let remains = match (is_partial, &cause.remains) {
+        (false, _) => [String::new(), String::new()],
+        (true, None) => ["; something remains", "; something remains"].map(String::from),
+        (true, Some(rest)) => [
+            format!("; something remains at {}", units.in_words(&rest.place)),
+            "; something remains".to_owned(),
+        ],
+    };
+    let Naming {
+        sure,
+        one_of,
+        together,
+        is_complete,
+    } = naming(cause);
+    let them: Vec<&str> = one_of.iter().map(String::as_str).collect();
+    let explained = match (is_partial, sure.is_empty()) {
+        (_, false) => "the rest",
+        (true, true) => "most of it",
+        (false, true) => "it",
+    };
+    let known = |names: String| match names.as_str() {
+        "" => String::new(),
+        names => format!("the twin lacks {names}; "),
+    };
+    let told = |names: String, others: String| match (is_complete, one_of.is_empty()) {
+        (true, _) => format!("the twin lacks {names}"),
+        (false, false) => format!(
+            "{}{explained} is explained by one of {others} (together {})",
+            known(names),
+            chance(together)
+        ),
+        (false, true) => format!(
+            "{}listed effects explain {explained}, but no single one can be named",
+            known(names)
+        ),
+    };
+    let full = || told(effects(units, &sure, "and"), effects(units, &them, "and"));
+    let ids = || told(sure.join(" and "), few(&them));
+    let counted = match sure.as_slice() {
+        [first, _, ..] => told(
+            format!("{} and {} more", effect(units, first), sure.len() - 1),
+            few(&them),
+        ),
+        _ => ids(),
+    };
+    let [place, somewhere] = remains;
+    short_enough(
+        [
+            (full(), &place),
+            (full(), &somewhere),
+            (ids(), &place),
+            (ids(), &somewhere),
+            (counted, &somewhere),
+        ]
+        .map(|(told, remains)| format!("Structural gap: {told}{remains}.")),
+    )
+}
+
 /// A class of effects: each by name where they are few; one alone only if it is more likely than not.
-fn one_of(cause: &Cause) -> String {
-    const APART: &str = "this record cannot tell which";
-    let rivals = rivals(cause);
-    // A second effect has rivals of its own; the first stays.
-    let (first, before) = match cause.accepted.split_last() {
-        Some((last, before)) => (last.as_str(), before.join(" and ")),
-        None => ("", String::new()),
+fn one_of(units: &Units, cause: &Cause) -> String {
+    let Naming { mut sure, .. } = naming(cause);
+    // A second effect has rivals of its own; the first stays, if it is sure.
+    let last = cause.accepted.last().map_or("", String::as_str);
+    let likely = sure.iter().position(|key| *key == last);
+    let is_likely = likely.map(|at| sure.remove(at)).is_some();
+    let mut class: Vec<&str> = vec![];
+    for key in cause.accepted.iter().chain(&cause.class) {
+        if !sure.contains(&key.as_str()) && !class.contains(&key.as_str()) {
+            class.push(key);
+        }
+    }
+    let before = match sure.is_empty() {
+        true => String::new(),
+        false => effects(units, &sure, "and") + " and ",
     };
-    let before = if before.is_empty() {
-        before
-    } else {
-        format!("{before} and ")
+    let count = class.len();
+    let lead = match is_likely {
+        true => format!(", most likely {}", effect(units, last)),
+        false => String::new(),
     };
-    let likely =
-        (cause.effects.iter()).any(|effect| effect.key() == first && effect.probability >= SAID);
-    let named = match rivals.len() < MOST_NAMES {
-        true => Some(format!(
-            "Structural gap: the twin lacks {before}{first} or {}; {APART}.",
-            rivals.join(" or ")
-        )),
-        false => None,
-    };
-    let count = rivals.len() + 1;
-    let lead = if likely {
-        format!(", most likely {first}")
-    } else {
-        String::new()
-    };
-    let counted =
-        format!("Structural gap: the twin lacks {before}one of {count} effects{lead}; {APART}.");
-    let last = format!("Structural gap: the twin lacks one of {count} effects; {APART}.");
-    short_enough(named.into_iter().chain([counted, last]))
+    let named = [effects(units, &class, "or"), class.join(" or ")]
+        .into_iter()
+        .filter(|_| count <= MOST_NAMES)
+        .map(|names| format!("Structural gap: the twin lacks {before}{names}; {APART}."));
+    let counted = [
+        format!("{before}one of {count} effects{lead}"),
+        format!("one of {count} effects"),
+    ]
+    .map(|what| format!("Structural gap: the twin lacks {what}; {APART}."));
+    short_enough(named.chain(counted))
 }
 
 /// Different places of the accepted effects.
@@ -109,20 +196,36 @@ pub(super) fn accepted_places(diagnosis: &Diagnosis) -> Vec<&str> {
     places
 }
 
+/// All places that the answer is about: those of the accepted effects, or the stated one and those that the records cannot tell from it.
+pub(super) fn places(diagnosis: &Diagnosis) -> Vec<&str> {
+    let location = &diagnosis.location;
+    let mut all = accepted_places(diagnosis);
+    for place in location.target.iter().chain(&location.class) {
+        if !all.contains(&place.as_str()) {
+            all.push(place);
+        }
+    }
+    all
+}
+
 /// The place of a gap, or the few that the records cannot tell apart, each by name; then in fewer words. None where it is not known.
-pub(super) fn somewhere(location: &Location) -> Option<[String; 2]> {
+pub(super) fn somewhere(units: &Units, location: &Location) -> Option<[String; 2]> {
     let target = location.target.as_ref()?;
-    let Some((last, first)) = location.class.split_last() else {
-        return Some([target.clone(), target.clone()]);
-    };
+    let named = units.in_words(target);
+    if location.class.is_empty() {
+        return Some([named.clone(), named]);
+    }
     let is_likely = (location.targets.iter()).any(|t| t.target == *target && t.probability >= SAID);
     let lead = match is_likely {
-        true => format!(", most likely {target}"),
+        true => format!(", most likely {named}"),
         false => String::new(),
     };
     let counted = format!("one of {} places{lead}", location.class.len());
-    let named = match location.class.len() <= MOST_NAMES {
-        true => format!("{} or {last}", first.join(", ")),
+    let all: Vec<String> = (location.class.iter())
+        .map(|place| units.in_words(place))
+        .collect();
+    let named = match all.len() <= MOST_NAMES {
+        true => joined(&all, "or"),
         false => counted.clone(),
     };
     Some([named, counted])
@@ -149,10 +252,73 @@ pub(super) fn rivals(cause: &Cause) -> Vec<&str> {
     others.map(String::as_str).collect()
 }
 
-/// At most three names, and how many more there are.
-pub(super) fn few(names: &[&str]) -> String {
-    match names.len() {
-        n if n > MOST_NAMES => format!("{} and {} more", names[..2].join(", "), n - 2),
-        _ => names.join(", "),
+/// The accepted effects by id where each is more probable than not, or else without names.
+pub(super) fn accepted_ids(cause: &Cause) -> String {
+    match naming(cause) {
+        Naming {
+            sure,
+            is_complete: true,
+            ..
+        } => sure.join(" and "),
+        _ => "the accepted effects".into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::fixture::{made, tanks};
+
+    /// Tanks with these effects and probabilities, so many of them accepted.
+    fn told(decision: Decision, effects: &[(&str, f64)], count: usize) -> String {
+        let mut diagnosis = made::tanks_class();
+        let cause = &mut diagnosis.cause;
+        let first = cause.effects[0].clone();
+        cause.decision = decision;
+        cause.effects = (effects.iter())
+            .map(|(key, probability)| {
+                let (id, target) = key.split_once('@').unwrap();
+                let mut fit = first.clone();
+                (fit.id, fit.target) = (id.into(), target.into());
+                fit.probability = *probability;
+                fit
+            })
+            .collect();
+        let keys = cause.effects.iter().map(|fit| fit.key());
+        cause.accepted = keys.take(count).collect();
+        cause.class.clone_from(&cause.accepted);
+        headline(&Units::of(&tanks()), &diagnosis)
+    }
+
+    #[test]
+    fn no_name_is_told_below_a_half() {
+        let pair = [
+            ("actuator-rate-limit@actuator", 0.9),
+            ("parameter-step@k1", 0.31),
+            ("sensor-lag@sensor", 0.3),
+            ("sensor-bias@sensor", 0.2),
+        ];
+        assert_eq!(
+            told(Decision::Partial, &pair[1..], 1),
+            "Structural gap: most of it is explained by one of parameter-step@k1, sensor-lag@sensor, sensor-bias@sensor (together 0.81); \
+             something remains."
+        );
+        let sure = told(Decision::Partial, &pair, 2);
+        assert!(
+            sure.starts_with("Structural gap: the twin lacks actuator-rate-limit@actuator; the rest is explained by one of"),
+            "{sure}"
+        );
+        let few = [("state-ceiling@h1", 0.45), ("power-law@h1", 0.4)];
+        assert_eq!(
+            told(Decision::Partial, &few, 1),
+            "Structural gap: most of it is explained by one of a ceiling and a power law at the upper tank (h1) (together 0.85); something \
+             remains."
+        );
+        let unsure = [("state-ceiling@h1", 0.2), ("power-law@h1", 0.1)];
+        assert_eq!(
+            told(Decision::Partial, &unsure, 1),
+            "Structural gap: listed effects explain most of it, but no single one can be named; something remains at the lower tank (h2)."
+        );
+        assert!(told(Decision::Named, &pair, 1).contains("lacks a rate limit at the actuator of"));
     }
 }

@@ -10,15 +10,16 @@ pub const NEXT_INPUT: &str = "next-input.csv";
 ///
 /// | key | holds |
 /// |---|---|
-/// | `verdict`, `detection` | which kind of gap, and the evidence for it |
-/// | `parameters`, `nuisance` | θ beside accepted effects; what else was estimated |
-/// | `where` | places by probability, missing functions, maps of the residuals |
-/// | `which` | effects best first, what was accepted, rivals, what remains |
-/// | `shrinkage` | free-run errors on held-out data |
-///
-/// Beyond the contract: `parameters[].prior`, of `where` all but target, targets, windows and regions, `windows[].record`,
-/// `shrinkage.controls`, `discovery`, `correlated_noise`, `outliers`, `quick`, `interrupted`, `integrator`, `substeps`, `power`,
-/// `candidates`, `not_tested`, `seconds`.
+/// | `verdict`, `detection` | kind of gap, and the evidence for it |
+/// | `parameters`, `nuisance` | θ beside the accepted effects; all other estimates |
+/// | `where` | places by probability, missing functions, maps of the residuals, time of a change |
+/// | `which` | effects with probabilities, the accepted ones first; rivals, what remains, the next input |
+/// | `shrinkage` | prediction errors on held-out data over several horizons, the share closed, controls |
+/// | `discovery` | exploratory law of the missing function |
+/// | `correlated_noise`, `outliers`, `integrator`, `substeps` | noise and step that the diagnosis used in place of the twin's |
+/// | `power`, `not_tested`, `candidates` | smallest detectable magnitudes; effects left out; explanations tested |
+/// | `warnings` | `code`, `what`, `remedy` of everything that makes the result doubtful |
+/// | `quick`, `interrupted`, `seconds` | extent of the search |
 ///
 /// All keys are always there; what was skipped is null, and so are numbers that are not finite.
 pub fn gap_json(diagnosis: &Diagnosis) -> Value {

@@ -3,7 +3,7 @@
 use crate::diagnose::Diagnosis;
 use crate::twin::Integrator;
 
-/// The settings of a study that take the finer step which everything is said with; none where it is the twin's own.
+/// The settings of a study for the finer step that the diagnosis used; none where it used the twin's own.
 pub(super) fn step_setting(diagnosis: &Diagnosis) -> Option<String> {
     let (integrator, substeps) = (diagnosis.integrator?, diagnosis.substeps?);
     let mut settings = vec![];

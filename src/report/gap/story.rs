@@ -1,6 +1,6 @@
 //! The answer in a few sentences: which effect, how sure, how far, what next.
 
-use super::headline::{SAID, headline};
+use super::headline::{SAID, accepted_ids, headline, naming};
 use super::json::NEXT_INPUT;
 use super::share::share_with_interval;
 use super::step::step_setting;
@@ -8,45 +8,61 @@ use crate::diagnose::{Decision, Diagnosis, EffectFit, Verdict};
 use crate::report::digits::{chance, percent, short, unit_suffix};
 use crate::report::units::Units;
 
-/// Effects that are told of.
-const TOLD: usize = 2;
+/// Words of the story: with the heading and the caption of the first picture there are at most 60 on the first screen.
+const WORDS: usize = 44;
 
-/// Headline and further sentences, at most 60 words together.
+/// Headline and further sentences, at most [`WORDS`] words together.
 pub(super) fn story(units: &Units, diagnosis: &Diagnosis) -> (String, Vec<String>) {
+    let headline = headline(units, diagnosis);
+    let mut rest: Vec<String> = how_sure(diagnosis).into_iter().collect();
+    rest.extend(how_far(diagnosis));
+    rest.push(next(diagnosis));
+    let mut left = WORDS.saturating_sub(words(&headline) + words(&rest.join(" ")));
     let mut sentences = effects(units, diagnosis);
-    sentences.extend(how_sure(diagnosis));
-    sentences.extend(how_far(diagnosis));
-    sentences.push(next(diagnosis));
-    (headline(diagnosis), sentences)
+    sentences.retain(|sentence| {
+        let count = words(sentence);
+        let has_room = count <= left;
+        left -= if has_room { count } else { 0 };
+        has_room
+    });
+    sentences.append(&mut rest);
+    (headline, sentences)
 }
 
-/// Sentences of the accepted effects.
+/// Number of words; signs such as % are none.
+fn words(text: &str) -> usize {
+    let is_word = |word: &&str| word.contains(char::is_alphanumeric);
+    text.split_whitespace().filter(is_word).count()
+}
+
+/// Sentences of the accepted effects that are more probable than not; none of a class, which is not told as a fact.
 pub(super) fn effects(units: &Units, diagnosis: &Diagnosis) -> Vec<String> {
     let cause = &diagnosis.cause;
-    let accepted = cause
-        .effects
-        .iter()
-        .filter(|effect| cause.accepted.contains(&effect.key()) && (effect.probability >= SAID));
-    accepted
-        .take(TOLD)
-        .filter_map(|effect| sentence(units, effect))
-        .collect()
+    if cause.decision == Decision::Class {
+        return vec![];
+    }
+    let told = (cause.effects.iter())
+        .filter(|effect| cause.accepted.contains(&effect.key()) && effect.probability >= SAID);
+    told.filter_map(|effect| sentence(units, effect)).collect()
 }
 
-/// The sentence of an effect, filled in.
+/// The sentence of an effect, filled in; of an effect without one, its name, its place and its magnitudes.
 pub(super) fn sentence(units: &Units, fit: &EffectFit) -> Option<String> {
     let effect = units.effect(&fit.id, &fit.target)?;
-    let mut text = effect.sentence()?.to_owned();
-    let place = match units.signal(&fit.target) {
-        Some(("output", signal)) => format!("the sensor of {}", signal.name),
-        Some((_, signal)) => format!("the actuator of {}", signal.name),
-        None => fit.target.clone(),
+    let Some(template) = effect.sentence() else {
+        let named = super::words::effect(units, &fit.key());
+        return Some(match units.magnitudes(fit).as_str() {
+            "" => capitalised(&format!("{named} is missing.")),
+            values => capitalised(&format!("{named} is missing: {values}.")),
+        });
     };
+    let mut text = template.to_owned();
+    let other = effect.other().map(|other| units.in_words(other));
     let mut filled = vec![
-        ("{place}".to_owned(), place),
+        ("{place}".to_owned(), units.in_words(&fit.target)),
         (
             "{other}".to_owned(),
-            effect.other().unwrap_or("nothing").to_owned(),
+            other.unwrap_or_else(|| "nothing".into()),
         ),
     ];
     for (name, value) in &fit.magnitudes {
@@ -63,16 +79,21 @@ pub(super) fn sentence(units: &Units, fit: &EffectFit) -> Option<String> {
     for (name, value) in filled {
         text = text.replace(&name, &value);
     }
-    let mut letters = text.chars();
-    let first = letters.next()?;
     // A sentence begins with a large letter, but a state keeps its name.
     Some(match text.starts_with("the ") {
-        true => format!("{}{}", first.to_uppercase(), letters.as_str()),
+        true => capitalised(&text),
         false => text,
     })
 }
 
-/// The probability of the answer.
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next();
+    let first = first.map_or_else(String::new, |c| c.to_uppercase().collect());
+    first + letters.as_str()
+}
+
+/// The probability of the answer; none where the headline has it.
 fn how_sure(diagnosis: &Diagnosis) -> Option<String> {
     let cause = &diagnosis.cause;
     let kinds = &cause.probabilities;
@@ -80,13 +101,13 @@ fn how_sure(diagnosis: &Diagnosis) -> Option<String> {
         return Some(format!("Probability: {}.", chance(kinds.nothing)));
     }
     let p = match cause.decision {
-        Decision::Named | Decision::Partial => (cause.effects.iter())
+        Decision::Named | Decision::Partial if naming(cause).is_complete => (cause.effects.iter())
             .filter(|effect| cause.accepted.contains(&effect.key()))
             .map(|effect| effect.probability)
             .fold(1.0, f64::min),
         Decision::Class => kinds.listed,
         Decision::NoneOfThese => kinds.unknown,
-        Decision::Absorbed | Decision::NotNeeded => return None,
+        _ => return None,
     };
     Some(format!("Probability: {}.", chance(p)))
 }
@@ -97,11 +118,11 @@ fn how_far(diagnosis: &Diagnosis) -> Option<String> {
     if s.hidden_by_noise().is_some() {
         return Some("Noise hides how much of the gap closes.".to_owned());
     }
-    let ahead = match s.horizon {
-        Some(seconds) => format!("{} s ahead", short(seconds)),
-        None => "of the free run".to_owned(),
-    };
-    Some(share_with_interval(s, &format!(" of the gap {ahead} closes"))? + ".")
+    let share = share_with_interval(s, " of the gap")?;
+    Some(match s.horizon {
+        Some(seconds) => format!("Predictions {} s ahead: {share} closes.", short(seconds)),
+        None => format!("Predictions from the start on: {share} closes."),
+    })
 }
 
 /// Advice on what to do.
@@ -111,16 +132,20 @@ pub(super) fn next(diagnosis: &Diagnosis) -> String {
     {
         return format!("Next: set {setting}; the twin's own step is too long.");
     }
-    let next = match (diagnosis.verdict, diagnosis.cause.decision) {
+    let cause = &diagnosis.cause;
+    let add = |then: &str| format!("Next: add {} to the study and {then}.", accepted_ids(cause));
+    let next = match (diagnosis.verdict, cause.decision) {
         (Verdict::NoGap, _) => "Next: use the twin, within the range of this record.",
         (Verdict::ParameterGap, _) => "Next: widen [prior] to these parameters.",
-        (_, Decision::Named) => "Next: add it to the study and fit again.",
-        (_, Decision::Partial) => "Next: add it to the study and diagnose again.",
-        (_, Decision::Class) if diagnosis.cause.next_input.is_some() => {
+        (_, Decision::Named) if naming(cause).is_complete => return add("fit again"),
+        (_, Decision::Partial) if naming(cause).is_complete => return add("diagnose again"),
+        (_, Decision::Class) if cause.next_input.is_some() => {
             const { assert!(NEXT_INPUT.len() == 14) };
-            "Next: measure next-input.csv, which can tell them apart."
+            "Next: measure next-input.csv to tell them apart."
         }
-        (_, Decision::Class) => "Next: another record, with other inputs, may tell them apart.",
+        (_, Decision::Class | Decision::Named | Decision::Partial) => {
+            "Next: another record, with other inputs, may tell them apart."
+        }
         _ => "Next: look at the system there, with the missing function in mind.",
     };
     next.to_owned()
@@ -144,7 +169,7 @@ mod tests {
         for diagnosis in diagnoses().iter().chain(&by_hand) {
             let (headline, sentences) = story(&units, diagnosis);
             let words = format!("{headline} {}", sentences.join(" "));
-            assert!(words.split_whitespace().count() <= 60, "{words}");
+            assert!(super::words(&words) <= WORDS, "{words}");
             assert!(headline.chars().count() <= 140, "{headline}");
             assert!(!words.contains('{'), "{words}");
         }
@@ -180,7 +205,24 @@ mod tests {
         let told = sentence(&Units::of(&study), &fit).unwrap();
         assert_eq!(
             told,
-            "h1 stops rising at 9.90 V; 40 % of what spills reaches h2."
+            "The upper tank (h1) stops rising at 9.90 V; 40 % of what spills reaches the lower tank (h2)."
         );
+    }
+    /// An effect of a study's own has no sentence: its name, place and magnitudes make one.
+    #[test]
+    fn an_own_effect_is_told_in_words() {
+        use crate::effect::{EffectKind, Magnitude};
+        let kind = EffectKind::force("magnet", "strength", |m, at| m[0] * at.x)
+            .magnitude(Magnitude::signed("pull", "state/s", &[1.0]));
+        let study = oscillator().with_effects([kind]);
+        let fit = EffectFit {
+            id: "magnet".into(),
+            target: "x1".into(),
+            probability: 0.98,
+            magnitudes: vec![("pull".into(), 0.5)],
+            log_evidence: 60.0,
+        };
+        let told = sentence(&Units::of(&study), &fit).unwrap();
+        assert_eq!(told, "A magnet at x1 is missing: pull 0.500 1/s.");
     }
 }

@@ -1,10 +1,11 @@
 //! A diagnosis on the terminal.
 
-use super::headline::{accepted_places, few, headline, rivals};
+use super::headline::{accepted_ids, accepted_places, headline, rivals};
 use super::json::NEXT_INPUT;
 use super::share::{closed_sentence, no_share};
 use super::step::step_setting;
 use super::story::{effects, next};
+use super::words::{few, joined};
 use crate::diagnose::{
     Cause, Decision, Detection, Diagnosis, Discovery, EffectFit, NextInput, RIVALS,
 };
@@ -18,14 +19,18 @@ use crate::twin::Role;
 const LINES: usize = 15;
 /// Number of explanations shown.
 const SHOWN: usize = 4;
+/// Head of the explanations, with their order.
+const HEAD: &str =
+    "  probability   nats   effect (most probable first, alone or beside others; nats: alone)";
 /// Number of terms shown of a missing function.
 const TERMS: usize = 3;
 
 /// Returns the diagnosis in at most fifteen lines: verdict, effects in words, evidence, parameters, location, explanations, what
 /// remains, extent, next record, what to do.
 pub fn gap_text(study: &Study, diagnosis: &Diagnosis) -> String {
-    let told = effects(&Units::of(study), diagnosis).join(" ");
-    let mut lines = vec![headline(diagnosis)];
+    let units = Units::of(study);
+    let told = effects(&units, diagnosis).join(" ");
+    let mut lines = vec![headline(&units, diagnosis)];
     lines.extend((!told.is_empty()).then_some(told));
     lines.push(evidence_sentence(diagnosis));
     lines.extend(step_sentence(diagnosis));
@@ -46,15 +51,15 @@ pub fn gap_text(study: &Study, diagnosis: &Diagnosis) -> String {
         })
         .collect();
     lines.push(parameters.join(", "));
-    lines.extend(place(diagnosis));
+    lines.extend(place(&units, diagnosis));
     if !diagnosis.cause.effects.is_empty() {
-        lines.push("  probability   nats   effect".into());
+        lines.push(HEAD.into());
         for effect in diagnosis.cause.effects.iter().take(SHOWN) {
             lines.push(format!(
                 "  {:>11} {:>6}   {}",
                 chance(effect.probability),
                 short(effect.log_evidence),
-                with_magnitudes(effect)
+                with_magnitudes(&units, effect)
             ));
         }
     }
@@ -94,7 +99,7 @@ pub(super) fn evidence_sentence(diagnosis: &Diagnosis) -> String {
     )
 }
 
-/// Returns which kinds of noise beside the twin's own everything is said with; none where its own is enough.
+/// Returns the kinds of noise that the diagnosis used beside the twin's own; none where its own is enough.
 fn noise_sentence(diagnosis: &Diagnosis) -> Option<String> {
     let correlated = diagnosis.correlated_noise.join(" and ");
     let outliers = diagnosis.outliers.join(" and ");
@@ -114,7 +119,7 @@ fn noise_sentence(diagnosis: &Diagnosis) -> Option<String> {
 pub(super) fn quick_sentence(diagnosis: &Diagnosis) -> Option<String> {
     let said = match (diagnosis.interrupted, diagnosis.quick) {
         (true, _) => {
-            "Interrupted: this was found until then. Pairs, other noise or a finer step may not have been tried."
+            "Interrupted before the search ended. Pairs, other noise or a finer step may not have been tried."
         }
         (false, true) => {
             "A quick look: effects one at a time, each from few starts. Without --quick, pairs are searched, and names are surer."
@@ -124,11 +129,11 @@ pub(super) fn quick_sentence(diagnosis: &Diagnosis) -> Option<String> {
     Some(said.to_owned())
 }
 
-/// Returns with which step everything is said; none where it is the twin's own.
+/// Returns the finer step that the diagnosis used; none where it used the twin's own.
 pub(super) fn step_sentence(diagnosis: &Diagnosis) -> Option<String> {
     let setting = step_setting(diagnosis)?;
     Some(format!(
-        "The twin's own step is too long for this record: all this is said with {setting}."
+        "The twin's own step is too long for this record; the diagnosis used {setting}."
     ))
 }
 
@@ -143,21 +148,27 @@ pub(super) fn calibration(d: &Detection) -> Option<String> {
 }
 
 /// Returns the place of the gap, in the twin, in time and by values; none where it is not known.
-fn place(diagnosis: &Diagnosis) -> Option<String> {
+fn place(units: &Units, diagnosis: &Diagnosis) -> Option<String> {
     let location = &diagnosis.location;
     let target = location.target.as_ref()?;
     let of = |place: &str| {
+        let words = units.in_words(place);
         let share = location.targets.iter().find(|t| t.target == place);
-        let probability = share.map(|t| format!(" (probability {})", chance(t.probability)));
-        format!("{place}{}", probability.unwrap_or_default())
+        match (share, words.strip_suffix(')')) {
+            (None, _) => words,
+            (Some(t), Some(open)) => format!("{open}, probability {})", chance(t.probability)),
+            (Some(t), None) => format!("{words} (probability {})", chance(t.probability)),
+        }
     };
-    let together = accepted_places(diagnosis);
+    let together: Vec<String> = (accepted_places(diagnosis).into_iter())
+        .map(|place| units.in_words(place))
+        .collect();
     let places = match location.class.is_empty() {
-        _ if together.len() > 1 => together.join(" and "),
+        _ if together.len() > 1 => joined(&together, "and"),
         true => of(target),
         false => {
             let class: Vec<String> = location.class.iter().map(|place| of(place)).collect();
-            class.join(" or ")
+            joined(&class, "or")
         }
     };
     let mut line = format!("Where: {places}");
@@ -173,7 +184,15 @@ fn place(diagnosis: &Diagnosis) -> Option<String> {
         .map(|w| format!("{} to {} s", short(w.start), short(w.end)))
         .collect();
     let regions: Vec<String> = (maps.regions.iter().take(2))
-        .map(|r| format!("{} in {} … {}", r.variable, short(r.low), short(r.high)))
+        .map(|r| {
+            let unit = unit_suffix(units.variable(&r.variable));
+            format!(
+                "{} in {} … {}{unit}",
+                r.variable,
+                short(r.low),
+                short(r.high)
+            )
+        })
         .collect();
     for (what, list) in [("clearest", when), ("at", regions)] {
         if !list.is_empty() {
@@ -188,7 +207,7 @@ pub(super) fn remains_sentence(cause: &Cause) -> Option<String> {
     let remains = cause.remains.as_ref()?;
     let effects = match cause.accepted.as_slice() {
         [] => "the best listed effect".into(),
-        accepted => accepted.join(" and "),
+        _ => accepted_ids(cause),
     };
     let said = if remains.log_evidence > 0.0 {
         format!(
@@ -243,22 +262,22 @@ fn measure_next(next: &NextInput) -> String {
     )
 }
 
-/// `id@target (name value, …)`.
-fn with_magnitudes(effect: &EffectFit) -> String {
-    let values: Vec<String> = (effect.magnitudes.iter())
-        .filter(|(_, v)| v.is_finite())
-        .map(|(name, v)| format!("{name} {}", short(*v)))
-        .collect();
-    format!("{} ({})", effect.key(), values.join(", "))
+/// `id@target (name value unit, …)`.
+fn with_magnitudes(units: &Units, effect: &EffectFit) -> String {
+    format!("{} ({})", effect.key(), units.magnitudes(effect))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::fixture::{diagnoses, made, oscillator};
+    use crate::report::fixture::{diagnoses, made, oscillator, tanks};
 
     fn gap_text(diagnosis: &Diagnosis) -> String {
-        super::gap_text(&oscillator(), diagnosis)
+        let study = match diagnosis.twin.as_str() {
+            "tanks" => tanks(),
+            _ => oscillator(),
+        };
+        super::gap_text(&study, diagnosis)
     }
 
     #[test]
@@ -293,10 +312,12 @@ mod tests {
     fn evidence_change_exploration_and_what_to_measure_are_said() {
         let class = gap_text(&made::tanks_class());
         for text in [
-            "the twin lacks state-ceiling@h1 or power-law@h1 or quadratic-drag@h1; this record cannot tell which.",
+            "the twin lacks a ceiling, a power law or quadratic drag at the upper tank (h1); this record cannot tell which.",
             "Evidence for a gap: 43.9 nats; probability that nothing is missing: < 0.01; p < 0.0099 (100 simulations).",
-            "Where: h1 (probability 0.93); k1 changes at 612 s; clearest",
-            "         0.61   38.5   state-ceiling@h1 (level 4.80, spill 0.500)",
+            "Where: the upper tank (h1, probability 0.93); k1 changes at 612 s; clearest",
+            "h1 in 3.60 … 4.80 V",
+            "nats   effect (most probable first",
+            "         0.61   38.5   state-ceiling@h1 (level 4.80 V, spill 0.500)",
             "What remains: beside state-ceiling@h1, an unknown function at h2 adds 1.20 nats (3 % of all).",
             "separates the rivals in 18 of 20 simulations, the present inputs in 6 of 20",
             NEXT_INPUT,
@@ -310,7 +331,7 @@ mod tests {
             "{none}"
         );
         let partial = gap_text(&made::rig_pair());
-        let lacks = "lacks state-ceiling@a_state_with_a_name_that_is_long and sensor-quantization@sensor2; something remains.";
+        let lacks = "lacks a ceiling in a_state_with_a_name_that_is_long and quantization in sensor2; something remains at enthalpy.";
         assert!(partial.contains(lacks), "{partial}");
         let mut rivalled = made::rig_pair();
         rivalled.cause.class.push("sensor-lag@sensor2".into());
@@ -339,13 +360,13 @@ mod tests {
             (0, "acts on x2.", "Where: x2 (probability 0.97)"),
             (
                 3,
-                "acts on x2, x1 or sensor.",
-                "Where: x2 (probability 0.97) or x1 or sensor",
+                "acts on x2, x1 or the sensor of y.",
+                "Where: x2 (probability 0.97), x1 or the sensor of y",
             ),
             (
                 4,
                 "acts on one of 4 places, most likely x2.",
-                "Where: x2 (probability 0.97) or x1 or sensor or actuator",
+                "Where: x2 (probability 0.97), x1, the sensor of y and 1 more",
             ),
         ] {
             diagnosis.location.class = all[..count].iter().map(|p| (*p).to_owned()).collect();

@@ -48,7 +48,7 @@ fn a_lacking_spring_is_reported_and_bad_calls_are_refused() {
     ];
     let text = done(&[&call[..], &twin].concat());
     assert!(
-        text.starts_with("Structural gap: the twin lacks cubic-stiffness@x2"),
+        text.starts_with("Structural gap: the twin lacks cubic stiffness at x2"),
         "{text}"
     );
     assert!(text.lines().count() <= 15, "{text}");
@@ -62,7 +62,7 @@ fn a_lacking_spring_is_reported_and_bad_calls_are_refused() {
     assert!((magnitude - 0.15).abs() < 0.03, "{magnitude}");
     assert_eq!(report["shrinkage"]["held_out"], "validation record");
     let page = fs::read_to_string(place.join("out/report.html")).unwrap();
-    assert!(page.contains("Structural gap: the twin lacks cubic-stiffness@x2"));
+    assert!(page.contains("Structural gap: the twin lacks cubic stiffness at x2"));
     // What is to be measured next lies beside the page, where something is.
     let next = place.join("out/next-input.csv");
     assert_eq!(next.exists(), !report["which"]["next_input"].is_null());

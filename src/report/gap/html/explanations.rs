@@ -2,12 +2,17 @@
 
 use crate::diagnose::{Decision, Diagnosis, EffectFit, RIVALS, Verdict};
 use crate::report::digits::{chance, short};
-use crate::report::gap::headline::{few, rivals};
+use crate::report::gap::headline::{naming, rivals};
 use crate::report::gap::pictures;
 use crate::report::gap::text::{evidence_sentence, remains_sentence};
+use crate::report::gap::words::few;
 use crate::report::page::Column::{Number, Text};
 use crate::report::page::{Section, figure, paragraph, table};
 use crate::report::units::Units;
+
+/// Order of the effects.
+const ORDER: &str = "The accepted effects first, then the most probable. A probability counts an effect alone and beside others; nats are its \
+                     evidence alone, over the twin, so that their order may differ. Effects accepted together have the nats of all of them.";
 
 pub(super) fn section_of(units: &Units, diagnosis: &Diagnosis) -> Section {
     Section::new("which", "Which effect", body(units, diagnosis))
@@ -43,11 +48,7 @@ fn body(units: &Units, diagnosis: &Diagnosis) -> String {
             ("probability", Number),
             ("nats", Number),
         ];
-        body.push_str(&table(
-            "Best first. Nats: evidence over the twin alone; for effects that are accepted together, of all of them.",
-            &head,
-            &rows,
-        ));
+        body.push_str(&table(ORDER, &head, &rows));
     }
     if let Some(remains) = remains_sentence(which) {
         body.push_str(&paragraph(&remains));
@@ -68,10 +69,13 @@ fn decision(diagnosis: &Diagnosis) -> String {
             "The best explanation is accepted; the record cannot separate it from {} within {RIVALS} nats.",
             few(&rivals(which))
         ),
-        Decision::Partial => format!(
+        Decision::Partial if naming(which).is_complete => format!(
             "{} explains most of the gap; something unknown remains.",
             which.accepted.join(" and ")
         ),
+        Decision::Partial => {
+            "Listed effects explain most of the gap, but not all of them are more probable than not; something unknown remains.".into()
+        }
         Decision::NoneOfThese => "No listed effect is accepted: with each of them, something unknown remains.".into(),
         Decision::Absorbed => {
             "Parameters outside the prior explain the record; so do these effects with parameters inside the prior.".into()

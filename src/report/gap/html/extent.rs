@@ -35,8 +35,8 @@ fn body(diagnosis: &Diagnosis) -> String {
     if let Some(svg) = pictures::horizons(diagnosis) {
         body.push_str(&figure(
             &svg,
-            "Predictions begin anew from what the record has shown, and reach so far ahead. Floor: errors of records that the twin with \
-             effects makes itself, with its fitted noise.",
+            "Predictions begin anew from what the record has shown, and reach so far ahead; a free run never does. Floor: errors of records \
+             that the twin with effects makes itself, with its fitted noise.",
         ));
     }
     if let Some([before, after]) = s.log_score.filter(|_| s.metric != Shrinkage::LOG_SCORE) {

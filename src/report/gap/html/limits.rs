@@ -3,14 +3,17 @@
 use crate::diagnose::{Diagnosis, Maps, Visible};
 use crate::report::digits::{short, unit_suffix};
 use crate::report::gap::text::{calibration, quick_sentence, step_sentence};
+use crate::report::gap::words::few;
 use crate::report::page::Column::{Number, Text};
 use crate::report::page::{Section, folded, list, paragraph, table};
 use crate::report::units::Units;
 
 pub(super) fn section_of(units: &Units, diagnosis: &Diagnosis) -> Section {
     let body = [
+        warnings(diagnosis),
         list(&sure(diagnosis)),
         list(&untested(diagnosis)),
+        all_untested(diagnosis),
         power(units, diagnosis),
     ]
     .concat();
@@ -56,10 +59,29 @@ fn untested(diagnosis: &Diagnosis) -> Vec<String> {
     if !diagnosis.not_tested.is_empty() {
         items.push(format!(
             "Not tested (excluded by the call or the study, or without a filter model): {}.",
-            diagnosis.not_tested.join(", ")
+            few(&diagnosis.not_tested)
         ));
     }
     items
+}
+
+/// Returns all effects that were not tested, where a sentence has no room for them.
+fn all_untested(diagnosis: &Diagnosis) -> String {
+    match few(&diagnosis.not_tested) == diagnosis.not_tested.join(", ") {
+        true => String::new(),
+        false => folded("All effects not tested", &list(&diagnosis.not_tested)),
+    }
+}
+
+/// Returns everything that makes the result doubtful.
+fn warnings(diagnosis: &Diagnosis) -> String {
+    let all: Vec<String> = (diagnosis.warnings.iter())
+        .map(|warning| format!("Warning: {}; {}.", warning.what, warning.remedy))
+        .collect();
+    match all.is_empty() {
+        true => String::new(),
+        false => list(&all),
+    }
 }
 
 /// Returns the smallest detectable magnitudes.

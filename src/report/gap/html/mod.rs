@@ -11,7 +11,8 @@ mod steps;
 use crate::diagnose::{Diagnosis, Verdict};
 use crate::report::gap::pictures;
 use crate::report::gap::story::story;
-use crate::report::page::{Section, escaped, figure, page, paragraph};
+use crate::report::page::{Section, escaped, figure, folded, page, paragraph};
+use crate::report::residuals::{Left, residual_figures};
 use crate::report::units::Units;
 use crate::study::Study;
 
@@ -40,17 +41,14 @@ pub(crate) fn gap_html(study: &Study, diagnosis: &Diagnosis) -> String {
         steps::section_of(study, &units, diagnosis),
         limits::section_of(&units, diagnosis),
     ]);
+    sections.extend(residuals(study, diagnosis));
     // Without a structural gap, the parameters are the answer.
     let parameters = match diagnosis.verdict {
         Verdict::StructuralGap => sections.len(),
         _ => 0,
     };
     sections.insert(parameters, numbers::section_of(&units, diagnosis));
-    page(
-        &format!("{}: what the twin lacks", diagnosis.twin),
-        &lead,
-        &sections,
-    )
+    page(&format!("{}: diagnosis", diagnosis.twin), &lead, &sections)
 }
 
 /// Measured and twin, as a figure.
@@ -58,13 +56,33 @@ fn record(study: &Study, diagnosis: &Diagnosis) -> String {
     let marked = if diagnosis.location.maps.notable().windows.is_empty() {
         ""
     } else {
-        " The strip below the axis marks windows that stand out from white noise, with their shares of the gap."
+        " Strip: share of the misfit."
     };
-    let caption = format!(
-        "The twin runs from the inputs alone, without noise. Its parameters are fitted to this record.{marked}"
-    );
+    let caption = format!("The twin runs from the inputs alone.{marked}");
     let svg = pictures::runs(study, diagnosis, false);
     svg.map_or_else(String::new, |svg| figure(&svg, &caption))
+}
+
+/// Residuals of the accepted twin, folded.
+fn residuals(study: &Study, diagnosis: &Diagnosis) -> Option<Section> {
+    let all: Vec<Left<'_>> = (diagnosis.residuals.iter())
+        .map(|r| Left {
+            inputs: &r.inputs,
+            outputs: &r.outputs,
+        })
+        .collect();
+    if all.is_empty() {
+        return None;
+    }
+    let of_what = match diagnosis.cause.accepted.is_empty() {
+        true => "one-step prediction errors of the refitted twin, over their standard deviation",
+        false => {
+            "one-step prediction errors of the twin with the accepted effects, over their standard deviation"
+        }
+    };
+    let figures = residual_figures(study, of_what, &all);
+    let body = folded("Correlations and quantiles", &figures);
+    Some(Section::new("residuals", "Residuals", body))
 }
 
 /// The validation record and twin.

@@ -37,7 +37,11 @@ pub(super) fn section_of(units: &Units, diagnosis: &Diagnosis) -> Section {
         ""
     };
     let caption = format!(
-        "The twin's own parameters{beside}. Not identified: the record adds nothing to the prior."
+        "The twin's own parameters{beside}.{}",
+        match diagnosis.parameters.iter().all(|p| p.identified) {
+            true => "",
+            false => " Not identified: the record adds nothing to the prior.",
+        }
     );
     let mut body = parameter_table(&caption, &more, &lines);
     if !diagnosis.nuisance.is_empty() {

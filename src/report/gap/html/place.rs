@@ -2,8 +2,9 @@
 
 use crate::diagnose::{Diagnosis, Location, Maps, Verdict, Window};
 use crate::report::digits::{chance, percent, short, unit_suffix};
-use crate::report::gap::headline::{accepted_places, somewhere};
+use crate::report::gap::headline::{accepted_ids, accepted_places, places, somewhere};
 use crate::report::gap::pictures;
+use crate::report::gap::words::{few, joined};
 use crate::report::page::Column::{self, Number, Text};
 use crate::report::page::{Section, figure, folded, paragraph, subheading, table};
 use crate::report::units::Units;
@@ -21,11 +22,15 @@ pub(super) fn section_of(study: &Study, diagnosis: &Diagnosis) -> Section {
 }
 
 fn body(study: &Study, diagnosis: &Diagnosis) -> String {
-    let together = accepted_places(diagnosis);
-    let mut body = match somewhere(&diagnosis.location) {
+    let units = Units::of(study);
+    let together: Vec<String> = (accepted_places(diagnosis).into_iter())
+        .map(|place| units.in_words(place))
+        .collect();
+    let mut body = targets(diagnosis);
+    body.push_str(&match somewhere(&units, &diagnosis.location) {
         Some(_) if together.len() > 1 => paragraph(&format!(
             "The missing laws act on {}.",
-            together.join(" and ")
+            joined(&together, "and")
         )),
         Some([place, _]) if diagnosis.location.class.is_empty() => {
             paragraph(&format!("The missing law acts on {place}."))
@@ -34,8 +39,7 @@ fn body(study: &Study, diagnosis: &Diagnosis) -> String {
             "The missing law acts on {places}: this record cannot tell which."
         )),
         None => String::new(),
-    };
-    body.push_str(&targets(diagnosis));
+    });
     body.push_str(&time(diagnosis));
     body.push_str(&functions(study, diagnosis));
     if let Some(svg) = pictures::regions(study, diagnosis) {
@@ -76,9 +80,10 @@ fn targets(diagnosis: &Diagnosis) -> String {
         return String::new();
     };
     let place = &diagnosis.location;
-    let named = match &place.target {
-        Some(target) => format!(" Filled bar and bold name: {target}."),
-        None => String::new(),
+    let named = match places(diagnosis).as_slice() {
+        [] => String::new(),
+        [one] => format!(" Filled bar and bold name: {one}."),
+        several => format!(" Filled bars and bold names: {}.", few(several)),
     };
     let caption = format!("Posterior probability of each place, given a gap.{named}");
     let rows: Vec<Vec<String>> = (place.targets.iter())
@@ -132,7 +137,7 @@ fn time(diagnosis: &Diagnosis) -> String {
     if let Some(after) = &place.after {
         let added = match diagnosis.cause.accepted.as_slice() {
             [] => "the best explanation".into(),
-            accepted => accepted.join(" and "),
+            _ => accepted_ids(&diagnosis.cause),
         };
         lead.push_str(&format!(
             " With {added} added: {}.",

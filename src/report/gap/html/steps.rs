@@ -1,17 +1,18 @@
 //! Section on next steps.
 
-use crate::diagnose::{Decision, Diagnosis, EffectFit, NextInput, Verdict};
+use crate::diagnose::{Cause, Decision, Diagnosis, EffectFit, NextInput, Verdict};
 use crate::math::six_digits;
 use crate::report::digits::short;
-use crate::report::gap::headline::somewhere;
+use crate::report::gap::headline::{Naming, naming, somewhere};
 use crate::report::gap::json::NEXT_INPUT;
 use crate::report::gap::pictures;
+use crate::report::gap::words::few;
 use crate::report::page::{Section, figure, list, paragraph, preformatted, subheading};
 use crate::report::units::Units;
 use crate::study::Study;
 
 pub(super) fn section_of(study: &Study, units: &Units, diagnosis: &Diagnosis) -> Section {
-    let mut body = list(&steps(diagnosis));
+    let mut body = list(&steps(units, diagnosis));
     let accepted = &diagnosis.cause.accepted;
     if !accepted.is_empty() {
         let tables: Vec<String> = (diagnosis.cause.effects.iter())
@@ -39,7 +40,7 @@ fn measure(study: &Study, diagnosis: &Diagnosis, next: &NextInput) -> String {
         drive.samples(),
         short(drive.dt()),
         short(drive.time(drive.samples())),
-        next.rivals.join(" and ")
+        few(&next.rivals)
     )));
     let ([split, of], [again, of_again]) = (next.split, next.again);
     body.push_str(&paragraph(&format!(
@@ -63,37 +64,35 @@ fn measure(study: &Study, diagnosis: &Diagnosis, next: &NextInput) -> String {
     body
 }
 
-fn steps(diagnosis: &Diagnosis) -> Vec<String> {
+fn steps(units: &Units, diagnosis: &Diagnosis) -> Vec<String> {
     let which = &diagnosis.cause;
     let mut steps = Vec::new();
     match (diagnosis.verdict, which.decision) {
         (Verdict::NoGap, _) => steps.push("Use the twin with the refitted parameters.".into()),
         (Verdict::ParameterGap, Decision::Absorbed) => steps.push(format!(
             "Take the refitted parameters, or measure with another input to separate them from {}.",
-            which.class.join(", ")
+            few(&which.class)
         )),
         (Verdict::ParameterGap, _) => steps.push(
             "Check the refitted parameters. If they make sense, widen the prior in the study and pretrain again.".into(),
         ),
-        (_, Decision::Named) => {
-            steps.push(format!("Add {} to the twin.", which.accepted.join(" and ")));
-        }
+        (_, Decision::Named) => steps.push(add(which)),
         (_, Decision::Class) if which.next_input.is_some() => steps.push(format!(
             "Separate the rivals ({}): measure the record below.",
-            which.class.join(", ")
+            few(&which.class)
         )),
         (_, Decision::Class) => steps.push(format!(
             "Separate the rivals ({}): give another record, with a wider or faster input; docs/choosing-effects.md \
              explains how to separate neighbours.",
-            which.class.join(", ")
+            few(&which.class)
         )),
         (_, Decision::Partial) => {
-            steps.push(format!("Add {} to the twin.", which.accepted.join(" and ")));
-            let remains = which.remains.as_ref().map(|r| r.place.as_str());
-            steps.extend(unlisted(diagnosis, remains));
+            steps.push(add(which));
+            let remains = which.remains.as_ref().map(|r| units.in_words(&r.place));
+            steps.extend(unlisted(diagnosis, remains.as_deref()));
         }
         _ => {
-            let places = somewhere(&diagnosis.location).map(|[named, _]| named);
+            let places = somewhere(units, &diagnosis.location).map(|[named, _]| named);
             steps.extend(unlisted(diagnosis, places.as_deref()));
         }
     }
@@ -104,7 +103,7 @@ fn steps(diagnosis: &Diagnosis) -> Vec<String> {
     if !vague.is_empty() {
         steps.push(format!(
             "This record does not identify {}: fix the parameters that are known otherwise, or measure with a richer input.",
-            vague.join(", ")
+            few(&vague)
         ));
     }
     if diagnosis.validation_runs.is_none() && diagnosis.verdict == Verdict::StructuralGap {
@@ -112,6 +111,24 @@ fn steps(diagnosis: &Diagnosis) -> Vec<String> {
             .push("Measure a second record with another input and give it as --validation.".into());
     }
     steps
+}
+
+/// Returns the advice to add effects, by name if they are more probable than not.
+fn add(which: &Cause) -> String {
+    let Naming {
+        sure,
+        one_of,
+        is_complete,
+        ..
+    } = naming(which);
+    match (is_complete, one_of.is_empty()) {
+        (true, _) => format!("Add {} to the twin.", sure.join(" and ")),
+        (false, false) => format!(
+            "Try {} in the study, and keep the one that predicts another record best; or measure with another input to separate them.",
+            few(&one_of)
+        ),
+        (false, true) => "Measure with another input: this record names no single effect.".into(),
+    }
 }
 
 /// Returns hints for an unlisted law at a place: the maps that it leaves, and the exploration.
@@ -146,7 +163,7 @@ fn unlisted(diagnosis: &Diagnosis, place: Option<&str>) -> Vec<String> {
         .map(|term| term.name.as_str())
         .collect();
     if !terms.is_empty() {
-        look.push_str(&format!("; the exploration points to {}", terms.join(", ")));
+        look.push_str(&format!("; the exploration points to {}", few(&terms)));
     }
     vec![
         look + ".",

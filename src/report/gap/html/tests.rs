@@ -86,10 +86,19 @@ fn the_page_is_well_formed_and_stands_alone() {
 
 #[test]
 fn every_section_is_there_under_every_verdict() {
+    let units = Units::of(&oscillator());
     for diagnosis in cases() {
         let page = gap_html(&oscillator(), &diagnosis);
         assert_eq!(page.matches("class=\"first\"").count(), 1);
-        let sections = ["where", "which", "extent", "parameters", "limits", "next"];
+        let sections = [
+            "where",
+            "which",
+            "extent",
+            "parameters",
+            "limits",
+            "next",
+            "residuals",
+        ];
         for section in sections {
             assert_eq!(
                 page.matches(&format!("<section id=\"{section}\"")).count(),
@@ -104,7 +113,7 @@ fn every_section_is_there_under_every_verdict() {
         let more: usize = more.into_iter().map(usize::from).sum();
         assert_eq!(page.matches("<h2").count(), sections.len() + more);
         assert_eq!(page.matches("<h1>").count(), 1);
-        assert!(page.contains(&escaped(&headline(&diagnosis))));
+        assert!(page.contains(&escaped(&headline(&units, &diagnosis))));
         let pictures = page.matches("<svg").count();
         assert!(pictures > 0);
         assert_eq!(page.matches("role=\"img\"").count(), pictures);
@@ -223,6 +232,8 @@ fn every_part_of_the_answer_has_its_place() {
         "<title>The input to measure with next</title>",
         "measure the record below",
         "simulated by the fitted twin with as much evidence is p &lt; 0.0099 (100 simulations).",
+        "<title>Residuals against inputs</title>",
+        "of the twin with the accepted effects, over their standard deviation, of all 2 records.",
         "Not tested (excluded by the call or the study, or without a filter model): outliers@sensor",
         "<td class=\"n\">5.20 V</td>",
         "<td class=\"n\">not detectable</td>",
@@ -244,7 +255,7 @@ fn every_part_of_the_answer_has_its_place() {
     }
     let partial = gap_html(&oscillator(), &made::rig_pair());
     for text in [
-        "something remains.",
+        "something remains at enthalpy.",
         "explains most of the gap; something unknown remains.",
         "Look at enthalpy",
     ] {

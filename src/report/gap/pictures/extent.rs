@@ -16,7 +16,7 @@ pub fn extent(diagnosis: &Diagnosis) -> Option<String> {
     let errors = [
         ("not refitted", s.unfitted, false),
         ("before, refitted", Some(s.before), false),
-        ("best effect outside the class", s.placebo, false),
+        ("best other effect", s.placebo, false),
         ("effects at random, median", median(&s.random).ok(), false),
         ("after, with effects", s.after, true),
         ("floor, noise alone", s.floor, false),

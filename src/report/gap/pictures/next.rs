@@ -10,7 +10,7 @@ use crate::study::Study;
 pub fn next_input(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
     let next = diagnosis.cause.next_input.as_ref()?;
     let drive = &next.drive;
-    let inputs = Units::of(study).inputs;
+    let inputs = Units::of(study).signals.inputs;
     if inputs.is_empty() {
         return None;
     }

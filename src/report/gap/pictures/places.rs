@@ -3,6 +3,7 @@
 use crate::diagnose::{Band, Cell, Diagnosis, Lag, Region};
 use crate::report::chart::{Bar, BarChart, BarGroup};
 use crate::report::digits::{chance, percent, short, unit_suffix};
+use crate::report::gap::headline::places;
 use crate::report::units::Units;
 use crate::study::Study;
 
@@ -30,10 +31,11 @@ fn grouped<'c, C, K: Ord + Copy>(
 pub fn targets(diagnosis: &Diagnosis) -> Option<String> {
     let targets = &diagnosis.location.targets;
     let first = targets.first()?;
+    let answer = places(diagnosis);
     let bars = (targets.iter())
-        .filter(|t| t.probability >= VISIBLE)
+        .filter(|t| t.probability >= VISIBLE || answer.contains(&t.target.as_str()))
         .map(|t| {
-            let is_answer = diagnosis.location.target.as_ref() == Some(&t.target);
+            let is_answer = answer.contains(&t.target.as_str());
             Bar::new(&t.target, t.probability, &chance(t.probability)).clear(is_answer)
         })
         .collect();
@@ -85,7 +87,7 @@ pub fn regions(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
 pub fn channels(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
     let channels = diagnosis.location.maps.notable().channels;
     let clearest = channels.first()?;
-    if Units::of(study).outputs.len() < 2 {
+    if Units::of(study).signals.outputs.len() < 2 {
         return None;
     }
     let bars = (channels.iter()).map(|c| bar(&c.channel, c)).collect();

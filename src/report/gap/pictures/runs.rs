@@ -17,7 +17,7 @@ pub fn runs(study: &Study, diagnosis: &Diagnosis, validation: bool) -> Option<St
     } else {
         &diagnosis.free_runs
     };
-    let outputs = Units::of(study).outputs;
+    let outputs = Units::of(study).signals.outputs;
     let panels = (outputs.iter().enumerate())
         .map(|(j, output)| {
             let panel = Panel::new(&named(output), series(runs, j));
@@ -40,7 +40,7 @@ pub fn runs(study: &Study, diagnosis: &Diagnosis, validation: bool) -> Option<St
     };
     let (name, end) = (&diagnosis.twin, runs.times.last().copied().unwrap_or(0.0));
     let chart = Chart {
-        title: format!("{name}: {record} and twin, running free"),
+        title: format!("{name}: {record} and twin"),
         description: format!(
             "Measured outputs of the {record} over {} s; the refitted twin without noise{after}.",
             short(end)

@@ -4,6 +4,7 @@ use super::windows::{largest, mark, spans};
 use crate::diagnose::{Diagnosis, Maps, Onset};
 use crate::report::chart::{HeatGroup, HeatMap, HeatRow};
 use crate::report::digits::{percent, short};
+use crate::report::gap::headline::accepted_ids;
 
 /// Windows of time by output, of the refitted twin and, below, with the accepted effects added; `None` where nothing was looked for.
 ///
@@ -43,7 +44,7 @@ pub fn time(diagnosis: &Diagnosis) -> Option<String> {
 fn with_effects(diagnosis: &Diagnosis) -> String {
     match diagnosis.cause.accepted.as_slice() {
         [] => "with the best explanation added".into(),
-        accepted => format!("with {} added", accepted.join(" and ")),
+        _ => format!("with {} added", accepted_ids(&diagnosis.cause)),
     }
 }
 

@@ -1,0 +1,225 @@
+//! Residuals as people know them: auto-correlation, cross-correlation with the inputs, quantiles.
+
+use super::chart::{Area, Chart, Curves, Dot, Dots, Panel, Series, Style};
+use super::page::{figure, paragraph};
+use crate::record::Signal;
+use crate::study::Study;
+use statrs::distribution::{ContinuousCDF, Normal};
+
+/// Lags of the correlations, in samples.
+const LAGS: usize = 20;
+/// Standard deviations of 95 % of white noise.
+const BAND: f64 = 1.96;
+/// Points of a quantile plot: more only blot.
+const QUANTILES: usize = 200;
+/// Panels of cross-correlations; more pairs of output and input are left out.
+const PAIRS: usize = 12;
+/// Height of a panel of correlations.
+const HEIGHT: f64 = 120.0;
+
+/// Residuals of one record beside its inputs.
+pub(super) struct Left<'a> {
+    /// N × inputs.
+    pub inputs: &'a Signal,
+    /// N × outputs; NaN where nothing was measured.
+    pub outputs: &'a Signal,
+}
+
+/// Returns the pictures of the residuals of all records, which are `of_what`.
+pub(super) fn residual_figures(study: &Study, of_what: &str, all: &[Left<'_>]) -> String {
+    let signals = study.twin().signals();
+    let names = |channels: Vec<crate::record::Quantity>| -> Vec<String> {
+        channels.into_iter().map(|q| q.name).collect()
+    };
+    let (inputs, outputs) = (names(signals.inputs), names(signals.outputs));
+    let of = match all.len() {
+        1 => format!("Residuals are {of_what}."),
+        n => format!("Residuals are {of_what}, of all {n} records."),
+    };
+    let mut body = paragraph(&of);
+    body += &figure(
+        &auto_correlations(&outputs, all),
+        "Band: 95 % of white noise. Residuals of a right twin's predictions are white.",
+    );
+    if let Some(svg) = cross_correlations(&outputs, &inputs, all) {
+        body += &figure(
+            &svg,
+            "Residuals against inputs some samples before. Band: 95 % of white noise. Outside it, the twin misses a part of what the input \
+             does.",
+        );
+    }
+    body += &figure(
+        &quantiles(&outputs, all),
+        "Sorted, against those of a normal distribution of the same size: on the line if they are normal.",
+    );
+    body
+}
+
+/// A column less its mean over all records; missing values are 0, which adds nothing to a product.
+fn centred<'a>(
+    all: &'a [Left<'a>],
+    pick: impl Fn(&Left<'a>) -> &'a Signal,
+    j: usize,
+) -> Vec<Vec<f64>> {
+    let columns: Vec<Vec<f64>> = all.iter().map(|l| pick(l).column(j).to_vec()).collect();
+    let there = || columns.iter().flatten().filter(|v| v.is_finite());
+    let mean = there().sum::<f64>() / there().count().max(1) as f64;
+    let centre = |v: f64| if v.is_finite() { v - mean } else { 0.0 };
+    (columns.into_iter())
+        .map(|column| column.into_iter().map(centre).collect())
+        .collect()
+}
+
+/// Correlation of `late` with `early` so many samples before, over all records.
+fn correlation(late: &[Vec<f64>], early: &[Vec<f64>], lag: usize) -> f64 {
+    let product: f64 = (late.iter().zip(early))
+        .map(|(a, b)| {
+            let shifted = a.iter().skip(lag);
+            shifted.zip(b).map(|(x, y)| x * y).sum::<f64>()
+        })
+        .sum();
+    let size = |all: &[Vec<f64>]| all.iter().flatten().map(|v| v * v).sum::<f64>();
+    product / (size(late) * size(early)).sqrt().max(f64::MIN_POSITIVE)
+}
+
+/// A panel of correlations at some lags, with the band of white noise of so many values.
+fn panel(label: &str, at: impl Fn(usize) -> f64, lags: [usize; 2], count: usize) -> Panel {
+    let reach = BAND / (count.max(1) as f64).sqrt();
+    let dots = (lags[0]..=lags[1]).map(|lag| {
+        let y = at(lag);
+        Dot {
+            x: lag as f64,
+            y,
+            low: y.min(0.0),
+            high: y.max(0.0),
+        }
+    });
+    let ends = [lags[0] as f64 - 0.5, lags[1] as f64 + 0.5].map(|x| (x, -reach, reach));
+    let zero = Series::new("", Style::ZERO, ends.map(|(x, ..)| (x, 0.0)));
+    Panel::new(label, vec![zero])
+        .height(HEIGHT)
+        .area(Area {
+            label: "95 % of white noise".into(),
+            points: ends.to_vec(),
+        })
+        .dots(Dots {
+            label: String::new(),
+            points: dots.collect(),
+        })
+}
+
+/// Number of residuals of an output that are there.
+fn count(all: &[Left<'_>], j: usize) -> usize {
+    let there = |l: &Left<'_>| l.outputs.column(j).iter().filter(|v| v.is_finite()).count();
+    all.iter().map(there).sum()
+}
+
+/// Auto-correlations of the residuals of each output.
+fn auto_correlations(names: &[String], all: &[Left<'_>]) -> String {
+    let panels = names.iter().enumerate().map(|(j, name)| {
+        let own = centred(all, |l| l.outputs, j);
+        let at = |lag| correlation(&own, &own, lag);
+        let label = format!("correlation of {name}");
+        panel(&label, at, [1, LAGS], count(all, j))
+    });
+    Chart {
+        title: "Residuals against themselves".into(),
+        description: format!("Auto-correlations of the residuals at lags 1 to {LAGS}."),
+        x: "lag in samples".into(),
+        panels: panels.collect(),
+    }
+    .svg()
+}
+
+/// Cross-correlations of the residuals of each output with each input before; `None` without inputs.
+fn cross_correlations(outputs: &[String], inputs: &[String], all: &[Left<'_>]) -> Option<String> {
+    let pairs = (0..outputs.len()).flat_map(|j| (0..inputs.len()).map(move |i| (j, i)));
+    let panels: Vec<Panel> = pairs
+        .take(PAIRS)
+        .map(|(j, i)| {
+            let late = centred(all, |l| l.outputs, j);
+            let early = centred(all, |l| l.inputs, i);
+            let label = format!("correlation of {} with {}", outputs[j], inputs[i]);
+            let at = |lag| correlation(&late, &early, lag);
+            panel(&label, at, [0, LAGS], count(all, j))
+        })
+        .collect();
+    if panels.is_empty() {
+        return None;
+    }
+    let chart = Chart {
+        title: "Residuals against inputs".into(),
+        description: format!(
+            "Cross-correlations of residuals with inputs at lags 0 to {LAGS}, {} panels.",
+            panels.len()
+        ),
+        x: "lag in samples".into(),
+        panels,
+    };
+    Some(chart.svg())
+}
+
+/// Quantiles of the residuals of each output against normal ones.
+fn quantiles(names: &[String], all: &[Left<'_>]) -> String {
+    let normal = Normal::standard();
+    let panels = names.iter().enumerate().map(|(j, name)| {
+        let columns = all.iter().flat_map(|l| l.outputs.column(j).to_vec());
+        let mut values: Vec<f64> = columns.filter(|v| v.is_finite()).collect();
+        values.sort_unstable_by(f64::total_cmp);
+        let n = values.len().max(1) as f64;
+        let size = (values.iter().map(|v| v * v).sum::<f64>() / n).sqrt();
+        let every = values.len().div_ceil(QUANTILES).max(1);
+        let points: Vec<(f64, f64)> = (values.iter().enumerate().step_by(every))
+            .map(|(i, v)| (normal.inverse_cdf((i as f64 + 0.5) / n), *v))
+            .collect();
+        let ends = [points.first(), points.last()].into_iter().flatten();
+        let line: Vec<(f64, f64)> = ends.map(|(x, _)| (*x, x * size)).collect();
+        let lines = vec![
+            Series::new("normal", Style::ZERO, line),
+            Series::new("residuals", Style::AFTER, points),
+        ];
+        (
+            "normal quantile".to_owned(),
+            Panel::new(&format!("residual of {name}"), lines),
+        )
+    });
+    Curves {
+        title: "Sizes of residuals".into(),
+        description: "Sorted residuals against quantiles of a normal distribution.".into(),
+        panels: panels.collect(),
+    }
+    .svg()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A residual that is the input three samples before, in two records: the correlation is 1 there alone.
+    #[test]
+    fn a_missed_delay_shows_in_the_cross_correlation() {
+        let noise = |k: usize| ((k * k * 7919 + k * 104_729) % 2003) as f64 / 1001.0 - 1.0;
+        let inputs =
+            [0, 5000].map(|from| Signal::from_shape_fn((400, 1), |(k, _)| noise(k + from)));
+        let outputs = [0, 5000].map(|from| {
+            Signal::from_shape_fn((400, 1), |(k, _)| match k {
+                0..3 => f64::NAN,
+                k => 0.5 * noise(k - 3 + from),
+            })
+        });
+        let all: Vec<Left<'_>> = (inputs.iter().zip(&outputs))
+            .map(|(inputs, outputs)| Left { inputs, outputs })
+            .collect();
+        let late = centred(&all, |l| l.outputs, 0);
+        let early = centred(&all, |l| l.inputs, 0);
+        let at: Vec<f64> = (0..=LAGS)
+            .map(|lag| correlation(&late, &early, lag))
+            .collect();
+        let band = BAND / (count(&all, 0) as f64).sqrt();
+        assert!(at[3] > 0.99, "{at:?}");
+        let outside = at.iter().filter(|r| r.abs() > 2.0 * band).count();
+        assert_eq!(outside, 1, "{at:?}");
+        assert_eq!(count(&all, 0), 794);
+        assert!(correlation(&late, &late, 1).abs() < 2.0 * band);
+    }
+}
