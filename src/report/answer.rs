@@ -41,6 +41,7 @@ pub(crate) fn estimate_html(study: &Study, record: &Record, estimate: &Estimate)
         posterior: estimate.posterior.as_ref(),
         residuals: residuals.as_ref(),
         of_what: "record − free run",
+        is_white: false,
         warnings: &estimate.warnings,
         text,
     };
@@ -69,6 +70,7 @@ pub(crate) fn fit_html(study: &Study, records: &[Record], fit: &Fit) -> String {
         posterior: fit.posterior.as_ref(),
         residuals: fit.residuals.first(),
         of_what: "one-step errors over their standard deviation",
+        is_white: true,
         warnings: &fit.warnings,
         text: super::fit::fit_text(study, fit),
     };
@@ -84,6 +86,8 @@ struct Answer<'a> {
     posterior: Option<&'a Posterior>,
     residuals: Option<&'a Signal>,
     of_what: &'static str,
+    /// Residuals of a right twin are white: one-step errors are, differences from a free run are not if the states have noise.
+    is_white: bool,
     warnings: &'a [Warning],
     text: String,
 }
@@ -155,11 +159,15 @@ impl Answer<'_> {
             .map(|output| output.name)
             .collect();
         let what = format!("Of {}.", self.of_what);
+        let whiteness = match self.is_white {
+            true => "Band: 95 % of white noise. One-step errors of a right twin are white.",
+            false => {
+                "A right twin's are white only without process noise: a state that noise has moved stays off for a while. `truetwin fit` shows one-step errors, which are white for every right twin."
+            }
+        };
         let lags = figure(
-            &correlations(&names, residuals),
-            &format!(
-                "{what} Band: 95 % of white noise. Residuals of a right twin's predictions are white."
-            ),
+            &correlations(&names, residuals, self.is_white),
+            &format!("{what} {whiteness}"),
         );
         let quantiles = figure(
             &quantiles(&names, residuals),
@@ -172,7 +180,7 @@ impl Answer<'_> {
 }
 
 /// Auto-correlations of the residuals of each output.
-fn correlations(names: &[String], residuals: &Signal) -> String {
+fn correlations(names: &[String], residuals: &Signal, is_white: bool) -> String {
     let panels = names.iter().enumerate().map(|(j, name)| {
         let values = present(residuals, j);
         let n = values.len().max(1) as f64;
@@ -194,16 +202,18 @@ fn correlations(names: &[String], residuals: &Signal) -> String {
         });
         let ends = [(0.5, -reach, reach), (LAGS as f64 + 0.5, -reach, reach)];
         let zero = ends.map(|(x, ..)| (x, 0.0));
-        Panel::new(
+        let panel = Panel::new(
             &format!("correlation of {name}"),
             vec![Series::new("", Style::ZERO, zero)],
-        )
-        .height(120.0)
-        .area(Area {
-            label: "95 % of white noise".into(),
-            points: ends.to_vec(),
-        })
-        .dots(Dots {
+        );
+        let panel = match is_white {
+            true => panel.area(Area {
+                label: "95 % of white noise".into(),
+                points: ends.to_vec(),
+            }),
+            false => panel,
+        };
+        panel.height(120.0).dots(Dots {
             label: String::new(),
             points: dots.collect(),
         })
