@@ -63,9 +63,7 @@ pub(super) fn check_all<'a>(
     for name in names {
         check(name).map_err(|problem| format!("{what}: {problem}"))?;
         if !seen.insert(name) {
-            return Err(format!(
-                "{what}: duplicate name {name}; rename one"
-            ));
+            return Err(format!("{what}: duplicate name {name}; rename one"));
         }
     }
     Ok(())
@@ -99,6 +97,9 @@ mod tests {
             assert!(!problem.contains(hidden), "{problem}");
         }
         let twice = check_all("inputs", ["u", "u"]).unwrap_err();
-        assert!(twice.contains("inputs: duplicate name u; rename one"), "{twice}");
+        assert!(
+            twice.contains("inputs: duplicate name u; rename one"),
+            "{twice}"
+        );
     }
 }

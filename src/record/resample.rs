@@ -173,7 +173,9 @@ mod tests {
             1,
             "a gap of 1.5 s"
         );
-        let held = resample(&uneven, 1.5, InputRule::Hold, None).unwrap().record;
+        let held = resample(&uneven, 1.5, InputRule::Hold, None)
+            .unwrap()
+            .record;
         assert_eq!(column(held.drive().inputs()), [1.0, 2.0, 8.0]);
         assert_eq!(column(held.outputs()), [0.0, 2.0, 5.0]);
         assert!(held.drive().is_uniform());

@@ -282,7 +282,7 @@ mod tests {
         let of_fit = fit_html(&found.study, &records, &fit);
         assert!(of_fit.contains("id=\"draws\""));
         for page in [
-            of_fit,
+            of_fit.clone(),
             estimate_html(&found.study, &found.record, &found.refined),
         ] {
             for part in [
@@ -296,5 +296,10 @@ mod tests {
             }
             assert!(!page.contains("NaN") && !page.contains("<script"));
         }
+        // Only one-step errors are to be white.
+        let of_estimate = estimate_html(&found.study, &found.record, &found.refined);
+        assert!(of_fit.contains("95 % of white noise"));
+        assert!(!of_estimate.contains("95 % of white noise"));
+        assert!(of_estimate.contains("white only without process noise"));
     }
 }

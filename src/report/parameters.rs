@@ -194,7 +194,14 @@ mod tests {
         let parameter = Parameter::new("k", "1/s", -0.25, 1.0).within(f64::NEG_INFINITY, 2e9);
         let mut row = ParameterRow::new(&parameter, 0.5, 0.18, [0.2, 0.8]);
         row.leans = true;
-        let line = || ("k".to_owned(), Role::Parameter, row.clone(), vec!["0.4".to_owned()]);
+        let line = || {
+            (
+                "k".to_owned(),
+                Role::Parameter,
+                row.clone(),
+                vec!["0.4".to_owned()],
+            )
+        };
         let text = parameter_rows(["final", "90 % interval"], &["initial"], &[line()]);
         assert_eq!(text[0].len(), text[1].len());
         assert_eq!(
@@ -202,7 +209,10 @@ mod tests {
             "k|1/s|0.4|0.50|0.18|[0.20, 0.80]|−0.25…1|−∞…2e9|leans on prior: 25 %"
         );
         let page = parameter_table("", &["initial"], &[line()]);
-        assert!(page.contains("−∞…2e9") && page.contains("leans on prior: 25 %"), "{page}");
+        assert!(
+            page.contains("−∞…2e9") && page.contains("leans on prior: 25 %"),
+            "{page}"
+        );
         let level = parameter.with_role(Role::Noise);
         let row = ParameterRow::new(&level, 0.5, 0.18, [0.2, 0.8]);
         assert_eq!(row.cells(Role::Noise)[3..], ["", "", ""]);

@@ -8,8 +8,7 @@ use crate::twins::CascadedTanks;
 
 /// The tanks, all physical parameters fixed.
 fn fixed(tables: &str) -> Study {
-    let text =
-        format!("twin = 'tanks'\n[fixed]\nk1 = 0.6\nk2 = 0.6\nk3 = 0.6\nk4 = 0.6\n{tables}");
+    let text = format!("twin = 'tanks'\n[fixed]\nk1 = 0.6\nk2 = 0.6\nk3 = 0.6\nk4 = 0.6\n{tables}");
     let file = StudyFile::parse(&text, "s.toml".as_ref()).unwrap();
     let plan = RecordPlan::levels(0.5, 60, 0.0, 3.0, 30);
     let study = Study::new("tanks", CascadedTanks, plan).unwrap();
