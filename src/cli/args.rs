@@ -50,8 +50,13 @@ pub(super) struct FileColumns {
 }
 
 impl FileColumns {
-    /// Creates a reader of the records of a study.
+    /// Creates a reader of the records of a study; it refuses those with other channels than the twin's.
     pub fn reader(&self, study: &Study) -> RecordReader {
+        self.reader_of_any(study).for_twin(study.name())
+    }
+
+    /// As [`reader`](Self::reader), for a verb that looks at the channels itself.
+    pub fn reader_of_any(&self, study: &Study) -> RecordReader {
         let columns = self.columns.clone();
         let columns = columns.unwrap_or_else(|| study.file().record.columns.clone());
         RecordReader::new(columns, Some(study.twin().signals()))
@@ -85,12 +90,14 @@ pub(super) fn at_least_one(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(0) => Err("choose at least 1".into()),
         Ok(number) => Ok(number),
-        Err(error) => Err(format!("{error}")),
+        // Failure::usage has the words.
+        Err(error) => Err(error.to_string()),
     }
 }
 
 /// Parses a duration in seconds.
 pub(super) fn seconds(text: &str) -> Result<Duration, String> {
     let number: f64 = text.parse().map_err(|error| format!("{error}"))?;
-    Duration::try_from_secs_f64(number).map_err(|error| error.to_string())
+    Duration::try_from_secs_f64(number)
+        .map_err(|_| "expected a positive number of seconds".to_owned())
 }

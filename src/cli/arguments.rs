@@ -2,7 +2,7 @@
 
 use super::args::External;
 use super::verbs::Command as Verbs;
-use clap::{Command, CommandFactory, Parser};
+use clap::{Arg, Command, CommandFactory, Parser};
 
 /// Calibrate simulators against measured data and diagnose what they are missing.
 #[derive(Debug, Parser)]
@@ -44,5 +44,14 @@ pub(super) fn command() -> Command {
         };
         command.after_help(text)
     };
-    with_exit(Arguments::command()).mut_subcommands(with_exit)
+    // `--seed -1` is a wrong number, not an unknown option.
+    let signed = |argument: Arg| {
+        let takes_value = argument.get_action().takes_values() && !argument.is_positional();
+        match takes_value {
+            true => argument.allow_negative_numbers(true),
+            false => argument,
+        }
+    };
+    with_exit(Arguments::command().mut_args(signed))
+        .mut_subcommands(|verb| with_exit(verb.mut_args(signed)))
 }

@@ -71,6 +71,33 @@ impl Context<'_> {
         }
     }
 
+    /// Refuses a program or FMU beside `--twin` or `--study` of another twin: it would be ignored.
+    pub fn check_external_is_used(&self, subject: &Subject) -> Result<(), Failure> {
+        if self.external.is_none() {
+            return Ok(());
+        }
+        let (option, name) = match (&subject.twin, &subject.study) {
+            (Some(name), _) => ("--twin", name.clone()),
+            (None, Some(path)) => ("--study", StudyFile::read(path)?.twin),
+            (None, None) => return Ok(()),
+        };
+        // An unknown name is refused where the twin is looked up, with the known ones.
+        match self.named(&name) {
+            Ok(_) => self.check_external_is(&name, option),
+            Err(_) => Ok(()),
+        }
+    }
+
+    /// Refuses a program or FMU with another twin than the one that `option` names.
+    pub fn check_external_is(&self, name: &str, option: &str) -> Result<(), Failure> {
+        match self.external.map(|project| project.study().name()) {
+            Some(external) if external != name => Err(Failure::user(format!(
+                "{option} names the twin {name}, --program or --fmu the twin {external}; give one of them"
+            ))),
+            _ => Ok(()),
+        }
+    }
+
     /// Returns the share of this process in numbered work: that of `--shard`, or of its rank.
     pub fn share(&self, asked: Option<Share>) -> Result<Share, Failure> {
         match asked {

@@ -24,6 +24,24 @@ const USER: u8 = 2;
 /// Exit code of everything else.
 const INTERNAL: u8 = 1;
 
+/// Words of the standard library for text that is no number, and what is expected in place of it.
+const NUMBERS: [(&str, &str); 6] = [
+    ("invalid digit found in string", WHOLE),
+    ("cannot parse integer from empty string", WHOLE),
+    (
+        "number too large to fit in target type",
+        "expected a whole number up to 18446744073709551615",
+    ),
+    ("number too small to fit in target type", WHOLE),
+    ("invalid float literal", "expected a number, such as 0.5"),
+    (
+        "cannot parse float from empty string",
+        "expected a number, such as 0.5",
+    ),
+];
+const WHOLE: &str =
+    "expected a whole number in digits, such as 100, without sign, point or exponent";
+
 /// The reason why a verb ended early.
 #[derive(Debug)]
 pub(super) struct Failure {
@@ -70,7 +88,8 @@ impl Failure {
         let text = error.to_string();
         let first = text.split("\n\n").next().unwrap_or(&text);
         let line = first.split_whitespace().collect::<Vec<_>>().join(" ");
-        let line = line.strip_prefix("error: ").unwrap_or(&line);
+        let line = line.strip_prefix("error: ").unwrap_or(&line).to_owned();
+        let line = (NUMBERS.iter()).fold(line, |line, (library, ours)| line.replace(library, ours));
         let similar = [
             ContextKind::SuggestedSubcommand,
             ContextKind::SuggestedArg,

@@ -163,6 +163,9 @@ fn dispatch(
         command: arguments::command,
     };
     let verb = arguments.command.verb();
+    if let Some(subject) = verb.subject() {
+        context.check_external_is_used(subject)?;
+    }
     let study = verb.subject().and_then(|subject| subject.study.as_deref());
     (verb.run(&context)).map_err(|failure| failure.of_study(study))
 }

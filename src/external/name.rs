@@ -1,4 +1,4 @@
-//! Names that come from outside: of twins, parameters and channels.
+//! Names of twins, parameters and channels that come from programs and FMUs.
 
 use crate::storage::untrusted::hidden;
 
@@ -9,14 +9,14 @@ fn odd(c: char) -> bool {
     c.is_whitespace() || hidden(c) || ",=@\"'\\".contains(c)
 }
 
-/// `name` with `_` in place of what [`check`] refuses.
+/// Replaces characters that [`check`] refuses by `_`.
 #[cfg(feature = "fmi")]
 pub(super) fn made_fit(name: &str) -> String {
     let fit = |c| if odd(c) { '_' } else { c };
     name.chars().take(LONGEST).map(fit).collect()
 }
 
-/// Checks whether `name` can stand on a command line (`--theta a=1,b=2`), in a study file and in a table; else what is wrong.
+/// Checks that `name` can be written on a command line (`--theta a=1,b=2`), in a study file and in a table. The error says what is wrong.
 pub(super) fn check(name: &str) -> Result<(), String> {
     if name.is_empty() {
         return Err("a name is empty; give each its own".into());
@@ -28,20 +28,20 @@ pub(super) fn check(name: &str) -> Result<(), String> {
     }
     match name.chars().find(|&c| odd(c)) {
         Some(c) => Err(format!(
-            "the name {name:?} holds {c:?}; use letters, digits, _ - . instead"
+            "the name {name:?} contains {c:?}; use letters, digits, _ - . instead"
         )),
         None => Ok(()),
     }
 }
 
-/// A unit, fit to be shown beside a number: without hidden characters, and not too long.
+/// Replaces hidden characters of a unit by `_` and cuts it to the longest one.
 #[cfg(feature = "fmi")]
 pub(super) fn made_fit_unit(unit: &str) -> String {
     let fit = |c| if hidden(c) { '_' } else { c };
     unit.chars().take(LONGEST).map(fit).collect()
 }
 
-/// Checks whether a unit can be shown beside a number; else what is wrong.
+/// Checks that a unit can be shown beside a number. The error says what is wrong.
 pub(super) fn check_unit(unit: &str) -> Result<(), String> {
     if unit.chars().count() > LONGEST {
         return Err(format!(
@@ -49,12 +49,12 @@ pub(super) fn check_unit(unit: &str) -> Result<(), String> {
         ));
     }
     match unit.chars().find(|&c| hidden(c)) {
-        Some(c) => Err(format!("the unit {unit:?} holds {c:?}; leave that out")),
+        Some(c) => Err(format!("the unit {unit:?} contains {c:?}; remove it")),
         None => Ok(()),
     }
 }
 
-/// As [`check`] for each of `names`, which must be unique.
+/// Checks each of `names` as [`check`] does, and that no two are the same.
 pub(super) fn check_all<'a>(
     what: &str,
     names: impl IntoIterator<Item = &'a str>,
@@ -63,9 +63,7 @@ pub(super) fn check_all<'a>(
     for name in names {
         check(name).map_err(|problem| format!("{what}: {problem}"))?;
         if !seen.insert(name) {
-            return Err(format!(
-                "{what}: {name} stands there twice; give each its own name"
-            ));
+            return Err(format!("{what}: duplicate name {name}; rename one"));
         }
     }
     Ok(())
@@ -99,6 +97,9 @@ mod tests {
             assert!(!problem.contains(hidden), "{problem}");
         }
         let twice = check_all("inputs", ["u", "u"]).unwrap_err();
-        assert!(twice.contains("inputs: u stands there twice"), "{twice}");
+        assert!(
+            twice.contains("inputs: duplicate name u; rename one"),
+            "{twice}"
+        );
     }
 }

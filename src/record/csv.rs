@@ -57,6 +57,8 @@ pub fn parse_record(text: &str, path: &Path) -> Result<Record, RecordError> {
 pub struct RecordReader {
     columns: Columns,
     signals: Option<Signals>,
+    /// Name of the twin whose channels each record must have.
+    twin: Option<String>,
     /// Numbers that may be read yet.
     left: usize,
 }
@@ -66,6 +68,7 @@ impl Default for RecordReader {
         Self {
             columns: Columns::default(),
             signals: None,
+            twin: None,
             left: MOST_NUMBERS,
         }
     }
@@ -81,10 +84,22 @@ impl RecordReader {
         }
     }
 
+    /// Refuses records that do not have the channels of the twin; messages call it by this name.
+    #[must_use]
+    pub fn for_twin(mut self, name: &str) -> Self {
+        self.twin = Some(name.into());
+        self
+    }
+
     /// Reads a measured record.
     pub fn record(&mut self, path: &Path) -> Result<Record, RecordError> {
         let columns = self.columns.clone();
-        self.read(path, &columns)?.record(path)
+        let record = self.read(path, &columns)?.record(path)?;
+        if let Some((twin, signals)) = self.twin.as_ref().zip(self.signals.as_ref()) {
+            (record.check_channels(signals))
+                .map_err(|error| RecordError::file(path, error.of_twin(twin)))?;
+        }
+        Ok(record)
     }
 
     /// Reads time and inputs; columns of outputs are refused.

@@ -55,7 +55,7 @@ pub enum RecordError {
     },
     /// A missing output where every one is needed.
     #[error(
-        "row {row}, column {column} is missing; features need every output: fill it in (`truetwin resample R.csv --step s --out R2.csv`), or use `truetwin fit` or `truetwin diagnose`, which take such records"
+        "row {row}, column {column} is missing; features need every output: fill it in (`truetwin resample R.csv --step S --out R2.csv` closes short gaps; --longest-gap for longer ones), or use `truetwin fit` or `truetwin diagnose`, which take such records"
     )]
     Incomplete {
         /// Row of the file; the header is row 1.
@@ -106,7 +106,9 @@ pub enum RecordError {
     },
     /// Channels other than the twin's.
     #[error(
-        "the record has {given} {kind}, the twin has {expected} ({names}); name its columns so"
+        "the record has {given} {kind}, the twin has {expected}{}; {} takes the columns {columns}: choose the twin that this record is of (`truetwin twins` lists them), or correct the columns",
+        names.as_deref().map_or(String::new(), |names| format!(" ({names})")),
+        twin.as_deref().unwrap_or("the twin")
     )]
     Channels {
         /// "inputs" or "outputs".
@@ -115,8 +117,12 @@ pub enum RecordError {
         given: usize,
         /// In the twin.
         expected: usize,
-        /// Columns that the file needs.
-        names: String,
+        /// The twin's columns of this kind, if it has any.
+        names: Option<String>,
+        /// All columns of the twin's records.
+        columns: String,
+        /// Name of the twin, where it is known.
+        twin: Option<String>,
     },
     /// A file that cannot be read or written.
     #[error("{}: {}", path.display(), with_remedy(error))]
@@ -137,6 +143,28 @@ pub enum RecordError {
 }
 
 impl RecordError {
+    /// Adds the name of the twin to an error about its channels.
+    pub(crate) fn of_twin(self, name: &str) -> Self {
+        match self {
+            Self::Channels {
+                kind,
+                given,
+                expected,
+                names,
+                columns,
+                ..
+            } => Self::Channels {
+                kind,
+                given,
+                expected,
+                names,
+                columns,
+                twin: Some(name.into()),
+            },
+            other => other,
+        }
+    }
+
     /// Creates an error about a file as a whole.
     pub(super) fn file(path: &Path, problem: impl std::fmt::Display) -> Self {
         Self::File {

@@ -165,11 +165,16 @@ impl Record {
             ("outputs", "y", self.outputs.ncols(), signals.outputs.len()),
         ] {
             if given != expected {
+                let inputs = column_names("u", signals.inputs.len());
+                let outputs = column_names("y", signals.outputs.len());
+                let columns = [vec!["t".to_owned()], inputs, outputs].concat();
                 return Err(RecordError::Channels {
                     kind,
                     given,
                     expected,
-                    names: column_names(letter, expected).join(","),
+                    names: (expected > 0).then(|| column_names(letter, expected).join(",")),
+                    columns: columns.join(","),
+                    twin: None,
                 });
             }
         }
@@ -217,7 +222,11 @@ mod tests {
         assert_eq!(error, "output 2, sample 2 is inf; outputs must be finite");
         let record = Record::new(drive, Signal::zeros((3, 1))).unwrap();
         let error = record.check_channels(&Signals::default()).unwrap_err();
-        assert!(error.to_string().contains("0 inputs, the twin has 1 (u)"));
+        let text = error.to_string();
+        assert!(text.contains("0 inputs, the twin has 1 (u)"), "{text}");
+        let named = error.of_twin("tanks").to_string();
+        let expected = "tanks takes the columns t,u,y: choose the twin";
+        assert!(named.contains(expected), "{named}");
     }
     #[test]
     fn outputs_may_be_missing() {

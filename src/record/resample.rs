@@ -7,6 +7,9 @@ use crate::storage::untrusted::MOST_NUMBERS;
 
 /// Share of a step within which two instants are the same: that of uniform steps.
 const SAME: f64 = 1e-3;
+/// Longest gap that is closed unless said otherwise, in steps between the measured outputs on both sides: three missing samples. A
+/// straight line over more may miss a motion of the system.
+pub(crate) const CLOSED_STEPS: f64 = 4.0;
 
 /// Inputs of a new step, made from those held over the old ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,20 +27,32 @@ pub struct Resampled {
     pub record: Record,
     /// Outputs that lie between two measured ones and were interpolated.
     pub interpolated: usize,
-    /// Longest gap between measured outputs that is interpolated over, in seconds.
+    /// Longest time between two measured outputs that is interpolated over, in seconds.
     pub longest_gap: f64,
 }
 
 /// Resamples a record to one `step` in seconds, from its first sample on.
 ///
-/// Outputs are interpolated linearly between measured ones. A gap longer than a step, the old or the new one, stays empty.
+/// Outputs are interpolated linearly between measured ones that are at most `longest_gap` seconds apart ([`CLOSED_STEPS`] steps, the old
+/// or the new ones, if not given). Longer gaps stay empty, and so do samples before the first measured output and after the last.
 ///
 /// # Errors
 ///
-/// [`RecordError`]: a step that is not positive, or that leaves too few or too many samples.
-pub fn resample(record: &Record, step: f64, rule: InputRule) -> Result<Resampled, RecordError> {
+/// [`RecordError`]: a step that is not positive, or that leaves too few or too many samples; a gap that is not positive.
+pub fn resample(
+    record: &Record,
+    step: f64,
+    rule: InputRule,
+    longest_gap: Option<f64>,
+) -> Result<Resampled, RecordError> {
     if !(step > 0.0 && step.is_normal()) {
         return Err(RecordError::Step(step));
+    }
+    if let Some(gap) = longest_gap.filter(|gap| !(*gap > 0.0 && gap.is_finite())) {
+        return Err(RecordError::Resample(format!(
+            "a longest gap of {} s; choose a positive number of seconds",
+            number(gap)
+        )));
     }
     let drive = record.drive();
     let (inputs, outputs) = (drive.inputs().ncols(), record.outputs().ncols());
@@ -58,7 +73,7 @@ pub fn resample(record: &Record, step: f64, rule: InputRule) -> Result<Resampled
         return refused(&format!("more than {most} samples"), "choose a longer step");
     }
     let samples = steps as usize + 1;
-    let longest_gap = drive.dt().max(step) * (1.0 + SAME);
+    let longest_gap = longest_gap.unwrap_or(CLOSED_STEPS * drive.dt().max(step));
     let mut interpolated = 0;
     let mut all = Signal::from_elem((samples, outputs), f64::NAN);
     for (j, mut column) in all.columns_mut().into_iter().enumerate() {
@@ -79,7 +94,7 @@ pub fn resample(record: &Record, step: f64, rule: InputRule) -> Result<Resampled
             if after <= t + slack {
                 *value = y;
             } else if let Some((before, start)) = next.checked_sub(1).map(|i| measured[i])
-                && after - before <= longest_gap
+                && after - before <= longest_gap * (1.0 + SAME)
             {
                 interpolated += 1;
                 *value = start + (y - start) * (t - before) / (after - before);
@@ -151,14 +166,16 @@ mod tests {
             &[1.0, 2.0, 4.0, 8.0],
             &[0.0, 1.0, 4.0, 5.0],
         );
-        let even = resample(&uneven, 1.0, InputRule::Mean).unwrap();
+        let even = resample(&uneven, 1.0, InputRule::Mean, Some(1.0)).unwrap();
         assert_eq!(column(even.record.drive().inputs()), [1.0, 2.0, 3.0, 8.0]);
         assert_eq!(
             even.record.outputs().iter().filter(|y| y.is_nan()).count(),
             1,
             "a gap of 1.5 s"
         );
-        let held = resample(&uneven, 1.5, InputRule::Hold).unwrap().record;
+        let held = resample(&uneven, 1.5, InputRule::Hold, None)
+            .unwrap()
+            .record;
         assert_eq!(column(held.drive().inputs()), [1.0, 2.0, 8.0]);
         assert_eq!(column(held.outputs()), [0.0, 2.0, 5.0]);
         assert!(held.drive().is_uniform());
@@ -174,18 +191,42 @@ mod tests {
             &[0.0, 0.1, nan, 0.3, 0.4],
         );
         for rule in [InputRule::Mean, InputRule::Hold] {
-            let same = resample(&own, 0.1, rule).unwrap();
+            let same = resample(&own, 0.1, rule, Some(0.1)).unwrap();
             assert_eq!(
                 column(same.record.drive().inputs()),
                 [1.0, 2.0, 3.0, 4.0, 5.0]
             );
             assert_eq!((same.record.missing(), same.interpolated), (1, 0));
         }
-        let coarse = resample(&own, 0.2, InputRule::Mean).unwrap();
+        let coarse = resample(&own, 0.2, InputRule::Mean, None).unwrap();
         assert_eq!(column(coarse.record.drive().inputs()), [1.5, 3.5, 5.0]);
         assert_eq!(column(coarse.record.outputs()), [0.0, 0.2, 0.4]);
-        let fine = resample(&own, 0.05, InputRule::Mean).unwrap().record;
+        let fine = resample(&own, 0.05, InputRule::Mean, Some(0.1));
+        let fine = fine.unwrap().record;
         assert_eq!((fine.samples(), fine.missing()), (9, 3));
+    }
+
+    /// One to three missing samples are closed on the record's own grid; four are not, unless asked for; ends never.
+    #[test]
+    fn short_gaps_are_closed() {
+        let nan = f64::NAN;
+        let y = [
+            nan, 0.1, nan, 0.3, nan, nan, nan, 0.7, nan, nan, nan, nan, 1.2, nan,
+        ];
+        let times: Vec<f64> = (0..14).map(|k| 0.1 * f64::from(k)).collect();
+        let own = record(&times, &[0.0; 14], &y);
+        let missing = |gap| resample(&own, 0.1, InputRule::Mean, gap).unwrap();
+        let closed = missing(None);
+        assert_eq!((closed.interpolated, closed.record.missing()), (4, 6));
+        let line: Vec<f64> = closed.record.outputs().iter().copied().collect();
+        assert!((line[5] - 0.5).abs() < 1e-12 && line[8].is_nan());
+        assert!((closed.longest_gap - 0.4).abs() < 1e-12);
+        assert_eq!(missing(Some(0.5)).record.missing(), 2);
+        assert_eq!(missing(Some(0.3)).interpolated, 1);
+        for gap in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let refused = resample(&own, 0.1, InputRule::Mean, Some(gap)).unwrap_err();
+            assert!(refused.to_string().contains("choose a positive number"));
+        }
     }
 
     #[test]
@@ -200,7 +241,7 @@ mod tests {
             ),
             (1e-12, "choose a longer step"),
         ] {
-            let error = resample(&short, step, InputRule::Mean)
+            let error = resample(&short, step, InputRule::Mean, None)
                 .unwrap_err()
                 .to_string();
             assert!(error.contains(part), "{error}");

@@ -248,7 +248,7 @@ fn csv_error(path: &Path, separator: u8, error: csv::Error) -> RecordError {
             len,
         } => {
             let comma = if len > expected_len && separator == b',' {
-                "; write decimal points, not commas"
+                "; write decimal points, or separate the columns by semicolons"
             } else {
                 ""
             };
@@ -282,6 +282,13 @@ fn channels(names: &[&str], columns: &Columns) -> Result<(usize, usize), String>
             "t" => "column t appears twice; remove one".into(),
             name => format!("column \"{}\" appears twice; {}", quoted(name), rename()),
         });
+    }
+    let is_number = |name: &&str| name.replacen(',', ".", 1).parse::<f64>().is_ok();
+    if columns.is_empty() && names.iter().all(is_number) {
+        return Err(
+            "row 1 holds numbers, not the names of the columns; add a first row such as t,u,y"
+                .into(),
+        );
     }
     let channel =
         |name: &str| name.starts_with(['u', 'y']) && name[1..].chars().all(|c| c.is_ascii_digit());

@@ -37,6 +37,7 @@ pub(crate) fn estimate_html(study: &Study, record: &Record, estimate: &Estimate)
             })
             .collect(),
         of_what: "record − twin",
+        is_white: false,
         warnings: &estimate.warnings,
         text,
     };
@@ -70,6 +71,7 @@ pub(crate) fn fit_html(study: &Study, records: &[Record], fit: &Fit) -> String {
             })
             .collect(),
         of_what: "one-step errors over their standard deviation",
+        is_white: true,
         warnings: &fit.warnings,
         text: super::fit::fit_text(study, fit),
     };
@@ -85,6 +87,8 @@ struct Answer<'a> {
     posterior: Option<&'a Posterior>,
     residuals: Vec<Left<'a>>,
     of_what: &'static str,
+    /// Residuals of a right twin are white: one-step errors are, differences from a free run are not if the states have noise.
+    is_white: bool,
     warnings: &'a [Warning],
     text: String,
 }
@@ -126,7 +130,7 @@ impl Answer<'_> {
             sections.push(Section::new("records", "Further records", others));
         }
         if !self.residuals.is_empty() {
-            let body = residual_figures(study, self.of_what, &self.residuals);
+            let body = residual_figures(study, self.of_what, self.is_white, &self.residuals);
             sections.push(Section::new("residuals", "Residuals", body));
         }
         let text = preformatted(&self.text);
@@ -168,7 +172,7 @@ mod tests {
         let of_fit = fit_html(&found.study, &records, &fit);
         assert!(of_fit.contains("id=\"draws\""));
         for page in [
-            of_fit,
+            of_fit.clone(),
             estimate_html(&found.study, &found.record, &found.refined),
         ] {
             for part in [
@@ -182,5 +186,10 @@ mod tests {
             }
             assert!(!page.contains("NaN") && !page.contains("<script"));
         }
+        // Only one-step errors are to be white.
+        let of_estimate = estimate_html(&found.study, &found.record, &found.refined);
+        assert!(of_fit.contains("95 % of white noise"));
+        assert!(!of_estimate.contains("95 % of white noise"));
+        assert!(of_estimate.contains("white only without process noise"));
     }
 }

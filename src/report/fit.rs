@@ -2,7 +2,7 @@
 
 use super::chart::Pairs;
 use super::digits::{self, Digits, short, unit_suffix};
-use super::parameters::ParameterRow;
+use super::parameters::{Line, ParameterRow, parameter_rows};
 use super::table::table;
 use crate::fit::{Fit, FittedNoise, FittedValue, Posterior, Side};
 use crate::study::Study;
@@ -113,17 +113,14 @@ pub(super) fn posterior_text(posterior: &Posterior) -> String {
 /// The fit as text: parameters, noise, starts, errors, warnings.
 pub(super) fn fit_text(study: &Study, fit: &Fit) -> String {
     let level = format!("{:.0} % interval", 100.0 * fit.level);
-    let mut parameters = vec![row([
-        "parameter",
-        "unit",
-        "value",
-        "± std error",
-        &level,
-        "prior",
-        "",
-    ])];
     let space = study.twin().parameters();
-    parameters.extend(fit.parameters.iter().map(|p| parameter(p, &space)));
+    let lines: Vec<Line> = (fit.parameters.iter())
+        .map(|p| {
+            let (own, line) = described(p, &space);
+            (p.name.clone(), own.role, line, vec![])
+        })
+        .collect();
+    let parameters = parameter_rows(["value", &level], &[], &lines);
     let mut noise = vec![row([
         "noise of",
         "unit",
@@ -201,20 +198,6 @@ pub(super) fn fit_text(study: &Study, fit: &Fit) -> String {
 
 fn row<const N: usize>(cells: [&str; N]) -> Vec<String> {
     cells.map(str::to_owned).to_vec()
-}
-
-fn parameter(p: &FittedValue, space: &ParameterSpace) -> Vec<String> {
-    let (own, line) = described(p, space);
-    let [value, error, interval, prior, note] = line.cells(own.role);
-    vec![
-        p.name.clone(),
-        p.unit.clone(),
-        value,
-        error,
-        interval,
-        prior,
-        note,
-    ]
 }
 
 /// The parameter of a fitted value, and its line in the table.

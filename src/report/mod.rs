@@ -49,7 +49,9 @@ pub(crate) use estimate::{overlay_svg, together_json, together_text, trajectorie
 pub(crate) use fit::posterior_svg;
 pub(crate) use gap::NEXT_INPUT;
 pub(crate) use page::with_footer;
-pub(crate) use reproduce::{first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
+pub(crate) use reproduce::{
+    coverage_svg, first_run_svg, mean_runs_svg, reproduce_json, reproduce_text,
+};
 pub(crate) use scorecard::{scorecard_json, scorecard_text};
 
 use crate::diagnose::Diagnosis;

@@ -25,8 +25,13 @@ pub(super) struct Left<'a> {
     pub outputs: &'a Signal,
 }
 
-/// Returns the pictures of the residuals of all records, which are `of_what`.
-pub(super) fn residual_figures(study: &Study, of_what: &str, all: &[Left<'_>]) -> String {
+/// Returns the pictures of the residuals of all records, which are `of_what`; those of a right twin are white, or are not.
+pub(super) fn residual_figures(
+    study: &Study,
+    of_what: &str,
+    is_white: bool,
+    all: &[Left<'_>],
+) -> String {
     let signals = study.twin().signals();
     let names = |channels: Vec<crate::record::Quantity>| -> Vec<String> {
         channels.into_iter().map(|q| q.name).collect()
@@ -37,10 +42,13 @@ pub(super) fn residual_figures(study: &Study, of_what: &str, all: &[Left<'_>]) -
         n => format!("Residuals are {of_what}, of all {n} records."),
     };
     let mut body = paragraph(&of);
-    body += &figure(
-        &auto_correlations(&outputs, all),
-        "Band: 95 % of white noise. Residuals of a right twin's predictions are white.",
-    );
+    let whiteness = match is_white {
+        true => "Band: 95 % of white noise. Residuals of a right twin's predictions are white.",
+        false => {
+            "Band: 95 % of white noise. Errors of a right twin's free run are white only without process noise; `truetwin fit` shows one-step errors."
+        }
+    };
+    body += &figure(&auto_correlations(&outputs, all), whiteness);
     if let Some(svg) = cross_correlations(&outputs, &inputs, all) {
         body += &figure(
             &svg,

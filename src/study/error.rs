@@ -58,7 +58,7 @@ pub enum StudyError {
         /// The problem there, and the remedy.
         error: EffectError,
     },
-    /// The twin's own parameters, `[fixed]` or `[library]` are wrong.
+    /// The twin is missing, its own parameters, `[fixed]` or `[library]` are wrong.
     #[error("{0}")]
     Table(String),
     /// Step, length or input are wrong, or a record has another step.

@@ -205,6 +205,12 @@ impl StudyFile {
         check_shapes(&table).map_err(|(key, problem)| wrong(line_of(text, &key), &problem))?;
         let mut file: Self = toml::from_str(text).map_err(syntax)?;
         check_names(&table).map_err(|problem| wrong(1, &problem))?;
+        if !table.contains_key("twin") {
+            return Err(StudyError::Table(format!(
+                "{}: the key twin is missing; add twin = \"NAME\" (`truetwin twins` lists them)",
+                path.display()
+            )));
+        }
         file.origin = Some((path.into(), text.into()));
         Ok(file)
     }

@@ -145,7 +145,7 @@ fn likely_mistakes_in_records_are_warned_of() {
     rows[30] = &outlier;
     fs::write(at("far.csv"), rows.join("\n")).unwrap();
     // The odd last record ends each call at once.
-    fs::write(at("odd.csv"), "t,u,y\n0,1,1\n0.05,1,1\n").unwrap();
+    fs::write(at("odd.csv"), "t,y\n0,1\n0.05,2\n").unwrap();
     for (records, parts) in [
         (
             "r.csv same.csv odd.csv",
@@ -231,6 +231,65 @@ fn leftovers_of_killed_runs_are_removed_by_the_next() {
     let call = "simulate --twin van-der-pol --theta nu=1 --out s.csv";
     assert!(run(place.path(), call).status.success());
     assert!(leftovers(place.path()).is_empty());
+}
+
+/// Beside the folder, in it, and in each of its parts; what the run itself has written stays.
+#[cfg(unix)]
+#[test]
+fn leftovers_in_a_folder_of_trials_are_removed_by_the_next_run() {
+    let place = tempfile::tempdir().unwrap();
+    let trials =
+        "withheld --twin van-der-pol --trials 1 --kinds none --detection-only --out trials";
+    assert!(run(place.path(), trials).status.success());
+    let parts = [".", "trials", "trials/records", "trials/answers"];
+    for part in parts {
+        fs::write(place.path().join(part).join(".truetwin-a1b2c3"), "half").unwrap();
+    }
+    let read = || fs::read(place.path().join("trials/scorecard.json")).unwrap();
+    let before = read();
+    assert!(run(place.path(), trials).status.success());
+    for part in parts {
+        assert!(leftovers(&place.path().join(part)).is_empty(), "{part}");
+    }
+    assert_eq!(read(), before);
+    assert!(place.path().join("trials/records/0000.csv").exists());
+}
+
+#[test]
+fn a_misspelt_word_is_met_with_the_right_one() {
+    let place = with_record();
+    for (call, parts) in [
+        (
+            "diagnos r.csv --twin van-der-pol",
+            ["'diagnos'", "did you mean diagnose?"],
+        ),
+        (
+            "pre-train --twin tanks",
+            ["'pre-train'", "did you mean pretrain?"],
+        ),
+        (
+            "diagnose r.csv --twin van-der-pol --valdation r.csv",
+            ["'--valdation'", "did you mean --validation?"],
+        ),
+        (
+            "fit r.csv --twn van-der-pol",
+            ["'--twn'", "did you mean --twin?"],
+        ),
+        (
+            "fit r.csv --twin van-der-pole",
+            ["\"van-der-pole\"", "did you mean \"van-der-pol\"?"],
+        ),
+        (
+            "reproduce --twin tanks --scenario unform",
+            ["'unform'", "did you mean uniform?"],
+        ),
+        (
+            "diagnose r.csv --twin van-der-pol --without sensor-bais",
+            ["sensor-bais", "did you mean \"sensor-bias\"?"],
+        ),
+    ] {
+        refused(place.path(), call, &parts);
+    }
 }
 
 #[cfg(unix)]

@@ -86,7 +86,7 @@ impl Check {
         study: &Study,
         path: &Path,
     ) -> Result<ExitCode, Failure> {
-        let record = self.columns.reader(study).record(path)?;
+        let record = self.columns.reader_of_any(study).record(path)?;
         let result = study.suitability(&record, context.seed, context.progress)?;
         if context.json {
             let provenance = Provenance::new(context, Some(&self.subject), [("record", path)]);

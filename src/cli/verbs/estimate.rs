@@ -51,6 +51,7 @@ impl Verb for Estimate {
         let folder = self.out.as_deref().map(output::NewFolder::new);
         let folder = folder.transpose()?;
         let estimator = Estimator::load(&self.estimator, context.projects)?;
+        context.check_external_is(estimator.study().name(), "--estimator")?;
         let reader = self.columns.reader(estimator.study());
         let (records, validation) =
             records::read(reader, &self.records, self.validation.as_deref())?;

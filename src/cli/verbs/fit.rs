@@ -43,10 +43,6 @@ impl Verb for Fit {
         let study = context.study(&self.subject)?;
         let (records, _) = records::read(self.columns.reader(&study), &self.records, None)?;
         records::warn_of_still(&study, &self.records, &records);
-        for (record, path) in records.iter().zip(&self.records) {
-            (record.check_channels(&study.twin().signals()))
-                .map_err(|error| Failure::from(error).within(path))?;
-        }
         let settings = FitSettings {
             seed: context.seed,
             draws: self.draws.count()?,

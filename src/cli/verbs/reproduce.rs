@@ -11,7 +11,7 @@ use crate::estimator::{
 use crate::evaluate::paper::{
     AnswerRuns, Benchmark, MeanRuns, MonteCarlo, Origin, Run, Scenario, score,
 };
-use crate::report::{first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
+use crate::report::{coverage_svg, first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
 use crate::storage::StorageError;
 use crate::storage::work::{Share, WorkFolder};
 use crate::study::Study;
@@ -57,8 +57,8 @@ impl From<ScenarioArgument> for Scenario {
 
 /// Score every method on simulated records: the paper's table and figures.
 ///
-/// Methods: the pretrained network (TS-pre), Gauss–Newton (GN), tuned heads (TS-fine), what `estimate` would answer
-/// (final), and as baselines the prediction-error method (PEM) and the dual Kalman filter (dual-EKF), each from a good
+/// Methods: the pretrained network (TS-pre), Gauss–Newton (GN), tuned heads (TS-fine, the answer of `estimate`), the choice of the
+/// gate between network and tuned heads (final, the answer of `estimate` if the study says `[prior] trust = true`), and as baselines the prediction-error method (PEM) and the dual Kalman filter (dual-EKF), each from a good
 /// start, from TS-pre, and from a bad start. The paper's figures stand beside ours. If records do not determine all of θ,
 /// a second table has the errors of the combinations that they determine.
 ///
@@ -72,7 +72,7 @@ impl From<ScenarioArgument> for Scenario {
         A twin of your own, over all of its bounds:\n  \
         truetwin reproduce --study S.toml --scenario uniform --runs 200 --out study\n\n\
         DIR holds reproduce.json (as --json), table.txt, trajectories.svg (as in the paper: the truth and the mean\n\
-        predictions; scenarios 1 and 2), first-record.svg, and the state of the work: manifest.json, estimator.est,\n\
+        predictions; scenarios 1 and 2), coverage.svg (scenario grid), first-record.svg, and the state of the work: manifest.json, estimator.est,\n\
         runs/NNNN.json. Interrupted, the same command resumes it; a different command is refused.")]
 pub(in crate::cli) struct Reproduce {
     #[command(flatten)]
@@ -178,6 +178,9 @@ impl Verb for Reproduce {
         if let Some(folder) = &folder {
             let stage = context.progress.stage("figures", 1);
             draw(folder, study, &plan, &runs)?;
+            if let Some(svg) = coverage_svg(study, &scores.points) {
+                folder.write("coverage.svg", &svg)?;
+            }
             stage.finish();
             folder.write("table.txt", &text)?;
             // Written last: it marks the folder as complete.

@@ -13,10 +13,11 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Resample a record to one step: inputs averaged or held, outputs interpolated linearly, long gaps left empty.
+/// Resample a record to one step: inputs averaged or held, outputs interpolated linearly, longer gaps left empty.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
         truetwin resample R.csv --step 0.5 --out R2.csv\n  \
+        truetwin resample R.csv --step 0.5 --longest-gap 10 --out R2.csv\n  \
         truetwin resample log.csv --columns t=time,u=pump,y=level --step 1 --inputs hold --out R.csv\n\
         Next: truetwin check R2.csv --twin NAME")]
 pub(in crate::cli) struct Resample {
@@ -31,6 +32,10 @@ pub(in crate::cli) struct Resample {
     /// Inputs of a step: the mean of those that act during it, or the one that acts when it begins.
     #[arg(long, value_enum, default_value = "mean")]
     inputs: Inputs,
+    /// Longest time between two measured outputs that is interpolated over [default: 4 steps, the old or the new ones: 3 missing
+    /// samples in a row].
+    #[arg(long, value_name = "SECONDS")]
+    longest_gap: Option<f64>,
     /// New file of the resampled record.
     #[arg(long, value_name = "R2.csv")]
     out: PathBuf,
@@ -53,7 +58,7 @@ impl Verb for Resample {
             Inputs::Mean => InputRule::Mean,
             Inputs::Hold => InputRule::Hold,
         };
-        let new = resample(&record, self.step, rule)
+        let new = resample(&record, self.step, rule, self.longest_gap)
             .map_err(|error| Failure::from(error).within(&self.record))?;
         new.record.write(&self.out)?;
         if context.json {
@@ -83,11 +88,16 @@ impl Verb for Resample {
             });
         }
         lines.push(format!(
-            "outputs: {} interpolated, {} left empty (gaps longer than {} s)",
+            "outputs: {} interpolated, over at most {} s between measured ones",
             new.interpolated,
-            new.record.missing(),
             short(new.longest_gap)
         ));
+        if new.record.missing() > 0 {
+            lines.push(format!(
+                "{} outputs are left empty: in longer gaps (--longest-gap SECONDS closes them), or before the first or after the last measured output (remove these rows for `estimate`)",
+                new.record.missing()
+            ));
+        }
         output::print(&lines.join("\n"))?;
         Provenance::new(context, None, [("record", self.record.as_path())]).tell(context);
         Ok(ExitCode::SUCCESS)

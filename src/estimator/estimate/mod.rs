@@ -1,6 +1,7 @@
 //! From a measured record to a calibrated twin.
 
 mod cloud;
+mod gates;
 mod merit;
 mod noise;
 mod outcome;
@@ -18,7 +19,7 @@ pub(crate) use tune::Contributions;
 use crate::estimator::bank::{Draws, FeatureSimulator};
 use crate::estimator::error::EstimatorError;
 use crate::estimator::estimator::Estimator;
-use crate::estimator::gate::{GateForm, GateOutcome, GateSettings, GateTest};
+use crate::estimator::gate::GateOutcome;
 use crate::estimator::readout::{INTERVAL_LEVEL, Spread};
 use crate::estimator::recipe::PresetName;
 use crate::estimator::refine::{Information, RefineSettings, Refined, Refinement};
@@ -192,64 +193,6 @@ struct Outcome {
 }
 
 impl Run<'_> {
-    fn gate_test<'a>(&'a self, simulator: &'a FeatureSimulator, purpose: &str) -> GateTest<'a> {
-        GateTest {
-            simulator,
-            drive: self.record.drive(),
-            settings: &self.settings.gate,
-            noise: self.noise.child(purpose),
-            progress: self.progress,
-        }
-    }
-
-    /// Returns whether the record is what the twin makes at the network's estimate.
-    fn gate(
-        &self,
-        simulator: &FeatureSimulator,
-        initial: &[f64],
-    ) -> Result<GateOutcome, EstimatorError> {
-        let first = self.tested(simulator, initial, &self.settings.gate, "gate")?;
-        match (first.is_unsure(), self.settings.gate.form) {
-            (true, GateForm::Calibrated) => self.tested(
-                simulator,
-                initial,
-                &self.settings.gate.larger(),
-                "gate, larger",
-            ),
-            _ => Ok(first),
-        }
-    }
-
-    /// The test with these settings.
-    fn tested(
-        &self,
-        simulator: &FeatureSimulator,
-        initial: &[f64],
-        settings: &GateSettings,
-        purpose: &str,
-    ) -> Result<GateOutcome, EstimatorError> {
-        let test = GateTest {
-            settings,
-            ..self.gate_test(simulator, purpose)
-        };
-        let gate = match settings.form {
-            GateForm::Paper => test.at(initial)?,
-            GateForm::Calibrated => {
-                // The hypothesis is a θ in the prior; the network extrapolates, and errs, beyond.
-                let space = self.estimator.study().twin().parameters();
-                let initial: Vec<f64> = (space.iter().zip(initial))
-                    .map(|(p, v)| p.prior.clamp(*v))
-                    .collect();
-                let refinement = self.refinement(simulator, self.observed, &self.settings.refine);
-                let jacobians = refinement.jacobians_at(&initial)?;
-                test.at_estimate(&initial, &jacobians, |features| {
-                    Ok(self.estimator.predict(features)?)
-                })?
-            }
-        };
-        Ok(gate.test(self.observed))
-    }
-
     fn refinement<'a>(
         &'a self,
         simulator: &'a FeatureSimulator,
@@ -358,17 +301,7 @@ impl Run<'_> {
                 Answer::new(gauss_newton.clone(), spread, &space)
             }
         };
-        let after = self.gate_test(simulator, "after").after_refit(
-            &answer.theta,
-            &refined.jacobian,
-            &observed,
-        );
-        let after = match after {
-            Ok(after) => after,
-            // Simulations at the answer cannot be tested (they diverge, say); the answer stands.
-            Err(EstimatorError::Hopeless { .. } | EstimatorError::Whitening(_)) => None,
-            Err(error) => return Err(error),
-        };
+        let after = self.after(simulator, &answer, &refined, &observed)?;
         Ok(Outcome {
             answer,
             gauss_newton: Some(gauss_newton),
@@ -392,44 +325,4 @@ impl Run<'_> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::estimator::estimate::EstimateOptions;
-    use crate::estimator::pretrain::{PretrainOptions, pretrain};
-    use crate::study::{RecordPlan, Study, StudyFile};
-    use crate::twins::CascadedTanks;
-
-    /// The tanks, all physical parameters fixed.
-    fn fixed(tables: &str) -> Study {
-        let text =
-            format!("twin = 'tanks'\n[fixed]\nk1 = 0.6\nk2 = 0.6\nk3 = 0.6\nk4 = 0.6\n{tables}");
-        let file = StudyFile::parse(&text, "s.toml".as_ref()).unwrap();
-        let plan = RecordPlan::levels(0.5, 60, 0.0, 3.0, 30);
-        let study = Study::new("tanks", CascadedTanks, plan).unwrap();
-        study.configure(&file).unwrap()
-    }
-
-    const SMALL: PretrainOptions = PretrainOptions {
-        preset: crate::estimator::recipe::PresetName::Default,
-        bank_size: Some(100),
-        epochs: Some(1),
-        seed: 1,
-    };
-
-    #[test]
-    fn a_start_alone_is_estimated() {
-        let study =
-            fixed("[start]\nh1 = 'estimate'\n[features]\nkind = 'arx'\noutputs = 4\ninputs = 4");
-        let (estimator, _) = pretrain(&study, &SMALL, &Progress::silent()).unwrap();
-        let noise = Noise::new(1, "record", 0);
-        let drive = study.drives().unwrap().draw(noise).unwrap();
-        let theta = study.twin().parameters().centre();
-        let outputs = study.twin().simulate(&theta, &drive, noise).unwrap();
-        let record = Record::new(drive, outputs).unwrap();
-        let estimate = estimator
-            .estimate(&record, &EstimateOptions::default(), &Progress::silent())
-            .unwrap();
-        assert_eq!(estimate.names, ["start.h1"]);
-        assert!(estimate.std_error[0].is_finite());
-    }
-}
+mod tests;

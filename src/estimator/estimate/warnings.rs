@@ -1,6 +1,7 @@
 //! Reasons to doubt an estimate.
 
 use super::outcome::{DIVERGES, Estimate, NO_BETTER};
+use crate::estimator::gate::GateOutcome;
 use crate::fit::{Fit, NOT_CONVERGED, Warning};
 use crate::math::{deviation, three_digits};
 use crate::record::{Record, Signal};
@@ -103,14 +104,21 @@ pub(super) fn warnings(
             );
         }
     }
-    let gate = estimate.gate;
-    if gate.is_unsure() {
+    let tests = [
+        ("the test", Some(estimate.gate)),
+        ("the test after the refit", estimate.after),
+    ];
+    for (name, test) in tests {
+        let Some(test) = test.filter(GateOutcome::is_unsure) else {
+            continue;
+        };
         warn(
             "gate-near-level",
             format!(
-                "the test's p-value {} ± {} lies about at its level",
-                number(three_digits(gate.p_value)),
-                number(three_digits(gate.p_error)),
+                "the p-value of {name}, {} ± {}, is near its level {}",
+                number(three_digits(test.p_value)),
+                number(three_digits(test.p_error)),
+                number(test.alpha),
             ),
             "take neither answer of the test as sure",
         );

@@ -17,6 +17,11 @@ pub(super) fn not_whole(reason: &str) -> String {
     format!("not a whole estimator file ({reason}); make one with `truetwin pretrain`")
 }
 
+/// The problem of a file of another kind.
+pub(super) fn foreign() -> String {
+    "not an estimator file; give one that `truetwin pretrain` has made".into()
+}
+
 /// The header. The order of its fields is part of the format.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

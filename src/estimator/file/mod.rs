@@ -15,8 +15,8 @@ use crate::network::Architecture;
 use crate::storage::files::{replace, write_new};
 use crate::storage::untrusted::read;
 use crate::study::StudyFile;
-use header::{Header, not_whole};
-use safetensors::tensor::SafeTensors;
+use header::{Header, foreign, not_whole};
+use safetensors::tensor::{SafeTensorError, SafeTensors};
 use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -75,15 +75,15 @@ fn restored(bytes: &[u8], path: &Path, known: &[Project]) -> Result<Estimator, S
         return Err(not_whole(&reason));
     }
     let limit = header.limit.unwrap_or(f64::INFINITY);
-    let foreign = |reason: String| not_whole(&reason);
+    let damaged = |reason: String| not_whole(&reason);
     Ok(Estimator {
         readout: Readout {
-            inputs: tensors.inputs(n, limit).map_err(foreign)?,
-            targets: tensors.targets(d).map_err(foreign)?,
+            inputs: tensors.inputs(n, limit).map_err(damaged)?,
+            targets: tensors.targets(d).map_err(damaged)?,
             layer: None,
             network,
         },
-        calibration: tensors.calibration(d).map_err(foreign)?,
+        calibration: tensors.calibration(d).map_err(damaged)?,
         preset: header.preset,
         settings: header.settings,
         recipe: header.features,
@@ -95,16 +95,28 @@ fn restored(bytes: &[u8], path: &Path, known: &[Project]) -> Result<Estimator, S
 
 /// Header and tensors, their checksum compared.
 fn intact(bytes: &[u8]) -> Result<(Header, Tensors), String> {
-    let foreign = |error| not_whole(&format!("{error:?}"));
-    let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(foreign)?;
-    let text = (metadata.metadata().as_ref().and_then(|m| m.get(KEY)))
-        .ok_or_else(|| not_whole("no truetwin header"))?;
+    let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(unread)?;
+    let text = (metadata.metadata().as_ref().and_then(|m| m.get(KEY))).ok_or_else(foreign)?;
     let header = Header::parse(text)?;
-    let tensors = Tensors::read(&SafeTensors::deserialize(bytes).map_err(foreign)?);
+    let tensors = Tensors::read(&SafeTensors::deserialize(bytes).map_err(unread)?);
     if header.is_intact(&tensors) {
         Ok((header, tensors))
     } else {
         Err("the checksum does not match, the file was altered; pretrain again".into())
+    }
+}
+
+/// The problem of a container that cannot be read.
+fn unread(error: SafeTensorError) -> String {
+    use SafeTensorError as E;
+    match error {
+        E::HeaderTooSmall
+        | E::HeaderTooLarge
+        | E::InvalidHeader
+        | E::InvalidHeaderStart
+        | E::InvalidHeaderDeserialization => foreign(),
+        E::InvalidHeaderLength | E::MetadataIncompleteBuffer => not_whole("it is cut off"),
+        _ => not_whole("its tensors are damaged"),
     }
 }
 

@@ -30,5 +30,5 @@ pub use presets::{reference_projects, reference_studies};
 pub(crate) use run::Run;
 pub(crate) use scenario::{Benchmark, Scenario};
 use scenario::{Published, TestPoint};
-pub(crate) use score::COVERAGE_LEVEL;
+pub(crate) use score::{COVERAGE_LEVEL, PointScore};
 pub(crate) use score::{Scores, score};

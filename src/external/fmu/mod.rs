@@ -1,6 +1,6 @@
 //! A twin from an FMU, as Modelica tools, Simulink and many others export them (cargo feature `fmi`).
 //!
-//! FMI 2.0 and 3.0, co-simulation. `docs/external-programs.md` says what becomes of the model description.
+//! FMI 2.0 and 3.0, co-simulation. `docs/external-programs.md` explains how the model description is used.
 
 mod archive;
 mod description;
@@ -27,13 +27,13 @@ use worker::{References, Worker};
 ///
 /// | field | default | |
 /// |---|---|---|
-/// | `variables` | all | names of the parameters to estimate, of inputs and outputs; of a kind that none is named of, all are used |
-/// | `workers` | as many as threads simulate | instances at once; 1 of an FMU that allows no more |
+/// | `variables` | all | names of the parameters to estimate, of inputs and outputs; if no variable of a kind is named, all of that kind are used |
+/// | `workers` | one per thread | number of instances that run at once; 1 if the FMU allows no more |
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct FmuSettings {
-    /// Names of the real parameters, inputs and outputs that the twin has; the others keep their start.
+    /// Names of the real parameters, inputs and outputs of the twin; others keep their start value.
     pub variables: Vec<String>,
-    /// Instances at once; `None`: one for each thread of the rayon pool that opens the twin.
+    /// Number of instances that run at once; `None`: one per thread of the rayon pool that opens the twin.
     pub workers: Option<usize>,
 }
 
@@ -47,7 +47,7 @@ pub struct FmuSettings {
 /// sample. A step that fails is a divergence at its time; a refused initialisation costs the run. Instances are reset between
 /// runs and have a thread each. The FMU runs in this process: if it crashes or hangs, so does this.
 pub struct FmuTwin {
-    /// Ended before the folder goes.
+    /// Dropped before the unpacked folder is removed.
     workers: Lending<Worker>,
     archive: Arc<Archive>,
     references: References,
@@ -100,7 +100,7 @@ impl FmuTwin {
             return Err(failed(format!("its library has no {function}")));
         }
         let archive = Arc::new(archive);
-        // Only to see that it can be made; instances live on threads of their own.
+        // A test instance; those that simulate live on threads of their own.
         drop(Instance::new(&archive).map_err(|e| failed(e.to_string()))?);
         let threads = settings.workers.unwrap_or_else(rayon::current_num_threads);
         let references = |list: &[Variable]| list.iter().map(|v| v.reference).collect();
@@ -125,17 +125,17 @@ impl FmuTwin {
         })
     }
 
-    /// The name of the model.
+    /// Returns the name of the model.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Step and length of the default experiment; random input levels where all inputs have the same limits.
+    /// Returns step and length of the default experiment, with random input levels if all inputs have the same limits.
     pub fn plan(&self) -> &RecordPlan {
         &self.plan
     }
 
-    /// The study of this twin with the default experiment as its record plan.
+    /// Returns the study of this twin; its record plan is the default experiment.
     ///
     /// # Errors
     ///
@@ -155,7 +155,7 @@ impl DigitalTwin for FmuTwin {
         self.signals.clone()
     }
 
-    /// The noise goes unused: FMUs have none.
+    /// Simulates without noise: FMUs have none.
     fn simulate(
         &self,
         theta: &[f64],

@@ -172,7 +172,7 @@ mod tests {
             ("\"name\": \"lag\",", "", "missing key `name`"),
             ("\"lag\"", "\"a lag\"", "\"a lag\" holds ' '"),
             ("\"s\"", "\"\\u001b[2J\"", "the unit \"\\u{1b}[2J\" holds"),
-            ("\"k\"", "\"tau\"", "parameters: tau stands there twice"),
+            ("\"k\"", "\"tau\"", "parameters: duplicate name tau"),
             ("[1, 3]", "[3, 1]", "invalid interval"),
             ("[0.1, 9]", "[2, 9]", "leaves its bounds"),
             ("[{\"name\": \"y\"}]", "[]", "no output"),

@@ -12,11 +12,10 @@ use serde_json::{Value, json};
 /// |---|---|
 /// | `names`, `theta`, `std_error`, `interval` | the twin's own parameters, in one order, in their units |
 /// | `nuisance` | start states, noise levels and magnitudes of effects, estimated beside them |
-/// | `gate`, `after` | the test at the network's estimate, and at the refitted one; `after` is null without a refit, its values are null where the refit left no degree of freedom |
+/// | `gate`, `after` | the test at the network's estimate, and at the refitted one; `after` is null without a refit, its values are null where the refit left no degree of freedom. `p_error`: Monte-Carlo error of `p_value`; `simulations`: those that the record is ranked among; `at_floor`: none of them is as far, so that p is below `p_value` |
 /// | `weak_directions` | unit vectors in θ over the prior's width that the prior knows better than the record |
 /// | `free_run` | root mean square of record − noise-free run, in output units |
 /// | `simulations`, `seconds` | what it took |
-///
 /// | `answer` | `record`: `theta.final` is the record's own; `prior`: the network's, which leans on the prior |
 /// | `trusting_prior` | the network's estimate with its errors, for those who trust the prior |
 /// | `heads` | parts of `theta.fine`: `alpha`, what the heads add to the quadratic layer (0 nothing, 1 all they say); shares of the cloud's variance that the layer, and both, explain; `layer`, its estimate alone; null where heads were not tuned on a layer |
@@ -37,8 +36,13 @@ pub fn estimate_json(study: &Study, estimate: &Estimate) -> Value {
             "consistent": estimate.after.map(|_| estimate.is_consistent()),
             "alpha": estimate.after.map(|test| test.alpha),
             "statistic": estimate.after.map(|test| test.statistic),
+            "p_error": estimate.after.map(|test| test.p_error),
+            "simulations": estimate.after.map(|test| test.simulations),
+            "at_floor": estimate.after.map(|test| test.at_floor()),
         })
     });
+    let mut gate = json!(estimate.gate);
+    gate["at_floor"] = json!(estimate.gate.at_floor());
     let directions = estimate.information.as_ref().map(|known| &known.directions);
     let weak: Vec<_> = (estimate.information.iter())
         .flat_map(|known| known.weak())
@@ -48,7 +52,7 @@ pub fn estimate_json(study: &Study, estimate: &Estimate) -> Value {
         "schema": "truetwin.estimate/1",
         "twin": study.name(),
         "names": estimate.physical(&estimate.names),
-        "gate": estimate.gate,
+        "gate": gate,
         "theta": {
             "initial": own(&estimate.initial),
             "gauss_newton": stage(&estimate.gauss_newton),
@@ -139,6 +143,13 @@ mod tests {
         assert!(kept["free_run"]["validation_rmse"].is_null());
         let refined = checked(&found.refined);
         assert!(refined["after"]["consistent"].is_boolean());
+        for test in ["gate", "after"] {
+            let test = &refined[test];
+            let (p, of) = (&test["p_value"], test["simulations"].as_f64().unwrap());
+            let expected = p.as_f64().unwrap() * (of + 1.0) < 1.5;
+            assert_eq!(test["at_floor"], expected, "{test}");
+            assert!(test["p_error"].as_f64().unwrap() > 0.0, "{test}");
+        }
         assert!(refined["seconds"]["tune"].is_number());
         assert!(refined["free_run"]["validation_rmse"].is_number());
         for value in [kept, refined] {
@@ -168,7 +179,9 @@ mod tests {
         estimate.tracking = None;
         estimate.information = None;
         let value = checked(&estimate);
-        assert_eq!(value["after"]["p_value"], Value::Null);
+        for key in ["p_value", "p_error", "simulations", "at_floor"] {
+            assert_eq!(value["after"][key], Value::Null, "{key}");
+        }
         assert_eq!(value["std_error"], json!([null]));
         assert_eq!(value["nuisance"][0]["std_error"], Value::Null);
         assert_eq!(value["free_run"]["rmse"], Value::Null);

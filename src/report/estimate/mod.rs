@@ -21,12 +21,11 @@ pub(super) fn rows(study: &Study, estimate: &Estimate) -> Vec<ParameterRow> {
     let space = study.twin().parameters();
     let row = |(j, parameter)| {
         let interval = [estimate.low[j], estimate.high[j]];
-        ParameterRow::new(
-            parameter,
-            estimate.theta[j],
-            estimate.std_error[j],
-            interval,
-        )
+        let (value, error) = (estimate.theta[j], estimate.std_error[j]);
+        ParameterRow {
+            leans: estimate.leans_on_prior(),
+            ..ParameterRow::new(parameter, value, error, interval)
+        }
     };
     space.iter().enumerate().map(row).collect()
 }

@@ -5,7 +5,7 @@ use crate::estimator::{Estimate, GateOutcome, INTERVAL_LEVEL};
 use crate::math::three_digits;
 use crate::report::digits::{Digits, probability, short, unit_suffix};
 use crate::report::fit::posterior_text;
-use crate::report::parameters::ParameterRow;
+use crate::report::parameters::{Line, ParameterRow, parameter_rows};
 use crate::setting::number;
 use crate::study::Study;
 use crate::twin::{Parameter, Role};
@@ -13,8 +13,9 @@ use crate::twin::{Parameter, Role};
 /// Limits of columns and lines.
 const COLUMNS: usize = 100;
 const LINES: usize = 24;
-/// Cells of a parameter: name, unit, first estimate, final one, standard error, interval, prior, note.
-const COLUMNS_OF_TABLE: usize = 8;
+/// Columns of the table before the bounds: name, unit, first estimate, final one, standard error, interval, prior.
+const BEFORE_BOUNDS: usize = 7;
+const BEFORE_PRIOR: usize = 6;
 /// Least room for a name.
 const LEAST_NAME: usize = 8;
 /// Number of warnings shown.
@@ -22,7 +23,7 @@ const WARNINGS: usize = 3;
 /// Number of weak combinations shown.
 const COMBINATIONS: usize = 2;
 
-/// Returns the estimate in at most 20 lines of 100 columns: gate, parameters with errors, weak combinations, test after the
+/// Returns the estimate in at most 24 lines of 100 columns: gate, parameters with errors, weak combinations, test after the
 /// refit, free-run errors.
 ///
 /// Values have the digits that their standard errors support.
@@ -74,24 +75,13 @@ fn p_value(test: &GateOutcome) -> String {
 
 /// Returns names, units and numbers of θ in aligned columns, in at most `lines` lines.
 fn table(study: &Study, estimate: &Estimate, lines: usize) -> Vec<String> {
-    let level = format!("{:.0} % interval", 100.0 * INTERVAL_LEVEL);
-    let head = [
-        "parameter",
-        "unit",
-        "initial",
-        "final",
-        "± std error",
-        &level,
-        "prior",
-        "",
-    ];
     let space = study.twin().parameters();
     // The twin's own parameters first.
     let (own, others): (Vec<_>, Vec<_>) =
         (space.iter().enumerate()).partition(|(_, p)| p.role == Role::Parameter);
     let table = rows(study, estimate);
-    let all: Vec<_> = (own.into_iter().chain(others))
-        .map(|(j, parameter)| row(estimate.initial[j], &table[j], parameter))
+    let all: Vec<Line> = (own.into_iter().chain(others))
+        .map(|(j, parameter)| line(estimate.initial[j], &table[j], parameter))
         .collect();
     let room = lines.saturating_sub(1).max(2);
     let shown = if all.len() > room {
@@ -99,30 +89,33 @@ fn table(study: &Study, estimate: &Estimate, lines: usize) -> Vec<String> {
     } else {
         all.len()
     };
-    let mut cells = vec![head.map(str::to_owned)];
-    cells.extend_from_slice(&all[..shown]);
+    let level = format!("{:.0} % interval", 100.0 * INTERVAL_LEVEL);
+    let mut cells = parameter_rows(["final", &level], &["initial"], &all[..shown]);
     let mut widths = widths_of(&cells);
     let others = |widths: &[usize]| -> usize { widths[1..].iter().map(|w| w + 2).sum() };
-    if others(&widths) + LEAST_NAME > COLUMNS {
-        // Very long numbers: prior and note are in the JSON.
-        for row in &mut cells {
-            row[6].clear();
-            row[7].clear();
+    // Long numbers: bounds, then prior and remark are left to the JSON.
+    for kept in [BEFORE_BOUNDS, BEFORE_PRIOR] {
+        if others(&widths) + LEAST_NAME > COLUMNS {
+            for row in &mut cells {
+                let remark = row.pop().filter(|_| kept == BEFORE_BOUNDS);
+                row.truncate(kept);
+                row.extend(remark);
+            }
+            widths = widths_of(&cells);
         }
-        widths = widths_of(&cells);
     }
     let others = others(&widths);
     widths[0] = widths[0].min(COLUMNS.saturating_sub(others).max(LEAST_NAME));
+    let is_text: Vec<bool> = (cells[0].iter())
+        .map(|head| ["parameter", "unit", ""].contains(&head.as_str()))
+        .collect();
     let mut written: Vec<String> = (cells.iter())
         .map(|row| {
-            let aligned = row
-                .iter()
-                .zip(&widths)
-                .enumerate()
-                .map(|(c, (cell, &width))| match c {
-                    0 | 1 | 7 => format!("{:<width$}", clipped(cell, width)),
-                    _ => format!("{cell:>width$}"),
-                });
+            let columns = row.iter().zip(&widths).zip(&is_text);
+            let aligned = columns.map(|((cell, &width), is_text)| match is_text {
+                true => format!("{:<width$}", clipped(cell, width)),
+                false => format!("{cell:>width$}"),
+            });
             aligned.collect::<Vec<_>>().join("  ").trim_end().to_owned()
         })
         .collect();
@@ -135,31 +128,23 @@ fn table(study: &Study, estimate: &Estimate, lines: usize) -> Vec<String> {
     written
 }
 
-fn widths_of(cells: &[[String; COLUMNS_OF_TABLE]]) -> Vec<usize> {
+fn widths_of(cells: &[Vec<String>]) -> Vec<usize> {
+    let columns = cells.first().map_or(0, Vec::len);
     let width = |c: usize| cells.iter().map(|row| length(&row[c])).max().unwrap_or(0);
-    (0..COLUMNS_OF_TABLE).map(width).collect()
+    (0..columns).map(width).collect()
 }
 
 /// Returns one line of the table.
-fn row(initial: f64, row: &ParameterRow, parameter: &Parameter) -> [String; COLUMNS_OF_TABLE] {
+fn line(initial: f64, row: &ParameterRow, parameter: &Parameter) -> Line {
     let name = match parameter.role {
         Role::Parameter | Role::Magnitude => parameter.name.clone(),
         Role::Start => format!("start of {}", parameter.target()),
         Role::Noise => format!("noise of {}", parameter.target()),
     };
     let digits = Digits::supported(row.value, row.std_error);
-    let [value, error, interval, prior, note] = row.cells(parameter.role);
-    let unit = clipped(&parameter.unit, 10);
-    [
-        name,
-        unit,
-        digits.write(initial),
-        value,
-        error,
-        interval,
-        prior,
-        note,
-    ]
+    let mut row = row.clone();
+    row.unit = clipped(&row.unit, 10);
+    (name, parameter.role, row, vec![digits.write(initial)])
 }
 
 /// Returns the weak combinations after an empty line; nothing if there are none.

@@ -3,7 +3,7 @@
 use super::estimate_json;
 use crate::estimator::{INTERVAL_LEVEL, Together};
 use crate::report::digits::{Digits, error, probability, short};
-use crate::report::parameters::ParameterRow;
+use crate::report::parameters::{Line, ParameterRow, parameter_rows};
 use crate::report::table::table;
 use crate::study::Study;
 use crate::twin::Role;
@@ -55,11 +55,10 @@ pub fn together_json(study: &Study, all: &Together, files: &[String]) -> Value {
 /// The shared table, then one line a record, then whether they agree, then the warnings of each.
 pub fn together_text(study: &Study, all: &Together, files: &[String]) -> String {
     let level = format!("{:.0} % interval", 100.0 * INTERVAL_LEVEL);
-    let head = ["parameter", "value", "± std error", &level, "prior", ""];
-    let mut lines = vec![head.map(str::to_owned).to_vec()];
-    for (row, role) in rows(study, all) {
-        lines.push([vec![row.name.clone()], row.cells(role).to_vec()].concat());
-    }
+    let shown: Vec<Line> = (rows(study, all).into_iter())
+        .map(|(row, role)| (row.name.clone(), role, row, vec![]))
+        .collect();
+    let lines = parameter_rows(["value", &level], &[], &shown);
     let names: Vec<&String> = all.names.iter().take(SHOWN).collect();
     let mut head = vec!["record".to_owned()];
     head.extend(names.iter().map(|name| (*name).clone()));

@@ -1,6 +1,6 @@
 //! JSON, tables and figures of one small study.
 
-use super::{first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
+use super::{coverage_svg, first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
 use crate::estimator::{PresetName, PretrainOptions, pretrain};
 use crate::evaluate::paper::{
     AnswerRuns, Benchmark, MeanRuns, Method, MonteCarlo, Run, Scenario, Scores, reference_projects,
@@ -143,6 +143,36 @@ fn the_figures_show_every_family_and_leave_out_who_is_silent() {
         means.is_none(),
         "a mean over different truths shows nothing"
     );
+}
+
+/// One panel of coverage and one of errors a parameter, one dot a point; nothing without a grid.
+#[test]
+fn a_grid_is_a_map() {
+    let Made {
+        study, plan, runs, ..
+    } = made();
+    assert!(coverage_svg(study, &made().scores.points).is_none());
+    let plan = MonteCarlo {
+        scenario: Scenario::Grid,
+        ..plan.clone()
+    };
+    let mut runs = runs.clone();
+    runs[1].truth = vec![1.0];
+    let points = score(study, &plan, &runs).points;
+    let svg = coverage_svg(study, &points).unwrap();
+    for part in [
+        "nu: share held",
+        "nu: rms error",
+        "true nu",
+        ">prior<",
+        ">nominal<",
+        "at 2 fixed points with 1 records",
+    ] {
+        assert!(svg.contains(part), "{part} is not in {svg}");
+    }
+    // One in the legend.
+    assert_eq!(svg.matches("<circle").count(), 2 + 2 + 1);
+    assert!(!svg.contains("NaN"));
 }
 
 /// The record of a run is made again as it was: the true twin runs through it.

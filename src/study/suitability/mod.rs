@@ -78,7 +78,10 @@ impl Study {
         let noise = Noise::new(seed, "suitability", 0);
         let mut findings = Vec::new();
         if let Err(error) = record.check_channels(&self.twin.signals()) {
-            findings.push(Finding::failure("channels", error.to_string()));
+            findings.push(Finding::failure(
+                "channels",
+                error.of_twin(&self.name).to_string(),
+            ));
             return Ok(Suitability {
                 findings,
                 parameters: vec![],
@@ -166,7 +169,8 @@ impl Study {
         let gaps = match record.missing() {
             0 => String::new(),
             n => format!(
-                "; {n} outputs are missing: `fit` and `diagnose` leave them out, `estimate` needs `truetwin resample R.csv --step s --out R2.csv`"
+                "; {n} outputs are missing: `fit` and `diagnose` leave them out; for `estimate`, `truetwin resample R.csv --step {} --out R2.csv` closes short gaps",
+                text(drive.dt())
             ),
         };
         format!(

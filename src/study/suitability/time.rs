@@ -62,7 +62,7 @@ pub(super) fn check(
     let mut findings = vec![];
     if !drive.is_uniform() {
         let remedy = format!(
-            "`fit` and `diagnose` take them for a twin with equations; otherwise: truetwin resample R.csv --step {} --out R2.csv",
+            "`fit` takes them for a twin with equations, and so does `diagnose` where their median is the study's step; otherwise: truetwin resample R.csv --step {} --out R2.csv",
             text(step)
         );
         findings.push(Finding::warning(
@@ -71,7 +71,7 @@ pub(super) fn check(
         ));
     } else if (step / plan - 1.0).abs() > SAME {
         let message = format!(
-            "{} s, {} s in the study: `fit` and `diagnose` take any; for an estimator: truetwin resample R.csv --step {} --out R2.csv, or [record] step = {} in the study",
+            "{} s, {} s in the study: `fit` takes any step, `diagnose` with --step-of-record; for an estimator: truetwin resample R.csv --step {} --out R2.csv, or [record] step = {} in the study",
             text(step),
             text(plan),
             text(plan),

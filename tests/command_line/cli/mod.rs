@@ -2,6 +2,7 @@
 
 mod diagnose;
 mod fit;
+mod newcomers;
 mod records;
 mod reproduce;
 mod shell;

@@ -157,7 +157,7 @@ fn wrong_columns_are_refused_in_one_line() {
     refused(&["fit", &record, "--study", &study], &["s.toml, line 3"]);
 }
 
-/// Features need one step and all outputs; the message offers the verb that makes such a record.
+/// Features need one step and all outputs; the message offers the verb that makes such a record, and `estimate` takes it.
 #[test]
 fn gaps_and_varying_steps_are_resampled() {
     let place = Place::new();
@@ -174,25 +174,45 @@ fn gaps_and_varying_steps_are_resampled() {
             "tanks".into(),
         ]
     };
-    let call: [String; 4] = features(&gaps);
-    let call: Vec<&str> = call.iter().map(String::as_str).collect();
+    let words: [String; 4] = features(&gaps);
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
     refused(
-        &call,
+        &words,
         &[
             "row 102, column y",
-            "`truetwin resample R.csv --step s --out R2.csv`",
+            "`truetwin resample R.csv --step S --out R2.csv`",
         ],
     );
     let out = place.at("even.csv");
     let text = done(&["resample", &gaps, "--step", "0.5", "--out", &out]);
     for part in [
         "gaps.csv: 399 samples, steps of 0.5 to 1 s, 1 missing outputs",
-        "even.csv: 400 samples, a step of 0.5 s, 2 missing outputs",
+        "even.csv: 400 samples, a step of 0.5 s, 0 missing outputs",
         "inputs: mean over each step",
-        "outputs: 0 interpolated, 2 left empty (gaps longer than 0.5005 s)",
+        "outputs: 2 interpolated, over at most 2 s between measured ones",
     ] {
         assert!(text.contains(part), "{text}");
     }
+    let estimator = place.at("small.est");
+    let train = ["pretrain", "--twin", "tanks", "--out", &estimator];
+    done(&[&train[..], &["--bank-size", "200", "--epochs", "1"]].concat());
+    let estimate = ["estimate", "--estimator", &estimator];
+    let of_gaps = [&estimate[..], &[&gaps]].concat();
+    refused(&of_gaps, &["gaps.csv: row 102, column y is missing"]);
+    assert!(done(&[&estimate[..], &[&out]].concat()).contains("k4"));
+    let open = place.at("open.csv");
+    let call = ["resample", &gaps, "--step", "0.5", "--longest-gap"];
+    let text = done(&[&call[..], &["0.9", "--out", &open]].concat());
+    let parts = [
+        "outputs: 0 interpolated, over at most 0.9 s",
+        "2 outputs are left empty: in longer gaps (--longest-gap SECONDS closes them)",
+    ];
+    assert!(parts.iter().all(|part| text.contains(part)), "{text}");
+    let none = place.at("none.csv");
+    refused(
+        &[&call[..], &["-1", "--out", &none]].concat(),
+        &["gaps.csv: a longest gap of -1 s; choose a positive number"],
+    );
     let out = place.at("coarse.csv");
     let call = [
         "resample", &gaps, "--step", "1", "--inputs", "hold", "--out", &out, "--json",

@@ -144,7 +144,10 @@ fn trials_can_be_like_a_measured_record() {
     ];
     refused(
         &[&other[..], &["--out", &format!("{out}-2")]].concat(),
-        &["inputs"],
+        &[
+            "r.csv: the record has 1 inputs",
+            "van-der-pol takes the columns t,y",
+        ],
     );
     fs::remove_dir_all(place).unwrap();
 }

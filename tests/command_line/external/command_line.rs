@@ -38,6 +38,20 @@ fn a_program_is_trained_for_estimated_and_diagnosed() {
     let program = format!("{python} 'lag twin.py'");
     let with = |arguments: &[&str]| done(&[arguments, &["--program", &program]].concat());
     assert!(with(&["check"]).starts_with("pass"));
+    // A program that a call would not use is refused.
+    let both = ["--program", &program, "--twin", "tanks"];
+    let parts = [
+        "--twin names the twin tanks",
+        "the twin lag",
+        "give one of them",
+    ];
+    refused(&[&["check"][..], &both].concat(), &parts);
+    file("tanks.toml", "twin = 'tanks'\n");
+    let both = ["--program", &program, "--study", "tanks.toml"];
+    refused(
+        &[&["check"][..], &both].concat(),
+        &["--study names the twin tanks"],
+    );
     assert!(with(&["twins"]).contains("tau"));
     assert!(with(&["effects"]).contains("sensor-bias"));
     let small = ["--bank-size", "1000", "--epochs", "20", "--out"];

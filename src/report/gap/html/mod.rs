@@ -80,7 +80,7 @@ fn residuals(study: &Study, diagnosis: &Diagnosis) -> Option<Section> {
             "one-step prediction errors of the twin with the accepted effects, over their standard deviation"
         }
     };
-    let figures = residual_figures(study, of_what, &all);
+    let figures = residual_figures(study, of_what, true, &all);
     let body = folded("Correlations and quantiles", &figures);
     Some(Section::new("residuals", "Residuals", body))
 }

@@ -1,0 +1,92 @@
+//! The tests of an estimate: at the network's, and at the refitted one. An answer near its level is taken again from more simulations.
+
+use super::{Answer, Run};
+use crate::estimator::bank::FeatureSimulator;
+use crate::estimator::error::EstimatorError;
+use crate::estimator::gate::{GateForm, GateOutcome, GateSettings, GateTest};
+use crate::estimator::refine::Refined;
+use nalgebra::DVector;
+
+impl Run<'_> {
+    fn gate_test<'a>(&'a self, simulator: &'a FeatureSimulator, purpose: &str) -> GateTest<'a> {
+        GateTest {
+            simulator,
+            drive: self.record.drive(),
+            settings: &self.settings.gate,
+            noise: self.noise.child(purpose),
+            progress: self.progress,
+        }
+    }
+
+    /// Returns whether the record is what the twin makes at the network's estimate.
+    pub(super) fn gate(
+        &self,
+        simulator: &FeatureSimulator,
+        initial: &[f64],
+    ) -> Result<GateOutcome, EstimatorError> {
+        let settings = &self.settings.gate;
+        let first = self.tested(simulator, initial, settings, "gate")?;
+        match (first.is_unsure(), settings.form) {
+            (true, GateForm::Calibrated) => {
+                self.tested(simulator, initial, &settings.larger(), "gate, larger")
+            }
+            _ => Ok(first),
+        }
+    }
+
+    /// The test with these settings.
+    fn tested(
+        &self,
+        simulator: &FeatureSimulator,
+        initial: &[f64],
+        settings: &GateSettings,
+        purpose: &str,
+    ) -> Result<GateOutcome, EstimatorError> {
+        let test = GateTest {
+            settings,
+            ..self.gate_test(simulator, purpose)
+        };
+        let gate = match settings.form {
+            GateForm::Paper => test.at(initial)?,
+            GateForm::Calibrated => {
+                // The hypothesis is a θ in the prior; the network extrapolates, and errs, beyond.
+                let space = self.estimator.study().twin().parameters();
+                let initial: Vec<f64> = (space.iter().zip(initial))
+                    .map(|(p, v)| p.prior.clamp(*v))
+                    .collect();
+                let refinement = self.refinement(simulator, self.observed, &self.settings.refine);
+                let jacobians = refinement.jacobians_at(&initial)?;
+                test.at_estimate(&initial, &jacobians, |features| {
+                    Ok(self.estimator.predict(features)?)
+                })?
+            }
+        };
+        Ok(gate.test(self.observed))
+    }
+
+    /// The test of the refitted answer; `None` where no degree of freedom is left, or where simulations at the answer cannot be tested
+    /// (they diverge, say).
+    pub(super) fn after(
+        &self,
+        simulator: &FeatureSimulator,
+        answer: &Answer,
+        refined: &Refined,
+        observed: &DVector<f64>,
+    ) -> Result<Option<GateOutcome>, EstimatorError> {
+        let tested = |settings: &GateSettings, purpose: &str| {
+            let test = GateTest {
+                settings,
+                ..self.gate_test(simulator, purpose)
+            };
+            match test.after_refit(&answer.theta, &refined.jacobian, observed) {
+                Err(EstimatorError::Hopeless { .. } | EstimatorError::Whitening(_)) => Ok(None),
+                outcome => outcome,
+            }
+        };
+        let settings = &self.settings.gate;
+        match tested(settings, "after")? {
+            Some(first) if first.is_unsure() => tested(&settings.larger(), "after, larger"),
+            first => Ok(first),
+        }
+    }
+}
