@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 /// | key | holds |
 /// |---|---|
 /// | `parameters` | name, unit, value, standard error, interval, prior, bounds; `prior_share`: variance over the prior's; `at_bound`: `low`, `high` or null |
-/// | `noise` | fitted levels: states in units per √s, outputs in their own; `declared` is null where nothing was declared |
+/// | `noise` | fitted levels: states in units per √s, outputs in their own; `declared` is null where nothing was declared; `at_bound` as of parameters |
 /// | `starts` | states at the first sample of each record, given all of it |
 /// | `level` | level of the intervals |
 /// | `log_likelihood`, `evidence` | in nats; `evidence.std_error` is null where Laplace's approximation stands alone |
@@ -233,12 +233,13 @@ fn noise_level(level: &FittedNoise) -> Vec<String> {
     let digits = Digits::supported(level.value, level.std_error);
     let declared = level.declared.map_or(String::new(), short);
     let error = digits::error(level.std_error);
+    let note = level.at_bound.map_or("", |_| "at its bound");
     row([
         &level.name,
         &level.unit,
         &digits.write(level.value),
         &error,
         &declared,
-        "",
+        note,
     ])
 }

@@ -1,0 +1,159 @@
+//! The searches of a fit: of the twin without the effects of its study, then with them.
+
+use super::axis::Axis;
+use super::climb::Fitted;
+use super::effects::Search;
+use super::magnitude::{Kind, kinds, largest, size_axis};
+use super::problem::Problem;
+use super::starts::{base_fit, polish, search};
+use crate::effect::Effect;
+use crate::likelihood::Measured;
+use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::record::{Record, Signal};
+use crate::twin::{Noise, Role};
+use std::collections::BTreeMap;
+
+/// Iterations of each search: loud noise has a way to go.
+const ITERATIONS: usize = 80;
+
+/// Ends of all searches.
+pub(super) struct Searched<'a> {
+    pub problem: Problem<'a>,
+    /// Best first.
+    pub fits: Vec<Fitted>,
+    /// Log-likelihood of the twin with all effects off; none without effects that are fitted.
+    pub without: Option<f64>,
+    /// Kinds of the magnitudes of effects.
+    pub kinds: BTreeMap<String, Kind>,
+}
+
+/// Fits a twin from all starts.
+pub(super) fn searched<'a>(
+    measured: &Measured,
+    effects: &[Effect],
+    records: &'a [Record],
+    noise: Noise,
+) -> Result<Searched<'a>, FilterError> {
+    let plain = Problem::of_measured(measured, records);
+    let space = measured.twin.parameters();
+    if space.iter().all(|p| p.role != Role::Magnitude) {
+        return Ok(Searched {
+            fits: fits(&plain, &[], noise)?,
+            problem: plain,
+            without: None,
+            kinds: BTreeMap::new(),
+        });
+    }
+    let twin = &measured.twin;
+    let without = off(&plain, &kinds(twin, effects, records, &[]));
+    let base = fits(&without, &[], noise.child("without"))?;
+    let Some(base) = base.into_iter().next() else {
+        return Ok(Searched {
+            fits: fits(&plain, &[], noise)?,
+            problem: plain,
+            without: None,
+            kinds: BTreeMap::new(),
+        });
+    };
+    // Where the twin follows the record: thresholds on states are somewhere among these.
+    let states: Vec<Signal> = match plain.is_simulated() {
+        true => vec![],
+        false => (recoverable(without.states(&base.theta))?.unwrap_or_default().into_iter())
+            .map(|(_, states)| states)
+            .collect(),
+    };
+    let kinds = kinds(twin, effects, records, &states);
+    let problem = scaled(&plain, &without, &kinds)?;
+    let mut theta = base.theta.clone();
+    for (j, parameter) in space.iter().enumerate() {
+        if let Some(kind) = kinds.get(&parameter.name) {
+            theta[j] = problem.axes[j].bounds.clamp(kind.off(parameter));
+        }
+    }
+    let initial = match problem.is_simulated() {
+        true => vec![theta],
+        false => {
+            let search = Search {
+                problem: &problem,
+                effects,
+                kinds: &kinds,
+                iterations: ITERATIONS,
+            };
+            search.starts(&theta)?
+        }
+    };
+    Ok(Searched {
+        fits: fits(&problem, &initial, noise)?,
+        problem,
+        without: Some(base.log_likelihood),
+        kinds,
+    })
+}
+
+/// Fits from `initial`, from the prior's centre and from random points, best first.
+fn fits(
+    problem: &Problem<'_>,
+    initial: &[Vec<f64>],
+    noise: Noise,
+) -> Result<Vec<Fitted>, FilterError> {
+    let fits = match problem.is_simulated() {
+        true => {
+            let theta = initial.first().map(Vec::as_slice);
+            base_fit(problem, theta, noise)?.into_iter().collect()
+        }
+        false => search(problem, initial, noise, ITERATIONS)?,
+    };
+    polish(problem, fits, ITERATIONS)
+}
+
+/// The problem with every effect held where it is off.
+fn off<'a>(problem: &Problem<'a>, kinds: &BTreeMap<String, Kind>) -> Problem<'a> {
+    with_axes(problem, |axis, j, space| {
+        if let Some(kind) = kinds.get(&space[j].name) {
+            axis.centre = kind.off(&space[j]);
+            axis.held = true;
+        }
+    })
+}
+
+/// The problem with the magnitudes of effects in the units of the record. Sizes are told from the states where the twin without effects
+/// follows the record with loud noise.
+fn scaled<'a>(
+    problem: &Problem<'a>,
+    without: &Problem<'_>,
+    kinds: &BTreeMap<String, Kind>,
+) -> Result<Problem<'a>, FilterError> {
+    let begin = without.begin(&without.centre());
+    let states: Option<Vec<Signal>> = match problem.is_simulated() {
+        true => None,
+        false => recoverable(without.states(&begin))?
+            .map(|all| all.into_iter().map(|(_, states)| states).collect()),
+    };
+    Ok(with_axes(problem, |axis, j, space| {
+        let parameter = &space[j];
+        match (kinds.get(&parameter.name), &states) {
+            (Some(Kind::Size(_)), Some(states)) => {
+                let entry = (j, parameter);
+                let size = largest(&problem.twin, &begin, entry, problem.records, states);
+                if let Some(size) = size {
+                    *axis = size_axis(parameter, size);
+                }
+            }
+            (Some(kind), _) => *axis = kind.axis(parameter),
+            (None, _) => {}
+        }
+    }))
+}
+
+/// The problem with other axes.
+fn with_axes<'a>(
+    problem: &Problem<'a>,
+    change: impl Fn(&mut Axis, usize, &crate::twin::ParameterSpace),
+) -> Problem<'a> {
+    let space = problem.twin.parameters();
+    let mut axes = problem.axes[..space.len()].to_vec();
+    for (j, axis) in axes.iter_mut().enumerate() {
+        change(axis, j, &space);
+    }
+    Problem::new(problem.twin.clone(), axes, problem.records)
+}
