@@ -92,6 +92,10 @@ impl<'a> Doubts<'a> {
         }
         for level in noise {
             let Some(side) = level.at_bound else { continue };
+            // A black box has noise of its own, and needs none on top.
+            if side == Side::Low && self.problem.is_simulated() {
+                continue;
+            }
             let what = format!(
                 "the {} noise of {} lies at its {} bound",
                 level.role,

@@ -38,13 +38,17 @@ const WORTH: f64 = 1.0;
 /// A point of the grid, and what it promises in nats.
 type Promise = (f64, Vec<f64>);
 
+/// Fits of a problem from all starts, best first.
+pub(super) type Fits<'a> =
+    dyn Fn(&Problem<'_>, &[Vec<f64>]) -> Result<Vec<Fitted>, FilterError> + 'a;
+
 /// The effects of a study beside a fit of the twin.
 pub(super) struct Search<'a> {
     pub problem: &'a Problem<'a>,
     pub effects: &'a [Effect],
     pub kinds: &'a BTreeMap<String, Kind>,
-    /// Iterations of a fit that effects are added to.
-    pub iterations: usize,
+    /// Fits from these starts and all others, best first.
+    pub fit: &'a Fits<'a>,
 }
 
 /// An effect and its free magnitudes.
@@ -82,6 +86,7 @@ impl<'a> Search<'a> {
         let mut best = theta.to_vec();
         let mut starts: Vec<Vec<f64>> = vec![];
         let mut open: Vec<Added<'a>> = vec![];
+        let count = alone.len();
         for (n, (added, fits)) in alone.into_iter().enumerate() {
             open.push(added);
             let problem = self.opened(&open);
@@ -90,13 +95,16 @@ impl<'a> Search<'a> {
                 _ => self.tried(&problem, &best, &open[n])?,
             };
             starts = fits.into_iter().map(|fit| fit.theta).collect();
-            if let Some(first) = starts.first()
-                && let Some(fit) = climb(&problem, first, self.iterations)?
+            if n > 0 {
+                starts.push(best.clone());
+            }
+            // As thorough as if these effects were all: with one effect more no fit is worse.
+            if n + 1 < count
+                && let Some(fit) = (self.fit)(&problem, &starts)?.into_iter().next()
             {
                 best = fit.theta;
             }
         }
-        starts.push(best);
         starts.push(theta.to_vec());
         Ok(starts)
     }

@@ -23,8 +23,8 @@ const FACTOR: f64 = 3.0;
 
 /// Levels that are tried for a threshold: shares of the values that lie below an upper one, above a lower one.
 const LEVELS: [f64; 6] = [0.97, 0.9, 0.8, 0.65, 0.5, 0.35];
-/// Part of the states' range by which a threshold on a state may lie beyond it: states move with θ.
-const BEYOND: f64 = 0.25;
+/// Part of their range by which a threshold on states or outputs may lie beyond it: states move with θ, and predictions scatter.
+const BEYOND: f64 = 0.5;
 /// Limits of a rate that are tried, as shares of the fastest step of the record.
 const RATES: [f64; 5] = [0.02, 0.05, 0.1, 0.2, 0.5];
 
@@ -83,8 +83,8 @@ pub(crate) fn kinds(
             rate_limit(&values_at(twin, effect, records, states), dt, duration)
         }
         (_, Some(off)) if off.is_infinite() => {
-            let is_state = effect.law().target() == TargetKind::State;
-            threshold(&values_at(twin, effect, records, states), off, is_state)
+            let is_known = effect.law().target() == TargetKind::Actuator;
+            threshold(&values_at(twin, effect, records, states), off, is_known)
         }
         ("Hz", _) => Kind::Shape {
             low: 0.5 / duration,
@@ -155,13 +155,13 @@ pub(crate) fn levels(values: &[f64], is_upper: bool) -> Vec<f64> {
 }
 
 /// Kind of a threshold, off at an infinite level; a level beyond the values is as good.
-fn threshold(values: &[f64], off: f64, is_state: bool) -> Kind {
+fn threshold(values: &[f64], off: f64, is_known: bool) -> Kind {
     if values.is_empty() {
         return Kind::Size(off);
     }
     let (low, high) = ends(values);
     let is_upper = off > 0.0;
-    let beyond = if is_state { BEYOND * (high - low) } else { 0.0 };
+    let beyond = if is_known { 0.0 } else { BEYOND * (high - low) };
     let (low, high) = match is_upper {
         true => (low, high + beyond),
         false => (low - beyond, high),

@@ -14,6 +14,7 @@
 //! | `evidence.rs` | the likelihood averaged over the prior |
 //! | `reference.rs` | linear gain of a direction beside θ |
 //! | `doubts.rs` | reasons to doubt a fit |
+//! | `sampler.rs` | draws weighed by a density, and proposals that follow them |
 //! | `posterior.rs`, `draws.rs`, `spread.rs` | draws of θ given the records, as a table, as errors and intervals |
 //! | `least_squares/` | Gauss–Newton on residuals, on argmin |
 
@@ -33,6 +34,7 @@ pub(crate) mod posterior;
 pub(crate) mod problem;
 pub(crate) mod reference;
 mod run;
+mod sampler;
 mod score;
 mod search;
 mod slope;

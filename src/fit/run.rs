@@ -1,7 +1,7 @@
 //! Fit of a twin to records, with fitted noise and uncertain starts.
 
 use super::certificate::Certificate;
-use super::climb::Fitted;
+use super::climb::{Fitted, climb};
 use super::doubts::Doubts;
 use super::draws::table;
 use super::evidence::evidence;
@@ -11,8 +11,9 @@ use super::outcome::{
 };
 use super::posterior::{Draws, posterior};
 use super::problem::Problem;
-use super::search::{Searched, searched};
+use super::search::{ITERATIONS, Searched, searched};
 use super::spread::Spread;
+use super::starts::polish;
 use crate::effect::Effect;
 use crate::likelihood::kalman::FilterError;
 use crate::likelihood::{Beliefs, Level, measured};
@@ -23,6 +24,9 @@ use std::time::Instant;
 
 /// Nats by which a fit with effects may end below one without, since the priors of the effects count, too.
 const BELOW: f64 = 0.5;
+
+/// Searches from posterior draws that are better than the best fit.
+const RESTARTS: usize = 6;
 
 /// Subject of a fit: a twin in its study's setting.
 pub(crate) struct Subject<'a> {
@@ -43,22 +47,22 @@ pub(crate) fn run(
     let measured = measured(subject.twin, records, subject.beliefs)?;
     let Searched {
         problem,
-        fits,
+        mut fits,
         without,
         kinds,
     } = searched(&measured, subject.effects, records, noise)?;
     let levels = measured.levels;
+    let asked = (settings.draws > 0).then_some(settings.draws);
+    let draws = match problem.is_simulated() && asked.is_none() {
+        true => Draws::default(),
+        false => drawn(&problem, &mut fits, asked, noise.child("posterior"))?,
+    };
     let Some((fitted, certificate)) =
         (fits.first().cloned()).zip(Certificate::new(&problem, &fits))
     else {
         return Ok(None);
     };
-    let evidence = evidence(&problem, &fitted, Some(noise.child("evidence")))?;
-    let asked = (settings.draws > 0).then_some(settings.draws);
-    let draws = match problem.is_simulated() && asked.is_none() {
-        true => Draws::default(),
-        false => posterior(&problem, &fits, asked, noise.child("posterior"))?,
-    };
+    let evidence = evidence(&problem, &fitted, &draws.proposals, noise.child("evidence"))?;
     let spread = Spread::new(&problem, &fitted, &draws.thetas, settings.level);
     let (parameters, noise_levels) = values(&problem, &fitted, &certificate, &levels, &spread);
     let smoothed = problem.smoothed(&fitted.theta)?;
@@ -103,6 +107,29 @@ pub(crate) fn run(
             .collect(),
         free_runs,
     }))
+}
+
+/// Posterior draws; where one of them is better than the best fit, another search begins there: the likelihood has kinks that no slope
+/// leads over.
+fn drawn(
+    problem: &Problem<'_>,
+    fits: &mut Vec<Fitted>,
+    asked: Option<usize>,
+    noise: Noise,
+) -> Result<Draws, FilterError> {
+    let mut draws = posterior(problem, fits, asked, noise)?;
+    for _ in 0..RESTARTS {
+        let Some(better) = draws.better.take() else {
+            break;
+        };
+        let Some(fit) = climb(problem, &better, ITERATIONS)? else {
+            break;
+        };
+        fits.insert(0, fit);
+        *fits = polish(problem, std::mem::take(fits), ITERATIONS)?;
+        draws = posterior(problem, fits, asked, noise)?;
+    }
+    Ok(draws)
 }
 
 /// Parameters and noise levels with errors and intervals.

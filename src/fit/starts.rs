@@ -96,8 +96,9 @@ pub(crate) fn polish(
 
 /// A random point: magnitudes in the units of the record, held entries where they are held.
 pub(super) fn drawn(problem: &Problem<'_>, mut theta: Vec<f64>, noise: Noise) -> Vec<f64> {
-    let mut source = noise.source("magnitudes");
-    for (value, axis) in theta.iter_mut().zip(&problem.axes) {
+    for (j, (value, axis)) in theta.iter_mut().zip(&problem.axes).enumerate() {
+        // By name: one effect more draws the others alike.
+        let mut source = noise.source(&problem.name(j));
         *value = match axis.evidence {
             _ if axis.held => axis.centre,
             EvidencePrior::Magnitude { largest } => largest * (2.0 * source.uniform() - 1.0),

@@ -134,7 +134,10 @@ pub(super) fn fit_text(study: &Study, fit: &Fit) -> String {
     ])];
     noise.extend(fit.noise.iter().map(noise_level));
     let mut text = format!("{}: fitted to {} samples.\n\n", study.name(), fit.samples);
-    text += &table(&parameters);
+    text += &match fit.parameters.is_empty() {
+        true => "All parameters are fixed: noise alone is fitted.\n".to_owned(),
+        false => table(&parameters),
+    };
     if !fit.noise.is_empty() {
         text += "\n";
         text += &table(&noise);

@@ -25,8 +25,9 @@ impl Prior {
     ///
     /// # Errors
     ///
-    /// Features that the twin cannot have.
+    /// Features that the twin cannot have; a study of which nothing is left to estimate.
     pub fn new(study: &Study, features: &dyn FeatureRecipe) -> Result<Self, EstimatorError> {
+        study.check_estimated()?;
         Ok(Self {
             simulator: FeatureSimulator::new(study.twin().clone(), features)?,
             space: study.twin().parameters(),
