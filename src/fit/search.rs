@@ -166,7 +166,7 @@ mod tests {
     use crate::fit::starts::drawn;
     use crate::likelihood::{Beliefs, measured};
     use crate::record::Drive;
-    use crate::twin::{DigitalTwin, Integrator, Now, Outline, Parameter, StateSpace, Twin};
+    use crate::twin::{Integrator, Now, Outline, Parameter, StateSpace, Twin};
     use std::path::Path;
 
     /// M·q̈ = F − Fv·q̇: the carriage of examples/rigs.rs.

@@ -14,6 +14,8 @@ use std::f64::consts::{LN_2, TAU};
 const SAMPLES: usize = 400_000;
 const LEAST_DRAWS: usize = 200;
 const MOST_DRAWS: usize = 1000;
+/// Share of the first proposals' covariance in those that follow their draws.
+const KEPT: f64 = 0.05;
 /// Monte-Carlo error in nats that is small enough, and rounds for which more draws are taken at most.
 const ENOUGH: f64 = 0.03;
 const MOST_ROUNDS: usize = 4;
@@ -26,12 +28,13 @@ impl Expansion<'_> {
         blocks: &[Block],
         noise: Noise,
     ) -> Result<Option<(f64, f64, f64)>, FilterError> {
-        let proposals: Vec<Proposal> = (proposals.iter())
+        let first: Vec<Proposal> = (proposals.iter())
             .filter_map(|proposal| proposal.within(&self.free, &self.phi))
             .collect();
-        if proposals.is_empty() {
+        if first.is_empty() {
             return Ok(None);
         }
+        let mut proposals = first.clone();
         let count = (SAMPLES / self.problem.samples()).clamp(LEAST_DRAWS, MOST_DRAWS);
         let log_target = |phi: &DVector<f64>| {
             let log_prior = self.log_prior(&phi.select_rows(&self.free), blocks);
@@ -47,6 +50,7 @@ impl Expansion<'_> {
         let mut found = None;
         for _ in 0..MOST_ROUNDS {
             let round = Round::new(self.problem, &proposals, count, &mut source, log_target)?;
+            proposals = round.adapted(&first, KEPT);
             logs.extend(round.logs);
             let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             if !top.is_finite() {

@@ -63,6 +63,8 @@ fn a_record_is_fitted_and_bad_calls_are_refused() {
     assert_eq!(value["noise"].as_array().unwrap().len(), 3);
     let text = done(&["fit", &record, "--study", &fixed, "--out", &at("tested")]);
     assert!(text.contains("All parameters are fixed"), "{text}");
+    let text = done(&["check", &record, "--study", &fixed]);
+    assert!(text.contains("none to estimate"), "{text}");
     refused(
         &["pretrain", "--study", &fixed, "--out", &at("none.est")],
         &["nothing is left to estimate", "truetwin fit"],
