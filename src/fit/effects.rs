@@ -1,17 +1,22 @@
 //! Where searches for the magnitudes of effects begin.
 //!
-//! At the fit of the twin without effects, each effect is tried over a grid of its shapes: the change of innovations that a small
-//! size makes is a direction, and the gain along it, θ free to answer, says how large the effect wants to be.
+//! Effects are added one by one to the fit of the twin without them, the most promising first. Each is tried over a grid of its
+//! thresholds, lags and shapes: the change of innovations that it makes is a direction, and the gain along it, θ free to answer, says how
+//! much it promises. The best of the grid are fitted for a while, and the best of these are starts.
 
 use super::axis::{EvidencePrior, SMALL};
-use super::magnitude::{LONGEST, duration};
+use super::climb::{Fitted, climb};
+use super::magnitude::{Kind, duration};
 use super::problem::Problem;
 use super::reference::Reference;
+use super::starts::sort;
 use crate::effect::{Effect, Magnitude};
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::math::ends;
 use crate::record::Record;
+use crate::twin::Role;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 
 /// Frequencies in 1/T: half a cycle apart, since a gain falls off within one; up to a fifth of the sampling rate.
@@ -19,72 +24,231 @@ const FREQUENCIES_PER_CYCLE: f64 = 2.0;
 const HIGHEST: f64 = 0.2;
 /// Most frequencies that are tried; a longer record has them closer together and more of them, each of more samples.
 const MOST: usize = 2000;
-/// Starts of an effect.
+/// Points of the grid that are fitted, and fits that become starts.
 const KEPT: usize = 3;
-/// Factor from one lag or delay to the next.
-const FACTOR: f64 = 3.0;
 /// Times of a change, as shares of the record.
 const TIMES: usize = 9;
+/// Iterations of a fit that compares starts.
+const SHORT: usize = 20;
+/// Largest share of a threshold's or a lag's change that is credited: its direction is no straight line.
+const WHOLE: f64 = 1.5;
+/// Gain in nats that is worth another round over the thresholds of one effect.
+const WORTH: f64 = 1.0;
 
-/// Starts beside `theta`, the fit without effects, which is one of them: each effect where it promises most, and the last one where it
-/// promises nearly as much.
-pub(crate) fn begin(
-    problem: &Problem<'_>,
-    theta: &[f64],
-    effects: &[Effect],
-) -> Result<Vec<Vec<f64>>, FilterError> {
-    let Some(reference) = recoverable(Reference::new(problem, theta))?.flatten() else {
-        return Ok(vec![theta.to_vec()]);
-    };
-    let space = problem.twin.parameters();
-    let mut best = vec![theta.to_vec()];
-    for effect in effects {
-        let entries: Vec<Option<usize>> = (effect.magnitudes().iter())
-            .map(|m| space.position(&effect.key().magnitude(m.name)).ok())
-            .collect();
-        let Some(size) =
-            (entries.iter().flatten().copied()).find(|&j| largest(problem, j).is_some())
-        else {
-            continue;
+/// A point of the grid, and what it promises in nats.
+type Promise = (f64, Vec<f64>);
+
+/// Fits of a problem from all starts, best first.
+pub(super) type Fits<'a> =
+    dyn Fn(&Problem<'_>, &[Vec<f64>]) -> Result<Vec<Fitted>, FilterError> + 'a;
+
+/// The effects of a study beside a fit of the twin.
+pub(super) struct Search<'a> {
+    pub problem: &'a Problem<'a>,
+    pub effects: &'a [Effect],
+    pub kinds: &'a BTreeMap<String, Kind>,
+    /// Fits from these starts and all others, best first.
+    pub fit: &'a Fits<'a>,
+}
+
+/// An effect and its free magnitudes.
+struct Added<'a> {
+    effect: &'a Effect,
+    /// Entries of θ, none for a magnitude that is given.
+    entries: Vec<Option<usize>>,
+}
+
+impl Added<'_> {
+    fn holds(&self, j: usize) -> bool {
+        self.entries.contains(&Some(j))
+    }
+}
+
+impl<'a> Search<'a> {
+    /// Starts beside `theta`, the fit with all effects off, which is one of them: no fit from these ends below it.
+    pub fn starts(&self, theta: &[f64]) -> Result<Vec<Vec<f64>>, FilterError> {
+        let space = self.problem.twin.parameters();
+        let added = self.effects.iter().map(|effect| Added {
+            effect,
+            entries: (effect.magnitudes().iter())
+                .map(|m| space.position(&effect.key().magnitude(m.name)).ok())
+                .collect(),
+        });
+        let mut alone: Vec<(Added<'a>, Vec<Fitted>)> = added
+            .filter(|added| added.entries.iter().any(Option::is_some))
+            .map(|added| {
+                let fits = self.tried(&self.opened(std::slice::from_ref(&added)), theta, &added)?;
+                Ok((added, fits))
+            })
+            .collect::<Result<_, FilterError>>()?;
+        let promise = |fits: &[Fitted]| fits.first().map_or(f64::NEG_INFINITY, |f| f.objective);
+        alone.sort_by(|a, b| promise(&b.1).total_cmp(&promise(&a.1)));
+        let mut best = theta.to_vec();
+        let mut starts: Vec<Vec<f64>> = vec![];
+        let mut open: Vec<Added<'a>> = vec![];
+        let count = alone.len();
+        for (n, (added, fits)) in alone.into_iter().enumerate() {
+            open.push(added);
+            let problem = self.opened(&open);
+            let fits = match n {
+                0 => fits,
+                _ => self.tried(&problem, &best, &open[n])?,
+            };
+            starts = fits.into_iter().map(|fit| fit.theta).collect();
+            if n > 0 {
+                starts.push(best.clone());
+            }
+            // As thorough as if these effects were all: with one effect more no fit is worse.
+            if n + 1 < count
+                && let Some(fit) = (self.fit)(&problem, &starts)?.into_iter().next()
+            {
+                best = fit.theta;
+            }
+        }
+        starts.push(theta.to_vec());
+        Ok(starts)
+    }
+
+    /// The problem with the magnitudes of all other effects held.
+    fn opened(&self, open: &[Added<'_>]) -> Problem<'a> {
+        let space = self.problem.twin.parameters();
+        self.problem.holding(|j| {
+            let is_magnitude = space.iter().nth(j).map(|p| p.role) == Some(Role::Magnitude);
+            is_magnitude && !open.iter().any(|added| added.holds(j))
+        })
+    }
+
+    /// Short fits with an effect, best first, beside a fit without it.
+    fn tried(
+        &self,
+        problem: &Problem<'_>,
+        theta: &[f64],
+        added: &Added<'_>,
+    ) -> Result<Vec<Fitted>, FilterError> {
+        let mut fits: Vec<Fitted> = climb(problem, theta, SHORT)?.into_iter().collect();
+        let mut from = theta.to_vec();
+        // A second threshold is off until the first one is found.
+        for _ in 0..self.switches(added).count().max(1) {
+            let without = problem.holding(|j| added.holds(j));
+            let Some(reference) = recoverable(Reference::new(&without, &from))?.flatten() else {
+                break;
+            };
+            let promises = self.promises(problem, &reference, &from, added)?;
+            let mut starts: Vec<Vec<f64>> = promises.into_iter().map(|(_, there)| there).collect();
+            // Where the effect is large, quiet noise has narrow valleys.
+            starts.extend(starts.first().map(|there| problem.begin(there)));
+            let found: Vec<Option<Fitted>> = (starts.par_iter())
+                .map(|start| climb(problem, start, SHORT))
+                .collect::<Result<_, _>>()?;
+            let before = fits.first().map_or(f64::NEG_INFINITY, |fit| fit.objective);
+            fits.extend(found.into_iter().flatten());
+            sort(&mut fits);
+            fits.truncate(KEPT);
+            match fits.first() {
+                Some(best) if best.objective > before + WORTH => from.clone_from(&best.theta),
+                _ => break,
+            }
+        }
+        Ok(fits)
+    }
+
+    /// Thresholds, lags and delays of an effect: entry and values to try.
+    fn switches<'b>(&'b self, added: &'b Added<'_>) -> impl Iterator<Item = (usize, &'b [f64])> {
+        let kind = |m: &Magnitude| self.kinds.get(&added.effect.key().magnitude(m.name));
+        (added.effect.magnitudes().iter().zip(&added.entries))
+            .filter_map(move |(m, entry)| Some((kind(m)?, (*entry)?)))
+            .filter_map(|(kind, j)| match kind {
+                Kind::Switch { grid, .. } => Some((j, &grid[..])),
+                _ => None,
+            })
+    }
+
+    /// The points of an effect's grid that promise most, best first.
+    fn promises(
+        &self,
+        problem: &Problem<'_>,
+        reference: &Reference,
+        theta: &[f64],
+        added: &Added<'_>,
+    ) -> Result<Vec<Promise>, FilterError> {
+        let switches: Vec<(usize, &[f64])> = self.switches(added).collect();
+        let size = added.entries.iter().flatten().copied();
+        let size = size
+            .filter_map(|j| Some((j, largest(problem, j)?)))
+            .next();
+        let is_shape = |j: usize| {
+            largest(problem, j).is_none() && switches.iter().all(|(switch, _)| *switch != j)
         };
-        let step = SMALL * largest(problem, size).unwrap_or(1.0);
-        let grid = grid(problem, effect, &entries);
-        let tried: Vec<Option<(f64, Vec<f64>)>> = (grid.par_iter())
-            .map(|shapes| {
-                let mut there = theta.to_vec();
-                for &(j, value) in shapes {
-                    there[j] = problem.axes[j].bounds.clamp(value);
-                }
-                there[size] = problem.axes[size].bounds.clamp(step);
+        let shapes = shapes(problem, added, is_shape);
+        let at = |shapes: &[(usize, f64)]| {
+            let mut there = theta.to_vec();
+            for &(j, value) in shapes {
+                there[j] = problem.axes[j].bounds.clamp(value);
+            }
+            there
+        };
+        let mut tried: Vec<Promise> = vec![];
+        if let Some((j, largest)) = size {
+            let step = SMALL * largest;
+            let of_size = (shapes.par_iter()).map(|shapes| {
+                let mut there = at(shapes);
+                let bounds = problem.axes[j].bounds;
+                there[j] = bounds.clamp(step);
                 let Some(filtered) = recoverable(problem.filtered(&there))? else {
                     return Ok(None);
                 };
-                let bounds = problem.axes[size].bounds;
                 let range = (bounds.low() / step, bounds.high() / step);
                 let gain = reference.gain(&reference.direction(&filtered), range);
-                there[size] = bounds.clamp(gain.alpha * step);
+                there[j] = bounds.clamp(gain.alpha * step);
                 Ok((gain.nats > 0.0).then_some((gain.nats, there)))
-            })
-            .collect::<Result<_, FilterError>>()?;
-        let mut tried: Vec<(f64, Vec<f64>)> = tried.into_iter().flatten().collect();
+            });
+            let of_size: Vec<Option<Promise>> = of_size.collect::<Result<_, FilterError>>()?;
+            tried.extend(best_of_times(
+                added,
+                of_size.into_iter().flatten().collect(),
+            ));
+        }
+        let here: f64 = reference.filtered.iter().map(|f| f.log_likelihood).sum();
+        for (j, values) in switches {
+            let points: Vec<Vec<f64>> = (shapes.iter())
+                .flat_map(|shapes| values.iter().map(|v| at(&[&shapes[..], &[(j, *v)]].concat())))
+                .collect();
+            let of_switch = points.into_par_iter().map(|there| {
+                let Some(filtered) = recoverable(problem.filtered(&there))? else {
+                    return Ok(None);
+                };
+                let value: f64 = filtered.iter().map(|f| f.log_likelihood).sum();
+                let gain = reference.gain(&reference.direction(&filtered), (0.0, WHOLE));
+                Ok(Some((gain.nats.max(value - here), there)))
+            });
+            let of_switch: Vec<Option<Promise>> = of_switch.collect::<Result<_, FilterError>>()?;
+            let mut of_switch: Vec<Promise> = of_switch.into_iter().flatten().collect();
+            of_switch.sort_by(|a, b| b.0.total_cmp(&a.0));
+            of_switch.truncate(KEPT);
+            tried.extend(of_switch);
+        }
         tried.sort_by(|a, b| b.0.total_cmp(&a.0));
-        tried.truncate(KEPT);
-        let before = best[0].clone();
-        best = (tried.into_iter())
-            .map(|(_, there)| {
-                let mut start = before.clone();
-                for j in entries.iter().copied().flatten() {
-                    start[j] = there[j];
-                }
-                start
-            })
-            .collect();
-        if best.is_empty() {
-            best.push(before);
+        Ok(tried)
+    }
+}
+
+/// The best points; of an effect that begins at some time, the best of each time: the times that promise most lie together, and the
+/// change may be at another.
+fn best_of_times(added: &Added<'_>, mut points: Vec<Promise>) -> Vec<Promise> {
+    points.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let time = (added.effect.magnitudes().iter().zip(&added.entries))
+        .find_map(|(m, entry)| (*entry).filter(|_| m.unit == "s" && m.off.is_none()));
+    let Some(time) = time else {
+        points.truncate(KEPT);
+        return points;
+    };
+    let mut kept: Vec<Promise> = vec![];
+    for point in points {
+        if kept.iter().all(|other| other.1[time] != point.1[time]) {
+            kept.push(point);
         }
     }
-    best.push(theta.to_vec());
-    Ok(best)
+    kept
 }
 
 fn largest(problem: &Problem<'_>, j: usize) -> Option<f64> {
@@ -95,14 +259,14 @@ fn largest(problem: &Problem<'_>, j: usize) -> Option<f64> {
 }
 
 /// Every combination of an effect's free shapes, as entries of θ.
-fn grid(
+fn shapes(
     problem: &Problem<'_>,
-    effect: &Effect,
-    entries: &[Option<usize>],
+    added: &Added<'_>,
+    is_shape: impl Fn(usize) -> bool,
 ) -> Vec<Vec<(usize, f64)>> {
-    (effect.magnitudes().iter().zip(entries))
+    (added.effect.magnitudes().iter().zip(&added.entries))
         .filter_map(|(m, entry)| Some((m, (*entry)?)))
-        .filter(|(_, j)| largest(problem, *j).is_none())
+        .filter(|(_, j)| is_shape(*j))
         .fold(vec![vec![]], |all, (m, j)| {
             let values = values(m, problem.records);
             (all.iter())
@@ -116,7 +280,7 @@ fn grid(
 }
 
 /// Values of a shape that are tried on these records.
-pub(super) fn values(m: &Magnitude, records: &[Record]) -> Vec<f64> {
+fn values(m: &Magnitude, records: &[Record]) -> Vec<f64> {
     let duration = duration(records);
     let dt = records[0].drive().dt();
     match m.unit {
@@ -127,11 +291,8 @@ pub(super) fn values(m: &Magnitude, records: &[Record]) -> Vec<f64> {
                 .collect()
         }
         "rad" => vec![0.0, FRAC_PI_2],
-        "s" if m.off.is_none() => (1..=TIMES)
+        "s" => (1..=TIMES)
             .map(|i| duration * i as f64 / (TIMES + 1) as f64)
-            .collect(),
-        "s" => std::iter::successors(Some(dt), |v| Some(FACTOR * v))
-            .take_while(|v| *v <= LONGEST * duration)
             .collect(),
         _ => {
             let (low, high) = ends(m.starts);

@@ -1,9 +1,10 @@
 //! Sizes of effects: as large as the twin's own terms.
 
 use super::axis::{Axis, EvidencePrior};
-use crate::effect::{Effect, Magnitude};
+use crate::effect::{Effect, Magnitude, TargetKind, targets};
+use crate::math::{ends, quantile};
 use crate::record::{Record, Signal};
-use crate::twin::{Acting, Parameter, StateSpace, Twin};
+use crate::twin::{Acting, Interval, Parameter, StateSpace, Twin};
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
@@ -17,43 +18,175 @@ const LOOKS: usize = 5;
 /// Longest lag or delay, as a share of the record: a longer one shows fewer than four times, and passes for the twin's own motion. At half
 /// of it, a delay of 0.15 records is told as two shorter ones.
 pub(crate) const LONGEST: f64 = 0.25;
+/// Factor from one lag or delay that is tried to the next.
+const FACTOR: f64 = 3.0;
+
+/// Levels that are tried for a threshold: shares of the values that lie below an upper one, above a lower one.
+const LEVELS: [f64; 6] = [0.97, 0.9, 0.8, 0.65, 0.5, 0.35];
+/// Part of their range by which a threshold on states or outputs may lie beyond it: states move with θ, and predictions scatter.
+const BEYOND: f64 = 0.5;
+/// Limits of a rate that are tried, as shares of the fastest step of the record.
+const RATES: [f64; 5] = [0.02, 0.05, 0.1, 0.2, 0.5];
 
 /// Kind of an effect's magnitude.
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Kind {
     /// A size, off at this value.
     Size(f64),
-    /// A time, a frequency, a delay: uniform over what a record can show.
+    /// A threshold, a lag, a delay: uniform over what a record can show, off at one end.
+    Switch {
+        low: f64,
+        high: f64,
+        off: f64,
+        /// Values to try.
+        grid: Vec<f64>,
+    },
+    /// A time or a frequency: uniform over what a record can show.
     Shape { low: f64, high: f64 },
     /// Anything else: normal, as its parameter's prior says.
     Other,
 }
 
-/// Kinds of magnitudes of effects by their name in θ, on these records.
-pub(crate) fn kinds(effects: &[Effect], records: &[Record]) -> BTreeMap<String, Kind> {
+impl Kind {
+    /// Axis of a magnitude whose kind needs no states of the twin.
+    pub fn axis(&self, parameter: &Parameter) -> Axis {
+        match self {
+            Self::Switch { low, high, .. } => switch_axis(parameter, *low, *high),
+            Self::Shape { low, high } => shape_axis(parameter, *low, *high),
+            Self::Size(_) | Self::Other => Axis::of(parameter),
+        }
+    }
+
+    /// Value at which the magnitude is off, or in the middle of its range where it has no effect of its own.
+    pub fn off(&self, parameter: &Parameter) -> f64 {
+        let value = match self {
+            Self::Size(off) | Self::Switch { off, .. } => *off,
+            Self::Shape { low, high } => 0.5 * (low + high),
+            Self::Other => parameter.prior.centre(),
+        };
+        parameter.bounds.clamp(value)
+    }
+}
+
+/// Kinds of magnitudes of effects by their name in θ, on these records. Thresholds on states are told from `states`; where none are
+/// given they lie out of reach.
+pub(crate) fn kinds(
+    twin: &Twin,
+    effects: &[Effect],
+    records: &[Record],
+    states: &[Signal],
+) -> BTreeMap<String, Kind> {
     let duration = duration(records);
     let dt = records[0].drive().dt();
-    let kind = |m: &Magnitude| match (m.unit, m.off) {
+    let kind = |effect: &Effect, m: &Magnitude| match (m.unit, m.off) {
+        ("signal/s", Some(off)) if off.is_infinite() => {
+            rate_limit(&values_at(twin, effect, records, states), dt, duration)
+        }
+        (_, Some(off)) if off.is_infinite() => {
+            let is_known = effect.law().target() == TargetKind::Actuator;
+            threshold(&values_at(twin, effect, records, states), off, is_known)
+        }
         ("Hz", _) => Kind::Shape {
             low: 0.5 / duration,
             high: 0.5 / dt,
         },
-        ("s", Some(_)) => Kind::Shape {
-            low: 0.0,
-            high: LONGEST * duration,
-        },
+        ("s", Some(off)) => {
+            let mut longest = LONGEST * duration;
+            let (least, most) = effect.kind().memories();
+            // A delay's register ends.
+            if least < most {
+                longest = longest.min((most - 1) as f64 * dt);
+            }
+            Kind::Switch {
+                low: 0.0,
+                high: longest,
+                off,
+                grid: std::iter::successors(Some(dt), |v| Some(FACTOR * v))
+                    .take_while(|v| *v <= longest)
+                    .collect(),
+            }
+        }
         ("s", None) => Kind::Shape {
             low: 0.0,
             high: duration,
         },
-        (_, Some(off)) if off.is_finite() => Kind::Size(off),
+        (_, Some(off)) => Kind::Size(off),
         _ => Kind::Other,
     };
     (effects.iter())
         .flat_map(|effect| {
             let name = |m: &Magnitude| effect.key().magnitude(m.name);
-            effect.magnitudes().iter().map(move |m| (name(m), kind(m)))
+            (effect.magnitudes().iter()).map(move |m| (name(m), kind(effect, m)))
         })
         .collect()
+}
+
+/// Values of the sensor, actuator or state that an effect stands at.
+fn values_at(twin: &Twin, effect: &Effect, records: &[Record], states: &[Signal]) -> Vec<f64> {
+    let kind = effect.law().target();
+    let known = targets(kind, twin.outline().as_ref(), &twin.signals());
+    let Some(target) = known.iter().position(|name| name == effect.target()) else {
+        return vec![];
+    };
+    let column = |signal: &Signal| -> Vec<f64> {
+        match target < signal.ncols() {
+            true => signal.column(target).to_vec(),
+            false => vec![],
+        }
+    };
+    let all: Vec<Vec<f64>> = match kind {
+        TargetKind::Sensor => records.iter().map(|r| column(r.outputs())).collect(),
+        TargetKind::Actuator => (records.iter())
+            .map(|r| column(r.drive().inputs()))
+            .collect(),
+        _ => states.iter().map(column).collect(),
+    };
+    all.into_iter()
+        .flatten()
+        .filter(|v| v.is_finite())
+        .collect()
+}
+
+/// Levels of a threshold that are worth a try.
+pub(crate) fn levels(values: &[f64], is_upper: bool) -> Vec<f64> {
+    (LEVELS.iter())
+        .filter_map(|p| quantile(values, if is_upper { *p } else { 1.0 - p }).ok())
+        .collect()
+}
+
+/// Kind of a threshold, off at an infinite level; a level beyond the values is as good.
+fn threshold(values: &[f64], off: f64, is_known: bool) -> Kind {
+    if values.is_empty() {
+        return Kind::Size(off);
+    }
+    let (low, high) = ends(values);
+    let is_upper = off > 0.0;
+    let beyond = if is_known { 0.0 } else { BEYOND * (high - low) };
+    let (low, high) = match is_upper {
+        true => (low, high + beyond),
+        false => (low - beyond, high),
+    };
+    Kind::Switch {
+        low,
+        high,
+        off: if is_upper { high } else { low },
+        grid: levels(values, is_upper),
+    }
+}
+
+/// Kind of the limit of a rate: beyond the fastest step of the record it is off, below the slowest wander nothing passes.
+fn rate_limit(values: &[f64], dt: f64, duration: f64) -> Kind {
+    let (low, high) = match values.is_empty() {
+        true => (0.0, 1.0),
+        false => ends(values),
+    };
+    let fastest = (high - low).max(1e-9) / dt;
+    Kind::Switch {
+        low: fastest * dt / duration,
+        high: fastest,
+        off: fastest,
+        grid: RATES.map(|share| share * fastest).to_vec(),
+    }
 }
 
 /// Length of the longest record, in seconds.
@@ -157,6 +290,43 @@ pub(crate) fn shape_axis(parameter: &Parameter, low: f64, high: f64) -> Axis {
         }
     } else {
         axis
+    }
+}
+
+/// Axis of a magnitude that is off at an end of a range: within it, the user's bounds kept.
+fn switch_axis(parameter: &Parameter, low: f64, high: f64) -> Axis {
+    let bounds = Interval::unchecked(
+        low.max(parameter.bounds.low()),
+        high.min(parameter.bounds.high()),
+    );
+    let (low, high) = (bounds.low(), bounds.high());
+    if low >= high {
+        return Axis::of(parameter);
+    }
+    let axis = Axis::of(&Parameter {
+        prior: bounds,
+        bounds,
+        ..parameter.clone()
+    });
+    match axis.is_log() {
+        true => Axis {
+            centre: (low * high).sqrt(),
+            deviation: 2.0 * (high / low).ln(),
+            longest: 0.15 * (high / low).ln(),
+            evidence: EvidencePrior::Uniform {
+                low: low.ln(),
+                high: high.ln(),
+            },
+            ..axis
+        },
+        false => Axis {
+            centre: 0.5 * (low + high),
+            deviation: 2.0 * (high - low),
+            longest: 0.15 * (high - low),
+            width: 0.05 * (high - low),
+            evidence: EvidencePrior::Uniform { low, high },
+            ..axis
+        },
     }
 }
 

@@ -3,6 +3,7 @@
 //! | file | question |
 //! |---|---|
 //! | `run.rs`, `outcome.rs` | a fit from beginning to end, and its result |
+//! | `search.rs` | searches without and with the effects of a study |
 //! | `magnitude.rs`, `effects.rs` | how large an effect may be, and where a search for it begins |
 //! | `problem.rs`, `axis.rs` | what is unknown, in which bounds, and what is known before |
 //! | `score.rs` | how well a fit predicts a record that it has not seen |
@@ -12,12 +13,15 @@
 //! | `certificate.rs` | has the search arrived, and what lies at a bound |
 //! | `evidence.rs` | the likelihood averaged over the prior |
 //! | `reference.rs` | linear gain of a direction beside θ |
+//! | `doubts.rs` | reasons to doubt a fit |
+//! | `sampler.rs` | draws weighed by a density, and proposals that follow them |
 //! | `posterior.rs`, `draws.rs`, `spread.rs` | draws of θ given the records, as a table, as errors and intervals |
 //! | `least_squares/` | Gauss–Newton on residuals, on argmin |
 
 pub(crate) mod axis;
 pub(crate) mod certificate;
 pub(crate) mod climb;
+mod doubts;
 mod draws;
 mod effects;
 pub(crate) mod evidence;
@@ -30,7 +34,9 @@ pub(crate) mod posterior;
 pub(crate) mod problem;
 pub(crate) mod reference;
 mod run;
+mod sampler;
 mod score;
+mod search;
 mod slope;
 pub(crate) mod spread;
 pub(crate) mod starts;

@@ -99,6 +99,8 @@ pub struct FittedNoise {
     pub std_error: f64,
     /// Level that the twin or its study declares.
     pub declared: Option<f64>,
+    /// The bound that the level lies at: rounding at the lower one, or what an output that stops at an end of its range needs.
+    pub at_bound: Option<Side>,
 }
 
 /// An unknown start, noise level or magnitude that a study estimates beside the twin's parameters.

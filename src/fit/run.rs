@@ -1,20 +1,19 @@
 //! Fit of a twin to records, with fitted noise and uncertain starts.
 
-use super::certificate::{Certificate, Side};
-use super::climb::Fitted;
+use super::certificate::Certificate;
+use super::climb::{Fitted, climb};
+use super::doubts::Doubts;
 use super::draws::table;
-use super::effects::begin;
 use super::evidence::evidence;
 use super::follow::{free_runs, starts};
-use super::magnitude::{Kind, kinds, largest, shape_axis, size_axis};
 use super::outcome::{
-    Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedValue, NOT_CONVERGED,
-    OutputErrors, Warning,
+    Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedValue, OutputErrors,
 };
 use super::posterior::{Draws, posterior};
 use super::problem::Problem;
+use super::search::{ITERATIONS, Searched, searched};
 use super::spread::Spread;
-use super::starts::{base_fit, polish, search};
+use super::starts::polish;
 use crate::effect::Effect;
 use crate::likelihood::kalman::FilterError;
 use crate::likelihood::{Beliefs, Level, measured};
@@ -23,8 +22,11 @@ use crate::record::{Record, Signal};
 use crate::twin::{Noise, Role, Twin};
 use std::time::Instant;
 
-/// Iterations of each search: loud noise has a way to go.
-const ITERATIONS: usize = 80;
+/// Nats by which a fit with effects may end below one without, since the priors of the effects count, too.
+const BELOW: f64 = 0.5;
+
+/// Searches from posterior draws that are better than the best fit.
+const RESTARTS: usize = 6;
 
 /// Subject of a fit: a twin in its study's setting.
 pub(crate) struct Subject<'a> {
@@ -43,67 +45,43 @@ pub(crate) fn run(
     let clock = Instant::now();
     let noise = Noise::new(settings.seed, "fit", 0);
     let measured = measured(subject.twin, records, subject.beliefs)?;
-    let mut problem = Problem::of_measured(&measured, records);
-    let (twin, levels) = (measured.twin, measured.levels);
-    let space = twin.parameters();
-    let own = space.len() - levels.len();
-    if !problem.is_simulated() {
-        // Sizes of effects are known once states are: where the twin follows the record with loud noise.
-        let kinds = kinds(subject.effects, records);
-        let mut begin = problem.begin(&problem.centre());
-        // A step that is beyond the records changes nothing, whatever its size.
-        for (value, parameter) in begin.iter_mut().zip(space.iter()) {
-            if let Some(Kind::Shape { low, high }) = kinds.get(&parameter.name) {
-                *value = parameter.bounds.clamp(0.5 * (low + high));
-            }
-        }
-        let states = problem.states(&begin);
-        if let Ok(states) = states {
-            let mut axes = problem.axes[..space.len()].to_vec();
-            let states: Vec<Signal> = states.into_iter().map(|(_, states)| states).collect();
-            for (j, parameter) in space.iter().enumerate().take(own) {
-                match kinds.get(&parameter.name) {
-                    Some(Kind::Size(off)) => {
-                        let mut theta = begin.clone();
-                        theta[j] = *off;
-                        let entry = (j, parameter);
-                        if let Some(size) = largest(&twin, &theta, entry, records, &states) {
-                            axes[j] = size_axis(parameter, size);
-                        }
-                    }
-                    Some(Kind::Shape { low, high }) => {
-                        axes[j] = shape_axis(parameter, *low, *high);
-                    }
-                    Some(Kind::Other) | None => {}
-                }
-            }
-            problem = Problem::new(twin.clone(), axes, records);
-        }
-    }
-    let fits = search_all(&problem, subject.effects, noise)?;
+    let Searched {
+        problem,
+        mut fits,
+        without,
+        kinds,
+    } = searched(&measured, subject.effects, records, noise)?;
+    let levels = measured.levels;
+    let asked = (settings.draws > 0).then_some(settings.draws);
+    let draws = match problem.is_simulated() && asked.is_none() {
+        true => Draws::default(),
+        false => drawn(&problem, &mut fits, asked, noise.child("posterior"))?,
+    };
     let Some((fitted, certificate)) =
         (fits.first().cloned()).zip(Certificate::new(&problem, &fits))
     else {
         return Ok(None);
     };
-    let evidence = evidence(&problem, &fitted, Some(noise.child("evidence")))?;
-    let asked = (settings.draws > 0).then_some(settings.draws);
-    let draws = match problem.is_simulated() && asked.is_none() {
-        true => Draws::default(),
-        false => posterior(&problem, &fits, asked, noise.child("posterior"))?,
-    };
+    let evidence = evidence(&problem, &fitted, &draws.proposals, noise.child("evidence"))?;
     let spread = Spread::new(&problem, &fitted, &draws.thetas, settings.level);
     let (parameters, noise_levels) = values(&problem, &fitted, &certificate, &levels, &spread);
     let smoothed = problem.smoothed(&fitted.theta)?;
     let free_runs = free_runs(&problem, &fitted.theta, &smoothed);
     let errors = errors(&problem, &fitted.theta, &free_runs)?;
-    let convergence = Convergence {
+    let mut convergence = Convergence {
         converged: certificate.has_converged(),
         distance: certificate.distance,
         agreeing: certificate.agreeing,
         searches: certificate.searches,
     };
-    let warnings = warnings(&parameters, &convergence, &errors);
+    let ends = without.is_none_or(|base| fitted.log_likelihood > base - BELOW);
+    convergence.converged &= ends;
+    let mut doubts = Doubts::new(&problem, &fitted.theta);
+    doubts.below(without.filter(|_| !ends), fitted.log_likelihood);
+    doubts.search(&convergence);
+    doubts.bounds(&parameters, &noise_levels, &kinds);
+    doubts.runs(&errors);
+    doubts.records(free_runs.iter().all(Option::is_some));
     Ok(Some(Fit {
         parameters,
         noise: noise_levels,
@@ -118,7 +96,7 @@ pub(crate) fn run(
         }),
         convergence,
         errors,
-        warnings,
+        warnings: doubts.all,
         posterior: (asked.is_some())
             .then(|| table(&problem, &draws, noise.child("starts")))
             .transpose()?,
@@ -131,28 +109,27 @@ pub(crate) fn run(
     }))
 }
 
-/// Fits from all starts, best first. Effects begin where a fit without them says that they promise most.
-fn search_all(
+/// Posterior draws; where one of them is better than the best fit, another search begins there: the likelihood has kinks that no slope
+/// leads over.
+fn drawn(
     problem: &Problem<'_>,
-    effects: &[Effect],
+    fits: &mut Vec<Fitted>,
+    asked: Option<usize>,
     noise: Noise,
-) -> Result<Vec<Fitted>, FilterError> {
-    let space = problem.twin.parameters();
-    let is_magnitude = |j: usize| space[j].role == Role::Magnitude;
-    let mut initial = vec![];
-    if !problem.is_simulated() && (0..space.len()).any(is_magnitude) {
-        let without = problem.holding(is_magnitude);
-        let base = search(&without, &[], noise.child("without"), ITERATIONS)?;
-        if let Some(base) = base.first() {
-            initial = begin(&without, &base.theta, effects)?;
-        }
+) -> Result<Draws, FilterError> {
+    let mut draws = posterior(problem, fits, asked, noise)?;
+    for _ in 0..RESTARTS {
+        let Some(better) = draws.better.take() else {
+            break;
+        };
+        let Some(fit) = climb(problem, &better, ITERATIONS)? else {
+            break;
+        };
+        fits.insert(0, fit);
+        *fits = polish(problem, std::mem::take(fits), ITERATIONS)?;
+        draws = posterior(problem, fits, asked, noise)?;
     }
-    let fits = if problem.is_simulated() {
-        base_fit(problem, None, noise)?.into_iter().collect()
-    } else {
-        search(problem, &initial, noise, ITERATIONS)?
-    };
-    polish(problem, fits, ITERATIONS)
+    Ok(draws)
 }
 
 /// Parameters and noise levels with errors and intervals.
@@ -167,6 +144,10 @@ fn values(
     let errors = &spread.errors;
     let (mut parameters, mut noise) = (vec![], vec![]);
     for (j, p) in space.iter().enumerate() {
+        // Unknown starts of equations are integrated; they stand among the starts.
+        if p.role == Role::Start && problem.axes[j].held {
+            continue;
+        }
         if p.role == Role::Noise {
             let level = levels.iter().find(|level| level.parameter.name == p.name);
             noise.push(FittedNoise {
@@ -179,6 +160,7 @@ fn values(
                 value: fitted.theta[j],
                 std_error: errors[j],
                 declared: level.and_then(|level| level.declared),
+                at_bound: certificate.at_bound[j],
             });
             continue;
         }
@@ -235,54 +217,4 @@ pub(super) fn errors(
             }
         })
         .collect())
-}
-
-fn warnings(
-    parameters: &[FittedValue],
-    convergence: &Convergence,
-    errors: &[OutputErrors],
-) -> Vec<Warning> {
-    let mut all = Vec::new();
-    let mut warn = |code, what, remedy| all.push(Warning { code, what, remedy });
-    if !convergence.converged {
-        let what = format!(
-            "the search has not arrived: {:.2} standard deviations from the top, {} of {} searches agree",
-            convergence.distance, convergence.agreeing, convergence.searches
-        );
-        warn(
-            NOT_CONVERGED,
-            what,
-            "narrow [prior], or fix a parameter that the record does not identify",
-        );
-    }
-    for p in parameters {
-        if let Some(side) = p.at_bound {
-            let side = match side {
-                Side::Low => "lower",
-                Side::High => "upper",
-            };
-            let what = format!("{} lies at its {side} bound", p.name);
-            warn(
-                "at-bound",
-                what,
-                "widen [bounds] if other values are possible; its error means little here",
-            );
-        }
-    }
-    for e in errors {
-        match e.free_run {
-            None => warn(
-                "free-run-diverges",
-                format!("the free run of {} diverges", e.name),
-                "judge by one-step errors, or look for what the twin lacks: truetwin diagnose",
-            ),
-            Some(rmse) if rmse >= e.deviation => warn(
-                "no-better-than-constant",
-                format!("the free run of {} is no better than a constant", e.name),
-                "look for what the twin lacks: truetwin diagnose",
-            ),
-            Some(_) => {}
-        }
-    }
-    all
 }

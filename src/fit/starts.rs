@@ -1,5 +1,6 @@
 //! The first fit of the twin as it is.
 
+use crate::fit::axis::EvidencePrior;
 use crate::fit::climb::{Fitted, climb};
 use crate::fit::growing;
 use crate::fit::problem::Problem;
@@ -41,16 +42,16 @@ pub(crate) fn search(
     noise: Noise,
     iterations: usize,
 ) -> Result<Vec<Fitted>, FilterError> {
-    let begin = |theta: &[f64]| problem.begin(&problem.full(theta));
     let space = problem.twin.parameters();
     let mut screened: Vec<(f64, Vec<f64>)> = (0..SCREENED)
         .into_par_iter()
         .map(|i| {
             let noise = noise.child("starts").sample(i);
-            let theta = begin(&match i % 2 {
+            let theta = problem.full(&match i % 2 {
                 0 => space.draw_prior(noise),
                 _ => space.draw_bounds(noise),
             });
+            let theta = problem.begin(&drawn(problem, theta, noise));
             let value = recoverable(problem.log_likelihood(&theta))?;
             Ok(value.map(|v| (v + problem.log_prior(&theta, true), theta)))
         })
@@ -93,7 +94,25 @@ pub(crate) fn polish(
     Ok(fits)
 }
 
+/// A random point: magnitudes in the units of the record, held entries where they are held.
+pub(super) fn drawn(problem: &Problem<'_>, mut theta: Vec<f64>, noise: Noise) -> Vec<f64> {
+    for (j, (value, axis)) in theta.iter_mut().zip(&problem.axes).enumerate() {
+        // By name: one effect more draws the others alike.
+        let mut source = noise.source(&problem.name(j));
+        *value = match axis.evidence {
+            _ if axis.held => axis.centre,
+            EvidencePrior::Magnitude { largest } => largest * (2.0 * source.uniform() - 1.0),
+            EvidencePrior::Uniform { low, high } => {
+                let phi = low + source.uniform() * (high - low);
+                if axis.is_log() { phi.exp() } else { phi }
+            }
+            _ => *value,
+        };
+    }
+    problem.clamp(&theta)
+}
+
 /// Best first; of equal ones the first start's stays first.
-fn sort(fits: &mut [Fitted]) {
+pub(super) fn sort(fits: &mut [Fitted]) {
     fits.sort_by(|a, b| b.objective.total_cmp(&a.objective));
 }

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 /// | key | holds |
 /// |---|---|
 /// | `parameters` | name, unit, value, standard error, interval, prior, bounds; `prior_share`: variance over the prior's; `at_bound`: `low`, `high` or null |
-/// | `noise` | fitted levels: states in units per √s, outputs in their own; `declared` is null where nothing was declared |
+/// | `noise` | fitted levels: states in units per √s, outputs in their own; `declared` is null where nothing was declared; `at_bound` as of parameters |
 /// | `starts` | states at the first sample of each record, given all of it |
 /// | `level` | level of the intervals |
 /// | `log_likelihood`, `evidence` | in nats; `evidence.std_error` is null where Laplace's approximation stands alone |
@@ -131,7 +131,10 @@ pub(super) fn fit_text(study: &Study, fit: &Fit) -> String {
     ])];
     noise.extend(fit.noise.iter().map(noise_level));
     let mut text = format!("{}: fitted to {} samples.\n\n", study.name(), fit.samples);
-    text += &table(&parameters);
+    text += &match fit.parameters.is_empty() {
+        true => "All parameters are fixed: noise alone is fitted.\n".to_owned(),
+        false => table(&parameters),
+    };
     if !fit.noise.is_empty() {
         text += "\n";
         text += &table(&noise);
@@ -216,12 +219,13 @@ fn noise_level(level: &FittedNoise) -> Vec<String> {
     let digits = Digits::supported(level.value, level.std_error);
     let declared = level.declared.map_or(String::new(), short);
     let error = digits::error(level.std_error);
+    let note = level.at_bound.map_or("", |_| "at its bound");
     row([
         &level.name,
         &level.unit,
         &digits.write(level.value),
         &error,
         &declared,
-        "",
+        note,
     ])
 }

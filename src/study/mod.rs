@@ -182,6 +182,17 @@ impl Study {
         })
     }
 
+    /// Refuses a study of which nothing is left to estimate, where simulations are to teach an estimator.
+    pub(crate) fn check_estimated(&self) -> Result<(), StudyError> {
+        if !self.twin.parameters().is_empty() {
+            return Ok(());
+        }
+        Err(StudyError::Table(
+            "[fixed] holds every parameter, nothing is left to estimate; free one, or test the twin on a record with `truetwin fit`"
+                .into(),
+        ))
+    }
+
     /// Returns whether estimates may lean on the prior: `[prior] trust = true`.
     pub(crate) fn trusts_prior(&self) -> bool {
         self.file.prior.trust

@@ -6,8 +6,8 @@ use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::thresholds::Thresholds;
 use crate::effect::{Effect, Law, Magnitude, Mark, TargetKind, on_levels, targets};
 use crate::fit::axis::{Axis, EvidencePrior};
-use crate::fit::magnitude::{LONGEST, largest, shape_axis, size_axis};
-use crate::math::{ends, quantile};
+use crate::fit::magnitude::{LONGEST, largest, levels, shape_axis, size_axis};
+use crate::math::ends;
 use crate::twin::{Interval, Parameter, Twin};
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -235,10 +235,7 @@ impl Library<'_> {
         }
         if m.is_threshold() {
             let upper = m.off.is_some_and(|off| off > 0.0);
-            let shares: [f64; 6] = [0.97, 0.9, 0.8, 0.65, 0.5, 0.35];
-            let levels = (shares.iter())
-                .filter_map(|p| quantile(values, if upper { *p } else { 1.0 - p }).ok());
-            return linear(low, low + span, levels.collect());
+            return linear(low, low + span, levels(values, upper));
         }
         match (m.unit, m.off) {
             ("s", Some(_)) if register.is_some() => {

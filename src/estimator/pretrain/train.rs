@@ -121,6 +121,7 @@ pub(super) fn settings(
 
 /// The prior through the preset's features, which the network must take.
 pub(super) fn prior(project: &Project, options: &PretrainOptions) -> Result<Prior, EstimatorError> {
+    project.study().check_estimated()?;
     let preset = project.recipe(options.preset);
     let prior = Prior::new(project.study(), preset.features.as_ref())?;
     let most = preset.architecture.max_features();

@@ -23,6 +23,7 @@ debug_by_name!(Prior);
 impl Prior {
     /// Creates the prior of a study, seen through features.
     pub fn new(study: &Study, features: &dyn FeatureRecipe) -> Result<Self, EstimatorError> {
+        study.check_estimated()?;
         Ok(Self {
             simulator: FeatureSimulator::new(study.twin().clone(), features)?,
             space: study.twin().parameters(),

@@ -1,90 +1,72 @@
-//! Correction of Laplace by draws around it.
+//! Evidence by importance sampling.
 
-use super::expansion::{Expansion, Laplace, log_mean};
+use super::expansion::{Expansion, log_mean};
 use super::sizes::Block;
 use crate::fit::axis::EvidencePrior;
+use crate::fit::sampler::{Proposal, Round, effective};
 use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::math::deviation;
 use crate::twin::Noise;
 use nalgebra::DVector;
-use rayon::prelude::*;
 use std::f64::consts::{LN_2, TAU};
 
-/// Samples that are filtered for the correction, and draws that makes at least and at most.
+/// Samples that are filtered in one round, and draws that makes at least and at most.
 const SAMPLES: usize = 400_000;
 const LEAST_DRAWS: usize = 200;
 const MOST_DRAWS: usize = 1000;
-/// Degrees of freedom of the proposal: heavier tails than the posterior's.
-const FREEDOM: usize = 5;
+/// Share of the first proposals' covariance in those that follow their draws.
+const KEPT: f64 = 0.05;
+/// Monte-Carlo error in nats that is small enough, and rounds for which more draws are taken at most.
+const ENOUGH: f64 = 0.03;
+const MOST_ROUNDS: usize = 4;
 
 impl Expansion<'_> {
-    /// log Z from draws around a Laplace approximation, its standard error, and the effective number of draws.
+    /// log Z from draws of proposals that follow the posterior, its standard error, and the effective number of draws.
     pub(super) fn by_draws(
         &self,
-        around: &Laplace,
+        proposals: &[Proposal],
         blocks: &[Block],
         noise: Noise,
     ) -> Result<Option<(f64, f64, f64)>, FilterError> {
-        let d = self.free.len();
-        let Some(factor) = around.precision.clone().cholesky() else {
-            return Ok(None);
-        };
-        let root = factor.l().transpose();
-        let log_root: f64 = (0..d).map(|a| root[(a, a)].ln()).sum();
-        let count = (SAMPLES / self.problem.samples()).clamp(LEAST_DRAWS, MOST_DRAWS) / 2;
-        let c = &self.problem.coordinates;
-        // Pairs on both sides of the centre: what is odd in the posterior cancels.
-        let pairs: Vec<[f64; 2]> = (0..count as u64)
-            .into_par_iter()
-            .map(|i| {
-                let mut source = noise.sample(i).source("evidence");
-                let z = DVector::from_fn(d, |_, _| source.normal());
-                let square: f64 = (0..FREEDOM).map(|_| source.normal().powi(2)).sum();
-                let stretch = (FREEDOM as f64 / square).sqrt();
-                let Some(step) = root.solve_upper_triangular(&(z * stretch)) else {
-                    return Ok([f64::NEG_INFINITY; 2]);
-                };
-                let length = (&root * &step).norm_squared();
-                let log_proposal = log_student(d, length) + log_root;
-                let mut weights = [f64::NEG_INFINITY; 2];
-                for (weight, sign) in weights.iter_mut().zip([1.0, -1.0]) {
-                    let free = &around.centre + sign * &step;
-                    let mut phi = self.phi.clone();
-                    for (a, &j) in self.free.iter().enumerate() {
-                        phi[j] = free[a];
-                    }
-                    let inside = (phi.iter().zip(c.lower().iter().zip(c.upper())))
-                        .all(|(v, (low, high))| (low..=high).contains(&v));
-                    let log_prior = self.log_prior(&free, blocks);
-                    if !inside || log_prior == f64::NEG_INFINITY {
-                        continue;
-                    }
-                    let theta = c.theta(phi.as_slice());
-                    if let Some(value) = recoverable(self.problem.log_likelihood(&theta))? {
-                        *weight = value + log_prior - log_proposal;
-                    }
-                }
-                Ok(weights)
-            })
-            .collect::<Result<_, FilterError>>()?;
-        let logs: Vec<f64> = pairs.iter().flatten().copied().collect();
-        let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        if !top.is_finite() {
+        let first: Vec<Proposal> = (proposals.iter())
+            .filter_map(|proposal| proposal.within(&self.free, &self.phi))
+            .collect();
+        if first.is_empty() {
             return Ok(None);
         }
-        let weights: Vec<f64> = logs.iter().map(|l| (l - top).exp()).collect();
-        let sum: f64 = weights.iter().sum();
-        let effective = sum * sum / weights.iter().map(|w| w * w).sum::<f64>();
-        // Pairs are not independent within themselves.
-        let means: Vec<f64> = weights
-            .chunks_exact(2)
-            .map(|p| 0.5 * (p[0] + p[1]))
-            .collect();
-        let mean = sum / weights.len() as f64;
-        let n = means.len() as f64;
-        let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        let error = (variance / n).sqrt() / mean;
+        let mut proposals = first.clone();
+        let count = (SAMPLES / self.problem.samples()).clamp(LEAST_DRAWS, MOST_DRAWS);
+        let log_target = |phi: &DVector<f64>| {
+            let log_prior = self.log_prior(&phi.select_rows(&self.free), blocks);
+            if log_prior == f64::NEG_INFINITY {
+                return Ok(None);
+            }
+            let theta = self.problem.coordinates.theta(phi.as_slice());
+            let value = recoverable(self.problem.log_likelihood(&theta))?;
+            Ok(value.map(|value| value + log_prior))
+        };
+        let mut source = noise.source("evidence");
+        let mut logs: Vec<f64> = vec![];
+        let mut found = None;
+        for _ in 0..MOST_ROUNDS {
+            let round = Round::new(self.problem, &proposals, count, &mut source, log_target)?;
+            proposals = round.adapted(&first, KEPT);
+            logs.extend(round.logs);
+            let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            if !top.is_finite() {
+                break;
+            }
+            let weights: Vec<f64> = logs.iter().map(|l| (l - top).exp()).collect();
+            let n = weights.len() as f64;
+            let mean = weights.iter().sum::<f64>() / n;
+            let error = deviation(&weights) / n.sqrt() / mean;
+            found = Some((top + mean.ln(), error, effective(&weights)));
+            if error <= ENOUGH {
+                break;
+            }
+        }
         let bounds = self.beyond_bounds(&self.problem.prior_terms().collect::<Vec<_>>());
-        Ok(Some((top + mean.ln() + bounds, error, effective)))
+        Ok(found.map(|(log, error, effective)| (log + bounds, error, effective)))
     }
 
     /// log of the prior density of the free entries.
@@ -125,14 +107,4 @@ impl Expansion<'_> {
             .sum();
         of_entries + of_blocks
     }
-}
-
-/// log density of a standard Student with [`FREEDOM`] degrees at squared length `square`.
-fn log_student(d: usize, square: f64) -> f64 {
-    let (nu, d) = (FREEDOM as f64, d as f64);
-    let gamma = statrs::function::gamma::ln_gamma;
-    gamma(0.5 * (nu + d))
-        - gamma(0.5 * nu)
-        - 0.5 * d * (nu * TAU / 2.0).ln()
-        - 0.5 * (nu + d) * (square / nu).ln_1p()
 }

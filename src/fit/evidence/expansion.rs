@@ -15,9 +15,8 @@ pub(crate) struct Laplace {
     pub log_evidence: f64,
     /// Entries that are free.
     pub free: Vec<usize>,
-    /// Mean and precision, in φ of the free entries.
+    /// Mean, in φ of the free entries.
     pub centre: DVector<f64>,
-    pub precision: DMatrix<f64>,
     /// Deviations of the priors of sizes: entry and deviation.
     pub sizes: Vec<(usize, f64)>,
 }
@@ -160,7 +159,7 @@ impl<'a> Expansion<'a> {
             }
         });
         let likelihood = self.gradient.select_rows(&self.free);
-        let factor = precision.clone().cholesky()?;
+        let factor = precision.cholesky()?;
         let step = factor.solve(&(&likelihood - pull));
         let centre = &phi + &step;
         let gain = likelihood.dot(&step) - 0.5 * (&information * &step).dot(&step);
@@ -180,7 +179,6 @@ impl<'a> Expansion<'a> {
             log_evidence,
             free: self.free.clone(),
             centre,
-            precision,
             sizes,
         })
     }

@@ -10,7 +10,8 @@
 //! normal prior whose deviation τ is unknown: six values from what is just visible to what is as large as the twin's own terms.
 //! An unfinished fit is credited with 1.5 nats of what its quadratic promises, no more.
 //!
-//! Laplace is exact for a normal posterior. Draws around it correct the rest: Z = mean of likelihood·prior/proposal.
+//! Laplace is exact for a normal posterior. Draws correct the rest: Z = mean of likelihood·prior/proposal, the proposals those that
+//! follow the posterior draws.
 //!
 //! Sources: MacKay, *Information Theory, Inference, and Learning Algorithms* (2003), chapters 27 to 29; Kass & Raftery, "Bayes factors",
 //! *JASA* 90 (1995).
@@ -25,6 +26,7 @@ pub(crate) use expansion::{CREDIT, Laplace, log_mean};
 
 use super::climb::Fitted;
 use super::problem::Problem;
+use super::sampler::Proposal;
 use crate::likelihood::kalman::FilterError;
 use crate::twin::Noise;
 use expansion::Expansion;
@@ -34,7 +36,7 @@ const LEAST_EFFECTIVE: f64 = 30.0;
 
 /// Evidence, in nats.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Evidence {
+pub(super) struct Evidence {
     /// log Z.
     pub log_evidence: f64,
     /// log Z by Laplace alone.
@@ -60,15 +62,16 @@ pub(crate) fn laplace(
 
 /// Evidence of a twin around the fit that maximises it.
 ///
-/// With `noise`, draws correct what Laplace leaves; without, and for simulated likelihoods, Laplace stands alone.
-pub(crate) fn evidence(
+/// Draws of `proposals` correct what Laplace leaves; without any, and for simulated likelihoods, Laplace stands alone.
+pub(super) fn evidence(
     problem: &Problem<'_>,
     fitted: &Fitted,
-    noise: Option<Noise>,
+    proposals: &[Proposal],
+    noise: Noise,
 ) -> Result<Option<Evidence>, FilterError> {
     let expansion = Expansion::new(problem, fitted);
     let blocks = expansion.blocks();
-    let Some((laplace, best)) = expansion.laplace(&blocks) else {
+    let Some((laplace, _)) = expansion.laplace(&blocks) else {
         return Ok(None);
     };
     let alone = Evidence {
@@ -77,10 +80,10 @@ pub(crate) fn evidence(
         error: None,
         effective: 0.0,
     };
-    let (Some(noise), false) = (noise, problem.is_simulated()) else {
+    if problem.is_simulated() {
         return Ok(Some(alone));
-    };
-    let Some((log, error, effective)) = expansion.by_draws(&best, &blocks, noise)? else {
+    }
+    let Some((log, error, effective)) = expansion.by_draws(proposals, &blocks, noise)? else {
         return Ok(Some(alone));
     };
     Ok(Some(if effective >= LEAST_EFFECTIVE {

@@ -5,6 +5,7 @@ use super::*;
 use crate::fit::axis::Axis;
 use crate::fit::axis::EvidencePrior;
 use crate::fit::climb::climb;
+use crate::fit::posterior::posterior;
 use crate::record::{Drive, Record, Signal};
 use crate::twin::{Now, Outline, Parameter, StateSpace, Twin};
 use nalgebra::{DMatrix, DVector};
@@ -69,6 +70,14 @@ fn problem(records: &[Record], size: Option<f64>) -> Problem<'_> {
     Problem::new(twin, axes, records)
 }
 
+/// Evidence corrected by draws of proposals that follow the posterior.
+fn corrected(problem: &Problem<'_>, fitted: &Fitted, seed: u64) -> Evidence {
+    let noise = Noise::new(seed, "t", 0);
+    let draws = posterior(problem, std::slice::from_ref(fitted), None, noise).unwrap();
+    let found = evidence(problem, fitted, &draws.proposals, noise).unwrap();
+    found.unwrap()
+}
+
 #[test]
 fn a_normal_posterior_has_the_exact_evidence() {
     let records = [record(60)];
@@ -76,9 +85,7 @@ fn a_normal_posterior_has_the_exact_evidence() {
     let fitted = climb(&problem, &[0.0, 0.0], 40).unwrap().unwrap();
     let deviation = problem.axes[0].deviation;
     let truth = exact(&records[0], [deviation * deviation; 2]);
-    let found = evidence(&problem, &fitted, Some(Noise::new(1, "t", 0)))
-        .unwrap()
-        .unwrap();
+    let found = corrected(&problem, &fitted, 1);
     assert!((found.laplace - truth).abs() < 1e-3, "{found:?} {truth}");
     let error = found.error.unwrap();
     assert!(
@@ -95,13 +102,7 @@ fn the_seed_hardly_matters() {
     let problem = problem(&records, Some(3.0));
     let fitted = climb(&problem, &[0.0, 0.5], 40).unwrap().unwrap();
     let values: Vec<f64> = (0..10)
-        .map(|seed| {
-            let noise = Some(Noise::new(seed, "t", 0));
-            evidence(&problem, &fitted, noise)
-                .unwrap()
-                .unwrap()
-                .log_evidence
-        })
+        .map(|seed| corrected(&problem, &fitted, seed).log_evidence)
         .collect();
     let (low, high) = crate::math::ends(&values);
     assert!(high - low < 0.1, "{values:?}");
@@ -119,7 +120,9 @@ fn sizes_are_averaged_over() {
     let each: Vec<f64> = (blocks[0].options.iter())
         .map(|size| exact(&records[0], [deviation.powi(2), size[0] * size[0]]))
         .collect();
-    let found = evidence(&problem, &fitted, None).unwrap().unwrap();
+    let found = evidence(&problem, &fitted, &[], Noise::OFF)
+        .unwrap()
+        .unwrap();
     assert!(
         (found.laplace - log_mean(&each)).abs() < 0.02,
         "{found:?} {each:?}"
@@ -139,7 +142,9 @@ fn an_entry_at_its_bound_is_integrated_on_one_side() {
     problem = Problem::new(problem.twin.clone(), axes, &records);
     let fitted = climb(&problem, &[0.0, 0.0], 40).unwrap().unwrap();
     assert_eq!(fitted.theta[1], 0.5);
-    let found = evidence(&problem, &fitted, None).unwrap().unwrap();
+    let found = evidence(&problem, &fitted, &[], Noise::OFF)
+        .unwrap()
+        .unwrap();
     // By quadrature over b, a in closed form.
     let deviation = problem.axes[0].deviation;
     let logs: Vec<f64> = (0..4000)

@@ -70,7 +70,10 @@ pub(super) fn check(
         true => String::new(),
         false => format!("; {plain}: no more than the prior says, as in some planned records"),
     };
-    let message = format!("expected errors in widths of the prior: {all}{note}");
+    let message = match all.is_empty() {
+        true => "none to estimate".to_owned(),
+        false => format!("expected errors in widths of the prior: {all}{note}"),
+    };
     (Finding::pass(CHECK, message), parameters)
 }
 

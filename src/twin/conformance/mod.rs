@@ -44,14 +44,14 @@ const PAIRED: f64 = 1e-2;
 /// `truetwin check` adds *step*: half the step moves no output by more than its noise.
 pub fn check(twin: &dyn DigitalTwin, drive: &Drive, seed: u64) -> Vec<Finding> {
     let space = twin.parameters();
-    if let Err(error) = space.check() {
-        return vec![Finding::failure("parameters", error.to_string())];
-    }
-    let names = space.names().join(", ");
-    let mut findings = vec![Finding::pass(
-        "parameters",
-        format!("{} to estimate: {names}", space.len()),
-    )];
+    // A study may hold all of them.
+    let is_fixed = space.is_empty();
+    let message = match space.check() {
+        _ if is_fixed => "none to estimate".to_owned(),
+        Err(error) => return vec![Finding::failure("parameters", error.to_string())],
+        Ok(()) => format!("{} to estimate: {}", space.len(), space.names().join(", ")),
+    };
+    let mut findings = vec![Finding::pass("parameters", message)];
     let setting = Setting {
         twin,
         drive,
@@ -83,8 +83,10 @@ pub fn check(twin: &dyn DigitalTwin, drive: &Drive, seed: u64) -> Vec<Finding> {
     let other = twin.simulate(&setting.centre, drive, Noise::new(seed, "check", 1));
     let spread = other.map_or(0.0, |other| rms(&first, &other));
     findings.push(noisy(spread));
-    findings.push(setting.paired(&first, spread));
-    findings.push(setting.identifiable(spread));
+    if !is_fixed {
+        findings.push(setting.paired(&first, spread));
+        findings.push(setting.identifiable(spread));
+    }
     findings
 }
 

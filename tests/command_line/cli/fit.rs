@@ -1,6 +1,7 @@
 //! `fit` as a user meets it.
 
 use super::{done, json, refused, truetwin};
+use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -56,10 +57,27 @@ fn a_record_is_fitted_and_bad_calls_are_refused() {
         "fixed.toml",
         "[fixed]\nk1 = 0.6\nk2 = 0.5\nk3 = 0.55\nk4 = 1.0\n",
     );
+    // Nothing to estimate: the record is tested, noise alone is fitted; an estimator has nothing to learn.
+    let value = json(&["fit", &record, "--study", &fixed, "--json"]);
+    assert_eq!(value["parameters"].as_array().unwrap().len(), 0);
+    assert_eq!(value["noise"].as_array().unwrap().len(), 3);
+    let text = done(&["fit", &record, "--study", &fixed, "--out", &at("tested")]);
+    assert!(text.contains("All parameters are fixed"), "{text}");
+    let text = done(&["check", &record, "--study", &fixed]);
+    assert!(text.contains("none to estimate"), "{text}");
     refused(
-        &["fit", &record, "--study", &fixed],
-        &["no parameter to estimate"],
+        &["pretrain", "--study", &fixed, "--out", &at("none.est")],
+        &["nothing is left to estimate", "truetwin fit"],
     );
+
+    // A start that is integrated stands once, among the starts.
+    let started = study("started.toml", "[start]\nh1 = 'estimate'\n");
+    let value = json(&["fit", &record, "--study", &started, "--json"]);
+    let names: Vec<&str> = (value["parameters"].as_array().unwrap().iter())
+        .map(|p| p["name"].as_str().unwrap())
+        .collect();
+    assert_eq!(names, ["k1", "k2", "k3", "k4"]);
+    assert_eq!(value["starts"][0]["name"], "h1");
 
     refused(
         &["fit", &record, "--twin", "tanks", "--out", &out],
@@ -101,4 +119,40 @@ fn an_input_that_never_moves_is_warned_of() {
     let fitted = truetwin(&["fit", &record, "--twin", "tanks"]);
     let said = String::from_utf8_lossy(&fitted.stderr);
     assert!(said.contains("still.csv: u never changes"), "{said}");
+    let value = json(&["fit", &record, "--twin", "tanks", "--json"]);
+    assert!(codes(&value).contains(&"constant-input"), "{value}");
+}
+
+/// A step of 20 s is longer than the tanks' time constants, and an output without noise drives its level to the end of its range.
+#[test]
+fn a_long_step_and_a_noise_level_at_its_end_are_told() {
+    let place = place();
+    let at = |name: &str| place.join(name).display().to_string();
+    let study = |name: &str, tables: &str| {
+        fs::write(place.join(name), format!("twin = 'tanks'\n{tables}")).unwrap();
+        at(name)
+    };
+    let silent = "[noise]\nh1 = { std = 0.0, known = true }\nh2 = { std = 0.0, known = true }\ny = 0.0\n";
+    let (silent, record) = (study("silent.toml", silent), at("silent.csv"));
+    let theta = "k1=0.6,k2=0.5,k3=0.55,k4=1";
+    let simulate = ["simulate", "--study", &silent, "--theta", theta];
+    done(&[&simulate[..], &["--out", &record]].concat());
+    let value = json(&["fit", &record, "--study", &silent, "--json"]);
+    assert_eq!(value["noise"][0]["at_bound"], "low", "{value}");
+    assert!(codes(&value).contains(&"noise-at-bound"), "{value}");
+    let text = done(&["fit", &record, "--study", &silent]);
+    assert!(text.contains("at its bound"), "{text}");
+
+    let coarse = study("coarse.toml", "[record]\nstep = 2.0\nsamples = 100\n");
+    let record = at("coarse.csv");
+    let simulate = ["simulate", "--study", &coarse, "--theta", theta];
+    done(&[&simulate[..], &["--out", &record]].concat());
+    let value = json(&["fit", &record, "--study", &coarse, "--json"]);
+    assert!(codes(&value).contains(&"step-matters"), "{value}");
+}
+
+/// Codes of the warnings of a fit.
+fn codes(fit: &Value) -> Vec<&str> {
+    let all = fit["warnings"].as_array().unwrap().iter();
+    all.map(|w| w["code"].as_str().unwrap()).collect()
 }
