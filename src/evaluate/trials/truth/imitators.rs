@@ -4,7 +4,8 @@
 //! left = min over the size of ½·‖(change of the departure − change of the effect)⊥‖²   in nats
 //! ```
 //!
-//! Laws are those of the world. The small change of an effect screens it: no search where a multiple of that leaves much.
+//! Laws are those of the world. Two changes screen an effect, a small one and one as large as the departure's: no search where multiples
+//! of both leave much.
 
 use super::Rival;
 use super::listed::Listed;
@@ -16,8 +17,10 @@ use crate::evaluate::trials::variant::{Variant, is_proportional, is_signed};
 
 /// An effect is a right answer if it leaves less than this share of the information, and less than this in nats.
 const IMITATES: (f64, f64) = (0.02, 1.0);
-/// An effect is searched if a multiple of its small change leaves less than this share, and less than this in nats.
+/// An effect is searched if a multiple of a change of it leaves less than this share, and less than this in nats.
 const PROMISES: (f64, f64) = (0.5, 6.0);
+/// A law that is proportional to its size is not tried at a larger one where its small change leaves more than this share.
+const UNLIKE: f64 = 0.9;
 /// Share that is as good as nothing: no search can improve on it.
 const NOTHING: f64 = 1e-3;
 /// Sizes on either side of the screened one, as a factor.
@@ -32,8 +35,8 @@ const GOLDEN: f64 = 0.618_033_988_749_894_8;
 pub(super) struct Imitators {
     /// Keys of the right answers, sorted.
     pub right: Vec<String>,
-    /// The nearest effect that is no right answer.
-    pub rival: Option<Rival>,
+    /// Every other effect.
+    pub wrong: Vec<Rival>,
 }
 
 /// A law of a sign and a shape at its screened size.
@@ -55,7 +58,7 @@ impl Imitators {
     ) -> Result<Self, EvaluateError> {
         let mut imitators = Self {
             right: own.into_iter().cloned().collect(),
-            rival: None,
+            wrong: vec![],
         };
         if stage.world.is_black_box() {
             return Ok(imitators);
@@ -66,19 +69,25 @@ impl Imitators {
             let left = left(sized, effect, stage, information)?;
             if left < share && left * sized.nats < nats {
                 imitators.right.push(effect.key.clone());
-                continue;
-            }
-            let nats = left * sized.nats;
-            if imitators.rival.as_ref().is_none_or(|r| nats < r.nats) {
-                imitators.rival = Some(Rival {
+            } else {
+                imitators.wrong.push(Rival {
                     effect: effect.key.clone(),
-                    nats,
+                    nats: left * sized.nats,
                 });
             }
         }
         imitators.right.sort();
         Ok(imitators)
     }
+}
+
+/// Returns the effect that leaves least of any departure and is a right answer to none.
+pub(super) fn rival(all: &[Imitators]) -> Option<Rival> {
+    let is_right = |key: &String| all.iter().any(|imitators| imitators.right.contains(key));
+    (all.iter().flat_map(|imitators| &imitators.wrong))
+        .filter(|rival| !is_right(&rival.effect))
+        .min_by(|a, b| a.nats.total_cmp(&b.nats))
+        .cloned()
 }
 
 /// Share of a departure's information that an effect leaves at its best sign, shape and size.
@@ -88,25 +97,39 @@ fn left(
     stage: &Stage<'_>,
     information: &Information<'_>,
 ) -> Result<f64, EvaluateError> {
-    let mut best: Option<Screened> = None;
+    let mut least = 1.0_f64;
+    let mut promising = Vec::new();
+    let (share, nats) = PROMISES;
     for variant in Variant::of(&effect.id) {
-        if let Some(screened) = screened(sized, effect, variant, stage, information)?
-            && (best.as_ref()).is_none_or(|b| screened.unexplained < b.unexplained)
-        {
-            best = Some(screened);
+        let Some(screened) = screened(sized, effect, variant, stage, information)? else {
+            continue;
+        };
+        let left = screened.unexplained;
+        if left < share && left * sized.nats < nats {
+            promising.push(screened);
+        } else {
+            least = least.min(left);
         }
     }
-    let Some(best) = best else {
-        return Ok(1.0);
-    };
-    let (share, nats) = PROMISES;
-    if best.unexplained > share || best.unexplained * sized.nats > nats {
-        return Ok(best.unexplained);
+    // Shapes that look alike in small differ at the size that it takes.
+    let mut best: Option<(f64, Screened)> = None;
+    for screened in promising {
+        let left = left_at(sized, &screened, screened.size, stage, information)?;
+        if best.as_ref().is_none_or(|(least, _)| left < *least) {
+            best = Some((left, screened));
+        }
     }
-    searched(sized, &best, stage, information)
+    match best {
+        None => Ok(least),
+        Some((left, _)) if left < NOTHING => Ok(left),
+        Some((left, screened)) => {
+            let searched = searched(sized, &screened, stage, information)?;
+            Ok(left.min(searched))
+        }
+    }
 }
 
-/// Matches a small change of an effect; `None` for one that cannot be made or has the other sign.
+/// Matches changes of an effect; `None` for one that cannot be made or has the other sign.
 fn screened(
     sized: &Sized,
     effect: &Listed,
@@ -114,48 +137,61 @@ fn screened(
     stage: &Stage<'_>,
     information: &Information<'_>,
 ) -> Result<Option<Screened>, EvaluateError> {
-    let Some(draft) = Draft::variant(&effect.id, effect.place, effect.other, variant) else {
+    let draft = |variant| Draft::variant(&effect.id, effect.place, effect.other, variant);
+    let Some(positive) = draft(variant) else {
         return Ok(None);
     };
-    let matched = |size: f64| -> Result<Option<(Match, f64)>, EvaluateError> {
-        let change = stage.changed(&draft, size, information)?;
-        Ok(change.map(|change| {
-            let of_change = information.matched(&sized.change, &change);
-            (of_change, information.nats(&change))
-        }))
-    };
-    let Some((small, nats)) = matched(FIRST)? else {
+    let Some(small) = stage.changed(&positive, FIRST, information)? else {
         return Ok(None);
     };
-    let (mut size, mut best) = (FIRST, small);
-    if !is_proportional(&effect.id) {
-        // An end of a range, a play: the size at which it changes as much as the departure does.
+    let nats = information.nats(&small);
+    let small = information.matched(&sized.change, &small);
+    let is_signed = is_signed(&effect.id);
+    let sign = if is_signed {
+        small.multiple.signum()
+    } else {
+        1.0
+    };
+    let Some(draft) = draft(Variant { sign, ..variant }) else {
+        return Ok(None);
+    };
+    let largest = draft.largest();
+    let mut best = Screened {
+        draft,
+        size: FIRST * sign * small.multiple,
+        unexplained: small.unexplained,
+    };
+    if !is_proportional(&effect.id) || (best.size > 0.0 && small.unexplained < UNLIKE) {
+        // An end of a range, a play, a level at its limit: the size at which the effect changes as much as the departure does.
         let same = match nats > 0.0 {
             true => FIRST * (information.nats(&sized.change) / nats).sqrt(),
             false => 10.0 * FIRST,
         };
-        let same = same.clamp(0.1 * FIRST, draft.largest());
-        if let Some((large, _)) = matched(same)?
-            && large.multiple > 0.0
-            && (best.multiple <= 0.0 || large.unexplained < best.unexplained)
-        {
-            (size, best) = (same, large);
+        let same = same.clamp(0.1 * FIRST, largest);
+        if let Some(large) = stage.changed(&best.draft, same, information)? {
+            let large: Match = information.matched(&sized.change, &large);
+            if large.multiple > 0.0 && (best.size <= 0.0 || large.unexplained < best.unexplained) {
+                best.size = same * large.multiple;
+                best.unexplained = large.unexplained;
+            }
         }
     }
-    if best.multiple < 0.0 && !is_signed(&effect.id) {
-        return Ok(None);
-    }
-    let sign = if best.multiple < 0.0 { -1.0 } else { 1.0 };
-    let draft = Draft::variant(
-        &effect.id,
-        effect.place,
-        effect.other,
-        Variant { sign, ..variant },
-    );
-    Ok(draft.map(|draft| Screened {
-        size: (size * best.multiple.abs()).clamp(1e-6, draft.largest()),
-        unexplained: best.unexplained,
-        draft,
+    best.size = best.size.min(largest);
+    Ok((best.size > 0.0).then_some(best))
+}
+
+/// Share that an effect of a size leaves. One that cannot be made leaves everything.
+fn left_at(
+    sized: &Sized,
+    screened: &Screened,
+    size: f64,
+    stage: &Stage<'_>,
+    information: &Information<'_>,
+) -> Result<f64, EvaluateError> {
+    let all = information.nats(&sized.change);
+    let by: Option<Change> = stage.changed(&screened.draft, size, information)?;
+    Ok(by.map_or(1.0, |by| {
+        (information.left(&sized.change, &by) / all).min(1.0)
     }))
 }
 
@@ -166,24 +202,13 @@ fn searched(
     stage: &Stage<'_>,
     information: &Information<'_>,
 ) -> Result<f64, EvaluateError> {
-    let all = information.nats(&sized.change);
-    // A size that cannot be made leaves everything.
-    let left = |log: f64| -> Result<f64, EvaluateError> {
-        let by: Option<Change> = stage.changed(&screened.draft, log.exp(), information)?;
-        Ok(by.map_or(1.0, |by| {
-            (information.left(&sized.change, &by) / all).min(1.0)
-        }))
-    };
+    let left = |log: f64| left_at(sized, screened, log.exp(), stage, information);
     let middle = screened.size.ln();
-    let mut best = left(middle)?;
-    if best < NOTHING {
-        return Ok(best);
-    }
     let largest = screened.draft.largest().ln();
     let (mut low, mut high) = (middle - REACH.ln(), (middle + REACH.ln()).min(largest));
     let mut inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
     let mut values = [left(inner[0])?, left(inner[1])?];
-    for _ in 3..SEARCH {
+    for _ in 2..SEARCH {
         if values[0] < values[1] {
             high = inner[1];
             (inner[1], values[1]) = (inner[0], values[0]);
@@ -196,8 +221,7 @@ fn searched(
             values[1] = left(inner[1])?;
         }
     }
-    best = best.min(values[0]).min(values[1]);
-    Ok(best)
+    Ok(values[0].min(values[1]))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Draws truths and their records.
 
 use super::Truth;
-use super::imitators::Imitators;
+use super::imitators::{Imitators, rival};
 use super::listed::Listed;
 use super::prior::{conditions, has_room, nuisances, theta};
 use super::reject::Reject;
@@ -249,13 +249,14 @@ impl<'a> TruthSampler<'a> {
             return Ok(Err(Reject::TooAlike));
         }
         truth.information = all.iter().map(|sized| sized.nats).reduce(f64::min);
-        for (i, sized) in all.iter().enumerate() {
-            let own = truth.effects.get(i);
-            let found = Imitators::of(sized, own, &self.listed, &stage, &information)?;
-            truth.right.push(found.right);
-            let nearest = [truth.rival.take(), found.rival];
-            truth.rival = (nearest.into_iter().flatten()).min_by(|a, b| a.nats.total_cmp(&b.nats));
-        }
+        let imitators = (all.iter().enumerate())
+            .map(|(i, sized)| {
+                let own = truth.effects.get(i);
+                Imitators::of(sized, own, &self.listed, &stage, &information)
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        truth.rival = rival(&imitators);
+        truth.right = imitators.into_iter().map(|i| i.right).collect();
         truth.places = self.true_places(&truth, &scene);
         Ok(self.drawn(truth, &drive, extra, noise, &scene))
     }

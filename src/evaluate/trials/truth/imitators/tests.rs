@@ -49,7 +49,7 @@ fn right(id: &str, place: Place, sign: f64) -> Vec<String> {
         let draft = Draft::variant(id, place, None, variant).unwrap();
         let sized = stage.sized(&draft, 40.0, information).unwrap().unwrap();
         let all = Imitators::of(&sized, None, &listed, stage, information).unwrap();
-        let rival = all.rival.as_ref().unwrap();
+        let rival = rival(std::slice::from_ref(&all)).unwrap();
         assert!(!all.right.contains(&rival.effect), "{all:?}");
         assert!((0.2..=sized.nats * 1.01).contains(&rival.nats), "{all:?}");
         all.right
@@ -93,4 +93,26 @@ fn a_dead_zone_that_is_never_entered_is_a_bias() {
         assert!(holds(&zone, key), "{zone:?}");
     }
     assert!(!holds(&zone, "actuator-lag@actuator"), "{zone:?}");
+}
+
+/// The effects of a pair are no rivals of each other.
+#[test]
+fn a_right_answer_to_one_departure_is_no_rival_of_the_other() {
+    let rivals = |wrong: &[(&str, f64)]| -> Vec<Rival> {
+        let rival = |(effect, nats): &(&str, f64)| Rival {
+            effect: (*effect).into(),
+            nats: *nats,
+        };
+        wrong.iter().map(rival).collect()
+    };
+    let of = |right: &str, wrong: &[(&str, f64)]| Imitators {
+        right: vec![right.into()],
+        wrong: rivals(wrong),
+    };
+    let pair = [
+        of("a@x", &[("b@y", 1.0), ("c@x", 7.0)]),
+        of("b@y", &[("a@x", 2.0), ("c@x", 5.0)]),
+    ];
+    assert_eq!(rival(&pair), rivals(&[("c@x", 5.0)]).pop());
+    assert_eq!(rival(&[]), None);
 }
