@@ -1,4 +1,4 @@
-//! What qualifies as layers of an architecture.
+//! Bounds on the layers of an architecture.
 
 use super::{Batch, TapedBatch};
 use dfdx::prelude::{ConstDim, Cpu, CpuError, Module, ModuleMut, TensorCollection};
