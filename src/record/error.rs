@@ -106,9 +106,7 @@ pub enum RecordError {
     },
     /// Channels other than the twin's.
     #[error(
-        "the record has {given} {kind}, the twin has {expected}{}; {} takes the columns {columns}: choose the twin that this record is of (`truetwin twins` lists them), or correct the columns",
-        names.as_deref().map_or(String::new(), |names| format!(" ({names})")),
-        twin.as_deref().unwrap_or("the twin")
+        "the record has {given} {kind}, the twin has {expected}{names}; {twin}: choose the twin that this record is of (`truetwin twins` lists them), or correct the columns"
     )]
     Channels {
         /// "inputs" or "outputs".
@@ -117,12 +115,10 @@ pub enum RecordError {
         given: usize,
         /// In the twin.
         expected: usize,
-        /// The twin's columns of this kind, if it has any.
-        names: Option<String>,
-        /// All columns of the twin's records.
-        columns: String,
-        /// Name of the twin, where it is known.
-        twin: Option<String>,
+        /// The twin's columns of this kind in parentheses after a space; empty where it has none.
+        names: String,
+        /// The twin and all its columns: "tanks takes the columns t,u,y".
+        twin: String,
     },
     /// A file that cannot be read or written.
     #[error("{}: {}", path.display(), with_remedy(error))]
@@ -144,25 +140,11 @@ pub enum RecordError {
 
 impl RecordError {
     /// Adds the name of the twin to an error about its channels.
-    pub(crate) fn of_twin(self, name: &str) -> Self {
-        match self {
-            Self::Channels {
-                kind,
-                given,
-                expected,
-                names,
-                columns,
-                ..
-            } => Self::Channels {
-                kind,
-                given,
-                expected,
-                names,
-                columns,
-                twin: Some(name.into()),
-            },
-            other => other,
+    pub(crate) fn of_twin(mut self, name: &str) -> Self {
+        if let Self::Channels { twin, .. } = &mut self {
+            *twin = twin.replacen("the twin", name, 1);
         }
+        self
     }
 
     /// Creates an error about a file as a whole.

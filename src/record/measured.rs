@@ -172,9 +172,11 @@ impl Record {
                     kind,
                     given,
                     expected,
-                    names: (expected > 0).then(|| column_names(letter, expected).join(",")),
-                    columns: columns.join(","),
-                    twin: None,
+                    names: match expected {
+                        0 => String::new(),
+                        _ => format!(" ({})", column_names(letter, expected).join(",")),
+                    },
+                    twin: format!("the twin takes the columns {}", columns.join(",")),
                 });
             }
         }

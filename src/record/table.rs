@@ -270,6 +270,13 @@ fn channels(names: &[&str], columns: &Columns) -> Result<(usize, usize), String>
     if columns.is_empty() && names.iter().all(|name| name.is_empty()) {
         return Err("the file is empty; a record needs a header t,u,y and rows".into());
     }
+    let is_number = |name: &&str| name.replacen(',', ".", 1).parse::<f64>().is_ok();
+    if columns.is_empty() && names.iter().all(is_number) {
+        return Err(
+            "row 1 holds numbers, not the names of the columns; add a first row such as t,u,y"
+                .into(),
+        );
+    }
     let count = |letter: char| names.iter().filter(|n| n.starts_with(letter)).count();
     let (inputs, outputs) = (count('u'), count('y'));
     let mut expected = vec!["t".to_owned()];
@@ -282,13 +289,6 @@ fn channels(names: &[&str], columns: &Columns) -> Result<(usize, usize), String>
             "t" => "column t appears twice; remove one".into(),
             name => format!("column \"{}\" appears twice; {}", quoted(name), rename()),
         });
-    }
-    let is_number = |name: &&str| name.replacen(',', ".", 1).parse::<f64>().is_ok();
-    if columns.is_empty() && names.iter().all(is_number) {
-        return Err(
-            "row 1 holds numbers, not the names of the columns; add a first row such as t,u,y"
-                .into(),
-        );
     }
     let channel =
         |name: &str| name.starts_with(['u', 'y']) && name[1..].chars().all(|c| c.is_ascii_digit());

@@ -170,8 +170,12 @@ mod tests {
     fn what_is_wrong_is_named() {
         for (from, to, part) in [
             ("\"name\": \"lag\",", "", "missing key `name`"),
-            ("\"lag\"", "\"a lag\"", "\"a lag\" holds ' '"),
-            ("\"s\"", "\"\\u001b[2J\"", "the unit \"\\u{1b}[2J\" holds"),
+            ("\"lag\"", "\"a lag\"", "\"a lag\" contains ' '"),
+            (
+                "\"s\"",
+                "\"\\u001b[2J\"",
+                "the unit \"\\u{1b}[2J\" contains",
+            ),
             ("\"k\"", "\"tau\"", "parameters: duplicate name tau"),
             ("[1, 3]", "[3, 1]", "invalid interval"),
             ("[0.1, 9]", "[2, 9]", "leaves its bounds"),

@@ -110,7 +110,7 @@ fn wrong_calls_are_refused_in_one_line_that_names_what_and_where() {
     };
     let tanks = tanks_record();
     refuses(&["none.csv"], &["none.csv"]);
-    refuses(&[&tanks], &["of-tanks.csv", "record 1", "inputs"]);
+    refuses(&[&tanks], &["of-tanks.csv: the record has 1 inputs"]);
     refuses(
         &[&record, "--without", "cubic"],
         &["unknown effect cubic in --without", "truetwin effects"],
