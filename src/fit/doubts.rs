@@ -2,9 +2,7 @@
 
 use super::certificate::Side;
 use super::magnitude::Kind;
-use super::outcome::{
-    Convergence, FittedNoise, FittedValue, NOT_CONVERGED, OutputErrors, Warning,
-};
+use super::outcome::{Convergence, FittedNoise, FittedValue, NOT_CONVERGED, OutputErrors, Warning};
 use super::problem::Problem;
 use crate::math::three_digits;
 use crate::record::Signal;
@@ -12,8 +10,7 @@ use crate::setting::number;
 use crate::twin::conformance::{Severity, check_step};
 use std::collections::BTreeMap;
 
-const BOUNDS: &str =
-    "widen [bounds] if other values are possible; its error means little here";
+const BOUNDS: &str = "widen [bounds] if other values are possible; its error means little here";
 const LACKS: &str = "look for what the twin lacks: truetwin diagnose";
 
 /// Warnings of a fit.

@@ -173,9 +173,7 @@ impl<'a> Search<'a> {
     ) -> Result<Vec<Promise>, FilterError> {
         let switches: Vec<(usize, &[f64])> = self.switches(added).collect();
         let size = added.entries.iter().flatten().copied();
-        let size = size
-            .filter_map(|j| Some((j, largest(problem, j)?)))
-            .next();
+        let size = size.filter_map(|j| Some((j, largest(problem, j)?))).next();
         let is_shape = |j: usize| {
             largest(problem, j).is_none() && switches.iter().all(|(switch, _)| *switch != j)
         };
@@ -211,7 +209,11 @@ impl<'a> Search<'a> {
         let here: f64 = reference.filtered.iter().map(|f| f.log_likelihood).sum();
         for (j, values) in switches {
             let points: Vec<Vec<f64>> = (shapes.iter())
-                .flat_map(|shapes| values.iter().map(|v| at(&[&shapes[..], &[(j, *v)]].concat())))
+                .flat_map(|shapes| {
+                    values
+                        .iter()
+                        .map(|v| at(&[&shapes[..], &[(j, *v)]].concat()))
+                })
                 .collect();
             let of_switch = points.into_par_iter().map(|there| {
                 let Some(filtered) = recoverable(problem.filtered(&there))? else {

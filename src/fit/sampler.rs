@@ -43,11 +43,7 @@ impl Proposal {
         Self::new(free, centre, information.try_inverse()?)
     }
 
-    pub fn new(
-        free: Vec<usize>,
-        centre: DVector<f64>,
-        covariance: DMatrix<f64>,
-    ) -> Option<Self> {
+    pub fn new(free: Vec<usize>, centre: DVector<f64>, covariance: DMatrix<f64>) -> Option<Self> {
         let root = covariance.clone().cholesky()?.l();
         let (nu, d) = (FREEDOM as f64, free.len() as f64);
         let gamma = statrs::function::gamma::ln_gamma;
@@ -158,8 +154,8 @@ impl Round {
 
     /// Draw with the largest target, and its log.
     pub fn best(&self) -> Option<(&DVector<f64>, f64)> {
-        let best = (0..self.targets.len())
-            .max_by(|&a, &b| self.targets[a].total_cmp(&self.targets[b]))?;
+        let best =
+            (0..self.targets.len()).max_by(|&a, &b| self.targets[a].total_cmp(&self.targets[b]))?;
         Some((&self.draws[best], self.targets[best]))
     }
 
@@ -290,12 +286,17 @@ mod tests {
         assert!(draws.iter().all(|phi| phi[1] == 7.0), "held entries stay");
         let n = draws.len() as f64;
         let variance = draws.iter().map(|phi| (phi[0] - 1.0).powi(2)).sum::<f64>() / n;
-        assert!((variance / (4.0 * 5.0 / 3.0) - 1.0).abs() < 0.1, "{variance}");
+        assert!(
+            (variance / (4.0 * 5.0 / 3.0) - 1.0).abs() < 0.1,
+            "{variance}"
+        );
         let other = Proposal::new(vec![0, 2], centre, 0.5 * covariance).unwrap();
         let ratio = |phi| (other.log_density(phi) - proposal.log_density(phi)).exp();
         let mean = draws.iter().map(ratio).sum::<f64>() / n;
         assert!((mean - 1.0).abs() < 0.02, "{mean}");
-        let part = proposal.within(&[2], &DVector::from_vec(vec![9.0, 7.0, 5.0])).unwrap();
+        let part = proposal
+            .within(&[2], &DVector::from_vec(vec![9.0, 7.0, 5.0]))
+            .unwrap();
         assert_eq!((part.centre[0], part.centre[2]), (9.0, -1.0));
         assert_eq!(part.covariance[(0, 0)], 2.0);
     }

@@ -58,9 +58,11 @@ pub(super) fn searched<'a>(
     // Where the twin follows the record: thresholds on states are somewhere among these.
     let states: Vec<Signal> = match plain.is_simulated() {
         true => vec![],
-        false => (recoverable(without.states(&base.theta))?.unwrap_or_default().into_iter())
-            .map(|(_, states)| states)
-            .collect(),
+        false => (recoverable(without.states(&base.theta))?
+            .unwrap_or_default()
+            .into_iter())
+        .map(|(_, states)| states)
+        .collect(),
     };
     let kinds = kinds(twin, effects, records, &states);
     let problem = scaled(&plain, &without, &kinds)?;

@@ -254,7 +254,11 @@ fn a_free_ceiling_is_found_and_nested_fits_are_never_worse() {
     assert!((level - 6.0).abs() < 1.0, "{level}");
     // An effect that the record does not ask for does no harm.
     let lag = fit("[[effect]]\nid = 'sensor-saturation'\ntarget = 'sensor'\n");
-    assert!(lag.log_likelihood > base.log_likelihood - 0.5, "{}", lag.log_likelihood);
+    assert!(
+        lag.log_likelihood > base.log_likelihood - 0.5,
+        "{}",
+        lag.log_likelihood
+    );
 }
 
 /// The same on the tanks of Schoukens et al., whose upper one overflows.
@@ -264,7 +268,8 @@ fn the_overflow_of_real_tanks_is_found_by_fits() {
         return;
     };
     let records = [Record::read(&path).unwrap()];
-    let example = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/cascaded-tanks.toml");
+    let example =
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/cascaded-tanks.toml");
     let text = std::fs::read_to_string(example).unwrap();
     let fit = |effects: &str| {
         let text = format!("{text}\n{effects}");
@@ -291,13 +296,17 @@ fn the_seed_hardly_moves_the_evidence_of_the_tanks() {
                 seed,
                 ..FitSettings::default()
             };
-            let fit = tanks().fit(&records, &settings, &Progress::silent()).unwrap();
+            let fit = tanks()
+                .fit(&records, &settings, &Progress::silent())
+                .unwrap();
             let evidence = fit.evidence.unwrap();
             assert!(evidence.std_error.unwrap() < 0.05, "{evidence:?}");
             evidence.log_evidence
         })
         .collect();
-    let (low, high) = all.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
+    let (low, high) = all
+        .iter()
+        .fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
     println!("{all:?}");
     assert!(high - low < 0.12, "{all:?}");
 }

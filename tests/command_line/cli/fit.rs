@@ -132,7 +132,8 @@ fn a_long_step_and_a_noise_level_at_its_end_are_told() {
         fs::write(place.join(name), format!("twin = 'tanks'\n{tables}")).unwrap();
         at(name)
     };
-    let silent = "[noise]\nh1 = { std = 0.0, known = true }\nh2 = { std = 0.0, known = true }\ny = 0.0\n";
+    let silent =
+        "[noise]\nh1 = { std = 0.0, known = true }\nh2 = { std = 0.0, known = true }\ny = 0.0\n";
     let (silent, record) = (study("silent.toml", silent), at("silent.csv"));
     let theta = "k1=0.6,k2=0.5,k3=0.55,k4=1";
     let simulate = ["simulate", "--study", &silent, "--theta", theta];
