@@ -249,7 +249,6 @@ impl Refinement<'_> {
             step_tolerance: 1e-5,
             // A step over half the prior's width leaves what the Jacobian knows.
             max_step: Some(0.5),
-            ..GaussNewton::default()
         }
     }
 
