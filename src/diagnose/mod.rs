@@ -45,7 +45,7 @@ pub(crate) use outcome::Cell;
 pub use outcome::{
     Band, Cause, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit, FittedParameter,
     FreeRuns, Horizon, Lag, Location, Maps, MissingFunction, NextInput, Onset, Probabilities,
-    Region, Remains, Residuals, Shrinkage, TargetShare, Term, Verdict, Visible, Window,
+    Region, Remains, Shrinkage, TargetShare, Term, Verdict, Visible, Window,
 };
 pub(crate) use quantify::share::SHORTEST_SPLIT;
 pub use run::diagnose;

@@ -225,7 +225,9 @@ fn report(
             &parameters,
             base.step.is_some(),
         ),
-        residuals: Residuals::of(records, filtered.unwrap_or_default()),
+        residuals: (records.iter().zip(filtered.into_iter().flatten()))
+            .filter_map(|(r, filtered)| Record::new(r.drive().clone(), filtered.standardised).ok())
+            .collect(),
         parameters,
         nuisance: nuisance(last, &base.noises)?,
         location: Location {

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use truetwin::diagnose::{
     Band, Cause, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit, FittedParameter,
     FreeRuns, Horizon, Lag, Location, Maps, MissingFunction, NextInput, Onset, Probabilities,
-    Region, Remains, Residuals, Shrinkage, TargetShare, Term, Verdict, Visible, Window,
+    Region, Remains, Shrinkage, TargetShare, Term, Verdict, Visible, Window,
 };
 use truetwin::estimator::{EstimateOptions, PretrainOptions, pretrain};
 use truetwin::evaluate::paper::reference_studies;

@@ -1,7 +1,6 @@
 //! Results of a diagnosis.
 
 mod location;
-mod residuals;
 mod warnings;
 
 pub(crate) use location::Cell;
@@ -9,11 +8,10 @@ pub use location::{
     Band, Channel, Lag, Location, Maps, MissingFunction, Onset, Region, TargetShare, Window,
 };
 
-pub use residuals::Residuals;
 pub(in crate::diagnose) use warnings::warnings;
 
 use crate::fit::{Nuisance, Warning};
-use crate::record::{Drive, Signal};
+use crate::record::{Drive, Record, Signal};
 use crate::twin::{Integrator, Interval};
 use serde::ser::{SerializeStruct, Serializer};
 use serde::{Deserialize, Serialize};
@@ -298,9 +296,10 @@ pub struct Diagnosis {
     pub warnings: Vec<Warning>,
     /// Wall-clock seconds.
     pub seconds: f64,
-    /// One-step residuals of the twin with the accepted effects, a record each.
+    /// Each record with one-step residuals in the place of its outputs: prediction errors of the twin with the accepted effects, over their
+    /// standard deviation.
     #[serde(skip)]
-    pub residuals: Vec<Residuals>,
+    pub residuals: Vec<Record>,
     /// Free runs beside the first record.
     #[serde(skip)]
     pub free_runs: FreeRuns,

@@ -1,5 +1,6 @@
 //! Names of effects and lists of names, in words.
 
+use crate::effect::EffectKey;
 use crate::report::units::Units;
 
 /// Names in one sentence.
@@ -27,22 +28,22 @@ pub(super) fn effect(units: &Units, key: &str) -> String {
 
 /// Returns effects in words, joined by `and` or `or`; their place once if it is the same.
 pub(super) fn effects(units: &Units, keys: &[&str], last: &str) -> String {
-    let pairs: Vec<(&str, &str)> = (keys.iter())
-        .map(|key| key.split_once('@').unwrap_or((key, "")))
+    let keys: Vec<EffectKey> = (keys.iter())
+        .map(|key| key.parse().unwrap_or_else(|_| EffectKey::new(key, "")))
         .collect();
     let place = |target: &str| match target {
         "" => String::new(),
         target if units.is_parameter(target) => format!(" in {}", units.in_words(target)),
         target => format!(" at {}", units.in_words(target)),
     };
-    match pairs.split_first() {
-        Some(((_, first), rest)) if rest.iter().all(|(_, target)| target == first) => {
-            let nouns: Vec<String> = pairs.iter().map(|(id, _)| noun(id)).collect();
-            joined(&nouns, last) + &place(first)
+    match keys.split_first() {
+        Some((first, rest)) if rest.iter().all(|key| key.target == first.target) => {
+            let nouns: Vec<String> = keys.iter().map(|key| noun(&key.id)).collect();
+            joined(&nouns, last) + &place(&first.target)
         }
         _ => {
-            let all: Vec<String> = (pairs.iter())
-                .map(|(id, target)| noun(id) + &place(target))
+            let all: Vec<String> = (keys.iter())
+                .map(|key| noun(&key.id) + &place(&key.target))
                 .collect();
             joined(&all, last)
         }

@@ -67,8 +67,8 @@ fn record(study: &Study, diagnosis: &Diagnosis) -> String {
 fn residuals(study: &Study, diagnosis: &Diagnosis) -> Option<Section> {
     let all: Vec<Left<'_>> = (diagnosis.residuals.iter())
         .map(|r| Left {
-            inputs: &r.inputs,
-            outputs: &r.outputs,
+            inputs: r.drive().inputs(),
+            outputs: r.outputs(),
         })
         .collect();
     if all.is_empty() {
