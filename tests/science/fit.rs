@@ -282,6 +282,9 @@ fn the_overflow_of_real_tanks_is_found_by_fits() {
     let all = [&base, &held, &free, &both].map(|fit| fit.log_likelihood);
     println!("{all:?}");
     assert!(free.log_likelihood > base.log_likelihood + 200.0, "{all:?}");
+    // Where the twin stops at its own limit, measurement noise stays at the least that stopped outputs need.
+    assert!(base.noise.iter().any(|level| level.at_bound.is_some()));
+    assert!(base.warnings.iter().any(|w| w.code == "noise-at-bound"));
     assert!(free.log_likelihood > held.log_likelihood - 5.0, "{all:?}");
     assert!(both.log_likelihood > free.log_likelihood - 0.5, "{all:?}");
 }
