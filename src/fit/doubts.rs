@@ -1,7 +1,7 @@
 //! Reasons to doubt a fit.
 
 use super::certificate::Side;
-use super::magnitude::Kind;
+use super::effects::magnitude::Kind;
 use super::outcome::{Convergence, FittedNoise, FittedValue, NOT_CONVERGED, OutputErrors, Warning};
 use super::problem::Problem;
 use crate::math::three_digits;

@@ -5,7 +5,6 @@
 
 use crate::fit::climb::{Fitted, climb};
 use crate::fit::problem::Problem;
-use crate::fit::starts::drawn;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::record::Record;
 use crate::twin::Noise;
@@ -35,7 +34,7 @@ pub(crate) fn base_fit(
                 0 => space.draw_prior(noise),
                 _ => space.draw_bounds(noise),
             };
-            drawn(problem, problem.full(&theta), noise)
+            problem.drawn(problem.full(&theta), noise)
         })
         .chain([problem.centre()])
         .chain(initial.clone())

@@ -3,8 +3,7 @@
 //! | file | question |
 //! |---|---|
 //! | `run.rs`, `outcome.rs` | a fit from beginning to end, and its result |
-//! | `search.rs` | searches without and with the effects of a study |
-//! | `magnitude.rs`, `effects.rs` | how large an effect may be, and where a search for it begins |
+//! | `effects/` | searches without and with the effects of a study |
 //! | `problem.rs`, `axis.rs` | what is unknown, in which bounds, and what is known before |
 //! | `score.rs` | how well a fit predicts a record that it has not seen |
 //! | `follow.rs` | how the fitted twin follows its records |
@@ -28,7 +27,6 @@ pub(crate) mod evidence;
 pub(crate) mod follow;
 pub(crate) mod growing;
 pub(crate) mod least_squares;
-pub(crate) mod magnitude;
 mod outcome;
 pub(crate) mod posterior;
 pub(crate) mod problem;
@@ -36,13 +34,13 @@ pub(crate) mod reference;
 mod run;
 mod sampler;
 mod score;
-mod search;
 mod slope;
 pub(crate) mod spread;
 pub(crate) mod starts;
 
 pub use certificate::Side;
 pub use draws::Posterior;
+pub(crate) use effects::magnitude;
 pub(crate) use outcome::NOT_CONVERGED;
 pub use outcome::{
     Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedStart, FittedValue, Nuisance,

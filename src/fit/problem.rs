@@ -1,10 +1,10 @@
 //! A twin and the records that it is fitted to.
 
-use crate::fit::axis::{Axis, Family};
+use crate::fit::axis::{Axis, EvidencePrior, Family};
 use crate::likelihood::kalman::{Coordinates, FilterError, Filtered, Score, States};
 use crate::likelihood::{Likelihood, Measured, likelihood_of};
 use crate::record::{Record, Signal};
-use crate::twin::{Outline, Parameter, ParameterSpace, Role, Twin};
+use crate::twin::{Noise, Outline, Parameter, ParameterSpace, Role, Twin};
 use std::sync::Arc;
 
 /// Longest step of a fit in the logarithm of a black box's noise level.
@@ -194,6 +194,24 @@ impl<'a> Problem<'a> {
         (self.axes.iter().zip(theta))
             .map(|(axis, v)| axis.bounds.clamp(axis.begin.unwrap_or(*v)))
             .collect()
+    }
+
+    /// A random point from one of the twin's own parameters: magnitudes in the units of the record, held entries where they are held.
+    pub(super) fn drawn(&self, mut theta: Vec<f64>, noise: Noise) -> Vec<f64> {
+        for (j, (value, axis)) in theta.iter_mut().zip(&self.axes).enumerate() {
+            // By name: one effect more draws the others alike.
+            let mut source = noise.source(&self.name(j));
+            *value = match axis.evidence {
+                _ if axis.held => axis.centre,
+                EvidencePrior::Magnitude { largest } => largest * (2.0 * source.uniform() - 1.0),
+                EvidencePrior::Uniform { low, high } => {
+                    let phi = low + source.uniform() * (high - low);
+                    if axis.is_log() { phi.exp() } else { phi }
+                }
+                _ => *value,
+            };
+        }
+        self.clamp(&theta)
     }
 
     /// Log-density of the priors, up to a constant: of all axes, or of those that count.

@@ -4,6 +4,7 @@ use super::certificate::Certificate;
 use super::climb::{Fitted, climb};
 use super::doubts::Doubts;
 use super::draws::table;
+use super::effects::search::{ITERATIONS, Searched, searched};
 use super::evidence::evidence;
 use super::follow::{free_runs, starts};
 use super::outcome::{
@@ -11,7 +12,6 @@ use super::outcome::{
 };
 use super::posterior::{Draws, posterior};
 use super::problem::Problem;
-use super::search::{ITERATIONS, Searched, searched};
 use super::spread::Spread;
 use super::starts::polish;
 use crate::effect::Effect;
@@ -125,8 +125,9 @@ fn drawn(
         let Some(fit) = climb(problem, &better, ITERATIONS)? else {
             break;
         };
-        fits.insert(0, fit);
-        *fits = polish(problem, std::mem::take(fits), ITERATIONS)?;
+        for fit in polish(problem, vec![fit], ITERATIONS)? {
+            fits.insert(0, fit);
+        }
         draws = posterior(problem, fits, asked, noise)?;
     }
     Ok(draws)

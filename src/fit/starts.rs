@@ -1,6 +1,5 @@
 //! The first fit of the twin as it is.
 
-use crate::fit::axis::EvidencePrior;
 use crate::fit::climb::{Fitted, climb};
 use crate::fit::growing;
 use crate::fit::problem::Problem;
@@ -51,7 +50,7 @@ pub(crate) fn search(
                 0 => space.draw_prior(noise),
                 _ => space.draw_bounds(noise),
             });
-            let theta = problem.begin(&drawn(problem, theta, noise));
+            let theta = problem.begin(&problem.drawn(theta, noise));
             let value = recoverable(problem.log_likelihood(&theta))?;
             Ok(value.map(|v| (v + problem.log_prior(&theta, true), theta)))
         })
@@ -92,24 +91,6 @@ pub(crate) fn polish(
         .collect::<Result<_, FilterError>>()?;
     sort(&mut fits);
     Ok(fits)
-}
-
-/// A random point: magnitudes in the units of the record, held entries where they are held.
-pub(super) fn drawn(problem: &Problem<'_>, mut theta: Vec<f64>, noise: Noise) -> Vec<f64> {
-    for (j, (value, axis)) in theta.iter_mut().zip(&problem.axes).enumerate() {
-        // By name: one effect more draws the others alike.
-        let mut source = noise.source(&problem.name(j));
-        *value = match axis.evidence {
-            _ if axis.held => axis.centre,
-            EvidencePrior::Magnitude { largest } => largest * (2.0 * source.uniform() - 1.0),
-            EvidencePrior::Uniform { low, high } => {
-                let phi = low + source.uniform() * (high - low);
-                if axis.is_log() { phi.exp() } else { phi }
-            }
-            _ => *value,
-        };
-    }
-    problem.clamp(&theta)
 }
 
 /// Best first; of equal ones the first start's stays first.

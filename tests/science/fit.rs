@@ -239,7 +239,7 @@ const DRAG: &str = "[[effect]]\nid = 'power-law'\ntarget = 'h2'\n";
 fn a_free_ceiling_is_found_and_nested_fits_are_never_worse() {
     let truth = with_effects(&format!("{CEILING}{HELD}"));
     let noise = Noise::new(3, "ceiling", 0);
-    let drive = truth.drives().unwrap().draw(noise).unwrap();
+    let drive = truth.drive(noise).unwrap();
     let outputs = truth.twin().simulate(&TRUTH, &drive, noise).unwrap();
     let records = [Record::new(drive, outputs).unwrap()];
     let fit = |effects: &str| fitted(&with_effects(effects), &records);
@@ -282,6 +282,9 @@ fn the_overflow_of_real_tanks_is_found_by_fits() {
     let all = [&base, &held, &free, &both].map(|fit| fit.log_likelihood);
     println!("{all:?}");
     assert!(free.log_likelihood > base.log_likelihood + 200.0, "{all:?}");
+    // Where the twin stops at its own limit, measurement noise stays at the least that stopped outputs need.
+    assert!(base.noise.iter().any(|level| level.at_bound.is_some()));
+    assert!(base.warnings.iter().any(|w| w.code == "noise-at-bound"));
     assert!(free.log_likelihood > held.log_likelihood - 5.0, "{all:?}");
     assert!(both.log_likelihood > free.log_likelihood - 0.5, "{all:?}");
 }

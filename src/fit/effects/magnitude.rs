@@ -1,7 +1,7 @@
 //! Sizes of effects: as large as the twin's own terms.
 
-use super::axis::{Axis, EvidencePrior};
 use crate::effect::{Effect, Magnitude, TargetKind, targets};
+use crate::fit::axis::{Axis, EvidencePrior};
 use crate::math::{ends, quantile};
 use crate::record::{Record, Signal};
 use crate::twin::{Acting, Interval, Parameter, StateSpace, Twin};

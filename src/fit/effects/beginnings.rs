@@ -4,13 +4,13 @@
 //! thresholds, lags and shapes: the change of innovations that it makes is a direction, and the gain along it, θ free to answer, says how
 //! much it promises. The best of the grid are fitted for a while, and the best of these are starts.
 
-use super::axis::{EvidencePrior, SMALL};
-use super::climb::{Fitted, climb};
 use super::magnitude::{Kind, duration};
-use super::problem::Problem;
-use super::reference::Reference;
-use super::starts::sort;
 use crate::effect::{Effect, Magnitude};
+use crate::fit::axis::{EvidencePrior, SMALL};
+use crate::fit::climb::{Fitted, climb};
+use crate::fit::problem::Problem;
+use crate::fit::reference::Reference;
+use crate::fit::starts::sort;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::math::ends;
 use crate::record::Record;
