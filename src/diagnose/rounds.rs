@@ -291,7 +291,7 @@ fn again<'a, R>(
     // Beside a gap, noise levels are fitted loud, and hide the step, or that a finer one is still too long. A second effect may imitate
     // its error, and so may an effect that explains a little more than the right one.
     for model in findings.candidates().filter_map(|f| f.model.as_ref()) {
-        let finer = finer_step(model, Thresholds::STEP_SHOWS, 0.0)?;
+        let finer = finer_step(model, Thresholds::STEP_SHOWS, findings.top())?;
         let Some((step, gain)) = finer.filter(|(step, _)| base.step != Some(*step)) else {
             continue;
         };

@@ -152,13 +152,30 @@ impl<'a> Findings<'a> {
         self.listed.iter().find(|f| keys.contains(&f.last().key()))
     }
 
-    /// Nats that so many effects together cost: that something else is missing beside the first, one of all that are listed, in either
-    /// order; and what the first law's own form may leave.
+    /// Nats that so many effects together cost: their prior, and what the first law's own form may leave.
     pub fn price(&self, count: usize) -> f64 {
+        self.prior(count) + Thresholds::SECOND_SHARE * self.top().max(0.0) * (count - 1) as f64
+    }
+
+    /// Nats of the prior that something else is missing beside the first effect, one of all that are listed, in either order.
+    fn prior(&self, count: usize) -> f64 {
         let pairs = 0.5 * (self.listed.len() as f64 - 1.0);
         let second = Thresholds::SECOND * Thresholds::LISTED / pairs.max(1.0);
-        let top = self.top().max(0.0);
-        (Thresholds::SECOND_SHARE * top - second.ln()) * (count - 1) as f64
+        -second.ln() * (count - 1) as f64
+    }
+
+    /// Returns whether a second effect explains something that an unknown function beside the first does not, but for the fine print of laws:
+    /// few functions are searched there.
+    fn needs_second(&self) -> bool {
+        let best = |count: usize| {
+            let sets = self.beside.iter().filter(|(keys, _)| keys.len() == count);
+            let gains = sets.filter_map(|(_, on_top)| Some(on_top.first()?.gain));
+            gains.reduce(f64::max)
+        };
+        match (best(1), best(2)) {
+            (Some(one), Some(two)) => two - self.prior(2) > (1.0 - Thresholds::FINE_PRINT) * one,
+            (one, two) => one.is_none() && two.is_some(),
+        }
     }
 
     /// Returns whether the records ask for another kind of noise beside the best listed effect.
@@ -200,6 +217,13 @@ impl<'a> Findings<'a> {
         })
     }
 
+    /// Returns whether a listed effect at the place of an unknown function explains nearly as much: the function is that effect in another
+    /// form.
+    fn holds_listed(&self, unknown: &Found<'_>) -> bool {
+        let least = (1.0 - Thresholds::OUTDONE) * unknown.gain;
+        (self.listed.iter()).any(|f| f.gain > least && f.last().target == unknown.last().target)
+    }
+
     /// log of the evidence of nothing missing, whatever the noise, over that of the twin.
     fn nothing(&self) -> f64 {
         let [alone, pairs] = [&self.noise, &self.noise_pairs]
@@ -210,7 +234,7 @@ impl<'a> Findings<'a> {
             .into_iter()
             .filter(|z| z.is_finite())
             .collect();
-        log_mean(&all) + (all.len() as f64).ln()
+        log_sum(&all)
     }
 
     /// log of the odds of a gap against none, noise being of the twin's own kind.
@@ -240,7 +264,10 @@ impl<'a> Findings<'a> {
         for found in self.rivals() {
             all.push(Weighed {
                 log_weight: every.ln() + found.gain,
-                kind: Kind::Unknown,
+                kind: match self.holds_listed(found) {
+                    true => Kind::Partial(1),
+                    false => Kind::Unknown,
+                },
                 places: places(found),
             });
         }
@@ -255,7 +282,7 @@ impl<'a> Findings<'a> {
             }
         }
         let logs: Vec<f64> = all.iter().map(|h| h.log_weight).collect();
-        let sum = log_mean(&logs) + (logs.len() as f64).ln();
+        let sum = log_sum(&logs);
         let nothing = self.nothing();
         let log_odds = sum - nothing;
         let whole = sum.max(nothing) + (-log_odds.abs()).exp().ln_1p();
@@ -268,11 +295,7 @@ impl<'a> Findings<'a> {
             log_evidence: whole,
             ..Chances::default()
         };
-        let top = (all.iter())
-            .filter(|h| matches!(h.kind, Kind::Listed(_)))
-            .map(|h| h.log_weight)
-            .fold(f64::NEG_INFINITY, f64::max);
-        // Each set, its probability alone, and its weight among them.
+        // Each set, its probability alone, and the log of its weight among them.
         let mut sets: Vec<(Vec<String>, f64, f64)> = vec![];
         // Probability of something unknown beside sets of each number of effects.
         let mut beside: BTreeMap<usize, f64> = BTreeMap::new();
@@ -291,18 +314,26 @@ impl<'a> Findings<'a> {
                 }
                 Kind::Listed(keys) => {
                     kinds.listed += p;
-                    sets.push((keys, p, (hypothesis.log_weight - top).exp()));
+                    sets.push((keys, p, hypothesis.log_weight));
                 }
             }
         }
-        // Which set of so many explains a part, the sets' own evidence says: what is beside them is not known well enough to choose by. What
-        // is unknown beside one effect says nothing for a second one.
-        for (keys, p, share) in &sets {
-            let alike = sets.iter().filter(|(other, ..)| other.len() == keys.len());
-            let shares: f64 = alike.map(|(.., share)| share).sum();
+        // Which set explains a part, the sets' own evidence says: what is beside them is not known well enough to choose by. What is unknown
+        // beside one effect says nothing for a second one, unless that is needed, too.
+        let all_alike = self.needs_second();
+        let count = |keys: &[String]| if all_alike { 1 } else { keys.len() };
+        if all_alike {
+            beside = BTreeMap::from([(1, kinds.partial)]);
+        }
+        for (keys, p, log_weight) in &sets {
+            let alike: Vec<f64> = (sets.iter())
+                .filter(|(other, ..)| count(other) == count(keys))
+                .map(|(.., log_weight)| *log_weight)
+                .collect();
+            let share = (log_weight - log_sum(&alike)).exp();
             let part = beside
-                .get(&keys.len())
-                .map_or(0.0, |beside| beside * share / shares);
+                .get(&count(keys))
+                .map_or(0.0, |beside| beside * share);
             for key in keys {
                 *chances.effects.entry(key.clone()).or_default() += p + part;
             }
@@ -336,6 +367,11 @@ pub(in crate::diagnose) fn leaves_nothing(gain: f64, added: f64) -> bool {
 pub(in crate::diagnose) fn suffices(found: &Found<'_>, on_top: &[Found<'_>]) -> bool {
     let added = on_top.first().map_or(0.0, |f| f.gain - found.gain);
     leaves_nothing(found.gain, added)
+}
+
+/// log of the sum of exponentials.
+fn log_sum(logs: &[f64]) -> f64 {
+    log_mean(logs) + (logs.len() as f64).ln()
 }
 
 fn same(a: &[String], b: &[String]) -> bool {
@@ -410,10 +446,15 @@ mod tests {
         };
         findings.add(&first, Some(vec![wave(Nature::Function, "h2", 75.0)]));
         let key = second.last().key();
+        let pair = findings.several[0].clone();
         findings.listed = vec![first, second];
         let chances = findings.chances();
         assert!(chances.kinds.partial > 0.9);
         assert!(chances.effects[&key] < 0.1, "{}", chances.effects[&key]);
+        // Unless the second one explains something that functions do not.
+        findings.add(&pair, Some(vec![wave(Nature::Function, "h2", 90.0)]));
+        let chances = findings.chances();
+        assert!(chances.effects[&key] > 0.9, "{}", chances.effects[&key]);
     }
 
     /// A wave of the flow explains what a wave of the level does, and takes no probability from it, unless it explains more.
