@@ -237,12 +237,20 @@ fn explored<'a, R>(
         &stage,
     )?;
     // Beside an explanation the twin's own fit may have gone further than it went.
-    if let Some(better) = base.fitted_from(&alone.findings.thetas())? {
-        stage.finish();
-        let before = Before::Worse(&alone.findings, base.model.log_evidence);
-        return explored(study, better, before, settings, rounds, progress, then);
-    }
-    let mut findings = explore(alone, &base.model, &terms, settings, &stage)?;
+    let better = base.fitted_from(&alone.findings.thetas())?;
+    let mut findings = match better {
+        None => explore(alone, &base.model, &terms, settings, &stage)?,
+        Some(better) => {
+            let before = Before::Worse(&alone.findings, base.model.log_evidence);
+            match explored(study, better, before, settings, rounds, progress, then) {
+                Err(DiagnoseError::Cancelled(_)) if settings.give_partial => Findings {
+                    is_partial: true,
+                    ..alone.findings
+                },
+                found => return found,
+            }
+        }
+    };
     stage.finish();
     if !findings.is_partial {
         match again(study, &base, &findings, settings, rounds, progress, then) {

@@ -13,8 +13,9 @@ const LEAST: usize = 100;
 const MOST: usize = 500;
 /// Draws of the last round for each that is asked for: weights are uneven, and fewer would repeat draws.
 const OVER: usize = 4;
-/// Rounds of adaptation where draws are asked for; without, one.
+/// Rounds of adaptation: where draws are asked for, and where only their moments are.
 const ROUNDS: usize = 3;
+const ROUNDS_OF_MOMENTS: usize = 2;
 /// Share of the first round's covariance in that of the next.
 const KEPT: f64 = 0.05;
 /// Nats below the best top within which another counts: a mode with a thousandth of the mass is none.
@@ -72,7 +73,7 @@ pub(crate) fn posterior(
     };
     let (rounds, size) = match count {
         Some(count) => (ROUNDS, usual.max(OVER * count)),
-        None => (1, usual),
+        None => (ROUNDS_OF_MOMENTS, usual),
     };
     let mut proposals = first.clone();
     let mut round = Round::new(problem, &proposals, usual, &mut source, log_posterior)?;

@@ -45,15 +45,21 @@ pub(super) fn residual_figures(
     let whiteness = match is_white {
         true => "Band: 95 % of white noise. Residuals of a right twin's predictions are white.",
         false => {
-            "Band: 95 % of white noise. Errors of a right twin's free run are white only without process noise; `truetwin fit` shows one-step errors."
+            "Errors of a right twin's free run are white only without process noise. `truetwin fit` shows one-step errors, which are white for every \
+             right twin."
         }
     };
-    body += &figure(&auto_correlations(&outputs, all), whiteness);
-    if let Some(svg) = cross_correlations(&outputs, &inputs, all) {
+    body += &figure(&auto_correlations(&outputs, is_white, all), whiteness);
+    if let Some(svg) = cross_correlations(&outputs, &inputs, is_white, all) {
         body += &figure(
             &svg,
-            "Residuals against inputs some samples before. Band: 95 % of white noise. Outside it, the twin misses a part of what the input \
-             does.",
+            match is_white {
+                true => {
+                    "Residuals against inputs some samples before. Band: 95 % of white noise. Outside it, the twin misses a part of what the \
+                     input does."
+                }
+                false => "Residuals against inputs some samples before.",
+            },
         );
     }
     body += &figure(
@@ -90,9 +96,8 @@ fn correlation(late: &[Vec<f64>], early: &[Vec<f64>], lag: usize) -> f64 {
     product / (size(late) * size(early)).sqrt().max(f64::MIN_POSITIVE)
 }
 
-/// A panel of correlations at some lags, with the band of white noise of so many values.
-fn panel(label: &str, at: impl Fn(usize) -> f64, lags: [usize; 2], count: usize) -> Panel {
-    let reach = BAND / (count.max(1) as f64).sqrt();
+/// A panel of correlations at some lags, with the band of white noise of so many values, if given.
+fn panel(label: &str, at: impl Fn(usize) -> f64, lags: [usize; 2], count: Option<usize>) -> Panel {
     let dots = (lags[0]..=lags[1]).map(|lag| {
         let y = at(lag);
         Dot {
@@ -102,18 +107,23 @@ fn panel(label: &str, at: impl Fn(usize) -> f64, lags: [usize; 2], count: usize)
             high: y.max(0.0),
         }
     });
-    let ends = [lags[0] as f64 - 0.5, lags[1] as f64 + 0.5].map(|x| (x, -reach, reach));
-    let zero = Series::new("", Style::ZERO, ends.map(|(x, ..)| (x, 0.0)));
-    Panel::new(label, vec![zero])
-        .height(HEIGHT)
-        .area(Area {
-            label: "95 % of white noise".into(),
-            points: ends.to_vec(),
-        })
-        .dots(Dots {
-            label: String::new(),
-            points: dots.collect(),
-        })
+    let ends = [lags[0] as f64 - 0.5, lags[1] as f64 + 0.5];
+    let zero = Series::new("", Style::ZERO, ends.map(|x| (x, 0.0)));
+    let panel = Panel::new(label, vec![zero]).height(HEIGHT);
+    let panel = match count {
+        None => panel,
+        Some(count) => {
+            let reach = BAND / (count.max(1) as f64).sqrt();
+            panel.area(Area {
+                label: "95 % of white noise".into(),
+                points: ends.map(|x| (x, -reach, reach)).to_vec(),
+            })
+        }
+    };
+    panel.dots(Dots {
+        label: String::new(),
+        points: dots.collect(),
+    })
 }
 
 /// Number of residuals of an output that are there.
@@ -123,12 +133,12 @@ fn count(all: &[Left<'_>], j: usize) -> usize {
 }
 
 /// Auto-correlations of the residuals of each output.
-fn auto_correlations(names: &[String], all: &[Left<'_>]) -> String {
+fn auto_correlations(names: &[String], is_white: bool, all: &[Left<'_>]) -> String {
     let panels = names.iter().enumerate().map(|(j, name)| {
         let own = centred(all, |l| l.outputs, j);
         let at = |lag| correlation(&own, &own, lag);
         let label = format!("correlation of {name}");
-        panel(&label, at, [1, LAGS], count(all, j))
+        panel(&label, at, [1, LAGS], is_white.then(|| count(all, j)))
     });
     Chart {
         title: "Residuals against themselves".into(),
@@ -140,7 +150,12 @@ fn auto_correlations(names: &[String], all: &[Left<'_>]) -> String {
 }
 
 /// Cross-correlations of the residuals of each output with each input before; `None` without inputs.
-fn cross_correlations(outputs: &[String], inputs: &[String], all: &[Left<'_>]) -> Option<String> {
+fn cross_correlations(
+    outputs: &[String],
+    inputs: &[String],
+    is_white: bool,
+    all: &[Left<'_>],
+) -> Option<String> {
     let pairs = (0..outputs.len()).flat_map(|j| (0..inputs.len()).map(move |i| (j, i)));
     let panels: Vec<Panel> = pairs
         .take(PAIRS)
@@ -149,7 +164,7 @@ fn cross_correlations(outputs: &[String], inputs: &[String], all: &[Left<'_>]) -
             let early = centred(all, |l| l.inputs, i);
             let label = format!("correlation of {} with {}", outputs[j], inputs[i]);
             let at = |lag| correlation(&late, &early, lag);
-            panel(&label, at, [0, LAGS], count(all, j))
+            panel(&label, at, [0, LAGS], is_white.then(|| count(all, j)))
         })
         .collect();
     if panels.is_empty() {

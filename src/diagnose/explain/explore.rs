@@ -6,6 +6,7 @@ use super::noise::{instead_of_second, with_noise};
 use super::pairs::{FIRST, SINGLES, alone, pairs};
 use super::search::{Breadth, FEW, listed, unknown};
 use super::terms::{Terms, of_keys, on_top, scales};
+use super::valleys::leave_valleys;
 use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::term::Term;
 use crate::diagnose::model::Model;
@@ -111,8 +112,10 @@ fn beside_better<'a>(
     let mut functions = unknown(base, &(terms.unknown)(&[]), origin, breadth.few())?;
     improve(&mut functions, kept(&old.unknown));
     stage.tick()?;
-    let mut effects = listed(base, terms.listed, origin, &[], breadth)?;
+    let mut effects = listed(base, terms.listed, origin, &[], breadth.of_all())?;
     improve(&mut effects, kept(&old.listed));
+    leave_valleys(base, &mut effects, 0.0)?;
+    sort(&mut effects);
     stage.tick()?;
     Ok(Singles::alone(functions, effects))
 }

@@ -211,7 +211,10 @@ mod tests {
         let world = World::new(&twin);
         let drive = Drive::new(0.1, levels).unwrap();
         let scene = Scene::new(&world, theta, &drive, Draws::of(Noise::new(1, "s", 0))).unwrap();
-        Structure::of(world.equations().unwrap(), theta, &scene)
+        let World::Equations(twin) = &world else {
+            panic!("a black box");
+        };
+        Structure::of(twin.as_ref(), theta, &scene)
     }
 
     /// k4 multiplies the pump's input, which enters the upper tank alone; k1 is that tank's, k2 and k3 the lower one's.

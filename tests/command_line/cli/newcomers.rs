@@ -67,7 +67,10 @@ fn a_number_is_asked_for_in_plain_words() {
         &["--calibrate", "'1e9'", whole],
     );
     let trials = ["withheld", "--twin", "tanks", "--out", &out, "--trials"];
-    told(&[&trials[..], &["1e12"]].concat(), &["--trials", whole]);
+    told(
+        &[&trials[..], &["1e12"]].concat(),
+        &["--trials", "choose at most 1000000"],
+    );
     told(&[&trials[..], &["-5"]].concat(), &["--trials", whole]);
     told(&[&trials[..], &["0"]].concat(), &["choose at least 1"]);
     told(

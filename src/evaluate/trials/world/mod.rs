@@ -93,14 +93,6 @@ impl World {
         matches!(self, Self::BlackBox(_))
     }
 
-    /// Returns the equations; none for a black box.
-    pub fn equations(&self) -> Option<&dyn StateSpace> {
-        match self {
-            Self::Equations(twin) => Some(twin.as_ref()),
-            Self::BlackBox(_) => None,
-        }
-    }
-
     /// Makes a record; `None` where the system diverges.
     pub fn run(&self, system: System<'_>, drive: &Drive, draws: Draws) -> Option<Run> {
         match self {
