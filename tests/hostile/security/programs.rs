@@ -142,7 +142,7 @@ fn hostile_names_steer_no_terminal_and_are_no_elements() {
     ] {
         let program = start(twin, parameter, unit);
         let line = refused(place.path(), &["twins", "--program", &program]);
-        assert!(line.contains("holds"), "{line}");
+        assert!(line.contains("contains"), "{line}");
     }
     let program = start(
         "<script>alert(1)</script>",
