@@ -13,9 +13,8 @@ const LEAST: usize = 100;
 const MOST: usize = 500;
 /// Draws of the last round for each that is asked for: weights are uneven, and fewer would repeat draws.
 const OVER: usize = 4;
-/// Rounds of adaptation: where draws are asked for, and where only their moments are.
+/// Rounds of adaptation where draws are asked for; without, one.
 const ROUNDS: usize = 3;
-const ROUNDS_OF_MOMENTS: usize = 2;
 /// Share of the first round's covariance in that of the next.
 const KEPT: f64 = 0.05;
 /// Nats below the best top within which another counts: a mode with a thousandth of the mass is none.
@@ -40,6 +39,11 @@ pub(crate) struct Draws {
     pub(super) better: Option<Vec<f64>>,
 }
 
+/// Number of draws whose time is that of a fit.
+pub(super) fn usual(problem: &Problem<'_>) -> usize {
+    (SAMPLES / problem.samples()).clamp(LEAST, MOST)
+}
+
 /// `count` draws of θ, or as many as fits need, from the posterior of likelihood and weak priors within the bounds; `fits` are ends of
 /// searches, best first.
 ///
@@ -57,7 +61,7 @@ pub(crate) fn posterior(
     let Some(best) = fits.first() else {
         return Ok(Draws::default());
     };
-    let usual = (SAMPLES / problem.samples()).clamp(LEAST, MOST);
+    let usual = usual(problem);
     let mut source = noise.source("draws");
     let first: Vec<Proposal> = (tops(problem, fits).into_iter())
         .filter_map(|fit| Proposal::around(problem, fit))
@@ -73,7 +77,7 @@ pub(crate) fn posterior(
     };
     let (rounds, size) = match count {
         Some(count) => (ROUNDS, usual.max(OVER * count)),
-        None => (ROUNDS_OF_MOMENTS, usual),
+        None => (1, usual),
     };
     let mut proposals = first.clone();
     let mut round = Round::new(problem, &proposals, usual, &mut source, log_posterior)?;

@@ -1,7 +1,7 @@
 //! Standard errors and intervals of a fit.
 
 use super::climb::Fitted;
-use super::posterior::{Draws, posterior};
+use super::posterior::{Draws, posterior, usual};
 use super::problem::Problem;
 use crate::likelihood::kalman::FilterError;
 use crate::math::{deviation, quantile};
@@ -28,7 +28,11 @@ impl Spread {
     ) -> Result<Self, FilterError> {
         let draws = match problem.is_simulated() {
             true => Draws::default(),
-            false => posterior(problem, std::slice::from_ref(fitted), None, noise)?,
+            false => {
+                // With fewer rounds, deviations of a clipped record differ by a seventh from one set of units to another.
+                let count = Some(usual(problem));
+                posterior(problem, std::slice::from_ref(fitted), count, noise)?
+            }
         };
         Ok(Self::new(problem, fitted, &draws.thetas, level))
     }
