@@ -36,7 +36,7 @@ text-align:left}.matrix td.right{border:2px solid #222;font-weight:700}\
 @media (max-width:40rem){body{padding:.75rem}table{font-size:.875rem}th[scope=row]{white-space:normal;min-width:7rem}figure>.wide{margin:0 -.75rem;max-width:none}}\
 @media print{body{margin:0;max-width:none;padding:0;font-size:11pt}nav,.skip{display:none}h2,h3,summary{break-after:avoid}\
 tr,pre,.matrix{break-inside:avoid}p:has(+figure){break-after:avoid}.wide{overflow:visible}.wide svg{min-width:0;max-width:34rem!important}\
-td,th{padding-right:.5rem}table{font-size:9pt}td:not(.n){min-width:0}thead th{white-space:normal}\
+td,th{padding-right:.35rem}table{font-size:8pt}td:not(.n){min-width:0}thead th{white-space:normal}\
 details::details-content{content-visibility:visible;display:block;height:auto}summary{color:#222;list-style:none}}";
 
 /// A page: its heading, what stands above all sections, then the sections behind a table of contents.
