@@ -9,14 +9,6 @@ use std::fmt::Debug;
 ///
 /// dfdx's own [`ReLU`] and [`Tanh`] are activations, and so is [`Leaky`]; each of the three also stands as a layer of
 /// its own in a plain dfdx tuple.
-///
-/// ```
-/// use truetwin::network::layers::{Leaky, Tanh};
-/// use truetwin::network::Activation;
-///
-/// assert_eq!(Leaky::value(-2.0), -0.02);
-/// assert_eq!(Tanh::slope(Tanh::value(0.0)), 1.0);
-/// ```
 pub trait Activation: Debug + Default + Clone + Send + Sync + 'static {
     /// a = f(z).
     fn value(z: f32) -> f32;
