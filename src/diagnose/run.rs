@@ -157,7 +157,7 @@ fn report(
             absorbed = absorbing(model, &within, listed)?;
             if !absorbed.is_empty() {
                 conclusion.decision = Decision::Absorbed;
-                conclusion.class = absorbed.iter().map(|f| f.keys()[0].clone()).collect();
+                conclusion.class = absorbed.iter().flat_map(|f| f.last().keys()).collect();
             }
         }
         _ => {}

@@ -84,6 +84,7 @@ fn fit_of(model: &Model<'_>, term: &Term, probability: f64, log_evidence: f64) -
         probability,
         magnitudes,
         log_evidence,
+        also: term.also.iter().map(ToString::to_string).collect(),
     }
 }
 

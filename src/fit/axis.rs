@@ -15,8 +15,10 @@ const LONGEST_NOISE: f64 = 1.5;
 /// Axis of one entry of θ in a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Axis {
-    /// Range; a logarithm is taken where the lower end is positive.
+    /// Range.
     pub bounds: Interval,
+    /// True where φ is the logarithm: that of a positive parameter.
+    pub is_log: bool,
     /// Centre of the weak prior, in θ.
     pub centre: f64,
     /// Standard deviation of the weak prior in φ; infinite for none.
@@ -70,6 +72,7 @@ impl Axis {
             let span = (prior.high() / prior.low()).ln() / 12f64.sqrt();
             Self {
                 bounds,
+                is_log: true,
                 centre,
                 deviation: LOG_DEVIATION.max(span),
                 width: 1.0,
@@ -82,6 +85,7 @@ impl Axis {
         } else {
             Self {
                 bounds,
+                is_log: false,
                 centre,
                 deviation: prior.width(),
                 width: prior.width(),
@@ -98,6 +102,7 @@ impl Axis {
     pub fn of_level(level: &Level) -> Self {
         Self {
             bounds: level.parameter.bounds,
+            is_log: level.parameter.bounds.low() > 0.0,
             centre: level.median,
             deviation: level.deviation,
             width: 1.0,
@@ -107,11 +112,6 @@ impl Axis {
             begin: Some(level.loud),
             evidence: EvidencePrior::Normal,
         }
-    }
-
-    /// Returns whether φ is the logarithm.
-    pub fn is_log(&self) -> bool {
-        self.bounds.low() > 0.0
     }
 
     /// A size at which its direction is taken: a hundredth of the largest, on the side that the bounds allow; `None` for other entries.
@@ -125,6 +125,11 @@ impl Axis {
         } else {
             -step
         })
+    }
+
+    /// The largest size on the same side, within the bounds.
+    pub fn largest_size(&self) -> Option<f64> {
+        Some(self.bounds.clamp(self.small_size()? / SMALL))
     }
 
     /// Returns whether a size can only be added: half of a normal prior lies within the bounds.

@@ -55,11 +55,14 @@ impl<'a> Problem<'a> {
             places.push(of_record);
         }
         let coordinates = |axes: &mut dyn Iterator<Item = &Axis>| {
-            Coordinates::new(&ParameterSpace::new(axes.map(|axis| {
+            let mut log = vec![];
+            let space = ParameterSpace::new(axes.map(|axis| {
+                log.push(axis.is_log);
                 let mut p = Parameter::new("", "", 0.0, axis.width);
                 p.bounds = axis.bounds;
                 p
-            })))
+            }));
+            Coordinates::with(&space, log)
         };
         // What simulations say is not worth the last of a gain.
         let likelihood = likelihood_of(&twin);
@@ -206,7 +209,7 @@ impl<'a> Problem<'a> {
                 EvidencePrior::Magnitude { largest } => largest * (2.0 * source.uniform() - 1.0),
                 EvidencePrior::Uniform { low, high } => {
                     let phi = low + source.uniform() * (high - low);
-                    if axis.is_log() { phi.exp() } else { phi }
+                    if axis.is_log { phi.exp() } else { phi }
                 }
                 _ => *value,
             };

@@ -18,9 +18,8 @@ pub trait Architecture: Send + Sync + Debug {
     /// Trains a new network on samples that the caller has standardised, by Adam on the loss of [`Training`]. The same
     /// arguments give the same bits. Ticks the stage `train` once an epoch.
     ///
-    /// Of samples of more than 64 MiB that come in several parts, no more than that are held at a time. The last parts are
-    /// held out then; each epoch has the others in an order of its own, rows in an order of their own among those that are in
-    /// memory together.
+    /// Samples that come in several parts may be larger than memory: at most 64 MiB are held at a time. The last parts are then held out,
+    /// and each epoch takes the others in a new order, with the rows in memory shuffled.
     ///
     /// A training that was interrupted goes on with what `checkpoints` have kept of it, to the same bits.
     fn train_on(

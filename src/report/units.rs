@@ -149,6 +149,7 @@ mod tests {
             probability: 1.0,
             magnitudes: magnitudes.iter().map(|(n, v)| ((*n).into(), *v)).collect(),
             log_evidence: 1.0,
+            also: vec![],
         }
     }
 

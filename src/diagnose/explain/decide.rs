@@ -115,12 +115,12 @@ fn named(
 ) -> Conclusion {
     let own = findings.gain(keys).unwrap_or(f64::NAN);
     let mut class = keys.to_vec();
-    for found in findings.listed.iter().chain(&findings.several) {
-        if found.gain > own - Thresholds::RIVALS && found.terms.len() == keys.len() {
-            for key in found.keys() {
-                if !class.contains(&key) {
-                    class.push(key);
-                }
+    let rivals = (findings.listed.iter().chain(&findings.several))
+        .filter(|f| f.gain > own - Thresholds::RIVALS && f.terms.len() == keys.len());
+    for term in (findings.set(keys).into_iter().chain(rivals)).flat_map(|found| &found.terms) {
+        for key in term.keys() {
+            if !class.contains(&key) {
+                class.push(key);
             }
         }
     }

@@ -48,12 +48,17 @@ pub(in crate::diagnose) fn explore<'a>(
     let breadth = Breadth::of(base, settings.quick);
     let Singles { findings, carried } = found;
     let (mut findings, several) = match carried {
-        Some(carried) => (
+        Some(Carried {
+            several,
+            noise,
+            noise_pairs,
+        }) => (
             Findings {
-                noise: carried.noise,
+                noise,
+                noise_pairs,
                 ..findings
             },
-            Some(carried.several),
+            Some(several),
         ),
         None => {
             let mut findings = findings;
@@ -79,6 +84,7 @@ pub(in crate::diagnose) struct Singles<'a> {
 struct Carried<'a> {
     several: Vec<Found<'a>>,
     noise: Vec<Found<'a>>,
+    noise_pairs: Vec<Found<'a>>,
 }
 
 /// Knowledge from a search before.
@@ -103,10 +109,7 @@ fn beside_better<'a>(
 ) -> Result<Singles<'a>, DiagnoseError> {
     let origin = base.log_evidence;
     let kept = |all: &[Found<'a>]| -> Vec<Found<'a>> {
-        let shifted = all.iter().cloned().map(|found| Found {
-            gain: found.gain + old_origin - origin,
-            ..found
-        });
+        let shifted = all.iter().cloned().map(|f| f.beside(old_origin, origin));
         fitted(shifted.collect()).collect()
     };
     let mut functions = unknown(base, &(terms.unknown)(&[]), origin, breadth.few())?;
@@ -130,11 +133,7 @@ fn carried_on<'a>(
     stage: &Stage,
 ) -> Result<Singles<'a>, DiagnoseError> {
     let origin = base.log_evidence;
-    let kept = |found: &Found<'_>| Found {
-        terms: found.terms.clone(),
-        gain: found.gain + old_origin - origin,
-        model: None,
-    };
+    let kept = |found: &Found<'_>| found.promised().beside(old_origin, origin);
     // What does not stand out keeps its evidence: another step does not help it more than the others.
     let least = FIRST * old.top();
     let carry = |found: &Found<'_>| -> Result<Found<'a>, DiagnoseError> {
@@ -177,6 +176,7 @@ fn carried_on<'a>(
         carried: Some(Carried {
             several: carry_all(&old.several)?,
             noise: old.noise.iter().map(kept).collect(),
+            noise_pairs: old.noise_pairs.iter().map(kept).collect(),
         }),
         ..Singles::alone(functions, effects)
     })

@@ -7,12 +7,13 @@
 //! ```
 
 use super::found::{Found, own_theta};
-use crate::diagnose::hypotheses::term::Nature;
+use crate::diagnose::hypotheses::term::{Nature, Term};
 use crate::diagnose::model::Model;
 use crate::diagnose::outcome::Probabilities;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::evidence::log_mean;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Explanations of a kind from whose θ the twin is fitted again.
 const STARTS: usize = 2;
@@ -88,7 +89,7 @@ impl<'a> Findings<'a> {
     }
 
     /// A set of listed effects.
-    fn set(&self, keys: &[String]) -> Option<&Found<'a>> {
+    pub fn set(&self, keys: &[String]) -> Option<&Found<'a>> {
         (self.listed.iter().chain(&self.several)).find(|f| same(&f.keys(), keys))
     }
 
@@ -221,7 +222,8 @@ impl<'a> Findings<'a> {
     /// form.
     fn holds_listed(&self, unknown: &Found<'_>) -> bool {
         let least = (1.0 - Thresholds::OUTDONE) * unknown.gain;
-        (self.listed.iter()).any(|f| f.gain > least && f.last().target == unknown.last().target)
+        (self.listed.iter())
+            .any(|f| f.gain > least && f.last().places().contains(&unknown.last().target.as_str()))
     }
 
     /// log of the evidence of nothing missing, whatever the noise, over that of the twin.
@@ -250,8 +252,16 @@ impl<'a> Findings<'a> {
         );
         let each = Thresholds::LISTED / listed;
         let every = (1.0 - Thresholds::LISTED) / unknown;
-        let places = |found: &Found<'_>| -> Vec<String> {
-            found.terms.iter().map(|t| t.target.clone()).collect()
+        // Each term's part of one, shared by the places of its names.
+        let places = |found: &Found<'_>| -> Vec<(String, f64)> {
+            let count = found.terms.len() as f64;
+            let of_term = |term: &Arc<Term>| -> Vec<(String, f64)> {
+                let places = term.places();
+                let share = 1.0 / (count * places.len() as f64);
+                let shared = places.into_iter().map(|place| (place.to_owned(), share));
+                shared.collect()
+            };
+            found.terms.iter().flat_map(of_term).collect()
         };
         let mut all: Vec<Weighed> = vec![];
         for found in self.listed.iter().chain(&self.several) {
@@ -302,9 +312,8 @@ impl<'a> Findings<'a> {
         let kinds = &mut chances.kinds;
         for hypothesis in all {
             let p = (hypothesis.log_weight - whole).exp();
-            for place in &hypothesis.places {
-                *chances.places.entry(place.clone()).or_default() +=
-                    p / hypothesis.places.len() as f64;
+            for (place, share) in hypothesis.places {
+                *chances.places.entry(place).or_default() += p * share;
             }
             match hypothesis.kind {
                 Kind::Unknown => kinds.unknown += p,
@@ -346,7 +355,8 @@ impl<'a> Findings<'a> {
 struct Weighed {
     log_weight: f64,
     kind: Kind,
-    places: Vec<String>,
+    /// Places, and the share of each.
+    places: Vec<(String, f64)>,
 }
 
 enum Kind {

@@ -24,6 +24,23 @@ impl<'a> Found<'a> {
         }
     }
 
+    /// The same beside another twin, of this log Z instead of `old`.
+    pub fn beside(self, old: f64, origin: f64) -> Self {
+        Self {
+            gain: self.gain + old - origin,
+            ..self
+        }
+    }
+
+    /// What is known of it without its fit, which belongs to its twin.
+    pub fn promised<'b>(&self) -> Found<'b> {
+        Found {
+            terms: self.terms.clone(),
+            gain: self.gain,
+            model: None,
+        }
+    }
+
     /// Keys of the terms.
     pub fn keys(&self) -> Vec<String> {
         self.terms.iter().map(|t| t.key()).collect()

@@ -119,6 +119,7 @@ fn term(
         starts,
         variables,
         mark: 0.0,
+        also: vec![],
         part: Part::Effect {
             effect,
             held: BTreeMap::new(),
@@ -235,6 +236,7 @@ pub(super) fn entered(target: &str, entry: Entry, variable: &Variable, largest: 
         }],
         variables: vec![(variable.name.clone(), ends.0, ends.1)],
         mark: 0.0,
+        also: vec![],
     }
 }
 

@@ -6,7 +6,7 @@ use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::thresholds::Thresholds;
 use crate::effect::{Effect, Law, Magnitude, Mark, TargetKind, on_levels, targets};
 use crate::fit::axis::{Axis, EvidencePrior};
-use crate::fit::magnitude::{LONGEST, largest, levels, shape_axis, size_axis};
+use crate::fit::magnitude::{LONGEST, largest, levels, size_axis, uniform_axis};
 use crate::math::ends;
 use crate::twin::{Interval, Parameter, Twin};
 use std::collections::BTreeMap;
@@ -131,6 +131,7 @@ impl Library<'_> {
                 Mark::Present(_) if !rounds && on_levels(values) => 0.0,
                 Mark::Present(_) => Thresholds::MARK_PRESENT,
             },
+            also: vec![],
         };
         let twin = with_terms(self.twin, std::iter::once(&term))?;
         let space = twin.parameters();
@@ -186,33 +187,20 @@ impl Library<'_> {
         let logarithmic = |low: f64, high: f64, grid: Vec<f64>| {
             let mut parameter = parameter.clone();
             parameter.bounds = Interval::unchecked(low, high);
-            parameter.prior = parameter.bounds;
             let axis = Axis {
                 counts: false,
                 longest: 0.7,
                 deviation: 3.0,
-                centre: (low * high).sqrt(),
-                evidence: EvidencePrior::Uniform {
-                    low: low.ln(),
-                    high: high.ln(),
-                },
-                ..Axis::of(&parameter)
+                ..uniform_axis(&parameter, (low, high), true)
             };
             (grid.into_iter().map(|v| v.clamp(low, high)).collect(), axis)
         };
         let linear = |low: f64, high: f64, grid: Vec<f64>| {
             let mut parameter = parameter.clone();
             parameter.bounds = Interval::unchecked(low, high);
-            parameter.prior = parameter.bounds;
-            let axis = shape_axis(&parameter, low, high);
             let axis = Axis {
                 counts: false,
-                centre: 0.5 * (low + high),
-                deviation: 2.0 * (high - low),
-                longest: 0.15 * (high - low),
-                width: 0.05 * (high - low),
-                evidence: EvidencePrior::Uniform { low, high },
-                ..axis
+                ..uniform_axis(&parameter, (low, high), false)
             };
             (grid.into_iter().map(|v| v.clamp(low, high)).collect(), axis)
         };
@@ -350,17 +338,12 @@ impl Library<'_> {
         let (low, high) = (0.7 / self.scales.duration(), 0.5 / self.scales.dt());
         let mut parameter = parameter.clone();
         parameter.bounds = Interval::unchecked(low, high);
-        parameter.prior = parameter.bounds;
         let axis = Axis {
             counts: false,
             // A search must stay at its peak of the spectrum.
             longest: 0.02,
             deviation: 10.0,
-            evidence: EvidencePrior::Uniform {
-                low: low.ln(),
-                high: high.ln(),
-            },
-            ..Axis::of(&parameter)
+            ..uniform_axis(&parameter, (low, high), true)
         };
         (self.frequencies.to_vec(), axis)
     }

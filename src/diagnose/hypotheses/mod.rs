@@ -1,5 +1,6 @@
 //! Hypotheses of what could be missing: listed effects, and unknown functions of states, of the past, of time.
 
+mod alike;
 pub(in crate::diagnose) mod basis;
 pub(in crate::diagnose) mod disturbed_equations;
 mod disturbed_signals;
@@ -21,7 +22,8 @@ use self::scales::Scales;
 use self::term::{Nature, Part, Start, Term};
 use crate::diagnose::error::DiagnoseError;
 use crate::effect::{EffectPattern, TargetKind, targets};
-use crate::fit::axis::{Axis, EvidencePrior};
+use crate::fit::axis::Axis;
+use crate::fit::magnitude::uniform_axis;
 use crate::math::quantile;
 use crate::record::Record;
 use crate::study::Study;
@@ -65,7 +67,7 @@ pub(in crate::diagnose) fn listed(
         }
         terms.extend(library.terms(&effect)?);
     }
-    Ok(terms)
+    alike::merged(terms, library)
 }
 
 /// Effects that the study has added to its twin.
@@ -77,7 +79,7 @@ fn already(study: &Study) -> Vec<String> {
 
 /// Effects that the twin may lack beside these and its own effects.
 pub(in crate::diagnose) fn not_tested(study: &Study, terms: &[Arc<Term>]) -> Vec<String> {
-    let known: Vec<String> = (terms.iter().map(|t| t.key()))
+    let known: Vec<String> = (terms.iter().flat_map(|t| t.keys()))
         .chain(already(study))
         .collect();
     let mut keys: Vec<String> = (study.effects().iter())
@@ -273,11 +275,7 @@ fn disturbances(
         counts: false,
         deviation: 3.0,
         longest: 0.7,
-        evidence: EvidencePrior::Uniform {
-            low: low.ln(),
-            high: high.ln(),
-        },
-        ..Axis::of(&parameter)
+        ..uniform_axis(&parameter, (low, high), true)
     };
     (times.into_iter())
         .map(|time| Term {
@@ -298,6 +296,7 @@ fn disturbances(
                 .to_vec(),
             variables: vec![],
             mark: 0.0,
+            also: vec![],
         })
         .collect()
 }

@@ -70,6 +70,8 @@ pub(in crate::diagnose) struct Term {
     pub variables: Vec<(String, f64, f64)>,
     /// Nats that the outputs themselves speak for it.
     pub mark: f64,
+    /// Listed effects that do the same in this twin: other names of this term.
+    pub also: Vec<EffectKey>,
 }
 
 /// Nats that the outputs themselves speak for terms together. Repeated values are one mark of a sensor, whatever limits or rounds it.
@@ -86,6 +88,23 @@ impl Term {
     /// `id@target`.
     pub fn key(&self) -> String {
         EffectKey::new(&self.id, &self.target).to_string()
+    }
+
+    /// Its own key and those of its other names.
+    pub fn keys(&self) -> Vec<String> {
+        let others = self.also.iter().map(EffectKey::to_string);
+        std::iter::once(self.key()).chain(others).collect()
+    }
+
+    /// Places of all its names, each once.
+    pub fn places(&self) -> Vec<&str> {
+        let mut places = vec![self.target.as_str()];
+        for other in &self.also {
+            if !places.contains(&other.target.as_str()) {
+                places.push(&other.target);
+            }
+        }
+        places
     }
 
     /// Returns whether only noise changes, so that no free run moves.
@@ -193,6 +212,7 @@ pub(in crate::diagnose) mod fixture {
             starts: vec![],
             variables: vec![],
             mark,
+            also: vec![],
         }
     }
 }

@@ -126,6 +126,8 @@ pub struct EffectFit {
     pub magnitudes: Vec<(String, f64)>,
     /// log of the evidence over that of the twin, in nats; for the members of an accepted set, that of the set.
     pub log_evidence: f64,
+    /// Other effects that do the same in this twin, as `id@target`: the probability is that of all these names together.
+    pub also: Vec<String>,
 }
 
 impl EffectFit {

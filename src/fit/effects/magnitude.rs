@@ -38,6 +38,8 @@ pub(crate) enum Kind {
         low: f64,
         high: f64,
         off: f64,
+        /// True where the range is one of factors.
+        is_log: bool,
         /// Values to try.
         grid: Vec<f64>,
     },
@@ -51,7 +53,9 @@ impl Kind {
     /// Axis of a magnitude whose kind needs no states of the twin.
     pub fn axis(&self, parameter: &Parameter) -> Axis {
         match self {
-            Self::Switch { low, high, .. } => switch_axis(parameter, *low, *high),
+            Self::Switch {
+                low, high, is_log, ..
+            } => uniform_axis(parameter, (*low, *high), *is_log),
             Self::Shape { low, high } => shape_axis(parameter, *low, *high),
             Self::Size(_) | Self::Other => Axis::of(parameter),
         }
@@ -101,6 +105,7 @@ pub(crate) fn kinds(
                 low: 0.0,
                 high: longest,
                 off,
+                is_log: false,
                 grid: std::iter::successors(Some(dt), |v| Some(FACTOR * v))
                     .take_while(|v| *v <= longest)
                     .collect(),
@@ -170,6 +175,7 @@ fn threshold(values: &[f64], off: f64, is_known: bool) -> Kind {
         low,
         high,
         off: if is_upper { high } else { low },
+        is_log: false,
         grid: levels(values, is_upper),
     }
 }
@@ -185,6 +191,7 @@ fn rate_limit(values: &[f64], dt: f64, duration: f64) -> Kind {
         low: fastest * dt / duration,
         high: fastest,
         off: fastest,
+        is_log: true,
         grid: RATES.map(|share| share * fastest).to_vec(),
     }
 }
@@ -283,7 +290,7 @@ pub(crate) fn shape_axis(parameter: &Parameter, low: f64, high: f64) -> Axis {
         high.min(parameter.bounds.high()),
     );
     let axis = Axis::of(parameter);
-    if low < high && !axis.is_log() {
+    if low < high && !axis.is_log {
         Axis {
             evidence: EvidencePrior::Uniform { low, high },
             ..axis
@@ -293,40 +300,28 @@ pub(crate) fn shape_axis(parameter: &Parameter, low: f64, high: f64) -> Axis {
     }
 }
 
-/// Axis of a magnitude that is off at an end of a range: within it, the user's bounds kept.
-fn switch_axis(parameter: &Parameter, low: f64, high: f64) -> Axis {
+/// Axis of a magnitude that is uniform over a range, or in its logarithm; the user's bounds are kept. A level has no zero of its own, and
+/// is never taken in its logarithm.
+pub(crate) fn uniform_axis(parameter: &Parameter, (low, high): (f64, f64), is_log: bool) -> Axis {
     let bounds = Interval::unchecked(
         low.max(parameter.bounds.low()),
         high.min(parameter.bounds.high()),
     );
-    let (low, high) = (bounds.low(), bounds.high());
-    if low >= high {
-        return Axis::of(parameter);
+    let axis = Axis::of(parameter);
+    if bounds.low() >= bounds.high() {
+        return axis;
     }
-    let axis = Axis::of(&Parameter {
-        prior: bounds,
+    let [low, high] = [bounds.low(), bounds.high()].map(|v| if is_log { v.ln() } else { v });
+    let (centre, width) = (0.5 * (low + high), high - low);
+    Axis {
         bounds,
-        ..parameter.clone()
-    });
-    match axis.is_log() {
-        true => Axis {
-            centre: (low * high).sqrt(),
-            deviation: 2.0 * (high / low).ln(),
-            longest: 0.15 * (high / low).ln(),
-            evidence: EvidencePrior::Uniform {
-                low: low.ln(),
-                high: high.ln(),
-            },
-            ..axis
-        },
-        false => Axis {
-            centre: 0.5 * (low + high),
-            deviation: 2.0 * (high - low),
-            longest: 0.15 * (high - low),
-            width: 0.05 * (high - low),
-            evidence: EvidencePrior::Uniform { low, high },
-            ..axis
-        },
+        is_log,
+        centre: if is_log { centre.exp() } else { centre },
+        deviation: 2.0 * width,
+        longest: 0.15 * width,
+        width: if is_log { 1.0 } else { 0.05 * width },
+        evidence: EvidencePrior::Uniform { low, high },
+        ..axis
     }
 }
 

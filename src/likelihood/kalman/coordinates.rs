@@ -22,7 +22,12 @@ pub struct Coordinates {
 impl Coordinates {
     /// Creates the coordinates of a twin's parameters.
     pub fn new(space: &ParameterSpace) -> Self {
-        let log: Vec<bool> = space.iter().map(|p| p.bounds.low() > 0.0).collect();
+        let log = space.iter().map(|p| p.bounds.low() > 0.0).collect();
+        Self::with(space, log)
+    }
+
+    /// The same, logarithms where this says so.
+    pub(crate) fn with(space: &ParameterSpace, log: Vec<bool>) -> Self {
         let theta_lower: Vec<f64> = space.iter().map(|p| p.bounds.low()).collect();
         let theta_upper: Vec<f64> = space.iter().map(|p| p.bounds.high()).collect();
         let steps = (log.iter().zip(space.widths()))

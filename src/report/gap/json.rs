@@ -13,7 +13,7 @@ pub const NEXT_INPUT: &str = "next-input.csv";
 /// | `verdict`, `detection` | kind of gap, and the evidence for it |
 /// | `parameters`, `nuisance` | θ beside the accepted effects; all other estimates |
 /// | `where` | places by probability, missing functions, maps of the residuals, time of a change |
-/// | `which` | effects with probabilities, the accepted ones first; rivals, what remains, the next input |
+/// | `which` | effects with probabilities, the accepted ones first, and those that do the same in this twin (`also`); rivals, what remains, the next input |
 /// | `shrinkage` | prediction errors on held-out data over several horizons, the share closed, controls |
 /// | `discovery` | exploratory law of the missing function |
 /// | `correlated_noise`, `outliers`, `integrator`, `substeps` | noise and step that the diagnosis used in place of the twin's |

@@ -201,6 +201,7 @@ mod tests {
             probability: 0.98,
             magnitudes: vec![("level".into(), 9.9), ("spill".into(), 0.4)],
             log_evidence: 60.0,
+            also: vec![],
         };
         let told = sentence(&Units::of(&study), &fit).unwrap();
         assert_eq!(
@@ -221,6 +222,7 @@ mod tests {
             probability: 0.98,
             magnitudes: vec![("pull".into(), 0.5)],
             log_evidence: 60.0,
+            also: vec![],
         };
         let told = sentence(&Units::of(&study), &fit).unwrap();
         assert_eq!(told, "A magnet at x1 is missing: pull 0.500 1/s.");

@@ -262,9 +262,12 @@ fn measure_next(next: &NextInput) -> String {
     )
 }
 
-/// `id@target (name value unit, …)`.
+/// `id@target (name value unit, …), or …`.
 fn with_magnitudes(units: &Units, effect: &EffectFit) -> String {
-    format!("{} ({})", effect.key(), units.magnitudes(effect))
+    let others: String = (effect.also.iter())
+        .map(|key| format!(", or {key}"))
+        .collect();
+    format!("{} ({}){others}", effect.key(), units.magnitudes(effect))
 }
 
 #[cfg(test)]

@@ -97,8 +97,11 @@ fn row(units: &Units, diagnosis: &Diagnosis, effect: &EffectFit) -> Vec<String> 
     } else {
         ""
     };
+    let names: Vec<&str> = std::iter::once(key.as_str())
+        .chain(effect.also.iter().map(String::as_str))
+        .collect();
     vec![
-        key,
+        names.join(" or "),
         standing.into(),
         units.magnitudes(effect),
         chance(effect.probability),

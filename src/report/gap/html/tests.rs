@@ -296,6 +296,7 @@ fn absurd_numbers_and_hostile_names_stay_short_and_harmless() {
             ("low".into(), f64::NEG_INFINITY),
         ],
         log_evidence: 1.234_567e9,
+        also: vec!["<script>alert(2)</script>@x".into()],
     });
     let page = gap_html(&oscillator(), &diagnosis);
     assert!(!balanced(&page).iter().any(|e| e == "script"));

@@ -1,0 +1,202 @@
+//! Listed effects that do the same in a twin: one hypothesis with several names.
+//!
+//! A constant force on a velocity and a bias of the only motor that drives it are one term of the equations. Only laws of which nothing but
+//! the size is unknown are compared: a record tells times and shapes by itself.
+
+use super::listed::Library;
+use super::scales::Scales;
+use super::term::{Nature, Part, Term, with_terms};
+use crate::diagnose::error::DiagnoseError;
+use crate::effect::{EffectKey, TargetKind};
+use crate::twin::{Acting, Twin};
+
+/// Moments of each record at which equations are compared: many more than a law that is not the same could agree at by chance.
+const MOMENTS: usize = 48;
+/// Largest share of a term's square that another one may not have: rounding makes 10⁻²⁰, and 10⁻³ would show at thousands of nats alone.
+const SAME: f64 = 1e-6;
+
+/// Merges terms that add the same to the equations, at small sizes and at the largest. The first by place (state, actuator, sensor,
+/// parameter), then by name, stands for the others. A black box shows no equations, and keeps all.
+pub(super) fn merged(terms: Vec<Term>, library: &Library<'_>) -> Result<Vec<Term>, DiagnoseError> {
+    let mut heads: Vec<(usize, Additions)> = vec![];
+    let mut names: Vec<Vec<EffectKey>> = vec![vec![]; terms.len()];
+    let mut order: Vec<usize> = (0..terms.len()).collect();
+    order.sort_by_key(|&i| (rank(&terms[i]), terms[i].key()));
+    let mut is_merged = vec![false; terms.len()];
+    for i in order {
+        let Some(own) = Additions::of(&terms[i], library)? else {
+            continue;
+        };
+        let mut head = None;
+        for (j, other) in &heads {
+            if own.are_alike(other, library)? {
+                head = Some(*j);
+                break;
+            }
+        }
+        match head {
+            Some(j) => {
+                is_merged[i] = true;
+                names[j].push(EffectKey::new(&terms[i].id, &terms[i].target));
+            }
+            None => heads.push((i, own)),
+        }
+    }
+    Ok((terms.into_iter().zip(names).zip(is_merged))
+        .filter(|(_, is_merged)| !is_merged)
+        .map(|((term, also), _)| Term { also, ..term })
+        .collect())
+}
+
+/// Order of places.
+fn rank(term: &Term) -> usize {
+    let Part::Effect { effect, .. } = &term.part else {
+        return 4;
+    };
+    match effect.law().target() {
+        TargetKind::State => 0,
+        TargetKind::Actuator => 1,
+        TargetKind::Sensor => 2,
+        TargetKind::Parameter => 3,
+    }
+}
+
+/// What a term of one unknown size adds to rates and outputs along the records.
+struct Additions {
+    term: Term,
+    /// A small size, and the largest on the same side.
+    sizes: [f64; 2],
+    small: Vec<f64>,
+}
+
+impl Additions {
+    /// `None` for terms with more to find than a size, and for those that add nothing here.
+    fn of(term: &Term, library: &Library<'_>) -> Result<Option<Self>, DiagnoseError> {
+        let is_effect = term.nature == Nature::Listed && !term.is_noise();
+        let [axis] = &term.axes[..] else {
+            return Ok(None);
+        };
+        let Some((small, largest)) = axis.small_size().zip(axis.largest_size()) else {
+            return Ok(None);
+        };
+        if !is_effect || term.shape().is_some() || !library.scales.has_equations() {
+            return Ok(None);
+        }
+        let additions = along(term, small, library)?;
+        let moves = additions.iter().any(|v| *v != 0.0) && additions.iter().all(|v| v.is_finite());
+        Ok(moves.then(|| Self {
+            term: term.clone(),
+            sizes: [small, largest],
+            small: additions,
+        }))
+    }
+
+    /// Returns whether some multiple of another term adds the same, small or large.
+    fn are_alike(&self, other: &Self, library: &Library<'_>) -> Result<bool, DiagnoseError> {
+        // A friction is no force that may as well push.
+        if self.term.axes[0].is_one_sided() != other.term.axes[0].is_one_sided() {
+            return Ok(false);
+        }
+        let square = dot(&other.small, &other.small);
+        let multiple = dot(&self.small, &other.small) / square;
+        if !is_multiple(&self.small, multiple, &other.small) {
+            return Ok(false);
+        }
+        let [small, largest] = self.sizes;
+        let there = multiple * other.sizes[0] * largest / small;
+        if !other.term.axes[0].bounds.contains(there) {
+            return Ok(false);
+        }
+        let own = along(&self.term, largest, library)?;
+        Ok(is_multiple(&own, 1.0, &along(&other.term, there, library)?))
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Returns whether one list is so many times another.
+fn is_multiple(own: &[f64], multiple: f64, other: &[f64]) -> bool {
+    let rest: f64 = (own.iter().zip(other))
+        .map(|(own, other)| (own - multiple * other).powi(2))
+        .sum();
+    rest <= SAME * dot(own, own)
+}
+
+/// Changes of rates and outputs by a term of this size; empty where it adds states.
+fn along(term: &Term, size: f64, library: &Library<'_>) -> Result<Vec<f64>, DiagnoseError> {
+    let twin = with_terms(library.twin, std::iter::once(term))?;
+    let theta = [library.theta, &[size]].concat();
+    let own = equations(library.twin, library.theta, library.scales);
+    let grown = equations(&twin, &theta, library.scales);
+    Ok(match own.zip(grown) {
+        Some((own, grown)) => grown
+            .iter()
+            .zip(&own)
+            .map(|(there, own)| there - own)
+            .collect(),
+        None => vec![],
+    })
+}
+
+/// Rates and outputs of a twin, each in units of its own, at moments of all records.
+fn equations(twin: &Twin, theta: &[f64], scales: &Scales<'_>) -> Option<Vec<f64>> {
+    let twin = twin.equations()?;
+    let outline = twin.outline();
+    let (mut rates, mut outputs) = (
+        vec![0.0; scales.rates.len()],
+        vec![0.0; outline.outputs.len()],
+    );
+    if outline.states.len() != rates.len() {
+        return None;
+    }
+    let sizes: Vec<f64> = (0..outputs.len())
+        .map(|j| scales.size(TargetKind::Sensor, j))
+        .collect();
+    let units: Vec<f64> = (scales.rates.iter().chain(&sizes))
+        .map(|unit| if *unit > 0.0 { *unit } else { 1.0 })
+        .collect();
+    let mut all = vec![];
+    for (record, states) in scales.records.iter().zip(&scales.states) {
+        let acting = Acting::of(twin, theta, record.drive()).ok()?;
+        let count = MOMENTS.min(record.samples());
+        for k in (0..count).map(|m| m * record.samples() / count) {
+            let (now, x) = (acting.at(k, theta), states.row(k).to_vec());
+            twin.drift(&now, &x, &mut rates);
+            twin.observe(&now, &x, &mut outputs);
+            let values = rates.iter().chain(&outputs).zip(&units);
+            all.extend(values.map(|(value, unit)| value / unit));
+        }
+    }
+    Some(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::diagnose::DiagnoseSettings;
+    use crate::diagnose::base::Base;
+    use crate::diagnose::fixture::{biased_record, tanks};
+    use crate::likelihood::measured;
+
+    /// The pump feeds the upper tank alone: what biases it is a constant inflow there, what scales it is not.
+    #[test]
+    fn a_bias_of_the_only_pump_is_a_constant_inflow() {
+        let study = tanks(60);
+        let records = [biased_record(&study, 0.0, 5)];
+        let settings = DiagnoseSettings::default();
+        let measured = measured(study.twin(), &records, &study.beliefs()).unwrap();
+        let base = Base::new(&measured, &records, &settings).unwrap();
+        let terms = base.listed(&study, &settings).unwrap();
+        let merged: Vec<Vec<String>> = (terms.iter())
+            .filter(|term| !term.also.is_empty())
+            .map(|term| term.keys())
+            .collect();
+        assert_eq!(merged, [["constant-forcing@h1", "actuator-bias@actuator"]]);
+        let pump: Vec<&str> = (terms.iter())
+            .filter(|term| !term.also.is_empty())
+            .flat_map(|term| term.places())
+            .collect();
+        assert_eq!(pump, ["h1", "actuator"]);
+    }
+}
