@@ -125,19 +125,19 @@ fn accepted(units: &Units, cause: &Cause) -> String {
             chance(together)
         ),
         (false, true) => format!(
-            "{}listed effects explain {explained}, but no single one can be named",
+            "{}listed effects explain {explained}, but none can be named",
             known(names)
         ),
     };
     let full = || told(effects(units, &sure, "and"), effects(units, &them, "and"));
     let ids = || told(sure.join(" and "), few(&them));
-    let counted = match sure.as_slice() {
-        [first, _, ..] => told(
-            format!("{} and {} more", effect(units, first), sure.len() - 1),
-            few(&them),
-        ),
-        _ => ids(),
-    };
+    let counted = told(
+        match sure.as_slice() {
+            [first, _, ..] => format!("{} and {} more", effect(units, first), sure.len() - 1),
+            _ => sure.join(" and "),
+        },
+        format!("{} effects", them.len()),
+    );
     let [place, somewhere] = remains;
     short_enough(
         [
@@ -267,7 +267,9 @@ pub(super) fn accepted_ids(cause: &Cause) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::fixture::{made, tanks};
+    use crate::diagnose::EffectFit;
+    use crate::report::fixture::{made, oscillator, tanks};
+    use crate::twin::Noise;
 
     /// Tanks with these effects and probabilities, so many of them accepted.
     fn told(decision: Decision, effects: &[(&str, f64)], count: usize) -> String {
@@ -300,8 +302,7 @@ mod tests {
         ];
         assert_eq!(
             told(Decision::Partial, &pair[1..], 1),
-            "Structural gap: most of it is explained by one of parameter-step@k1, sensor-lag@sensor, sensor-bias@sensor (together 0.81); \
-             something remains."
+            "Structural gap: most of it is explained by one of 3 effects (together 0.81); something remains."
         );
         let sure = told(Decision::Partial, &pair, 2);
         assert!(
@@ -317,8 +318,54 @@ mod tests {
         let unsure = [("state-ceiling@h1", 0.2), ("power-law@h1", 0.1)];
         assert_eq!(
             told(Decision::Partial, &unsure, 1),
-            "Structural gap: listed effects explain most of it, but no single one can be named; something remains at the lower tank (h2)."
+            "Structural gap: listed effects explain most of it, but none can be named; something remains at the lower tank (h2)."
         );
         assert!(told(Decision::Named, &pair, 1).contains("lacks a rate limit at the actuator of"));
+    }
+
+    /// Any effects at any places, any probabilities and decisions: two lines of a page, at most three ids.
+    #[test]
+    fn a_thousand_answers_are_short() {
+        let mut source = Noise::new(3, "headlines", 0).source("answers");
+        for study in [tanks(), oscillator()] {
+            let units = Units::of(&study);
+            let keys: Vec<String> = (study.effects().iter())
+                .map(|effect| effect.key().to_string())
+                .collect();
+            for _ in 0..500 {
+                let mut below = |n: usize| (source.uniform() * n as f64) as usize;
+                let mut diagnosis = made::tanks_class();
+                let first = diagnosis.cause.effects[0].clone();
+                let effects: Vec<EffectFit> = (0..4)
+                    .map(|_| {
+                        let (id, target) = keys[below(keys.len())].split_once('@').unwrap();
+                        EffectFit {
+                            id: id.into(),
+                            target: target.into(),
+                            probability: 0.01 * below(101) as f64,
+                            ..first.clone()
+                        }
+                    })
+                    .collect();
+                let cause = &mut diagnosis.cause;
+                cause.class = effects.iter().map(EffectFit::key).collect();
+                cause.accepted = cause.class[..1 + below(2)].to_vec();
+                cause.class.truncate(1 + below(4));
+                cause.decision = [
+                    Decision::Named,
+                    Decision::Class,
+                    Decision::Partial,
+                    Decision::NoneOfThese,
+                ][below(4)];
+                let location = &mut diagnosis.location;
+                location.class = effects.iter().map(|fit| fit.target.clone()).collect();
+                location.class.truncate(below(5));
+                location.target = Some(effects[0].target.clone());
+                cause.effects = effects;
+                let told = headline(&units, &diagnosis);
+                assert!(told.chars().count() <= LONGEST, "{told}");
+                assert!(told.matches('@').count() <= MOST_NAMES, "{told}");
+            }
+        }
     }
 }
