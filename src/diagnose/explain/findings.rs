@@ -252,42 +252,35 @@ impl<'a> Findings<'a> {
         );
         let each = Thresholds::LISTED / listed;
         let every = (1.0 - Thresholds::LISTED) / unknown;
-        // Each term's part of one, shared by the places of its names.
-        let places = |found: &Found<'_>| -> Vec<(String, f64)> {
-            let count = found.terms.len() as f64;
-            let of_term = |term: &Arc<Term>| -> Vec<(String, f64)> {
-                let places = term.places();
-                let share = 1.0 / (count * places.len() as f64);
-                let shared = places.into_iter().map(|place| (place.to_owned(), share));
-                shared.collect()
-            };
-            found.terms.iter().flat_map(of_term).collect()
-        };
         let mut all: Vec<Weighed> = vec![];
         for found in self.listed.iter().chain(&self.several) {
             all.push(Weighed {
                 log_weight: each.ln() + found.gain - self.price(found.terms.len()),
                 kind: Kind::Listed(found.keys()),
-                places: places(found),
+                places: places(&found.terms),
             });
         }
         for found in self.rivals() {
             all.push(Weighed {
                 log_weight: every.ln() + found.gain,
                 kind: match self.holds_listed(found) {
-                    true => Kind::Partial(1),
+                    true => Kind::Partial(1, 0.0),
                     false => Kind::Unknown,
                 },
-                places: places(found),
+                places: places(&found.terms),
             });
         }
         for (keys, on_top) in &self.beside {
+            let own = self.gain(keys).unwrap_or(0.0);
             for found in on_top {
+                let by_effects = (own / found.gain.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
                 let second = Thresholds::SECOND.ln() + every.ln() - self.price(keys.len());
                 all.push(Weighed {
                     log_weight: each.ln() + second + found.gain,
-                    kind: Kind::Partial(keys.len()),
-                    places: places(found),
+                    kind: Kind::Partial(keys.len(), by_effects),
+                    places: (places(std::slice::from_ref(found.last())).into_iter())
+                        .map(|(place, share)| (place, share * (1.0 - by_effects)))
+                        .collect(),
                 });
             }
         }
@@ -307,8 +300,8 @@ impl<'a> Findings<'a> {
         };
         // Each set, its probability alone, and the log of its weight among them.
         let mut sets: Vec<(Vec<String>, f64, f64)> = vec![];
-        // Probability of something unknown beside sets of each number of effects.
-        let mut beside: BTreeMap<usize, f64> = BTreeMap::new();
+        // Probability of something unknown beside sets of each number of effects, and the part of it that the effects explain.
+        let mut beside: BTreeMap<usize, [f64; 2]> = BTreeMap::new();
         let kinds = &mut chances.kinds;
         for hypothesis in all {
             let p = (hypothesis.log_weight - whole).exp();
@@ -317,9 +310,11 @@ impl<'a> Findings<'a> {
             }
             match hypothesis.kind {
                 Kind::Unknown => kinds.unknown += p,
-                Kind::Partial(count) => {
+                Kind::Partial(count, by_effects) => {
                     kinds.partial += p;
-                    *beside.entry(count).or_default() += p;
+                    let of_count = beside.entry(count).or_default();
+                    of_count[0] += p;
+                    of_count[1] += p * by_effects;
                 }
                 Kind::Listed(keys) => {
                     kinds.listed += p;
@@ -332,7 +327,8 @@ impl<'a> Findings<'a> {
         let all_alike = self.needs_second();
         let count = |keys: &[String]| if all_alike { 1 } else { keys.len() };
         if all_alike {
-            beside = BTreeMap::from([(1, kinds.partial)]);
+            let sum = |i: usize| beside.values().map(|of_count| of_count[i]).sum();
+            beside = BTreeMap::from([(1, [sum(0), sum(1)])]);
         }
         for (keys, p, log_weight) in &sets {
             let alike: Vec<f64> = (sets.iter())
@@ -340,11 +336,14 @@ impl<'a> Findings<'a> {
                 .map(|(.., log_weight)| *log_weight)
                 .collect();
             let share = (log_weight - log_sum(&alike)).exp();
-            let part = beside
-                .get(&count(keys))
-                .map_or(0.0, |beside| beside * share);
+            let of_count = beside.get(&count(keys)).copied().unwrap_or_default();
+            let [part, by_effects] = of_count.map(|p| p * share);
             for key in keys {
                 *chances.effects.entry(key.clone()).or_default() += p + part;
+            }
+            let terms = self.set(keys).map_or(&[][..], |found| &found.terms);
+            for (place, share) in places(terms) {
+                *chances.places.entry(place).or_default() += by_effects * share;
             }
         }
         chances
@@ -362,8 +361,8 @@ struct Weighed {
 enum Kind {
     /// Listed effects alone.
     Listed(Vec<String>),
-    /// So many listed effects beside something unknown.
-    Partial(usize),
+    /// So many listed effects beside something unknown, and the share of the evidence that is theirs.
+    Partial(usize, f64),
     /// Something unknown alone.
     Unknown,
 }
@@ -377,6 +376,17 @@ pub(in crate::diagnose) fn leaves_nothing(gain: f64, added: f64) -> bool {
 pub(in crate::diagnose) fn suffices(found: &Found<'_>, on_top: &[Found<'_>]) -> bool {
     let added = on_top.first().map_or(0.0, |f| f.gain - found.gain);
     leaves_nothing(found.gain, added)
+}
+
+/// Places of terms, and the share of each: a term's part of one is shared by the places of its names.
+fn places(terms: &[Arc<Term>]) -> Vec<(String, f64)> {
+    let mut all = vec![];
+    for term in terms {
+        let places = term.places();
+        let share = 1.0 / (terms.len() * places.len()) as f64;
+        all.extend(places.into_iter().map(|place| (place.to_owned(), share)));
+    }
+    all
 }
 
 /// log of the sum of exponentials.
@@ -461,6 +471,10 @@ mod tests {
         let chances = findings.chances();
         assert!(chances.kinds.partial > 0.9);
         assert!(chances.effects[&key] < 0.1, "{}", chances.effects[&key]);
+        // The first explains two thirds of the evidence, at its place.
+        assert!((chances.places["h1"] - 2.0 / 3.0).abs() < 0.03);
+        let sum: f64 = chances.places.values().sum();
+        assert!((sum + chances.kinds.nothing - 1.0).abs() < 1e-9, "{sum}");
         // Unless the second one explains something that functions do not.
         findings.add(&pair, Some(vec![wave(Nature::Function, "h2", 90.0)]));
         let chances = findings.chances();

@@ -33,11 +33,14 @@ pub(super) fn closed_sentence(s: &Shrinkage) -> String {
     text + "."
 }
 
-/// Returns the share of the gap, which is so much `of` it, with its 90 % interval; the interval alone where that is too wide.
+/// Returns the share of the gap, which is so much `of` it, with its 90 % interval. Where that is too wide for one number: its lower end,
+/// if all of the gap may have closed, or else both ends.
 pub(super) fn share_with_interval(s: &Shrinkage, of: &str) -> Option<String> {
-    let [low, high] = s.interval?.map(percent);
+    let ends = s.interval?;
+    let [low, high] = ends.map(percent);
     Some(match s.closed {
         Some(closed) => format!("{}{of} ({low} to {high})", percent(closed)),
+        None if ends[0] > 0.0 && ends[1] >= 1.0 => format!("at least {low}{of}"),
         None => format!("{low} to {high}{of}"),
     })
 }
@@ -72,8 +75,14 @@ mod tests {
         (share.closed, share.interval) = (None, Some([0.6, 1.2]));
         let wide = closed_sentence(&share);
         assert!(
-            wide.ends_with("; 60 % to 120 % of the gap closed."),
+            wide.ends_with("; at least 60 % of the gap closed."),
             "{wide}"
+        );
+        share.interval = Some([-0.2, 0.7]);
+        let open = closed_sentence(&share);
+        assert!(
+            open.ends_with("; −20 % to 70 % of the gap closed."),
+            "{open}"
         );
         share.interval = None;
         let hidden = closed_sentence(&share);
