@@ -1,10 +1,15 @@
 //! Records of the tanks that tests of several parts begin with.
 
+use super::base::Base;
+use super::hypotheses::term::Term;
+use super::settings::DiagnoseSettings;
 use crate::effect::{Catalogue, augment};
+use crate::likelihood::measured;
 use crate::record::Record;
 use crate::study::{RecordPlan, Study};
 use crate::twin::{Noise, Twin};
 use crate::twins::CascadedTanks;
+use std::sync::Arc;
 
 /// The tanks with so many samples a record, 4 s apart.
 pub(crate) fn tanks(samples: usize) -> Study {
@@ -26,4 +31,12 @@ pub(super) fn biased_record(study: &Study, bias: f64, seed: u64) -> Record {
     let twin = augment(study.twin().clone(), vec![effect.unwrap()]).unwrap();
     let theta = [study.twin().parameters().centre(), vec![bias]].concat();
     record(study, &twin, &theta, seed)
+}
+
+/// Listed effects as hypotheses beside the fitted twin of a study.
+pub(super) fn listed_terms(study: &Study, records: &[Record]) -> Vec<Arc<Term>> {
+    let settings = DiagnoseSettings::default();
+    let measured = measured(study.twin(), records, &study.beliefs()).unwrap();
+    let base = Base::new(&measured, records, &settings).unwrap();
+    base.listed(study, &settings).unwrap()
 }

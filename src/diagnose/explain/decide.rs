@@ -39,6 +39,9 @@ impl Conclusion {
     }
 }
 
+/// Keys of a set, the nats of its evidence with its price paid, and those that functions add to it.
+type Candidate = (Vec<String>, f64, f64);
+
 /// Decides about a gap.
 pub(in crate::diagnose) fn decide(
     findings: &Findings<'_>,
@@ -51,9 +54,8 @@ pub(in crate::diagnose) fn decide(
         .listed
         .first()
         .map_or(f64::NEG_INFINITY, |f| f.gain);
-    // (keys, value with its price, what is left)
     let singles = (findings.listed.iter()).filter(|f| f.gain > top - Thresholds::CANDIDATES);
-    let candidates: Vec<(Vec<String>, f64, f64)> = singles
+    let candidates: Vec<Candidate> = singles
         .chain(&findings.several)
         .filter_map(|f| {
             let keys = f.keys();
@@ -61,7 +63,7 @@ pub(in crate::diagnose) fn decide(
             Some((keys, f.gain - findings.price(f.terms.len()), left))
         })
         .collect();
-    let mut chosen: Option<&(Vec<String>, f64, f64)> = None;
+    let mut chosen: Option<&Candidate> = None;
     for count in 1..=most_effects {
         let best = (candidates.iter())
             .filter(|c| c.0.len() == count && leaves_nothing(c.1, c.2))
@@ -72,6 +74,7 @@ pub(in crate::diagnose) fn decide(
             chosen = Some(best);
         }
     }
+    chosen = chosen.map(|c| likeliest(c, &candidates, chances, |c| leaves_nothing(c.1, c.2)));
     // A function of the effect's own variable holds the effect: it refutes its form only if it is clearly better.
     if chosen.is_some_and(|c| best_unknown > c.1 + Thresholds::RIVALS) {
         chosen = None;
@@ -89,7 +92,8 @@ pub(in crate::diagnose) fn decide(
     // black box has no functions to stand for it.
     let best = (candidates.iter())
         .filter(|c| c.0.len() <= most)
-        .max_by(|a, b| a.1.total_cmp(&b.1));
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|best| likeliest(best, &candidates, chances, |_| true));
     let kinds = &chances.kinds;
     if let Some((keys, own, left)) = best
         && has_equations
@@ -104,6 +108,26 @@ pub(in crate::diagnose) fn decide(
         return named(findings, chances, keys, Decision::Partial);
     }
     Conclusion::none_of_these()
+}
+
+/// The most probable of the candidates within 3 nats of the best one, and of as many effects: a function may be one of them in another
+/// form, and speak for it.
+fn likeliest<'c>(
+    best: &'c Candidate,
+    all: &'c [Candidate],
+    chances: &Chances,
+    may: impl Fn(&Candidate) -> bool,
+) -> &'c Candidate {
+    let probability = |c: &Candidate| -> f64 {
+        let of = |key: &String| chances.effects.get(key).copied().unwrap_or(0.0);
+        c.0.iter().map(of).fold(1.0, f64::min)
+    };
+    (all.iter())
+        .filter(|c| c.0.len() == best.0.len() && c.1 > best.1 - Thresholds::RIVALS && may(c))
+        .fold(best, |a, b| match probability(b) > probability(a) {
+            true => b,
+            false => a,
+        })
 }
 
 /// A set that is named, with single effects that the records cannot tell from it.

@@ -348,6 +348,12 @@ pub(in crate::diagnose) fn what_is_left<'a>(
     if let Some(first) = first.filter(|first| findings.left(&first.keys()).is_none()) {
         findings.add(&first, on_top(&first, terms, origin, few)?);
     }
+    // A function may speak for a rival of the best effect.
+    if let Some(rival) = findings.likeliest_single().cloned()
+        && findings.left(&rival.keys()).is_none()
+    {
+        findings.add(&rival, on_top(&rival, terms, origin, few)?);
+    }
     findings.is_partial = settings.ends(stage.tick())?;
     Ok(findings)
 }

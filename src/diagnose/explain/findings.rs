@@ -142,6 +142,16 @@ impl<'a> Findings<'a> {
         self.listed.first().map_or(0.0, |f| f.gain)
     }
 
+    /// The most probable of the best single effect and those within 3 nats of it.
+    pub fn likeliest_single(&self) -> Option<&Found<'a>> {
+        let effects = self.chances().effects;
+        let probability =
+            |found: &Found<'_>| effects.get(&found.last().key()).copied().unwrap_or(0.0);
+        (self.listed.iter())
+            .filter(|found| found.gain > self.top() - Thresholds::RIVALS)
+            .max_by(|a, b| probability(a).total_cmp(&probability(b)))
+    }
+
     /// Returns whether a pair explains more than any single effect, its price paid.
     pub fn wins(&self, pair: &Found<'_>) -> bool {
         pair.gain - self.price(2) > self.top()
@@ -218,12 +228,12 @@ impl<'a> Findings<'a> {
         })
     }
 
-    /// Returns whether a listed effect at the place of an unknown function explains nearly as much: the function is that effect in another
+    /// The best listed effect at the place of an unknown function, if it explains nearly as much: the function is that effect in another
     /// form.
-    fn holds_listed(&self, unknown: &Found<'_>) -> bool {
+    fn held_by(&self, unknown: &Found<'_>) -> Option<&Found<'a>> {
         let least = (1.0 - Thresholds::OUTDONE) * unknown.gain;
-        (self.listed.iter())
-            .any(|f| f.gain > least && f.last().places().contains(&unknown.last().target.as_str()))
+        let place = unknown.last().target.as_str();
+        (self.listed.iter()).find(|f| f.gain > least && f.last().places().contains(&place))
     }
 
     /// log of the evidence of nothing missing, whatever the noise, over that of the twin.
@@ -263,9 +273,9 @@ impl<'a> Findings<'a> {
         for found in self.rivals() {
             all.push(Weighed {
                 log_weight: every.ln() + found.gain,
-                kind: match self.holds_listed(found) {
-                    true => Kind::Partial(1, 0.0),
-                    false => Kind::Unknown,
+                kind: match self.held_by(found) {
+                    Some(effect) => Kind::Rest(effect.keys()),
+                    None => Kind::Unknown,
                 },
                 places: places(&found.terms),
             });
@@ -310,6 +320,12 @@ impl<'a> Findings<'a> {
             }
             match hypothesis.kind {
                 Kind::Unknown => kinds.unknown += p,
+                Kind::Rest(keys) => {
+                    kinds.partial += p;
+                    for key in keys {
+                        *chances.effects.entry(key).or_default() += p;
+                    }
+                }
                 Kind::Partial(count, by_effects) => {
                     kinds.partial += p;
                     let of_count = beside.entry(count).or_default();
@@ -363,6 +379,8 @@ enum Kind {
     Listed(Vec<String>),
     /// So many listed effects beside something unknown, and the share of the evidence that is theirs.
     Partial(usize, f64),
+    /// A listed effect in another form.
+    Rest(Vec<String>),
     /// Something unknown alone.
     Unknown,
 }

@@ -174,20 +174,13 @@ fn equations(twin: &Twin, theta: &[f64], scales: &Scales<'_>) -> Option<Vec<f64>
 
 #[cfg(test)]
 mod tests {
-    use crate::diagnose::DiagnoseSettings;
-    use crate::diagnose::base::Base;
-    use crate::diagnose::fixture::{biased_record, tanks};
-    use crate::likelihood::measured;
+    use crate::diagnose::fixture::{biased_record, listed_terms, tanks};
 
     /// The pump feeds the upper tank alone: what biases it is a constant inflow there, what scales it is not.
     #[test]
     fn a_bias_of_the_only_pump_is_a_constant_inflow() {
         let study = tanks(60);
-        let records = [biased_record(&study, 0.0, 5)];
-        let settings = DiagnoseSettings::default();
-        let measured = measured(study.twin(), &records, &study.beliefs()).unwrap();
-        let base = Base::new(&measured, &records, &settings).unwrap();
-        let terms = base.listed(&study, &settings).unwrap();
+        let terms = listed_terms(&study, &[biased_record(&study, 0.0, 5)]);
         let merged: Vec<Vec<String>> = (terms.iter())
             .filter(|term| !term.also.is_empty())
             .map(|term| term.keys())

@@ -366,20 +366,15 @@ fn product(lists: &[Vec<f64>]) -> Vec<Vec<f64>> {
 
 #[cfg(test)]
 mod tests {
-    use crate::diagnose::DiagnoseSettings;
-    use crate::diagnose::base::Base;
-    use crate::diagnose::fixture::{biased_record, tanks};
-    use crate::likelihood::measured;
+    use crate::diagnose::fixture::{biased_record, listed_terms, tanks};
+    use crate::fit::axis::EvidencePrior;
 
     /// A dead zone or a play may swallow every command, a lag may be long: a narrower search would hide the law that is missing.
     #[test]
     fn widths_and_lags_are_looked_for_all_over_the_record() {
         let study = tanks(60);
         let records = [biased_record(&study, 0.0, 5)];
-        let settings = DiagnoseSettings::default();
-        let measured = measured(study.twin(), &records, &study.beliefs()).unwrap();
-        let base = Base::new(&measured, &records, &settings).unwrap();
-        let terms = base.listed(&study, &settings).unwrap();
+        let terms = listed_terms(&study, &records);
         let inputs = records[0].drive().inputs();
         let largest = inputs.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
         for id in ["actuator-dead-zone", "actuator-backlash"] {
@@ -392,5 +387,28 @@ mod tests {
         let longest = lag.starts.iter().map(|start| start.m[0]);
         let duration = 4.0 * 60.0;
         assert!(longest.fold(0.0, f64::max) > duration / 16.0);
+    }
+
+    /// Levels of tanks that are never empty have positive ends: their priors must be in the coordinate of the fit all the same.
+    #[test]
+    fn uniform_priors_are_in_the_coordinate_of_the_fit() {
+        let study = tanks(60);
+        let terms = listed_terms(&study, &[biased_record(&study, 5.0, 5)]);
+        let mut levels = 0;
+        for (term, axis) in terms
+            .iter()
+            .flat_map(|t| t.axes.iter().map(move |a| (t, a)))
+        {
+            if let EvidencePrior::Uniform { low, high } = axis.evidence {
+                let centre = if axis.is_log {
+                    axis.centre.ln()
+                } else {
+                    axis.centre
+                };
+                assert!((low..=high).contains(&centre), "{}: {axis:?}", term.key());
+                levels += usize::from(!axis.is_log && low > 0.0);
+            }
+        }
+        assert!(levels > 0);
     }
 }

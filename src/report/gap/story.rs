@@ -98,7 +98,10 @@ fn how_sure(diagnosis: &Diagnosis) -> Option<String> {
     let cause = &diagnosis.cause;
     let kinds = &cause.probabilities;
     if diagnosis.verdict == Verdict::NoGap {
-        return Some(format!("Probability: {}.", chance(kinds.nothing)));
+        return Some(format!(
+            "Probability of this answer: {}.",
+            chance(kinds.nothing)
+        ));
     }
     let p = match cause.decision {
         Decision::Named | Decision::Partial if naming(cause).is_complete => (cause.effects.iter())
@@ -106,10 +109,11 @@ fn how_sure(diagnosis: &Diagnosis) -> Option<String> {
             .map(|effect| effect.probability)
             .fold(1.0, f64::min),
         Decision::Class => kinds.listed,
-        Decision::NoneOfThese => kinds.unknown,
+        // Something unknown, alone or beside a listed effect.
+        Decision::NoneOfThese => kinds.unknown + kinds.partial,
         _ => return None,
     };
-    Some(format!("Probability: {}.", chance(p)))
+    Some(format!("Probability of this answer: {}.", chance(p)))
 }
 
 /// The share of the gap that closes.
