@@ -99,7 +99,7 @@ fn how_sure(diagnosis: &Diagnosis) -> Option<String> {
     let kinds = &cause.probabilities;
     if diagnosis.verdict == Verdict::NoGap {
         return Some(format!(
-            "Probability of this answer: {}.",
+            "Probability: {}.",
             chance(kinds.nothing)
         ));
     }
@@ -113,7 +113,7 @@ fn how_sure(diagnosis: &Diagnosis) -> Option<String> {
         Decision::NoneOfThese => kinds.unknown + kinds.partial,
         _ => return None,
     };
-    Some(format!("Probability of this answer: {}.", chance(p)))
+    Some(format!("Probability: {}.", chance(p)))
 }
 
 /// The share of the gap that closes.
