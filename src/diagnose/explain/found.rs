@@ -24,7 +24,7 @@ impl<'a> Found<'a> {
         }
     }
 
-    /// The same beside another twin, of this log Z instead of `old`.
+    /// Evidence over another twin, of this log Z instead of `old`.
     pub fn beside(self, old: f64, origin: f64) -> Self {
         Self {
             gain: self.gain + old - origin,

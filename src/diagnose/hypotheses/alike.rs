@@ -4,11 +4,10 @@
 //! the size is unknown are compared: a record tells times and shapes by itself.
 
 use super::listed::Library;
-use super::scales::Scales;
 use super::term::{Nature, Part, Term, with_terms};
 use crate::diagnose::error::DiagnoseError;
 use crate::effect::{EffectKey, TargetKind};
-use crate::twin::{Acting, Twin};
+use crate::twin::Twin;
 
 /// Moments of each record at which equations are compared: many more than a law that is not the same could agree at by chance.
 const MOMENTS: usize = 48;
@@ -70,7 +69,7 @@ struct Additions {
 }
 
 impl Additions {
-    /// `None` for terms with more to find than a size, and for those that add nothing here.
+    /// What a term adds; `None` where more than its size is to be found, or where it adds nothing here.
     fn of(term: &Term, library: &Library<'_>) -> Result<Option<Self>, DiagnoseError> {
         let is_effect = term.nature == Nature::Listed && !term.is_noise();
         let [axis] = &term.axes[..] else {
@@ -128,8 +127,8 @@ fn is_multiple(own: &[f64], multiple: f64, other: &[f64]) -> bool {
 fn along(term: &Term, size: f64, library: &Library<'_>) -> Result<Vec<f64>, DiagnoseError> {
     let twin = with_terms(library.twin, std::iter::once(term))?;
     let theta = [library.theta, &[size]].concat();
-    let own = equations(library.twin, library.theta, library.scales);
-    let grown = equations(&twin, &theta, library.scales);
+    let at = |twin: &Twin, theta: &[f64]| library.scales.equations_at(twin, theta, MOMENTS);
+    let (own, grown) = (at(library.twin, library.theta), at(&twin, &theta));
     Ok(match own.zip(grown) {
         Some((own, grown)) => grown
             .iter()
@@ -138,38 +137,6 @@ fn along(term: &Term, size: f64, library: &Library<'_>) -> Result<Vec<f64>, Diag
             .collect(),
         None => vec![],
     })
-}
-
-/// Rates and outputs of a twin, each in units of its own, at moments of all records.
-fn equations(twin: &Twin, theta: &[f64], scales: &Scales<'_>) -> Option<Vec<f64>> {
-    let twin = twin.equations()?;
-    let outline = twin.outline();
-    let (mut rates, mut outputs) = (
-        vec![0.0; scales.rates.len()],
-        vec![0.0; outline.outputs.len()],
-    );
-    if outline.states.len() != rates.len() {
-        return None;
-    }
-    let sizes: Vec<f64> = (0..outputs.len())
-        .map(|j| scales.size(TargetKind::Sensor, j))
-        .collect();
-    let units: Vec<f64> = (scales.rates.iter().chain(&sizes))
-        .map(|unit| if *unit > 0.0 { *unit } else { 1.0 })
-        .collect();
-    let mut all = vec![];
-    for (record, states) in scales.records.iter().zip(&scales.states) {
-        let acting = Acting::of(twin, theta, record.drive()).ok()?;
-        let count = MOMENTS.min(record.samples());
-        for k in (0..count).map(|m| m * record.samples() / count) {
-            let (now, x) = (acting.at(k, theta), states.row(k).to_vec());
-            twin.drift(&now, &x, &mut rates);
-            twin.observe(&now, &x, &mut outputs);
-            let values = rates.iter().chain(&outputs).zip(&units);
-            all.extend(values.map(|(value, unit)| value / unit));
-        }
-    }
-    Some(all)
 }
 
 #[cfg(test)]

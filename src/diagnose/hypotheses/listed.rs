@@ -6,15 +6,11 @@ use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::thresholds::Thresholds;
 use crate::effect::{Effect, Law, Magnitude, Mark, TargetKind, on_levels, targets};
 use crate::fit::axis::{Axis, EvidencePrior};
-use crate::fit::magnitude::{LONGEST, largest, levels, size_axis, uniform_axis};
+use crate::fit::magnitude::{LONGEST, largest, level_axis, levels, size_axis, uniform_axis};
 use crate::math::ends;
 use crate::twin::{Interval, Parameter, Twin};
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
-
-/// Longest step of a fit to a level, in ranges of the values. A step that is cut is cut for θ, too: with 0.15, fits with a ceiling of real
-/// tanks ended 50 nats short.
-const LONGEST_TO_LEVEL: f64 = 0.5;
 
 /// Twin and record that effects are looked for in.
 pub(in crate::diagnose) struct Library<'a> {
@@ -227,9 +223,14 @@ impl Library<'_> {
         }
         if m.is_threshold() {
             let upper = m.off.is_some_and(|off| off > 0.0);
-            let (grid, axis) = linear(low, low + span, levels(values, upper));
-            let longest = LONGEST_TO_LEVEL * span;
-            return (grid, Axis { longest, ..axis });
+            let range = (low, low + span);
+            let mut parameter = parameter.clone();
+            parameter.bounds = Interval::unchecked(range.0, range.1);
+            let axis = Axis {
+                counts: false,
+                ..level_axis(&parameter, range)
+            };
+            return (levels(values, upper), axis);
         }
         match (m.unit, m.off) {
             ("s", Some(_)) if register.is_some() => {

@@ -71,6 +71,37 @@ impl<'a> Scales<'a> {
         if size > 0.0 { size } else { 1.0 }
     }
 
+    /// Rates and outputs of the twin, or of one with more terms but no more states, each in units of the record, at so many moments of each
+    /// record.
+    pub fn equations_at(&self, twin: &Twin, theta: &[f64], moments: usize) -> Option<Vec<f64>> {
+        let twin = twin.equations()?;
+        let outline = twin.outline();
+        let mut rates = vec![0.0; self.rates.len()];
+        let mut outputs = vec![0.0; outline.outputs.len()];
+        if outline.states.len() != rates.len() {
+            return None;
+        }
+        let sizes: Vec<f64> = (0..outputs.len())
+            .map(|j| self.size(TargetKind::Sensor, j))
+            .collect();
+        let units: Vec<f64> = (self.rates.iter().chain(&sizes))
+            .map(|unit| if *unit > 0.0 { *unit } else { 1.0 })
+            .collect();
+        let mut all = vec![];
+        for (record, states) in self.records.iter().zip(&self.states) {
+            let acting = Acting::of(twin, theta, record.drive()).ok()?;
+            let count = moments.min(record.samples());
+            for k in (0..count).map(|m| m * record.samples() / count) {
+                let (now, x) = (acting.at(k, theta), states.row(k).to_vec());
+                twin.drift(&now, &x, &mut rates);
+                twin.observe(&now, &x, &mut outputs);
+                let values = rates.iter().chain(&outputs).zip(&units);
+                all.extend(values.map(|(value, unit)| value / unit));
+            }
+        }
+        Some(all)
+    }
+
     /// Step in seconds; the median one where steps vary.
     pub fn dt(&self) -> f64 {
         self.records[0].drive().dt()

@@ -98,10 +98,7 @@ fn how_sure(diagnosis: &Diagnosis) -> Option<String> {
     let cause = &diagnosis.cause;
     let kinds = &cause.probabilities;
     if diagnosis.verdict == Verdict::NoGap {
-        return Some(format!(
-            "Probability: {}.",
-            chance(kinds.nothing)
-        ));
+        return Some(format!("Probability: {}.", chance(kinds.nothing)));
     }
     let p = match cause.decision {
         Decision::Named | Decision::Partial if naming(cause).is_complete => (cause.effects.iter())
