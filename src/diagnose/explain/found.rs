@@ -32,7 +32,7 @@ impl<'a> Found<'a> {
         }
     }
 
-    /// What is known of it without its fit, which belongs to its twin.
+    /// Terms and evidence without the fit, which belongs to its twin.
     pub fn promised<'b>(&self) -> Found<'b> {
         Found {
             terms: self.terms.clone(),

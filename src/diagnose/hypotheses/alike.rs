@@ -60,7 +60,7 @@ fn rank(term: &Term) -> usize {
     }
 }
 
-/// What a term of one unknown size adds to rates and outputs along the records.
+/// Changes of rates and outputs along the records by a term of one unknown size.
 struct Additions {
     term: Term,
     /// A small size, and the largest on the same side.
@@ -69,7 +69,7 @@ struct Additions {
 }
 
 impl Additions {
-    /// What a term adds; `None` where more than its size is to be found, or where it adds nothing here.
+    /// Additions of a term; `None` where more than its size is to be found, or where it adds nothing here.
     fn of(term: &Term, library: &Library<'_>) -> Result<Option<Self>, DiagnoseError> {
         let is_effect = term.nature == Nature::Listed && !term.is_noise();
         let [axis] = &term.axes[..] else {

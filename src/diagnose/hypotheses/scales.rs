@@ -25,7 +25,7 @@ impl<'a> Scales<'a> {
         states: Vec<Signal>,
         outline: Outline,
     ) -> Self {
-        let rates = match twin.equations() {
+        let rates = match shown(twin) {
             Some(equations) => rates(equations, theta, records, &states),
             None => vec![],
         };
@@ -74,7 +74,7 @@ impl<'a> Scales<'a> {
     /// Rates and outputs of the twin, or of one with more terms but no more states, each in units of the record, at so many moments of each
     /// record.
     pub fn equations_at(&self, twin: &Twin, theta: &[f64], moments: usize) -> Option<Vec<f64>> {
-        let twin = twin.equations()?;
+        let twin = shown(twin)?;
         let outline = twin.outline();
         let mut rates = vec![0.0; self.rates.len()];
         let mut outputs = vec![0.0; outline.outputs.len()];
@@ -112,6 +112,11 @@ impl<'a> Scales<'a> {
         let ends = self.records.iter().map(|r| r.drive().time(r.samples() - 1));
         ends.fold(0.0, f64::max)
     }
+}
+
+/// Equations, where the twin shows them.
+fn shown(twin: &Twin) -> Option<&dyn StateSpace> {
+    twin.equations()
 }
 
 /// Root mean square of the rates along states.
