@@ -309,10 +309,8 @@ fn located(
         .flat_map(|m| &m.terms)
         .map(|term| term.target.as_str())
         .collect();
-    // The most probable place of what is accepted.
-    let is_accepted =
-        |t: &&TargetShare| accepted.is_empty() || accepted.contains(&t.target.as_str());
-    let target = (targets.iter().find(is_accepted)).map(|t| t.target.clone());
+    let most = targets.first().map(|t| t.target.as_str());
+    let target = (accepted.first().copied().or(most)).map(str::to_owned);
     let several = accepted.iter().any(|place| *place != accepted[0]);
     let class = match &target {
         Some(target) if !several => TargetShare::alike(&targets, target),
