@@ -158,6 +158,8 @@ class Effect:
         Evidence for it over the twin without effects, in nats; 3 nats are odds of 20 to 1.
     magnitudes : dict of str to float or None
         Fitted magnitudes.
+    also : tuple of str
+        Other effects that do the same in this twin, as ``id@target``; they share the probability.
     """
 
     id: str
@@ -165,6 +167,7 @@ class Effect:
     probability: float
     log_evidence: float | None
     magnitudes: Mapping[str, float | None]
+    also: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         return f"{self.id}@{self.target}"
@@ -225,7 +228,10 @@ class Diagnosis(Result):
             accepted=tuple(which["accepted"]),
             rivals=tuple(which["class"]),
             effects=tuple(
-                Effect(e["id"], e["target"], e["probability"], e["log_evidence"], e["magnitudes"]) for e in which["effects"]
+                Effect(
+                    e["id"], e["target"], e["probability"], e["log_evidence"], e["magnitudes"], tuple(e["also"])
+                )
+                for e in which["effects"]
             ),
             places={place["target"]: place["probability"] for place in where["targets"]},
             log_evidence=raw["detection"]["log_evidence"],
