@@ -26,11 +26,7 @@ pub(in crate::diagnose) fn effects(
     let mut all: Vec<EffectFit> = (findings.listed.iter())
         .filter_map(|found| {
             let model = found.model.as_ref()?;
-            let probability = chances
-                .effects
-                .get(&found.last().key())
-                .copied()
-                .unwrap_or(0.0);
+            let probability = chances.effect(&found.last().key());
             Some(fit_of(model, found.last(), probability, found.gain))
         })
         .collect();
@@ -41,7 +37,7 @@ pub(in crate::diagnose) fn effects(
         let gain = findings.gain(&conclusion.accepted).unwrap_or(0.0);
         let mut first: Vec<EffectFit> = (model.terms.iter())
             .map(|term| {
-                let probability = chances.effects.get(&term.key()).copied().unwrap_or(0.0);
+                let probability = chances.effect(&term.key());
                 fit_of(model, term, probability, gain)
             })
             .collect();

@@ -119,8 +119,8 @@ fn likeliest<'c>(
     may: impl Fn(&Candidate) -> bool,
 ) -> &'c Candidate {
     let probability = |c: &Candidate| -> f64 {
-        let of = |key: &String| chances.effects.get(key).copied().unwrap_or(0.0);
-        c.0.iter().map(of).fold(1.0, f64::min)
+        let each = c.0.iter().map(|key| chances.effect(key));
+        each.fold(1.0, f64::min)
     };
     (all.iter())
         .filter(|c| c.0.len() == best.0.len() && c.1 > best.1 - Thresholds::RIVALS && may(c))
@@ -149,12 +149,8 @@ fn named(
         }
     }
     // No name is worth saying that is, with all its rivals, less probable than not.
-    let together: f64 = class
-        .iter()
-        .filter_map(|key| chances.effects.get(key))
-        .sum();
-    let alone = |key: &String| chances.effects.get(key).copied().unwrap_or(0.0);
-    let refuted = keys.iter().any(|key| alone(key) < Thresholds::REFUTED);
+    let together: f64 = class.iter().map(|key| chances.effect(key)).sum();
+    let refuted = (keys.iter()).any(|key| chances.effect(key) < Thresholds::REFUTED);
     if refuted || together < keys.len() as f64 - 1.0 + Thresholds::SAID {
         return Conclusion::none_of_these();
     }

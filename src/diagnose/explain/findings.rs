@@ -54,6 +54,13 @@ pub(in crate::diagnose) struct Chances {
     pub log_evidence: f64,
 }
 
+impl Chances {
+    /// Probability of an effect; 0 for one that was not weighed.
+    pub fn effect(&self, key: &str) -> f64 {
+        self.effects.get(key).copied().unwrap_or(0.0)
+    }
+}
+
 impl<'a> Findings<'a> {
     /// Notes what unknown functions add on top of a set; returns whether they add nothing of weight.
     pub fn add(&mut self, found: &Found<'a>, on_top: Option<Vec<Found<'a>>>) -> bool {
@@ -144,9 +151,8 @@ impl<'a> Findings<'a> {
 
     /// The most probable of the best single effect and those within 3 nats of it.
     pub fn likeliest_single(&self) -> Option<&Found<'a>> {
-        let effects = self.chances().effects;
-        let probability =
-            |found: &Found<'_>| effects.get(&found.last().key()).copied().unwrap_or(0.0);
+        let chances = self.chances();
+        let probability = |found: &Found<'_>| chances.effect(&found.last().key());
         (self.listed.iter())
             .filter(|found| found.gain > self.top() - Thresholds::RIVALS)
             .max_by(|a, b| probability(a).total_cmp(&probability(b)))

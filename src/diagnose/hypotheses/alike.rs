@@ -7,7 +7,6 @@ use super::listed::Library;
 use super::term::{Nature, Part, Term, with_terms};
 use crate::diagnose::error::DiagnoseError;
 use crate::effect::{EffectKey, TargetKind};
-use crate::twin::Twin;
 
 /// Moments of each record at which equations are compared: many more than a law that is not the same could agree at by chance.
 const MOMENTS: usize = 48;
@@ -17,18 +16,23 @@ const SAME: f64 = 1e-6;
 /// Merges terms that add the same to the equations, at small sizes and at the largest. The first by place (state, actuator, sensor,
 /// parameter), then by name, stands for the others. A black box shows no equations, and keeps all.
 pub(super) fn merged(terms: Vec<Term>, library: &Library<'_>) -> Result<Vec<Term>, DiagnoseError> {
-    let mut heads: Vec<(usize, Additions)> = vec![];
+    let (twin, theta) = (library.twin, library.theta);
+    let Some(own) = library.scales.equations_at(twin, theta, MOMENTS) else {
+        return Ok(terms);
+    };
+    let beside = Beside { library, own };
+    let mut heads: Vec<(usize, Additions<'_>)> = vec![];
     let mut names: Vec<Vec<EffectKey>> = vec![vec![]; terms.len()];
     let mut order: Vec<usize> = (0..terms.len()).collect();
     order.sort_by_key(|&i| (rank(&terms[i]), terms[i].key()));
     let mut is_merged = vec![false; terms.len()];
     for i in order {
-        let Some(own) = Additions::of(&terms[i], library)? else {
+        let Some(own) = Additions::of(&terms[i], &beside)? else {
             continue;
         };
         let mut head = None;
         for (j, other) in &heads {
-            if own.are_alike(other, library)? {
+            if own.are_alike(other, &beside)? {
                 head = Some(*j);
                 break;
             }
@@ -61,16 +65,16 @@ fn rank(term: &Term) -> usize {
 }
 
 /// Changes of rates and outputs along the records by a term of one unknown size.
-struct Additions {
-    term: Term,
+struct Additions<'t> {
+    term: &'t Term,
     /// A small size, and the largest on the same side.
     sizes: [f64; 2],
     small: Vec<f64>,
 }
 
-impl Additions {
+impl<'t> Additions<'t> {
     /// Additions of a term; `None` where more than its size is to be found, or where it adds nothing here.
-    fn of(term: &Term, library: &Library<'_>) -> Result<Option<Self>, DiagnoseError> {
+    fn of(term: &'t Term, beside: &Beside<'_>) -> Result<Option<Self>, DiagnoseError> {
         let is_effect = term.nature == Nature::Listed && !term.is_noise();
         let [axis] = &term.axes[..] else {
             return Ok(None);
@@ -78,20 +82,20 @@ impl Additions {
         let Some((small, largest)) = axis.small_size().zip(axis.largest_size()) else {
             return Ok(None);
         };
-        if !is_effect || term.shape().is_some() || !library.scales.has_equations() {
+        if !is_effect || term.shape().is_some() {
             return Ok(None);
         }
-        let additions = along(term, small, library)?;
+        let additions = beside.added(term, small)?;
         let moves = additions.iter().any(|v| *v != 0.0) && additions.iter().all(|v| v.is_finite());
-        Ok(moves.then(|| Self {
-            term: term.clone(),
+        Ok(moves.then_some(Self {
+            term,
             sizes: [small, largest],
             small: additions,
         }))
     }
 
     /// Returns whether some multiple of another term adds the same, small or large.
-    fn are_alike(&self, other: &Self, library: &Library<'_>) -> Result<bool, DiagnoseError> {
+    fn are_alike(&self, other: &Self, beside: &Beside<'_>) -> Result<bool, DiagnoseError> {
         // A friction is no force that may as well push.
         if self.term.axes[0].is_one_sided() != other.term.axes[0].is_one_sided() {
             return Ok(false);
@@ -106,8 +110,8 @@ impl Additions {
         if !other.term.axes[0].bounds.contains(there) {
             return Ok(false);
         }
-        let own = along(&self.term, largest, library)?;
-        Ok(is_multiple(&own, 1.0, &along(&other.term, there, library)?))
+        let own = beside.added(self.term, largest)?;
+        Ok(is_multiple(&own, 1.0, &beside.added(other.term, there)?))
     }
 }
 
@@ -120,23 +124,35 @@ fn is_multiple(own: &[f64], multiple: f64, other: &[f64]) -> bool {
     let rest: f64 = (own.iter().zip(other))
         .map(|(own, other)| (own - multiple * other).powi(2))
         .sum();
-    rest <= SAME * dot(own, own)
+    own.len() == other.len() && rest <= SAME * dot(own, own)
 }
 
-/// Changes of rates and outputs by a term of this size; empty where it adds states.
-fn along(term: &Term, size: f64, library: &Library<'_>) -> Result<Vec<f64>, DiagnoseError> {
-    let twin = with_terms(library.twin, std::iter::once(term))?;
-    let theta = [library.theta, &[size]].concat();
-    let at = |twin: &Twin, theta: &[f64]| library.scales.equations_at(twin, theta, MOMENTS);
-    let (own, grown) = (at(library.twin, library.theta), at(&twin, &theta));
-    Ok(match own.zip(grown) {
-        Some((own, grown)) => grown
+/// A fitted twin, and its own equations along the records.
+struct Beside<'l> {
+    library: &'l Library<'l>,
+    own: Vec<f64>,
+}
+
+impl Beside<'_> {
+    /// Changes of rates and outputs by a term of this size; empty where it adds states.
+    fn added(&self, term: &Term, size: f64) -> Result<Vec<f64>, DiagnoseError> {
+        let Library {
+            twin,
+            theta,
+            scales,
+            ..
+        } = self.library;
+        let twin = with_terms(twin, std::iter::once(term))?;
+        let theta = [*theta, &[size]].concat();
+        let grown = (scales.equations_at(&twin, &theta, MOMENTS))
+            .filter(|grown| grown.len() == self.own.len())
+            .unwrap_or_default();
+        Ok(grown
             .iter()
-            .zip(&own)
+            .zip(&self.own)
             .map(|(there, own)| there - own)
-            .collect(),
-        None => vec![],
-    })
+            .collect())
+    }
 }
 
 #[cfg(test)]

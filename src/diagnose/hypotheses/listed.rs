@@ -185,8 +185,7 @@ impl Library<'_> {
             if s > 0.0 { s } else { 1.0 }
         };
         let logarithmic = |low: f64, high: f64, grid: Vec<f64>| {
-            let mut parameter = parameter.clone();
-            parameter.bounds = Interval::unchecked(low, high);
+            let parameter = within(parameter, low, high);
             let axis = Axis {
                 counts: false,
                 longest: 0.7,
@@ -196,8 +195,7 @@ impl Library<'_> {
             (grid.into_iter().map(|v| v.clamp(low, high)).collect(), axis)
         };
         let linear = |low: f64, high: f64, grid: Vec<f64>| {
-            let mut parameter = parameter.clone();
-            parameter.bounds = Interval::unchecked(low, high);
+            let parameter = within(parameter, low, high);
             let axis = Axis {
                 counts: false,
                 ..uniform_axis(&parameter, (low, high), false)
@@ -223,12 +221,10 @@ impl Library<'_> {
         }
         if m.is_threshold() {
             let upper = m.off.is_some_and(|off| off > 0.0);
-            let range = (low, low + span);
-            let mut parameter = parameter.clone();
-            parameter.bounds = Interval::unchecked(range.0, range.1);
+            let parameter = within(parameter, low, low + span);
             let axis = Axis {
                 counts: false,
-                ..level_axis(&parameter, range)
+                ..level_axis(&parameter, (low, low + span))
             };
             return (levels(values, upper), axis);
         }
@@ -343,8 +339,7 @@ impl Library<'_> {
     /// Frequencies to try, and their axis: uniform up to half the sampling rate.
     pub fn frequency(&self, parameter: &Parameter) -> (Vec<f64>, Axis) {
         let (low, high) = (0.7 / self.scales.duration(), 0.5 / self.scales.dt());
-        let mut parameter = parameter.clone();
-        parameter.bounds = Interval::unchecked(low, high);
+        let parameter = within(parameter, low, high);
         let axis = Axis {
             counts: false,
             // A search must stay at its peak of the spectrum.
@@ -354,6 +349,13 @@ impl Library<'_> {
         };
         (self.frequencies.to_vec(), axis)
     }
+}
+
+/// A magnitude whose bounds are what the record can show, not the user's.
+fn within(parameter: &Parameter, low: f64, high: f64) -> Parameter {
+    let mut parameter = parameter.clone();
+    parameter.bounds = Interval::unchecked(low, high);
+    parameter
 }
 
 /// Every combination of one value of each list.

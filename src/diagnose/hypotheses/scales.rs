@@ -3,7 +3,7 @@
 use crate::effect::TargetKind;
 use crate::math::deviation;
 use crate::record::{Record, Signal};
-use crate::twin::{Acting, Outline, StateSpace, Twin};
+use crate::twin::{Acting, Outline, Twin};
 
 /// Records, the states that the twin has along them, and how fast these move.
 pub(in crate::diagnose) struct Scales<'a> {
@@ -25,10 +25,7 @@ impl<'a> Scales<'a> {
         states: Vec<Signal>,
         outline: Outline,
     ) -> Self {
-        let rates = match shown(twin) {
-            Some(equations) => rates(equations, theta, records, &states),
-            None => vec![],
-        };
+        let rates = rates(twin, theta, records, &states).unwrap_or_default();
         Self {
             records,
             states,
@@ -74,31 +71,19 @@ impl<'a> Scales<'a> {
     /// Rates and outputs of the twin, or of one with more terms but no more states, each in units of the record, at so many moments of each
     /// record.
     pub fn equations_at(&self, twin: &Twin, theta: &[f64], moments: usize) -> Option<Vec<f64>> {
-        let twin = shown(twin)?;
-        let outline = twin.outline();
-        let mut rates = vec![0.0; self.rates.len()];
-        let mut outputs = vec![0.0; outline.outputs.len()];
-        if outline.states.len() != rates.len() {
+        if twin.outline()?.states.len() != self.rates.len() {
             return None;
         }
-        let sizes: Vec<f64> = (0..outputs.len())
-            .map(|j| self.size(TargetKind::Sensor, j))
-            .collect();
-        let units: Vec<f64> = (self.rates.iter().chain(&sizes))
-            .map(|unit| if *unit > 0.0 { *unit } else { 1.0 })
+        let sizes = (0..self.outline.outputs.len()).map(|j| self.size(TargetKind::Sensor, j));
+        let units: Vec<f64> = (self.rates.iter().copied().chain(sizes))
+            .map(|unit| if unit > 0.0 { unit } else { 1.0 })
             .collect();
         let mut all = vec![];
-        for (record, states) in self.records.iter().zip(&self.states) {
-            let acting = Acting::of(twin, theta, record.drive()).ok()?;
-            let count = moments.min(record.samples());
-            for k in (0..count).map(|m| m * record.samples() / count) {
-                let (now, x) = (acting.at(k, theta), states.row(k).to_vec());
-                twin.drift(&now, &x, &mut rates);
-                twin.observe(&now, &x, &mut outputs);
-                let values = rates.iter().chain(&outputs).zip(&units);
-                all.extend(values.map(|(value, unit)| value / unit));
-            }
-        }
+        let (records, states) = (self.records, &self.states);
+        each_moment(twin, theta, (records, states), moments, |rates, outputs| {
+            let values = rates.iter().chain(outputs).zip(&units);
+            all.extend(values.map(|(value, unit)| value / unit));
+        })?;
         Some(all)
     }
 
@@ -114,29 +99,44 @@ impl<'a> Scales<'a> {
     }
 }
 
-/// Equations, where the twin shows them.
-fn shown(twin: &Twin) -> Option<&dyn StateSpace> {
-    twin.equations()
+/// Root mean square of the rates along states.
+fn rates(twin: &Twin, theta: &[f64], records: &[Record], states: &[Signal]) -> Option<Vec<f64>> {
+    let mut squares = vec![0.0; twin.outline()?.states.len()];
+    let mut count = 0.0;
+    each_moment(twin, theta, (records, states), usize::MAX, |rates, _| {
+        for (square, rate) in squares.iter_mut().zip(rates) {
+            if rate.is_finite() {
+                *square += rate * rate;
+            }
+        }
+        count += 1.0;
+    })?;
+    Some(squares.iter().map(|s: &f64| (s / count).sqrt()).collect())
 }
 
-/// Root mean square of the rates along states.
-fn rates(twin: &dyn StateSpace, theta: &[f64], records: &[Record], states: &[Signal]) -> Vec<f64> {
-    let n = twin.outline().states.len();
-    let (mut squares, mut count) = (vec![0.0; n], 0.0);
+/// Hands on rates and outputs at so many moments of each record, or at every row. A record whose inputs the twin cannot follow is left out.
+fn each_moment(
+    twin: &Twin,
+    theta: &[f64],
+    (records, states): (&[Record], &[Signal]),
+    moments: usize,
+    mut then: impl FnMut(&[f64], &[f64]),
+) -> Option<()> {
+    let twin = twin.equations()?;
+    let outline = twin.outline();
+    let mut rates = vec![0.0; outline.states.len()];
+    let mut outputs = vec![0.0; outline.outputs.len()];
     for (record, states) in records.iter().zip(states) {
         let Ok(acting) = Acting::of(twin, theta, record.drive()) else {
             continue;
         };
-        for k in 0..record.samples() {
-            let mut rate = vec![0.0; n];
-            twin.drift(&acting.at(k, theta), &states.row(k).to_vec(), &mut rate);
-            for (square, rate) in squares.iter_mut().zip(rate) {
-                if rate.is_finite() {
-                    *square += rate * rate;
-                }
-            }
-            count += 1.0;
+        let count = moments.min(record.samples());
+        for k in (0..count).map(|m| m * record.samples() / count) {
+            let (now, x) = (acting.at(k, theta), states.row(k).to_vec());
+            twin.drift(&now, &x, &mut rates);
+            twin.observe(&now, &x, &mut outputs);
+            then(&rates, &outputs);
         }
     }
-    squares.iter().map(|s: &f64| (s / count).sqrt()).collect()
+    Some(())
 }
