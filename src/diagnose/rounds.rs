@@ -2,8 +2,9 @@
 
 use super::base::Base;
 use super::error::DiagnoseError;
+use super::explain::chances::Chances;
 use super::explain::explore::{Before, STEPS, explore, singles, what_is_left};
-use super::explain::findings::{Chances, Findings};
+use super::explain::findings::Findings;
 use super::explain::search::{Breadth, listed};
 use super::explain::terms::Terms;
 use super::hypotheses::noise::kinds;

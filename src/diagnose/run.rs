@@ -2,9 +2,10 @@
 
 use super::base::{left_the_prior, verdict};
 use super::error::DiagnoseError;
+use super::explain::chances::Chances;
 use super::explain::decide::{Conclusion, decide};
 use super::explain::explore::absorbing;
-use super::explain::findings::{Chances, Findings};
+use super::explain::findings::Findings;
 use super::hypotheses::term::Part;
 use super::locate::discover::discover;
 use super::locate::functions::{curve, told};

@@ -1,8 +1,9 @@
 //! Summary of fits for a report.
 
 use super::error::DiagnoseError;
+use super::explain::chances::Chances;
 use super::explain::decide::Conclusion;
-use super::explain::findings::{Chances, Findings};
+use super::explain::findings::Findings;
 use super::explain::found::Found;
 use super::hypotheses::term::{Part, Term};
 use super::model::Model;

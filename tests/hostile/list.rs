@@ -175,11 +175,17 @@ fn likely_mistakes_in_records_are_warned_of() {
 #[test]
 fn numbers_beyond_memory_are_refused() {
     let place = tempfile::tempdir().unwrap();
-    for call in [
-        "withheld --twin tanks --trials 1000000000000 --out a",
-        "reproduce --twin tanks --runs 1000000000000 --out a",
+    for (call, value) in [
+        (
+            "withheld --twin tanks --trials 1000000000000 --out a",
+            "'1000000000000' for '--trials",
+        ),
+        (
+            "reproduce --twin tanks --runs 1000000000000 --out a",
+            "runs = 1e12;",
+        ),
     ] {
-        refused(place.path(), call, &["at most 1000000"]);
+        refused(place.path(), call, &[value, "at most 1000000"]);
     }
     assert!(files(place.path()).is_empty());
 }

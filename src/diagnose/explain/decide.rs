@@ -6,7 +6,8 @@
 //!          probable
 //! ```
 
-use super::findings::{Chances, Findings, leaves_nothing};
+use super::chances::Chances;
+use super::findings::{Findings, leaves_nothing};
 use crate::diagnose::outcome::Decision;
 use crate::diagnose::thresholds::Thresholds;
 
