@@ -88,13 +88,26 @@ fn ratios(clock: &Clock) {
     let score = |of: fn(&Kalman<'_>, &[f64], &Coordinates) -> Result<Score, FilterError>| {
         assert!(black_box(of(&kalman, black_box(&TANKS), &coordinates)).is_ok());
     };
-    let [before, now] = in_turn([&mut || score(Score::forward_one_by_one), &mut || {
-        score(Score::forward)
-    }]);
-    let ratio = before / now;
+    let eight: Vec<Record> = (0..8)
+        .map(|run| simulated(&CascadedTanks, &TANKS, &drive, run))
+        .collect();
+    let kalmans: Vec<Kalman<'_>> = (eight.iter())
+        .map(|record| Kalman::new(&CascadedTanks, record, &settings).expect("it fits"))
+        .collect();
+    let [before, now, of_eight] = in_turn([
+        &mut || score(Score::forward_one_by_one),
+        &mut || score(Score::forward),
+        &mut || {
+            let found = Score::forward_all(&kalmans, black_box(&TANKS), &coordinates);
+            assert!(black_box(found).iter().all(Result::is_ok));
+        },
+    ]);
+    let (ratio, each) = (before / now, of_eight / 8.0);
     println!(
         "filter: ratios, score: {before:.1} µs one by one, {now:.1} µs side by side: {ratio:.2}"
     );
+    let ratio = before / each;
+    println!("filter: ratios, score: {each:.1} µs a record, eight side by side: {ratio:.2}");
     let library = Catalogue::default();
     let listed = |id, target| library.effect(id, target).expect("it is listed");
     for (effect, magnitudes) in [
@@ -106,11 +119,12 @@ fn ratios(clock: &Clock) {
         let twin = augment(Arc::new(CascadedTanks), vec![effect]).expect("it stands there");
         let twin = twin.equations().expect("a twin with equations");
         let theta = [&TANKS[..], magnitudes].concat();
-        let kalman = Kalman::new(twin, &record, &settings).expect("it fits");
-        let [bare, augmented] = in_turn([
-            &mut || drop(black_box(kalman.log_likelihood(black_box(&TANKS)))),
-            &mut || drop(black_box(kalman.log_likelihood(black_box(&theta)))),
-        ]);
+        let grown = Kalman::new(twin, &record, &settings).expect("it fits");
+        let pass = |of: &Kalman<'_>, theta: &[f64]| {
+            assert!(black_box(of.log_likelihood(black_box(theta))).is_ok());
+        };
+        let [bare, augmented] =
+            in_turn([&mut || pass(&kalman, &TANKS), &mut || pass(&grown, &theta)]);
         let ratio = augmented / bare;
         println!(
             "filter: ratios, tanks with {name}: {augmented:.1} µs over {bare:.1} µs: {ratio:.2}"

@@ -14,8 +14,9 @@ use super::thresholds::Thresholds;
 use crate::effect::{TargetKind, targets};
 use crate::fit::axis::Axis;
 use crate::fit::climb::{Fitted, climb, fit};
+use crate::fit::growing::base_fit;
 use crate::fit::problem::Problem;
-use crate::fit::starts::{base_fit, polish, search};
+use crate::fit::starts::search;
 use crate::likelihood::Measured;
 use crate::record::Record;
 use crate::study::Study;
@@ -36,6 +37,8 @@ pub(in crate::diagnose) struct Base<'a> {
     pub frequencies: Vec<f64>,
     /// Places whose noise level is fitted.
     pub noisy: Vec<String>,
+    /// `true` for a black box without noise of its own.
+    pub is_silent: bool,
     /// Kinds of noise that the records asked for.
     pub noises: Vec<Arc<Term>>,
     /// The finer step that the records asked for.
@@ -70,11 +73,7 @@ impl<'a> Base<'a> {
         let starts = Noise::new(0, "diagnose/starts", 0);
         let fitted = if !problem.is_simulated() {
             let initial: Vec<Vec<f64>> = initial.iter().map(|theta| problem.full(theta)).collect();
-            let found = polish(
-                &problem,
-                search(&problem, &initial, starts, ITERATIONS)?,
-                ITERATIONS,
-            )?;
+            let found = search(&problem, &initial, starts, ITERATIONS)?;
             found.into_iter().next().map(|fitted| (problem, fitted))
         } else {
             let problem = Problem::of_twin(twin, records);
@@ -95,7 +94,7 @@ impl<'a> Base<'a> {
             .filter(|parameter| parameter.role == Role::Noise)
             .map(|parameter| place(parameter.target()))
             .collect();
-        Self::of(model, noisy, vec![], None)
+        Self::of(model, (noisy, measured.is_silent), vec![], None)
     }
 
     /// The twin with another kind of noise, fitted; `twin` is that of the model.
@@ -116,7 +115,8 @@ impl<'a> Base<'a> {
             return Ok(None);
         };
         let noises = self.noises.iter().chain(&found.terms).cloned().collect();
-        Base::of(model, self.noisy.clone(), noises, self.step).map(Some)
+        let noisy = (self.noisy.clone(), self.is_silent);
+        Base::of(model, noisy, noises, self.step).map(Some)
     }
 
     /// The twin fitted again from other θ; `None` where that is no better.
@@ -129,7 +129,8 @@ impl<'a> Base<'a> {
         let Some(model) = better else {
             return Ok(None);
         };
-        Self::of(model, self.noisy.clone(), self.noises.clone(), self.step).map(Some)
+        let noisy = (self.noisy.clone(), self.is_silent);
+        Self::of(model, noisy, self.noises.clone(), self.step).map(Some)
     }
 
     /// The twin where its fit inside the prior ends, if its own has left that: what is missing may have driven it out. `None` for a black
@@ -168,7 +169,7 @@ impl<'a> Base<'a> {
 
     fn of(
         model: Model<'a>,
-        noisy: Vec<String>,
+        (noisy, is_silent): (Vec<String>, bool),
         noises: Vec<Arc<Term>>,
         step: Option<FinerStep>,
     ) -> Result<Self, DiagnoseError> {
@@ -178,6 +179,7 @@ impl<'a> Base<'a> {
             scales: Scales::new(model.base, &theta, records, model.states()?, outline),
             frequencies: frequencies(&model)?,
             noisy,
+            is_silent,
             noises,
             theta,
             model,

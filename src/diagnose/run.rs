@@ -163,7 +163,8 @@ fn report(
         }
         _ => {}
     }
-    if !base.scales.has_equations() && !is_nearer(findings.model(&conclusion.accepted), model)? {
+    let is_linearised = !base.scales.has_equations() && !base.is_silent;
+    if is_linearised && !is_nearer(findings.model(&conclusion.accepted), model)? {
         conclusion = Conclusion::none_of_these();
     }
     let finished = finished(findings.model(&conclusion.accepted))?;
@@ -280,8 +281,8 @@ pub(super) fn finished<'a>(
     Ok(finished.or_else(|| Some(model.clone())))
 }
 
-/// Returns whether the free run of a black box's model is nearer to the record than that of the twin. Their likelihood is linearised about
-/// their runs, and says nothing where these are in another phase.
+/// Returns whether the free run of a noisy black box's model is nearer to the record than that of the twin. Their likelihood is linearised
+/// about their runs, and says nothing where these are in another phase.
 fn is_nearer(model: Option<&Model<'_>>, twin: &Model<'_>) -> Result<bool, DiagnoseError> {
     let Some(model) = model else { return Ok(true) };
     let error = |model: &Model<'_>| -> Result<f64, DiagnoseError> {

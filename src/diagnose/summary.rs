@@ -12,7 +12,7 @@ use super::settings::DiagnoseSettings;
 use super::thresholds::Thresholds;
 use crate::fit::Nuisance;
 use crate::fit::follow::starts;
-use crate::fit::spread::Spread;
+use crate::fit::posterior::Spread;
 use crate::likelihood::kalman::recoverable;
 use crate::twin::{PRIOR_DEVIATION, Role};
 use std::sync::Arc;

@@ -13,7 +13,6 @@
 mod ar;
 mod armax;
 mod arx;
-mod centred;
 mod deviation;
 mod regression;
 mod score;
@@ -21,15 +20,14 @@ mod score;
 pub use ar::Ar;
 pub use armax::Armax;
 pub use arx::Arx;
-pub(crate) use centred::Centred;
 pub use deviation::Deviation;
 pub use score::Score;
 
 use crate::likelihood::kalman::FilterError;
 use crate::math::MathError;
-use crate::record::{Drive, Record, RecordError, Signal};
+use crate::record::{Drive, RecordError, Signal};
 use crate::setting::number;
-use crate::twin::{Noise, SimulationError, Twin};
+use crate::twin::{SimulationError, Twin};
 use std::fmt::Debug;
 use std::sync::Arc;
 
@@ -58,16 +56,20 @@ pub trait FeatureMap: Send + Sync {
     /// Features of outputs (N × channels) under `drive`; length [`dim`](Self::dim), all finite.
     fn extract(&self, drive: &Drive, outputs: &Signal) -> Result<Vec<f64>, FeatureError>;
 
-    /// The map centred on one record, for features that are best near a reference and can find it without simulations;
-    /// `None` for all others. `initial` is an estimate at hand, `noise` draws whatever the search needs.
-    #[doc(hidden)]
-    fn centred(
-        &self,
-        _record: &Record,
-        _initial: &[f64],
-        _noise: Noise,
-    ) -> Result<Option<Centred>, FeatureError> {
-        Ok(None)
+    /// Features of several simulations, each as [`extract`](Self::extract) finds them, to the bit; for maps that are faster so.
+    fn extract_all(&self, all: &[(&Drive, &Signal)]) -> Vec<Result<Vec<f64>, FeatureError>> {
+        let each = |(drive, outputs): &(&Drive, &Signal)| self.extract(drive, outputs);
+        all.iter().map(each).collect()
+    }
+
+    /// Number of simulations that [`extract_all`](Self::extract_all) is best given at once.
+    fn at_once(&self) -> usize {
+        1
+    }
+
+    /// The same features about θ, for features that keep most information near a reference; `None` for all others.
+    fn about(&self, _theta: &[f64]) -> Option<Arc<dyn FeatureMap>> {
+        None
     }
 }
 

@@ -2,13 +2,12 @@
 
 use super::climb::Fitted;
 use super::problem::Problem;
+use super::starts::agreeing;
 
 /// Distance from the top that counts as arrived, in standard deviations: what is left to gain is its square's half, 0.02 nats.
 const ARRIVED: f64 = 0.2;
 /// The same where most searches end at one top: dry friction and thresholds make kinks, and at a kink no gradient vanishes.
 const AGREED: f64 = 1.0;
-/// Nats within which two fits have found the same top.
-const SAME: f64 = 0.1;
 
 /// Side of a bound.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -61,13 +60,10 @@ impl Certificate {
         let distance = (matrix.cholesky()).map_or(f64::INFINITY, |f| {
             gradient.dot(&f.solve(&gradient)).max(0.0).sqrt()
         });
-        let agreeing = (fits.iter())
-            .filter(|fit| fit.objective >= best.objective - SAME)
-            .count();
         Some(Self {
             distance,
             at_bound,
-            agreeing,
+            agreeing: agreeing(fits),
             searches: fits.len(),
         })
     }

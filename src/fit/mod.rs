@@ -13,15 +13,13 @@
 //! | `evidence.rs` | the likelihood averaged over the prior |
 //! | `reference.rs` | linear gain of a direction beside θ |
 //! | `doubts.rs` | reasons to doubt a fit |
-//! | `sampler.rs` | draws weighed by a density, and proposals that follow them |
-//! | `posterior.rs`, `draws.rs`, `spread.rs` | draws of θ given the records, as a table, as errors and intervals |
+//! | `posterior/` | draws of θ given the records, as a table, as errors and intervals, as a region |
 //! | `least_squares/` | Gauss–Newton on residuals, on argmin |
 
 pub(crate) mod axis;
 pub(crate) mod certificate;
 pub(crate) mod climb;
 mod doubts;
-mod draws;
 mod effects;
 pub(crate) mod evidence;
 pub(crate) mod follow;
@@ -32,20 +30,18 @@ pub(crate) mod posterior;
 pub(crate) mod problem;
 pub(crate) mod reference;
 mod run;
-mod sampler;
 mod score;
 mod slope;
-pub(crate) mod spread;
 pub(crate) mod starts;
 
 pub use certificate::Side;
-pub use draws::Posterior;
 pub(crate) use effects::magnitude;
 pub(crate) use outcome::NOT_CONVERGED;
 pub use outcome::{
     Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedStart, FittedValue, Nuisance,
     OutputErrors, Warning,
 };
+pub use posterior::Posterior;
 pub(crate) use run::{Subject, run};
 pub use score::FitScore;
 pub(crate) use score::score;

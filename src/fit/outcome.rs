@@ -1,7 +1,7 @@
 //! Result of a fit.
 
 use super::certificate::Side;
-use super::draws::Posterior;
+use super::posterior::{Posterior, Region};
 use crate::record::Signal;
 use serde::Serialize;
 
@@ -61,6 +61,9 @@ pub struct Fit {
     /// Free run beside each record, N × outputs; none where it diverges.
     #[serde(skip)]
     pub free_runs: Vec<Option<Signal>>,
+    /// Where the records put the twin's own parameters.
+    #[serde(skip)]
+    pub(crate) region: Region,
 }
 
 /// A parameter, or a magnitude of an effect.

@@ -199,6 +199,16 @@ impl<'a> Problem<'a> {
             .collect()
     }
 
+    /// The same with noise as it is believed to be.
+    pub(super) fn believed(&self, theta: &[f64]) -> Vec<f64> {
+        (self.axes.iter().zip(theta))
+            .map(|(axis, v)| match axis.begin {
+                Some(_) => axis.bounds.clamp(axis.centre),
+                None => *v,
+            })
+            .collect()
+    }
+
     /// A random point from one of the twin's own parameters: magnitudes in the units of the record, held entries where they are held.
     pub(super) fn drawn(&self, mut theta: Vec<f64>, noise: Noise) -> Vec<f64> {
         for (j, (value, axis)) in theta.iter_mut().zip(&self.axes).enumerate() {

@@ -3,16 +3,14 @@
 use super::certificate::Certificate;
 use super::climb::{Fitted, climb};
 use super::doubts::Doubts;
-use super::draws::table;
 use super::effects::search::{ITERATIONS, Searched, searched};
 use super::evidence::evidence;
 use super::follow::{free_runs, starts};
 use super::outcome::{
     Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedValue, OutputErrors,
 };
-use super::posterior::{Draws, posterior};
+use super::posterior::{Draws, Region, Spread, posterior, table};
 use super::problem::Problem;
-use super::spread::Spread;
 use super::starts::polish;
 use crate::effect::Effect;
 use crate::likelihood::kalman::FilterError;
@@ -67,6 +65,12 @@ pub(crate) fn run(
     let (parameters, noise_levels) = values(&problem, &fitted, &certificate, &levels, &spread);
     let smoothed = problem.smoothed(&fitted.theta)?;
     let free_runs = free_runs(&problem, &fitted.theta, &smoothed);
+    let starts = starts(&problem, &smoothed);
+    let own = subject.twin.parameters().len();
+    let start = |state: &str| {
+        let start = starts.iter().find(|start| start.name == state)?;
+        Some((start.value, start.std_error))
+    };
     let errors = errors(&problem, &fitted.theta, &free_runs)?;
     let mut convergence = Convergence {
         converged: certificate.has_converged(),
@@ -85,7 +89,8 @@ pub(crate) fn run(
     Ok(Some(Fit {
         parameters,
         noise: noise_levels,
-        starts: starts(&problem, &smoothed),
+        region: Region::new(&problem, &fitted, &draws, start, own),
+        starts,
         level: settings.level,
         log_likelihood: fitted.log_likelihood,
         evidence: evidence.map(|e| FitEvidence {

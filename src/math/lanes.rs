@@ -131,6 +131,11 @@ impl Lanes {
 }
 
 impl Mask {
+    #[inline(always)]
+    pub(crate) fn of(lanes: [bool; LANES]) -> Self {
+        Self(lanes.map(|holds| if holds { u64::MAX } else { 0 }))
+    }
+
     /// `yes` in the lanes of the mask, `no` in the others.
     #[inline(always)]
     pub(crate) fn select(self, yes: Lanes, no: Lanes) -> Lanes {
@@ -155,6 +160,14 @@ impl Mask {
     pub(crate) fn and(mut self, other: Self) -> Self {
         for i in 0..LANES {
             self.0[i] &= other.0[i];
+        }
+        self
+    }
+
+    #[inline(always)]
+    pub(crate) fn or(mut self, other: Self) -> Self {
+        for i in 0..LANES {
+            self.0[i] |= other.0[i];
         }
         self
     }

@@ -29,7 +29,7 @@ pub(crate) use convert::{one_column, one_row, to_array, to_matrix, to_vector};
 pub(crate) use difference::Stencil;
 pub use error::MathError;
 pub(crate) use lagged::{Lagged, LaggedSignals};
-pub(crate) use lanes::{LANES, Lanes};
+pub(crate) use lanes::{LANES, Lanes, Mask};
 pub(crate) use least_squares::{Fit, LeastSquares, Regressors};
 pub(crate) use quantile::{median, quantile, rank_p_value};
 pub(crate) use rounding::{six_digits, three_digits};

@@ -1,9 +1,9 @@
 //! One step of any equations; the points of several filters.
 
-use super::integrator::Refined;
+use super::integrator::{Integrator, Refined};
 use super::points::{gather, scatter};
 use super::simulation::simulate_equations;
-use crate::math::Lanes;
+use crate::math::{LANES, Lanes};
 use crate::record::{Drive, Signal};
 use crate::twin::{
     Advance, Interval, LanePoints, Layout, Noise, Now, Points, SimulationError, StateSpace,
@@ -38,8 +38,12 @@ impl<T: StateSpace> Advance for T {
     #[inline]
     fn advance(&self, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
         self.update(now, x);
-        let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| self.drift(now, x, dx);
-        self.integrator().carry(x.len(), now, x, work, drift);
+        // One call of the drift, compiled inline, for what most twins do.
+        if work.refined.is_none() && self.integrator() == Integrator::Euler {
+            let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| self.drift(now, x, dx);
+            return Integrator::Euler.step(now, x, work, drift);
+        }
+        carry(self, now, x, work);
     }
 
     fn run_equations(
@@ -51,7 +55,12 @@ impl<T: StateSpace> Advance for T {
         simulate_equations(self, theta, drive, noise)
     }
 
-    fn advance_lanes(&self, now: &[Now<'_>], points: LanePoints<'_>, work: &mut Workspace) -> bool {
+    fn advance_lanes(
+        &self,
+        now: &[Now<'_>],
+        points: LanePoints<'_>,
+        work: &mut Workspace,
+    ) -> [bool; LANES] {
         // Loops of known length, for the sizes of most twins.
         match points.shifts.len() {
             1 => advance_lanes(self, 1, now, points, work),
@@ -86,15 +95,22 @@ impl<T: StateSpace> Advance for T {
         }
     }
 
-    fn readout_lanes(&self, now: &[Now<'_>], y: &mut [Lanes]) -> bool {
-        let mut changed = false;
-        for (lane, at) in now.iter().enumerate() {
+    fn readout_lanes(&self, now: &[Now<'_>], y: &mut [Lanes]) -> [bool; LANES] {
+        let mut changed = [false; LANES];
+        for ((lane, at), changed) in now.iter().enumerate().zip(&mut changed) {
             for y in &mut *y {
-                changed |= self.readout_each(at, 1, &mut y.0[lane..=lane]);
+                *changed |= self.readout_each(at, 1, &mut y.0[lane..=lane]);
             }
         }
         changed
     }
+}
+
+/// One step by any integrator, in substeps.
+#[inline(never)]
+fn carry<T: StateSpace>(twin: &T, now: &Now<'_>, x: &mut [f64], work: &mut Workspace) {
+    let drift = |now: &Now<'_>, x: &[f64], dx: &mut [f64]| twin.drift(now, x, dx);
+    (twin.integrator()).carry(x.len(), now, x, work, drift);
 }
 
 #[inline(always)]
@@ -104,11 +120,11 @@ fn advance_lanes<T: StateSpace>(
     now: &[Now<'_>],
     points: LanePoints<'_>,
     work: &mut Workspace,
-) -> bool {
+) -> [bool; LANES] {
     let (moving, length) = (1 + 2 * n, (1 + 4 * n) * n);
     let (all, one) = (&mut points.all[..length], &mut points.one[..length]);
     let (shifts, shift) = (&points.shifts[..n], &mut points.shift[..n]);
-    let mut bent = false;
+    let mut bent = [false; LANES];
     for (lane, at) in now.iter().enumerate() {
         gather(&all[..moving * n], lane, &mut one[..moving * n]);
         gather(shifts, lane, shift);
@@ -118,48 +134,14 @@ fn advance_lanes<T: StateSpace>(
             limits: points.limits,
             shifts: &*shift,
         };
-        let before = bent;
-        bent |= twin.advance_each(at, point, work);
-        scatter(
-            &one[..moving * n],
-            (lane, now.len()),
-            &mut all[..moving * n],
-        );
-        if bent {
-            if !before {
-                straight(all, shifts, lane);
-            }
-            scatter(
-                &one[moving * n..],
-                (lane, now.len()),
-                &mut all[moving * n..],
-            );
+        bent[lane] = twin.advance_each(at, point, work);
+        let (moved, shifted) = one.split_at(moving * n);
+        scatter(moved, (lane, now.len()), &mut all[..moving * n]);
+        if bent[lane] {
+            scatter(shifted, (lane, now.len()), &mut all[moving * n..]);
         }
     }
     bent
-}
-
-/// Shifted points of the lanes before `lane`, on which no constraint acted.
-#[cold]
-fn straight(all: &mut [Lanes], shifts: &[Lanes], lane: usize) {
-    let n = shifts.len();
-    let (moving, shifted) = all.split_at_mut((1 + 2 * n) * n);
-    for (i, pair) in shifted.chunks_exact_mut(2 * n).enumerate() {
-        for (x, sign) in pair.chunks_exact_mut(n).zip([1.0, -1.0]) {
-            for (j, x) in x.iter_mut().enumerate() {
-                let shift = if j == i {
-                    shifts[i] * sign
-                } else {
-                    Lanes::ZERO
-                };
-                let to = moving[j] + shift;
-                x.0[..lane].copy_from_slice(&to.0[..lane]);
-                if lane > 0 {
-                    x.0[lane..].fill(to.0[0]);
-                }
-            }
-        }
-    }
 }
 
 #[inline(always)]

@@ -1,7 +1,7 @@
 //! Twins that show their equations.
 
 use super::points::{advance_one_by_one, readout_one_by_one};
-use crate::math::Lanes;
+use crate::math::{LANES, Lanes};
 use crate::record::{Drive, Signal};
 use crate::twin::{
     Integrator, Interval, LanePoints, Layout, Noise, Now, Outline, Points, SimulationError,
@@ -214,9 +214,14 @@ pub trait Advance {
     ) -> Result<Signal, SimulationError>;
 
     /// Carries the points of several filters over a step, one filter a lane; returns as [`advance_each`](Self::advance_each) for
-    /// any of them.
+    /// each of them.
     #[doc(hidden)]
-    fn advance_lanes(&self, now: &[Now<'_>], points: LanePoints<'_>, work: &mut Workspace) -> bool;
+    fn advance_lanes(
+        &self,
+        now: &[Now<'_>],
+        points: LanePoints<'_>,
+        work: &mut Workspace,
+    ) -> [bool; LANES];
 
     /// One output of the points, `n` states each, of several filters, one filter a lane; `buffer` holds those of one of them.
     #[doc(hidden)]
@@ -233,9 +238,9 @@ pub trait Advance {
     #[doc(hidden)]
     fn noise_lanes(&self, now: &[Now<'_>], process: &mut [Lanes], measurement: &mut Lanes);
 
-    /// Puts values of one output of several filters, one filter a lane, through the readout; returns whether it changed any.
+    /// Puts values of one output of several filters, one filter a lane, through the readout; returns the lanes that it changed.
     #[doc(hidden)]
-    fn readout_lanes(&self, now: &[Now<'_>], y: &mut [Lanes]) -> bool;
+    fn readout_lanes(&self, now: &[Now<'_>], y: &mut [Lanes]) -> [bool; LANES];
 }
 
 /// Rare large errors: with this probability, N(0, scale²) is added to a sample.

@@ -190,25 +190,23 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
             let size = scales.size(kind, j);
             let both = std::iter::once(&seen).chain(&time);
             terms.extend(both.map(|one| of_signal(&target, is_sensor, one, size)));
-            if has_equations {
-                terms.push(of_past(&target, is_sensor, name, past));
-                let lags = past[1..].iter().map(|tau| ("lagged", Trace::Lag(*tau)));
-                let plays =
-                    PLAYS.map(|part| ("play of", Trace::Play(0.5 * part * (seen.high - seen.low))));
-                terms.extend(lags.chain(plays).filter_map(|(word, trace)| {
-                    let values = trace.of(&scales.columns(kind, j), scales.dt());
-                    let (low, high) = visited(std::iter::once(values))?;
-                    let name = format!("{word} {name}");
-                    let of = Of::Signal;
-                    let seen = Variable {
-                        name,
-                        of,
-                        low,
-                        high,
-                    };
-                    Some(of_trace(&target, is_sensor, &seen, size, trace))
-                }));
-            }
+            terms.push(of_past(&target, is_sensor, name, past));
+            let lags = past[1..].iter().map(|tau| ("lagged", Trace::Lag(*tau)));
+            let plays =
+                PLAYS.map(|part| ("play of", Trace::Play(0.5 * part * (seen.high - seen.low))));
+            terms.extend(lags.chain(plays).filter_map(|(word, trace)| {
+                let values = trace.of(&scales.columns(kind, j), scales.dt());
+                let (low, high) = visited(std::iter::once(values))?;
+                let name = format!("{word} {name}");
+                let of = Of::Signal;
+                let seen = Variable {
+                    name,
+                    of,
+                    low,
+                    high,
+                };
+                Some(of_trace(&target, is_sensor, &seen, size, trace))
+            }));
             if has_equations && is_sensor {
                 let states = of_states.iter().map(|(_, state)| state);
                 let others = states.chain(&of_inputs);

@@ -25,9 +25,6 @@ pub(in crate::diagnose) fn kinds(
     let scales = library.scales;
     let is_fitted = |target: &str| fitted_noise.iter().any(|place| place == target);
     let mut terms = vec![];
-    if !scales.has_equations() {
-        return Ok(terms);
-    }
     for effect in study.candidates() {
         let excluded = without.iter().any(|p| p.matches(effect.key()));
         if matches!(effect.law(), Law::Outliers(_)) && is_fitted(effect.target()) && !excluded {
@@ -41,9 +38,11 @@ pub(in crate::diagnose) fn kinds(
             terms.extend(disturbances(target, entry, largest, dt, times));
         }
     };
-    let states = scales.outline.states.iter().enumerate();
-    for (i, state) in states.filter(|(_, state)| !is_memory(&state.name)) {
-        coloured(&state.name, Entry::State(i), scales.rates[i]);
+    // A black box shows no rates: its noise is that of its sensors.
+    for (i, (state, rate)) in (scales.outline.states.iter().zip(&scales.rates)).enumerate() {
+        if !is_memory(&state.name) {
+            coloured(&state.name, Entry::State(i), *rate);
+        }
     }
     let sensors = targets(TargetKind::Sensor, None, &library.twin.signals());
     for (j, target) in sensors.iter().enumerate() {

@@ -72,16 +72,32 @@ impl Draws {
     }
 }
 
-/// One simulation of a set.
+/// One simulation of a set, or the draws so far that gave none.
+#[derive(Default)]
 struct Row {
     theta: Vec<f64>,
-    features: Vec<f64>,
-    /// Draws before that were out of bounds.
+    features: Option<Vec<f64>>,
+    /// Draws that were out of bounds.
     rejected: usize,
-    /// Draws before that diverged or had no features.
+    /// Draws that diverged or had no features.
     failed: usize,
     /// Why the last of these failed.
     reason: Option<String>,
+}
+
+impl Row {
+    fn check(&self) -> Result<(), EstimatorError> {
+        if self.failed < ATTEMPTS && self.rejected < ATTEMPTS {
+            return Ok(());
+        }
+        let tried = self.failed + self.rejected;
+        let reason = self.reason.clone();
+        Err(EstimatorError::Hopeless {
+            failed: tried,
+            tried,
+            reason: reason.unwrap_or_else(|| "out of bounds".into()),
+        })
+    }
 }
 
 impl FeatureSimulator {
@@ -96,14 +112,17 @@ impl FeatureSimulator {
         draw: impl Fn(u64, usize, Noise) -> Result<Option<Draw<'a>>, EstimatorError> + Sync,
         stage: &Stage,
     ) -> Result<Draws, EstimatorError> {
-        let rows: Vec<Row> = rows
-            .into_par_iter()
-            .map(|i| {
-                let row = self.one(i, noise(i), &draw)?;
-                stage.tick()?;
-                Ok(row)
+        let numbers: Vec<u64> = rows.collect();
+        let rows: Vec<Row> = (numbers.par_chunks(self.at_once()))
+            .map(|numbers| {
+                let rows = self.some(numbers, &noise, &draw)?;
+                numbers.iter().try_for_each(|_| stage.tick())?;
+                Ok(rows)
             })
-            .collect::<Result<_, EstimatorError>>()?;
+            .collect::<Result<Vec<_>, EstimatorError>>()?
+            .into_iter()
+            .flatten()
+            .collect();
         let size = rows.len();
         let failed: usize = rows.iter().map(|row| row.failed).sum();
         if failed as f64 > HOPELESS * (size + failed) as f64 {
@@ -114,60 +133,62 @@ impl FeatureSimulator {
                 reason: reason.unwrap_or_default(),
             });
         }
-        let stack = |of: fn(&Row) -> &Vec<f64>, width: usize| {
+        let stack = |of: &dyn Fn(&Row) -> &[f64], width: usize| {
             let mut all = Array2::zeros((size, width));
-            for (mut row, values) in all.rows_mut().into_iter().zip(rows.iter().map(of)) {
-                row.assign(&ndarray::ArrayView1::from(values));
+            for (mut to, row) in all.rows_mut().into_iter().zip(&rows) {
+                to.assign(&ndarray::ArrayView1::from(of(row)));
             }
             all
         };
         Ok(Draws {
-            theta: stack(|row| &row.theta, self.twin().parameters().len()),
-            features: stack(|row| &row.features, self.dim()),
+            theta: stack(&|row| &row.theta, self.twin().parameters().len()),
+            features: stack(&|row| row.features.as_deref().unwrap_or(&[]), self.dim()),
             redrawn: failed + rows.iter().map(|row| row.rejected).sum::<usize>(),
         })
     }
 
-    /// One row.
-    fn one<'a>(
+    /// Rows of these numbers, the features of all that are drawn found at once.
+    fn some<'a>(
         &self,
-        i: u64,
-        noise: Noise,
+        numbers: &[u64],
+        noise: &impl Fn(u64) -> Noise,
         draw: &impl Fn(u64, usize, Noise) -> Result<Option<Draw<'a>>, EstimatorError>,
-    ) -> Result<Row, EstimatorError> {
-        let (mut rejected, mut failed, mut reason) = (0, 0, None);
-        while failed < ATTEMPTS && rejected < ATTEMPTS {
-            let attempt = rejected + failed;
-            let noise = match attempt {
-                0 => noise,
-                _ => noise.child(&format!("attempt {attempt}")),
-            };
-            let Some(Draw { theta, drive }) = draw(i, attempt, noise)? else {
-                rejected += 1;
-                continue;
-            };
-            match self.features(&theta, &drive, noise) {
-                Ok(features) => {
-                    return Ok(Row {
-                        theta,
-                        features,
-                        rejected,
-                        failed,
-                        reason,
-                    });
+    ) -> Result<Vec<Row>, EstimatorError> {
+        let mut rows: Vec<Row> = numbers.iter().map(|_| Row::default()).collect();
+        while rows.iter().any(|row| row.features.is_none()) {
+            let mut drawn: Vec<(usize, Draw<'a>, Noise)> = vec![];
+            for (k, row) in rows.iter_mut().enumerate() {
+                if row.features.is_some() {
+                    continue;
                 }
-                Err(EstimatorError::Rejected(text)) => {
-                    failed += 1;
-                    reason = Some(text);
+                row.check()?;
+                let attempt = row.rejected + row.failed;
+                let noise = match attempt {
+                    0 => noise(numbers[k]),
+                    _ => noise(numbers[k]).child(&format!("attempt {attempt}")),
+                };
+                match draw(numbers[k], attempt, noise)? {
+                    Some(draw) => drawn.push((k, draw, noise)),
+                    None => row.rejected += 1,
                 }
-                Err(error) => return Err(error),
+            }
+            let all: Vec<_> = (drawn.iter())
+                .map(|(_, draw, noise)| (&draw.theta[..], &*draw.drive, *noise))
+                .collect();
+            let found = self.features(&all);
+            for ((k, draw, _), found) in drawn.into_iter().zip(found) {
+                let row = &mut rows[k];
+                match found {
+                    Ok(features) => (row.theta, row.features) = (draw.theta, Some(features)),
+                    Err(EstimatorError::Rejected(text)) => {
+                        row.failed += 1;
+                        row.reason = Some(text);
+                    }
+                    Err(error) => return Err(error),
+                }
             }
         }
-        Err(EstimatorError::Hopeless {
-            failed: rejected + failed,
-            tried: rejected + failed,
-            reason: reason.unwrap_or_else(|| "out of bounds".into()),
-        })
+        Ok(rows)
     }
 
     /// `size` simulations at one θ under one drive.

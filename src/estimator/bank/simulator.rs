@@ -1,8 +1,8 @@
 //! A twin seen through its features.
 
 use crate::estimator::error::EstimatorError;
-use crate::feature::{Centred, FeatureError, FeatureMap, FeatureRecipe};
-use crate::record::{Drive, Record};
+use crate::feature::{FeatureError, FeatureMap, FeatureRecipe};
+use crate::record::{Drive, Record, Signal};
 use crate::twin::{Noise, Twin};
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -67,57 +67,50 @@ impl FeatureSimulator {
         Ok(DVector::from_vec(features))
     }
 
-    /// The simulator with its features centred on a record, and where the record puts θ; `None` for features that do not
-    /// centre themselves. Calls are counted together.
-    pub fn centred(
-        &self,
-        record: &Record,
-        initial: &[f64],
-        noise: Noise,
-    ) -> Result<Option<(Self, Centred)>, FeatureError> {
-        record.check_complete()?;
-        let found = self.map.centred(record, initial, noise)?;
-        Ok(found.map(|centred| {
-            let simulator = Self {
-                twin: self.twin.clone(),
-                calls: self.calls.clone(),
-                map: centred.map.clone(),
-            };
-            (simulator, centred)
-        }))
+    /// The simulator with its features about θ; `None` for features that have no reference. Calls are counted together.
+    pub fn about(&self, theta: &[f64]) -> Option<Self> {
+        Some(Self {
+            twin: self.twin.clone(),
+            calls: self.calls.clone(),
+            map: self.map.about(theta)?,
+        })
     }
 
-    /// Features of one simulation.
+    /// Number of simulations whose features are best found at once.
+    pub fn at_once(&self) -> usize {
+        self.map.at_once().max(1)
+    }
+
+    /// Features of simulations, each of which may be rejected.
     pub fn features(
         &self,
-        theta: &[f64],
-        drive: &Drive,
-        noise: Noise,
-    ) -> Result<Vec<f64>, EstimatorError> {
-        let outputs = match self.twin.simulate(theta, drive, noise) {
-            Ok(outputs) => outputs,
-            Err(error) if error.costs_one_run() => {
-                return Err(EstimatorError::Rejected(error.to_string()));
-            }
-            Err(error) => return Err(EstimatorError::Simulation(error)),
-        };
-        let rejected = |text: String| Err(EstimatorError::Rejected(text));
-        match self.map.extract(drive, &outputs) {
-            Ok(features) if features.iter().all(|v| v.is_finite()) => Ok(features),
-            Ok(_) => rejected("features are not finite".into()),
-            Err(
-                error @ (FeatureError::Constant { .. }
-                | FeatureError::Regression(_)
-                | FeatureError::Information),
-            ) => rejected(error.to_string()),
-            Err(FeatureError::Reference(error)) if error.costs_one_run() => {
-                rejected(error.to_string())
-            }
-            Err(FeatureError::Filter(error)) if error.is_recoverable() => {
-                rejected(error.to_string())
-            }
-            Err(error) => Err(EstimatorError::Feature(error)),
-        }
+        all: &[(&[f64], &Drive, Noise)],
+    ) -> Vec<Result<Vec<f64>, EstimatorError>> {
+        let outputs: Vec<Result<Signal, EstimatorError>> = (all.iter())
+            .map(|&(theta, drive, noise)| {
+                (self.twin.simulate(theta, drive, noise)).map_err(|error| {
+                    match error.costs_one_run() {
+                        true => EstimatorError::Rejected(error.to_string()),
+                        false => EstimatorError::Simulation(error),
+                    }
+                })
+            })
+            .collect();
+        let simulated: Vec<(&Drive, &Signal)> = (all.iter().zip(&outputs))
+            .filter_map(|((_, drive, _), outputs)| Some((*drive, outputs.as_ref().ok()?)))
+            .collect();
+        let mut features = self.map.extract_all(&simulated).into_iter();
+        (outputs.into_iter())
+            .map(|outputs| {
+                outputs?;
+                let missing = || EstimatorError::Rejected("the features are missing".into());
+                features
+                    .next()
+                    .ok_or_else(missing)?
+                    .map_err(refused)
+                    .and_then(finite)
+            })
+            .collect()
     }
 
     /// Mean features over noise samples 0 … `seeds` − 1 of `noise`: the same draws at every θ (common random
@@ -129,9 +122,14 @@ impl FeatureSimulator {
         noise: impl Fn(u64) -> Noise + Sync,
         seeds: usize,
     ) -> Result<DVector<f64>, EstimatorError> {
-        let runs: Vec<Vec<f64>> = (0..seeds as u64)
-            .into_par_iter()
-            .map(|sample| self.features(theta, drive, noise(sample)))
+        let samples: Vec<u64> = (0..seeds as u64).collect();
+        let runs: Vec<Vec<f64>> = (samples.par_chunks(self.at_once()))
+            .flat_map_iter(|samples| {
+                let all: Vec<_> = (samples.iter())
+                    .map(|&sample| (theta, drive, noise(sample)))
+                    .collect();
+                self.features(&all)
+            })
             .collect::<Result<_, _>>()?;
         // Summed in order: the same bits for any number of threads.
         let mut mean = DVector::zeros(self.dim());
@@ -139,6 +137,29 @@ impl FeatureSimulator {
             mean += DVector::from_vec(run);
         }
         Ok(mean / seeds as f64)
+    }
+}
+
+/// Features that are not there for reasons of one simulation reject it.
+fn refused(error: FeatureError) -> EstimatorError {
+    let is_of_one = match &error {
+        FeatureError::Constant { .. } | FeatureError::Regression(_) | FeatureError::Information => {
+            true
+        }
+        FeatureError::Reference(error) => error.costs_one_run(),
+        FeatureError::Filter(error) => error.is_recoverable(),
+        _ => false,
+    };
+    match is_of_one {
+        true => EstimatorError::Rejected(error.to_string()),
+        false => EstimatorError::Feature(error),
+    }
+}
+
+fn finite(features: Vec<f64>) -> Result<Vec<f64>, EstimatorError> {
+    match features.iter().all(|v| v.is_finite()) {
+        true => Ok(features),
+        false => Err(EstimatorError::Rejected("features are not finite".into())),
     }
 }
 

@@ -5,7 +5,7 @@ use crate::estimator::error::EstimatorError;
 use crate::estimator::refine::Refined;
 use crate::estimator::sample::{EigenBox, Sampler};
 use crate::estimator::settings::Settings;
-use crate::feature::Centred;
+use crate::fit::posterior::Region;
 use crate::progress::Progress;
 use crate::record::Drive;
 use crate::twin::{Interval, Noise};
@@ -27,8 +27,8 @@ pub struct Around<'a> {
     pub drive: &'a Drive,
     /// Gauss–Newton's estimate.
     pub refined: &'a Refined,
-    /// Where the features themselves put θ, if they can tell.
-    pub region: Option<&'a Centred>,
+    /// Where the record puts θ, if the features are about its mean.
+    pub region: Option<&'a Region>,
     /// Settings.
     pub settings: &'a Settings,
 }

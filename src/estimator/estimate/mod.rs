@@ -24,6 +24,7 @@ use crate::estimator::readout::{INTERVAL_LEVEL, Spread};
 use crate::estimator::recipe::PresetName;
 use crate::estimator::refine::{Information, RefineSettings, Refined, Refinement};
 use crate::estimator::settings::Settings;
+use crate::fit::posterior::Region;
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::twin::Noise;
@@ -107,7 +108,9 @@ impl Estimator {
             false => {
                 let bound = in_noise.map(|shown| simulator.of(&shown.twin, Some(&*self.recipe)));
                 let bound = bound.transpose()?;
-                run.refit(bound.as_ref().unwrap_or(&simulator), &initial, &mut seconds)?
+                let bound = bound.as_ref().unwrap_or(&simulator);
+                let region = shown.as_ref().map(|shown| &shown.fit.region);
+                run.refit(bound, &initial, region, &mut seconds)?
             }
         };
         let twin = simulator.twin();
@@ -250,17 +253,17 @@ impl Run<'_> {
         &self,
         simulator: &FeatureSimulator,
         initial: &[f64],
+        region: Option<&Region>,
         seconds: &mut Seconds,
     ) -> Result<Outcome, EstimatorError> {
         let (settings, progress) = (self.settings, self.progress);
         let lap = Instant::now();
-        // Features that can find the record's neighbourhood by themselves do, and are taken about it from here on.
-        let noise = self.noise.child("centre");
-        let centred = simulator.centred(self.record, initial, noise)?;
-        let (simulator, initial, refine) = match &centred {
-            Some((simulator, centred)) => {
+        // Features with a reference are taken about the record's own θ from here on.
+        let about = region.and_then(|region| Some((simulator.about(&region.theta)?, region)));
+        let (simulator, initial, refine) = match &about {
+            Some((simulator, region)) => {
                 let refine = settings.refine.centred();
-                (simulator, centred.theta.as_slice(), refine)
+                (simulator, region.theta.as_slice(), refine)
             }
             None => (simulator, initial, settings.refine.clone()),
         };
@@ -273,7 +276,7 @@ impl Run<'_> {
             simulator,
             drive: self.record.drive(),
             refined: &refined,
-            region: centred.as_ref().map(|(_, centred)| centred),
+            region: about.as_ref().map(|(_, region)| *region),
             settings,
         };
         let draws = cloud(&around, self.noise.child("cloud"), progress)?;

@@ -55,7 +55,10 @@ fn rejected(name: &str, settings: &GateSettings, records: u64) -> u64 {
         .filter(|&i| {
             let record = Noise::new(11, "record", i);
             let drive = drives.draw(record).unwrap();
-            let x = simulator.features(&theta, &drive, record).unwrap();
+            let x = simulator
+                .features(&[(&theta, &drive, record)])
+                .remove(0)
+                .unwrap();
             let test = GateTest {
                 simulator: &simulator,
                 drive: &drive,
@@ -116,7 +119,10 @@ fn calibrated_after_a_refit(name: &str, features: &dyn FeatureRecipe, records: u
             let noise = Noise::new(12, "record", i);
             let drive = drives.draw(noise).unwrap();
             let theta = space.draw_prior(noise);
-            let x = simulator.features(&theta, &drive, noise).unwrap();
+            let x = simulator
+                .features(&[(&theta, &drive, noise)])
+                .remove(0)
+                .unwrap();
             let observed = DVector::from_vec(x);
             let refinement = Refinement {
                 simulator: &simulator,

@@ -53,11 +53,16 @@ impl FeatureResidual<'_> {
         let stencil = Stencil::new(theta.as_slice(), &self.steps, &self.lower, &self.upper)?;
         let one = |seed: u64| {
             self.progress.checkpoint().map_err(MathError::fatal)?;
-            stencil.jacobian(|point| {
-                let noise = self.noise.sample(seed);
-                let features = self.simulator.features(point, self.drive, noise)?;
-                Ok::<_, MathError>(DVector::from_vec(features))
-            })
+            let points = stencil.points();
+            let noise = self.noise.sample(seed);
+            let all: Vec<_> = (points.iter())
+                .map(|point| (&point[..], self.drive, noise))
+                .collect();
+            let found = self.simulator.features(&all).into_iter();
+            let values: Vec<DVector<f64>> = found
+                .map(|features| Ok(DVector::from_vec(features?)))
+                .collect::<Result<_, EstimatorError>>()?;
+            Ok(stencil.assemble(&values))
         };
         (0..self.seeds as u64).into_par_iter().map(one).collect()
     }

@@ -5,8 +5,9 @@ use super::magnitude::{Kind, kinds, largest, size_axis};
 use crate::effect::Effect;
 use crate::fit::axis::Axis;
 use crate::fit::climb::Fitted;
+use crate::fit::growing::base_fit;
 use crate::fit::problem::Problem;
-use crate::fit::starts::{base_fit, polish, search};
+use crate::fit::starts::{polish, search};
 use crate::likelihood::Measured;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::record::{Record, Signal};
@@ -98,14 +99,12 @@ fn fits(
     initial: &[Vec<f64>],
     noise: Noise,
 ) -> Result<Vec<Fitted>, FilterError> {
-    let fits = match problem.is_simulated() {
-        true => {
-            let theta = initial.first().map(Vec::as_slice);
-            base_fit(problem, theta, noise)?.into_iter().collect()
-        }
-        false => search(problem, initial, noise, ITERATIONS)?,
-    };
-    polish(problem, fits, ITERATIONS)
+    if !problem.is_simulated() {
+        return search(problem, initial, noise, ITERATIONS);
+    }
+    let theta = initial.first().map(Vec::as_slice);
+    let fit = base_fit(problem, theta, noise)?;
+    polish(problem, fit.into_iter().collect(), ITERATIONS)
 }
 
 /// The problem with every effect held where it is off.

@@ -3,7 +3,7 @@
 use super::expansion::{Expansion, log_mean};
 use super::sizes::Block;
 use crate::fit::axis::EvidencePrior;
-use crate::fit::sampler::{Proposal, Round, effective};
+use crate::fit::posterior::{Proposal, Round, effective};
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::math::deviation;
 use crate::twin::Noise;

@@ -25,8 +25,8 @@ mod tests;
 pub(crate) use expansion::{CREDIT, Laplace, log_mean};
 
 use super::climb::Fitted;
+use super::posterior::Proposal;
 use super::problem::Problem;
-use super::sampler::Proposal;
 use crate::likelihood::kalman::FilterError;
 use crate::twin::Noise;
 use expansion::Expansion;

@@ -86,10 +86,32 @@ impl Score {
         theta: &[f64],
         coordinates: &Coordinates,
     ) -> Result<Self, FilterError> {
-        match side_by_side(kalman, theta, coordinates) {
+        let found = side_by_side(std::slice::from_ref(kalman), theta, coordinates).pop();
+        match found.flatten() {
             Some(score) => Ok(score),
             None => Self::forward_one_by_one(kalman, theta, coordinates),
         }
+    }
+
+    /// As [`forward`](Self::forward), of several records of one twin at one θ: their passes run side by side, too. The same bits.
+    #[doc(hidden)]
+    pub fn forward_all(
+        kalmans: &[Kalman<'_>],
+        theta: &[f64],
+        coordinates: &Coordinates,
+    ) -> Vec<Result<Self, FilterError>> {
+        let fit = kalmans.iter().all(|k| k.fits_beside(&kalmans[0]));
+        if !fit {
+            let each = |kalman| Self::forward(kalman, theta, coordinates);
+            return kalmans.iter().map(each).collect();
+        }
+        let found = side_by_side(kalmans, theta, coordinates);
+        (kalmans.iter().zip(found))
+            .map(|(kalman, found)| match found {
+                Some(score) => Ok(score),
+                None => Self::forward_one_by_one(kalman, theta, coordinates),
+            })
+            .collect()
     }
 
     /// As [`forward`](Self::forward), one pass after the other.
@@ -165,9 +187,15 @@ impl Score {
     }
 }
 
-/// One-sided score by lanes; `None` where these cannot hold the filter.
-fn side_by_side(kalman: &Kalman<'_>, theta: &[f64], coordinates: &Coordinates) -> Option<Score> {
-    kalman.check(theta).ok()?;
+/// One-sided scores by lanes; `None` where these cannot hold a filter.
+fn side_by_side(
+    kalmans: &[Kalman<'_>],
+    theta: &[f64],
+    coordinates: &Coordinates,
+) -> Vec<Option<Score>> {
+    if kalmans.iter().any(|kalman| kalman.check(theta).is_err()) {
+        return kalmans.iter().map(|_| None).collect();
+    }
     let phi = coordinates.of(theta);
     let moves: Vec<_> = (0..phi.len())
         .map(|j| {
@@ -177,19 +205,35 @@ fn side_by_side(kalman: &Kalman<'_>, theta: &[f64], coordinates: &Coordinates) -
         .collect();
     let moved = moves.iter().map(|(theta, _)| &theta[..]);
     let thetas: Vec<&[f64]> = std::iter::once(theta).chain(moved).collect();
-    let runs: Vec<Together> = (thetas.chunks(LANES))
-        .map(|thetas| together(kalman, thetas))
-        .collect::<Option<_>>()?;
-    let lane = |job: usize| (&runs[job / LANES], job % LANES);
-    let (centre, c) = lane(0);
-    let (n, d) = (centre.rows.len(), moves.len());
+    let all: Vec<(&Kalman<'_>, &[f64])> = (kalmans.iter())
+        .flat_map(|kalman| thetas.iter().map(move |theta| (kalman, *theta)))
+        .collect();
+    let runs: Vec<Option<Together>> = all.chunks(LANES).map(together).collect();
+    let distances: Vec<f64> = moves.iter().map(|(_, distance)| *distance).collect();
+    (0..kalmans.len())
+        .map(|r| {
+            let each: Option<Vec<(&Together, usize)>> = (r * thetas.len()..(r + 1) * thetas.len())
+                .map(|job| {
+                    let run = runs[job / LANES].as_ref()?;
+                    Some((run, run.lane(job % LANES)?))
+                })
+                .collect();
+            Some(of_lanes(&each?, &distances))
+        })
+        .collect()
+}
+
+/// Score of a record from its lanes at θ and at the points beside it, at these distances.
+fn of_lanes(each: &[(&Together, usize)], distances: &[f64]) -> Score {
+    let (centre, c) = each[0];
+    let (n, d) = (centre.rows.len(), distances.len());
     let [mut samples, mut shifts, mut spreads] = [(); 3].map(|()| DMatrix::zeros(n, d));
     // Reciprocals of variance and deviation.
     let scales: Vec<[f64; 2]> = (centre.rows.iter())
         .map(|[_, s]| [1.0 / s.0[c], 1.0 / s.0[c].sqrt()])
         .collect();
-    for (j, (_, distance)) in moves.iter().enumerate() {
-        let (moved, m) = lane(j + 1);
+    for (j, ((moved, m), distance)) in each[1..].iter().zip(distances).enumerate() {
+        let m = *m;
         let rows = (centre.rows.iter().zip(&moved.rows)).zip(&scales);
         let [samples, shifts, spreads] = [&mut samples, &mut shifts, &mut spreads]
             .map(|of| of.as_mut_slice()[j * n..(j + 1) * n].iter_mut());
@@ -207,8 +251,7 @@ fn side_by_side(kalman: &Kalman<'_>, theta: &[f64], coordinates: &Coordinates) -
         }
     }
     let log_likelihood = centre.log_likelihoods.0[c];
-    let changes = [&shifts, &spreads];
-    Some(Score::of_one_output(log_likelihood, &samples, changes))
+    Score::of_one_output(log_likelihood, &samples, [&shifts, &spreads])
 }
 
 /// ln, by its series where it is short.

@@ -58,6 +58,8 @@ pub(crate) struct Level {
 pub(crate) struct Measured {
     pub twin: Twin,
     pub levels: Vec<Level>,
+    /// `true` for a black box without noise of its own: its run is its prediction.
+    pub is_silent: bool,
 }
 
 /// The twin with these sizes of states and outputs.
@@ -162,5 +164,6 @@ pub(super) fn build(
     Measured {
         twin: Twin::Equations(Arc::new(Modified(noisy))),
         levels,
+        is_silent: false,
     }
 }

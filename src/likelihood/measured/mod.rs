@@ -35,10 +35,15 @@ pub(crate) fn measured(
 ) -> Result<Measured, FilterError> {
     match twin {
         Twin::Equations(base) => measured_equations(base, records, beliefs),
-        Twin::BlackBox(_) => Ok(Measured {
-            twin: ensemble::measured(twin, records)?.0,
-            levels: vec![],
-        }),
+        Twin::BlackBox(_) => {
+            let (twin, is_silent) = ensemble::measured(twin, records)?;
+            let levels = vec![];
+            Ok(Measured {
+                twin,
+                levels,
+                is_silent,
+            })
+        }
     }
 }
 

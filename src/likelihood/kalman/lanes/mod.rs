@@ -14,28 +14,49 @@ use pass::{Job, Pass, Rows};
 
 /// Rows of up to eight filters run side by side.
 pub(super) struct Together {
+    /// Lane of each filter that was asked for.
+    lanes: Vec<Option<usize>>,
     /// log p(y | θ) of each lane, in nats.
     pub log_likelihoods: Lanes,
     /// Innovation and its variance of each row.
     pub rows: Rows,
 }
 
+impl Together {
+    /// Lane of the i-th filter; `None` where it failed or needs more than lanes offer, and is to be run alone.
+    pub fn lane(&self, i: usize) -> Option<usize> {
+        self.lanes[i].filter(|&lane| self.log_likelihoods.0[lane].is_finite())
+    }
+}
+
 impl Kalman<'_> {
     /// Returns whether lanes can hold this filter.
-    pub(super) fn fits_lanes(&self) -> bool {
+    fn fits_lanes(&self) -> bool {
         (1..=4).contains(&self.states)
             && self.channels == 1
             && self.settings.method == Method::Points
     }
+
+    /// Returns whether lanes can hold this filter beside another: of one twin, with as many rows, and the same ones missing.
+    pub(super) fn fits_beside(&self, other: &Self) -> bool {
+        let is_same = std::ptr::eq(self, other);
+        is_same
+            || std::ptr::addr_eq(self.twin, other.twin)
+                && self.settings.method == other.settings.method
+                && self.record.samples() == other.record.samples()
+                && !(self.gaps || other.gaps)
+    }
 }
 
-/// Runs a filter at up to eight θ side by side; `None` where one of them fails or needs more than lanes offer, to be run one by one.
-pub(super) fn together(kalman: &Kalman<'_>, thetas: &[&[f64]]) -> Option<Together> {
-    if !kalman.fits_lanes() {
+/// Runs up to eight filters that fit beside each other, each at a θ, side by side; `None` where all have to be run one by one.
+pub(super) fn together(all: &[(&Kalman<'_>, &[f64])]) -> Option<Together> {
+    let (first, _) = all.first()?;
+    if !first.fits_lanes() {
         return None;
     }
-    let jobs: Vec<Job<'_>> = (thetas.iter())
-        .map(|&theta| {
+    let all = &all[..all.len().min(LANES)];
+    let held: Vec<Option<Job<'_>>> = (all.iter())
+        .map(|&(kalman, theta)| {
             let acting = kalman.acting(theta).ok()?;
             let plain =
                 kalman.twin.outliers(theta).is_empty() && kalman.twin.rounding(theta).is_empty();
@@ -45,16 +66,25 @@ pub(super) fn together(kalman: &Kalman<'_>, thetas: &[&[f64]]) -> Option<Togethe
                 acting,
             })
         })
-        .collect::<Option<_>>()?;
-    let mut rows = Vec::with_capacity(kalman.record.samples());
-    let (jobs, to) = (&jobs[..jobs.len().min(LANES)], &mut rows);
-    let log_likelihoods = match kalman.states {
+        .collect();
+    let mut used = 0..LANES;
+    let lanes = (held.iter())
+        .map(|job| job.as_ref().and_then(|_| used.next()))
+        .collect();
+    let jobs: Vec<Job<'_>> = held.into_iter().flatten().collect();
+    if jobs.is_empty() {
+        return None;
+    }
+    let mut rows = Vec::with_capacity(first.record.samples());
+    let (jobs, to) = (&jobs[..], &mut rows);
+    let log_likelihoods = match first.states {
         1 => widest(Pass::<1, 5> { jobs, rows: to }),
         2 => widest(Pass::<2, 18> { jobs, rows: to }),
         3 => widest(Pass::<3, 39> { jobs, rows: to }),
         _ => widest(Pass::<4, 68> { jobs, rows: to }),
     }?;
-    (log_likelihoods.0.iter().all(|v| v.is_finite())).then_some(Together {
+    Some(Together {
+        lanes,
         log_likelihoods,
         rows,
     })

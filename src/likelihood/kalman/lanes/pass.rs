@@ -1,13 +1,14 @@
 //! One pass over the rows for eight pairs of parameters and record at once.
 //!
 //! The recursion is that of the scalar pass, for one output. Lanes never branch apart: a column without pivot is zero, a limit
-//! that some lane feels is computed in all. What needs more (readouts that bend, rounding, outliers) is left to the scalar pass.
+//! that some lane feels is computed in all. No lane changes a bit of another. What needs more (readouts that bend, rounding, outliers) is
+//! left to the scalar pass.
 
 use super::super::Kalman;
 use super::super::likelihood::LOG_TWO_PI;
 use super::super::moments::{BEND, HALF_PER_REACH, REACH};
 use super::clip::clip;
-use crate::math::{Kernel, LANES, Lanes};
+use crate::math::{Kernel, LANES, Lanes, Mask};
 use crate::twin::{Acting, LanePoints, Now, Workspace};
 
 /// Parameters on a record.
@@ -34,7 +35,7 @@ const OUTERMOST: f64 = 2.856_970_013_872_806;
 impl<const N: usize, const P: usize> Kernel for Pass<'_, N, P> {
     type Output = Option<Lanes>;
 
-    /// Log-likelihoods, not finite in lanes that failed; `None` where the scalar pass is needed.
+    /// Log-likelihoods, not finite in lanes that failed or need the scalar pass; `None` where all do.
     #[inline(always)]
     fn run(self) -> Option<Lanes> {
         let Self { jobs, rows } = self;
@@ -70,7 +71,7 @@ impl<const N: usize, const P: usize> Kernel for Pass<'_, N, P> {
         rows.clear();
         for k in 0..samples {
             for (now, job) in nows.iter_mut().zip(jobs) {
-                *now = job.acting.at(k, job.theta);
+                job.acting.go_to(k, now);
             }
             let active = &nows[..jobs.len()];
             let mut r = zero;
@@ -97,9 +98,11 @@ impl<const N: usize, const P: usize> Kernel for Pass<'_, N, P> {
                 }
                 let sd = variance.sqrt();
                 let mut ends = [predicted + sd * OUTERMOST, predicted - sd * OUTERMOST];
-                if twin.readout_lanes(active, &mut ends) {
+                let changed = twin.readout_lanes(active, &mut ends);
+                if changed[..jobs.len()].iter().all(|changed| *changed) {
                     return None;
                 }
+                valid = Mask::of(changed).select(Lanes::all(f64::NAN), valid);
                 let mut y = zero;
                 for lane in 0..LANES {
                     let job = &jobs[if lane < jobs.len() { lane } else { 0 }];
@@ -115,11 +118,9 @@ impl<const N: usize, const P: usize> Kernel for Pass<'_, N, P> {
                 let next = product * variance;
                 let inside = (Lanes::all(1e-250).below(next)).and(next.below(Lanes::all(1e250)));
                 if inside.not().any() {
-                    logs += product.ln() + variance.ln();
-                    product = unit;
-                } else {
-                    product = next;
+                    logs += inside.select(zero, product.ln() + variance.ln());
                 }
+                product = inside.select(next, unit);
                 let mut gain = [zero; N];
                 for j in 0..N {
                     for i in 0..N {
@@ -164,7 +165,7 @@ impl<const N: usize, const P: usize> Kernel for Pass<'_, N, P> {
                 one: &mut one,
                 shift: &mut shift,
             };
-            let bent = twin.advance_lanes(active, lanes, &mut work);
+            let bent = Mask::of(twin.advance_lanes(active, lanes, &mut work));
             let (centre, images) = points.split_at_mut(N);
             for i in 0..N {
                 mean[i] = centre[i];
@@ -175,13 +176,13 @@ impl<const N: usize, const P: usize> Kernel for Pass<'_, N, P> {
             let (images, noises) = images.split_at_mut(2 * N * N);
             differences(images, centre, &mut mean);
             add_outer(images, &mut cov);
-            if bent {
+            if bent.any() {
                 for i in 0..N {
-                    if (q[i].below(zero)).any() || (zero.below(q[i])).any() {
-                        let pair = &mut noises[2 * i * N..2 * (i + 1) * N];
-                        differences(pair, centre, &mut mean);
-                        add_outer(pair, &mut cov);
-                    }
+                    // A state without noise has no shifted points.
+                    let moved = bent.and((q[i].below(zero)).or(zero.below(q[i])));
+                    let pair = &mut noises[2 * i * N..2 * (i + 1) * N];
+                    noise_differences(pair, centre, (i, q[i]), moved, &mut mean);
+                    add_outer(pair, &mut cov);
                 }
             } else {
                 for i in 0..N {
@@ -253,6 +254,25 @@ fn differences<const N: usize>(images: &mut [Lanes], centre: &[Lanes], mean: &mu
             mean[i] += bend * (1.0 / 3.0);
             (pair[i], pair[N + i]) = ((plus - minus) * HALF_PER_REACH, bend * BEND);
         }
+    }
+}
+
+/// The same of the images of noise of state i, q, in the lanes where a constraint bent them; straight in the others.
+#[inline(always)]
+fn noise_differences<const N: usize>(
+    pair: &mut [Lanes],
+    centre: &[Lanes],
+    (i, q): (usize, Lanes),
+    bent: Mask,
+    mean: &mut [Lanes; N],
+) {
+    for j in 0..N {
+        let (plus, minus) = (pair[j], pair[N + j]);
+        let bend = bent.select((plus + minus) * 0.5 - centre[j], Lanes::ZERO);
+        mean[j] += bend * (1.0 / 3.0);
+        let straight = if i == j { q } else { Lanes::ZERO };
+        pair[j] = bent.select((plus - minus) * HALF_PER_REACH, straight);
+        pair[N + j] = bend * BEND;
     }
 }
 

@@ -39,9 +39,10 @@ fn thetas(centre: &[f64]) -> Vec<Vec<f64>> {
 fn agree(twin: &dyn StateSpace, centre: &[f64], record: &Record, settings: &FilterSettings) {
     let kalman = Kalman::new(twin, record, settings).unwrap().of_cells();
     let thetas = thetas(centre);
-    let jobs: Vec<_> = thetas.iter().map(|theta| &theta[..]).collect();
-    let lanes = together(&kalman, &jobs).unwrap();
-    for (lane, theta) in thetas.iter().enumerate() {
+    let all: Vec<_> = thetas.iter().map(|theta| (&kalman, &theta[..])).collect();
+    let lanes = together(&all).unwrap();
+    for (i, theta) in thetas.iter().enumerate() {
+        let lane = lanes.lane(i).unwrap();
         let scalar = kalman.filter(theta).unwrap();
         let (found, expected) = (lanes.log_likelihoods.0[lane], scalar.log_likelihood);
         let error = (found - expected).abs() / expected.abs().max(1.0);
@@ -120,6 +121,37 @@ fn a_score_by_lanes_is_that_of_single_passes() {
     assert!((&lanes.fisher - &one.fisher).amax() < 1e-8 * one.fisher.amax());
 }
 
+/// Records run beside others have the bits that they have alone, where limits act on some and not on others, too.
+#[test]
+fn no_lane_changes_a_bit_of_another() {
+    let settings = FilterSettings::default();
+    let ceiling = Catalogue::default()
+        .effect("state-ceiling", "h1")
+        .unwrap()
+        .with_other("h2");
+    let twin: Arc<dyn DigitalTwin> =
+        Arc::new(augment(Arc::new(CascadedTanks), vec![ceiling]).unwrap());
+    let twin = twin.equations().unwrap();
+    let theta = [&CENTRE[..], &[3.0, 0.5]].concat();
+    let records: Vec<Record> = (0..11)
+        .map(|run| {
+            let drive = tanks_drive();
+            let inputs = drive.inputs() * (0.1 + 0.2 * run as f64);
+            let drive = drive.with_inputs(inputs).unwrap();
+            record(twin.as_ref(), &theta, &drive, run)
+        })
+        .collect();
+    let kalmans: Vec<Kalman<'_>> = (records.iter())
+        .map(|record| Kalman::new(twin.as_ref(), record, &settings).unwrap())
+        .collect();
+    let coordinates = Coordinates::new(kalmans[0].parameters());
+    let all = Score::forward_all(&kalmans, &theta, &coordinates);
+    for (kalman, beside) in kalmans.iter().zip(all) {
+        let alone = Score::forward(kalman, &theta, &coordinates).unwrap();
+        assert_eq!(beside.unwrap(), alone);
+    }
+}
+
 /// Twins that lanes do not hold go the scalar way, errors included.
 #[test]
 fn what_lanes_do_not_hold_is_run_one_by_one() {
@@ -127,7 +159,9 @@ fn what_lanes_do_not_hold_is_run_one_by_one() {
     let measured = record(&CascadedTanks, &CENTRE, &tanks_drive(), 0);
     let kalman = Kalman::new(&CascadedTanks, &measured, &settings).unwrap();
     let coordinates = Coordinates::new(kalman.parameters());
-    assert!(together(&kalman, &[&CENTRE, &[f64::NAN; 4]]).is_none());
+    let lanes = together(&[(&kalman, &[f64::NAN; 4]), (&kalman, &CENTRE)]).unwrap();
+    assert_eq!(lanes.lane(0), None);
+    assert!(lanes.lane(1).is_some());
     assert!(Score::forward(&kalman, &[f64::NAN; 4], &coordinates).is_err());
     assert!(Score::forward(&kalman, &[1.0], &coordinates).is_err());
     let saturated = Catalogue::default()
@@ -139,7 +173,7 @@ fn what_lanes_do_not_hold_is_run_one_by_one() {
     let theta = [&CENTRE[..], &[0.0, 2.0]].concat();
     let measured = record(twin.as_ref(), &theta, &tanks_drive(), 0);
     let kalman = Kalman::new(twin.as_ref(), &measured, &settings).unwrap();
-    assert!(together(&kalman, &[&theta]).is_none());
+    assert!(together(&[(&kalman, &theta)]).is_none());
     let coordinates = Coordinates::new(kalman.parameters());
     let one = Score::forward_one_by_one(&kalman, &theta, &coordinates).unwrap();
     assert_eq!(Score::forward(&kalman, &theta, &coordinates).unwrap(), one);

@@ -1,8 +1,8 @@
 //! Standard errors and intervals of a fit.
 
-use super::climb::Fitted;
-use super::posterior::{Draws, posterior, usual};
-use super::problem::Problem;
+use super::resampling::{Draws, posterior, usual};
+use crate::fit::climb::Fitted;
+use crate::fit::problem::Problem;
 use crate::likelihood::kalman::FilterError;
 use crate::math::{deviation, quantile};
 use crate::twin::Noise;

@@ -17,7 +17,7 @@ const COUNTING: f64 = 4.0;
 
 /// A Student density about one top, in the entries of φ that may move.
 #[derive(Debug, Clone)]
-pub(super) struct Proposal {
+pub(in crate::fit) struct Proposal {
     /// Entries that may move.
     pub free: Vec<usize>,
     /// The whole of φ.
@@ -97,7 +97,7 @@ impl Proposal {
 }
 
 /// Draws in φ from equal parts of several proposals.
-pub(super) struct Round {
+pub(in crate::fit) struct Round {
     pub draws: Vec<DVector<f64>>,
     /// Proposal that each draw belongs to.
     pub modes: Vec<usize>,
@@ -239,7 +239,7 @@ fn flattened(weights: Vec<f64>, least: f64) -> Option<Vec<f64>> {
 }
 
 /// Number of independent draws that weighed ones are worth.
-pub(super) fn effective(weights: &[f64]) -> f64 {
+pub(in crate::fit) fn effective(weights: &[f64]) -> f64 {
     let sum: f64 = weights.iter().sum();
     sum * sum / weights.iter().map(|w| w * w).sum::<f64>()
 }

@@ -1,13 +1,10 @@
 //! The gradient of a Kalman filter's likelihood as features.
 
-mod posterior;
-
-use super::{Centred, FeatureError, FeatureMap, FeatureRecipe};
-use crate::likelihood::kalman::{
-    Coordinates, FilterError, FilterSettings, Kalman, Score as Gradient,
-};
+use super::{FeatureError, FeatureMap, FeatureRecipe};
+use crate::likelihood::kalman::{Coordinates, FilterSettings, Kalman, Score as Gradient};
+use crate::math::LANES;
 use crate::record::{Drive, Record, Signal};
-use crate::twin::{Noise, ParameterSpace, StateSpace, Twin};
+use crate::twin::{ParameterSpace, StateSpace, Twin};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -20,8 +17,8 @@ use std::sync::Arc;
 /// ```
 ///
 /// The first part is a Newton step from θ_ref, which keeps nearly all information on θ near θ_ref; the rest tells how far the
-/// step can be trusted. θ_ref is the prior's centre for training; around one record the features centre themselves on the
-/// filter's posterior. Approximations of the filter cost information, not consistency: what x means for θ is
+/// step can be trusted. θ_ref is the prior's centre for training; for one record, an estimate takes them about the mean of its
+/// fit's posterior. Approximations of the filter cost information, not consistency: what x means for θ is
 /// learnt from simulations. File: `{ kind = "score" }`.
 ///
 /// Source: Alsing & Wandelt, "Generalized massive optimal data compression", MNRAS 476 (2018).
@@ -65,32 +62,17 @@ struct Bound {
 }
 
 impl Bound {
-    /// Runs `with` on the filter of a record.
-    fn filtered<R>(
-        &self,
-        record: &Record,
-        with: impl FnOnce(&Kalman<'_>) -> Result<R, FilterError>,
-    ) -> Result<R, FilterError> {
-        with(&Kalman::new(self.equations.as_ref(), record, &self.filter)?)
-    }
-}
-
-impl FeatureMap for Bound {
-    fn dim(&self) -> usize {
-        2 * self.space.len() + 1
-    }
-
-    fn extract(&self, drive: &Drive, outputs: &Signal) -> Result<Vec<f64>, FeatureError> {
+    fn record(&self, drive: &Drive, outputs: &Signal) -> Result<Record, FeatureError> {
         let (samples, needed) = (outputs.nrows(), 2 * self.dim() + 4);
         if samples < needed {
             return Err(FeatureError::TooShort { samples, needed });
         }
         super::check_varies(outputs)?;
-        let record = Record::new(drive.clone(), outputs.clone())
-            .map_err(|error| FeatureError::Filter(error.into()))?;
-        let score = self.filtered(&record, |kalman| {
-            Gradient::forward(kalman, &self.reference, &self.coordinates)
-        })?;
+        Record::new(drive.clone(), outputs.clone())
+            .map_err(|error| FeatureError::Filter(error.into()))
+    }
+
+    fn features(&self, record: &Record, score: &Gradient) -> Result<Vec<f64>, FeatureError> {
         let d = self.space.len();
         let information = &score.fisher + DMatrix::identity(d, d) * 4.0;
         let step = (information.cholesky())
@@ -100,23 +82,51 @@ impl FeatureMap for Bound {
         let fit = score.log_likelihood / (record.samples() as f64).sqrt();
         Ok(step.iter().chain(&spread).copied().chain([fit]).collect())
     }
+}
 
-    fn centred(
-        &self,
-        record: &Record,
-        initial: &[f64],
-        noise: Noise,
-    ) -> Result<Option<Centred>, FeatureError> {
-        let found = self.filtered(record, |kalman| {
-            posterior::localise(kalman, &self.space, &self.coordinates, initial, noise)
-        })?;
-        Ok(found.map(|found| Centred {
-            map: Arc::new(Self {
-                reference: found.theta.clone(),
-                ..self.clone()
-            }),
-            theta: found.theta,
-            axes: found.axes,
+impl FeatureMap for Bound {
+    fn dim(&self) -> usize {
+        2 * self.space.len() + 1
+    }
+
+    fn extract(&self, drive: &Drive, outputs: &Signal) -> Result<Vec<f64>, FeatureError> {
+        let record = self.record(drive, outputs)?;
+        let kalman = Kalman::new(self.equations.as_ref(), &record, &self.filter)?;
+        let score = Gradient::forward(&kalman, &self.reference, &self.coordinates)?;
+        self.features(&record, &score)
+    }
+
+    fn extract_all(&self, all: &[(&Drive, &Signal)]) -> Vec<Result<Vec<f64>, FeatureError>> {
+        let records: Vec<_> = (all.iter())
+            .map(|(drive, outputs)| self.record(drive, outputs))
+            .collect();
+        let kalmans: Result<Vec<Kalman<'_>>, _> = (records.iter().flatten())
+            .map(|record| Kalman::new(self.equations.as_ref(), record, &self.filter))
+            .collect();
+        let Ok(kalmans) = kalmans else {
+            let each = |(drive, outputs): &(&Drive, &Signal)| self.extract(drive, outputs);
+            return all.iter().map(each).collect();
+        };
+        let scores = Gradient::forward_all(&kalmans, &self.reference, &self.coordinates);
+        drop(kalmans);
+        let mut scores = scores.into_iter();
+        (records.into_iter())
+            .map(|record| {
+                let record = record?;
+                let score = scores.next().ok_or(FeatureError::Information)??;
+                self.features(&record, &score)
+            })
+            .collect()
+    }
+
+    fn at_once(&self) -> usize {
+        LANES
+    }
+
+    fn about(&self, theta: &[f64]) -> Option<Arc<dyn FeatureMap>> {
+        Some(Arc::new(Self {
+            reference: theta.to_vec(),
+            ..self.clone()
         }))
     }
 }
@@ -125,6 +135,7 @@ impl FeatureMap for Bound {
 mod tests {
     use super::*;
     use crate::feature::testing::Tank;
+    use crate::twin::Noise;
 
     fn bound() -> (Twin, Arc<dyn FeatureMap>) {
         let twin = Twin::new(Tank(1));
@@ -150,22 +161,5 @@ mod tests {
             assert_eq!(x.len(), 3);
             assert!(x[0] * sign > 0.0, "{k}: {x:?}");
         }
-    }
-
-    /// The posterior is centred on the truth within its own spread: 40 records, standardised errors of unit size.
-    #[test]
-    fn the_posterior_is_calibrated() {
-        let (twin, map) = bound();
-        let records = 40u64;
-        let squares: f64 = (0..records)
-            .map(|seed| {
-                let record = simulated(&twin, 0.8, seed);
-                let noise = Noise::new(seed, "posterior", 0);
-                let found = map.centred(&record, &[0.3], noise).unwrap().unwrap();
-                ((found.theta[0] - 0.8) / found.axes[(0, 0)]).powi(2)
-            })
-            .sum();
-        // χ² with 40 degrees of freedom: 40 ± 4·√80.
-        assert!((10.0..80.0).contains(&squares), "{squares}");
     }
 }

@@ -1,8 +1,8 @@
 //! Draws of θ given the records.
 
+use super::sampler::{Proposal, Round};
 use crate::fit::climb::Fitted;
 use crate::fit::problem::Problem;
-use crate::fit::sampler::{Proposal, Round};
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::twin::Noise;
 use nalgebra::DVector;
@@ -34,13 +34,13 @@ pub(crate) struct Draws {
     /// Number of independent draws that these are worth.
     pub effective: f64,
     /// Densities about the tops that follow the draws.
-    pub(super) proposals: Vec<Proposal>,
+    pub(in crate::fit) proposals: Vec<Proposal>,
     /// The best draw, where it is better than the best fit.
-    pub(super) better: Option<Vec<f64>>,
+    pub(in crate::fit) better: Option<Vec<f64>>,
 }
 
 /// Number of draws whose time is that of a fit.
-pub(super) fn usual(problem: &Problem<'_>) -> usize {
+pub(in crate::fit) fn usual(problem: &Problem<'_>) -> usize {
     (SAMPLES / problem.samples()).clamp(LEAST, MOST)
 }
 

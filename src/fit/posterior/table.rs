@@ -1,7 +1,7 @@
 //! Posterior draws of everything unknown, as a table.
 
-use super::posterior::Draws;
-use super::problem::{Problem, of_record};
+use super::resampling::Draws;
+use crate::fit::problem::{Problem, of_record};
 use crate::likelihood::kalman::{FilterError, States};
 use crate::math::to_matrix;
 use crate::twin::{Noise, Role, is_memory};
@@ -56,7 +56,7 @@ impl Posterior {
 }
 
 /// Names and values of the draws; the first states of equations are drawn given θ and the records.
-pub(super) fn table(
+pub(in crate::fit) fn table(
     problem: &Problem<'_>,
     draws: &Draws,
     noise: Noise,
