@@ -16,26 +16,38 @@ const SAME: f64 = 0.1;
 /// Times that other starts are tried. The right top of tanks records outside the prior is missed by the first four starts in one of 40.
 const AGAIN: u64 = 3;
 
-/// Fits from the prior's centre, the full θ that are given, and the best of random ones, each to its end; best first. Where only one of them
-/// ends at the best top, others are begun: a record of few tops has narrow ones, too, that one start in four finds.
+/// Starts of a search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Care {
+    /// With loud noise alone.
+    Loud,
+    /// With quiet noise, too, and more of them where only one ends at the best top.
+    Thorough,
+}
+
+/// Fits from the prior's centre, the full θ that are given, and the best of random ones, each to its end; best first.
 pub(crate) fn search(
     problem: &Problem<'_>,
     initial: &[Vec<f64>],
     noise: Noise,
     iterations: usize,
+    care: Care,
 ) -> Result<Vec<Fitted>, FilterError> {
+    let (quiet, again) = match care {
+        Care::Loud => (vec![], 0),
+        Care::Thorough => {
+            let noise = noise.child("quiet starts");
+            (screened(problem, noise, Screen::quiet(problem))?, AGAIN)
+        }
+    };
     let starts: Vec<Vec<f64>> = [problem.begin(&problem.centre())]
         .into_iter()
         .chain(initial.iter().map(|theta| problem.clamp(theta)))
         .chain(screened(problem, noise.child("starts"), Screen::LOUD)?)
-        .chain(screened(
-            problem,
-            noise.child("quiet starts"),
-            Screen::quiet(problem),
-        )?)
+        .chain(quiet)
         .collect();
     let mut fits = polish(problem, climbs(problem, &starts, iterations)?, iterations)?;
-    for round in 0..AGAIN {
+    for round in 0..again {
         if agreeing(&fits) > 1 {
             break;
         }

@@ -7,7 +7,7 @@ use crate::fit::axis::Axis;
 use crate::fit::climb::Fitted;
 use crate::fit::growing::base_fit;
 use crate::fit::problem::Problem;
-use crate::fit::starts::{polish, search};
+use crate::fit::starts::{Care, polish, search};
 use crate::likelihood::Measured;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::record::{Record, Signal};
@@ -100,7 +100,7 @@ fn fits(
     noise: Noise,
 ) -> Result<Vec<Fitted>, FilterError> {
     if !problem.is_simulated() {
-        return search(problem, initial, noise, ITERATIONS);
+        return search(problem, initial, noise, ITERATIONS, Care::Thorough);
     }
     let theta = initial.first().map(Vec::as_slice);
     let fit = base_fit(problem, theta, noise)?;
