@@ -33,17 +33,18 @@ pub(crate) fn search(
     iterations: usize,
     care: Care,
 ) -> Result<Vec<Fitted>, FilterError> {
-    let (quiet, again) = match care {
-        Care::Loud => (vec![], 0),
+    let (loud, quiet, again) = match care {
+        Care::Loud => (Screen::LOUD, vec![], 0),
         Care::Thorough => {
             let noise = noise.child("quiet starts");
-            (screened(problem, noise, Screen::quiet(problem))?, AGAIN)
+            let quiet = screened(problem, noise, Screen::quiet(problem))?;
+            (Screen::LOUD_APART, quiet, AGAIN)
         }
     };
     let starts: Vec<Vec<f64>> = [problem.begin(&problem.centre())]
         .into_iter()
         .chain(initial.iter().map(|theta| problem.clamp(theta)))
-        .chain(screened(problem, noise.child("starts"), Screen::LOUD)?)
+        .chain(screened(problem, noise.child("starts"), loud)?)
         .chain(quiet)
         .collect();
     let mut fits = polish(problem, climbs(problem, &starts, iterations)?, iterations)?;
@@ -52,7 +53,7 @@ pub(crate) fn search(
             break;
         }
         let noise = noise.child("more starts").sample(round);
-        let starts = screened(problem, noise, Screen::LOUD)?;
+        let starts = screened(problem, noise, Screen::LOUD_APART)?;
         fits.extend(climbs(problem, &starts, iterations)?);
         sort(&mut fits);
         fits = polish(problem, fits, iterations)?;
@@ -67,6 +68,8 @@ struct Screen {
     /// `true` where levels of noise are loud: a likelihood of few tops, of which the widest draws all searches. `false` where they are
     /// what is believed of them: more tops, each found by more points, and the highest stands out.
     is_loud: bool,
+    /// `true` where starts must lie apart: the best points of a screening are often of one valley.
+    is_apart: bool,
 }
 
 impl Screen {
@@ -74,6 +77,11 @@ impl Screen {
         points: 48,
         starts: 3,
         is_loud: true,
+        is_apart: false,
+    };
+    const LOUD_APART: Self = Self {
+        is_apart: true,
+        ..Self::LOUD
     };
 
     fn quiet(problem: &Problem<'_>) -> Self {
@@ -85,6 +93,7 @@ impl Screen {
             points: 64 * free.count().min(8) as u64,
             starts: 3,
             is_loud: false,
+            is_apart: true,
         }
     }
 }
@@ -119,14 +128,15 @@ fn screened(
     screened.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut starts: Vec<Vec<f64>> = vec![];
     for (_, theta) in screened {
-        if starts.len() < screen.starts && starts.iter().all(|one| is_apart(problem, one, &theta)) {
+        let is_new = |one: &Vec<f64>| !screen.is_apart || is_apart(problem, one, &theta);
+        if starts.len() < screen.starts && starts.iter().all(is_new) {
             starts.push(theta);
         }
     }
     Ok(starts)
 }
 
-/// Returns whether two points differ by a part of the prior in some entry: the best points of a screening are often of one valley.
+/// Returns whether two points differ by a part of the prior in some entry.
 fn is_apart(problem: &Problem<'_>, one: &[f64], other: &[f64]) -> bool {
     let c = &problem.coordinates;
     let (one, other) = (c.of(one), c.of(other));
