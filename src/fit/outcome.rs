@@ -61,9 +61,9 @@ pub struct Fit {
     /// Free run beside each record, N × outputs; none where it diverges.
     #[serde(skip)]
     pub free_runs: Vec<Option<Signal>>,
-    /// Where the records put the twin's own parameters.
+    /// Where the records put the twin's own parameters; none where there are none.
     #[serde(skip)]
-    pub(crate) region: Region,
+    pub(crate) region: Option<Region>,
 }
 
 /// A parameter, or a magnitude of an effect.

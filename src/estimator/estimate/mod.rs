@@ -109,7 +109,7 @@ impl Estimator {
                 let bound = in_noise.map(|shown| simulator.of(&shown.twin, Some(&*self.recipe)));
                 let bound = bound.transpose()?;
                 let bound = bound.as_ref().unwrap_or(&simulator);
-                let region = shown.as_ref().map(|shown| &shown.fit.region);
+                let region = shown.as_ref().and_then(|shown| shown.fit.region.as_ref());
                 run.refit(bound, &initial, region, &mut seconds)?
             }
         };

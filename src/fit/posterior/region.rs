@@ -20,14 +20,18 @@ pub(crate) struct Region {
 
 impl Region {
     /// Region of the first `own` entries of θ of the first record, from the draws about the best top; to first order, where these are few.
-    /// A first state that the likelihood integrates is what `start` says of it: mean and deviation.
+    /// A first state that the likelihood integrates is what `start` says of it: mean and deviation. `None` where nothing is estimated, or
+    /// the covariance is not finite.
     pub fn new(
         problem: &Problem<'_>,
         fitted: &Fitted,
         draws: &Draws,
         start: impl Fn(&str) -> Option<(f64, f64)>,
         own: usize,
-    ) -> Self {
+    ) -> Option<Self> {
+        if own == 0 {
+            return None;
+        }
         let about: Vec<DVector<f64>> = (draws.thetas.iter().zip(&draws.modes))
             .filter(|(_, mode)| **mode == 0)
             .map(|(theta, _)| DVector::from_column_slice(&theta[..own]))
@@ -46,12 +50,15 @@ impl Region {
                 covariance[(j, j)] = deviation.powi(2);
             }
         }
+        if covariance.iter().any(|v| !v.is_finite()) {
+            return None;
+        }
         let eigen = SymmetricEigen::new(covariance);
         let lengths = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
-        Self {
+        Some(Self {
             theta: mean.as_slice().to_vec(),
             axes: eigen.eigenvectors * DMatrix::from_diagonal(&lengths),
-        }
+        })
     }
 }
 
@@ -106,8 +113,8 @@ mod tests {
                 let outputs = VanDerPol.simulate(&[1.5], &drive, noise).unwrap();
                 let record = Record::new(drive.clone(), outputs).unwrap();
                 let fit = run(&subject, &[record], &FitSettings::default());
-                let fit = fit.unwrap().unwrap();
-                ((fit.region.theta[0] - 1.5) / fit.region.axes[(0, 0)]).powi(2)
+                let region = fit.unwrap().unwrap().region.unwrap();
+                ((region.theta[0] - 1.5) / region.axes[(0, 0)]).powi(2)
             })
             .sum();
         println!("{squares}");
