@@ -6,7 +6,7 @@ use super::starts::agreeing;
 
 /// Distance from the top that counts as arrived, in standard deviations: what is left to gain is its square's half, 0.02 nats.
 const ARRIVED: f64 = 0.2;
-/// The same where most searches end at one top: dry friction and thresholds make kinks, and at a kink no gradient vanishes.
+/// The same where three searches, or most of them, end at one top: dry friction and thresholds make kinks, and at a kink no gradient vanishes.
 const AGREED: f64 = 1.0;
 
 /// Side of a bound.
@@ -70,8 +70,9 @@ impl Certificate {
 
     /// `true` where the gradient is gone and more than one search ended there.
     pub fn has_converged(&self) -> bool {
-        let most = 2 * self.agreeing > self.searches && self.agreeing > 1;
+        // Three that began apart need no majority: some starts are there to find other tops.
+        let enough = self.agreeing > 2 || 2 * self.agreeing > self.searches && self.agreeing > 1;
         self.distance <= ARRIVED && (self.agreeing > 1 || self.searches == 1)
-            || self.distance <= AGREED && most
+            || self.distance <= AGREED && enough
     }
 }
