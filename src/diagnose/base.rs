@@ -73,7 +73,8 @@ impl<'a> Base<'a> {
         let starts = Noise::new(0, "diagnose/starts", 0);
         let fitted = if !problem.is_simulated() {
             let initial: Vec<Vec<f64>> = initial.iter().map(|theta| problem.full(theta)).collect();
-            // The twin is fitted again beside each explanation. With more starts, 60 trials end alike, in up to twice the time.
+            // The twin is fitted again beside each explanation. With more starts 60 open trials were decided alike, and the record of the
+            // quick start asked for a finer step than it has.
             let found = search(&problem, &initial, starts, ITERATIONS, Care::Loud)?;
             found.into_iter().next().map(|fitted| (problem, fitted))
         } else {
@@ -95,7 +96,11 @@ impl<'a> Base<'a> {
             .filter(|parameter| parameter.role == Role::Noise)
             .map(|parameter| place(parameter.target()))
             .collect();
-        Self::of(model, (noisy, measured.is_silent), vec![], None)
+        Ok(Self {
+            noisy,
+            is_silent: measured.is_silent,
+            ..Self::of(model)?
+        })
     }
 
     /// The twin with another kind of noise, fitted; `twin` is that of the model.
@@ -116,8 +121,7 @@ impl<'a> Base<'a> {
             return Ok(None);
         };
         let noises = self.noises.iter().chain(&found.terms).cloned().collect();
-        let noisy = (self.noisy.clone(), self.is_silent);
-        Base::of(model, noisy, noises, self.step).map(Some)
+        self.carried_on(model, noises).map(Some)
     }
 
     /// The twin fitted again from other θ; `None` where that is no better.
@@ -130,8 +134,7 @@ impl<'a> Base<'a> {
         let Some(model) = better else {
             return Ok(None);
         };
-        let noisy = (self.noisy.clone(), self.is_silent);
-        Self::of(model, noisy, self.noises.clone(), self.step).map(Some)
+        self.carried_on(model, self.noises.clone()).map(Some)
     }
 
     /// The twin where its fit inside the prior ends, if its own has left that: what is missing may have driven it out. `None` for a black
@@ -168,23 +171,34 @@ impl<'a> Base<'a> {
         Ok(shared(terms))
     }
 
-    fn of(
-        model: Model<'a>,
-        (noisy, is_silent): (Vec<String>, bool),
+    /// The same records, places and step with another fitted model, and these kinds of noise.
+    fn carried_on<'b>(
+        &self,
+        model: Model<'b>,
         noises: Vec<Arc<Term>>,
-        step: Option<FinerStep>,
-    ) -> Result<Self, DiagnoseError> {
+    ) -> Result<Base<'b>, DiagnoseError> {
+        Ok(Base {
+            noisy: self.noisy.clone(),
+            is_silent: self.is_silent,
+            noises,
+            step: self.step,
+            ..Base::of(model)?
+        })
+    }
+
+    /// A fitted model in units of its records, of which nothing else is known yet.
+    fn of(model: Model<'a>) -> Result<Self, DiagnoseError> {
         let (theta, outline) = (model.theta(), model.problem.outline());
         let records = model.problem.records;
         Ok(Self {
             scales: Scales::new(model.base, &theta, records, model.states()?, outline),
             frequencies: frequencies(&model)?,
-            noisy,
-            is_silent,
-            noises,
+            noisy: vec![],
+            is_silent: false,
+            noises: vec![],
+            step: None,
             theta,
             model,
-            step,
         })
     }
 }

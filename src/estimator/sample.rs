@@ -6,9 +6,9 @@
 
 use crate::estimator::error::EstimatorError;
 use crate::estimator::refine::Refined;
-use crate::math::median;
+use crate::math::{median, principal_axes};
 use crate::twin::{Noise, ParameterSpace};
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 /// Half-width of the box, in standard deviations of a cloud of spread 1.
@@ -54,9 +54,7 @@ impl CloudSampler {
             Self::Ellipsoid => Box::new(ellipsoid()?),
             Self::Sensitivity => Box::new(sensitivity()),
             Self::Box => {
-                let eigen = SymmetricEigen::new(refined.information.covariance.clone());
-                let lengths = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
-                let axes = eigen.eigenvectors * DMatrix::from_diagonal(&lengths);
+                let axes = principal_axes(refined.information.covariance.clone());
                 Box::new(EigenBox::of_spread(centre.as_slice(), &axes, spread))
             }
             Self::Hybrid => {

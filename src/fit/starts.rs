@@ -1,4 +1,4 @@
-//! The first fit of the twin as it is.
+//! Searches for the most probable θ, and where they begin.
 
 use crate::fit::climb::{Fitted, climb};
 use crate::fit::problem::Problem;
@@ -9,11 +9,18 @@ use rayon::prelude::*;
 /// Nats to the best within which a fit is carried on, and the gain at which it ends.
 const NEAR: f64 = 3.0;
 const POLISHED: f64 = 1e-4;
-/// Deviations of the prior between two starts.
+/// Random points whose likelihood is looked at with loud noise, and with quiet noise for each free entry, eight at most. The wide valleys
+/// of loud noise are met by few.
+const LOUD: u64 = 48;
+const QUIET_EACH: u64 = 64;
+const MOST_ENTRIES: usize = 8;
+/// Number of the points of either that become starts.
+const STARTS: usize = 3;
+/// Deviations of the prior between two starts that lie apart: nearer ones are mostly of one valley.
 const APART: f64 = 1.0;
 /// Nats within which two fits have found the same top.
 const SAME: f64 = 0.1;
-/// Times that other starts are tried. The right top of tanks records outside the prior is missed by the first four starts in one of 40.
+/// Times that other starts are tried while only one search ends at the best top.
 const AGAIN: u64 = 3;
 
 /// Starts of a search.
@@ -61,10 +68,9 @@ pub(crate) fn search(
     Ok(fits)
 }
 
-/// Random points whose likelihood is looked at, and how many of the best become starts.
+/// Random points whose likelihood is looked at.
 struct Screen {
     points: u64,
-    starts: usize,
     /// `true` where levels of noise are loud: a likelihood of few tops, of which the widest draws all searches. `false` where they are
     /// what is believed of them: more tops, each found by more points, and the highest stands out.
     is_loud: bool,
@@ -74,8 +80,7 @@ struct Screen {
 
 impl Screen {
     const LOUD: Self = Self {
-        points: 48,
-        starts: 3,
+        points: LOUD,
         is_loud: true,
         is_apart: false,
     };
@@ -90,8 +95,7 @@ impl Screen {
             .iter()
             .filter(|axis| !axis.held && axis.begin.is_none());
         Self {
-            points: 64 * free.count().min(8) as u64,
-            starts: 3,
+            points: QUIET_EACH * free.count().min(MOST_ENTRIES) as u64,
             is_loud: false,
             is_apart: true,
         }
@@ -129,7 +133,7 @@ fn screened(
     let mut starts: Vec<Vec<f64>> = vec![];
     for (_, theta) in screened {
         let is_new = |one: &Vec<f64>| !screen.is_apart || is_apart(problem, one, &theta);
-        if starts.len() < screen.starts && starts.iter().all(is_new) {
+        if starts.len() < STARTS && starts.iter().all(is_new) {
             starts.push(theta);
         }
     }

@@ -3,8 +3,9 @@
 use super::resampling::Draws;
 use crate::fit::climb::Fitted;
 use crate::fit::problem::Problem;
+use crate::math::principal_axes;
 use crate::twin::Role;
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 
 /// Draws for each parameter that a covariance needs.
 const DRAWS_EACH: usize = 10;
@@ -53,11 +54,9 @@ impl Region {
         if covariance.iter().any(|v| !v.is_finite()) {
             return None;
         }
-        let eigen = SymmetricEigen::new(covariance);
-        let lengths = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
         Some(Self {
             theta: mean.as_slice().to_vec(),
-            axes: eigen.eigenvectors * DMatrix::from_diagonal(&lengths),
+            axes: principal_axes(covariance),
         })
     }
 }
@@ -117,7 +116,6 @@ mod tests {
                 ((region.theta[0] - 1.5) / region.axes[(0, 0)]).powi(2)
             })
             .sum();
-        println!("{squares}");
         assert!((10.0..80.0).contains(&squares), "{squares}");
     }
 }

@@ -87,10 +87,7 @@ impl Score {
         coordinates: &Coordinates,
     ) -> Result<Self, FilterError> {
         let found = side_by_side(std::slice::from_ref(kalman), theta, coordinates).pop();
-        match found.flatten() {
-            Some(score) => Ok(score),
-            None => Self::forward_one_by_one(kalman, theta, coordinates),
-        }
+        Self::or_one_by_one(found.flatten(), kalman, theta, coordinates)
     }
 
     /// As [`forward`](Self::forward), of several records of one twin at one θ: their passes run side by side, too. The same bits.
@@ -100,18 +97,27 @@ impl Score {
         theta: &[f64],
         coordinates: &Coordinates,
     ) -> Vec<Result<Self, FilterError>> {
-        let fit = kalmans.iter().all(|k| k.fits_beside(&kalmans[0]));
-        if !fit {
+        if !kalmans.iter().all(|k| k.fits_beside(&kalmans[0])) {
             let each = |kalman| Self::forward(kalman, theta, coordinates);
             return kalmans.iter().map(each).collect();
         }
         let found = side_by_side(kalmans, theta, coordinates);
         (kalmans.iter().zip(found))
-            .map(|(kalman, found)| match found {
-                Some(score) => Ok(score),
-                None => Self::forward_one_by_one(kalman, theta, coordinates),
-            })
+            .map(|(kalman, found)| Self::or_one_by_one(found, kalman, theta, coordinates))
             .collect()
+    }
+
+    /// The score that lanes found, or, where they cannot hold the filter, one pass after the other.
+    fn or_one_by_one(
+        found: Option<Self>,
+        kalman: &Kalman<'_>,
+        theta: &[f64],
+        coordinates: &Coordinates,
+    ) -> Result<Self, FilterError> {
+        match found {
+            Some(score) => Ok(score),
+            None => Self::forward_one_by_one(kalman, theta, coordinates),
+        }
     }
 
     /// As [`forward`](Self::forward), one pass after the other.

@@ -37,10 +37,9 @@ pub(crate) fn measured(
         Twin::Equations(base) => measured_equations(base, records, beliefs),
         Twin::BlackBox(_) => {
             let (twin, is_silent) = ensemble::measured(twin, records)?;
-            let levels = vec![];
             Ok(Measured {
                 twin,
-                levels,
+                levels: vec![],
                 is_silent,
             })
         }

@@ -180,6 +180,10 @@ impl<const N: usize, const P: usize> Kernel for Pass<'_, N, P> {
                 for i in 0..N {
                     // A state without noise has no shifted points.
                     let moved = bent.and((q[i].below(zero)).or(zero.below(q[i])));
+                    if !moved.any() {
+                        cov[i][i] += q[i] * q[i];
+                        continue;
+                    }
                     let pair = &mut noises[2 * i * N..2 * (i + 1) * N];
                     noise_differences(pair, centre, (i, q[i]), moved, &mut mean);
                     add_outer(pair, &mut cov);
