@@ -15,6 +15,7 @@ use crate::effect::{TargetKind, targets};
 use crate::fit::axis::Axis;
 use crate::fit::climb::{Fitted, climb, fit};
 use crate::fit::growing::base_fit;
+use crate::fit::passes::Passes;
 use crate::fit::problem::Problem;
 use crate::fit::starts::{Care, search};
 use crate::likelihood::Measured;
@@ -60,6 +61,16 @@ impl<'a> Base<'a> {
         records: &'a [Record],
         settings: &DiagnoseSettings,
     ) -> Result<Self, DiagnoseError> {
+        Self::counted(measured, records, settings, &Passes::default())
+    }
+
+    /// Fits the twin, its passes added to these.
+    pub fn counted(
+        measured: &'a Measured,
+        records: &'a [Record],
+        settings: &DiagnoseSettings,
+        passes: &Passes,
+    ) -> Result<Self, DiagnoseError> {
         let twin = &measured.twin;
         let space = twin.parameters();
         let own = space.len() - measured.levels.len();
@@ -68,7 +79,7 @@ impl<'a> Base<'a> {
             let theta: Vec<f64> = initial.iter().copied().take(own).chain(levels).collect();
             theta
         });
-        let problem = Problem::of_measured(measured, records);
+        let problem = Problem::of_measured(measured, records).counted_with(passes);
         // The same starts whatever the seed: which optimum is found must not depend on it.
         let starts = Noise::new(0, "diagnose/starts", 0);
         let fitted = if !problem.is_simulated() {
@@ -78,7 +89,7 @@ impl<'a> Base<'a> {
             let found = search(&problem, &initial, starts, ITERATIONS, Care::Loud)?;
             found.into_iter().next().map(|fitted| (problem, fitted))
         } else {
-            let problem = Problem::of_twin(twin, records);
+            let problem = Problem::of_twin(twin, records).counted_with(passes);
             base_fit(&problem, initial.as_deref(), settings.noise())?
                 .map(|fitted| (problem, fitted))
         };
@@ -223,7 +234,7 @@ fn inside<'a>(problem: &Problem<'a>) -> Problem<'a> {
             _ => axis.clone(),
         })
         .collect::<Vec<Axis>>();
-    Problem::new(problem.twin.clone(), axes, problem.records)
+    problem.with_twin(problem.twin.clone(), axes)
 }
 
 /// Number of the twin's own parameters outside their prior.

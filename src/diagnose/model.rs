@@ -79,7 +79,7 @@ impl<'a> Model<'a> {
     pub fn problem_of(&self, base: &Twin) -> Result<Problem<'a>, DiagnoseError> {
         let twin = with_terms(base, self.terms.iter().map(Arc::as_ref))?;
         let axes = self.problem.axes[..twin.parameters().len()].to_vec();
-        let mut problem = Problem::new(twin, axes, self.problem.records);
+        let mut problem = self.problem.with_twin(twin, axes);
         problem.families.clone_from(&self.problem.families);
         Ok(problem)
     }
@@ -117,7 +117,7 @@ impl<'a> Model<'a> {
             axes.extend(term.axes.iter().cloned());
         }
         let entries: Vec<usize> = (d..axes.len()).collect();
-        let mut problem = Problem::new(twin, axes, self.problem.records);
+        let mut problem = self.problem.with_twin(twin, axes);
         problem.families = families;
         Ok(Extended {
             terms,

@@ -191,9 +191,10 @@ fn with_step<R>(
         initial: Some(base.theta.clone()),
         ..settings.clone()
     };
+    let passes = base.model.problem.passes();
     let base = Base {
         step: Some(finer.step),
-        ..Base::new(&measured, records, &begin)?
+        ..Base::counted(&measured, records, &begin, passes)?
     };
     let better = base.fitted_from(&finer.thetas)?;
     let base = better.unwrap_or(base);

@@ -265,6 +265,7 @@ fn report(
         substeps: base.step.map(|step| step.substeps),
         candidates: findings.listed.len() + findings.unknown.len(),
         not_tested: not_tested.clone(),
+        passes: model.problem.passes().so_far(),
         seconds: 0.0,
     })
 }

@@ -10,6 +10,7 @@
 //! | `starts.rs`, `growing.rs` | where does a search begin |
 //! | `climb.rs`, `slope.rs` | the most probable θ |
 //! | `certificate.rs` | has the search arrived, and what lies at a bound |
+//! | `passes.rs` | what a search costs |
 //! | `evidence.rs` | the likelihood averaged over the prior |
 //! | `reference.rs` | linear gain of a direction beside θ |
 //! | `doubts.rs` | reasons to doubt a fit |
@@ -26,6 +27,7 @@ pub(crate) mod follow;
 pub(crate) mod growing;
 pub(crate) mod least_squares;
 mod outcome;
+pub(crate) mod passes;
 pub(crate) mod posterior;
 pub(crate) mod problem;
 pub(crate) mod reference;

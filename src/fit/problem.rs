@@ -1,6 +1,7 @@
 //! A twin and the records that it is fitted to.
 
 use crate::fit::axis::{Axis, EvidencePrior, Family};
+use crate::fit::passes::Passes;
 use crate::likelihood::kalman::{Coordinates, FilterError, Filtered, Score, States};
 use crate::likelihood::{Likelihood, Measured, likelihood_of};
 use crate::record::{Record, Signal};
@@ -25,6 +26,8 @@ pub(crate) struct Problem<'a> {
     pub coordinates: Coordinates,
     coordinates_of: Vec<Coordinates>,
     likelihood: Arc<dyn Likelihood>,
+    /// What fits of this problem, and of those made from it, have cost.
+    passes: Passes,
     /// Gain at which a fit is done, in nats.
     done: f64,
 }
@@ -81,8 +84,22 @@ impl<'a> Problem<'a> {
                 5e-3
             },
             likelihood,
+            passes: Passes::default(),
             twin,
             records,
+        }
+    }
+
+    /// Another twin or other axes on the same records; its passes are counted with those of this one.
+    pub fn with_twin(&self, twin: Twin, axes: Vec<Axis>) -> Self {
+        Self::new(twin, axes, self.records).counted_with(&self.passes)
+    }
+
+    /// The same problem, its passes added to these.
+    pub fn counted_with(self, passes: &Passes) -> Self {
+        Self {
+            passes: passes.clone(),
+            ..self
         }
     }
 
@@ -124,7 +141,8 @@ impl<'a> Problem<'a> {
     /// The same twin on other records.
     pub fn on<'b>(&self, records: &'b [Record]) -> Problem<'b> {
         let d = self.twin.parameters().len();
-        Problem::new(self.twin.clone(), self.axes[..d].to_vec(), records)
+        let axes = self.axes[..d].to_vec();
+        Problem::new(self.twin.clone(), axes, records).counted_with(&self.passes)
     }
 
     /// States, inputs and outputs; of a black box, its predicted outputs stand for states.
@@ -256,7 +274,7 @@ impl<'a> Problem<'a> {
         let (mut log_likelihood, mut innovations) = (0.0, Some(vec![]));
         for (r, record) in self.records.iter().enumerate() {
             let theta = self.of_record(r, theta);
-            let (value, filtered) = self.likelihood.log_likelihood(&theta, record)?;
+            let (value, filtered) = self.counted().log_likelihood(&theta, record)?;
             log_likelihood += value;
             innovations = innovations.zip(filtered).map(|(mut all, filtered)| {
                 all.push(filtered);
@@ -269,15 +287,26 @@ impl<'a> Problem<'a> {
         })
     }
 
+    /// Passes over records so far, of this problem and of those made from it.
+    pub fn passes(&self) -> &Passes {
+        &self.passes
+    }
+
+    /// The likelihood, about to pass over a record.
+    fn counted(&self) -> &dyn Likelihood {
+        self.passes.count();
+        self.likelihood.as_ref()
+    }
+
     /// Outputs of a record predicted from its rows before, at θ of one record; `None` where only free runs are known.
     pub fn predicted(&self, theta: &[f64], record: &Record) -> Result<Option<Signal>, FilterError> {
-        self.likelihood.predicted(theta, record)
+        self.counted().predicted(theta, record)
     }
 
     /// Gradient and information of one record at the full θ; `None` where only differences give them.
     pub(super) fn score(&self, r: usize, theta: &[f64]) -> Result<Option<Score>, FilterError> {
         let (own, coordinates) = (self.of_record(r, theta), &self.coordinates_of[r]);
-        self.likelihood.score(&own, &self.records[r], coordinates)
+        self.counted().score(&own, &self.records[r], coordinates)
     }
 
     /// Gain at which a fit is done, in nats.
@@ -305,21 +334,21 @@ impl<'a> Problem<'a> {
     /// Innovations of each record.
     pub fn filtered(&self, theta: &[f64]) -> Result<Vec<Filtered>, FilterError> {
         (self.records.iter().enumerate())
-            .map(|(r, record)| self.likelihood.filtered(&self.of_record(r, theta), record))
+            .map(|(r, record)| self.counted().filtered(&self.of_record(r, theta), record))
             .collect()
     }
 
     /// Innovations and filtered states of each record.
     pub fn states(&self, theta: &[f64]) -> Result<Vec<(Filtered, Signal)>, FilterError> {
         (self.records.iter().enumerate())
-            .map(|(r, record)| self.likelihood.states(&self.of_record(r, theta), record))
+            .map(|(r, record)| self.counted().states(&self.of_record(r, theta), record))
             .collect()
     }
 
     /// States of each record given all of it; empty for a black box.
     pub fn smoothed(&self, theta: &[f64]) -> Result<Vec<States>, FilterError> {
         (self.records.iter().enumerate())
-            .map(|(r, record)| self.likelihood.smoothed(&self.of_record(r, theta), record))
+            .map(|(r, record)| self.counted().smoothed(&self.of_record(r, theta), record))
             .filter_map(Result::transpose)
             .collect()
     }

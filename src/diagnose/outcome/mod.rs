@@ -296,6 +296,8 @@ pub struct Diagnosis {
     pub not_tested: Vec<String>,
     /// Reasons to doubt the result.
     pub warnings: Vec<Warning>,
+    /// Passes over a record, of a filter or an ensemble, that the diagnosis took, without those of `--calibrate`: its cost on any machine.
+    pub passes: u64,
     /// Wall-clock seconds.
     pub seconds: f64,
     /// Each record with one-step residuals in the place of its outputs: prediction errors of the twin with the accepted effects, over their

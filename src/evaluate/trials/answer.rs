@@ -63,6 +63,8 @@ pub(crate) struct Outcome {
     pub parameters: Vec<Refitted>,
     /// Share of the gap that the accepted effects close.
     pub closed: Option<f64>,
+    /// Passes over a record that the diagnosis took.
+    pub passes: u64,
 }
 
 /// An effect with its probability.
@@ -169,6 +171,7 @@ impl Outcome {
                 })
                 .collect(),
             closed: found.shrinkage.as_ref().and_then(|share| share.closed),
+            passes: found.passes,
         }
     }
 

@@ -302,6 +302,7 @@ impl Serialize for Row {
         object.serialize_field("true_closed", &self.true_share.and_then(|s| s.closed))?;
         object.serialize_field("failure", &self.failure)?;
         object.serialize_field("redraws", &self.redraws)?;
+        object.serialize_field("passes", &outcome.map(|o| o.passes))?;
         object.serialize_field("seconds", &self.seconds)?;
         object.end()
     }

@@ -156,5 +156,5 @@ fn with_axes<'a>(
     for (j, axis) in axes.iter_mut().enumerate() {
         change(axis, j, &space);
     }
-    Problem::new(problem.twin.clone(), axes, problem.records)
+    problem.with_twin(problem.twin.clone(), axes)
 }

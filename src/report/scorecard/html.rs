@@ -65,7 +65,7 @@ fn scores(card: &Scorecard) -> String {
     let caption = "Intervals are Clopper and Pearson’s.";
     let rest = format!(
         "Mean log score of the truth {} nats, mean Brier score {}, over {} gaps with stated probabilities. Mean size of a class \
-         {}, of a set of places {}. Median share that the true effects close {}. Mean time of a diagnosis {} s. Draws of truths given up: {}.",
+         {}, of a set of places {}. Median share that the true effects close {}. Mean time of a diagnosis {} s, {} passes over its record. Draws of truths given up: {}.",
         dash(card.probabilities.log_score),
         dash(card.probabilities.brier),
         card.probabilities.trials,
@@ -73,6 +73,7 @@ fn scores(card: &Scorecard) -> String {
         dash(card.mean_places),
         dash(card.closed.true_median),
         dash(card.seconds_per_record),
+        dash(card.passes_per_record),
         card.redraws
     );
     table(caption, &head, &rows) + &paragraph(&rest)

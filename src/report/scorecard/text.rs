@@ -60,6 +60,11 @@ pub fn scorecard_text(card: &Scorecard) -> String {
             card.closed.true_median,
             "",
         ),
+        (
+            "Mean number of passes of a diagnosis",
+            card.passes_per_record,
+            "",
+        ),
         ("Mean time of a diagnosis", card.seconds_per_record, "s"),
     ] {
         if let Some(value) = value {

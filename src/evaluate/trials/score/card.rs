@@ -131,6 +131,8 @@ pub struct Scorecard {
     pub(crate) steadiness: Vec<Steadiness>,
     /// The diagnosis beside simple answers.
     pub(crate) baselines: Vec<Baseline>,
+    /// Mean number of passes over a record of a diagnosis that did not fail.
+    pub(crate) passes_per_record: Option<f64>,
     /// Mean wall-clock seconds of a diagnosis.
     pub(crate) seconds_per_record: Option<f64>,
     /// Diagnoses that ended in an error, of all.
@@ -158,6 +160,9 @@ impl Scorecard {
                 .collect();
             mean(&sizes)
         };
+        let passes: Vec<f64> = (rows.iter().filter_map(|row| row.outcome.as_ref()))
+            .map(|outcome| outcome.passes as f64)
+            .collect();
         let seconds: Vec<f64> = rows.iter().map(|row| row.seconds).collect();
         let right = |row: &Row| matches!(row.fate(), Fate::Delivered | Fate::Quiet);
         let is_fine = |row: &Row| row.is_null() && !row.is_coarse();
@@ -191,6 +196,7 @@ impl Scorecard {
             mean_places: mean_size(|o| o.places.len()),
             steadiness: steadiness(&rows),
             baselines: baselines(&rows),
+            passes_per_record: mean(&passes),
             seconds_per_record: mean(&seconds),
             failed: over(&|_| true, &|row| !answered(row)),
             redraws: rows.iter().map(|row| row.redraws).sum(),

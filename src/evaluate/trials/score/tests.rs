@@ -54,6 +54,7 @@ fn row(kind: Kind, truth: &[&str], accepted: &[&str], probability: f64) -> Row {
                 interval: [0.95, 1.25],
             }],
             closed: None,
+            passes: 100,
         }),
         failure: None,
         seconds: 2.0,
