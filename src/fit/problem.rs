@@ -26,7 +26,7 @@ pub(crate) struct Problem<'a> {
     pub coordinates: Coordinates,
     coordinates_of: Vec<Coordinates>,
     likelihood: Arc<dyn Likelihood>,
-    /// What fits of this problem, and of those made from it, have cost.
+    /// Cost so far: of fits of this problem and of those made from it.
     passes: Passes,
     /// Gain at which a fit is done, in nats.
     done: f64,

@@ -27,7 +27,7 @@ fn a_record_is_fitted_and_bad_calls_are_refused() {
     ]);
 
     let value = json(&["fit", &record, "--twin", "tanks", "--out", &out, "--json"]);
-    assert_eq!(value["schema"], "truetwin.fit/1");
+    valid(&value);
     assert_eq!(value["parameters"].as_array().unwrap().len(), 4);
     assert_eq!(value["noise"].as_array().unwrap().len(), 3);
     assert_eq!(value["convergence"]["converged"], true);
@@ -45,12 +45,17 @@ fn a_record_is_fitted_and_bad_calls_are_refused() {
         assert!(text.contains(part), "{part}: {text}");
     }
 
+    let drawn = json(&["fit", &record, "--twin", "tanks", "--draws", "20", "--json"]);
+    valid(&drawn);
+    assert_eq!(drawn["posterior"]["draws"], 20);
+
     // Known levels and starts are no part of the fit.
     let held = study(
         "held.toml",
         "[noise]\nh1 = { std = 0.1, known = true }\ny = { std = 0.15, known = true }\n[start]\nh1 = 0.0\n",
     );
     let value = json(&["fit", &record, "--study", &held, "--json"]);
+    valid(&value);
     assert_eq!(value["noise"].as_array().unwrap().len(), 1);
     assert_eq!(value["starts"][0]["std_error"].as_f64(), Some(0.0));
     let fixed = study(
@@ -59,6 +64,7 @@ fn a_record_is_fitted_and_bad_calls_are_refused() {
     );
     // Nothing to estimate: the record is tested, noise alone is fitted; an estimator has nothing to learn.
     let value = json(&["fit", &record, "--study", &fixed, "--json"]);
+    valid(&value);
     assert_eq!(value["parameters"].as_array().unwrap().len(), 0);
     assert_eq!(value["noise"].as_array().unwrap().len(), 3);
     let text = done(&["fit", &record, "--study", &fixed, "--out", &at("tested")]);
@@ -139,6 +145,13 @@ fn a_long_step_is_told() {
     done(&[&simulate[..], &["--out", &record]].concat());
     let value = json(&["fit", &record, "--study", &coarse, "--json"]);
     assert!(codes(&value).contains(&"step-matters"), "{value}");
+}
+
+/// Compares a fit as the program prints it with its contract.
+fn valid(value: &Value) {
+    let text = include_str!("../../contract/fit.schema.json");
+    let schema = serde_json::from_str(text).unwrap();
+    assert!(jsonschema::is_valid(&schema, value), "{value:#}");
 }
 
 /// Codes of the warnings of a fit.
