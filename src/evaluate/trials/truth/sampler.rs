@@ -5,7 +5,7 @@ use super::imitators::{Imitators, rival};
 use super::listed::Listed;
 use super::prior::{conditions, has_room, nuisances, theta};
 use super::reject::Reject;
-use super::sizing::{LEAST, Sized, Stage};
+use super::sizing::Stage;
 use crate::evaluate::EvaluateError;
 use crate::evaluate::trials::draft::{Draft, Form, index};
 use crate::evaluate::trials::information::Information;
@@ -225,28 +225,22 @@ impl<'a> TruthSampler<'a> {
         let Some(drafts) = self.drafts(kind, &scene, source) else {
             return Ok(Err(Reject::NoLaw));
         };
-        let mut all: Vec<Sized> = Vec::with_capacity(drafts.len());
-        for (draft, effect) in drafts {
-            let [low, high] = INFORMATION;
-            let wanted = low * (high / low).powf(source.uniform());
-            let Some(sized) = stage.sized(&draft, wanted, &information)? else {
-                return Ok(Err(Reject::TooWeak));
-            };
+        let [low, high] = INFORMATION;
+        let wanted: Vec<f64> = (drafts.iter())
+            .map(|_| low * (high / low).powf(source.uniform()))
+            .collect();
+        let own: Vec<&Draft> = drafts.iter().map(|(draft, _)| draft).collect();
+        let all = match stage.all_sized(&own, &wanted, &information)? {
+            Ok(all) => all,
+            Err(reject) => return Ok(Err(reject)),
+        };
+        for ((draft, effect), sized) in drafts.iter().zip(&all) {
             let target = self.places.name(sized.departure.place).to_owned();
             truth.labels.push(draft.label(&target));
             truth.formulas.extend(draft.formula());
-            truth.effects.extend(effect);
+            truth.effects.extend(effect.clone());
             truth.targets.push(target);
             truth.departures.push(sized.departure.clone());
-            all.push(sized);
-        }
-        // What one departure of a pair explains of the other, no record tells.
-        if let [first, second] = &mut all[..] {
-            first.nats *= information.unexplained(&first.change, &second.change);
-            second.nats *= information.unexplained(&second.change, &first.change);
-        }
-        if all.iter().any(|sized| sized.nats < LEAST) {
-            return Ok(Err(Reject::TooAlike));
         }
         truth.information = all.iter().map(|sized| sized.nats).reduce(f64::min);
         let imitators = (all.iter().enumerate())

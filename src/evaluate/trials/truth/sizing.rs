@@ -1,5 +1,6 @@
 //! The size at which a departure has the expected information that it is to have.
 
+use super::reject::Reject;
 use crate::evaluate::EvaluateError;
 use crate::evaluate::trials::draft::Draft;
 use crate::evaluate::trials::information::{Change, Information};
@@ -17,7 +18,10 @@ const NEAR: f64 = 0.15;
 /// Farthest that is taken where no nearer one was found.
 const FAR: f64 = 1.0;
 /// Less than this is no departure.
-pub(super) const LEAST: f64 = 0.5;
+const LEAST: f64 = 0.5;
+/// A departure of a pair of whose information the other explains more than nine tenths is the other in another form. Half or twice of it
+/// changes how many pairs are drawn again, not how large the others are.
+const OWN: f64 = 0.1;
 
 /// Everything of a trial but its departures.
 pub(super) struct Stage<'a> {
@@ -99,6 +103,52 @@ impl Stage<'_> {
             return Ok(None);
         };
         Ok(information.change(pair)?)
+    }
+
+    /// The departures at the sizes at which each has about the wanted nats. Of a pair, what one departure explains of the other no record
+    /// tells: only the rest counts.
+    pub fn all_sized(
+        &self,
+        drafts: &[&Draft],
+        wanted: &[f64],
+        information: &Information<'_>,
+    ) -> Result<Result<Vec<Sized>, Reject>, EvaluateError> {
+        let sized = |each: &[f64]| -> Result<Option<Vec<Sized>>, EvaluateError> {
+            (drafts.iter().zip(each))
+                .map(|(draft, nats)| self.sized(draft, *nats, information))
+                .collect()
+        };
+        let Some(all) = sized(wanted)? else {
+            return Ok(Err(Reject::TooWeak));
+        };
+        let own = |all: &[Sized]| match all {
+            [a, b] => vec![
+                information.unexplained(&a.change, &b.change),
+                information.unexplained(&b.change, &a.change),
+            ],
+            all => vec![1.0; all.len()],
+        };
+        let shares = own(&all);
+        if shares.iter().all(|share| *share == 1.0) {
+            return Ok(Ok(all));
+        }
+        if shares.iter().any(|share| *share < OWN) {
+            return Ok(Err(Reject::TooAlike));
+        }
+        // The share hardly depends on the sizes: once is enough.
+        let larger: Vec<f64> = wanted.iter().zip(&shares).map(|(w, s)| w / s).collect();
+        let Some(mut all) = sized(&larger)? else {
+            return Ok(Err(Reject::TooAlike));
+        };
+        let shares = own(&all);
+        for (sized, share) in all.iter_mut().zip(shares) {
+            sized.nats *= share;
+        }
+        let is_far = |(sized, wanted): (&Sized, &f64)| (sized.nats / wanted).ln().abs() > FAR;
+        match all.iter().zip(wanted).any(is_far) {
+            true => Ok(Err(Reject::TooAlike)),
+            false => Ok(Ok(all)),
+        }
     }
 
     /// Searches the size at which a departure has about `wanted` nats; `None` where none comes near.

@@ -294,13 +294,24 @@ fn departures_that_are_alike_have_no_information_beside_each_other() {
         assert!(information.unexplained(&push, &bias) < 0.01);
         assert!(information.unexplained(&push, &lag) > 0.1);
     });
-    // What a pair is drawn with is what remains, and is not nothing.
+}
+
+/// What remains of each departure of a pair is drawn as a single one's information is: the smaller of two logarithms is a third of its range
+/// above the least, on average.
+#[test]
+fn pairs_have_information_beside_each_other() {
     let study = tanks(250);
     let sampler = sampler(&study);
-    for trial in 0..3 {
-        let truth = draw(&sampler, Kind::Pair, trial).truth;
-        assert!(truth.information.unwrap() >= LEAST, "{truth:?}");
-    }
+    let all: Vec<f64> = (0..12)
+        .map(|trial| draw(&sampler, Kind::Pair, trial).truth.information.unwrap())
+        .map(f64::ln)
+        .collect();
+    let range = (INFORMATION[1] / INFORMATION[0]).ln();
+    // Its standard deviation is 0.24 of the range.
+    let count = all.len() as f64;
+    let mean = all.iter().sum::<f64>() / count / range;
+    let error = 0.24 / count.sqrt();
+    assert!((mean - 1.0 / 3.0).abs() < 2.5 * error, "{mean} ± {error}");
 }
 
 /// A drift of the pump's gain is as well one of the pump, and of the tank that it fills.
