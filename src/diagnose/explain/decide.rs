@@ -90,25 +90,29 @@ pub(in crate::diagnose) fn decide(
         most = keys.len() - 1;
     }
     // Listed effects that explain most, beside something unknown, or with so little left that chance may have made it. What is inside a
-    // black box has no functions to stand for it.
-    let best = (candidates.iter())
-        .filter(|c| c.0.len() <= most)
-        .max_by(|a, b| a.1.total_cmp(&b.1))
-        .map(|best| likeliest(best, &candidates, chances, |_| true));
+    // black box has no functions to stand for it. Of two of which one is refuted, the other may explain most.
     let kinds = &chances.kinds;
-    if let Some((keys, own, left)) = best
-        && has_equations
-        && *own > (1.0 - Thresholds::OUTDONE) * best_unknown
-        && kinds.unknown
-            < match leaves_nothing(*own, *left) {
-                true => kinds.partial,
-                false => kinds.partial + kinds.listed,
-            }
-        && *left < Thresholds::REST * (own + left)
-    {
-        return named(findings, chances, keys, Decision::Partial);
-    }
-    Conclusion::none_of_these()
+    let explains_most = |(_, own, left): &Candidate| {
+        has_equations
+            && *own > (1.0 - Thresholds::OUTDONE) * best_unknown
+            && kinds.unknown
+                < match leaves_nothing(*own, *left) {
+                    true => kinds.partial,
+                    false => kinds.partial + kinds.listed,
+                }
+            && *left < Thresholds::REST * (own + left)
+    };
+    (1..=most)
+        .rev()
+        .filter_map(|most| {
+            let best = (candidates.iter())
+                .filter(|c| c.0.len() <= most)
+                .max_by(|a, b| a.1.total_cmp(&b.1))?;
+            let best = likeliest(best, &candidates, chances, |_| true);
+            explains_most(best).then(|| named(findings, chances, &best.0, Decision::Partial))
+        })
+        .find(|conclusion| conclusion.decision == Decision::Partial)
+        .unwrap_or_else(Conclusion::none_of_these)
 }
 
 /// The most probable of the candidates within 3 nats of the best one, and of as many effects: a function may be one of them in another
@@ -188,5 +192,26 @@ mod tests {
         };
         assert_eq!(decided(53.0), Decision::Partial);
         assert_eq!(decided(56.0), Decision::NoneOfThese);
+    }
+
+    /// Of a pair whose second effect is less probable than something unknown in its place, the first still explains most.
+    #[test]
+    fn the_first_of_a_refuted_pair_is_a_part() {
+        let [first, second] =
+            [("h1", 130.0), ("h2", 80.0)].map(|(at, gain)| wave(Nature::Listed, at, gain));
+        let mut pair = second.clone();
+        pair.terms.extend(first.terms.clone());
+        pair.gain = 145.0;
+        let mut findings = Findings {
+            unknown: (0..40).map(|_| wave(Nature::Function, "y", 0.0)).collect(),
+            ..Findings::default()
+        };
+        findings.add(&first, Some(vec![wave(Nature::Function, "y", 150.0)]));
+        findings.add(&pair, Some(vec![wave(Nature::Function, "y", 150.5)]));
+        findings.listed = vec![first.clone(), second];
+        findings.several.push(pair);
+        let conclusion = decide(&findings, &findings.chances(), 2, true);
+        assert_eq!(conclusion.decision, Decision::Partial);
+        assert_eq!(conclusion.accepted, first.keys());
     }
 }

@@ -141,9 +141,9 @@ impl<'a> Findings<'a> {
         self.listed.iter().find(|f| keys.contains(&f.last().key()))
     }
 
-    /// Nats that so many effects together cost: their prior, and what the first law's own form may leave.
+    /// Nats that so many effects together cost: their prior, and the fine print of the first law.
     pub fn price(&self, count: usize) -> f64 {
-        self.prior(count) + Thresholds::SECOND_SHARE * self.top().max(0.0) * (count - 1) as f64
+        self.prior(count) + Thresholds::FINE_PRINT * self.top().max(0.0) * (count - 1) as f64
     }
 
     /// Nats of the prior that something else is missing beside the first effect, one of all that are listed, in either order.
@@ -243,7 +243,7 @@ mod tests {
         assert_eq!(findings.price(1), 0.0);
     }
 
-    /// A second effect has to add a tenth of what the first one explains, and its prior; what may imitate the step's error is asked about
+    /// A second effect has to add its prior, and a little of what the first one explains; what may imitate the step's error is asked about
     /// it, the nearest rivals, too.
     #[test]
     fn a_second_effect_adds_a_share() {
@@ -258,7 +258,7 @@ mod tests {
             };
             findings.candidates().map(|f| f.gain).collect::<Vec<f64>>()
         };
-        assert_eq!(found(221.0), [200.0, 197.0]);
-        assert_eq!(found(223.0), [223.0, 200.0, 197.0]);
+        assert_eq!(found(206.0), [200.0, 197.0]);
+        assert_eq!(found(207.0), [207.0, 200.0, 197.0]);
     }
 }

@@ -6,6 +6,7 @@
 
 use super::basis::{Of, TERMS, sum_of_one};
 use super::entry::Entry;
+use super::followed::followed;
 use crate::twin::{
     Layout, Modify, Now, Outline, Parameter, ParameterSpace, Role, StateSpace, Twin,
 };
@@ -13,7 +14,7 @@ use smallvec::SmallVec;
 use std::sync::Arc;
 
 /// Largest change of the logarithm of a parameter: e⁵ is beyond any that a record could show.
-const LARGEST: f64 = 5.0;
+pub(super) const LARGEST: f64 = 5.0;
 
 /// A function, where it enters, and the range that it is drawn over.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,8 +25,11 @@ pub(in crate::diagnose) struct Entered {
     pub ends: (f64, f64),
 }
 
-/// The twin with a function; θ is longer by its coefficients. A black box shows no states, and stays.
+/// The twin with a function; θ is longer by its coefficients.
 pub(in crate::diagnose) fn with_function(base: Twin, function: Entered) -> Twin {
+    if let Twin::BlackBox(base) = base {
+        return followed(base, function);
+    }
     base.modified(|base| {
         let mut outline = base.outline();
         let coefficients = (1..=TERMS).map(|k| {

@@ -6,6 +6,7 @@ pub(in crate::diagnose) mod disturbed_equations;
 mod disturbed_signals;
 mod entered;
 pub(in crate::diagnose) mod entry;
+mod followed;
 pub(in crate::diagnose) mod functions;
 pub(in crate::diagnose) mod listed;
 pub(in crate::diagnose) mod noise;
@@ -207,7 +208,7 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
                 };
                 Some(of_trace(&target, is_sensor, &seen, size, trace))
             }));
-            if has_equations && is_sensor {
+            if is_sensor {
                 let states = of_states.iter().map(|(_, state)| state);
                 let others = states.chain(&of_inputs);
                 terms.extend(others.map(|other| entered(&target, Entry::Sensor(j), other, size)));
@@ -224,11 +225,14 @@ pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -
         }
     }
     for (i, parameter) in outline.parameters.iter().enumerate() {
-        if parameter.role == Role::Parameter && has_equations {
+        if parameter.role == Role::Parameter {
             let target = &parameter.name;
             let states = of_states.iter().map(|(_, state)| state);
             let all = states.chain(&of_inputs).chain(&time);
             terms.extend(all.map(|one| entered(target, Entry::Parameter(i), one, 1.0)));
+            if !has_equations {
+                continue;
+            }
             terms.extend(disturbances(
                 target,
                 Entry::Parameter(i),

@@ -43,6 +43,13 @@ const ITERATIONS: usize = 30;
 /// Whitened change of the innovations of two records.
 pub(super) struct Change([DVector<f64>; 2]);
 
+impl Change {
+    /// What this change adds to another one.
+    pub fn without(&self, other: &Self) -> Self {
+        Self([0, 1].map(|i| &self.0[i] - &other.0[i]))
+    }
+}
+
 /// Match of one change by a multiple of another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Match {
@@ -222,8 +229,7 @@ impl<'a> Information<'a> {
 
     /// Nats of the difference of two changes: what one in place of the other leaves.
     pub fn left(&self, change: &Change, by: &Change) -> f64 {
-        let [own, again] = [0, 1].map(|i| &change.0[i] - &by.0[i]);
-        0.5 * self.product(&own, &again).max(0.0)
+        self.nats(&change.without(by))
     }
 
     /// Product of two directions without what θ and noise levels imitate.

@@ -25,9 +25,9 @@ pub(crate) enum Fate {
     FalseAlarm,
     /// The accepted answer is right, complete, and holds nothing false beside it; or nothing listed is right, and none was accepted.
     Delivered,
-    /// Everything accepted is right and complete, but more was said to be missing.
+    /// Everything accepted is right, but something unknown was said to remain: it does where one of two effects lacks.
     Partial,
-    /// Everything accepted is right, but one of two effects lacks.
+    /// Everything accepted is right, but one of two effects lacks, and nothing was said to remain.
     Incomplete,
     /// A false effect was accepted, one of a class of rivals; the class that was stated holds a right one.
     InClass,
@@ -237,6 +237,7 @@ impl Row {
                     Fate::Delivered if says_more && !self.right.iter().any(Vec::is_empty) => {
                         Fate::Partial
                     }
+                    Fate::Incomplete if says_more => Fate::Partial,
                     fate => fate,
                 }
             }

@@ -151,7 +151,7 @@ fn every_answer_has_one_fate() {
         ),
         (
             partial(row(Kind::Pair, &["a@s", "b@t"], &["a@s"], 0.9)),
-            Fate::Incomplete,
+            Fate::Partial,
         ),
         // The other departure has no listed name: more is missing indeed.
         (unlisted, Fate::Delivered),

@@ -20,7 +20,7 @@ impl Reject {
             Self::NoFilter => "could not be filtered",
             Self::NoLaw => "had no law that could be made",
             Self::TooWeak => "did not show in the outputs, or diverged before they did",
-            Self::TooAlike => "had two departures that no record tells apart",
+            Self::TooAlike => "had two departures of which one explains or hides the other",
         }
     }
 }

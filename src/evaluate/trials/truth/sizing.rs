@@ -105,8 +105,8 @@ impl Stage<'_> {
         Ok(information.change(pair)?)
     }
 
-    /// The departures at the sizes at which each has about the wanted nats. Of a pair, what one departure explains of the other no record
-    /// tells: only the rest counts.
+    /// The departures at the sizes at which each has about the wanted nats. Of a pair, only what one departure adds to the other counts, and
+    /// of that only what no multiple of the other explains.
     pub fn all_sized(
         &self,
         drafts: &[&Draft],
@@ -121,30 +121,38 @@ impl Stage<'_> {
         let Some(all) = sized(wanted)? else {
             return Ok(Err(Reject::TooWeak));
         };
-        let own = |all: &[Sized]| match all {
-            [a, b] => vec![
-                information.unexplained(&a.change, &b.change),
-                information.unexplained(&b.change, &a.change),
-            ],
-            all => vec![1.0; all.len()],
-        };
-        let shares = own(&all);
-        if shares.iter().all(|share| *share == 1.0) {
+        let [first, second] = &all[..] else {
             return Ok(Ok(all));
-        }
+        };
+        let shares = [
+            information.unexplained(&first.change, &second.change),
+            information.unexplained(&second.change, &first.change),
+        ];
         if shares.iter().any(|share| *share < OWN) {
             return Ok(Err(Reject::TooAlike));
         }
-        // The share hardly depends on the sizes: once is enough.
-        let larger: Vec<f64> = wanted.iter().zip(&shares).map(|(w, s)| w / s).collect();
+        let larger: Vec<f64> = wanted.iter().zip(shares).map(|(w, s)| w / s).collect();
         let Some(mut all) = sized(&larger)? else {
             return Ok(Err(Reject::TooAlike));
         };
-        let shares = own(&all);
-        for (sized, share) in all.iter_mut().zip(shares) {
-            sized.nats *= share;
+        // One departure may hide the other: what counts is what each adds.
+        let both: Vec<Departure> = all.iter().map(|sized| sized.departure.clone()).collect();
+        let together = match self.pair(&both) {
+            Some(records) => information.change(records)?,
+            None => None,
+        };
+        let Some(together) = together else {
+            return Ok(Err(Reject::TooAlike));
+        };
+        let added = [1, 0].map(|other| {
+            let by = &all[other].change;
+            let added = together.without(by);
+            information.nats(&added) * information.unexplained(&added, by)
+        });
+        for (sized, nats) in all.iter_mut().zip(added) {
+            sized.nats = sized.nats.min(nats);
         }
-        let is_far = |(sized, wanted): (&Sized, &f64)| (sized.nats / wanted).ln().abs() > FAR;
+        let is_far = |(sized, wanted): (&Sized, &f64)| !((sized.nats / wanted).ln().abs() <= FAR);
         match all.iter().zip(wanted).any(is_far) {
             true => Ok(Err(Reject::TooAlike)),
             false => Ok(Ok(all)),
