@@ -113,7 +113,7 @@ impl Likelihood for Ensemble {
         }
     }
     fn filtered(&self, theta: &[f64], record: &Record) -> Result<Filtered, FilterError> {
-        Ok(ensemble::predictor(self.0.as_ref(), theta, record)?.filter(record.outputs()))
+        ensemble::filtered(self.0.as_ref(), theta, record)
     }
     fn states(&self, theta: &[f64], record: &Record) -> Result<(Filtered, Signal), FilterError> {
         let filtered = self.filtered(theta, record)?;

@@ -3,8 +3,8 @@
 use super::simulation::check_length;
 use crate::record::{Drive, Signal, Signals};
 use crate::twin::{
-    DigitalTwin, Modified, Modify, Noise, Outline, ParameterSpace, SimulationError, StateSpace,
-    Twin, TwinError,
+    DigitalTwin, KnownNoise, Modified, Modify, Noise, Outline, ParameterSpace, SimulationError,
+    StateSpace, Twin, TwinError,
 };
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
@@ -125,6 +125,14 @@ impl DigitalTwin for HeldBlackBox {
     fn free_run(&self, theta: &[f64], drive: &Drive) -> Result<Signal, SimulationError> {
         check_length(self.parameters.len(), theta)?;
         self.base.free_run(&self.held.complete(theta), drive)
+    }
+    fn known_noise(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+    ) -> Result<Option<KnownNoise>, SimulationError> {
+        check_length(self.parameters.len(), theta)?;
+        (self.base).known_noise(&self.held.complete(theta), drive)
     }
 }
 

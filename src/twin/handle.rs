@@ -4,8 +4,8 @@ use super::definitions::defined_states;
 use super::digital_twin::FREE_RUNS;
 use crate::record::{Drive, RecordError, Signal, Signals};
 use crate::twin::{
-    DigitalTwin, Integrator, Modified, Modify, Noise, Outline, ParameterSpace, SimulationError,
-    StateSpace, Stepping,
+    DigitalTwin, Integrator, KnownNoise, Modified, Modify, Noise, Outline, ParameterSpace,
+    SimulationError, StateSpace, Stepping,
 };
 use std::sync::Arc;
 
@@ -184,6 +184,16 @@ impl DigitalTwin for Twin {
     }
     fn free_run(&self, theta: &[f64], drive: &Drive) -> Result<Signal, SimulationError> {
         self.free_run(theta, drive)
+    }
+    fn known_noise(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+    ) -> Result<Option<KnownNoise>, SimulationError> {
+        match self {
+            Self::Equations(_) => Ok(None),
+            Self::BlackBox(twin) => twin.known_noise(theta, drive),
+        }
     }
     fn equations(self: Arc<Self>) -> Option<Arc<dyn StateSpace>> {
         match self.as_ref() {

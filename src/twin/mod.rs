@@ -34,6 +34,7 @@ pub(crate) use acting::Acting;
 pub(crate) use adapt::{Adaptation, NoiseLevel, StartLevel, adapt, begun};
 pub(crate) use definitions::rates;
 pub use digital_twin::DigitalTwin;
+pub(crate) use digital_twin::{KnownNoise, NoisePart};
 pub(crate) use direction::{combination, oriented};
 pub use error::{SimulationError, TwinError};
 pub(crate) use fix::fix;

@@ -1,7 +1,7 @@
 //! Disturbances that stand for whatever is not in the library.
 
 use crate::diagnose::hypotheses::disturbed_signals;
-use crate::diagnose::hypotheses::entry::{Entry, share};
+use crate::diagnose::hypotheses::entry::{Entry, share, started};
 use crate::record::Quantity;
 use crate::twin::{
     Layout, Modify, Now, Outline, Parameter, ParameterSpace, Role, StateSpace, Twin,
@@ -13,6 +13,7 @@ use std::sync::Arc;
 ///
 /// ```text
 /// d ← a·d + σ·√(1 − a²)·w        (a = 1: d ← d + σ·w)        ẋ_i + d,   y_j + d   or   θ_i·exp(d)
+/// d ~ N(0, σ²) at the start      (a = 1: 0)
 /// ```
 ///
 /// θ is longer by σ > 0. A filter that may follow d gains on every gap at the right place, and on one elsewhere less.
@@ -107,6 +108,11 @@ impl Modify for Disturbed {
                 y[j] += x[own];
             }
         }
+    }
+    fn start_deviation(&self, now: &Now<'_>, std: &mut [f64]) {
+        let (std, own) = std.split_at_mut(std.len() - 1);
+        self.now(now, |now| self.base.start_deviation(now, std));
+        own[0] = started(self.memory) * now.theta[now.theta.len() - 1];
     }
     fn noise(&self, now: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
         let (process, own) = process.split_at_mut(process.len() - 1);

@@ -1,14 +1,18 @@
 //! Disturbances of a black box's signals: what stands for an effect that nobody listed.
 
-use crate::diagnose::hypotheses::entry::{Entry, share};
+use crate::diagnose::hypotheses::entry::{Entry, share, started};
 use crate::record::{Drive, Signal, Signals};
-use crate::twin::{DigitalTwin, Noise, Parameter, ParameterSpace, Role, SimulationError, Twin};
+use crate::twin::{
+    DigitalTwin, KnownNoise, Noise, NoisePart, Parameter, ParameterSpace, Role, SimulationError,
+    Twin,
+};
 use std::sync::Arc;
 
 /// The twin with an Ornstein–Uhlenbeck disturbance on an output or an input, θ longer by its strength σ.
 ///
 /// ```text
-/// d ← a·d + σ·√(1 − a²)·w        (a = 1: d ← d + σ·w),   d = 0 at the start        y_j + d   or   u_j + d
+/// d ← a·d + σ·√(1 − a²)·w        (a = 1: d ← d + σ·w)        y_j + d   or   u_j + d
+/// d ~ N(0, σ²) at the start      (a = 1: 0)
 /// ```
 pub(in crate::diagnose) fn disturbed(
     base: Arc<dyn DigitalTwin>,
@@ -22,6 +26,9 @@ pub(in crate::diagnose) fn disturbed(
     }))
 }
 
+/// Name of a disturbance's draws.
+const SOURCE: &str = "disturbance";
+
 struct Disturbed {
     base: Arc<dyn DigitalTwin>,
     entry: Entry,
@@ -30,9 +37,9 @@ struct Disturbed {
 
 impl Disturbed {
     fn add(&self, sigma: f64, noise: Noise, column: usize, signal: &mut Signal) {
-        let mut source = noise.source("disturbance");
+        let mut source = noise.source(SOURCE);
         let share = share(self.memory);
-        let mut d = 0.0;
+        let mut d = started(self.memory) * sigma * source.normal();
         for value in signal.column_mut(column) {
             *value += d;
             d = self.memory * d + share * sigma * source.normal();
@@ -68,5 +75,26 @@ impl DigitalTwin for Disturbed {
             self.add(sigma[0], noise, j, &mut outputs);
         }
         Ok(outputs)
+    }
+    fn known_noise(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+    ) -> Result<Option<KnownNoise>, SimulationError> {
+        let Entry::Sensor(output) = self.entry else {
+            return Ok(None);
+        };
+        let (own, sigma) = theta.split_at(theta.len() - 1);
+        let mut known = self.base.known_noise(own, drive)?;
+        if let Some(known) = &mut known {
+            known.parts.push(NoisePart {
+                output,
+                level: share(self.memory) * sigma[0],
+                memory: Some(self.memory),
+                start: started(self.memory) * sigma[0],
+                source: SOURCE.to_owned(),
+            });
+        }
+        Ok(known)
     }
 }

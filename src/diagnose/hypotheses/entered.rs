@@ -5,38 +5,20 @@
 //! ```
 
 use super::basis::{Of, TERMS, sum_of_one};
-use super::entry::Entry;
-use super::followed::followed;
-use crate::twin::{
-    Layout, Modify, Now, Outline, Parameter, ParameterSpace, Role, StateSpace, Twin,
-};
+use super::entered_black_box;
+use super::entry::{Entered, Entry, LARGEST, with_coefficients};
+use crate::twin::{Layout, Modify, Now, Outline, StateSpace, Twin};
 use smallvec::SmallVec;
 use std::sync::Arc;
-
-/// Largest change of the logarithm of a parameter: e⁵ is beyond any that a record could show.
-pub(super) const LARGEST: f64 = 5.0;
-
-/// A function, where it enters, and the range that it is drawn over.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::diagnose) struct Entered {
-    /// A sensor or a parameter.
-    pub entry: Entry,
-    pub of: Of,
-    pub ends: (f64, f64),
-}
 
 /// The twin with a function; θ is longer by its coefficients.
 pub(in crate::diagnose) fn with_function(base: Twin, function: Entered) -> Twin {
     if let Twin::BlackBox(base) = base {
-        return followed(base, function);
+        return entered_black_box::with_function(base, function);
     }
     base.modified(|base| {
         let mut outline = base.outline();
-        let coefficients = (1..=TERMS).map(|k| {
-            Parameter::new(&format!("function/{k}"), "", -1.0, 1.0).with_role(Role::Magnitude)
-        });
-        outline.parameters =
-            ParameterSpace::new(outline.parameters.iter().cloned().chain(coefficients));
+        outline.parameters = with_coefficients(&outline.parameters);
         WithFunction {
             base,
             function,

@@ -10,8 +10,7 @@
 //! Source: Solin & Särkkä, "Hilbert space methods for reduced-rank Gaussian process regression", *Statistics and Computing* 30 (2020).
 
 use super::basis::{Of, TERMS, pairs, sum_of_one, sum_of_two};
-use super::entered::Entered;
-use super::entry::Entry;
+use super::entry::{Entered, Entry};
 use super::term::{Nature, Part, Start, Term};
 use crate::effect::{Effect, EffectKind, Instant, Magnitude, clamp, lag};
 use crate::fit::axis::{Axis, EvidencePrior};

@@ -1,8 +1,8 @@
 //! One hypothesis of what a twin lacks: a term that is added to it.
 
 use super::disturbed_equations::disturbed;
-use super::entered::{Entered, with_function};
-use super::entry::Entry;
+use super::entered::with_function;
+use super::entry::{Entered, Entry};
 use crate::diagnose::error::DiagnoseError;
 use crate::effect::{Effect, EffectKey, Magnitude, augment_short};
 use crate::fit::axis::Axis;

@@ -3,7 +3,7 @@
 use super::finish::finish;
 use super::{Place, Placed, Slots};
 use crate::effect::batch::{Batch, Channel, ForceBatch, LimitBatch, SensorBatch};
-use crate::effect::law::{ForcePoint, Instant, Law, NOISE_ENTERS, NoiseLaw, ParameterLaw};
+use crate::effect::law::{ForcePoint, Instant, Law, NoiseLaw, ParameterLaw};
 use crate::record::{Drive, Quantity, Signal};
 use crate::twin::{Layout, Modify, Noise, Now, Outliers, Outline, SimulationError, StateSpace};
 use smallvec::SmallVec;
@@ -66,7 +66,7 @@ impl AugmentedEquations {
                     memory: from..outline.states.len(),
                     target: slot.place.target,
                 },
-                after_noise: kind.position() > NOISE_ENTERS,
+                after_noise: slot.is_of_readings(),
             });
         }
         Self {

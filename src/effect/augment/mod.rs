@@ -8,7 +8,7 @@ use super::batch::Pair;
 use super::check::{check_effects, targets};
 use super::error::EffectError;
 use super::kind::EffectKind;
-use super::law::{Instant, Law, SignalLaw};
+use super::law::{Instant, Law, NOISE_ENTERS, SignalLaw};
 use super::placed::Effect;
 use super::unit::magnitude_unit;
 use crate::record::{Drive, Quantity, RecordError, Signal, Signals};
@@ -113,6 +113,11 @@ struct Slot {
 }
 
 impl Slot {
+    /// Returns whether the effect acts on readings, which contain the noise of measurement.
+    fn is_of_readings(&self) -> bool {
+        self.effect.kind().position() > NOISE_ENTERS
+    }
+
     /// Passes the channel of a whole signal through a law.
     fn pass(&self, law: &SignalLaw, theta: &[f64], drive: &Drive, signal: &mut Signal) {
         let m = self.place.m(theta);

@@ -49,15 +49,7 @@ impl Predictor {
         let p = ensemble.outputs();
         let m = ensemble.runs;
         let lags = LAGS.min(m / RUNS_EACH / p).max(1);
-        let floors: Vec<f64> = (outputs.columns().into_iter().zip(record.cells()))
-            .map(|(y, cell)| {
-                let y: Array1<f64> = y.iter().copied().filter(|v| !v.is_nan()).collect();
-                let size = y
-                    .std(0.0)
-                    .max(1e-3 * y.iter().fold(0.0, |a, v| v.abs().max(a)));
-                (FLOOR * size).max(1e-150).powi(2).max(*cell)
-            })
-            .collect();
+        let floors = floors(record);
         let mut rows: Vec<Row> = (0..ensemble.mean.nrows())
             .map(|k| {
                 let past = (1..=lags.min(k)).flat_map(|lag| (0..p).map(move |j| (k - lag, j)));
@@ -121,6 +113,19 @@ impl Predictor {
         }
         filtered
     }
+}
+
+/// Least variance of each output: independent noise that everything measured has, and rounding.
+pub(super) fn floors(record: &Record) -> Vec<f64> {
+    (record.outputs().columns().into_iter().zip(record.cells()))
+        .map(|(y, cell)| {
+            let y: Array1<f64> = y.iter().copied().filter(|v| !v.is_nan()).collect();
+            let size = y
+                .std(0.0)
+                .max(1e-3 * y.iter().fold(0.0, |a, v| v.abs().max(a)));
+            (FLOOR * size).max(1e-150).powi(2).max(*cell)
+        })
+        .collect()
 }
 
 /// Least variance of output j in a row.

@@ -7,7 +7,8 @@ use super::runs::run;
 use crate::math::{deviation, largest};
 use crate::record::{Drive, Record, Signal, Signals};
 use crate::twin::{
-    DigitalTwin, Interval, Noise, Parameter, ParameterSpace, Role, SimulationError, Twin,
+    DigitalTwin, Interval, KnownNoise, Noise, NoisePart, Parameter, ParameterSpace, Role,
+    SimulationError, Twin,
 };
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
@@ -80,6 +81,26 @@ struct MeasuredBox {
 }
 
 impl MeasuredBox {
+    /// The simulator's own parameters, and the noise levels.
+    fn split<'t>(&self, theta: &'t [f64]) -> (&'t [f64], &'t [f64]) {
+        theta.split_at(theta.len() - self.levels.len())
+    }
+
+    fn parts(&self, theta: &[f64]) -> Vec<NoisePart> {
+        let channels = self.signals().outputs;
+        (self.levels.iter().zip(self.split(theta).1))
+            .map(|(parameter, level)| NoisePart {
+                output: (channels.iter())
+                    .position(|o| o.name == parameter.target())
+                    .unwrap_or(0),
+                level: *level,
+                memory: None,
+                start: 0.0,
+                source: format!("measured/{}", parameter.name),
+            })
+            .collect()
+    }
+
     fn run(
         &self,
         theta: &[f64],
@@ -123,17 +144,22 @@ impl DigitalTwin for MeasuredBox {
         drive: &Drive,
         noise: Noise,
     ) -> Result<Signal, SimulationError> {
-        let (own, levels) = theta.split_at(theta.len() - self.levels.len());
-        let mut outputs = self.run(own, drive, noise)?.as_ref().clone();
-        let channels = self.signals().outputs;
-        for (parameter, level) in self.levels.iter().zip(levels) {
-            let channel = channels.iter().position(|o| o.name == parameter.target());
-            let mut column = outputs.column_mut(channel.unwrap_or(0));
-            let mut source = noise.source(&format!("measured/{}", parameter.name));
-            column
-                .iter_mut()
-                .for_each(|v| *v += level * source.normal());
+        let (own, _) = self.split(theta);
+        let mean = self.run(own, drive, noise)?.as_ref().clone();
+        let parts = self.parts(theta);
+        Ok(KnownNoise { mean, parts }.draw(noise))
+    }
+    fn known_noise(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+    ) -> Result<Option<KnownNoise>, SimulationError> {
+        if !self.is_silent {
+            return Ok(None);
         }
-        Ok(outputs)
+        let (own, _) = self.split(theta);
+        let mean = self.run(own, drive, Noise::OFF)?.as_ref().clone();
+        let parts = self.parts(theta);
+        Ok(Some(KnownNoise { mean, parts }))
     }
 }

@@ -1,5 +1,9 @@
 //! The one trait that every simulator has.
 
+mod known_noise;
+
+pub(crate) use known_noise::{KnownNoise, NoisePart};
+
 use crate::record::{Drive, Signal, Signals};
 use crate::twin::{Noise, ParameterSpace, SimulationError, StateSpace};
 use std::sync::Arc;
@@ -80,6 +84,17 @@ pub trait DigitalTwin: Send + Sync {
             mean += &run;
         }
         Ok(mean / FREE_RUNS as f64)
+    }
+
+    /// Outputs where their noise is known, so that a likelihood needs no ensemble of runs: of a simulator without noise, whose records
+    /// have that of their sensors. For twins of this crate.
+    #[doc(hidden)]
+    fn known_noise(
+        &self,
+        _theta: &[f64],
+        _drive: &Drive,
+    ) -> Result<Option<KnownNoise>, SimulationError> {
+        Ok(None)
     }
 
     /// The equations, of a twin that shows them; none by default.

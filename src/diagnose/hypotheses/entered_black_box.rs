@@ -1,10 +1,9 @@
 //! Unknown functions of inputs and time at an output or in a parameter of a black box.
 
 use super::basis::{TERMS, sum_of_one};
-use super::entered::{Entered, LARGEST};
-use super::entry::Entry;
+use super::entry::{Entered, Entry, LARGEST, with_coefficients};
 use crate::record::{Drive, Signal, Signals};
-use crate::twin::{DigitalTwin, Noise, Parameter, ParameterSpace, Role, SimulationError, Twin};
+use crate::twin::{DigitalTwin, KnownNoise, Noise, ParameterSpace, SimulationError, Twin};
 use std::sync::Arc;
 
 /// The black box with a function; θ is longer by its coefficients.
@@ -15,16 +14,16 @@ use std::sync::Arc;
 ///
 /// A run cannot change its parameters on the way: outputs follow the runs at fixed values. That is right for changes that are slow beside
 /// the simulator's own memory.
-pub(super) fn followed(base: Arc<dyn DigitalTwin>, function: Entered) -> Twin {
-    Twin::BlackBox(Arc::new(Followed { base, function }))
+pub(super) fn with_function(base: Arc<dyn DigitalTwin>, function: Entered) -> Twin {
+    Twin::BlackBox(Arc::new(WithFunction { base, function }))
 }
 
-struct Followed {
+struct WithFunction {
     base: Arc<dyn DigitalTwin>,
     function: Entered,
 }
 
-impl Followed {
+impl WithFunction {
     fn values(&self, coefficients: &[f64], drive: &Drive) -> Vec<f64> {
         let Entered { of, ends, .. } = self.function;
         let at = |k: usize| of.value(drive.time(k), &[], drive.input(k), 0.0);
@@ -33,13 +32,32 @@ impl Followed {
             .collect()
     }
 
+    /// Outputs of runs with the function.
+    fn with(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+        run: impl Fn(&[f64]) -> Result<Signal, SimulationError>,
+    ) -> Result<Signal, SimulationError> {
+        let (own, coefficients) = theta.split_at(theta.len() - TERMS);
+        let values = self.values(coefficients, drive);
+        if let Entry::Parameter(i) = self.function.entry {
+            return Self::bent((own, i), &values, run);
+        }
+        let mut outputs = run(own)?;
+        if let Entry::Sensor(j) = self.function.entry {
+            for (y, value) in outputs.column_mut(j).iter_mut().zip(values) {
+                *y += value;
+            }
+        }
+        Ok(outputs)
+    }
+
     /// Outputs where the logarithm of parameter i is larger by these values: parabolas through three runs.
     fn bent(
-        &self,
         (theta, i): (&[f64], usize),
         by: &[f64],
-        drive: &Drive,
-        noise: Noise,
+        run: impl Fn(&[f64]) -> Result<Signal, SimulationError>,
     ) -> Result<Signal, SimulationError> {
         let by = || by.iter().map(|v| v.clamp(-LARGEST, LARGEST));
         let (low, high) = (
@@ -49,7 +67,7 @@ impl Followed {
         let at = |change: f64| {
             let mut theta = theta.to_vec();
             theta[i] *= change.exp();
-            self.base.simulate(&theta, drive, noise)
+            run(&theta)
         };
         let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
         let mut outputs = at(middle)?;
@@ -69,13 +87,9 @@ impl Followed {
     }
 }
 
-impl DigitalTwin for Followed {
+impl DigitalTwin for WithFunction {
     fn parameters(&self) -> ParameterSpace {
-        let base = self.base.parameters();
-        let coefficients = (1..=TERMS).map(|k| {
-            Parameter::new(&format!("function/{k}"), "", -1.0, 1.0).with_role(Role::Magnitude)
-        });
-        ParameterSpace::new(base.iter().cloned().chain(coefficients))
+        with_coefficients(&self.base.parameters())
     }
     fn signals(&self) -> Signals {
         self.base.signals()
@@ -86,18 +100,26 @@ impl DigitalTwin for Followed {
         drive: &Drive,
         noise: Noise,
     ) -> Result<Signal, SimulationError> {
-        let (own, coefficients) = theta.split_at(theta.len() - TERMS);
-        let values = self.values(coefficients, drive);
-        if let Entry::Parameter(i) = self.function.entry {
-            return self.bent((own, i), &values, drive, noise);
+        if let Some(known) = self.known_noise(theta, drive)? {
+            return Ok(known.draw(noise));
         }
-        let mut outputs = self.base.simulate(own, drive, noise)?;
-        if let Entry::Sensor(j) = self.function.entry {
-            for (y, value) in outputs.column_mut(j).iter_mut().zip(values) {
-                *y += value;
-            }
-        }
-        Ok(outputs)
+        self.with(theta, drive, |own| self.base.simulate(own, drive, noise))
+    }
+    fn known_noise(
+        &self,
+        theta: &[f64],
+        drive: &Drive,
+    ) -> Result<Option<KnownNoise>, SimulationError> {
+        let own = &theta[..theta.len() - TERMS];
+        let Some(known) = self.base.known_noise(own, drive)? else {
+            return Ok(None);
+        };
+        let mean = |own: &[f64]| match self.base.known_noise(own, drive)? {
+            Some(known) => Ok(known.mean),
+            None => self.base.simulate(own, drive, Noise::OFF),
+        };
+        let mean = self.with(theta, drive, mean)?;
+        Ok(Some(KnownNoise { mean, ..known }))
     }
 }
 
@@ -105,7 +127,7 @@ impl DigitalTwin for Followed {
 mod tests {
     use super::*;
     use crate::diagnose::hypotheses::basis::Of;
-    use crate::record::Signal;
+    use crate::twin::Parameter;
     use std::f64::consts::{PI, SQRT_2};
 
     /// y = θ²·u, at once.
@@ -132,7 +154,7 @@ mod tests {
         let inputs = Signal::from_shape_fn((50, 1), |(k, _)| 1.0 + 0.02 * k as f64);
         let drive = Drive::new(0.5, inputs).unwrap();
         let ends = (0.0, 30.0);
-        let twin = followed(Arc::new(Square), Entered { entry, of, ends });
+        let twin = with_function(Arc::new(Square), Entered { entry, of, ends });
         let theta = [&[0.8, first][..], &[0.0; TERMS - 1]].concat();
         let Twin::BlackBox(twin) = twin else {
             unreachable!()
