@@ -1,6 +1,5 @@
 //! Disturbances that stand for whatever is not in the library.
 
-use crate::diagnose::hypotheses::disturbed_signals;
 use crate::diagnose::hypotheses::entry::{Entry, share, started};
 use crate::record::Quantity;
 use crate::twin::{
@@ -16,11 +15,8 @@ use std::sync::Arc;
 /// d ~ N(0, σ²) at the start      (a = 1: 0)
 /// ```
 ///
-/// θ is longer by σ > 0. A filter that may follow d gains on every gap at the right place, and on one elsewhere less.
+/// θ is longer by σ > 0; a black box stays. A filter that may follow d gains on every gap at the right place, and on one elsewhere less.
 pub(in crate::diagnose) fn disturbed(base: Twin, entry: Entry, memory: f64) -> Twin {
-    if let Twin::BlackBox(base) = base {
-        return disturbed_signals::disturbed(base, entry, memory);
-    }
     base.modified(|base| {
         let mut outline = base.outline();
         // Noise may be coloured where something else is disturbed.

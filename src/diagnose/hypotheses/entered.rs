@@ -5,17 +5,13 @@
 //! ```
 
 use super::basis::{Of, TERMS, sum_of_one};
-use super::entered_black_box;
 use super::entry::{Entered, Entry, LARGEST, with_coefficients};
 use crate::twin::{Layout, Modify, Now, Outline, StateSpace, Twin};
 use smallvec::SmallVec;
 use std::sync::Arc;
 
-/// The twin with a function; θ is longer by its coefficients.
+/// The twin with a function; θ is longer by its coefficients. A black box stays.
 pub(in crate::diagnose) fn with_function(base: Twin, function: Entered) -> Twin {
-    if let Twin::BlackBox(base) = base {
-        return entered_black_box::with_function(base, function);
-    }
     base.modified(|base| {
         let mut outline = base.outline();
         outline.parameters = with_coefficients(&outline.parameters);

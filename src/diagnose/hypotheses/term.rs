@@ -3,6 +3,7 @@
 use super::disturbed_equations::disturbed;
 use super::entered::with_function;
 use super::entry::{Entered, Entry};
+use super::{disturbed_signals, entered_black_box};
 use crate::diagnose::error::DiagnoseError;
 use crate::effect::{Effect, EffectKey, Magnitude, augment_short};
 use crate::fit::axis::Axis;
@@ -182,10 +183,16 @@ pub(in crate::diagnose) fn with_terms<'t>(
         }
     }
     let twin = fix(augment_short(base.clone(), effects, memories)?, &off)?;
-    Ok(terms.fold(twin, |twin, term| match term.part {
-        Part::Disturbance { entry, memory } => disturbed(twin, entry, memory),
-        Part::Function(function) => with_function(twin, function),
-        Part::Effect { .. } => twin,
+    Ok(terms.fold(twin, |twin, term| match (twin, &term.part) {
+        (twin, Part::Effect { .. }) => twin,
+        (Twin::BlackBox(twin), &Part::Disturbance { entry, memory }) => {
+            disturbed_signals::disturbed(twin, entry, memory)
+        }
+        (Twin::BlackBox(twin), &Part::Function(function)) => {
+            entered_black_box::with_function(twin, function)
+        }
+        (twin, &Part::Disturbance { entry, memory }) => disturbed(twin, entry, memory),
+        (twin, &Part::Function(function)) => with_function(twin, function),
     }))
 }
 

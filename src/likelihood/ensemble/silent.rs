@@ -163,3 +163,65 @@ impl DigitalTwin for MeasuredBox {
         Ok(Some(KnownNoise { mean, parts }))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::{Catalogue, augment};
+
+    /// y = a·u, without noise.
+    struct Amplifier;
+
+    impl DigitalTwin for Amplifier {
+        fn parameters(&self) -> ParameterSpace {
+            ParameterSpace::new([Parameter::new("a", "", 0.5, 2.0)])
+        }
+        fn simulate(
+            &self,
+            theta: &[f64],
+            drive: &Drive,
+            _: Noise,
+        ) -> Result<Signal, SimulationError> {
+            Ok(drive.inputs().mapv(|u| theta[0] * u))
+        }
+    }
+
+    /// A sensor's lag moves the mean and leaves the noise white; what rounds readings rounds the noise, which is then no longer known.
+    #[test]
+    fn noise_enters_behind_the_laws_of_a_sensor() {
+        let u = Signal::from_shape_fn((60, 1), |(k, _)| [0.0, 1.0][k / 20 % 2]);
+        let drive = Drive::new(0.1, u).unwrap();
+        let outputs = drive.inputs().mapv(|u| 1.2 * u + 0.1 * (40.0 * u).sin());
+        let records = [Record::new(drive.clone(), outputs).unwrap()];
+        let base = Twin::BlackBox(Arc::new(Amplifier));
+        let (measured, is_silent) = measured(&base, &records).unwrap();
+        assert!(is_silent);
+        let with = |id: &str| {
+            let effect = Catalogue::default().effect(id, "sensor").unwrap();
+            augment(measured.clone(), vec![effect]).unwrap()
+        };
+        let noise = Noise::new(1, "test", 0);
+        let run = |twin: &Twin, theta: &[f64], noise| twin.simulate(theta, &drive, noise).unwrap();
+        let white = run(&measured, &[1.2, 0.3], noise) - run(&measured, &[1.2, 0.3], Noise::OFF);
+        let (lag, theta) = (with("sensor-lag"), [1.2, 0.3, 0.5]);
+        let lagged = run(&lag, &theta, Noise::OFF);
+        assert!(
+            (&lagged - &run(&measured, &[1.2, 0.3], Noise::OFF))
+                .mapv(f64::abs)
+                .sum()
+                > 1.0
+        );
+        let left = run(&lag, &theta, noise) - &lagged - white;
+        assert!(left.iter().all(|v| v.abs() < 1e-12));
+        let known = lag.known_noise(&theta, &drive).unwrap().unwrap();
+        assert_eq!(known.mean, lagged);
+        let rounded = with("sensor-quantization");
+        assert!(rounded.known_noise(&theta, &drive).unwrap().is_none());
+        let rounded = run(&rounded, &theta, noise);
+        assert!(
+            rounded
+                .iter()
+                .all(|y| (y / 0.5 - (y / 0.5).round()).abs() < 1e-9)
+        );
+    }
+}

@@ -47,8 +47,8 @@ struct Screened {
 }
 
 impl Imitators {
-    /// Compares a departure with every listed effect; `own` is its own key, where it has one. A black box answers too slowly to be asked
-    /// about others.
+    /// Compares a departure with every listed effect; `own` is its own key, where it has one. A black box with noise of its own answers
+    /// too slowly to be asked about others.
     pub fn of(
         sized: &Sized,
         own: Option<&String>,
@@ -60,7 +60,7 @@ impl Imitators {
             right: own.into_iter().cloned().collect(),
             wrong: vec![],
         };
-        if stage.world.is_black_box() {
+        if information.costs_ensembles {
             return Ok(imitators);
         }
         let (share, nats) = IMITATES;

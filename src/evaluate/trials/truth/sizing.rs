@@ -152,10 +152,10 @@ impl Stage<'_> {
         for (sized, nats) in all.iter_mut().zip(added) {
             sized.nats = sized.nats.min(nats);
         }
-        let is_far = |(sized, wanted): (&Sized, &f64)| !((sized.nats / wanted).ln().abs() <= FAR);
-        match all.iter().zip(wanted).any(is_far) {
-            true => Ok(Err(Reject::TooAlike)),
-            false => Ok(Ok(all)),
+        let is_near = |(sized, wanted): (&Sized, &f64)| (sized.nats / wanted).ln().abs() <= FAR;
+        match all.iter().zip(wanted).all(is_near) {
+            true => Ok(Ok(all)),
+            false => Ok(Err(Reject::TooAlike)),
         }
     }
 
