@@ -183,16 +183,17 @@ pub(in crate::diagnose) fn with_terms<'t>(
         }
     }
     let twin = fix(augment_short(base.clone(), effects, memories)?, &off)?;
-    Ok(terms.fold(twin, |twin, term| match (twin, &term.part) {
-        (twin, Part::Effect { .. }) => twin,
-        (Twin::BlackBox(twin), &Part::Disturbance { entry, memory }) => {
-            disturbed_signals::disturbed(twin, entry, memory)
-        }
-        (Twin::BlackBox(twin), &Part::Function(function)) => {
-            entered_black_box::with_function(twin, function)
-        }
-        (twin, &Part::Disturbance { entry, memory }) => disturbed(twin, entry, memory),
-        (twin, &Part::Function(function)) => with_function(twin, function),
+    Ok(terms.fold(twin, |twin, term| match (&term.part, twin) {
+        (Part::Effect { .. }, twin) => twin,
+        (part, Twin::BlackBox(twin)) => match *part {
+            Part::Function(function) => entered_black_box::with_function(twin, function),
+            Part::Disturbance { entry, memory } => {
+                disturbed_signals::disturbed(twin, entry, memory)
+            }
+            Part::Effect { .. } => twin.into(),
+        },
+        (&Part::Disturbance { entry, memory }, twin) => disturbed(twin, entry, memory),
+        (&Part::Function(function), twin) => with_function(twin, function),
     }))
 }
 

@@ -45,7 +45,9 @@ fn a_record_is_fitted_and_bad_calls_are_refused() {
         assert!(text.contains(part), "{part}: {text}");
     }
 
-    let drawn = json(&["fit", &record, "--twin", "tanks", "--draws", "20", "--json"]);
+    let drawn = at("drawn");
+    let drawn = ["--draws", "20", "--out", &drawn, "--json"];
+    let drawn = json(&[&["fit", &record, "--twin", "tanks"], &drawn[..]].concat());
     valid(&drawn);
     assert_eq!(drawn["posterior"]["draws"], 20);
 
