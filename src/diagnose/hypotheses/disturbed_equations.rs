@@ -1,6 +1,6 @@
 //! Disturbances that stand for whatever is not in the library.
 
-use crate::diagnose::hypotheses::entry::{Entry, share, started};
+use crate::diagnose::hypotheses::entry::{Entry, LARGEST, share, started};
 use crate::record::Quantity;
 use crate::twin::{
     Layout, Modify, Now, Outline, Parameter, ParameterSpace, Role, StateSpace, Twin,
@@ -45,7 +45,7 @@ impl Disturbed {
     fn bent<R>(&self, now: &Now<'_>, i: usize, d: f64, then: impl FnOnce(&Now<'_>) -> R) -> R {
         let own = &now.theta[..now.theta.len() - 1];
         let mut theta: SmallVec<[f64; 16]> = SmallVec::from_slice(own);
-        theta[i] *= d.clamp(-5.0, 5.0).exp();
+        theta[i] *= d.clamp(-LARGEST, LARGEST).exp();
         then(&Now {
             theta: &theta,
             ..*now

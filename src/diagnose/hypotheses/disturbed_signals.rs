@@ -26,9 +26,6 @@ pub(in crate::diagnose) fn disturbed(
     }))
 }
 
-/// Name of a disturbance's draws.
-const SOURCE: &str = "disturbance";
-
 struct Disturbed {
     base: Arc<dyn DigitalTwin>,
     entry: Entry,
@@ -36,13 +33,14 @@ struct Disturbed {
 }
 
 impl Disturbed {
-    fn add(&self, sigma: f64, noise: Noise, column: usize, signal: &mut Signal) {
-        let mut source = noise.source(SOURCE);
-        let share = share(self.memory);
-        let mut d = started(self.memory) * sigma * source.normal();
-        for value in signal.column_mut(column) {
-            *value += d;
-            d = self.memory * d + share * sigma * source.normal();
+    /// The disturbance of strength σ on a channel.
+    fn on(&self, channel: usize, sigma: f64) -> NoisePart {
+        NoisePart {
+            output: channel,
+            level: share(self.memory) * sigma,
+            memory: Some(self.memory),
+            start: started(self.memory) * sigma,
+            source: "disturbance".to_owned(),
         }
     }
 }
@@ -64,7 +62,7 @@ impl DigitalTwin for Disturbed {
         let (own, sigma) = theta.split_at(theta.len() - 1);
         if let Entry::Actuator(j) = self.entry {
             let mut inputs = drive.inputs().clone();
-            self.add(sigma[0], noise, j, &mut inputs);
+            self.on(j, sigma[0]).add(noise, &mut inputs);
             let drive = drive
                 .with_inputs(inputs)
                 .map_err(|_| SimulationError::Diverged { at: 0.0 })?;
@@ -72,7 +70,7 @@ impl DigitalTwin for Disturbed {
         }
         let mut outputs = self.base.simulate(own, drive, noise)?;
         if let Entry::Sensor(j) = self.entry {
-            self.add(sigma[0], noise, j, &mut outputs);
+            self.on(j, sigma[0]).add(noise, &mut outputs);
         }
         Ok(outputs)
     }
@@ -87,13 +85,7 @@ impl DigitalTwin for Disturbed {
         let (own, sigma) = theta.split_at(theta.len() - 1);
         let mut known = self.base.known_noise(own, drive)?;
         if let Some(known) = &mut known {
-            known.parts.push(NoisePart {
-                output,
-                level: share(self.memory) * sigma[0],
-                memory: Some(self.memory),
-                start: started(self.memory) * sigma[0],
-                source: SOURCE.to_owned(),
-            });
+            known.parts.push(self.on(output, sigma[0]));
         }
         Ok(known)
     }

@@ -2,7 +2,7 @@
 
 use super::finish::finish;
 use super::{Slot, Slots};
-use crate::effect::law::Law;
+use crate::effect::law::{Law, NoiseLaw};
 use crate::record::{Drive, Signal, Signals};
 use crate::twin::{DigitalTwin, KnownNoise, Noise, NoisePart, ParameterSpace, SimulationError};
 use std::sync::Arc;
@@ -19,15 +19,14 @@ impl AugmentedBlackBox {
         Self { base, slots }
     }
 
-    /// Outputs with their noise before what saturates or rounds readings; `None` where the simulator has noise of its own.
+    /// Outputs behind the laws of sensors, under a drive behind those of actuators, before what saturates or rounds readings; `None` where
+    /// the simulator has noise of its own.
     fn before_readings(
         &self,
         theta: &[f64],
         drive: &Drive,
+        acting: &Drive,
     ) -> Result<Option<KnownNoise>, SimulationError> {
-        self.slots.check(theta, drive.dt())?;
-        let actuated = self.slots.actuated(theta, drive)?;
-        let acting = actuated.as_ref().unwrap_or(drive);
         let own = &theta[..self.slots.base];
         let Some(mut known) = self.base.known_noise(own, acting)? else {
             return Ok(None);
@@ -35,13 +34,7 @@ impl AugmentedBlackBox {
         for slot in self.slots.all.iter().filter(|slot| !slot.is_of_readings()) {
             match slot.effect.law() {
                 Law::Sensor(law) => slot.pass(law.as_ref(), theta, drive, &mut known.mean),
-                Law::MeasurementNoise(law) => known.parts.push(NoisePart {
-                    output: slot.place.target,
-                    level: law(slot.place.m(theta)),
-                    memory: None,
-                    start: 0.0,
-                    source: noise_of(slot.place.target),
-                }),
+                Law::MeasurementNoise(law) => known.parts.push(noise_of(slot, law.as_ref(), theta)),
                 _ => {}
             }
         }
@@ -49,9 +42,11 @@ impl AugmentedBlackBox {
     }
 }
 
-/// Name of the draws of an output's added noise.
-fn noise_of(channel: usize) -> String {
-    format!("sensor-noise/{channel}")
+/// The noise that an effect adds to an output.
+fn noise_of(slot: &Slot, law: &NoiseLaw, theta: &[f64]) -> NoisePart {
+    let channel = slot.place.target;
+    let source = format!("sensor-noise/{channel}");
+    NoisePart::white(channel, law(slot.place.m(theta)), source)
 }
 
 impl DigitalTwin for AugmentedBlackBox {
@@ -69,27 +64,21 @@ impl DigitalTwin for AugmentedBlackBox {
         drive: &Drive,
         noise: Noise,
     ) -> Result<Signal, SimulationError> {
-        let known = self.before_readings(theta, drive)?;
+        self.slots.check(theta, drive.dt())?;
+        let actuated = self.slots.actuated(theta, drive)?;
+        let acting = actuated.as_ref().unwrap_or(drive);
+        let known = self.before_readings(theta, drive, acting)?;
         let is_known = known.is_some();
         let mut outputs = match known {
             Some(known) => known.draw(noise),
-            None => {
-                let actuated = self.slots.actuated(theta, drive)?;
-                let acting = actuated.as_ref().unwrap_or(drive);
-                (self.base).simulate(&theta[..self.slots.base], acting, noise)?
-            }
+            None => (self.base).simulate(&theta[..self.slots.base], acting, noise)?,
         };
         // `all` is sorted along the signal: sensors, noise, saturation, rounding, outliers.
         for slot in (self.slots.all.iter()).filter(|slot| !is_known || slot.is_of_readings()) {
             match slot.effect.law() {
                 Law::Sensor(law) => slot.pass(law.as_ref(), theta, drive, &mut outputs),
                 Law::MeasurementNoise(law) => {
-                    let level = law(slot.place.m(theta));
-                    let channel = slot.place.target;
-                    let mut source = noise.source(&noise_of(channel));
-                    for value in outputs.column_mut(channel) {
-                        *value += level * source.normal();
-                    }
+                    noise_of(slot, law.as_ref(), theta).add(noise, &mut outputs);
                 }
                 Law::Rounding(_) | Law::Outliers(_) => finish(slot, theta, noise, &mut outputs),
                 _ => {}
@@ -103,9 +92,11 @@ impl DigitalTwin for AugmentedBlackBox {
         theta: &[f64],
         drive: &Drive,
     ) -> Result<Option<KnownNoise>, SimulationError> {
-        match self.slots.all.iter().any(Slot::is_of_readings) {
-            true => Ok(None),
-            false => self.before_readings(theta, drive),
+        if self.slots.all.iter().any(Slot::is_of_readings) {
+            return Ok(None);
         }
+        self.slots.check(theta, drive.dt())?;
+        let actuated = self.slots.actuated(theta, drive)?;
+        self.before_readings(theta, drive, actuated.as_ref().unwrap_or(drive))
     }
 }

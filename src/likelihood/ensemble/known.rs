@@ -6,10 +6,9 @@
 
 use super::predictor::floors;
 use crate::likelihood::kalman::{FilterError, Filtered};
-use crate::record::{Record, Signal};
+use crate::record::Record;
 use crate::twin::KnownNoise;
 use nalgebra::{DMatrix, DVector};
-use ndarray::Array3;
 use std::f64::consts::TAU;
 
 /// Innovations of a record and their densities.
@@ -22,14 +21,7 @@ pub(super) fn filtered(known: &KnownNoise, record: &Record) -> Result<Filtered, 
         let at = record.drive().time(at.unwrap_or(0));
         return Err(FilterError::Diverged { at });
     }
-    let mut filtered = Filtered {
-        log_likelihood: 0.0,
-        log_densities: vec![0.0; samples],
-        innovations: Signal::zeros((samples, p)),
-        covariances: Array3::zeros((samples, p, p)),
-        standardised: Signal::zeros((samples, p)),
-        states: None,
-    };
+    let mut filtered = Filtered::new(samples, p, None);
     for (j, floor) in floors(record).into_iter().enumerate() {
         let parts = || known.parts.iter().filter(move |part| part.output == j);
         let white: f64 = parts()
@@ -72,7 +64,7 @@ pub(super) fn filtered(known: &KnownNoise, record: &Record) -> Result<Filtered, 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::Drive;
+    use crate::record::{Drive, Signal};
     use crate::twin::{Noise, NoisePart};
 
     /// Checks innovations and densities against the normal density of the whole record, missing rows left out.

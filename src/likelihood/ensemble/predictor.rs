@@ -19,7 +19,7 @@ use crate::likelihood::kalman::Filtered;
 use crate::math::quantile;
 use crate::record::{Record, Signal};
 use nalgebra::{DMatrix, DVector};
-use ndarray::{Array1, Array3};
+use ndarray::Array1;
 
 /// Rows before a row that it is predicted from.
 const LAGS: usize = 4;
@@ -76,14 +76,7 @@ impl Predictor {
     pub fn filter(&self, outputs: &Signal) -> Filtered {
         let (samples, p) = outputs.dim();
         let errors = outputs - &self.mean;
-        let mut filtered = Filtered {
-            log_likelihood: 0.0,
-            log_densities: vec![0.0; samples],
-            innovations: Signal::zeros((samples, p)),
-            covariances: Array3::zeros((samples, p, p)),
-            standardised: Signal::zeros((samples, p)),
-            states: None,
-        };
+        let mut filtered = Filtered::new(samples, p, None);
         for (k, row) in self.rows.iter().enumerate() {
             let past = row.past.iter().map(|&cell| errors[cell]);
             let z = DVector::from_iterator(row.past.len(), past);

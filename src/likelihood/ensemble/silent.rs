@@ -89,14 +89,10 @@ impl MeasuredBox {
     fn parts(&self, theta: &[f64]) -> Vec<NoisePart> {
         let channels = self.signals().outputs;
         (self.levels.iter().zip(self.split(theta).1))
-            .map(|(parameter, level)| NoisePart {
-                output: (channels.iter())
-                    .position(|o| o.name == parameter.target())
-                    .unwrap_or(0),
-                level: *level,
-                memory: None,
-                start: 0.0,
-                source: format!("measured/{}", parameter.name),
+            .map(|(parameter, level)| {
+                let channel = channels.iter().position(|o| o.name == parameter.target());
+                let source = format!("measured/{}", parameter.name);
+                NoisePart::white(channel.unwrap_or(0), *level, source)
             })
             .collect()
     }

@@ -27,7 +27,7 @@ pub struct Filtered {
 }
 
 impl Filtered {
-    pub(super) fn new(samples: usize, p: usize, states: Option<usize>) -> Self {
+    pub(in crate::likelihood) fn new(samples: usize, p: usize, states: Option<usize>) -> Self {
         Self {
             log_likelihood: 0.0,
             log_densities: vec![0.0; samples],

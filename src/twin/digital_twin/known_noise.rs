@@ -14,7 +14,7 @@ pub struct KnownNoise {
 /// A part of an output's noise.
 #[derive(Debug, Clone)]
 pub(crate) struct NoisePart {
-    /// Index of the output.
+    /// Index of the channel.
     pub output: usize,
     /// Standard deviation of what comes anew at each sample, in units of the output.
     pub level: f64,
@@ -26,25 +26,41 @@ pub(crate) struct NoisePart {
     pub source: String,
 }
 
+impl NoisePart {
+    /// White noise of an output.
+    pub(crate) fn white(output: usize, level: f64, source: String) -> Self {
+        Self {
+            output,
+            level,
+            memory: None,
+            start: 0.0,
+            source,
+        }
+    }
+
+    /// Adds these draws to its channel of a signal.
+    pub(crate) fn add(&self, noise: Noise, signal: &mut Signal) {
+        let mut source = noise.source(&self.source);
+        let column = signal.column_mut(self.output);
+        let Some(memory) = self.memory else {
+            column
+                .into_iter()
+                .for_each(|value| *value += self.level * source.normal());
+            return;
+        };
+        let mut kept = self.start * source.normal();
+        for value in column {
+            *value += kept;
+            kept = memory * kept + self.level * source.normal();
+        }
+    }
+}
+
 impl KnownNoise {
     /// A run: the mean with these draws on it.
     pub(crate) fn draw(self, noise: Noise) -> Signal {
         let mut outputs = self.mean;
-        for part in &self.parts {
-            let mut source = noise.source(&part.source);
-            let column = outputs.column_mut(part.output);
-            let Some(memory) = part.memory else {
-                column
-                    .into_iter()
-                    .for_each(|value| *value += part.level * source.normal());
-                continue;
-            };
-            let mut kept = part.start * source.normal();
-            for value in column {
-                *value += kept;
-                kept = memory * kept + part.level * source.normal();
-            }
-        }
+        (self.parts.iter()).for_each(|part| part.add(noise, &mut outputs));
         outputs
     }
 }

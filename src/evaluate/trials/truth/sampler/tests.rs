@@ -296,7 +296,7 @@ fn departures_that_are_alike_have_no_information_beside_each_other() {
     });
 }
 
-/// What remains of each departure of a pair is drawn as a single one's information is: the smaller of two logarithms is a third of its range
+/// Pairs are drawn so that the rest of each departure has the information that a single one has: the smaller of two logarithms is a third of its range
 /// above the least, on average.
 #[test]
 fn pairs_have_information_beside_each_other() {
