@@ -11,19 +11,13 @@
 
 use std::process::ExitCode;
 use truetwin::prelude::*;
-use truetwin::twin::Integrator;
+use truetwin::twin::{Hold, Integrator, Stepping};
 
 /// Step of the records: 610.35 Hz.
 const STEP: f64 = 0.0016384;
 
 /// ẍ = b·u − c·ẋ − k·x, in volts: the circuit resonates near 70 Hz. The sensor has an offset.
 struct Silverbox;
-
-impl Silverbox {
-    fn acceleration(now: &Now, x: &[f64]) -> f64 {
-        now.theta[2] * now.u[0] - now.theta[1] * x[1] - now.theta[0] * x[0]
-    }
-}
 
 impl StateSpace for Silverbox {
     fn outline(&self) -> Outline {
@@ -41,12 +35,10 @@ impl StateSpace for Silverbox {
     }
     fn drift(&self, now: &Now, x: &[f64], dx: &mut [f64]) {
         dx[0] = x[1];
-        dx[1] = Self::acceleration(now, x);
+        dx[1] = now.theta[2] * now.u[0] - now.theta[1] * x[1] - now.theta[0] * x[0];
     }
-    /// The measured input is smooth, the twin's is held: the record is read in the middle of each hold.
     fn observe(&self, now: &Now, x: &[f64], y: &mut [f64]) {
-        let half = 0.5 * now.dt;
-        y[0] = x[0] + half * x[1] + 0.5 * half * half * Self::acceleration(now, x) + now.theta[3];
+        y[0] = x[0] + now.theta[3];
     }
     /// The converter's noise alone: what the twin lacks is not to pass for process noise.
     fn noise(&self, _: &Now, _: &mut [f64], measurement: &mut [f64]) {
@@ -54,6 +46,13 @@ impl StateSpace for Silverbox {
     }
     fn integrator(&self) -> Integrator {
         Integrator::RungeKutta4
+    }
+    /// The input is smooth, and was sampled together with the output.
+    fn stepping(&self) -> Stepping {
+        Stepping {
+            substeps: 2,
+            hold: Hold::Nearest,
+        }
     }
 }
 

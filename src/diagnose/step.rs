@@ -101,10 +101,23 @@ pub(in crate::diagnose) fn finer_step(
         problem,
         ..own.clone()
     };
-    let gain = (finer.carried_on()?).map_or(f64::NEG_INFINITY, |finer| {
-        finer.log_evidence - own.log_evidence.max(model.log_evidence)
-    });
-    Ok((gain > Thresholds::STEP_WINS).then_some((chosen, gain)))
+    let Some(carried) = finer.carried_on()? else {
+        return Ok(None);
+    };
+    let gain = carried.log_evidence - own.log_evidence.max(model.log_evidence);
+    if gain <= Thresholds::STEP_WINS {
+        return Ok(None);
+    }
+    // With less noise than the own step needs, an error of the finer one may show as well.
+    let twin = chosen.of(model.base);
+    let further = match &twin {
+        Some(base) => finer_step(&Model { base, ..carried }, least, explained)?,
+        None => None,
+    };
+    Ok(Some(match further {
+        Some((step, more)) => (step, gain + more),
+        None => (chosen, gain),
+    }))
 }
 
 #[cfg(test)]

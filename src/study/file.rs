@@ -28,7 +28,7 @@ const MOST: u64 = 1 << 20;
 /// step = 4.0
 /// samples = 1024
 /// input = { levels = [0.5, 6.0], hold = 25 }   # or a file: "U.csv"
-/// hold = "linear"   # inputs on the line between samples; "zero" holds them
+/// hold = "linear"   # inputs on the line between samples; "nearest" holds the nearest, "zero" the last
 /// integrator = "runge-kutta-4"   # or "euler"
 /// substeps = 4      # steps of the integrator within a sample
 /// columns = { t = "time", u = "pump", y = "level" }   # of measured records
@@ -313,7 +313,7 @@ mod tests {
             ("twin = \n", "s.toml, line 1"),
             (
                 "twin = 'x'\n[record]\nhold = 'cubic'\n",
-                "s.toml, line 3: unknown value `cubic`, expected `zero` or `linear`",
+                "s.toml, line 3: unknown value `cubic`, expected one of `zero`, `linear`, `nearest`",
             ),
             ("twin = 'x'\n[record]\nsubsteps = 1e9\n", "s.toml, line 3"),
             ("twin = 'x'\n[record]\nsubsteps = -1\n", "s.toml, line 3"),

@@ -26,7 +26,7 @@ impl<'d> Acting<'d> {
         Ok(Self { drive, hold })
     }
 
-    /// Row k at θ. On lines, the last input is held.
+    /// Row k at θ. The last input is held.
     #[inline]
     pub fn at<'a>(&'a self, k: usize, theta: &'a [f64]) -> Now<'a> {
         let mut now = Now::new(0.0, 0.0, &[], theta);
@@ -39,9 +39,13 @@ impl<'d> Acting<'d> {
     pub fn go_to<'a>(&'a self, k: usize, now: &mut Now<'a>) {
         let drive = self.drive.as_ref();
         (now.t, now.dt, now.u) = (drive.time(k), drive.step(k), drive.input(k));
-        if self.hold == Hold::Linear {
+        if self.hold != Hold::Zero {
             let next = drive.input((k + 1).min(drive.samples() - 1));
-            now.between = Some(Between { next, share: 0.0 });
+            now.between = Some(Between {
+                next,
+                share: 0.0,
+                hold: self.hold,
+            });
         }
     }
 }

@@ -282,6 +282,15 @@ mod tests {
             run(Integrator::RungeKutta4, 3, Hold::Zero),
             [0.0, 0.0, 0.1, 0.4],
         );
+        near(
+            run(Integrator::RungeKutta4, 2, Hold::Nearest),
+            [0.0, 0.05, 0.25, 0.5],
+        );
+        // Of an odd number of substeps, the middle one has the mean.
+        near(
+            run(Integrator::Euler, 1, Hold::Nearest),
+            [0.0, 0.05, 0.25, 0.5],
+        );
         // Steps that vary, too: 0.1 · ½ + 0.3 · 2 + 0.1 · 2.5.
         let times = Drive::with_times(&[0.0, 0.1, 0.4, 0.5], drive.inputs().clone()).unwrap();
         let twin = refined(Integrator::RungeKutta4, 2, Hold::Linear);

@@ -2,6 +2,7 @@
 
 use crate::twin::Interval;
 use serde::{Deserialize, Serialize};
+use std::cmp::Ordering;
 
 /// Time, step, inputs and parameters at which equations are evaluated.
 #[derive(Debug, Clone, Copy)]
@@ -14,7 +15,7 @@ pub struct Now<'a> {
     pub u: &'a [f64],
     /// Parameters θ.
     pub theta: &'a [f64],
-    /// Position between samples; `None` where inputs are held.
+    /// Position between samples; `None` where inputs are held from one to the next.
     pub(crate) between: Option<Between<'a>>,
 }
 
@@ -31,13 +32,15 @@ impl<'a> Now<'a> {
     }
 }
 
-/// A position between two samples whose inputs are joined by a line.
+/// A position between two samples.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Between<'a> {
     /// Inputs at the next sample.
     pub next: &'a [f64],
-    /// Share of the step that has passed.
+    /// Share of the next sample's inputs.
     pub share: f64,
+    /// How inputs go from one sample to the next.
+    pub hold: Hold,
 }
 
 impl Between<'_> {
@@ -59,6 +62,24 @@ pub enum Hold {
     Zero,
     /// On the line from one sample to the next; the last is held.
     Linear,
+    /// Held at the value of the nearest sample: what a smooth input does that was sampled, and not held. With an odd number of substeps, the
+    /// middle one has the mean of both; the last is held.
+    Nearest,
+}
+
+impl Hold {
+    /// Share of the next sample's inputs at a `part` of one of several substeps.
+    pub(crate) fn share(self, substep: usize, substeps: usize, part: f64) -> f64 {
+        match self {
+            Self::Zero => 0.0,
+            Self::Linear => (substep as f64 + part) / substeps as f64,
+            Self::Nearest => match (2 * substep + 1).cmp(&substeps) {
+                Ordering::Less => 0.0,
+                Ordering::Equal => 0.5,
+                Ordering::Greater => 1.0,
+            },
+        }
+    }
 }
 
 /// Most substeps of a sample.
@@ -172,7 +193,7 @@ impl Integrator {
         }
     }
 
-    /// Steps of Δt/m, inputs on the line to the next sample where there is one. States are put into their limits between substeps, as
+    /// Steps of Δt/m, inputs between this sample's and the next one's where there is one. States are put into their limits between substeps, as
     /// they would be between samples of a finer step.
     #[inline(never)]
     fn substeps(
@@ -205,7 +226,7 @@ impl Integrator {
             let inputs = &mut refined.inputs;
             self.step_in_stages(&sub, x, work, |share, stage, x, dx| {
                 let between = Between {
-                    share: (i as f64 + share) / m as f64,
+                    share: between.hold.share(i, m, share),
                     ..between
                 };
                 between.line(now.u, inputs);

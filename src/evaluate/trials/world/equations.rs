@@ -3,7 +3,7 @@
 use super::{Draws, Run, System};
 use crate::evaluate::trials::law::{Departure, Law, Moment, Place, above};
 use crate::record::{Drive, Signal};
-use crate::twin::{Acting, Hold, Interval, Noise, Now, StateSpace};
+use crate::twin::{Acting, Interval, Noise, Now, StateSpace};
 use ndarray::ArrayView1;
 
 /// Steps of the integrator within a sample.
@@ -79,15 +79,15 @@ pub(super) fn run(
             (states[[k, i]], rates[[k, i]]) = (x[i], rate[i]);
         }
         twin.update(&now, &mut x);
-        // What lies between samples is on a line where the twin says so.
-        let next = match twin.stepping().hold {
-            Hold::Linear if k + 1 < samples => {
+        // The next sample's inputs, towards which these go where the twin says so.
+        let next = match k + 1 < samples {
+            true => {
                 let (from, to) = (drive.input(k), drive.input(k + 1));
                 (u.iter().zip(from.iter().zip(to)))
                     .map(|(u, (from, to))| u + to - from)
                     .collect()
             }
-            _ => u.clone(),
+            false => u.clone(),
         };
         plant.advance(&now, &next, &command, &mut x);
         for ((x, q), noise) in x.iter_mut().zip(&q).zip(&mut process) {
@@ -234,11 +234,13 @@ impl Plant<'_> {
     fn advance(&mut self, now: &Now<'_>, next: &[f64], command: &[f64], x: &mut [f64]) {
         let h = now.dt / SUBSTEPS as f64;
         let mut inputs = now.u.to_vec();
+        let hold = self.twin.stepping().hold;
         for step in 0..SUBSTEPS {
             for (stage, part) in [0.0, 0.5, 0.5, 1.0].into_iter().enumerate() {
                 let share = (step as f64 + part) / SUBSTEPS as f64;
+                let of_next = hold.share(step, SUBSTEPS, part);
                 for ((u, from), to) in inputs.iter_mut().zip(now.u).zip(next) {
-                    *u = from + share * (to - from);
+                    *u = from + of_next * (to - from);
                 }
                 let at = Now::new(now.t + share * now.dt, h, &inputs, now.theta);
                 for (i, value) in self.stage.iter_mut().enumerate() {
