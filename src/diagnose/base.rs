@@ -148,6 +148,19 @@ impl<'a> Base<'a> {
         self.carried_on(model, self.noises.clone()).map(Some)
     }
 
+    /// The same twin fitted to other records from where it is; `None` where that cannot be done.
+    pub fn on<'b>(&self, records: &'b [Record]) -> Result<Option<Base<'b>>, DiagnoseError>
+    where
+        'a: 'b,
+    {
+        let problem = self.model.problem.on(records).until(Thresholds::BETTER);
+        let start = problem.full(&self.theta);
+        let fitted = climb(&problem, &start, ITERATIONS)?;
+        let model = fitted
+            .and_then(|fitted| Model::bare(self.model.base, problem, fitted, self.model.by_bic));
+        (model.map(|model| self.carried_on(model, self.noises.clone()))).transpose()
+    }
+
     /// The twin where its fit inside the prior ends, if its own has left that: what is missing may have driven it out. `None` for a black
     /// box, whose fits cost too much.
     pub fn inside(&self) -> Result<Option<Model<'a>>, DiagnoseError> {

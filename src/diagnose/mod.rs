@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `run.rs`, `base.rs`, `summary.rs` | order of the steps; the fitted twin that they begin with; the summary of their results |
 //! | `rounds.rs` | the search, again with another kind of noise or a finer step |
+//! | `long.rs` | long records: searched in part, fitted whole |
 //! | `model.rs` | a twin with terms, fitted |
 //! | `greedy.rs` | a baseline: forward selection by BIC |
 //! | `known.rs` | the share that effects close which are known to be there |
@@ -27,6 +28,7 @@ mod greedy;
 mod hypotheses;
 mod known;
 mod locate;
+mod long;
 mod model;
 mod outcome;
 mod quantify;

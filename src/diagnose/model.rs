@@ -133,10 +133,11 @@ impl<'a> Model<'a> {
         Ok(fitted.and_then(|fitted| self.refitted(fitted)))
     }
 
-    /// The terms beside another twin of the same parameters, fitted on from here.
+    /// The terms beside another twin of the same parameters, or other records, fitted on from here.
     pub fn beside_twin<'b>(&self, base: &Model<'b>) -> Result<Option<Model<'b>>, DiagnoseError> {
         let extended = base.extend_by(&self.terms)?;
-        let fitted = climb(&extended.problem, &self.fitted.theta, TO_THE_END)?;
+        let start = extended.problem.carried(&self.problem, &self.fitted.theta);
+        let fitted = climb(&extended.problem, &start, TO_THE_END)?;
         let problem = extended.problem.clone();
         Ok(fitted.and_then(|fitted| extended.fitted(base.base, fitted, problem)))
     }

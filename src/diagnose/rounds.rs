@@ -43,6 +43,8 @@ pub(in crate::diagnose) struct Explored<'s, 'a> {
     pub findings: Findings<'a>,
     pub chances: Chances,
     pub not_tested: Vec<String>,
+    /// Rows that the search saw, where it did not see all.
+    pub searched: Option<usize>,
 }
 
 impl Explored<'_, '_> {
@@ -272,6 +274,7 @@ fn explored<'a, R>(
         base: &base,
         listed: &effects,
         not_tested: not_tested(study, &effects),
+        searched: None,
     })
 }
 

@@ -10,6 +10,7 @@ use super::hypotheses::term::Part;
 use super::locate::discover::discover;
 use super::locate::functions::{curve, told};
 use super::locate::maps::maps;
+use super::long::search;
 use super::model::Model;
 use super::outcome::*;
 use super::quantify::calibrate::calibrate;
@@ -17,7 +18,7 @@ use super::quantify::free_run::{Runner, free_runs, root};
 use super::quantify::next_input::next_input;
 use super::quantify::power::power;
 use super::quantify::share::{Measures, shrinkage};
-use super::rounds::{Explored, search};
+use super::rounds::Explored;
 use super::settings::DiagnoseSettings;
 use super::summary::{effects, nuisance, onset, parameters, remains};
 use super::thresholds::Thresholds;
@@ -106,6 +107,7 @@ fn report(
         findings,
         chances,
         not_tested,
+        searched,
     } = &explored;
     let model = &base.model;
     let records = model.problem.records;
@@ -226,6 +228,7 @@ fn report(
             validation,
             &parameters,
             base.step.is_some(),
+            *searched,
         ),
         residuals: (records.iter().zip(filtered.into_iter().flatten()))
             .filter_map(|(r, filtered)| Record::new(r.drive().clone(), filtered.standardised).ok())

@@ -117,8 +117,8 @@ impl Thresholds {
     pub const SECOND: f64 = 0.15;
     /// Largest share of the whole that may remain beside a partial explanation.
     pub const REST: f64 = 0.34;
-    /// Share of its evidence by which an unknown function alone may be better than a partial explanation. At half, the lag of a real
-    /// heater is not named; at twice, a pair is named on an open trial whose law is outside the library.
+    /// Share of an unknown function's evidence that a listed effect at its place may lack to be the same law in another form. At half, the
+    /// lag of a real heater is not named.
     pub const OUTDONE: f64 = 0.15;
     /// Evidence up to which few hypotheses are refitted: nothing seems to be missing.
     pub const NULL_LIKE: f64 = 4.0;

@@ -92,7 +92,10 @@ impl<'a> Problem<'a> {
 
     /// Another twin or other axes on the same records; its passes are counted with those of this one.
     pub fn with_twin(&self, twin: Twin, axes: Vec<Axis>) -> Self {
-        Self::new(twin, axes, self.records).counted_with(&self.passes)
+        Self {
+            done: self.done,
+            ..Self::new(twin, axes, self.records).counted_with(&self.passes)
+        }
     }
 
     /// The same problem, its passes added to these.
@@ -142,7 +145,10 @@ impl<'a> Problem<'a> {
     pub fn on<'b>(&self, records: &'b [Record]) -> Problem<'b> {
         let d = self.twin.parameters().len();
         let axes = self.axes[..d].to_vec();
-        Problem::new(self.twin.clone(), axes, records).counted_with(&self.passes)
+        Problem {
+            families: self.families.clone(),
+            ..Problem::new(self.twin.clone(), axes, records).counted_with(&self.passes)
+        }
     }
 
     /// States, inputs and outputs; of a black box, its predicted outputs stand for states.
@@ -186,7 +192,7 @@ impl<'a> Problem<'a> {
     /// Full θ from that of another problem, whose records are the first of these: others start as its first one does.
     pub fn carried(&self, other: &Problem<'_>, theta: &[f64]) -> Vec<f64> {
         let mut full = self.full(&other.of_record(0, theta));
-        for r in 0..other.records.len() {
+        for r in 0..other.records.len().min(self.records.len()) {
             self.place(r, &other.of_record(r, theta), &mut full);
         }
         full

@@ -2,8 +2,7 @@
 //!
 //! ```text
 //! named : the largest log Z of what leaves nothing;  a larger set must be 2 nats better, an unknown function alone must not be better by 3
-//! partial: the largest log Z, where it leaves a third at most;  an unknown function alone must not be better by 15 %, nor all of them more
-//!          probable
+//! partial: the largest log Z, where it leaves a third at most;  unknown functions alone must not be more probable than beside effects
 //! ```
 
 use super::chances::Chances;
@@ -94,7 +93,6 @@ pub(in crate::diagnose) fn decide(
     let kinds = &chances.kinds;
     let explains_most = |(_, own, left): &Candidate| {
         has_equations
-            && *own > (1.0 - Thresholds::OUTDONE) * best_unknown
             && kinds.unknown
                 < match leaves_nothing(*own, *left) {
                     true => kinds.partial,

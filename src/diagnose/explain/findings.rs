@@ -121,6 +121,16 @@ impl<'a> Findings<'a> {
         self.listed.first().map_or(0.0, |f| f.gain)
     }
 
+    /// Returns whether the best effect, pair or function has a frequency.
+    pub fn leads_with_wave(&self) -> bool {
+        let first = [&self.listed, &self.several, &self.unknown].map(|all| all.first());
+        let best = first
+            .into_iter()
+            .flatten()
+            .max_by(|a, b| a.gain.total_cmp(&b.gain));
+        best.is_some_and(|found| found.terms.iter().any(|term| term.is_wave()))
+    }
+
     /// The most probable of the best single effect and those within 3 nats of it.
     pub fn likeliest_single(&self) -> Option<&Found<'a>> {
         let chances = self.chances();

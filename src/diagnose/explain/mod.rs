@@ -6,7 +6,7 @@ pub(in crate::diagnose) mod explore;
 pub(in crate::diagnose) mod findings;
 pub(in crate::diagnose) mod found;
 mod noise;
-mod pairs;
+pub(in crate::diagnose) mod pairs;
 pub(in crate::diagnose) mod refit;
 pub(in crate::diagnose) mod scan;
 pub(in crate::diagnose) mod search;

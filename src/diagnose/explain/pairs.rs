@@ -11,9 +11,9 @@ use crate::diagnose::thresholds::Thresholds;
 use std::sync::Arc;
 
 /// Single effects that are looked at for something left, or for a second one beside them.
-pub(super) const SINGLES: usize = 3;
+pub(in crate::diagnose) const SINGLES: usize = 3;
 /// Least share of the best single effect's evidence of a first of a pair.
-pub(super) const FIRST: f64 = 1.0 / 3.0;
+pub(in crate::diagnose) const FIRST: f64 = 1.0 / 3.0;
 
 /// Second effects on top of the best singles.
 pub(super) fn pairs<'a>(

@@ -132,6 +132,11 @@ impl Term {
         }
     }
 
+    /// Returns whether this is a law with a frequency, listed or not.
+    pub fn is_wave(&self) -> bool {
+        self.nature == Nature::Periodic || self.is_listed_wave()
+    }
+
     /// Free magnitudes of an effect, in the order of the axes; none of other terms.
     fn free(&self) -> Vec<&Magnitude> {
         match &self.part {

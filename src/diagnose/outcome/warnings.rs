@@ -5,13 +5,15 @@ use crate::fit::Warning;
 use crate::record::{Quantity, Record, Signal};
 use crate::twin::{Parameter, Twin};
 
-/// Lists what makes a diagnosis doubtful: constant channels, repeated records, parameters at a bound, a coarse step.
+/// Lists what makes a diagnosis doubtful: constant channels, repeated records, parameters at a bound, a coarse step, a
+/// search that saw some of the rows.
 pub(in crate::diagnose) fn warnings(
     twin: &Twin,
     records: &[Record],
     validation: Option<&Record>,
     parameters: &[FittedParameter],
     has_finer_step: bool,
+    searched: Option<usize>,
 ) -> Vec<Warning> {
     let mut all = vec![];
     let mut warn = |code, what, remedy| all.push(Warning { code, what, remedy });
@@ -74,6 +76,16 @@ pub(in crate::diagnose) fn warnings(
             "set integrator and substeps in [record] of the study as this report has them",
         );
     }
+    if let Some(rows) = searched {
+        let all: usize = records.iter().map(Record::samples).sum();
+        warn(
+            "first-rows",
+            format!(
+                "explanations were chosen on the first {rows} of {all} rows, and fitted to all"
+            ),
+            "if something may begin later, diagnose that part of the record alone",
+        );
+    }
     all
 }
 
@@ -119,6 +131,7 @@ mod tests {
             Some(&record),
             &[parameter],
             true,
+            Some(4),
         );
         let codes: Vec<&str> = told.iter().map(|warning| warning.code).collect();
         assert_eq!(
@@ -132,6 +145,7 @@ mod tests {
                 "validation-is-record",
                 "at-bound",
                 "coarse-step",
+                "first-rows",
             ]
         );
         assert_eq!(told[4].what, "records 1 and 2 are the same and count twice");

@@ -1,0 +1,239 @@
+//! Long records: the search sees their first rows, and what stands out there is fitted to all of them.
+//!
+//! ```text
+//! n = 1024 rows, 4 n, 16 n …        until a gap is clear there
+//! log Z of all rows                 of the twin, and of what stands out, each fitted on from there
+//!                                   of the rest: that of the n rows times N/n, at most that of the best
+//! ```
+
+use super::error::DiagnoseError;
+use super::explain::findings::Findings;
+use super::explain::found::{Found, sort};
+use super::explain::pairs::{FIRST, SINGLES};
+use super::model::Model;
+use super::rounds::{self, Explored};
+use super::settings::DiagnoseSettings;
+use crate::progress::{Progress, Stage};
+use crate::record::Record;
+use crate::study::Study;
+use rayon::prelude::*;
+
+/// Rows of all records together from which they are long. On two cores, a gap in half as many takes a minute.
+const LONG: usize = 4096;
+/// Rows that the search begins with. With twice as many it takes twice as long; what half as many show, four times as many are asked for.
+const FIRST_ROWS: usize = 1024;
+/// Factor by which more rows are searched where a gap is not clear.
+const MORE: usize = 4;
+/// log of the odds from which a gap is clear: a rival that has a third of it stays in the race, and is 20 nats away.
+const CLEAR: f64 = 30.0;
+/// Functions that are fitted to all rows, alone and on top of an explanation.
+const FUNCTIONS: usize = 2;
+
+/// Fits the twin, searches for what explains the records beside it, and hands it all on.
+pub(super) fn search<R>(
+    study: &Study,
+    records: &[Record],
+    settings: &DiagnoseSettings,
+    progress: &Progress,
+    then: &dyn Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
+) -> Result<R, DiagnoseError> {
+    match search_part(study, records, settings, progress, then)? {
+        Some(found) => Ok(found),
+        None => rounds::search(study, records, settings, progress, then),
+    }
+}
+
+/// Searches the first rows of long records and hands on what is found there, fitted to all rows. `None` where records are short, where no
+/// part shows a clear gap, and where a wave explains most: its frequency is known as sharply as the record is long.
+fn search_part<R>(
+    study: &Study,
+    records: &[Record],
+    settings: &DiagnoseSettings,
+    progress: &Progress,
+    then: &dyn Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
+) -> Result<Option<R>, DiagnoseError> {
+    let rows: usize = records.iter().map(Record::samples).sum();
+    if rows < LONG || study.twin().outline().is_none() {
+        return Ok(None);
+    }
+    let mut first = FIRST_ROWS;
+    while MORE * first <= rows {
+        let Some(part) = first_rows(records, first) else {
+            return Ok(None);
+        };
+        let on_all = |own: Explored<'_, '_>| -> Result<Option<R>, DiagnoseError> {
+            if own.chances.log_odds < CLEAR || own.findings.leads_with_wave() {
+                return Ok(None);
+            }
+            let stage = progress.stage("all rows", STEPS);
+            let Some(base) = own.base.on(records)? else {
+                return Ok(None);
+            };
+            let carry = Carry {
+                origins: [own.base.model.log_evidence, base.model.log_evidence],
+                ratio: rows as f64 / first as f64,
+                model: &base.model,
+            };
+            let findings = carry.findings(&own.findings, &stage)?;
+            stage.finish();
+            then(Explored {
+                study,
+                base: &base,
+                listed: own.listed,
+                chances: findings.chances(),
+                findings,
+                not_tested: own.not_tested,
+                searched: Some(first),
+            })
+            .map(Some)
+        };
+        if let Some(found) = rounds::search(study, &part, settings, progress, &on_all)? {
+            return Ok(Some(found));
+        }
+        first *= MORE;
+    }
+    Ok(None)
+}
+
+/// The same share of each record, so many rows in all; `None` where an output has no value in them.
+fn first_rows(records: &[Record], rows: usize) -> Option<Vec<Record>> {
+    let all: usize = records.iter().map(Record::samples).sum();
+    (records.iter())
+        .map(|record| record.first_part((record.samples() * rows).div_ceil(all)))
+        .collect()
+}
+
+/// Steps that are reported: functions, effects, noise, pairs, what remains.
+const STEPS: usize = 5;
+
+/// Carries fits from a part of the records on to all of them.
+struct Carry<'m, 'a> {
+    /// log Z of the twin on the part, and on all rows.
+    origins: [f64; 2],
+    /// All rows over those of the part.
+    ratio: f64,
+    /// The twin on all rows.
+    model: &'m Model<'a>,
+}
+
+impl<'a> Carry<'_, 'a> {
+    fn findings(&self, old: &Findings<'_>, stage: &Stage) -> Result<Findings<'a>, DiagnoseError> {
+        let least = FIRST * old.top();
+        let unknown = self.all(&old.unknown, FUNCTIONS, 0.0)?;
+        stage.tick()?;
+        let listed = self.all(&old.listed, 2 * SINGLES, least)?;
+        stage.tick()?;
+        let noise = self.all(&old.noise, 1, 0.0)?;
+        let noise_pairs = self.all(&old.noise_pairs, 1, 0.0)?;
+        stage.tick()?;
+        let several = self.all(&old.several, SINGLES, least)?;
+        stage.tick()?;
+        let mut findings = Findings {
+            listed,
+            unknown,
+            several,
+            noise,
+            noise_pairs,
+            is_partial: old.is_partial,
+            ..Findings::default()
+        };
+        // What remains beside sets that are out of the race is of no weight.
+        for (keys, on_top) in &old.beside {
+            if findings.model(keys).is_some() {
+                let on_top = self.all(on_top, FUNCTIONS, 0.0)?;
+                findings.beside.push((keys.clone(), on_top));
+            }
+        }
+        stage.tick()?;
+        Ok(findings)
+    }
+
+    /// Explanations on all rows, best first: so many of the best fitted, if they have more than these nats on the part.
+    fn all(
+        &self,
+        old: &[Found<'_>],
+        most: usize,
+        least: f64,
+    ) -> Result<Vec<Found<'a>>, DiagnoseError> {
+        let fitted: Vec<Option<Found<'a>>> = (old.par_iter().take(most))
+            .map(|found| match found.gain > least {
+                true => self.fitted(found),
+                false => Ok(None),
+            })
+            .collect::<Result<_, _>>()?;
+        let best = (fitted.iter().flatten())
+            .map(|found| found.gain)
+            .fold(f64::NEG_INFINITY, f64::max);
+        let mut fitted = fitted.into_iter();
+        let mut all: Vec<Found<'a>> = (old.iter())
+            .map(|found| {
+                fitted.next().flatten().unwrap_or_else(|| {
+                    let mut other = found.promised();
+                    if other.gain > 0.0 {
+                        other.gain = (self.ratio * other.gain).min(best.max(0.0));
+                    }
+                    other
+                })
+            })
+            .collect();
+        sort(&mut all);
+        Ok(all)
+    }
+
+    /// One explanation fitted to all rows; `None` where it was not fitted to the part.
+    fn fitted(&self, old: &Found<'_>) -> Result<Option<Found<'a>>, DiagnoseError> {
+        let Some(own) = &old.model else {
+            return Ok(None);
+        };
+        let [before, now] = self.origins;
+        Ok(own.beside_twin(self.model)?.map(|model| Found {
+            terms: old.terms.clone(),
+            gain: old.gain + (model.log_evidence - now) - (own.log_evidence - before),
+            model: Some(model),
+        }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::diagnose;
+    use crate::diagnose::fixture::{biased_record, record, tanks};
+
+    /// A gap of a long record is found in its first rows and fitted to all of them: the magnitude is known as well as all rows let it be.
+    #[test]
+    fn a_long_record_is_searched_in_part() {
+        let study = tanks(LONG);
+        let settings = DiagnoseSettings {
+            quick: true,
+            ..DiagnoseSettings::default()
+        };
+        let found = |record: Record| {
+            diagnose(&study, &[record], None, &settings, &Progress::silent()).unwrap()
+        };
+        let biased = found(biased_record(&study, 2.0, 5));
+        assert_eq!(biased.cause.accepted, ["sensor-bias@sensor"]);
+        let bias = biased.cause.effects[0].magnitudes[0].1;
+        assert!((bias - 2.0).abs() < 0.1, "{bias}");
+        assert!(biased.warnings.iter().any(|w| w.code == "first-rows"));
+        assert_eq!(biased.residuals[0].samples(), LONG);
+    }
+
+    /// Where the first rows show no clear gap, all rows are searched.
+    #[test]
+    fn no_gap_is_told_of_all_rows() {
+        let study = tanks(LONG);
+        let theta = study.twin().parameters().centre();
+        let records = [record(&study, study.twin(), &theta, 3)];
+        let settings = DiagnoseSettings {
+            detection_only: true,
+            ..DiagnoseSettings::default()
+        };
+        let seen = search(&study, &records, &settings, &Progress::silent(), &|found| {
+            Ok((found.searched, found.chances.log_odds))
+        });
+        let (searched, log_odds) = seen.unwrap();
+        assert_eq!(searched, None);
+        assert!(log_odds < 3.0, "{log_odds}");
+    }
+}
