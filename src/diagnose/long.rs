@@ -70,6 +70,7 @@ fn search_part<R>(
                 return Ok(None);
             };
             let carry = Carry {
+                settings,
                 origins: [own.base.model.log_evidence, base.model.log_evidence],
                 ratio: rows as f64 / first as f64,
                 model: &base.model,
@@ -87,8 +88,11 @@ fn search_part<R>(
             })
             .map(Some)
         };
-        if let Some(found) = rounds::search(study, &part, settings, progress, &on_all)? {
-            return Ok(Some(found));
+        match rounds::search(study, &part, settings, progress, &on_all) {
+            Ok(Some(found)) => return Ok(Some(found)),
+            // What does not move yet cannot be fitted.
+            Ok(None) | Err(DiagnoseError::NoFit) => {}
+            Err(error) => return Err(error),
         }
         first *= MORE;
     }
@@ -103,11 +107,12 @@ fn first_rows(records: &[Record], rows: usize) -> Option<Vec<Record>> {
         .collect()
 }
 
-/// Steps that are reported: functions, effects, noise, pairs, what remains.
-const STEPS: usize = 5;
+/// Steps that are reported: explanations, what remains beside them.
+const STEPS: usize = 2;
 
 /// Carries fits from a part of the records on to all of them.
 struct Carry<'m, 'a> {
+    settings: &'m DiagnoseSettings,
     /// log Z of the twin on the part, and on all rows.
     origins: [f64; 2],
     /// All rows over those of the part.
@@ -119,32 +124,41 @@ struct Carry<'m, 'a> {
 impl<'a> Carry<'_, 'a> {
     fn findings(&self, old: &Findings<'_>, stage: &Stage) -> Result<Findings<'a>, DiagnoseError> {
         let least = FIRST * old.top();
-        let unknown = self.all(&old.unknown, FUNCTIONS, 0.0)?;
-        stage.tick()?;
-        let listed = self.all(&old.listed, 2 * SINGLES, least)?;
-        stage.tick()?;
-        let noise = self.all(&old.noise, 1, 0.0)?;
-        let noise_pairs = self.all(&old.noise_pairs, 1, 0.0)?;
-        stage.tick()?;
-        let several = self.all(&old.several, SINGLES, least)?;
-        stage.tick()?;
+        // Few fits, some of which take many times as long as others: all at once.
+        let of = |all, most, least| self.all(all, most, least);
+        let ((unknown, listed), (several, (noise, noise_pairs))) = rayon::join(
+            || {
+                rayon::join(
+                    || of(&old.unknown, FUNCTIONS, 0.0),
+                    || of(&old.listed, SINGLES, least),
+                )
+            },
+            || {
+                rayon::join(
+                    || of(&old.several, SINGLES, least),
+                    || rayon::join(|| of(&old.noise, 1, 0.0), || of(&old.noise_pairs, 1, 0.0)),
+                )
+            },
+        );
+        let is_cancelled = self.settings.ends(stage.tick())?;
         let mut findings = Findings {
-            listed,
-            unknown,
-            several,
-            noise,
-            noise_pairs,
-            is_partial: old.is_partial,
+            listed: listed?,
+            unknown: unknown?,
+            several: several?,
+            noise: noise?,
+            noise_pairs: noise_pairs?,
+            is_partial: old.is_partial || is_cancelled,
             ..Findings::default()
         };
-        // What remains beside sets that are out of the race is of no weight.
-        for (keys, on_top) in &old.beside {
-            if findings.model(keys).is_some() {
-                let on_top = self.all(on_top, FUNCTIONS, 0.0)?;
-                findings.beside.push((keys.clone(), on_top));
-            }
+        if findings.is_partial {
+            return Ok(findings);
         }
-        stage.tick()?;
+        // What remains beside sets that are out of the race is of no weight.
+        findings.beside = (old.beside.par_iter())
+            .filter(|(keys, _)| findings.model(keys).is_some())
+            .map(|(keys, on_top)| Ok((keys.clone(), self.all(on_top, FUNCTIONS, 0.0)?)))
+            .collect::<Result<_, DiagnoseError>>()?;
+        findings.is_partial = self.settings.ends(stage.tick())?;
         Ok(findings)
     }
 

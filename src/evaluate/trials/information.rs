@@ -21,7 +21,7 @@
 
 use super::world::Conditions;
 use crate::fit::axis::Axis;
-use crate::fit::climb::climb;
+use crate::fit::climb::fit;
 use crate::fit::problem::Problem;
 use crate::fit::reference::{Reference, weak};
 use crate::likelihood::kalman::{FilterError, recoverable};
@@ -174,8 +174,10 @@ impl<'a> Information<'a> {
     fn best(&self, records: [&Record; 2]) -> Result<Option<f64>, FilterError> {
         let mut sum = 0.0;
         for record in records {
-            let record = std::slice::from_ref(record);
-            let Some(fitted) = climb(&self.problem.on(record), &self.theta, ITERATIONS)? else {
+            let problem = self.problem.on(std::slice::from_ref(record));
+            // Loud noise leads to a distant θ that answers a departure: quiet noise has narrow valleys.
+            let starts = [self.theta.clone(), problem.begin(&self.theta)];
+            let Some(fitted) = fit(&problem, &starts, ITERATIONS)? else {
                 return Ok(None);
             };
             sum += fitted.log_likelihood;

@@ -4,7 +4,7 @@ use super::*;
 use crate::diagnose::fixture::tanks;
 use crate::evaluate::paper::reference_studies;
 use crate::evaluate::trials::information::Information;
-use crate::evaluate::trials::law::Place;
+use crate::evaluate::trials::law::{Departure, Law, Place, SignalLaw};
 use crate::evaluate::trials::truth::fixture::{on_stage, plain};
 use crate::evaluate::trials::truth::sizing::FIRST;
 use crate::study::RecordPlan;
@@ -293,6 +293,44 @@ fn departures_that_are_alike_have_no_information_beside_each_other() {
         let lag = changed("sensor-lag", Place::Sensor(0));
         assert!(information.unexplained(&push, &bias) < 0.01);
         assert!(information.unexplained(&push, &lag) > 0.1);
+    });
+}
+
+/// ẋ = (u − k·x)/area.
+struct Tank;
+
+impl StateSpace for Tank {
+    fn outline(&self) -> Outline {
+        Outline::new()
+            .parameter(Parameter::new("k", "m²/s", 0.2, 1.0).within(0.01, 3.0))
+            .parameter(Parameter::new("area", "m²", 0.5, 1.5).within(0.2, 5.0))
+            .state("h", "m")
+            .input("u", "m³/s")
+            .output("y", "m")
+    }
+    fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+        dx[0] = (now.u[0] - now.theta[0] * x[0]) / now.theta[1];
+    }
+    fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+        y[0] = x[0];
+    }
+    fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+        (process[0], measurement[0]) = (0.01, 0.02);
+    }
+}
+
+/// A gain of the level's sensor is a tank of another area with another outflow, however far away.
+#[test]
+fn what_a_distant_theta_absorbs_has_no_information() {
+    let study = Study::new("tank", Tank, RecordPlan::levels(0.1, 300, 0.0, 1.0, 20)).unwrap();
+    on_stage(&study, &[0.49, 1.04], |stage, information| {
+        let gain = Departure {
+            place: Place::Sensor(0),
+            law: Law::Signal(SignalLaw::Gain { factor: 2.35 }),
+        };
+        let [own, _, mirrored] = stage.records(&[gain]).unwrap();
+        let lost = information.lost([&own, &mirrored]).unwrap().unwrap();
+        assert!(lost < 1.0, "{lost}");
     });
 }
 
