@@ -49,8 +49,8 @@ impl Thresholds {
     pub const INTERVAL_LEVEL: f64 = 0.9;
     /// Horizons of predictions in samples, up to a tenth of the record.
     pub const HORIZONS: [usize; 6] = [1, 3, 10, 30, 100, 300];
-    /// Standard deviations of the floor that the error before lies above it, for a share to be measured: 1/CLEAR is the standard deviation
-    /// of a true system's share. At 2, 9 of 85 shares of right effects exceed 1.1.
+    /// Standard deviations of the floor that the twin's error on simulated records lies above it, for a share to be measured: 1/CLEAR is the
+    /// standard deviation of a true system's share.
     pub const CLEAR: f64 = 3.0;
     /// Widest interval of a share beside which one number is told. Of 150 shares of true effects 85 % lie in −0.1 to 1.1; of 92 with an
     /// interval narrower than 0.25 98 %, of 113 at 0.5 96 %, of 130 at 1 94 %.

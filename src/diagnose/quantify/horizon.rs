@@ -10,8 +10,8 @@
 //! ```
 //!
 //! If the accepted twin is right, A is one more of the Aᵢ, errors of estimation included, and the true system scores 1 in expectation.
-//! The headline is the horizon with the largest (B − F)/s, s the standard deviation of the Aᵢ: where twin and floor differ most clearly.
-//! A does not take part in the choice. A free run has a share only where it can follow: noise alone must leave it half of the variance of y,
+//! The headline is the horizon with the largest (mean Bᵢ − F)/s, s the standard deviation of the Aᵢ: where twin and floor differ most
+//! clearly. Neither A nor B takes part in the choice: a noisy record would choose itself. A free run has a share only where it can follow: noise alone must leave it half of the variance of y,
 //! F < ½. Its interval is that of (B − δBᵢ − A + δAᵢ)/(B − δBᵢ − F), δ the deviations of simulated records
 //! from their mean: what another record of the same system would have given.
 
@@ -166,8 +166,14 @@ pub(in crate::diagnose) fn compare(
         let floors = compared.means(after, reach, rows, &simulated)?;
         let floors: Vec<f64> = floors.into_iter().flatten().collect();
         let (floor, spread) = (mean(&floors), deviation(&floors));
-        let clear = (mean(&b) - floor) / spread.max(f64::MIN_POSITIVE);
-        let is_clear = clear.is_finite() && clear > Thresholds::CLEAR && reach.can_measure(floor);
+        // Whether the gap shows, simulated records say: where the measured one does, its noise would have chosen itself.
+        let twins = compared.means(before, reach, rows, &simulated)?;
+        let twins: Vec<f64> = twins.into_iter().flatten().collect();
+        let clear = (mean(&twins) - floor) / spread.max(f64::MIN_POSITIVE);
+        let is_clear = clear.is_finite()
+            && clear > Thresholds::CLEAR
+            && reach.can_measure(floor)
+            && mean(&b) > floor;
         if is_clear && clear > clearest {
             (compared.headline, clearest) = (Some(compared.horizons.len()), clear);
         }
