@@ -2,11 +2,13 @@
 //!
 //! ```text
 //! named : the largest log Z of what leaves nothing;  a larger set must be 2 nats better, an unknown function alone must not be better by 3
-//! partial: the largest log Z, where it leaves a third at most;  unknown functions alone must not be more probable than beside effects
+//! partial: the largest log Z, where it leaves a third at most;  an unknown function alone must not be better by 15 %, unless no other
+//!          listed effect has a third of it;  nor may all of them be more probable than beside effects
 //! ```
 
 use super::chances::Chances;
 use super::findings::{Findings, leaves_nothing};
+use super::pairs::FIRST;
 use crate::diagnose::outcome::Decision;
 use crate::diagnose::thresholds::Thresholds;
 
@@ -91,8 +93,10 @@ pub(in crate::diagnose) fn decide(
     // Listed effects that explain most, beside something unknown, or with so little left that chance may have made it. What is inside a
     // black box has no functions to stand for it. Of two of which one is refuted, the other may explain most.
     let kinds = &chances.kinds;
-    let explains_most = |(_, own, left): &Candidate| {
+    let explains_most = |(keys, own, left): &Candidate| {
         has_equations
+            && (*own > (1.0 - Thresholds::OUTDONE) * best_unknown
+                || stands_alone(findings, keys, *own))
             && kinds.unknown
                 < match leaves_nothing(*own, *left) {
                     true => kinds.partial,
@@ -111,6 +115,15 @@ pub(in crate::diagnose) fn decide(
         })
         .find(|conclusion| conclusion.decision == Decision::Partial)
         .unwrap_or_else(Conclusion::none_of_these)
+}
+
+/// Returns whether no listed effect outside a set has a third of its nats: a law outside the library is imitated by several.
+fn stands_alone(findings: &Findings<'_>, keys: &[String], own: f64) -> bool {
+    let others = findings
+        .listed
+        .iter()
+        .filter(|f| !keys.contains(&f.last().key()));
+    others.map(|f| f.gain).fold(0.0, f64::max) < FIRST * own
 }
 
 /// The most probable of the candidates within 3 nats of the best one, and of as many effects: a function may be one of them in another
@@ -190,6 +203,24 @@ mod tests {
         };
         assert_eq!(decided(53.0), Decision::Partial);
         assert_eq!(decided(56.0), Decision::NoneOfThese);
+    }
+
+    /// An effect beside which an unknown function alone is much better is a part only if no other effect does anything like it.
+    #[test]
+    fn an_effect_that_stands_alone_is_a_part() {
+        let decided = |other: f64| {
+            let effect = wave(Nature::Listed, "h1", 120.0);
+            let mut findings = Findings {
+                unknown: (0..40).map(|_| wave(Nature::Function, "h2", 0.0)).collect(),
+                ..Findings::default()
+            };
+            findings.unknown[0].gain = 150.0;
+            findings.add(&effect, Some(vec![wave(Nature::Function, "h2", 170.0)]));
+            findings.listed = vec![effect, wave(Nature::Listed, "h2", other)];
+            decide(&findings, &findings.chances(), 2, true).decision
+        };
+        assert_eq!(decided(20.0), Decision::Partial);
+        assert_eq!(decided(60.0), Decision::NoneOfThese);
     }
 
     /// The first of a pair still explains most where its second effect is less probable than something unknown in its place.
