@@ -35,6 +35,7 @@ pub fn gap_text(study: &Study, diagnosis: &Diagnosis) -> String {
     lines.push(evidence_sentence(diagnosis));
     lines.extend(step_sentence(diagnosis));
     lines.extend(quick_sentence(diagnosis));
+    lines.extend(warned(diagnosis));
     let parameters: Vec<String> = (diagnosis.parameters.iter())
         .map(|p| {
             let note = match ParameterRow::diagnosed(p).note(Role::Parameter) {
@@ -80,6 +81,17 @@ pub fn gap_text(study: &Study, diagnosis: &Diagnosis) -> String {
     ));
     lines.truncate(LINES);
     lines.join("\n") + "\n"
+}
+
+/// Returns, in one line, the warnings that are not told elsewhere: still channels when records are read, a coarse step beside the evidence.
+fn warned(diagnosis: &Diagnosis) -> Option<String> {
+    const TOLD: [&str; 3] = ["constant-input", "constant-output", "coarse-step"];
+    let own = diagnosis
+        .warnings
+        .iter()
+        .filter(|w| !TOLD.contains(&w.code));
+    let all: Vec<String> = own.map(|w| format!("{} ({})", w.what, w.remedy)).collect();
+    (!all.is_empty()).then(|| format!("Warning: {}.", all.join("; ")))
 }
 
 /// Returns the evidence behind the verdict.
@@ -273,6 +285,7 @@ fn with_magnitudes(units: &Units, effect: &EffectFit) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fit::Warning;
     use crate::report::fixture::{diagnoses, made, oscillator, tanks};
 
     fn gap_text(diagnosis: &Diagnosis) -> String {
@@ -295,6 +308,25 @@ mod tests {
             "{named}"
         );
         assert!(named.contains("Where: "), "{named}");
+    }
+
+    #[test]
+    fn warnings_that_are_not_told_elsewhere_are_one_line() {
+        let mut diagnosis = made::tanks_class();
+        let warning = |code, what: &str| Warning {
+            code,
+            what: what.into(),
+            remedy: "look there",
+        };
+        diagnosis.warnings = vec![
+            warning("constant-input", "the input u never changes"),
+            warning("at-bound", "k1 lies at its upper bound"),
+            warning("repeated-record", "records 1 and 2 are the same"),
+        ];
+        let text = gap_text(&diagnosis);
+        let line = "Warning: k1 lies at its upper bound (look there); records 1 and 2 are the same (look there).";
+        assert!(text.lines().any(|l| l == line), "{text}");
+        assert!(!text.contains("never changes"));
     }
 
     #[test]

@@ -319,13 +319,13 @@ impl StateSpace for Tank {
     }
 }
 
-/// A gain of the level's sensor is a tank of another area with another outflow, however far away.
+/// A gain of the pump is a tank of another area with another outflow, however far away.
 #[test]
 fn what_a_distant_theta_absorbs_has_no_information() {
     let study = Study::new("tank", Tank, RecordPlan::levels(0.1, 300, 0.0, 1.0, 20)).unwrap();
     on_stage(&study, &[0.49, 1.04], |stage, information| {
         let gain = Departure {
-            place: Place::Sensor(0),
+            place: Place::Actuator(0),
             law: Law::Signal(SignalLaw::Gain { factor: 2.35 }),
         };
         let [own, _, mirrored] = stage.records(&[gain]).unwrap();
