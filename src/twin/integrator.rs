@@ -39,7 +39,7 @@ pub(crate) struct Between<'a> {
     pub next: &'a [f64],
     /// Share of the next sample's inputs.
     pub share: f64,
-    /// How inputs go from one sample to the next.
+    /// Inputs between this sample and the next.
     pub hold: Hold,
 }
 

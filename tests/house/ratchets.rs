@@ -130,7 +130,7 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
     vec![
         Ratchet::new("public items", 150, items.collect()),
         Ratchet::new("error types", 15, errors),
-        Ratchet::new("lines of src, files of tests apart", 74_400, lines),
+        Ratchet::new("lines of src, files of tests apart", 74_800, lines),
         Ratchet::new("folders with more than 18 files", 0, crowded(sources, 18)),
         Ratchet::new("questions for equations", 8, questions(sources)),
         Ratchet::new(
