@@ -107,8 +107,8 @@ fn first_rows(records: &[Record], rows: usize) -> Option<Vec<Record>> {
         .collect()
 }
 
-/// Steps that are reported: explanations, what remains beside them.
-const STEPS: usize = 2;
+/// Steps that are reported.
+const STEPS: usize = 1;
 
 /// Carries fits from a part of the records on to all of them.
 struct Carry<'m, 'a> {
@@ -126,7 +126,14 @@ impl<'a> Carry<'_, 'a> {
         let least = FIRST * old.top();
         // Few fits, some of which take many times as long as others: all at once.
         let of = |all, most, least| self.all(all, most, least);
-        let ((unknown, listed), (several, (noise, noise_pairs))) = rayon::join(
+        // What remains beside sets that are out of the race is of no weight.
+        let beside = || -> Result<Vec<_>, DiagnoseError> {
+            (old.beside.par_iter())
+                .filter(|(keys, _)| old.gain(keys).is_some_and(|gain| gain > least))
+                .map(|(keys, on_top)| Ok((keys.clone(), of(on_top, FUNCTIONS, 0.0)?)))
+                .collect()
+        };
+        let ((unknown, listed), (several, (beside, noise))) = rayon::join(
             || {
                 rayon::join(
                     || of(&old.unknown, FUNCTIONS, 0.0),
@@ -136,29 +143,27 @@ impl<'a> Carry<'_, 'a> {
             || {
                 rayon::join(
                     || of(&old.several, SINGLES, least),
-                    || rayon::join(|| of(&old.noise, 1, 0.0), || of(&old.noise_pairs, 1, 0.0)),
+                    || rayon::join(beside, || of(&old.noise, 1, 0.0)),
                 )
             },
         );
-        let is_cancelled = self.settings.ends(stage.tick())?;
         let mut findings = Findings {
             listed: listed?,
             unknown: unknown?,
             several: several?,
             noise: noise?,
-            noise_pairs: noise_pairs?,
-            is_partial: old.is_partial || is_cancelled,
+            noise_pairs: of(&old.noise_pairs, 1, 0.0)?,
             ..Findings::default()
         };
-        if findings.is_partial {
-            return Ok(findings);
-        }
-        // What remains beside sets that are out of the race is of no weight.
-        findings.beside = (old.beside.par_iter())
-            .filter(|(keys, _)| findings.model(keys).is_some())
-            .map(|(keys, on_top)| Ok((keys.clone(), self.all(on_top, FUNCTIONS, 0.0)?)))
-            .collect::<Result<_, DiagnoseError>>()?;
-        findings.is_partial = self.settings.ends(stage.tick())?;
+        findings.beside = beside?;
+        (findings.beside).retain(|(keys, _)| {
+            findings
+                .listed
+                .iter()
+                .chain(&findings.several)
+                .any(|f| f.keys() == *keys && f.model.is_some())
+        });
+        findings.is_partial = old.is_partial || self.settings.ends(stage.tick())?;
         Ok(findings)
     }
 
