@@ -65,7 +65,7 @@ fn search_part<R>(
             if own.chances.log_odds < CLEAR || own.findings.leads_with_wave() {
                 return Ok(None);
             }
-            let stage = progress.stage("all rows", STEPS);
+            let stage = progress.stage("all rows", 1);
             let Some(base) = own.base.on(records)? else {
                 return Ok(None);
             };
@@ -106,9 +106,6 @@ fn first_rows(records: &[Record], rows: usize) -> Option<Vec<Record>> {
         .map(|record| record.first_part((record.samples() * rows).div_ceil(all)))
         .collect()
 }
-
-/// Steps that are reported.
-const STEPS: usize = 1;
 
 /// Carries fits from a part of the records on to all of them.
 struct Carry<'m, 'a> {
@@ -155,14 +152,8 @@ impl<'a> Carry<'_, 'a> {
             noise_pairs: of(&old.noise_pairs, 1, 0.0)?,
             ..Findings::default()
         };
-        findings.beside = beside?;
-        (findings.beside).retain(|(keys, _)| {
-            findings
-                .listed
-                .iter()
-                .chain(&findings.several)
-                .any(|f| f.keys() == *keys && f.model.is_some())
-        });
+        let fitted = |(keys, _): &(Vec<String>, _)| findings.model(keys).is_some();
+        findings.beside = beside?.into_iter().filter(fitted).collect();
         findings.is_partial = old.is_partial || self.settings.ends(stage.tick())?;
         Ok(findings)
     }

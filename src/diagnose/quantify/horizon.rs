@@ -11,9 +11,9 @@
 //!
 //! If the accepted twin is right, A is one more of the Aᵢ, errors of estimation included, and the true system scores 1 in expectation.
 //! The headline is the horizon with the largest (mean Bᵢ − F)/s, s the standard deviation of the Aᵢ: where twin and floor differ most
-//! clearly. Neither A nor B takes part in the choice: a noisy record would choose itself. A free run has a share only where it can follow: noise alone must leave it half of the variance of y,
-//! F < ½. Its interval is that of (B − δBᵢ − A + δAᵢ)/(B − δBᵢ − F), δ the deviations of simulated records
-//! from their mean: what another record of the same system would have given.
+//! clearly. Neither A nor B takes part in the choice: a noisy record would choose itself. A free run has a share only where it can follow:
+//! noise alone must leave it half of the variance of y, F < ½. Its interval is that of (B − δBᵢ − A + δAᵢ)/(B − δBᵢ − F), δ the deviations
+//! of simulated records from their mean: what another record of the same system would have given.
 
 use super::free_run::{Runner, mean, scaled, variances};
 use crate::diagnose::error::DiagnoseError;
@@ -163,12 +163,13 @@ pub(in crate::diagnose) fn compare(
         if b.is_empty() {
             continue;
         }
-        let floors = compared.means(after, reach, rows, &simulated)?;
-        let floors: Vec<f64> = floors.into_iter().flatten().collect();
-        let (floor, spread) = (mean(&floors), deviation(&floors));
+        let on_simulated = |p: &Predictor<'_>| -> Result<Vec<f64>, FilterError> {
+            let all = compared.means(p, reach, rows, &simulated)?;
+            Ok(all.into_iter().flatten().collect())
+        };
         // Whether the gap shows, simulated records say: where the measured one does, its noise would have chosen itself.
-        let twins = compared.means(before, reach, rows, &simulated)?;
-        let twins: Vec<f64> = twins.into_iter().flatten().collect();
+        let (floors, twins) = (on_simulated(after)?, on_simulated(before)?);
+        let (floor, spread) = (mean(&floors), deviation(&floors));
         let clear = (mean(&twins) - floor) / spread.max(f64::MIN_POSITIVE);
         let is_clear = clear.is_finite()
             && clear > Thresholds::CLEAR

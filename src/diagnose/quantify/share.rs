@@ -39,10 +39,11 @@ impl HeldOut<'_> {
     /// The problem of a model without what is held out, and its fit; `None` where it cannot be fitted.
     fn refit<'p>(&'p self, model: &'p Model<'_>) -> Result<Option<Refit<'p>>, FilterError> {
         if self.from == 0 {
-            let (problem, fitted) = (on(model, model.problem.records), model.fitted.clone());
+            let problem = model.problem.on(model.problem.records);
+            let fitted = model.fitted.clone();
             return Ok(Some(Refit { problem, fitted }));
         }
-        let problem = on(model, self.begins);
+        let problem = model.problem.on(self.begins);
         let fitted = climb(&problem, &problem.full(&model.theta()), REFIT)?;
         Ok(fitted.map(|fitted| Refit { problem, fitted }))
     }
@@ -53,7 +54,7 @@ impl HeldOut<'_> {
         model: &Model<'_>,
         theta: Vec<f64>,
     ) -> Result<Option<Predictor<'a>>, DiagnoseError> {
-        let problem = on(model, self.begins);
+        let problem = model.problem.on(self.begins);
         let runner = Runner::new(&problem, &problem.full(&theta))?;
         Ok(runner.map(|runner| Predictor {
             problem,
@@ -109,13 +110,6 @@ impl Refit<'_> {
     fn theta(&self) -> Vec<f64> {
         self.problem.of_record(0, &self.fitted.theta)
     }
-}
-
-/// A model's problem on other records.
-fn on<'r>(model: &Model<'_>, records: &'r [Record]) -> Problem<'r> {
-    let mut problem = model.problem.on(records);
-    problem.families.clone_from(&model.problem.families);
-    problem
 }
 
 /// Means to measure the share of a gap.
