@@ -13,16 +13,17 @@
 #[cfg(test)]
 mod tests;
 
-use crate::estimator::bank::FeatureSimulator;
+use crate::estimator::bank::{Draw, Draws, FeatureSimulator};
 use crate::estimator::error::EstimatorError;
 use crate::math::{Whitening, median, rank_p_value, to_vector};
-use crate::progress::Progress;
+use crate::progress::{Progress, Stage};
 use crate::record::Drive;
 use crate::setting::SettingError;
 use crate::twin::Noise;
 use nalgebra::{DMatrix, DVector};
 use ndarray::{Array2, ArrayView1};
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// Monte-Carlo errors between p-value and level that leave the answer to chance in fewer than 1 of 20 cases.
 const UNSURE: f64 = 2.0;
@@ -204,15 +205,17 @@ impl GateTest<'_> {
         })
     }
 
-    /// The test at a θ that was itself read off the record: the simulations that the record is ranked among are read off in
-    /// the same way, and each is compared with the mean at its own estimate,
+    /// The test at a θ that was itself read off the record. The record's true θ lies some error e away, and its features with it. So
+    /// the record is ranked among simulations at θ + e_k, each of which is read off in the same way and compared with the mean at its
+    /// own estimate, to first order:
     ///
     /// ```text
-    /// s_k = ‖S^{-1/2}(x_k − μ − ∂f̄/∂θ·(θ̂(x_k) − θ))‖²
+    /// s_k = ‖S^{-1/2}(x_k − μ − ∂f̄/∂θ·(θ̂(x_k) − θ))‖²,   x_k simulated at θ + e_k
     /// ```
     ///
-    /// so that what the reader gets wrong on records of the twin itself rejects no record. `jacobians` are ∂f/∂θ at θ
-    /// (n × d) of several seeds; their median in whitened features is taken, since far from their reference features have
+    /// The errors e_k are those of fresh simulations at `near`: parameters of the prior that the reader takes for about θ. They have the
+    /// record's own input and noise, so that what the reader gets wrong on records of the twin itself rejects no record. `jacobians`
+    /// are ∂f/∂θ at θ (n × d) of several seeds; their median in whitened features is taken, since far from their reference features have
     /// heavy tails, and one such run would spoil a mean. `estimate` maps features (rows) to θ̂. The paper's form stays as
     /// [`at`](Self::at).
     ///
@@ -222,28 +225,38 @@ impl GateTest<'_> {
     pub fn at_estimate(
         &self,
         theta: &[f64],
+        near: &[Vec<f64>],
         jacobians: &[DMatrix<f64>],
-        estimate: impl FnOnce(&Array2<f64>) -> Result<Array2<f64>, EstimatorError>,
+        estimate: impl Fn(&Array2<f64>) -> Result<Array2<f64>, EstimatorError>,
     ) -> Result<Gate, EstimatorError> {
-        let simulated = self.simulate(theta)?;
-        let whitening = self.settings.whiten(&simulated.whitening)?;
-        let ranked = simulated.ranked();
-        let null = match self.settings.form {
-            GateForm::Paper => whitening.squared_distances(ranked),
-            GateForm::Calibrated => {
-                let jacobian = whitened_median(&whitening, jacobians);
-                let estimates = estimate(ranked)?;
-                let distance = |(row, estimate): (ArrayView1<'_, f64>, ArrayView1<'_, f64>)| {
-                    let moved = DVector::from_fn(theta.len(), |j, _| estimate[j] - theta[j]);
-                    (whitening.residual(&to_vector(&row)) - &jacobian * moved).norm_squared()
-                };
-                (ranked.rows().into_iter().zip(estimates.rows()))
-                    .map(distance)
+        if self.settings.form == GateForm::Paper {
+            return self.at(theta);
+        }
+        let size = self.settings.whitening_simulations(self.simulator.dim());
+        let null = self.settings.null;
+        let stage = self.progress.stage("gate", size + 2 * null);
+        let whitening = (self.settings).whiten(&self.repeat(theta, size, "whitening", &stage)?)?;
+        let read = self.draws(null, near, "errors", &stage)?;
+        let errors = &read.theta - &estimate(&read.features)?;
+        let space = self.simulator.twin().parameters();
+        let around: Vec<Vec<f64>> = (errors.rows().into_iter())
+            .map(|error| {
+                (space.iter().zip(theta).zip(error))
+                    .map(|((p, theta), error)| p.prior.clamp(theta + error))
                     .collect()
-            }
+            })
+            .collect();
+        let ranked = self.draws(null, &around, "null", &stage)?.features;
+        let estimates = estimate(&ranked)?;
+        let jacobian = whitened_median(&whitening, jacobians);
+        let distance = |(row, estimate): (ArrayView1<'_, f64>, ArrayView1<'_, f64>)| {
+            let moved = DVector::from_fn(theta.len(), |j, _| estimate[j] - theta[j]);
+            (whitening.residual(&to_vector(&row)) - &jacobian * moved).norm_squared()
         };
         Ok(Gate {
-            null,
+            null: (ranked.rows().into_iter().zip(estimates.rows()))
+                .map(distance)
+                .collect(),
             whitening,
             settings: self.settings.clone(),
         })
@@ -291,6 +304,7 @@ impl GateTest<'_> {
         Ok(Some(gate.decide(statistic)))
     }
 
+    /// What [`at`](Self::at) needs: simulations for μ and S, and those to rank a record among.
     fn simulate(&self, theta: &[f64]) -> Result<NullFeatures, EstimatorError> {
         let size = self.settings.whitening_simulations(self.simulator.dim());
         let fresh = match self.settings.form {
@@ -298,18 +312,44 @@ impl GateTest<'_> {
             GateForm::Paper => 0,
         };
         let stage = self.progress.stage("gate", size + fresh);
-        let simulate = |size: usize, purpose: &'static str| {
-            let noise = self.noise.child(purpose);
-            self.simulator
-                .repeat(theta, self.drive, size, |i| noise.sample(i), &stage)
-        };
         Ok(NullFeatures {
-            whitening: simulate(size, "whitening")?,
+            whitening: self.repeat(theta, size, "whitening", &stage)?,
             fresh: match fresh {
                 0 => None,
-                _ => Some(simulate(fresh, "null")?),
+                _ => Some(self.repeat(theta, fresh, "null", &stage)?),
             },
         })
+    }
+
+    /// `size` simulations at one θ.
+    fn repeat(
+        &self,
+        theta: &[f64],
+        size: usize,
+        purpose: &'static str,
+        stage: &Stage,
+    ) -> Result<Array2<f64>, EstimatorError> {
+        let noise = self.noise.child(purpose);
+        (self.simulator).repeat(theta, self.drive, size, |i| noise.sample(i), stage)
+    }
+
+    /// `size` simulations at these θ in turn; one that fails is made again at the next.
+    fn draws(
+        &self,
+        size: usize,
+        thetas: &[Vec<f64>],
+        purpose: &'static str,
+        stage: &Stage,
+    ) -> Result<Draws, EstimatorError> {
+        let noise = self.noise.child(purpose);
+        let draw = |i: u64, attempt: usize, _| {
+            let theta = thetas.get((i as usize + attempt) % thetas.len().max(1));
+            Ok(theta.map(|theta| Draw {
+                theta: theta.clone(),
+                drive: Cow::Borrowed(self.drive),
+            }))
+        };
+        (self.simulator).draws(0..size as u64, |i| noise.sample(i), draw, stage)
     }
 }
 

@@ -56,7 +56,8 @@ impl Run<'_> {
                     .collect();
                 let refinement = self.refinement(simulator, self.observed, &self.settings.refine);
                 let jacobians = refinement.jacobians_at(&initial)?;
-                test.at_estimate(&initial, &jacobians, |features| {
+                let near = (self.estimator.calibration).truths_near(&initial, &space.widths());
+                test.at_estimate(&initial, &near, &jacobians, |features| {
                     Ok(self.estimator.predict(features)?)
                 })?
             }

@@ -52,9 +52,15 @@ fn tail(count: usize, tail: f64) -> f64 {
 }
 
 impl Calibration {
-    /// Errors of the simulations whose predictions lie nearest to `prediction`, distances in `widths`; ends are the
-    /// quantiles (1 ± level)/2. `None` without simulations.
-    pub fn spread(&self, prediction: &[f64], widths: &[f64], level: f64) -> Option<Spread> {
+    /// True parameters of the simulations whose predictions lie nearest to `prediction`, distances in `widths`.
+    pub(crate) fn truths_near(&self, prediction: &[f64], widths: &[f64]) -> Vec<Vec<f64>> {
+        (self.nearest(prediction, widths).into_iter())
+            .map(|i| self.truth.row(i).to_vec())
+            .collect()
+    }
+
+    /// Numbers of the simulations whose predictions lie nearest.
+    fn nearest(&self, prediction: &[f64], widths: &[f64]) -> Vec<usize> {
         let distance = |i: usize| -> f64 {
             (self.predicted.row(i).iter().zip(prediction).zip(widths))
                 .map(|((p, q), w)| ((p - q) / w).powi(2))
@@ -65,9 +71,16 @@ impl Calibration {
             .collect();
         nearest.sort_by(|a, b| a.0.total_cmp(&b.0));
         nearest.truncate(NEIGHBOURS);
+        nearest.into_iter().map(|(_, i)| i).collect()
+    }
+
+    /// Errors of the simulations whose predictions lie nearest to `prediction`, distances in `widths`; ends are the
+    /// quantiles (1 ± level)/2. `None` without simulations.
+    pub fn spread(&self, prediction: &[f64], widths: &[f64], level: f64) -> Option<Spread> {
+        let nearest = self.nearest(prediction, widths);
         let errors = |j: usize| -> Vec<f64> {
             (nearest.iter())
-                .map(|&(_, i)| self.truth[[i, j]] - self.predicted[[i, j]])
+                .map(|&i| self.truth[[i, j]] - self.predicted[[i, j]])
                 .collect()
         };
         let mut spread = Spread {
