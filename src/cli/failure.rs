@@ -2,7 +2,6 @@
 
 use super::say::say;
 use crate::diagnose::DiagnoseError;
-use crate::effect::EffectError;
 use crate::estimator::EstimatorError;
 use crate::evaluate::EvaluateError;
 use crate::feature::FeatureError;
@@ -162,13 +161,7 @@ macro_rules! users {
         })*
     };
 }
-users!(
-    EffectError,
-    RecordError,
-    SimulationError,
-    StorageError,
-    TwinError,
-);
+users!(RecordError, SimulationError, StorageError, TwinError);
 
 /// Errors that the setting of the study can cause.
 macro_rules! studies {

@@ -1,6 +1,5 @@
 //! Errors of a diagnosis.
 
-use crate::effect::EffectError;
 use crate::likelihood::kalman::FilterError;
 use crate::progress::Cancelled;
 use crate::record::RecordError;
@@ -64,10 +63,7 @@ pub enum DiagnoseError {
     /// An error of the filter.
     #[error(transparent)]
     Filter(#[from] FilterError),
-    /// An error of an effect.
-    #[error(transparent)]
-    Effect(#[from] EffectError),
-    /// An error of parameters.
+    /// An error of parameters or of an effect.
     #[error(transparent)]
     Parameter(#[from] TwinError),
     /// An error of a simulation.

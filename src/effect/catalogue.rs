@@ -1,12 +1,11 @@
 //! All effects that a program knows, and where in a twin each can stand.
 
 use super::check::targets;
-use super::error::EffectError;
 use super::key::EffectPattern;
 use super::kind::{EffectKind, OtherState};
 use super::library;
 use super::placed::{Effect, EffectEntry};
-use crate::twin::{Outline, ParameterSpace, Role, StateSpace, Twin, is_memory};
+use crate::twin::{Outline, ParameterSpace, Role, StateSpace, Twin, TwinError, is_memory};
 use std::sync::{Arc, LazyLock};
 
 static LIBRARY: LazyLock<Vec<Arc<EffectKind>>> =
@@ -37,9 +36,9 @@ impl Catalogue {
         &self.0
     }
 
-    fn kind(&self, id: &str) -> Result<&Arc<EffectKind>, EffectError> {
+    fn kind(&self, id: &str) -> Result<&Arc<EffectKind>, TwinError> {
         let known = self.0.iter().find(|kind| kind.id() == id);
-        known.ok_or_else(|| EffectError::Unknown {
+        known.ok_or_else(|| TwinError::UnknownEffect {
             id: id.into(),
             known: (self.0.iter().map(|kind| kind.id()))
                 .collect::<Vec<_>>()
@@ -49,12 +48,12 @@ impl Catalogue {
 
     /// Returns the effect `id` at `target`, all magnitudes free. A law between two states needs
     /// [`Effect::with_other`], too. Whether the target exists is checked when the effect is added to a twin.
-    pub fn effect(&self, id: &str, target: &str) -> Result<Effect, EffectError> {
+    pub fn effect(&self, id: &str, target: &str) -> Result<Effect, TwinError> {
         Ok(Effect::new(self.kind(id)?.clone(), target, None))
     }
 
     /// Returns the effect of an `[[effect]]` table.
-    pub(crate) fn resolve(&self, entry: &EffectEntry) -> Result<Effect, EffectError> {
+    pub(crate) fn resolve(&self, entry: &EffectEntry) -> Result<Effect, TwinError> {
         Effect::from_entry(self.kind(&entry.id)?.clone(), entry)
     }
 

@@ -1,10 +1,9 @@
 //! Effects against the twin that they are added to.
 
-use super::error::EffectError;
 use super::law::{Law, NOISE_ENTERS, TargetKind};
 use super::placed::Effect;
 use crate::record::Signals;
-use crate::twin::{Outline, is_memory};
+use crate::twin::{Outline, TwinError, is_memory};
 
 /// Returns the names of all targets of a kind, in a twin with these equations (none: a black box) and signals.
 pub(crate) fn targets(
@@ -33,13 +32,13 @@ pub(crate) fn check_effects(
     effects: &[Effect],
     outline: Option<&Outline>,
     signals: &Signals,
-) -> Result<(), EffectError> {
+) -> Result<(), TwinError> {
     for effect in effects {
         check_place(effect, outline, signals)?;
         let (id, target) = (effect.id().to_owned(), effect.target().to_owned());
         let same = effects.iter().filter(|other| other.key() == effect.key());
         if same.count() > 1 {
-            return Err(EffectError::Duplicate { id, target });
+            return Err(TwinError::DuplicateEffect { id, target });
         }
         check_given(effect)?;
     }
@@ -50,17 +49,17 @@ fn check_place(
     effect: &Effect,
     outline: Option<&Outline>,
     signals: &Signals,
-) -> Result<(), EffectError> {
+) -> Result<(), TwinError> {
     let (id, law) = (effect.id().to_owned(), effect.law());
     let kind = law.target();
     if outline.is_none() && !kind.is_signal() {
-        return Err(EffectError::BlackBox { id });
+        return Err(TwinError::EffectOnBlackBox { id });
     }
     if matches!(law, Law::Sensor(_))
         && effect.kind().memories().1 > 0
         && effect.kind().position() > NOISE_ENTERS
     {
-        return Err(EffectError::Memory {
+        return Err(TwinError::EffectMemory {
             id,
             limit: NOISE_ENTERS,
         });
@@ -71,7 +70,7 @@ fn check_place(
         .flatten()
     {
         if !known.iter().any(|k| k == name) {
-            return Err(EffectError::Target {
+            return Err(TwinError::EffectTarget {
                 id,
                 what: kind.name(),
                 name: name.into(),
@@ -88,29 +87,29 @@ fn check_place(
     let lost = matches!(law, Law::Limit) && alone;
     if effect.other() == Some(effect.target()) && !lost {
         let target = effect.target().to_owned();
-        return Err(EffectError::Itself { id, target });
+        return Err(TwinError::EffectOnItself { id, target });
     }
     Ok(())
 }
 
-fn check_given(effect: &Effect) -> Result<(), EffectError> {
+fn check_given(effect: &Effect) -> Result<(), TwinError> {
     let declared = effect.magnitudes();
     for (name, &value) in effect.all_given() {
         let id = effect.id().to_owned();
         let Some(magnitude) = declared.iter().find(|m| m.name == name.as_str()) else {
             let known: Vec<_> = declared.iter().map(|m| m.name).collect();
-            return Err(EffectError::Magnitude {
+            return Err(TwinError::UnknownMagnitude {
                 id,
                 name: name.into(),
                 known: known.join(", "),
             });
         };
         if !magnitude.limits.contains(value) {
-            return Err(EffectError::Value {
+            return Err(TwinError::MagnitudeValue {
                 id,
                 name: name.into(),
                 value,
-                limits: magnitude.limits,
+                limits: magnitude.limits.to_string(),
             });
         }
     }

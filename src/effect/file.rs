@@ -1,9 +1,9 @@
 //! Effect files.
 
 use super::catalogue::Catalogue;
-use super::error::EffectError;
 use super::placed::{Effect, EffectEntry};
 use crate::storage::untrusted::{check_names, message, read_text};
+use crate::twin::TwinError;
 use serde::Deserialize;
 use std::path::Path;
 
@@ -21,22 +21,22 @@ impl Catalogue {
     /// Reads effects from the text of a file.
     ///
     /// Targets and magnitudes are checked when the effects are added to a twin.
-    pub fn parse(&self, text: &str) -> Result<Vec<Effect>, EffectError> {
+    pub fn parse(&self, text: &str) -> Result<Vec<Effect>, TwinError> {
         self.parse_file(text, Path::new("effects"))
     }
 
     /// Reads effects from a file.
-    pub fn read(&self, path: &Path) -> Result<Vec<Effect>, EffectError> {
-        let text = read_text(path, LARGEST_FILE).map_err(|error| EffectError::Io {
+    pub fn read(&self, path: &Path) -> Result<Vec<Effect>, TwinError> {
+        let text = read_text(path, LARGEST_FILE).map_err(|error| TwinError::EffectFile {
             path: path.into(),
-            error,
+            error: error.to_string(),
         })?;
         self.parse_file(&text, path)
     }
 
-    fn parse_file(&self, text: &str, path: &Path) -> Result<Vec<Effect>, EffectError> {
+    fn parse_file(&self, text: &str, path: &Path) -> Result<Vec<Effect>, TwinError> {
         if let Ok(table) = toml::from_str(text) {
-            check_names(&table).map_err(|problem| EffectError::Text {
+            check_names(&table).map_err(|problem| TwinError::EffectText {
                 path: path.into(),
                 line: 1,
                 problem,
@@ -45,7 +45,7 @@ impl Catalogue {
         let at = |byte: usize, problem: &str| {
             let lines = problem.lines().map(str::trim);
             let lines: Vec<_> = lines.filter(|line| !line.is_empty()).collect();
-            EffectError::Text {
+            TwinError::EffectText {
                 path: path.into(),
                 line: 1 + text.bytes().take(byte).filter(|b| *b == b'\n').count(),
                 problem: message(&lines.join(", ")),

@@ -1,5 +1,6 @@
 //! Identity of an effect: its id and its target.
 
+use crate::twin::TwinError;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
@@ -35,12 +36,12 @@ impl fmt::Display for EffectKey {
 }
 
 impl FromStr for EffectKey {
-    type Err = super::error::EffectError;
+    type Err = TwinError;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         match text.split_once('@') {
             Some((id, target)) => Ok(Self::new(id, target)),
-            None => Err(super::error::EffectError::Key { text: text.into() }),
+            None => Err(TwinError::EffectKey { text: text.into() }),
         }
     }
 }

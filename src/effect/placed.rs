@@ -1,10 +1,10 @@
 //! An effect at one target of a twin.
 
-use super::error::EffectError;
 use super::key::EffectKey;
 use super::kind::EffectKind;
 use super::law::Law;
 use super::magnitude::Magnitude;
+use crate::twin::TwinError;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -18,7 +18,7 @@ use std::sync::Arc;
 /// let lag = Catalogue::default().effect("sensor-lag", "sensor")?.hold("tau", 2.5);
 /// assert_eq!(lag.key().to_string(), "sensor-lag@sensor");
 /// assert_eq!(lag.given("tau"), Some(2.5));
-/// # Ok::<(), truetwin::effect::EffectError>(())
+/// # Ok::<(), truetwin::twin::TwinError>(())
 /// ```
 #[derive(Clone)]
 pub struct Effect {
@@ -47,20 +47,20 @@ impl Effect {
     pub(super) fn from_entry(
         kind: Arc<EffectKind>,
         entry: &EffectEntry,
-    ) -> Result<Self, EffectError> {
+    ) -> Result<Self, TwinError> {
         let id = || kind.id().to_owned();
         let key = kind.other_state().map(super::kind::OtherState::key);
         for (other, state) in [("from", &entry.from), ("to", &entry.to)] {
             match state {
                 Some(state) if key != Some(other) => {
-                    return Err(EffectError::Other {
+                    return Err(TwinError::OtherState {
                         id: id(),
                         key: other,
                         state: state.clone(),
                     });
                 }
                 None if key == Some(other) => {
-                    return Err(EffectError::NoOther {
+                    return Err(TwinError::NoOtherState {
                         id: id(),
                         key: other,
                     });

@@ -1,6 +1,5 @@
 //! The error of a study.
 
-use crate::effect::EffectError;
 use crate::likelihood::kalman::FilterError;
 use crate::progress::Cancelled;
 use crate::record::RecordError;
@@ -42,12 +41,9 @@ pub enum StudyError {
         /// Known twins.
         known: String,
     },
-    /// Prior, bounds, limits, noise or starts do not fit the twin.
+    /// Prior, bounds, limits, noise, starts or an effect do not fit the twin.
     #[error(transparent)]
     Adaptation(#[from] TwinError),
-    /// An effect does not fit the twin.
-    #[error(transparent)]
-    Effect(#[from] EffectError),
     /// An effect of the study file is unknown, or does not fit the twin.
     #[error("{}, line {line}: {error}", path.display())]
     EffectAt {
@@ -56,7 +52,7 @@ pub enum StudyError {
         /// Line, from 1.
         line: usize,
         /// The problem there, and the remedy.
-        error: EffectError,
+        error: TwinError,
     },
     /// The twin is missing, its own parameters, `[fixed]` or `[library]` are wrong.
     #[error("{0}")]

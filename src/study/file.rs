@@ -1,6 +1,6 @@
 //! The study file: a twin in the user's own setting.
 
-use crate::effect::{EffectEntry, EffectError, EffectPattern};
+use crate::effect::{EffectEntry, EffectPattern};
 use crate::feature::FeatureRecipe;
 use crate::record::{Columns, Drive};
 use crate::setting::number;
@@ -11,7 +11,7 @@ use crate::study::lines::{line, line_of, with_line};
 use crate::study::plan::InputPlan;
 use crate::study::prior::{PriorTable, flatten};
 use crate::study::shapes::check_shapes;
-use crate::twin::{Hold, Integrator, Interval, NoiseLevel, StartLevel};
+use crate::twin::{Hold, Integrator, Interval, NoiseLevel, StartLevel, TwinError};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -216,7 +216,7 @@ impl StudyFile {
     }
 
     /// Adds to the error of effect `index` its line, if the file was parsed from a text.
-    pub(super) fn effect_error(&self, index: usize, error: EffectError) -> StudyError {
+    pub(super) fn effect_error(&self, index: usize, error: TwinError) -> StudyError {
         match (&self.origin, self.effect.get(index)) {
             (Some(origin), Some(entry)) => with_line(error, origin, index, entry),
             _ => error.into(),

@@ -1,7 +1,8 @@
 //! Lines of `[[effect]]` tables, for messages.
 
 use super::error::StudyError;
-use crate::effect::{EffectEntry, EffectError};
+use crate::effect::EffectEntry;
+use crate::twin::TwinError;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -45,20 +46,20 @@ impl Keys {
     }
 
     /// Returns the byte at which the value that `error` is about starts.
-    fn start(&self, error: &EffectError) -> usize {
+    fn start(&self, error: &TwinError) -> usize {
         let id = self.id.span().start;
         let of = |value: &Option<Spanned<String>>| value.as_ref().map(|v| v.span().start);
         let other = of(&self.from).or(of(&self.to));
         match error {
-            EffectError::Target { name, .. } if name == self.target.as_ref() => {
+            TwinError::EffectTarget { name, .. } if name == self.target.as_ref() => {
                 self.target.span().start
             }
-            EffectError::Duplicate { .. } => self.target.span().start,
-            EffectError::Target { .. }
-            | EffectError::Itself { .. }
-            | EffectError::Other { key: "from", .. } => other.unwrap_or(id),
-            EffectError::Other { .. } => of(&self.to).unwrap_or(id),
-            EffectError::Magnitude { name, .. } | EffectError::Value { name, .. } => {
+            TwinError::DuplicateEffect { .. } => self.target.span().start,
+            TwinError::EffectTarget { .. }
+            | TwinError::EffectOnItself { .. }
+            | TwinError::OtherState { key: "from", .. } => other.unwrap_or(id),
+            TwinError::OtherState { .. } => of(&self.to).unwrap_or(id),
+            TwinError::UnknownMagnitude { name, .. } | TwinError::MagnitudeValue { name, .. } => {
                 (self.magnitudes.get(name)).map_or(id, |value| value.span().start)
             }
             _ => id,
@@ -68,7 +69,7 @@ impl Keys {
 
 /// Adds to the error of effect `index`, which is `entry`, its line in the text of the file.
 pub(super) fn with_line(
-    error: EffectError,
+    error: TwinError,
     (path, text): &(PathBuf, Arc<str>),
     index: usize,
     entry: &EffectEntry,

@@ -19,9 +19,7 @@ pub(crate) use plan::InputPlan;
 pub(crate) use plan::Levels;
 pub use plan::RecordPlan;
 
-use crate::effect::{
-    Catalogue, Effect, EffectError, EffectKey, EffectKind, EffectPattern, augment,
-};
+use crate::effect::{Catalogue, Effect, EffectKey, EffectKind, EffectPattern, augment};
 use crate::record::{Drive, Record};
 use crate::setting::did_you_mean;
 use crate::twin::{
@@ -335,7 +333,7 @@ impl Study {
 }
 
 /// Adds effects to a twin; an error comes with the index of the first effect that cannot be added.
-fn augmented(twin: &Twin, effects: &[Effect]) -> Result<Twin, (usize, EffectError)> {
+fn augmented(twin: &Twin, effects: &[Effect]) -> Result<Twin, (usize, TwinError)> {
     (1..=effects.len()).try_fold(twin.clone(), |_, n| {
         augment(twin.clone(), effects[..n].to_vec()).map_err(|error| (n - 1, error))
     })

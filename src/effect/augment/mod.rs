@@ -6,13 +6,14 @@ mod finish;
 
 use super::batch::Pair;
 use super::check::{check_effects, targets};
-use super::error::EffectError;
 use super::kind::EffectKind;
 use super::law::{Instant, Law, NOISE_ENTERS, SignalLaw};
 use super::placed::Effect;
 use super::unit::magnitude_unit;
 use crate::record::{Drive, Quantity, RecordError, Signal, Signals};
-use crate::twin::{Interval, Modified, Parameter, ParameterSpace, Role, SimulationError, Twin};
+use crate::twin::{
+    Interval, Modified, Parameter, ParameterSpace, Role, SimulationError, Twin, TwinError,
+};
 use black_box::AugmentedBlackBox;
 use equations::AugmentedEquations;
 use std::ops::Range;
@@ -28,7 +29,7 @@ use std::sync::Arc;
 ///
 /// # Errors
 ///
-/// [`EffectError`] where a target, a magnitude or the equations are missing.
+/// [`TwinError`] where a target, a magnitude or the equations are missing.
 ///
 /// ```
 /// use std::sync::Arc;
@@ -47,7 +48,7 @@ use std::sync::Arc;
 /// assert_eq!(biased, plain + 0.5);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn augment(base: impl Into<Twin>, effects: Vec<Effect>) -> Result<Twin, EffectError> {
+pub fn augment(base: impl Into<Twin>, effects: Vec<Effect>) -> Result<Twin, TwinError> {
     let memories = effects.iter().map(|e| e.kind().memories().1).collect();
     augment_short(base.into(), effects, memories)
 }
@@ -61,7 +62,7 @@ pub(crate) fn augment_short(
     base: Twin,
     effects: Vec<Effect>,
     memories: Vec<usize>,
-) -> Result<Twin, EffectError> {
+) -> Result<Twin, TwinError> {
     if effects.is_empty() {
         return Ok(base);
     }
