@@ -1,7 +1,6 @@
 //! Turns errors into one line and an exit code.
 
 use super::say::say;
-use crate::diagnose::DiagnoseError;
 use crate::estimator::EstimatorError;
 use crate::evaluate::EvaluateError;
 use crate::feature::FeatureError;
@@ -66,6 +65,14 @@ impl Failure {
             message: message.to_string(),
             code: INTERNAL,
             about_study: false,
+        }
+    }
+
+    /// Creates the failure of a diagnosis: its records or options are wrong, the study file was accepted.
+    pub fn diagnosis(error: StudyError) -> Self {
+        Self {
+            about_study: false,
+            ..error.into()
         }
     }
 
@@ -163,22 +170,30 @@ macro_rules! users {
 }
 users!(RecordError, SimulationError, StorageError, TwinError);
 
-/// Errors that the setting of the study can cause.
-macro_rules! studies {
-    ($($error:ty),* $(,)?) => {
-        $(impl From<$error> for Failure {
-            fn from(error: $error) -> Self {
-                Self { about_study: true, ..Self::user(error) }
-            }
-        })*
-    };
+impl From<FeatureError> for Failure {
+    fn from(error: FeatureError) -> Self {
+        Self {
+            about_study: true,
+            ..Self::user(error)
+        }
+    }
 }
-studies!(FeatureError, StudyError);
+
+impl From<StudyError> for Failure {
+    fn from(error: StudyError) -> Self {
+        match error {
+            StudyError::Cancelled(_) => Self::internal(error),
+            _ => Self {
+                about_study: true,
+                ..Self::user(error)
+            },
+        }
+    }
+}
 
 impl From<EvaluateError> for Failure {
     fn from(error: EvaluateError) -> Self {
         match error {
-            EvaluateError::Diagnose(error) => error.into(),
             EvaluateError::Cancelled(_) => Self::internal(error),
             EvaluateError::NoDeparture { .. }
             | EvaluateError::NoTruth { .. }
@@ -212,15 +227,6 @@ impl From<EstimatorError> for Failure {
                 about_study: true,
                 ..Self::user(error)
             },
-            _ => Self::user(error),
-        }
-    }
-}
-
-impl From<DiagnoseError> for Failure {
-    fn from(error: DiagnoseError) -> Self {
-        match error {
-            DiagnoseError::Cancelled(_) => Self::internal(error),
             _ => Self::user(error),
         }
     }

@@ -1,6 +1,5 @@
 //! The twin as it is, fitted: where a diagnosis begins.
 
-use super::error::DiagnoseError;
 use super::hypotheses::listed::Library;
 use super::hypotheses::scales::Scales;
 use super::hypotheses::term::{Part, Term};
@@ -20,7 +19,7 @@ use crate::fit::problem::Problem;
 use crate::fit::starts::{Care, search};
 use crate::likelihood::Measured;
 use crate::record::Record;
-use crate::study::Study;
+use crate::study::{Study, StudyError};
 use crate::twin::{Noise, Role, Twin};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::sync::Arc;
@@ -60,7 +59,7 @@ impl<'a> Base<'a> {
         measured: &'a Measured,
         records: &'a [Record],
         settings: &DiagnoseSettings,
-    ) -> Result<Self, DiagnoseError> {
+    ) -> Result<Self, StudyError> {
         Self::counted(measured, records, settings, &Passes::default())
     }
 
@@ -70,7 +69,7 @@ impl<'a> Base<'a> {
         records: &'a [Record],
         settings: &DiagnoseSettings,
         passes: &Passes,
-    ) -> Result<Self, DiagnoseError> {
+    ) -> Result<Self, StudyError> {
         let twin = &measured.twin;
         let space = twin.parameters();
         let own = space.len() - measured.levels.len();
@@ -93,9 +92,9 @@ impl<'a> Base<'a> {
             base_fit(&problem, initial.as_deref(), settings.noise())?
                 .map(|fitted| (problem, fitted))
         };
-        let (problem, fitted) = fitted.ok_or(DiagnoseError::NoFit)?;
+        let (problem, fitted) = fitted.ok_or(StudyError::NoStart)?;
         let model = Model::bare(twin, problem, fitted, settings.lacks(Ablation::Evidence))
-            .ok_or(DiagnoseError::NoFit)?;
+            .ok_or(StudyError::NoStart)?;
         let outline = model.problem.outline();
         let outputs = &outline.outputs;
         let sensors = targets(TargetKind::Sensor, None, &twin.signals());
@@ -119,7 +118,7 @@ impl<'a> Base<'a> {
         &self,
         found: &Model<'a>,
         twin: &'b Twin,
-    ) -> Result<Option<Base<'b>>, DiagnoseError>
+    ) -> Result<Option<Base<'b>>, StudyError>
     where
         'a: 'b,
     {
@@ -136,7 +135,7 @@ impl<'a> Base<'a> {
     }
 
     /// The twin fitted again from other θ; `None` where that is no better.
-    pub fn fitted_from(&self, thetas: &[Vec<f64>]) -> Result<Option<Base<'a>>, DiagnoseError> {
+    pub fn fitted_from(&self, thetas: &[Vec<f64>]) -> Result<Option<Base<'a>>, StudyError> {
         let problem = &self.model.problem;
         let starts: Vec<Vec<f64>> = thetas.iter().map(|theta| problem.full(theta)).collect();
         let fitted = fit(problem, &starts, ITERATIONS)?;
@@ -149,7 +148,7 @@ impl<'a> Base<'a> {
     }
 
     /// The same twin fitted to other records from where it is; `None` where that cannot be done.
-    pub fn on<'b>(&self, records: &'b [Record]) -> Result<Option<Base<'b>>, DiagnoseError>
+    pub fn on<'b>(&self, records: &'b [Record]) -> Result<Option<Base<'b>>, StudyError>
     where
         'a: 'b,
     {
@@ -163,7 +162,7 @@ impl<'a> Base<'a> {
 
     /// The twin where its fit inside the prior ends, if its own has left that: what is missing may have driven it out. `None` for a black
     /// box, whose fits cost too much.
-    pub fn inside(&self) -> Result<Option<Model<'a>>, DiagnoseError> {
+    pub fn inside(&self) -> Result<Option<Model<'a>>, StudyError> {
         let problem = &self.model.problem;
         if problem.is_simulated() || beyond(&self.model) == 0 {
             return Ok(None);
@@ -190,7 +189,7 @@ impl<'a> Base<'a> {
         &self,
         study: &Study,
         settings: &DiagnoseSettings,
-    ) -> Result<Vec<Arc<Term>>, DiagnoseError> {
+    ) -> Result<Vec<Arc<Term>>, StudyError> {
         let terms = listed(study, &settings.without, &self.library(), &self.noisy)?;
         Ok(shared(terms))
     }
@@ -200,7 +199,7 @@ impl<'a> Base<'a> {
         &self,
         model: Model<'b>,
         noises: Vec<Arc<Term>>,
-    ) -> Result<Base<'b>, DiagnoseError> {
+    ) -> Result<Base<'b>, StudyError> {
         Ok(Base {
             noisy: self.noisy.clone(),
             is_silent: self.is_silent,
@@ -211,7 +210,7 @@ impl<'a> Base<'a> {
     }
 
     /// A fitted model in units of its records, of which nothing else is known yet.
-    fn of(model: Model<'a>) -> Result<Self, DiagnoseError> {
+    fn of(model: Model<'a>) -> Result<Self, StudyError> {
         let (theta, outline) = (model.theta(), model.problem.outline());
         let records = model.problem.records;
         Ok(Self {
@@ -260,7 +259,7 @@ fn beyond(model: &Model<'_>) -> usize {
 }
 
 /// The best fit with the twin's own parameters within their prior box.
-fn fitted_inside(model: &Model<'_>) -> Result<Option<Fitted>, DiagnoseError> {
+fn fitted_inside(model: &Model<'_>) -> Result<Option<Fitted>, StudyError> {
     let boxed = inside(&model.problem);
     let starts = [model.fitted.theta.clone(), boxed.centre()];
     Ok(fit(&boxed, &starts, INSIDE)?)
@@ -271,7 +270,7 @@ fn fitted_inside(model: &Model<'_>) -> Result<Option<Fitted>, DiagnoseError> {
 pub(in crate::diagnose) fn left_the_prior<'a>(
     model: &Model<'a>,
     alpha: f64,
-) -> Result<(bool, Option<Model<'a>>), DiagnoseError> {
+) -> Result<(bool, Option<Model<'a>>), StudyError> {
     let beyond = beyond(model);
     if beyond == 0 {
         return Ok((false, None));

@@ -1,13 +1,12 @@
 //! Forward selection by BIC, noise levels as declared: what a diagnosis is to be held against.
 
 use super::base::Base;
-use super::error::DiagnoseError;
 use super::explain::search::{Breadth, listed};
 use super::settings::{Ablation, DiagnoseSettings};
 use crate::effect::EffectPattern;
 use crate::likelihood::measured;
 use crate::record::Record;
-use crate::study::Study;
+use crate::study::{Study, StudyError};
 
 /// Most effects that are selected.
 const MOST: usize = 3;
@@ -18,7 +17,7 @@ pub(crate) fn greedy(
     study: &Study,
     record: &Record,
     without: &[EffectPattern],
-) -> Result<Option<Vec<String>>, DiagnoseError> {
+) -> Result<Option<Vec<String>>, StudyError> {
     if study.twin().outline().is_none() {
         return Ok(None);
     }

@@ -1,7 +1,6 @@
 //! The share of a gap that the effects close which are truly there: what a share is to be held against.
 
 use super::base::Base;
-use super::error::DiagnoseError;
 use super::explain::search::{Breadth, listed};
 use super::model::Model;
 use super::outcome::Shrinkage;
@@ -12,7 +11,7 @@ use super::step::finer_step;
 use super::thresholds::Thresholds;
 use crate::likelihood::measured;
 use crate::record::Record;
-use crate::study::Study;
+use crate::study::{Study, StudyError};
 
 /// Fits these effects, of keys `id@target`, beside the twin, whatever a diagnosis would say of them, and measures the share that they close;
 /// a finer step stands on both sides where the record asks for one. `None` where an effect cannot be fitted, and for a black box, whose
@@ -23,7 +22,7 @@ pub(crate) fn share_of(
     validation: Option<&Record>,
     keys: &[String],
     settings: &DiagnoseSettings,
-) -> Result<Option<Shrinkage>, DiagnoseError> {
+) -> Result<Option<Shrinkage>, StudyError> {
     if study.twin().outline().is_none() {
         return Ok(None);
     }
@@ -70,7 +69,7 @@ fn fitted<'a>(
     base: &Base<'a>,
     keys: &[String],
     settings: &DiagnoseSettings,
-) -> Result<Option<Model<'a>>, DiagnoseError> {
+) -> Result<Option<Model<'a>>, StudyError> {
     let terms = base.listed(study, settings)?;
     let mut model = base.model.clone();
     for key in keys {

@@ -6,7 +6,6 @@
 //!                                   of the rest: that of the n rows times N/n, at most that of the best
 //! ```
 
-use super::error::DiagnoseError;
 use super::explain::findings::Findings;
 use super::explain::found::{Found, sort};
 use super::explain::pairs::{FIRST, SINGLES};
@@ -15,7 +14,7 @@ use super::rounds::{self, Explored};
 use super::settings::DiagnoseSettings;
 use crate::progress::{Progress, Stage};
 use crate::record::Record;
-use crate::study::Study;
+use crate::study::{Study, StudyError};
 use rayon::prelude::*;
 
 /// Rows of all records together from which they are long. On two cores, a gap in half as many takes a minute.
@@ -35,8 +34,8 @@ pub(super) fn search<R>(
     records: &[Record],
     settings: &DiagnoseSettings,
     progress: &Progress,
-    then: &dyn Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
-) -> Result<R, DiagnoseError> {
+    then: &dyn Fn(Explored<'_, '_>) -> Result<R, StudyError>,
+) -> Result<R, StudyError> {
     match search_part(study, records, settings, progress, then)? {
         Some(found) => Ok(found),
         None => rounds::search(study, records, settings, progress, then),
@@ -50,8 +49,8 @@ fn search_part<R>(
     records: &[Record],
     settings: &DiagnoseSettings,
     progress: &Progress,
-    then: &dyn Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
-) -> Result<Option<R>, DiagnoseError> {
+    then: &dyn Fn(Explored<'_, '_>) -> Result<R, StudyError>,
+) -> Result<Option<R>, StudyError> {
     let rows: usize = records.iter().map(Record::samples).sum();
     if rows < LONG || study.twin().outline().is_none() {
         return Ok(None);
@@ -61,7 +60,7 @@ fn search_part<R>(
         let Some(part) = first_rows(records, first) else {
             return Ok(None);
         };
-        let on_all = |own: Explored<'_, '_>| -> Result<Option<R>, DiagnoseError> {
+        let on_all = |own: Explored<'_, '_>| -> Result<Option<R>, StudyError> {
             if own.chances.log_odds < CLEAR || own.findings.leads_with_wave() {
                 return Ok(None);
             }
@@ -91,7 +90,7 @@ fn search_part<R>(
         match rounds::search(study, &part, settings, progress, &on_all) {
             Ok(Some(found)) => return Ok(Some(found)),
             // What does not move yet cannot be fitted.
-            Ok(None) | Err(DiagnoseError::NoFit) => {}
+            Ok(None) | Err(StudyError::NoStart) => {}
             Err(error) => return Err(error),
         }
         first *= MORE;
@@ -119,12 +118,12 @@ struct Carry<'m, 'a> {
 }
 
 impl<'a> Carry<'_, 'a> {
-    fn findings(&self, old: &Findings<'_>, stage: &Stage) -> Result<Findings<'a>, DiagnoseError> {
+    fn findings(&self, old: &Findings<'_>, stage: &Stage) -> Result<Findings<'a>, StudyError> {
         let least = FIRST * old.top();
         // Few fits, some of which take many times as long as others: all at once.
         let of = |all, most, least| self.all(all, most, least);
         // What remains beside sets that are out of the race is of no weight.
-        let beside = || -> Result<Vec<_>, DiagnoseError> {
+        let beside = || -> Result<Vec<_>, StudyError> {
             (old.beside.par_iter())
                 .filter(|(keys, _)| old.gain(keys).is_some_and(|gain| gain > least))
                 .map(|(keys, on_top)| Ok((keys.clone(), of(on_top, FUNCTIONS, 0.0)?)))
@@ -164,7 +163,7 @@ impl<'a> Carry<'_, 'a> {
         old: &[Found<'_>],
         most: usize,
         least: f64,
-    ) -> Result<Vec<Found<'a>>, DiagnoseError> {
+    ) -> Result<Vec<Found<'a>>, StudyError> {
         let fitted: Vec<Option<Found<'a>>> = (old.par_iter().take(most))
             .map(|found| match found.gain > least {
                 true => self.fitted(found),
@@ -191,7 +190,7 @@ impl<'a> Carry<'_, 'a> {
     }
 
     /// One explanation fitted to all rows; `None` where it was not fitted to the part.
-    fn fitted(&self, old: &Found<'_>) -> Result<Option<Found<'a>>, DiagnoseError> {
+    fn fitted(&self, old: &Found<'_>) -> Result<Option<Found<'a>>, StudyError> {
         let Some(own) = &old.model else {
             return Ok(None);
         };

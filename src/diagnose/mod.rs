@@ -20,7 +20,6 @@
 //! See docs/diagnosing-a-gap.md for the mathematics and how to read the answer.
 
 mod base;
-mod error;
 mod explain;
 #[cfg(test)]
 pub(crate) mod fixture;
@@ -40,7 +39,6 @@ mod step;
 mod summary;
 mod thresholds;
 
-pub use error::DiagnoseError;
 pub(crate) use greedy::greedy;
 pub(crate) use known::share_of;
 pub(crate) use outcome::Cell;

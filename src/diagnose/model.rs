@@ -1,12 +1,12 @@
 //! A twin with terms, fitted to the records.
 
-use super::error::DiagnoseError;
 use super::hypotheses::term::{Term, marks, with_terms};
 use crate::fit::axis::{EvidencePrior, Family};
 use crate::fit::climb::{Fitted, climb};
 use crate::fit::evidence::{CREDIT, Laplace, laplace};
 use crate::fit::problem::Problem;
 use crate::record::Signal;
+use crate::study::StudyError;
 use crate::twin::Twin;
 use std::sync::Arc;
 
@@ -76,7 +76,7 @@ impl<'a> Model<'a> {
     }
 
     /// The problem with another twin in the place of its own, of the same parameters.
-    pub fn problem_of(&self, base: &Twin) -> Result<Problem<'a>, DiagnoseError> {
+    pub fn problem_of(&self, base: &Twin) -> Result<Problem<'a>, StudyError> {
         let twin = with_terms(base, self.terms.iter().map(Arc::as_ref))?;
         let axes = self.problem.axes[..twin.parameters().len()].to_vec();
         let mut problem = self.problem.with_twin(twin, axes);
@@ -90,17 +90,17 @@ impl<'a> Model<'a> {
     }
 
     /// Filtered states of each record.
-    pub fn states(&self) -> Result<Vec<Signal>, DiagnoseError> {
+    pub fn states(&self) -> Result<Vec<Signal>, StudyError> {
         let all = self.problem.states(&self.fitted.theta)?;
         Ok(all.into_iter().map(|(_, states)| states).collect())
     }
 
     /// The model with one more term.
-    pub fn extend(&self, term: &Arc<Term>) -> Result<Extended<'a>, DiagnoseError> {
+    pub fn extend(&self, term: &Arc<Term>) -> Result<Extended<'a>, StudyError> {
         self.extend_by(std::slice::from_ref(term))
     }
 
-    fn extend_by(&self, new: &[Arc<Term>]) -> Result<Extended<'a>, DiagnoseError> {
+    fn extend_by(&self, new: &[Arc<Term>]) -> Result<Extended<'a>, StudyError> {
         let terms: Vec<Arc<Term>> = self.terms.iter().chain(new).cloned().collect();
         let twin = with_terms(self.base, terms.iter().map(Arc::as_ref))?;
         let d = self.problem.twin.parameters().len();
@@ -128,13 +128,13 @@ impl<'a> Model<'a> {
     }
 
     /// The model fitted to the end of a climb: a search stops before.
-    pub fn carried_on(&self) -> Result<Option<Self>, DiagnoseError> {
+    pub fn carried_on(&self) -> Result<Option<Self>, StudyError> {
         let fitted = climb(&self.problem, &self.fitted.theta, TO_THE_END)?;
         Ok(fitted.and_then(|fitted| self.refitted(fitted)))
     }
 
     /// The terms beside another twin of the same parameters, or other records, fitted on from here.
-    pub fn beside_twin<'b>(&self, base: &Model<'b>) -> Result<Option<Model<'b>>, DiagnoseError> {
+    pub fn beside_twin<'b>(&self, base: &Model<'b>) -> Result<Option<Model<'b>>, StudyError> {
         let extended = base.extend_by(&self.terms)?;
         let start = extended.problem.carried(&self.problem, &self.fitted.theta);
         let fitted = climb(&extended.problem, &start, TO_THE_END)?;
@@ -170,7 +170,7 @@ impl<'a> Extended<'a> {
     }
 
     /// Slope and information at θ, without a step.
-    pub fn at(&self, theta: &[f64]) -> Result<Option<Fitted>, DiagnoseError> {
+    pub fn at(&self, theta: &[f64]) -> Result<Option<Fitted>, StudyError> {
         Ok(climb(&self.problem, theta, 0)?)
     }
 

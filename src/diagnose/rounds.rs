@@ -1,7 +1,6 @@
 //! Rounds of the search: the twin as it is, with another kind of noise, with a finer step.
 
 use super::base::Base;
-use super::error::DiagnoseError;
 use super::explain::chances::Chances;
 use super::explain::explore::{Before, STEPS, explore, singles, what_is_left};
 use super::explain::findings::Findings;
@@ -18,7 +17,7 @@ use super::thresholds::Thresholds;
 use crate::likelihood::measured;
 use crate::progress::Progress;
 use crate::record::Record;
-use crate::study::Study;
+use crate::study::{Study, StudyError};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -60,8 +59,8 @@ pub(in crate::diagnose) fn search<R>(
     records: &[Record],
     settings: &DiagnoseSettings,
     progress: &Progress,
-    then: &dyn Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
-) -> Result<R, DiagnoseError> {
+    then: &dyn Fn(Explored<'_, '_>) -> Result<R, StudyError>,
+) -> Result<R, StudyError> {
     let stage = progress.stage("fit", 1);
     let measured = measured(study.twin(), records, &settings.beliefs(study))?;
     let base = Base::new(&measured, records, settings)?;
@@ -74,9 +73,9 @@ pub(in crate::diagnose) fn search<R>(
     let then = |mut own: Explored<'_, '_>| {
         match likelier_with_step(&own, settings, progress, then) {
             // A twin that its own step holds together may go nowhere with a finer one.
-            Ok(None) | Err(DiagnoseError::NoFit) => {}
+            Ok(None) | Err(StudyError::NoStart) => {}
             Ok(Some(found)) => return Ok(found),
-            Err(DiagnoseError::Cancelled(_)) if settings.give_partial => {
+            Err(StudyError::Cancelled(_)) if settings.give_partial => {
                 own.findings.is_partial = true;
             }
             Err(error) => return Err(error),
@@ -93,8 +92,8 @@ fn likelier_with_step<R>(
     own: &Explored<'_, '_>,
     settings: &DiagnoseSettings,
     progress: &Progress,
-    then: &dyn Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
-) -> Result<Option<R>, DiagnoseError> {
+    then: &dyn Fn(Explored<'_, '_>) -> Result<R, StudyError>,
+) -> Result<Option<R>, StudyError> {
     if own.base.step.is_some() || own.findings.is_partial || own.chances.log_odds <= Thresholds::GAP
     {
         return Ok(None);
@@ -120,7 +119,7 @@ fn likelier_with_step<R>(
 }
 
 /// Returns whether the twin or one of the best explanations, each carried on with a finer step, is likelier than all are with their own.
-fn helps_explanations(own: &Explored<'_, '_>, step: FinerStep) -> Result<bool, DiagnoseError> {
+fn helps_explanations(own: &Explored<'_, '_>, step: FinerStep) -> Result<bool, StudyError> {
     let model = &own.base.model;
     let Some(twin) = step.of(model.base) else {
         return Ok(false);
@@ -145,7 +144,7 @@ fn helps_explanations(own: &Explored<'_, '_>, step: FinerStep) -> Result<bool, D
             .carried_on()?;
             Ok(finer.is_some_and(|finer| finer.log_evidence > least))
         })
-        .collect::<Result<_, DiagnoseError>>()?;
+        .collect::<Result<_, StudyError>>()?;
     Ok(finer.contains(&true))
 }
 
@@ -155,7 +154,7 @@ fn step_of(
     study: &Study,
     base: &Base<'_>,
     settings: &DiagnoseSettings,
-) -> Result<Option<FinerStep>, DiagnoseError> {
+) -> Result<Option<FinerStep>, StudyError> {
     let least = Thresholds::STEP_SHOWS;
     let Some((step, gain)) = finer_step(&base.model, least, 0.0)? else {
         return Ok(None);
@@ -183,8 +182,8 @@ fn with_step<R>(
     before: Before<'_, '_>,
     settings: &DiagnoseSettings,
     progress: &Progress,
-    then: &dyn Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
-) -> Result<R, DiagnoseError> {
+    then: &dyn Fn(Explored<'_, '_>) -> Result<R, StudyError>,
+) -> Result<R, StudyError> {
     let records = base.model.problem.records;
     let twin = finer.step.of(study.twin());
     let twin = twin.as_ref().unwrap_or(study.twin());
@@ -212,8 +211,8 @@ fn explored<'a, R>(
     settings: &DiagnoseSettings,
     rounds: usize,
     progress: &Progress,
-    then: &dyn Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
-) -> Result<R, DiagnoseError> {
+    then: &dyn Fn(Explored<'_, '_>) -> Result<R, StudyError>,
+) -> Result<R, StudyError> {
     let library = base.library();
     let effects = base.listed(study, settings)?;
     let mut noise = match rounds {
@@ -247,7 +246,7 @@ fn explored<'a, R>(
         Some(better) => {
             let before = Before::Worse(&alone.findings, base.model.log_evidence);
             match explored(study, better, before, settings, rounds, progress, then) {
-                Err(DiagnoseError::Cancelled(_)) if settings.give_partial => Findings {
+                Err(StudyError::Cancelled(_)) if settings.give_partial => Findings {
                     is_partial: true,
                     ..alone.findings
                 },
@@ -260,7 +259,7 @@ fn explored<'a, R>(
         match again(study, &base, &findings, settings, rounds, progress, then) {
             Ok(Some(found)) => return Ok(found),
             Ok(None) => {}
-            Err(DiagnoseError::Cancelled(_)) if settings.give_partial => findings.is_partial = true,
+            Err(StudyError::Cancelled(_)) if settings.give_partial => findings.is_partial = true,
             Err(error) => return Err(error),
         }
     }
@@ -287,8 +286,8 @@ fn again<'a, R>(
     settings: &DiagnoseSettings,
     rounds: usize,
     progress: &Progress,
-    then: &dyn Fn(Explored<'_, '_>) -> Result<R, DiagnoseError>,
-) -> Result<Option<R>, DiagnoseError> {
+    then: &dyn Fn(Explored<'_, '_>) -> Result<R, StudyError>,
+) -> Result<Option<R>, StudyError> {
     if let Some(better) = base.fitted_from(&findings.thetas())? {
         let before = Before::Worse(findings, base.model.log_evidence);
         return explored(study, better, before, settings, rounds, progress, then).map(Some);
@@ -323,8 +322,9 @@ fn again<'a, R>(
 #[cfg(test)]
 mod tests {
     use crate::diagnose::fixture::{biased_record, tanks};
-    use crate::diagnose::{DiagnoseError, DiagnoseSettings, Verdict, diagnose};
+    use crate::diagnose::{DiagnoseSettings, Verdict, diagnose};
     use crate::progress::{Listener, Progress};
+    use crate::study::StudyError;
     use std::sync::Arc;
     use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -358,6 +358,6 @@ mod tests {
         assert!(partial.interrupted && partial.quick);
         assert_eq!(partial.verdict, Verdict::StructuralGap);
         assert!(partial.cause.effects.iter().any(|e| e.id == "sensor-bias"));
-        assert!(matches!(found(false), Err(DiagnoseError::Cancelled(_))));
+        assert!(matches!(found(false), Err(StudyError::Cancelled(_))));
     }
 }

@@ -1,7 +1,6 @@
 //! Entry of a diagnosis, and the order of its steps.
 
 use super::base::{left_the_prior, verdict};
-use super::error::DiagnoseError;
 use super::explain::chances::Chances;
 use super::explain::decide::{Conclusion, decide};
 use super::explain::explore::absorbing;
@@ -28,7 +27,7 @@ use crate::math::six_digits;
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::setting::SettingError;
-use crate::study::Study;
+use crate::study::{Study, StudyError};
 use crate::twin::Noise;
 use std::time::Instant;
 
@@ -64,7 +63,7 @@ const FINISH: usize = 80;
 ///
 /// # Errors
 ///
-/// [`DiagnoseError`]: records that do not fit the twin or each other, settings that cannot be used, a twin that
+/// [`StudyError`]: records that do not fit the twin or each other, settings that cannot be used, a twin that
 /// no start fits, and cancellation.
 pub fn diagnose(
     study: &Study,
@@ -72,7 +71,7 @@ pub fn diagnose(
     validation: Option<&Record>,
     settings: &DiagnoseSettings,
     progress: &Progress,
-) -> Result<Diagnosis, DiagnoseError> {
+) -> Result<Diagnosis, StudyError> {
     let clock = Instant::now();
     check(study, records, validation, settings)?;
     let found = search(study, records, settings, progress, &|explored| {
@@ -90,7 +89,7 @@ fn report(
     validation: Option<&Record>,
     settings: &DiagnoseSettings,
     progress: &Progress,
-) -> Result<Diagnosis, DiagnoseError> {
+) -> Result<Diagnosis, StudyError> {
     // What is left to do for a partial answer is done as for a quick look, without a share: that takes longest.
     let hurried = DiagnoseSettings {
         quick: true,
@@ -141,7 +140,7 @@ fn report(
             &stage,
         );
         let p = match p {
-            Err(DiagnoseError::Cancelled(_)) if settings.give_partial => None,
+            Err(StudyError::Cancelled(_)) if settings.give_partial => None,
             p => p?,
         };
         if let Some((p, at_floor)) = p {
@@ -208,7 +207,7 @@ fn report(
         }
         settings.ends(stage.tick())?;
     }
-    let runs = |records: &[Record]| -> Result<FreeRuns, DiagnoseError> {
+    let runs = |records: &[Record]| -> Result<FreeRuns, StudyError> {
         let runner = |model: &Model<'_>| {
             let problem = model.problem.on(records);
             Runner::new(&problem, &problem.full(&model.theta()))
@@ -274,9 +273,7 @@ fn report(
 }
 
 /// The accepted model, its fit carried on to its end: the search stops where a hypothesis is known well enough to be compared.
-pub(super) fn finished<'a>(
-    accepted: Option<&Model<'a>>,
-) -> Result<Option<Model<'a>>, DiagnoseError> {
+pub(super) fn finished<'a>(accepted: Option<&Model<'a>>) -> Result<Option<Model<'a>>, StudyError> {
     let Some(model) = accepted else {
         return Ok(None);
     };
@@ -287,9 +284,9 @@ pub(super) fn finished<'a>(
 
 /// Returns whether the free run of a noisy black box's model is nearer to the record than that of the twin. Their likelihood is linearised
 /// about their runs, and says nothing where these are in another phase.
-fn is_nearer(model: Option<&Model<'_>>, twin: &Model<'_>) -> Result<bool, DiagnoseError> {
+fn is_nearer(model: Option<&Model<'_>>, twin: &Model<'_>) -> Result<bool, StudyError> {
     let Some(model) = model else { return Ok(true) };
-    let error = |model: &Model<'_>| -> Result<f64, DiagnoseError> {
+    let error = |model: &Model<'_>| -> Result<f64, StudyError> {
         let runner = Runner::new(&model.problem, &model.fitted.theta)?;
         let errors = runner.and_then(|runner| runner.errors(&model.problem.records[0], 0));
         Ok(errors.map_or(f64::INFINITY, |errors| root(&errors)))
@@ -303,7 +300,7 @@ fn located(
     chances: &Chances,
     conclusion: &Conclusion,
     model: &Model<'_>,
-) -> Result<Location, DiagnoseError> {
+) -> Result<Location, StudyError> {
     let mut targets: Vec<TargetShare> = (chances.places.iter())
         .map(|(target, p)| TargetShare {
             target: target.clone(),
@@ -370,22 +367,22 @@ fn check(
     records: &[Record],
     validation: Option<&Record>,
     settings: &DiagnoseSettings,
-) -> Result<(), DiagnoseError> {
-    let first = records.first().ok_or(DiagnoseError::NoRecord)?;
+) -> Result<(), StudyError> {
+    let first = records.first().ok_or(StudyError::NoRecord)?;
     let expected = first.drive().dt();
     let measured = (records.iter().enumerate()).map(|(i, record)| (Some(i), record));
     let validation = validation.map(|record| (None, record));
     for (which, record) in measured.chain(validation) {
         (record.check_channels(&study.twin().signals()))
             .and_then(|()| study.twin().check_drive(record.drive()))
-            .map_err(|error| DiagnoseError::Channels {
+            .map_err(|error| StudyError::Channels {
                 record: which,
                 error,
             })?;
         let given = record.drive().dt();
         let uniform = first.drive().is_uniform() && record.drive().is_uniform();
         if uniform && (given - expected).abs() > 1e-3 * expected {
-            return Err(DiagnoseError::Steps {
+            return Err(StudyError::Steps {
                 record: which,
                 given: six_digits(given),
                 expected: six_digits(expected),
@@ -394,7 +391,7 @@ fn check(
         let samples = record.measured_rows();
         let least = study.twin().parameters().len() + 3;
         if samples < least {
-            return Err(DiagnoseError::TooShort {
+            return Err(StudyError::TooShort {
                 record: which,
                 samples,
                 least,

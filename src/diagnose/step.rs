@@ -1,11 +1,11 @@
 //! The step of a twin's own integrator as a rival of every gap: what a finer step explains, the system does not lack.
 
-use super::error::DiagnoseError;
 use super::model::Model;
 use super::thresholds::Thresholds;
 use crate::fit::problem::Problem;
 use crate::fit::reference::Reference;
 use crate::likelihood::kalman::recoverable;
+use crate::study::StudyError;
 use crate::twin::{Integrator, MOST_SUBSTEPS, Twin};
 use nalgebra::DVector;
 
@@ -56,7 +56,7 @@ pub(in crate::diagnose) fn finer_step(
     model: &Model<'_>,
     least: f64,
     explained: f64,
-) -> Result<Option<(FinerStep, f64)>, DiagnoseError> {
+) -> Result<Option<(FinerStep, f64)>, StudyError> {
     let Some((integrator, stepping)) = model.base.integration() else {
         return Ok(None);
     };
@@ -64,11 +64,11 @@ pub(in crate::diagnose) fn finer_step(
     let Some(reference) = recoverable(Reference::new(&model.problem, theta))?.flatten() else {
         return Ok(None);
     };
-    let problem = |step: FinerStep| -> Result<Option<Problem<'_>>, DiagnoseError> {
+    let problem = |step: FinerStep| -> Result<Option<Problem<'_>>, StudyError> {
         let twin = step.of(model.base);
         twin.map(|twin| model.problem_of(&twin)).transpose()
     };
-    let direction = |step: FinerStep| -> Result<Option<DVector<f64>>, DiagnoseError> {
+    let direction = |step: FinerStep| -> Result<Option<DVector<f64>>, StudyError> {
         let Some(problem) = problem(step)? else {
             return Ok(None);
         };

@@ -1,6 +1,5 @@
 //! Summary of fits for a report.
 
-use super::error::DiagnoseError;
 use super::explain::chances::Chances;
 use super::explain::decide::Conclusion;
 use super::explain::findings::Findings;
@@ -14,6 +13,7 @@ use crate::fit::Nuisance;
 use crate::fit::follow::starts;
 use crate::fit::posterior::Spread;
 use crate::likelihood::kalman::recoverable;
+use crate::study::StudyError;
 use crate::twin::{PRIOR_DEVIATION, Role};
 use std::sync::Arc;
 
@@ -90,7 +90,7 @@ pub(in crate::diagnose) fn parameters(
     model: &Model<'_>,
     alone: &[f64],
     settings: &DiagnoseSettings,
-) -> Result<Vec<FittedParameter>, DiagnoseError> {
+) -> Result<Vec<FittedParameter>, StudyError> {
     let noise = settings.noise().child("parameters");
     let level = Thresholds::INTERVAL_LEVEL;
     let spread = Spread::drawn(&model.problem, &model.fitted, level, noise)?;
@@ -118,7 +118,7 @@ pub(in crate::diagnose) fn parameters(
 pub(in crate::diagnose) fn nuisance(
     model: &Model<'_>,
     noises: &[Arc<Term>],
-) -> Result<Vec<Nuisance>, DiagnoseError> {
+) -> Result<Vec<Nuisance>, StudyError> {
     let errors = model.fitted.std_errors(&model.problem);
     let theta = model.theta();
     let space = model.base.parameters();

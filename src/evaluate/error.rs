@@ -1,6 +1,5 @@
 //! Errors of baselines, studies over many records, and sealed trials.
 
-use crate::diagnose::DiagnoseError;
 use crate::likelihood::kalman::FilterError;
 use crate::math::MathError;
 use crate::progress::Cancelled;
@@ -95,9 +94,6 @@ pub enum EvaluateError {
     /// A setting cannot be used.
     #[error(transparent)]
     Setting(#[from] SettingError),
-    /// The diagnosis failed.
-    #[error(transparent)]
-    Diagnose(#[from] DiagnoseError),
     /// The caller stopped the work.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),

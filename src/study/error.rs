@@ -1,14 +1,14 @@
-//! The error of a study.
+//! The error of a study, its fits and its diagnoses.
 
 use crate::likelihood::kalman::FilterError;
 use crate::progress::Cancelled;
 use crate::record::RecordError;
-use crate::setting::did_you_mean;
+use crate::setting::{SettingError, did_you_mean, number};
 use crate::storage::files::with_remedy;
-use crate::twin::TwinError;
+use crate::twin::{SimulationError, TwinError};
 use std::path::PathBuf;
 
-/// Error of a study, its file, or its records.
+/// Error of a study, its file, its records, or a fit or diagnosis of them.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum StudyError {
@@ -74,4 +74,76 @@ pub enum StudyError {
     /// A record, its file, or its channels are wrong.
     #[error(transparent)]
     Record(#[from] RecordError),
+    /// A diagnosis of no record.
+    #[error("no record given; pass at least one")]
+    NoRecord,
+    /// Records of a diagnosis have different steps.
+    #[error("{} has a step of {} s, the first record {} s; resample it", name(*record), number(*given), number(*expected))]
+    Steps {
+        /// Index among the measured records, from 0; none for the validation record.
+        record: Option<usize>,
+        /// Step of the record, in seconds.
+        given: f64,
+        /// Step of the first record.
+        expected: f64,
+    },
+    /// A record is too short for a diagnosis.
+    #[error("{} has {samples} samples; at least {least} are needed, measure longer", name(*record))]
+    TooShort {
+        /// Index among the measured records, from 0; none for the validation record.
+        record: Option<usize>,
+        /// Number of samples.
+        samples: usize,
+        /// Least number of samples.
+        least: usize,
+    },
+    /// One of several records has channels or steps that the twin cannot have.
+    #[error("{} does not fit the twin: {error}", name(*record))]
+    Channels {
+        /// Index among the measured records, from 0; none for the validation record.
+        record: Option<usize>,
+        /// The error.
+        error: RecordError,
+    },
+    /// A setting of a fit or a diagnosis is out of range.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// A diagnosis is to leave out an effect that is unknown.
+    #[error("unknown effect {0} in --without; `truetwin effects --twin T` lists those of a twin")]
+    Without(String),
+    /// A diagnosis finds no starting point that can be fitted.
+    #[error(
+        "no starting point could be fitted to the record; check units and step of the record, and the prior"
+    )]
+    NoStart,
+    /// A simulation failed in a way that other parameters cannot mend.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+}
+
+/// A record of several, as a message calls it.
+fn name(record: Option<usize>) -> String {
+    record.map_or("the validation record".into(), |index| {
+        format!("record {}", index + 1)
+    })
+}
+
+impl StudyError {
+    /// Returns what stands for the record that caused the error among what stands for all of them, if one did.
+    pub(crate) fn culprit<'a, R>(
+        &self,
+        records: &'a [R],
+        validation: Option<&'a R>,
+    ) -> Option<&'a R> {
+        match self {
+            Self::Steps { record, .. }
+            | Self::TooShort { record, .. }
+            | Self::Channels { record, .. } => match record {
+                Some(index) => records.get(*index),
+                None => validation,
+            },
+            Self::NoStart => records.first(),
+            _ => None,
+        }
+    }
 }

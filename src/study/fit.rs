@@ -46,8 +46,7 @@ impl Study {
             "level",
             level,
             "choose a level between 0 and 1, such as 0.9",
-        )
-        .map_err(|error| StudyError::Table(error.to_string()))?;
+        )?;
         for record in records {
             record.check_channels(&self.twin.signals())?;
         }

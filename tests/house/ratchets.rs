@@ -128,8 +128,8 @@ fn ratchets(sources: &Crate) -> Vec<Ratchet> {
         })
         .collect();
     vec![
-        Ratchet::new("public items", 149, items.collect()),
-        Ratchet::new("error types", 14, errors),
+        Ratchet::new("public items", 148, items.collect()),
+        Ratchet::new("error types", 13, errors),
         Ratchet::new("lines of src, files of tests apart", 74_800, lines),
         Ratchet::new("folders with more than 18 files", 0, crowded(sources, 18)),
         Ratchet::new("questions for equations", 8, questions(sources)),

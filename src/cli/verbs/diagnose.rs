@@ -93,7 +93,7 @@ impl Verb for Diagnose {
         )
         .map_err(|error| {
             let path = error.culprit(&self.records, self.validation.as_ref());
-            let failure = Failure::from(error);
+            let failure = Failure::diagnosis(error);
             match path {
                 Some(path) => failure.within(path),
                 None => failure,

@@ -7,12 +7,12 @@ use super::pairs::{FIRST, SINGLES, alone, pairs};
 use super::search::{Breadth, FEW, listed, unknown};
 use super::terms::{Terms, of_keys, on_top, scales};
 use super::valleys::leave_valleys;
-use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::term::Term;
 use crate::diagnose::model::Model;
 use crate::diagnose::settings::DiagnoseSettings;
 use crate::diagnose::thresholds::Thresholds;
 use crate::progress::{Progress, Stage};
+use crate::study::StudyError;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -28,7 +28,7 @@ pub(in crate::diagnose) fn singles<'a>(
     before: Before<'_, 'a>,
     settings: &DiagnoseSettings,
     stage: &Stage,
-) -> Result<Singles<'a>, DiagnoseError> {
+) -> Result<Singles<'a>, StudyError> {
     let breadth = Breadth::of(base, settings.quick);
     match before {
         Before::Nothing => one_by_one(base, inside, terms, breadth, stage),
@@ -44,7 +44,7 @@ pub(in crate::diagnose) fn explore<'a>(
     terms: &Terms<'_>,
     settings: &DiagnoseSettings,
     stage: &Stage,
-) -> Result<Findings<'a>, DiagnoseError> {
+) -> Result<Findings<'a>, StudyError> {
     let breadth = Breadth::of(base, settings.quick);
     let Singles { findings, carried } = found;
     let (mut findings, several) = match carried {
@@ -106,7 +106,7 @@ fn beside_better<'a>(
     terms: &Terms<'_>,
     breadth: Breadth,
     stage: &Stage,
-) -> Result<Singles<'a>, DiagnoseError> {
+) -> Result<Singles<'a>, StudyError> {
     let origin = base.log_evidence;
     let kept = |all: &[Found<'a>]| -> Vec<Found<'a>> {
         let shifted = all.iter().cloned().map(|f| f.beside(old_origin, origin));
@@ -131,12 +131,12 @@ fn carried_on<'a>(
     terms: &Terms<'_>,
     breadth: Breadth,
     stage: &Stage,
-) -> Result<Singles<'a>, DiagnoseError> {
+) -> Result<Singles<'a>, StudyError> {
     let origin = base.log_evidence;
     let kept = |found: &Found<'_>| found.promised().beside(old_origin, origin);
     // What does not stand out keeps its evidence: another step does not help it more than the others.
     let least = FIRST * old.top();
-    let carry = |found: &Found<'_>| -> Result<Found<'a>, DiagnoseError> {
+    let carry = |found: &Found<'_>| -> Result<Found<'a>, StudyError> {
         let mut carried = kept(found);
         if let Some(old) = found.model.as_ref().filter(|_| found.gain > least)
             && let Some(new) = old.beside_twin(base)?
@@ -146,7 +146,7 @@ fn carried_on<'a>(
         }
         Ok(carried)
     };
-    let carry_all = |all: &[Found<'_>]| -> Result<Vec<Found<'a>>, DiagnoseError> {
+    let carry_all = |all: &[Found<'_>]| -> Result<Vec<Found<'a>>, StudyError> {
         let mut all: Vec<Found<'a>> = all.par_iter().map(carry).collect::<Result<_, _>>()?;
         sort(&mut all);
         Ok(all)
@@ -202,7 +202,7 @@ fn one_by_one<'a>(
     terms: &Terms<'_>,
     breadth: Breadth,
     stage: &Stage,
-) -> Result<Singles<'a>, DiagnoseError> {
+) -> Result<Singles<'a>, StudyError> {
     let origin = base.log_evidence;
     let first = (terms.unknown)(&[]);
     let mut unknown_alone = unknown(base, &first, origin, breadth)?;
@@ -222,7 +222,7 @@ fn one_by_one<'a>(
         true => breadth.afresh(),
         false => breadth,
     };
-    let alone = |breadth: Breadth, top: f64| -> Result<Vec<Found<'a>>, DiagnoseError> {
+    let alone = |breadth: Breadth, top: f64| -> Result<Vec<Found<'a>>, StudyError> {
         let mut all = listed(base, terms.listed, origin, &[], afresh(breadth, top))?;
         if let Some(inside) = inside {
             let others = listed(inside, terms.listed, origin, &[], breadth)?;
@@ -245,7 +245,7 @@ fn wider<'a>(
     terms: &Terms<'_>,
     breadth: Breadth,
     findings: &mut Findings<'a>,
-) -> Result<(), DiagnoseError> {
+) -> Result<(), StudyError> {
     if findings.top() <= Thresholds::WIDER {
         return Ok(());
     }
@@ -265,7 +265,7 @@ fn beside_each_other<'a>(
     several: Option<Vec<Found<'a>>>,
     settings: &DiagnoseSettings,
     stage: &Stage,
-) -> Result<Findings<'a>, DiagnoseError> {
+) -> Result<Findings<'a>, StudyError> {
     if explains_nothing_more(&findings) {
         return Ok(findings);
     }
@@ -312,7 +312,7 @@ pub(in crate::diagnose) fn what_is_left<'a>(
     terms: &Terms<'_>,
     settings: &DiagnoseSettings,
     progress: &Progress,
-) -> Result<Findings<'a>, DiagnoseError> {
+) -> Result<Findings<'a>, StudyError> {
     if settings.detection_only || explains_nothing_more(&findings) {
         return Ok(findings);
     }
@@ -375,7 +375,7 @@ pub(in crate::diagnose) fn absorbing<'a>(
     free: &Model<'a>,
     within: &Model<'a>,
     terms: &[Arc<Term>],
-) -> Result<Vec<Found<'a>>, DiagnoseError> {
+) -> Result<Vec<Found<'a>>, StudyError> {
     let breadth = Breadth::of(within, false).of_all();
     let found = listed(within, terms, within.log_evidence, &[], breadth)?;
     let best = free.fitted.log_likelihood - Thresholds::ABSORBS;

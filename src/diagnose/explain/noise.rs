@@ -4,10 +4,10 @@ use super::findings::{Findings, suffices};
 use super::found::Found;
 use super::search::{Breadth, listed};
 use super::terms::{Terms, on_top};
-use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::term::{Part, Term};
 use crate::diagnose::model::Model;
 use crate::diagnose::thresholds::Thresholds;
+use crate::study::StudyError;
 use std::sync::Arc;
 
 /// Adds other kinds of noise to what was found alone.
@@ -16,7 +16,7 @@ pub(super) fn with_noise<'a>(
     terms: &Terms<'_>,
     breadth: Breadth,
     findings: Findings<'a>,
-) -> Result<Findings<'a>, DiagnoseError> {
+) -> Result<Findings<'a>, StudyError> {
     let (origin, every) = (base.log_evidence, breadth.of_all());
     let noise = listed(base, terms.noise, origin, &[], every)?;
     Ok(Findings {
@@ -34,7 +34,7 @@ fn noise_beside<'a>(
     noise: &[Arc<Term>],
     origin: f64,
     breadth: Breadth,
-) -> Result<Option<(String, f64)>, DiagnoseError> {
+) -> Result<Option<(String, f64)>, StudyError> {
     let best = singles.first().filter(|f| f.gain > Thresholds::WIDER);
     let Some((best, model)) = best.and_then(|f| Some((f, f.model.as_ref()?))) else {
         return Ok(None);
@@ -55,7 +55,7 @@ pub(super) fn instead_of_second(
     terms: &Terms<'_>,
     origin: f64,
     breadth: Breadth,
-) -> Result<Option<(String, f64)>, DiagnoseError> {
+) -> Result<Option<(String, f64)>, StudyError> {
     let first = findings.several.first();
     let Some(pair) = first.filter(|pair| findings.wins(pair)) else {
         return Ok(None);
@@ -88,7 +88,7 @@ fn noise_pairs<'a>(
     terms: &[Arc<Term>],
     origin: f64,
     breadth: Breadth,
-) -> Result<Vec<Found<'a>>, DiagnoseError> {
+) -> Result<Vec<Found<'a>>, StudyError> {
     let best = noise.first().filter(|f| f.gain > Thresholds::NOISE);
     let Some((best, model)) = best.and_then(|f| Some((f, f.model.as_ref()?))) else {
         return Ok(vec![]);

@@ -4,10 +4,10 @@ use super::findings::{Findings, leaves_nothing};
 use super::found::{Found, improve, keep, own_theta};
 use super::search::{Breadth, listed};
 use super::terms::{Terms, of_keys};
-use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::term::Term;
 use crate::diagnose::model::Model;
 use crate::diagnose::thresholds::Thresholds;
+use crate::study::StudyError;
 use std::sync::Arc;
 
 /// Single effects that are looked at for something left, or for a second one beside them.
@@ -22,7 +22,7 @@ pub(super) fn pairs<'a>(
     origin: f64,
     breadth: Breadth,
     enough: bool,
-) -> Result<Vec<Found<'a>>, DiagnoseError> {
+) -> Result<Vec<Found<'a>>, StudyError> {
     let thetas: Vec<Vec<f64>> = findings
         .listed
         .iter()
@@ -81,7 +81,7 @@ pub(super) fn alone<'a>(
     terms: &Terms<'_>,
     origin: f64,
     breadth: Breadth,
-) -> Result<(), DiagnoseError> {
+) -> Result<(), StudyError> {
     let first = findings.several.first();
     let Some(pair) = first.filter(|pair| findings.wins(pair)) else {
         return Ok(());

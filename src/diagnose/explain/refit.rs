@@ -1,12 +1,12 @@
 //! Fits of terms together with θ and noise levels.
 
 use super::scan::{Beginning, Linear, Promise};
-use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::model::{Extended, Model};
 use crate::fit::climb::{Fitted, climb, fit};
 use crate::fit::evidence::{CREDIT, laplace};
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::study::StudyError;
 use rayon::prelude::*;
 
 /// Shares of the step to the top of the quadratic that a function's fit may begin at.
@@ -37,7 +37,7 @@ pub(in crate::diagnose) fn fit_promise<'a>(
     promise: &Promise,
     thetas: &[Vec<f64>],
     effort: Effort,
-) -> Result<Option<Model<'a>>, DiagnoseError> {
+) -> Result<Option<Model<'a>>, StudyError> {
     let extended = model.extend(&promise.term)?;
     let chosen: Vec<&Beginning> = promise.starts.iter().take(effort.starts).collect();
     // Times and delays stay until θ and the size have answered them: a small size would let them go anywhere.
@@ -52,7 +52,7 @@ pub(in crate::diagnose) fn fit_promise<'a>(
             let settled = climb(held, &theta, HELD)?;
             Ok(settled.map_or(theta, |settled| settled.theta))
         })
-        .collect::<Result<_, DiagnoseError>>()?;
+        .collect::<Result<_, StudyError>>()?;
     if let Some(first) = chosen.first() {
         let first = model.beside(&extended, &first.m);
         from.extend(thetas.iter().map(|own| extended.from(own, first.clone())));
@@ -66,7 +66,7 @@ pub(in crate::diagnose) fn fit_promise<'a>(
 pub(in crate::diagnose) fn fit_afresh<'a>(
     model: &Model<'a>,
     promise: &Promise,
-) -> Result<Option<Model<'a>>, DiagnoseError> {
+) -> Result<Option<Model<'a>>, StudyError> {
     let extended = model.extend(&promise.term)?;
     let problem = extended.problem.clone();
     let centre = problem.begin(&problem.centre());
@@ -83,9 +83,7 @@ pub(in crate::diagnose) fn fit_afresh<'a>(
 
 /// The model with its noise held loud, θ fitted to that: predictions then hardly reach beyond a row, and the likelihood has no narrow
 /// valleys.
-pub(in crate::diagnose) fn loudly<'a>(
-    model: &Model<'a>,
-) -> Result<Option<Model<'a>>, DiagnoseError> {
+pub(in crate::diagnose) fn loudly<'a>(model: &Model<'a>) -> Result<Option<Model<'a>>, StudyError> {
     let is_noise = |j: usize| model.problem.axes[j].begin.is_some();
     let problem = model.problem.holding(is_noise);
     let start = problem.begin(&model.fitted.theta);
@@ -102,7 +100,7 @@ pub(in crate::diagnose) fn anneal(
     loud: &Model<'_>,
     promise: &Promise,
     starts: usize,
-) -> Result<Vec<Fitted>, DiagnoseError> {
+) -> Result<Vec<Fitted>, StudyError> {
     let held = loud.extend(&promise.term)?;
     let c = &held.problem.coordinates;
     let quiet = (model.problem.coordinates).of(&model.fitted.theta);
@@ -126,7 +124,7 @@ pub(in crate::diagnose) fn anneal(
             }
             Ok(last)
         })
-        .collect::<Result<_, DiagnoseError>>()?;
+        .collect::<Result<_, StudyError>>()?;
     Ok(fits.into_iter().flatten().collect())
 }
 
@@ -135,7 +133,7 @@ pub(in crate::diagnose) fn release<'a>(
     model: &Model<'a>,
     promise: &Promise,
     begun: &[Fitted],
-) -> Result<Option<Model<'a>>, DiagnoseError> {
+) -> Result<Option<Model<'a>>, StudyError> {
     let free = model.extend(&promise.term)?;
     let fits: Vec<Option<Fitted>> = (begun.par_iter())
         .map(|begun| climb(&free.problem, &begun.theta, RELEASED))
@@ -151,7 +149,7 @@ fn begin(
     model: &Model<'_>,
     extended: &Extended<'_>,
     start: &Beginning,
-) -> Result<Vec<f64>, DiagnoseError> {
+) -> Result<Vec<f64>, StudyError> {
     let c = &model.problem.coordinates;
     let phi = c.of(&model.fitted.theta);
     let points = SHARES.map(|share| {
@@ -193,7 +191,7 @@ pub(in crate::diagnose) fn fit_function<'a>(
     model: &Model<'a>,
     linear: Linear<'a>,
     iterations: usize,
-) -> Result<Option<Model<'a>>, DiagnoseError> {
+) -> Result<Option<Model<'a>>, StudyError> {
     let Linear {
         extended,
         found,

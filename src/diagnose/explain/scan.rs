@@ -3,12 +3,12 @@
 //! The innovations of the model with a little of the term give a direction; the gain along it, θ free to answer, is the promise of a
 //! listed effect. An unknown function's coefficients have a score each, so that its evidence has a closed form.
 
-use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::term::{Start, Term, marks};
 use crate::diagnose::model::{Extended, Model};
 use crate::fit::evidence::{Laplace, laplace};
 use crate::fit::reference::Reference;
 use crate::likelihood::kalman::recoverable;
+use crate::study::StudyError;
 use nalgebra::DVector;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -47,7 +47,7 @@ impl Promise {
 pub(in crate::diagnose) fn scan(
     model: &Model<'_>,
     terms: &[Arc<Term>],
-) -> Result<Vec<Promise>, DiagnoseError> {
+) -> Result<Vec<Promise>, StudyError> {
     let Some(reference) =
         recoverable(Reference::new(&model.problem, &model.fitted.theta))?.flatten()
     else {
@@ -58,7 +58,7 @@ pub(in crate::diagnose) fn scan(
             let extended = model.extend(term)?;
             let mut starts: Vec<Beginning> = (term.starts.par_iter())
                 .map(|start| promise(model, &reference, &extended, start))
-                .collect::<Result<Vec<_>, DiagnoseError>>()?
+                .collect::<Result<Vec<_>, StudyError>>()?
                 .into_iter()
                 .flatten()
                 .collect();
@@ -69,7 +69,7 @@ pub(in crate::diagnose) fn scan(
                 starts,
             })
         })
-        .collect::<Result<_, DiagnoseError>>()?;
+        .collect::<Result<_, StudyError>>()?;
     all.retain(|promise| !promise.starts.is_empty());
     all.sort_by(|a, b| b.nats().total_cmp(&a.nats()));
     Ok(all)
@@ -81,7 +81,7 @@ fn promise(
     reference: &Reference,
     extended: &Extended<'_>,
     start: &Start,
-) -> Result<Option<Beginning>, DiagnoseError> {
+) -> Result<Option<Beginning>, StudyError> {
     let problem = &extended.problem;
     let first = &problem.axes[extended.entries[0]];
     let mut m = start.m.clone();
@@ -137,7 +137,7 @@ pub(in crate::diagnose) struct Linear<'a> {
 pub(in crate::diagnose) fn functions<'a>(
     model: &Model<'a>,
     terms: &[Arc<Term>],
-) -> Result<Vec<Linear<'a>>, DiagnoseError> {
+) -> Result<Vec<Linear<'a>>, StudyError> {
     let mut all: Vec<Linear<'a>> = (terms.par_iter())
         .map(|term| {
             let extended = model.extend(term)?;
@@ -164,7 +164,7 @@ pub(in crate::diagnose) fn functions<'a>(
                 theta,
             }))
         })
-        .collect::<Result<Vec<_>, DiagnoseError>>()?
+        .collect::<Result<Vec<_>, StudyError>>()?
         .into_iter()
         .flatten()
         .collect();

@@ -6,13 +6,13 @@ use super::refit::{
 };
 use super::scan::{Promise, functions, scan};
 use super::valleys::leave_valleys;
-use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::term::{Nature, Term, marks};
 use crate::diagnose::model::Model;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::climb::{Fitted, climb};
 use crate::fit::evidence::log_mean;
 use crate::math::median;
+use crate::study::StudyError;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -146,7 +146,7 @@ pub(in crate::diagnose) fn listed<'a>(
     origin: f64,
     thetas: &[Vec<f64>],
     breadth: Breadth,
-) -> Result<Vec<Found<'a>>, DiagnoseError> {
+) -> Result<Vec<Found<'a>>, StudyError> {
     if terms.is_empty() {
         return Ok(vec![]);
     }
@@ -204,7 +204,7 @@ fn first_fits<'a>(
     promises: &[Promise],
     thetas: &[Vec<f64>],
     breadth: Breadth,
-) -> Result<Vec<Model<'a>>, DiagnoseError> {
+) -> Result<Vec<Model<'a>>, StudyError> {
     let chosen: Vec<&Promise> = (promises.iter().take(breadth.listed))
         .filter(|promise| promise.nats() > breadth.least)
         .collect();
@@ -214,18 +214,15 @@ fn first_fits<'a>(
     };
     let fits: Vec<Option<Model<'a>>> = (chosen.par_iter())
         .map(|promise| fit_promise(model, promise, thetas, effort))
-        .collect::<Result<_, DiagnoseError>>()?;
+        .collect::<Result<_, StudyError>>()?;
     Ok(fits.into_iter().flatten().collect())
 }
 
 /// Fits of all terms from the prior's centre: beside the twin where it is, the right one may promise nothing.
-fn fresh_fits<'a>(
-    model: &Model<'a>,
-    promises: &[Promise],
-) -> Result<Vec<Model<'a>>, DiagnoseError> {
+fn fresh_fits<'a>(model: &Model<'a>, promises: &[Promise]) -> Result<Vec<Model<'a>>, StudyError> {
     let fits: Vec<Option<Model<'a>>> = (promises.par_iter())
         .map(|promise| fit_afresh(model, promise))
-        .collect::<Result<_, DiagnoseError>>()?;
+        .collect::<Result<_, StudyError>>()?;
     Ok(fits.into_iter().flatten().collect())
 }
 
@@ -236,14 +233,14 @@ fn annealed_fits<'a>(
     loud: &Model<'a>,
     terms: &[Arc<Term>],
     breadth: Breadth,
-) -> Result<Vec<Model<'a>>, DiagnoseError> {
+) -> Result<Vec<Model<'a>>, StudyError> {
     let promises: Vec<Promise> = (scan(loud, terms)?.into_iter())
         .take(breadth.annealed)
         .filter(|promise| promise.nats() > breadth.least)
         .collect();
     let begun: Vec<Vec<Fitted>> = (promises.par_iter())
         .map(|promise| anneal(model, loud, promise, 2))
-        .collect::<Result<_, DiagnoseError>>()?;
+        .collect::<Result<_, StudyError>>()?;
     let best = (begun.iter().flatten())
         .map(|fitted| fitted.objective)
         .fold(f64::NEG_INFINITY, f64::max);
@@ -252,7 +249,7 @@ fn annealed_fits<'a>(
             begun.retain(|fitted| fitted.objective > best - LOST);
             release(model, promise, &begun)
         })
-        .collect::<Result<_, DiagnoseError>>()?;
+        .collect::<Result<_, StudyError>>()?;
     Ok(fits.into_iter().flatten().collect())
 }
 
@@ -262,7 +259,7 @@ fn fit_on<'a>(
     promises: &[Promise],
     all: &mut [Found<'a>],
     origin: f64,
-) -> Result<(), DiagnoseError> {
+) -> Result<(), StudyError> {
     let top = all.first().map_or(0.0, |f| f.gain);
     let floor = model.log_evidence - origin;
     let is_near = |i: usize, gain: f64| i < 5 || gain > top - 4.0;
@@ -303,7 +300,7 @@ fn fit_on<'a>(
             });
             Ok(best.map(|model| Found::of(model, origin)))
         })
-        .collect::<Result<_, DiagnoseError>>()?;
+        .collect::<Result<_, StudyError>>()?;
     for (own, better) in all.iter_mut().zip(better) {
         if let Some(better) = better.filter(|better| better.gain > own.gain) {
             *own = better;
@@ -318,7 +315,7 @@ pub(in crate::diagnose) fn unknown<'a>(
     terms: &[Arc<Term>],
     origin: f64,
     breadth: Breadth,
-) -> Result<Vec<Found<'a>>, DiagnoseError> {
+) -> Result<Vec<Found<'a>>, StudyError> {
     let floor = model.log_evidence - origin;
     let of = |natures: &[Nature]| -> Vec<Arc<Term>> {
         terms
@@ -347,7 +344,7 @@ pub(in crate::diagnose) fn unknown<'a>(
                 };
                 Ok((terms, gain, fitted))
             })
-            .collect::<Result<_, DiagnoseError>>()?;
+            .collect::<Result<_, StudyError>>()?;
         let refits: Vec<(f64, Option<f64>)> = (fits.iter())
             .map(|(_, gain, m)| (*gain, added(model, m.as_ref())))
             .collect();
@@ -382,7 +379,7 @@ pub(in crate::diagnose) fn unknown<'a>(
             };
             Ok((i, fitted))
         })
-        .collect::<Result<_, DiagnoseError>>()?;
+        .collect::<Result<_, StudyError>>()?;
     let refits: Vec<(f64, Option<f64>)> = (fits.iter())
         .map(|(i, m)| (rough[*i], added(model, m.as_ref())))
         .collect();

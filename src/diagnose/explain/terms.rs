@@ -2,9 +2,9 @@
 
 use super::found::Found;
 use super::search::{Breadth, unknown};
-use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::scales::Scales;
 use crate::diagnose::hypotheses::term::Term;
+use crate::study::StudyError;
 use std::sync::Arc;
 
 /// Terms of a diagnosis.
@@ -30,7 +30,7 @@ pub(super) fn on_top<'a>(
     terms: &Terms<'_>,
     origin: f64,
     breadth: Breadth,
-) -> Result<Option<Vec<Found<'a>>>, DiagnoseError> {
+) -> Result<Option<Vec<Found<'a>>>, StudyError> {
     let Some(model) = &found.model else {
         return Ok(None);
     };
@@ -44,7 +44,7 @@ pub(super) fn on_top<'a>(
 }
 
 /// Sizes of the states along fitted models.
-pub(super) fn scales<'a>(found: &[Found<'a>]) -> Result<Vec<Scales<'a>>, DiagnoseError> {
+pub(super) fn scales<'a>(found: &[Found<'a>]) -> Result<Vec<Scales<'a>>, StudyError> {
     let mut all = vec![];
     for model in found.iter().filter_map(|f| f.model.as_ref()) {
         all.push(Scales {

@@ -2,11 +2,11 @@
 
 use super::found::{Found, own_theta};
 use super::refit::CARRIED;
-use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::term::Term;
 use crate::diagnose::model::Model;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::climb::{climb, fit};
+use crate::study::StudyError;
 use rayon::prelude::*;
 
 /// Places from which the same law begins again elsewhere.
@@ -25,13 +25,13 @@ pub(super) fn leave_valleys<'a>(
     model: &Model<'a>,
     all: &mut [Found<'a>],
     floor: f64,
-) -> Result<(), DiagnoseError> {
+) -> Result<(), StudyError> {
     let top = all.first().map_or(floor, |f| f.gain);
     let least = (top - Thresholds::CANDIDATES).max(floor + Thresholds::NULL_LIKE);
     let better: Vec<Option<Found<'a>>> = (0..all.len())
         .into_par_iter()
         .map(|i| again(model, &all[i], &all[..i], least))
-        .collect::<Result<_, DiagnoseError>>()?;
+        .collect::<Result<_, StudyError>>()?;
     for (old, new) in all.iter_mut().zip(better) {
         if let Some(new) = new.filter(|new| new.gain > old.gain) {
             *old = new;
@@ -46,7 +46,7 @@ fn again<'a>(
     found: &Found<'a>,
     before: &[Found<'a>],
     least: f64,
-) -> Result<Option<Found<'a>>, DiagnoseError> {
+) -> Result<Option<Found<'a>>, StudyError> {
     let Some(shape) = found.last().shape() else {
         return Ok(None);
     };
@@ -88,7 +88,7 @@ fn begun_again<'a>(
     model: &Model<'a>,
     found: &Found<'a>,
     starts: &[(Vec<f64>, Vec<f64>)],
-) -> Result<Option<Found<'a>>, DiagnoseError> {
+) -> Result<Option<Found<'a>>, StudyError> {
     let Some(own) = &found.model else {
         return Ok(None);
     };

@@ -2,12 +2,12 @@
 
 use super::scales::Scales;
 use super::term::{Nature, Part, Start, Term, with_terms};
-use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::thresholds::Thresholds;
 use crate::effect::{Effect, Law, Magnitude, Mark, TargetKind, on_levels, targets};
 use crate::fit::axis::{Axis, EvidencePrior};
 use crate::fit::magnitude::{LONGEST, largest, level_axis, levels, size_axis, uniform_axis};
 use crate::math::ends;
+use crate::study::StudyError;
 use crate::twin::{Interval, Parameter, Twin};
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -24,7 +24,7 @@ pub(in crate::diagnose) struct Library<'a> {
 
 impl Library<'_> {
     /// Hypotheses of one effect: one for each way to use its magnitudes.
-    pub fn terms(&self, effect: &Effect) -> Result<Vec<Term>, DiagnoseError> {
+    pub fn terms(&self, effect: &Effect) -> Result<Vec<Term>, StudyError> {
         let known = targets(
             effect.law().target(),
             Some(&self.scales.outline),
@@ -95,7 +95,7 @@ impl Library<'_> {
         mark: &Mark,
         off: &[usize],
         kept: Option<usize>,
-    ) -> Result<Option<Term>, DiagnoseError> {
+    ) -> Result<Option<Term>, StudyError> {
         let magnitudes = effect.magnitudes();
         let held: BTreeMap<String, f64> = (off.iter())
             .map(|&i| {
@@ -140,9 +140,7 @@ impl Library<'_> {
         let mut grids: Vec<Vec<f64>> = vec![];
         let mut scales = false;
         for (i, (m, name)) in free.iter().zip(&names).enumerate() {
-            let j = space
-                .position(name)
-                .map_err(crate::diagnose::error::DiagnoseError::from)?;
+            let j = space.position(name)?;
             let (grid, axis) = self.magnitude(m, effect, values, register, (&twin, j, &space[j]));
             if matches!(axis.evidence, EvidencePrior::Magnitude { .. }) && i == 0 {
                 scales = true;

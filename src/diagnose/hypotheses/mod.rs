@@ -21,13 +21,12 @@ use self::functions::{
 use self::listed::Library;
 use self::scales::Scales;
 use self::term::{Nature, Part, Start, Term};
-use crate::diagnose::error::DiagnoseError;
 use crate::effect::{EffectPattern, TargetKind, targets};
 use crate::fit::axis::Axis;
 use crate::fit::magnitude::uniform_axis;
 use crate::math::quantile;
 use crate::record::Record;
-use crate::study::Study;
+use crate::study::{Study, StudyError};
 use crate::twin::{Interval, Parameter, Role, is_memory};
 use std::sync::Arc;
 
@@ -51,9 +50,9 @@ pub(in crate::diagnose) fn listed(
     without: &[EffectPattern],
     library: &Library<'_>,
     fitted_noise: &[String],
-) -> Result<Vec<Term>, DiagnoseError> {
+) -> Result<Vec<Term>, StudyError> {
     if let Some(name) = without.iter().find(|name| !study.knows_effect(name)) {
-        return Err(DiagnoseError::Without(study.with_nearest_effect(name)));
+        return Err(StudyError::Without(study.with_nearest_effect(name)));
     }
     let already = already(study);
     let mut terms = vec![];

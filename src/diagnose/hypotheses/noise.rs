@@ -4,9 +4,8 @@ use super::disturbances;
 use super::entry::Entry;
 use super::listed::Library;
 use super::term::{Nature, Term};
-use crate::diagnose::error::DiagnoseError;
 use crate::effect::{EffectPattern, Law, TargetKind, targets};
-use crate::study::Study;
+use crate::study::{Study, StudyError};
 use crate::twin::is_memory;
 
 /// Steps over which coloured noise forgets itself: correlations of 0.37 and 0.85 from a sample to the next. What lasts longer is a
@@ -21,7 +20,7 @@ pub(in crate::diagnose) fn kinds(
     without: &[EffectPattern],
     library: &Library<'_>,
     fitted_noise: &[String],
-) -> Result<Vec<Term>, DiagnoseError> {
+) -> Result<Vec<Term>, StudyError> {
     let scales = library.scales;
     let is_fitted = |target: &str| fitted_noise.iter().any(|place| place == target);
     let mut terms = vec![];

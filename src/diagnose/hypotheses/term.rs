@@ -4,9 +4,9 @@ use super::disturbed_equations::disturbed;
 use super::entered::with_function;
 use super::entry::{Entered, Entry};
 use super::{disturbed_signals, entered_black_box};
-use crate::diagnose::error::DiagnoseError;
 use crate::effect::{Effect, EffectKey, Magnitude, augment_short};
 use crate::fit::axis::Axis;
+use crate::study::StudyError;
 use crate::twin::{Twin, fix};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -177,7 +177,7 @@ impl Term {
 pub(in crate::diagnose) fn with_terms<'t>(
     base: &Twin,
     terms: impl Iterator<Item = &'t Term> + Clone,
-) -> Result<Twin, DiagnoseError> {
+) -> Result<Twin, StudyError> {
     let (mut effects, mut memories) = (vec![], vec![]);
     let mut off = BTreeMap::new();
     for term in terms.clone() {

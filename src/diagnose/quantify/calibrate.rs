@@ -1,9 +1,9 @@
 //! Calibration: how much evidence for a gap do records show that the fitted twin itself has made?
 
-use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::model::Model;
 use crate::progress::Stage;
 use crate::record::Record;
+use crate::study::StudyError;
 use crate::twin::Noise;
 use rayon::prelude::*;
 
@@ -12,10 +12,10 @@ pub(in crate::diagnose) fn calibrate(
     model: &Model<'_>,
     count: usize,
     own: f64,
-    log_odds: impl Fn(&[Record]) -> Result<f64, DiagnoseError> + Sync,
+    log_odds: impl Fn(&[Record]) -> Result<f64, StudyError> + Sync,
     noise: Noise,
     stage: &Stage,
-) -> Result<Option<(f64, bool)>, DiagnoseError> {
+) -> Result<Option<(f64, bool)>, StudyError> {
     let theta = &model.fitted.theta;
     let problem = &model.problem;
     let values: Vec<Option<f64>> = (0..count as u64)
@@ -42,13 +42,13 @@ pub(in crate::diagnose) fn calibrate(
             }
             let value = match log_odds(&records) {
                 Ok(value) => Some(value),
-                Err(DiagnoseError::NoFit) => None,
+                Err(StudyError::NoStart) => None,
                 Err(error) => return Err(error),
             };
             stage.tick()?;
             Ok(value)
         })
-        .collect::<Result<_, DiagnoseError>>()?;
+        .collect::<Result<_, StudyError>>()?;
     let all: Vec<f64> = values.into_iter().flatten().collect();
     if all.is_empty() {
         return Ok(None);

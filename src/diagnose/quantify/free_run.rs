@@ -1,12 +1,12 @@
 //! Free-run errors, and the share of a gap that effects close.
 
-use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::outcome::FreeRuns;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::recoverable;
 use crate::math::median;
 use crate::record::{Record, Signal};
+use crate::study::StudyError;
 use crate::twin::{Noise, Twin, begun};
 use ndarray::Array1;
 use rayon::prelude::*;
@@ -19,7 +19,7 @@ pub(in crate::diagnose) struct Runner {
 
 impl Runner {
     /// The twin of a problem at θ, begun as a record shows; `None` where its first state cannot be told.
-    pub fn new(problem: &Problem<'_>, theta: &[f64]) -> Result<Option<Self>, DiagnoseError> {
+    pub fn new(problem: &Problem<'_>, theta: &[f64]) -> Result<Option<Self>, StudyError> {
         let twin = match recoverable(problem.smoothed(theta))? {
             None => return Ok(None),
             Some(smoothed) => match smoothed.first() {

@@ -16,13 +16,13 @@
 //! of simulated records from their mean: what another record of the same system would have given.
 
 use super::free_run::{Runner, mean, scaled, variances};
-use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::outcome::Horizon;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::math::{deviation, quantile};
 use crate::record::{Record, Signal};
+use crate::study::StudyError;
 use crate::twin::Noise;
 use rayon::prelude::*;
 
@@ -146,7 +146,7 @@ pub(in crate::diagnose) fn compare(
     draws: &[Predictor<'_>],
     rows: HeldOutRows<'_>,
     noise: Noise,
-) -> Result<Compared, DiagnoseError> {
+) -> Result<Compared, StudyError> {
     let simulated = simulated(draws, rows.record, Thresholds::FLOOR_RECORDS, noise);
     let mut compared = Compared {
         horizons: vec![],
@@ -230,7 +230,7 @@ impl Compared {
         horizon: Option<usize>,
         of: &Predictor<'_>,
         rows: HeldOutRows<'_>,
-    ) -> Result<Option<f64>, DiagnoseError> {
+    ) -> Result<Option<f64>, StudyError> {
         let Some(at) = horizon else {
             return Ok(None);
         };
@@ -246,7 +246,7 @@ impl Compared {
         draws: &[Predictor<'_>],
         rows: HeldOutRows<'_>,
         noise: Noise,
-    ) -> Result<Option<[f64; 2]>, DiagnoseError> {
+    ) -> Result<Option<[f64; 2]>, StudyError> {
         let Some(at) = self.headline else {
             return Ok(None);
         };

@@ -7,7 +7,6 @@
 //!
 //! Source of the criterion: Hunter & Reiner, "Designs for discriminating between two rival models" (1965).
 
-use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::model::{Model, keys};
 use crate::diagnose::outcome::NextInput;
 use crate::diagnose::thresholds::Thresholds;
@@ -17,6 +16,7 @@ use crate::fit::problem::Problem;
 use crate::fit::reference::Reference;
 use crate::likelihood::kalman::recoverable;
 use crate::record::{Drive, Record, Signal};
+use crate::study::StudyError;
 use crate::twin::Noise;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -43,7 +43,7 @@ struct Rival<'a> {
 pub(in crate::diagnose) fn next_input(
     class: &[&Model<'_>],
     noise: Noise,
-) -> Result<Option<NextInput>, DiagnoseError> {
+) -> Result<Option<NextInput>, StudyError> {
     let rivals: Vec<Rival<'_>> = (class.iter().take(Thresholds::MOST_RIVALS))
         .map(|model| Rival {
             key: keys(&model.terms).join("+"),
@@ -92,11 +92,11 @@ fn best_of(
     records: &[Record],
     times: usize,
     noise: Noise,
-) -> Result<Option<Proposal>, DiagnoseError> {
+) -> Result<Option<Proposal>, StudyError> {
     let looks = proposals(&records[0], times, noise)?
         .into_par_iter()
         .map(|proposal| Ok((first_statistics(rivals, &proposal.drive, noise)?, proposal)))
-        .collect::<Result<Vec<_>, DiagnoseError>>()?;
+        .collect::<Result<Vec<_>, StudyError>>()?;
     let best = (looks.into_iter()).max_by(|a, b| a.0.total_cmp(&b.0));
     Ok(best
         .filter(|(nats, _)| *nats > 0.0)
@@ -104,7 +104,7 @@ fn best_of(
 }
 
 /// Inputs within the range of those of a record, so many times as long as it; without inputs, a longer record.
-fn proposals(record: &Record, times: usize, noise: Noise) -> Result<Vec<Proposal>, DiagnoseError> {
+fn proposals(record: &Record, times: usize, noise: Noise) -> Result<Vec<Proposal>, StudyError> {
     let drive = record.drive();
     let (dt, samples) = (drive.dt(), times * drive.samples());
     let long = match times {
@@ -176,7 +176,7 @@ fn proposals(record: &Record, times: usize, noise: Noise) -> Result<Vec<Proposal
 
 impl Rival<'_> {
     /// Simulates a record of this rival; `None` where it diverges.
-    fn record(&self, drive: &Drive, noise: Noise) -> Result<Option<Record>, DiagnoseError> {
+    fn record(&self, drive: &Drive, noise: Noise) -> Result<Option<Record>, StudyError> {
         let theta = self.problem.of_record(0, &self.theta);
         match self.problem.twin.simulate(&theta, drive, noise) {
             // A black box may diverge without saying so.
@@ -188,7 +188,7 @@ impl Rival<'_> {
     }
 
     /// Its evidence on the present records and another one together, fitted to both.
-    fn evidence(&self, records: &[Record]) -> Result<f64, DiagnoseError> {
+    fn evidence(&self, records: &[Record]) -> Result<f64, StudyError> {
         let problem = self.problem.on(records);
         let start = problem.carried(&self.problem, &self.theta);
         let fitted = climb(&problem, &start, WARM)?;
@@ -199,11 +199,7 @@ impl Rival<'_> {
 
 /// Difference of the closest two rivals in nats: half of what the change from the innovations of the one to those of the
 /// other holds that θ of the other, as far as the present records leave it free, cannot imitate.
-fn first_statistics(
-    rivals: &[Rival<'_>],
-    drive: &Drive,
-    noise: Noise,
-) -> Result<f64, DiagnoseError> {
+fn first_statistics(rivals: &[Rival<'_>], drive: &Drive, noise: Noise) -> Result<f64, StudyError> {
     let mut least = f64::INFINITY;
     for (i, truth) in rivals.iter().enumerate() {
         let noise = noise.child("look").sample(i as u64);
@@ -248,7 +244,7 @@ fn told_apart(
     drive: &Drive,
     trials: u64,
     noise: Noise,
-) -> Result<[u64; 2], DiagnoseError> {
+) -> Result<[u64; 2], StudyError> {
     let told = (0..trials)
         .into_par_iter()
         .map(|i| {
@@ -259,12 +255,12 @@ fn told_apart(
             let both = [records, &[record]].concat();
             let scores: Vec<f64> = (rivals.iter())
                 .map(|rival| rival.evidence(&both))
-                .collect::<Result<_, DiagnoseError>>()?;
+                .collect::<Result<_, StudyError>>()?;
             let others = scores.iter().enumerate().filter(|(j, _)| *j != truth);
             let next = others.map(|(_, s)| *s).fold(f64::NEG_INFINITY, f64::max);
             Ok(scores[truth] > next + Thresholds::RIVALS)
         })
-        .collect::<Result<Vec<bool>, DiagnoseError>>()?;
+        .collect::<Result<Vec<bool>, StudyError>>()?;
     Ok([told.iter().filter(|t| **t).count() as u64, trials])
 }
 

@@ -9,7 +9,6 @@
 //!
 //! Sizes are linear in d⊥; of thresholds the values on the grid of the search are looked at, the mildest that shows.
 
-use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::hypotheses::term::{Part, Term};
 use crate::diagnose::model::Model;
 use crate::diagnose::outcome::Visible;
@@ -17,6 +16,7 @@ use crate::diagnose::thresholds::Thresholds;
 use crate::fit::axis::SMALL;
 use crate::fit::reference::Reference;
 use crate::likelihood::kalman::recoverable;
+use crate::study::StudyError;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -25,7 +25,7 @@ use std::sync::Arc;
 pub(in crate::diagnose) fn power(
     model: &Model<'_>,
     terms: &[Arc<Term>],
-) -> Result<Vec<Visible>, DiagnoseError> {
+) -> Result<Vec<Visible>, StudyError> {
     let Some(reference) =
         recoverable(Reference::new(&model.problem, &model.fitted.theta))?.flatten()
     else {
@@ -43,7 +43,7 @@ pub(in crate::diagnose) fn power(
             };
             Ok((term.key(), visible, distance))
         })
-        .collect::<Result<_, DiagnoseError>>()?;
+        .collect::<Result<_, StudyError>>()?;
     // Of several ways to use one effect, the one that shows best.
     let mut best: BTreeMap<String, (Visible, f64)> = BTreeMap::new();
     let mut order = vec![];
@@ -81,7 +81,7 @@ fn smallest(
     reference: &Reference,
     term: &Arc<Term>,
     need: f64,
-) -> Result<(Option<f64>, f64), DiagnoseError> {
+) -> Result<(Option<f64>, f64), StudyError> {
     let extended = model.extend(term)?;
     let axis = &extended.problem.axes[extended.entries[0]];
     let mut best = (None, f64::INFINITY);

@@ -2,7 +2,6 @@
 
 use super::free_run::{Runner, root};
 use super::horizon::{HeldOutRows, Predictor, compare};
-use crate::diagnose::error::DiagnoseError;
 use crate::diagnose::explain::found::Found;
 use crate::diagnose::model::{Model, keys};
 use crate::diagnose::outcome::Shrinkage;
@@ -12,6 +11,7 @@ use crate::fit::posterior::posterior;
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::FilterError;
 use crate::record::Record;
+use crate::study::StudyError;
 use crate::twin::Noise;
 
 /// Samples of the shortest record whose last third is held out.
@@ -53,7 +53,7 @@ impl HeldOut<'_> {
         &'a self,
         model: &Model<'_>,
         theta: Vec<f64>,
-    ) -> Result<Option<Predictor<'a>>, DiagnoseError> {
+    ) -> Result<Option<Predictor<'a>>, StudyError> {
         let problem = model.problem.on(self.begins);
         let runner = Runner::new(&problem, &problem.full(&theta))?;
         Ok(runner.map(|runner| Predictor {
@@ -64,7 +64,7 @@ impl HeldOut<'_> {
     }
 
     /// The model refitted without what is held out.
-    fn refitted<'a>(&'a self, model: &Model<'_>) -> Result<Option<Predictor<'a>>, DiagnoseError> {
+    fn refitted<'a>(&'a self, model: &Model<'_>) -> Result<Option<Predictor<'a>>, StudyError> {
         match self.refit(model)? {
             Some(refit) => self.predictor(model, refit.theta()),
             None => Ok(None),
@@ -77,7 +77,7 @@ impl HeldOut<'_> {
         model: &Model<'_>,
         refit: &Refit<'_>,
         noise: Noise,
-    ) -> Result<Vec<Predictor<'a>>, DiagnoseError> {
+    ) -> Result<Vec<Predictor<'a>>, StudyError> {
         let fitted = std::slice::from_ref(&refit.fitted);
         let drawn = posterior(&refit.problem, fitted, None, noise)?;
         let mut all = vec![];
@@ -132,7 +132,7 @@ pub(in crate::diagnose) struct Measures<'m, 'a> {
 pub(in crate::diagnose) fn shrinkage(
     measures: &Measures<'_, '_>,
     noise: Noise,
-) -> Result<Option<Shrinkage>, DiagnoseError> {
+) -> Result<Option<Shrinkage>, StudyError> {
     let base = measures.base;
     let whole = &base.problem.records[0];
     let short: Vec<Record>;

@@ -1,9 +1,9 @@
 //! Answer of the diagnoser to one trial, from the record alone. Nothing else in the trials reads a diagnosis.
 
-use crate::diagnose::{Decision, DiagnoseError, DiagnoseSettings, Diagnosis, Verdict, diagnose};
-use crate::progress::Progress;
+use crate::diagnose::{Decision, DiagnoseSettings, Diagnosis, Verdict, diagnose};
+use crate::progress::{Cancelled, Progress};
 use crate::record::Record;
-use crate::study::Study;
+use crate::study::{Study, StudyError};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
@@ -94,11 +94,11 @@ pub(super) fn ask(
     validation: Option<&Record>,
     settings: &DiagnoseSettings,
     progress: &Progress,
-) -> Result<Result<Outcome, String>, DiagnoseError> {
+) -> Result<Result<Outcome, String>, Cancelled> {
     let records = [record.clone()];
     match diagnose(study, &records, validation, settings, &progress.unshown()) {
         Ok(found) => Ok(Ok(Outcome::of(&found))),
-        Err(error @ DiagnoseError::Cancelled(_)) => Err(error),
+        Err(StudyError::Cancelled(stop)) => Err(stop),
         Err(error) => Ok(Err(error.to_string())),
     }
 }
@@ -111,7 +111,7 @@ impl Answer {
         (record, validation): (&Record, Option<&Record>),
         settings: &DiagnoseSettings,
         progress: &Progress,
-    ) -> Result<Self, DiagnoseError> {
+    ) -> Result<Self, Cancelled> {
         let clock = Instant::now();
         let answer = ask(study, record, validation, settings, progress)?;
         let seconds = clock.elapsed().as_secs_f64();
