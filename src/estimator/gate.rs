@@ -235,7 +235,8 @@ impl GateTest<'_> {
         let size = self.settings.whitening_simulations(self.simulator.dim());
         let null = self.settings.null;
         let stage = self.progress.stage("gate", size + 2 * null);
-        let whitening = (self.settings).whiten(&self.repeat(theta, size, "whitening", &stage)?)?;
+        let whitening =
+            (self.settings).whiten(&self.repeat(theta, size, "whitening", &stage)?)?;
         let read = self.draws(null, near, "errors", &stage)?;
         let errors = &read.theta - &estimate(&read.features)?;
         let space = self.simulator.twin().parameters();

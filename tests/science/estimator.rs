@@ -95,6 +95,36 @@ fn in_distribution_most_records_keep_the_estimate_of_a_trusted_prior() {
     }
 }
 
+/// Of the twin's own records the gate keeps as many as it says, also where the noise that the network has learnt is three times that of the
+/// records: its null errs as the network does. With all of the null at the network's estimate, it kept 23 of 60 then.
+#[test]
+fn the_gate_keeps_records_of_the_twin_whatever_noise_is_declared() {
+    const RECORDS: u64 = 30;
+    let text = "twin = 'van-der-pol'\n[noise]\nx2 = 0.0212";
+    let file = StudyFile::parse(text, "s.toml".as_ref()).unwrap();
+    let options = PretrainOptions {
+        bank_size: Some(2000),
+        epochs: Some(40),
+        seed: 1,
+        ..PretrainOptions::default()
+    };
+    let study = studies()[0].configure(&file).unwrap();
+    let (loud, _) = pretrain(study, &options, &Progress::silent()).unwrap();
+    let space = loud.study().twin().parameters();
+    let kept = |estimator: &Estimator| {
+        let of = |seed: &u64| {
+            let nu = space.draw_prior(Noise::new(*seed, "prior", 0))[0];
+            let options = EstimateOptions::default();
+            let found = estimator.estimate(&record(nu, 400 + seed), &options, &Progress::silent());
+            !found.unwrap().gate.out_of_distribution
+        };
+        (0..RECORDS).filter(of).count() as u64
+    };
+    // At 90 %, fewer than 21 of 30 have a chance of 1 in 500; a null that leans to one side keeps fewer than 18.
+    let kept = [kept(estimator()), kept(&loud)];
+    assert!(kept.iter().all(|kept| *kept >= 21), "{kept:?} of {RECORDS}");
+}
+
 /// Four records of one ν, one of them half as long: errors shrink, 90 % intervals hold ν, and the records agree. Two of another ν do not.
 /// Weights without the precisions, or simulations shared by records, fail the bounds.
 #[test]

@@ -51,12 +51,22 @@ impl<'a> Findings<'a> {
         }
     }
 
-    /// The best listed effect at the place of an unknown function, if it explains nearly as much: the function is that effect in another
-    /// form.
-    fn held_by(&self, unknown: &Found<'_>) -> Option<&Found<'a>> {
+    /// The listed effects at the place of an unknown function that explain nearly as much, and the share of each: the function is one of
+    /// them in another form. Where the form of the best misses R nats, a lead of R over the others counts as one of 3 nats does where
+    /// none are missed.
+    fn holding(&self, unknown: &Found<'_>) -> Vec<(Vec<String>, f64)> {
         let least = (1.0 - Thresholds::OUTDONE) * unknown.gain;
         let place = unknown.last().target.as_str();
-        (self.listed.iter()).find(|f| f.gain > least && f.last().places().contains(&place))
+        let all: Vec<&Found<'a>> = (self.listed.iter())
+            .filter(|f| f.gain > least && f.last().places().contains(&place))
+            .collect();
+        let best = all.iter().map(|f| f.gain).fold(f64::NEG_INFINITY, f64::max);
+        let error = ((unknown.gain - best) / Thresholds::RIVALS).max(1.0);
+        let logs: Vec<f64> = all.iter().map(|f| f.gain / error).collect();
+        let sum = log_sum(&logs);
+        (all.iter().zip(logs))
+            .map(|(found, log)| (found.keys(), (log - sum).exp()))
+            .collect()
     }
 
     /// log of the evidence of nothing missing, whatever the noise, over that of the twin.
@@ -96,9 +106,9 @@ impl<'a> Findings<'a> {
         for found in self.rivals() {
             all.push(Weighed {
                 log_weight: every.ln() + found.gain,
-                kind: match self.held_by(found) {
-                    Some(effect) => Kind::Rest(effect.keys()),
-                    None => Kind::Unknown,
+                kind: match self.holding(found) {
+                    effects if effects.is_empty() => Kind::Unknown,
+                    effects => Kind::Rest(effects),
                 },
                 places: places(&found.terms),
             });
@@ -143,10 +153,12 @@ impl<'a> Findings<'a> {
             }
             match hypothesis.kind {
                 Kind::Unknown => kinds.unknown += p,
-                Kind::Rest(keys) => {
+                Kind::Rest(effects) => {
                     kinds.partial += p;
-                    for key in keys {
-                        *chances.effects.entry(key).or_default() += p;
+                    for (keys, share) in effects {
+                        for key in keys {
+                            *chances.effects.entry(key).or_default() += p * share;
+                        }
                     }
                 }
                 Kind::Partial(count, by_effects) => {
@@ -202,8 +214,8 @@ enum Kind {
     Listed(Vec<String>),
     /// So many listed effects beside something unknown, and the share of the evidence that is theirs.
     Partial(usize, f64),
-    /// A listed effect in another form.
-    Rest(Vec<String>),
+    /// A listed effect in another form: which, and the share of each.
+    Rest(Vec<(Vec<String>, f64)>),
     /// Something unknown alone.
     Unknown,
 }
@@ -257,6 +269,29 @@ mod tests {
         findings.add(&pair, Some(vec![wave(Nature::Function, "h2", 90.0)]));
         let chances = findings.chances();
         assert!(chances.effects[&key] > 0.9, "{}", chances.effects[&key]);
+    }
+
+    /// A function of the level speaks for a loss there, and for friction as much if both miss as much of it: not if one misses little.
+    #[test]
+    fn a_function_speaks_for_all_that_it_may_be() {
+        let of = |gain: f64| {
+            let [loss, friction] = [("loss", 160.0), ("friction", 157.0)].map(|(id, gain)| {
+                let mut found = wave(Nature::Listed, "h1", gain);
+                let term = Arc::make_mut(found.terms.last_mut().unwrap());
+                term.id = id.into();
+                found
+            });
+            let findings = Findings {
+                unknown: vec![wave(Nature::Function, "h1", gain)],
+                listed: vec![loss, friction],
+                ..Findings::default()
+            };
+            let key = findings.listed[0].last().key();
+            findings.chances().effect(&key)
+        };
+        assert!(of(150.0) > 0.94, "{}", of(150.0));
+        let far = of(185.0);
+        assert!((0.5..0.7).contains(&far), "{far}");
     }
 
     /// A wave of the flow explains what a wave of the level does, and takes no probability from it, unless it explains more.
