@@ -10,141 +10,25 @@
 //!
 //! Source: Lakshminarayanan, Guerrero & Rojas, section IV-A.
 
+mod settings;
 #[cfg(test)]
 mod tests;
+
+pub use settings::{GateForm, GateSettings};
 
 use crate::estimator::bank::{Draw, Draws, FeatureSimulator};
 use crate::estimator::error::EstimatorError;
 use crate::math::{Whitening, median, rank_p_value, to_vector};
 use crate::progress::{Progress, Stage};
 use crate::record::Drive;
-use crate::setting::SettingError;
 use crate::twin::Noise;
 use nalgebra::{DMatrix, DVector};
 use ndarray::{Array2, ArrayView1};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::borrow::Cow;
 
 /// Monte-Carlo errors between p-value and level that leave the answer to chance in fewer than 1 of 20 cases.
 const UNSURE: f64 = 2.0;
-/// Simulations of the test of an unsure answer, over those of the first: they halve its Monte-Carlo error.
-const MORE: usize = 4;
-
-/// Which form of the test.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum GateForm {
-    /// Rank among fresh simulations: exact for any number of features.
-    #[default]
-    Calibrated,
-    /// As printed: threshold from the simulations that μ and S were estimated from, S + ε I.
-    Paper,
-}
-
-/// Settings of the test.
-///
-/// | field | default | range | meaning |
-/// |---|---|---|---|
-/// | `form` | calibrated | | see [`GateForm`] |
-/// | `alpha` | 0.10 | (0, 1) | rejection rate when θ is right |
-/// | `simulations` | 150 | ≥ 2 | for μ and S; the calibrated form takes at least `per_feature` a feature |
-/// | `per_feature` | 16 | ≥ 2 | simulations a feature for μ and S; calibrated only |
-/// | `null` | 199 | ≥ 1/α − 1 | fresh simulations to rank among; calibrated only |
-/// | `epsilon` | 1e-8 | > 0 | added to S, in squared feature units; paper's form only |
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct GateSettings {
-    /// Form of the test.
-    pub form: GateForm,
-    /// Rejection rate when θ is right.
-    pub alpha: f64,
-    /// Simulations for mean and covariance.
-    pub simulations: usize,
-    /// Least number of simulations a feature, calibrated form.
-    pub per_feature: usize,
-    /// Fresh simulations to rank among, calibrated form.
-    pub null: usize,
-    /// Added to the diagonal of S, paper's form.
-    pub epsilon: f64,
-}
-
-impl Default for GateSettings {
-    fn default() -> Self {
-        Self {
-            form: GateForm::Calibrated,
-            alpha: 0.10,
-            simulations: 150,
-            per_feature: 16,
-            null: 199,
-            epsilon: 1e-8,
-        }
-    }
-}
-
-impl GateSettings {
-    /// Checks whether each field is in its range.
-    pub fn check(&self) -> Result<(), SettingError> {
-        let refuse = |field: &str, value: f64, remedy: &str| {
-            Err(SettingError::new(format!("gate: {field}"), value, remedy))
-        };
-        if !(self.alpha > 0.0 && self.alpha < 1.0) {
-            return refuse("alpha", self.alpha, "choose a rate between 0 and 1");
-        }
-        if self.simulations < 2 {
-            return refuse(
-                "simulations",
-                self.simulations as f64,
-                "at least 2 are needed",
-            );
-        }
-        if self.per_feature < 2 {
-            return refuse(
-                "per_feature",
-                self.per_feature as f64,
-                "at least 2 are needed",
-            );
-        }
-        if (self.null as f64) < 1.0 / self.alpha - 1.0 {
-            return refuse(
-                "null",
-                self.null as f64,
-                "take at least 1/alpha - 1, or p can never fall below alpha",
-            );
-        }
-        if !(self.epsilon > 0.0 && self.epsilon.is_finite()) {
-            return refuse("epsilon", self.epsilon, "must be positive");
-        }
-        Ok(())
-    }
-
-    /// Simulations for μ and S of n features.
-    pub fn whitening_simulations(&self, n: usize) -> usize {
-        match self.form {
-            GateForm::Calibrated => self.simulations.max(self.per_feature * n),
-            GateForm::Paper => self.simulations,
-        }
-    }
-
-    /// The settings of a test that is four times as large.
-    pub(super) fn larger(&self) -> Self {
-        Self {
-            simulations: MORE * self.simulations,
-            per_feature: MORE * self.per_feature,
-            null: MORE * (self.null + 1) - 1,
-            ..self.clone()
-        }
-    }
-
-    /// μ and S^{-1/2} from simulated features, in the form of the test.
-    pub fn whiten(&self, features: &Array2<f64>) -> Result<Whitening, EstimatorError> {
-        match self.form {
-            GateForm::Calibrated => Whitening::calibrated(features),
-            GateForm::Paper => Whitening::regularised(features, self.epsilon),
-        }
-        .map_err(EstimatorError::Whitening)
-    }
-}
 
 /// The test's answer.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
