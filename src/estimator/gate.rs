@@ -189,7 +189,7 @@ impl GateTest<'_> {
         Ok(Some(gate.decide(statistic)))
     }
 
-    /// What [`at`](Self::at) needs: simulations for μ and S, and those to rank a record among.
+    /// Simulates what [`at`](Self::at) needs: features for μ and S, and those to rank a record among.
     fn simulate(&self, theta: &[f64]) -> Result<NullFeatures, EstimatorError> {
         let size = self.settings.whitening_simulations(self.simulator.dim());
         let fresh = match self.settings.form {

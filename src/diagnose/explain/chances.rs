@@ -290,7 +290,7 @@ mod tests {
             findings.chances().effect(&key)
         };
         assert!(of(150.0) > 0.94, "{}", of(150.0));
-        let far = of(185.0);
+        let far = of(180.0);
         assert!((0.5..0.7).contains(&far), "{far}");
     }
 
