@@ -59,6 +59,14 @@ impl Failure {
         }
     }
 
+    /// Creates a failure whose cause may be the study file.
+    fn of_study(message: impl Display) -> Self {
+        Self {
+            about_study: true,
+            ..Self::user(message)
+        }
+    }
+
     /// Creates a failure that the user cannot fix.
     pub fn internal(message: impl Display) -> Self {
         Self {
@@ -172,10 +180,7 @@ users!(RecordError, SimulationError, StorageError, TwinError);
 
 impl From<FeatureError> for Failure {
     fn from(error: FeatureError) -> Self {
-        Self {
-            about_study: true,
-            ..Self::user(error)
-        }
+        Self::of_study(error)
     }
 }
 
@@ -183,10 +188,7 @@ impl From<StudyError> for Failure {
     fn from(error: StudyError) -> Self {
         match error {
             StudyError::Cancelled(_) => Self::internal(error),
-            _ => Self {
-                about_study: true,
-                ..Self::user(error)
-            },
+            _ => Self::of_study(error),
         }
     }
 }
@@ -197,10 +199,7 @@ impl From<EvaluateError> for Failure {
             EvaluateError::Cancelled(_) => Self::internal(error),
             EvaluateError::NoDeparture { .. }
             | EvaluateError::NoTruth { .. }
-            | EvaluateError::Plan(_) => Self {
-                about_study: true,
-                ..Self::user(error)
-            },
+            | EvaluateError::Plan(_) => Self::of_study(error),
             _ => Self::user(error),
         }
     }
@@ -223,10 +222,9 @@ impl From<EstimatorError> for Failure {
             E::Feature(error) => error.into(),
             E::Network(error) => error.into(),
             E::Cancelled(_) | E::Search(_) | E::Cloud(_) => Self::internal(error),
-            E::Simulation(_) | E::Rejected(_) | E::Hopeless { .. } | E::Inputs(_) => Self {
-                about_study: true,
-                ..Self::user(error)
-            },
+            E::Simulation(_) | E::Rejected(_) | E::Hopeless { .. } | E::Inputs(_) => {
+                Self::of_study(error)
+            }
             _ => Self::user(error),
         }
     }

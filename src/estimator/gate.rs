@@ -100,8 +100,7 @@ impl GateTest<'_> {
     /// The errors e_k are those of fresh simulations at `near`: parameters of the prior that the reader takes for about θ. They have the
     /// record's own input and noise, so that what the reader gets wrong on records of the twin itself rejects no record. `jacobians`
     /// are ∂f/∂θ at θ (n × d) of several seeds; their median in whitened features is taken, since far from their reference features have
-    /// heavy tails, and one such run would spoil a mean. `estimate` maps features (rows) to θ̂. The paper's form stays as
-    /// [`at`](Self::at).
+    /// heavy tails, and one such run would spoil a mean. `estimate` maps features (rows) to θ̂.
     ///
     /// # Errors
     ///
@@ -113,9 +112,6 @@ impl GateTest<'_> {
         jacobians: &[DMatrix<f64>],
         estimate: impl Fn(&Array2<f64>) -> Result<Array2<f64>, EstimatorError>,
     ) -> Result<Gate, EstimatorError> {
-        if self.settings.form == GateForm::Paper {
-            return self.at(theta);
-        }
         let size = self.settings.whitening_simulations(self.simulator.dim());
         let null = self.settings.null;
         let stage = self.progress.stage("gate", size + 2 * null);
@@ -126,9 +122,8 @@ impl GateTest<'_> {
         let space = self.simulator.twin().parameters();
         let around: Vec<Vec<f64>> = (errors.rows().into_iter())
             .map(|error| {
-                (space.iter().zip(theta).zip(error))
-                    .map(|((p, theta), error)| p.prior.clamp(theta + error))
-                    .collect()
+                let moved: Vec<f64> = theta.iter().zip(error).map(|(t, e)| t + e).collect();
+                space.clamp_to_prior(&moved)
             })
             .collect();
         let ranked = self.draws(null, &around, "null", &stage)?.features;

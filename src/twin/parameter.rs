@@ -256,6 +256,13 @@ impl ParameterSpace {
             .collect()
     }
 
+    /// `theta` moved to the nearest point in the prior box.
+    pub(crate) fn clamp_to_prior(&self, theta: &[f64]) -> Vec<f64> {
+        (self.0.iter().zip(theta))
+            .map(|(p, &v)| p.prior.clamp(v))
+            .collect()
+    }
+
     /// Uniform in the prior box, from the noise source `theta`.
     pub fn draw_prior(&self, noise: Noise) -> Vec<f64> {
         let mut source = noise.source("theta");

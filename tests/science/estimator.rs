@@ -96,7 +96,7 @@ fn in_distribution_most_records_keep_the_estimate_of_a_trusted_prior() {
 }
 
 /// Of the twin's own records the gate keeps as many as it says, also where the noise that the network has learnt is three times that of the
-/// records: its null errs as the network does. With all of the null at the network's estimate, it kept 23 of 60 then.
+/// records: its null errs as the network does.
 #[test]
 fn the_gate_keeps_records_of_the_twin_whatever_noise_is_declared() {
     const RECORDS: u64 = 30;
@@ -120,7 +120,8 @@ fn the_gate_keeps_records_of_the_twin_whatever_noise_is_declared() {
         };
         (0..RECORDS).filter(of).count() as u64
     };
-    // At 90 %, fewer than 21 of 30 have a chance of 1 in 500; a null that leans to one side keeps fewer than 18.
+    // Fewer than 21 of 30 have a chance of 1 in 2000 at 90 %. With all of the null at the network's estimate 23 of 60 were kept, and
+    // at that rate 21 of 30 have a chance of 1 in 2000.
     let kept = [kept(estimator()), kept(&loud)];
     assert!(kept.iter().all(|kept| *kept >= 21), "{kept:?} of {RECORDS}");
 }

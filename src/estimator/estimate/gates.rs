@@ -51,9 +51,7 @@ impl Run<'_> {
             GateForm::Calibrated => {
                 // The hypothesis is a θ in the prior; the network extrapolates, and errs, beyond.
                 let space = self.estimator.study().twin().parameters();
-                let initial: Vec<f64> = (space.iter().zip(initial))
-                    .map(|(p, v)| p.prior.clamp(*v))
-                    .collect();
+                let initial = space.clamp_to_prior(initial);
                 let refinement = self.refinement(simulator, self.observed, &self.settings.refine);
                 let jacobians = refinement.jacobians_at(&initial)?;
                 let near = (self.estimator.calibration).truths_near(&initial, &space.widths());
