@@ -60,7 +60,7 @@ impl Failure {
     }
 
     /// Creates a failure whose cause may be the study file.
-    fn of_study(message: impl Display) -> Self {
+    fn study(message: impl Display) -> Self {
         Self {
             about_study: true,
             ..Self::user(message)
@@ -180,7 +180,7 @@ users!(RecordError, SimulationError, StorageError, TwinError);
 
 impl From<FeatureError> for Failure {
     fn from(error: FeatureError) -> Self {
-        Self::of_study(error)
+        Self::study(error)
     }
 }
 
@@ -188,7 +188,7 @@ impl From<StudyError> for Failure {
     fn from(error: StudyError) -> Self {
         match error {
             StudyError::Cancelled(_) => Self::internal(error),
-            _ => Self::of_study(error),
+            _ => Self::study(error),
         }
     }
 }
@@ -199,7 +199,7 @@ impl From<EvaluateError> for Failure {
             EvaluateError::Cancelled(_) => Self::internal(error),
             EvaluateError::NoDeparture { .. }
             | EvaluateError::NoTruth { .. }
-            | EvaluateError::Plan(_) => Self::of_study(error),
+            | EvaluateError::Plan(_) => Self::study(error),
             _ => Self::user(error),
         }
     }
@@ -223,7 +223,7 @@ impl From<EstimatorError> for Failure {
             E::Network(error) => error.into(),
             E::Cancelled(_) | E::Search(_) | E::Cloud(_) => Self::internal(error),
             E::Simulation(_) | E::Rejected(_) | E::Hopeless { .. } | E::Inputs(_) => {
-                Self::of_study(error)
+                Self::study(error)
             }
             _ => Self::user(error),
         }
