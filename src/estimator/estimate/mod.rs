@@ -29,7 +29,7 @@ use crate::progress::Progress;
 use crate::record::Record;
 use crate::twin::Noise;
 use cloud::{Around, cloud};
-use merit::Merit;
+use merit::{Merit, error_by_chance};
 use nalgebra::DVector;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::time::Instant;
@@ -127,7 +127,11 @@ impl Estimator {
             };
             let first = merit(&initial, &tracking_initial);
             let refined = merit(&outcome.answer.theta, &tracking);
-            if refined.is_worse_than(&first, initial.len()) {
+            let by_chance = || {
+                let noise = Noise::new(seed, "merit", 0);
+                error_by_chance(twin, &outcome.answer.theta, record, noise)
+            };
+            if refined.is_worse_than(&first, initial.len(), by_chance) {
                 refinement_refused = true;
                 outcome.answer = trusting.clone();
                 tracking = tracking_initial.clone();

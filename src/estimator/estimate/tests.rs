@@ -52,7 +52,7 @@ fn an_answer_near_the_level_is_taken_from_more_simulations() {
     let theta = study.twin().parameters().centre();
     let (mut first, mut after) = (0, 0);
     for index in 0..40 {
-        let noise = Noise::new(2, "record", index);
+        let noise = Noise::new(3, "record", index);
         let drive = study.drives().unwrap().draw(noise).unwrap();
         let outputs = study.twin().simulate(&theta, &drive, noise).unwrap();
         let record = Record::new(drive, outputs).unwrap();
