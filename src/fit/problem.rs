@@ -73,7 +73,10 @@ impl<'a> Problem<'a> {
             coordinates: coordinates(&mut all.iter()),
             coordinates_of: places
                 .iter()
-                .map(|place| coordinates(&mut place.iter().map(|&j| &all[j])))
+                .map(|place| {
+                    let held = place.iter().map(|&j| all[j].held).collect();
+                    coordinates(&mut place.iter().map(|&j| &all[j])).holding(held)
+                })
                 .collect(),
             places,
             axes: all,
@@ -333,6 +336,10 @@ impl<'a> Problem<'a> {
         let mut problem = self.clone();
         for (j, axis) in problem.axes.iter_mut().enumerate() {
             axis.held |= held(j);
+        }
+        for (place, coordinates) in self.places.iter().zip(&mut problem.coordinates_of) {
+            let held = place.iter().map(|&j| problem.axes[j].held).collect();
+            *coordinates = coordinates.clone().holding(held);
         }
         problem
     }

@@ -83,7 +83,6 @@ pub(super) fn error_by_chance(
 mod tests {
     use super::*;
     use crate::study::{RecordPlan, Study};
-    use crate::twin::DigitalTwin;
     use crate::twins::CascadedTanks;
 
     #[test]

@@ -17,6 +17,7 @@ pub struct Coordinates {
     upper: Vec<f64>,
     theta_lower: Vec<f64>,
     theta_upper: Vec<f64>,
+    held: Vec<bool>,
 }
 
 impl Coordinates {
@@ -36,11 +37,22 @@ impl Coordinates {
         Self {
             lower: forward(&log, &theta_lower),
             upper: forward(&log, &theta_upper),
+            held: vec![false; log.len()],
             log,
             steps,
             theta_lower,
             theta_upper,
         }
+    }
+
+    /// The same, some entries held: no derivative is taken by them.
+    pub(crate) fn holding(self, held: Vec<bool>) -> Self {
+        Self { held, ..self }
+    }
+
+    /// Entries by which derivatives are taken.
+    pub(super) fn free(&self) -> Vec<usize> {
+        (0..self.held.len()).filter(|&j| !self.held[j]).collect()
     }
 
     /// φ of θ.

@@ -76,7 +76,7 @@ impl Score {
 
     /// As [`at`](Self::at), by one-sided differences with steps of a hundredth: d + 1 passes over the record instead of
     /// 2·d + 1, the gradient off by half a step times the information. For searches, and for features. Small twins run
-    /// all passes side by side.
+    /// all passes side by side. Entries that the coordinates hold have zeros.
     ///
     /// # Errors
     ///
@@ -130,12 +130,14 @@ impl Score {
         let (log_likelihood, centre) = rows(kalman, theta)?;
         let phi = coordinates.of(theta);
         let mut jacobian = DMatrix::zeros(centre.len(), phi.len());
-        for (j, mut column) in jacobian.column_iter_mut().enumerate() {
+        for j in coordinates.free() {
             let (moved, distance) = coordinates.beside(&phi, j, FORWARD);
             let (_, there) = rows(kalman, &coordinates.theta(&moved))?;
-            column.zip_zip_apply(&there, &centre, |d, there, here| {
-                *d = (there - here) / distance;
-            });
+            jacobian
+                .column_mut(j)
+                .zip_zip_apply(&there, &centre, |d, there, here| {
+                    *d = (there - here) / distance;
+                });
         }
         Self::assemble(kalman, log_likelihood, &centre, &jacobian)
     }
@@ -203,19 +205,22 @@ fn side_by_side(
         return kalmans.iter().map(|_| None).collect();
     }
     let phi = coordinates.of(theta);
-    let moves: Vec<_> = (0..phi.len())
-        .map(|j| {
-            let (moved, distance) = coordinates.beside(&phi, j, FORWARD);
-            (coordinates.theta(&moved), distance)
+    let moves: Vec<Move> = (coordinates.free().into_iter())
+        .map(|entry| {
+            let (moved, distance) = coordinates.beside(&phi, entry, FORWARD);
+            Move {
+                entry,
+                theta: coordinates.theta(&moved),
+                distance,
+            }
         })
         .collect();
-    let moved = moves.iter().map(|(theta, _)| &theta[..]);
+    let moved = moves.iter().map(|to| &to.theta[..]);
     let thetas: Vec<&[f64]> = std::iter::once(theta).chain(moved).collect();
     let all: Vec<(&Kalman<'_>, &[f64])> = (kalmans.iter())
         .flat_map(|kalman| thetas.iter().map(move |theta| (kalman, *theta)))
         .collect();
     let runs: Vec<Option<Together>> = all.chunks(LANES).map(together).collect();
-    let distances: Vec<f64> = moves.iter().map(|(_, distance)| *distance).collect();
     (0..kalmans.len())
         .map(|r| {
             let each: Option<Vec<(&Together, usize)>> = (r * thetas.len()..(r + 1) * thetas.len())
@@ -224,29 +229,37 @@ fn side_by_side(
                     Some((run, run.lane(job % LANES)?))
                 })
                 .collect();
-            Some(of_lanes(&each?, &distances))
+            Some(of_lanes(&each?, &moves, phi.len()))
         })
         .collect()
 }
 
-/// Score of a record from its lanes at θ and at the points beside it, at these distances.
-fn of_lanes(each: &[(&Together, usize)], distances: &[f64]) -> Score {
+/// A point beside θ.
+struct Move {
+    /// The entry that differs, and by how much in φ.
+    entry: usize,
+    distance: f64,
+    theta: Vec<f64>,
+}
+
+/// Score of a record from its lanes at θ and at the points beside it; d parameters.
+fn of_lanes(each: &[(&Together, usize)], moves: &[Move], d: usize) -> Score {
     let (centre, c) = each[0];
-    let (n, d) = (centre.rows.len(), distances.len());
+    let n = centre.rows.len();
     let [mut samples, mut shifts, mut spreads] = [(); 3].map(|()| DMatrix::zeros(n, d));
     // Reciprocals of variance and deviation.
     let scales: Vec<[f64; 2]> = (centre.rows.iter())
         .map(|[_, s]| [1.0 / s.0[c], 1.0 / s.0[c].sqrt()])
         .collect();
-    for (j, ((moved, m), distance)) in each[1..].iter().zip(distances).enumerate() {
-        let m = *m;
+    for ((moved, m), to) in each[1..].iter().zip(moves) {
+        let (m, j) = (*m, to.entry);
         let rows = (centre.rows.iter().zip(&moved.rows)).zip(&scales);
         let [samples, shifts, spreads] = [&mut samples, &mut shifts, &mut spreads]
             .map(|of| of.as_mut_slice()[j * n..(j + 1) * n].iter_mut());
-        let to = samples.zip(shifts).zip(spreads);
-        let per_distance = 1.0 / distance;
+        let results = samples.zip(shifts).zip(spreads);
+        let per_distance = 1.0 / to.distance;
         for (([[e, _], [e_moved, s_moved]], [per_s, per_sd]), ((sample, shift), spread)) in
-            rows.map(|((a, b), scale)| ([a, b], scale)).zip(to)
+            rows.map(|((a, b), scale)| ([a, b], scale)).zip(results)
         {
             let (e, e_moved, s_moved) = (e.0[c], e_moved.0[m], s_moved.0[m]);
             let ratio = s_moved * per_s;
