@@ -18,9 +18,9 @@ pub(super) trait Verb {
         None
     }
 
-    /// Tells whether rerunning the same command resumes the work.
+    /// Tells whether rerunning the same command resumes the work: what ranks share lies in a folder.
     fn is_resumed(&self) -> bool {
-        false
+        self.is_shared_out()
     }
 
     /// Tells whether the ranks of a cluster share the work.

@@ -100,7 +100,8 @@ fn in_distribution_most_records_keep_the_estimate_of_a_trusted_prior() {
 #[test]
 fn the_gate_keeps_records_of_the_twin_whatever_noise_is_declared() {
     const RECORDS: u64 = 30;
-    let text = "twin = 'van-der-pol'\n[noise]\nx2 = 0.0212";
+    // The prior is trusted, and what is kept is not refined.
+    let text = "twin = 'van-der-pol'\n[noise]\nx2 = 0.0212\n[prior]\ntrust = true";
     let file = StudyFile::parse(text, "s.toml".as_ref()).unwrap();
     let options = PretrainOptions {
         bank_size: Some(2000),

@@ -45,10 +45,6 @@ impl Verb for Bank {
         Some(&self.subject)
     }
 
-    fn is_resumed(&self) -> bool {
-        true
-    }
-
     fn is_shared_out(&self) -> bool {
         true
     }

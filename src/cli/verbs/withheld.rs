@@ -68,10 +68,6 @@ impl Verb for Withheld {
         Some(&self.subject)
     }
 
-    fn is_resumed(&self) -> bool {
-        true
-    }
-
     fn is_shared_out(&self) -> bool {
         true
     }

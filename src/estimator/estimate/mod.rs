@@ -36,7 +36,7 @@ use std::time::Instant;
 use tune::tune;
 use warnings::warnings;
 
-/// The tuned estimate is kept while its whitened misfit is within this quantile of χ²_d.
+/// The tuned estimate is kept within this quantile of χ²_d: of its squared distance from the record's posterior, or of its whitened misfit.
 const KEEP_TUNED: f64 = 0.999;
 
 impl Estimator {
@@ -297,15 +297,20 @@ impl Run<'_> {
         )?;
         seconds.tune = Some(lap.elapsed().as_secs_f64());
         let gauss_newton = refined.theta.as_slice().to_vec();
-        let fine = tuned.theta.clone();
+        let fine = tuned.theta;
         let space = simulator.twin().parameters();
+        let keeps = match around.region {
+            Some(region) => is_likely(region.squared_distance(&fine), fine.len()),
+            None => self.keeps(&refinement, &refined, &fine),
+        };
         let answer = match tuned.spread {
-            Some(spread) if self.keeps(&refinement, &refined, &tuned.theta) => {
-                Answer::new(tuned.theta, spread, &space)
-            }
+            Some(spread) if keeps => Answer::new(fine.clone(), spread, &space),
             _ => {
-                let spread = Spread::normal(refined.information.std_error.clone(), INTERVAL_LEVEL);
-                Answer::new(gauss_newton.clone(), spread, &space)
+                let (theta, std_error) = match around.region {
+                    Some(region) => (region.theta.clone(), region.std_errors()),
+                    None => (gauss_newton.clone(), refined.information.std_error.clone()),
+                };
+                Answer::new(theta, Spread::normal(std_error, INTERVAL_LEVEL), &space)
             }
         };
         let after = self.after(simulator, &answer, &refined, &observed)?;
@@ -324,11 +329,15 @@ impl Run<'_> {
     /// Returns whether the tuned estimate stays within the misfit that θ could still explain by chance: the part of its whitened
     /// residual in the Jacobian's column space against χ²_d(0.999).
     fn keeps(&self, refinement: &Refinement<'_>, refined: &Refined, theta: &[f64]) -> bool {
-        let threshold = ChiSquared::new(theta.len() as f64).map(|chi| chi.inverse_cdf(KEEP_TUNED));
-        let misfit = (refinement.whitened_residual(refined, theta))
-            .map(|residual| refined.explainable_misfit(&residual));
-        matches!((misfit, threshold), (Ok(misfit), Ok(threshold)) if misfit <= threshold)
+        (refinement.whitened_residual(refined, theta))
+            .map(|residual| refined.explainable_misfit(&residual))
+            .is_ok_and(|misfit| is_likely(misfit, theta.len()))
     }
+}
+
+/// Returns whether a squared distance of so many degrees of freedom is one of chance.
+fn is_likely(square: f64, freedom: usize) -> bool {
+    ChiSquared::new(freedom as f64).is_ok_and(|chi| square <= chi.inverse_cdf(KEEP_TUNED))
 }
 
 #[cfg(test)]

@@ -10,7 +10,14 @@ use nalgebra::{DMatrix, DVector};
 /// Draws for each parameter that a covariance needs.
 const DRAWS_EACH: usize = 10;
 
-/// Mean and principal axes of the posterior of the twin's own parameters, about its best top.
+/// Length of an axis over the longest at which it is none: a start that is known, say.
+const LEAST_AXIS: f64 = 1e-9;
+
+/// Share of the draws that a top must have for the region to hold it: a 90 % interval misses a tenth. Tops along one ridge share it, and
+/// the best of them may have little of it; a far top of less mass would make the region larger than what the records leave open.
+const LEAST_SHARE: f64 = 0.05;
+
+/// Mean and principal axes of the posterior of the twin's own parameters.
 #[derive(Debug, Clone)]
 pub(crate) struct Region {
     /// Mean.
@@ -20,7 +27,7 @@ pub(crate) struct Region {
 }
 
 impl Region {
-    /// Region of the first `own` entries of θ of the first record, from the draws about the best top; to first order, where these are few.
+    /// Region of the first `own` entries of θ of the first record, from the draws; to first order about the best top, where these are few.
     /// A first state that the likelihood integrates is what `start` says of it: mean and deviation. `None` where nothing is estimated, or
     /// the covariance is not finite.
     pub fn new(
@@ -33,8 +40,11 @@ impl Region {
         if own == 0 {
             return None;
         }
+        let least = LEAST_SHARE * draws.modes.len() as f64;
+        let counts =
+            |mode: usize| draws.modes.iter().filter(|m| **m == mode).count() as f64 >= least;
         let about: Vec<DVector<f64>> = (draws.thetas.iter().zip(&draws.modes))
-            .filter(|(_, mode)| **mode == 0)
+            .filter(|(_, mode)| counts(**mode))
             .map(|(theta, _)| DVector::from_column_slice(&theta[..own]))
             .collect();
         let (mut mean, mut covariance) = match about.len() >= DRAWS_EACH * own {
@@ -58,6 +68,22 @@ impl Region {
             theta: mean.as_slice().to_vec(),
             axes: principal_axes(covariance),
         })
+    }
+
+    /// Standard deviation of each entry.
+    pub fn std_errors(&self) -> Vec<f64> {
+        self.axes.row_iter().map(|row| row.norm()).collect()
+    }
+
+    /// Squared distance of θ from the mean, in standard deviations: χ² of as many degrees of freedom as there are entries, for a draw.
+    pub fn squared_distance(&self, theta: &[f64]) -> f64 {
+        let away = DVector::from_fn(theta.len(), |j, _| theta[j] - self.theta[j]);
+        let longest = self.axes.amax();
+        (self.axes.column_iter())
+            .map(|axis| (axis, axis.norm_squared()))
+            .filter(|(_, square)| square.sqrt() > LEAST_AXIS * longest)
+            .map(|(axis, square)| (axis.dot(&away) / square).powi(2))
+            .sum()
     }
 }
 
@@ -87,11 +113,35 @@ fn first_order(problem: &Problem<'_>, fitted: &Fitted, own: usize) -> (DVector<f
 
 #[cfg(test)]
 mod tests {
+    use super::*;
+    use crate::fit::climb::climb;
     use crate::fit::{FitSettings, Subject, run};
     use crate::likelihood::Beliefs;
     use crate::record::{Drive, Record};
     use crate::twin::{DigitalTwin, Noise, Twin};
     use crate::twins::VanDerPol;
+
+    /// A top that holds most of the draws is the region, whichever is best; one of a thirtieth is left out.
+    #[test]
+    fn the_region_is_where_the_draws_are() {
+        let twin = Twin::new(VanDerPol);
+        let drive = Drive::autonomous(0.05, 100).unwrap();
+        let outputs = twin.simulate(&[1.5], &drive, Noise::new(1, "region", 0));
+        let records = [Record::new(drive, outputs.unwrap()).unwrap()];
+        let problem = Problem::of_twin(&twin, &records);
+        let fitted = climb(&problem, &[1.5], 10).unwrap().unwrap();
+        let near = (0..58).map(|i| (1.0 + 0.01 * f64::from(i % 2), 1));
+        let (values, modes): (Vec<f64>, _) = near.chain([(4.0, 0); 2]).unzip();
+        let draws = Draws {
+            thetas: values.into_iter().map(|nu| vec![nu]).collect(),
+            modes,
+            ..Draws::default()
+        };
+        let region = Region::new(&problem, &fitted, &draws, |_| None, 1).unwrap();
+        assert!((region.theta[0] - 1.005).abs() < 1e-9);
+        assert!((region.std_errors()[0] - 0.005).abs() < 1e-9);
+        assert!((region.squared_distance(&[1.015]) - 4.0).abs() < 1e-6);
+    }
 
     /// Standardised errors of the mean have unit size: 40 records, χ² with 40 degrees of freedom within 40 ± 4·√80.
     #[test]
