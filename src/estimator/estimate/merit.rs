@@ -6,7 +6,7 @@ use crate::record::Record;
 use crate::twin::{Noise, Twin};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// Ratio of free-run errors from which on one is worth asking about.
+/// Ratio of free-run errors from which on the twin's own records are asked: few answers pay for them.
 const LARGER: f64 = 1.2;
 /// Records of the twin itself that a free run's error is compared with: by chance, one in twenty lies beyond all.
 const OWN_RECORDS: u64 = 19;
