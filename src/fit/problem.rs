@@ -73,10 +73,7 @@ impl<'a> Problem<'a> {
             coordinates: coordinates(&mut all.iter()),
             coordinates_of: places
                 .iter()
-                .map(|place| {
-                    let held = place.iter().map(|&j| all[j].held).collect();
-                    coordinates(&mut place.iter().map(|&j| &all[j])).holding(held)
-                })
+                .map(|place| coordinates(&mut place.iter().map(|&j| &all[j])))
                 .collect(),
             places,
             axes: all,
@@ -314,8 +311,10 @@ impl<'a> Problem<'a> {
 
     /// Gradient and information of one record at the full θ; `None` where only differences give them.
     pub(super) fn score(&self, r: usize, theta: &[f64]) -> Result<Option<Score>, FilterError> {
-        let (own, coordinates) = (self.of_record(r, theta), &self.coordinates_of[r]);
-        self.counted().score(&own, &self.records[r], coordinates)
+        let held = self.places[r].iter().map(|&j| self.axes[j].held).collect();
+        let coordinates = self.coordinates_of[r].clone().holding(held);
+        let own = self.of_record(r, theta);
+        self.counted().score(&own, &self.records[r], &coordinates)
     }
 
     /// Gain at which a fit is done, in nats.
@@ -336,10 +335,6 @@ impl<'a> Problem<'a> {
         let mut problem = self.clone();
         for (j, axis) in problem.axes.iter_mut().enumerate() {
             axis.held |= held(j);
-        }
-        for (place, coordinates) in self.places.iter().zip(&mut problem.coordinates_of) {
-            let held = place.iter().map(|&j| problem.axes[j].held).collect();
-            *coordinates = coordinates.clone().holding(held);
         }
         problem
     }

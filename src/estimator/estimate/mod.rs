@@ -299,18 +299,24 @@ impl Run<'_> {
         let gauss_newton = refined.theta.as_slice().to_vec();
         let fine = tuned.theta;
         let space = simulator.twin().parameters();
-        let keeps = match around.region {
-            Some(region) => is_likely(region.squared_distance(&fine), fine.len()),
-            None => self.keeps(&refinement, &refined, &fine),
+        // What is kept while nothing speaks against it, and what stands in for it.
+        let (keeps, instead, std_error) = match around.region {
+            Some(region) => (
+                is_likely(region.squared_distance(&fine), fine.len()),
+                &region.theta,
+                region.std_errors(),
+            ),
+            None => (
+                self.keeps(&refinement, &refined, &fine),
+                &gauss_newton,
+                refined.information.std_error.clone(),
+            ),
         };
         let answer = match tuned.spread {
             Some(spread) if keeps => Answer::new(fine.clone(), spread, &space),
             _ => {
-                let (theta, std_error) = match around.region {
-                    Some(region) => (region.theta.clone(), region.std_errors()),
-                    None => (gauss_newton.clone(), refined.information.std_error.clone()),
-                };
-                Answer::new(theta, Spread::normal(std_error, INTERVAL_LEVEL), &space)
+                let spread = Spread::normal(std_error, INTERVAL_LEVEL);
+                Answer::new(instead.clone(), spread, &space)
             }
         };
         let after = self.after(simulator, &answer, &refined, &observed)?;

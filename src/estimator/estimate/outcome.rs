@@ -79,8 +79,8 @@ pub struct Estimate {
     /// Contributions of layer and heads to it.
     pub(crate) contributions: Option<Contributions>,
     /// The estimate: the record's own, within the bounds. That is the tuned one, unless it is too far from the record's posterior or its
-    /// misfit too large: else the posterior's mean, or Gauss–Newton's. The network's is kept where the prior is trusted and the gate agrees, and where refined ones explain the record
-    /// worse.
+    /// misfit too large: else the posterior's mean, or Gauss–Newton's. The network's is kept where the prior is trusted and the gate
+    /// agrees, and where refined ones explain the record worse.
     pub theta: Vec<f64>,
     /// Standard errors of `theta`.
     pub std_error: Vec<f64>,

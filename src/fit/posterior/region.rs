@@ -3,7 +3,7 @@
 use super::resampling::Draws;
 use crate::fit::climb::Fitted;
 use crate::fit::problem::Problem;
-use crate::math::principal_axes;
+use crate::math::{principal_axes, solve_truncated};
 use crate::twin::Role;
 use nalgebra::{DMatrix, DVector};
 
@@ -78,12 +78,8 @@ impl Region {
     /// Squared distance of θ from the mean, in standard deviations: χ² of as many degrees of freedom as there are entries, for a draw.
     pub fn squared_distance(&self, theta: &[f64]) -> f64 {
         let away = DVector::from_fn(theta.len(), |j, _| theta[j] - self.theta[j]);
-        let longest = self.axes.amax();
-        (self.axes.column_iter())
-            .map(|axis| (axis, axis.norm_squared()))
-            .filter(|(_, square)| square.sqrt() > LEAST_AXIS * longest)
-            .map(|(axis, square)| (axis.dot(&away) / square).powi(2))
-            .sum()
+        solve_truncated(&self.axes, &away, LEAST_AXIS)
+            .map_or(f64::INFINITY, |own| own.step.norm_squared())
     }
 }
 

@@ -236,8 +236,9 @@ fn side_by_side(
 
 /// A point beside θ.
 struct Move {
-    /// The entry that differs, and by how much in φ.
+    /// The entry that differs.
     entry: usize,
+    /// Its move in φ.
     distance: f64,
     theta: Vec<f64>,
 }

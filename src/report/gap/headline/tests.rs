@@ -39,6 +39,15 @@ fn no_name_is_told_below_a_half() {
         "Structural gap: most of it is explained by one of parameter-step@k1, sensor-lag@sensor, sensor-bias@sensor (together 0.81); \
          3 % remains."
     );
+    let long = [
+        ("actuator-rate-limit@actuator", 0.31),
+        ("periodic-disturbance@h1", 0.3),
+        ("actuator-dead-zone@actuator", 0.2),
+    ];
+    assert_eq!(
+        told(Decision::Partial, &long, 1),
+        "Structural gap: most of it is explained by one of 3 effects (together 0.81); 3 % remains."
+    );
     let sure = told(Decision::Partial, &pair, 2);
     assert!(
         sure.starts_with("Structural gap: the twin lacks actuator-rate-limit@actuator; the rest is explained by one of"),
