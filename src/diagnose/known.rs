@@ -1,4 +1,4 @@
-//! The share of a gap that the effects close which are truly there: what a share is to be held against.
+//! The effects that are truly there, fitted: how much evidence the record holds for them, and the share of the gap that they close.
 
 use super::base::Base;
 use super::explain::search::{Breadth, listed};
@@ -13,16 +13,25 @@ use crate::likelihood::measured;
 use crate::record::Record;
 use crate::study::{Study, StudyError};
 
-/// Fits these effects, of keys `id@target`, beside the twin, whatever a diagnosis would say of them, and measures the share that they close;
-/// a finer step stands on both sides where the record asks for one. `None` where an effect cannot be fitted, and for a black box, whose
-/// fits would cost as much as its diagnosis.
-pub(crate) fn share_of(
+/// A fit of the true effects: what an answer is to be held against.
+#[derive(Debug)]
+pub(crate) struct TrueFit {
+    /// Log evidence of the twin with these effects over that of the twin alone, in nats.
+    pub held: f64,
+    /// The share that they close; `None` where none can be told.
+    pub share: Option<Shrinkage>,
+}
+
+/// Fits these effects, of keys `id@target`, beside the twin, whatever a diagnosis would say of them; a finer step stands on both sides
+/// where the record asks for one. `None` where an effect cannot be fitted, and for a black box, whose fits would cost as much as its
+/// diagnosis.
+pub(crate) fn true_fit(
     study: &Study,
     record: &Record,
     validation: Option<&Record>,
     keys: &[String],
     settings: &DiagnoseSettings,
-) -> Result<Option<Shrinkage>, StudyError> {
+) -> Result<Option<TrueFit>, StudyError> {
     if study.twin().outline().is_none() {
         return Ok(None);
     }
@@ -37,7 +46,10 @@ pub(crate) fn share_of(
             validation: validation.map(std::slice::from_ref),
             initial: None,
         };
-        shrinkage(&measures, settings.noise())
+        Ok(Some(TrueFit {
+            held: with.log_evidence - base.model.log_evidence,
+            share: shrinkage(&measures, settings.noise())?,
+        }))
     };
     let own = measured(study.twin(), records, &settings.beliefs(study))?;
     let base = Base::new(&own, records, settings)?;
@@ -97,18 +109,20 @@ mod tests {
 
     /// The true effect closes the gap on a record that it has not seen, an effect of another place next to nothing.
     #[test]
-    fn the_true_effect_closes_the_gap_and_another_does_not() {
+    fn the_true_effect_has_the_evidence_and_closes_the_gap_and_another_does_not() {
         let study = tanks(200);
         let (record, other) = (biased_record(&study, 3.0, 5), biased_record(&study, 3.0, 6));
         let share = |key: &str| {
             let keys = [key.to_owned()];
             let settings = DiagnoseSettings::default();
-            let share = share_of(&study, &record, Some(&other), &keys, &settings).unwrap();
-            share.and_then(|share| share.closed)
+            let fit = true_fit(&study, &record, Some(&other), &keys, &settings).unwrap();
+            let fit = fit.unwrap();
+            (fit.held, fit.share.and_then(|share| share.closed))
         };
-        let own = share("sensor-bias@sensor").unwrap();
-        assert!((0.8..1.2).contains(&own), "{own}");
-        let wrong = share("actuator-bias@actuator").unwrap_or(0.0);
-        assert!(wrong < 0.8, "{wrong}");
+        let (held, own) = share("sensor-bias@sensor");
+        assert!((0.8..1.2).contains(&own.unwrap()), "{own:?}");
+        let (less, wrong) = share("actuator-bias@actuator");
+        assert!(wrong.unwrap_or(0.0) < 0.8, "{wrong:?}");
+        assert!(held > 10.0 && held > less + 10.0, "{held} and {less} nats");
     }
 }

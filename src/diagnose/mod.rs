@@ -40,7 +40,7 @@ mod summary;
 mod thresholds;
 
 pub(crate) use greedy::greedy;
-pub(crate) use known::share_of;
+pub(crate) use known::true_fit;
 pub(crate) use outcome::Cell;
 pub use outcome::{
     Band, Cause, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit, FittedParameter,

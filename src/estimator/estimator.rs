@@ -1,6 +1,7 @@
 //! The pretrained estimator.
 
 use crate::estimator::bank::FeatureSimulator;
+use crate::estimator::error::EstimatorError;
 use crate::estimator::project::Project;
 use crate::estimator::readout::{Calibration, Readout};
 use crate::estimator::recipe::PresetName;
@@ -70,6 +71,21 @@ impl Estimator {
     /// Twin and features, with a call counter of its own.
     pub(crate) fn simulator(&self) -> Result<FeatureSimulator, FeatureError> {
         FeatureSimulator::new(self.study().twin().clone(), self.recipe.as_ref())
+    }
+
+    /// Checks that a record has the channels of the study, no missing output, and the study's step. Another step is taken where
+    /// asked for, by features that are found anew for each: those about a reference.
+    pub(crate) fn check_record(
+        &self,
+        record: &Record,
+        step_of_record: bool,
+    ) -> Result<(), EstimatorError> {
+        let twin = self.study().twin();
+        let about = |simulator: FeatureSimulator| simulator.about(&twin.parameters().centre());
+        if step_of_record && about(self.simulator()?).is_some() {
+            return Ok(self.study().check_complete(record)?);
+        }
+        Ok(self.study().check_record(record)?)
     }
 
     /// Features of a record.

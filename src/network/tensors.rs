@@ -74,18 +74,17 @@ pub(super) fn collect<M: TensorCollection<f32, Cpu>>(
     .expect("collecting refuses nothing");
 }
 
-/// Gives each tensor of `module` the values stored under its name, taking them out of `stored`.
-pub(super) fn assign<'s, M: TensorCollection<f32, Cpu>>(
+/// Gives each tensor of `module`, by name and shape, to `change`, and takes the values that it leaves.
+fn change_each<M: TensorCollection<f32, Cpu>>(
     module: &mut M,
     prefix: &str,
-    architecture: &'static str,
-    stored: &mut BTreeMap<&'s str, &'s NamedTensor>,
+    change: impl FnMut(&str, &[usize], &mut [f32]) -> Result<(), NetworkError>,
 ) -> Result<(), NetworkError> {
-    struct Assign<'a, 'b> {
-        architecture: &'static str,
-        stored: &'a mut BTreeMap<&'b str, &'b NamedTensor>,
-    }
-    impl TensorVisitor<f32, Cpu> for Assign<'_, '_> {
+    struct Change<F>(F);
+    impl<F> TensorVisitor<f32, Cpu> for Change<F>
+    where
+        F: FnMut(&str, &[usize], &mut [f32]) -> Result<(), NetworkError>,
+    {
         type Viewer = (ViewTensorMut, ViewTensorName);
         type Err = NetworkError;
         type E2 = f32;
@@ -96,38 +95,49 @@ pub(super) fn assign<'s, M: TensorCollection<f32, Cpu>>(
             _: TensorOptions<S, f32, Cpu>,
             (tensor, name): (&mut Tensor<S, f32, Cpu>, String),
         ) -> Visited<S> {
-            let expected = sizes(tensor);
-            let Some(found) = self.stored.remove(name.as_str()) else {
-                return Err(NetworkError::MissingTensor {
-                    name,
-                    expected,
-                    architecture: self.architecture,
-                });
-            };
-            let count: usize = expected.iter().product();
-            if found.shape != expected || found.values.len() != count {
-                return Err(NetworkError::MisshapenTensor {
-                    name,
-                    expected,
-                    found: found.shape.clone(),
-                    values: found.values.len(),
-                });
-            }
-            if !found.values.iter().all(|v| v.is_finite()) {
-                return Err(NetworkError::DamagedTensor { name });
-            }
-            tensor.copy_from(&found.values);
+            let mut values = tensor.as_vec();
+            (self.0)(&name, &sizes(tensor), &mut values)?;
+            tensor.copy_from(&values);
             Ok(None)
         }
     }
     M::iter_tensors(&mut RecursiveWalker {
         m: (module, prefix.to_owned()),
-        f: &mut Assign {
-            architecture,
-            stored,
-        },
+        f: &mut Change(change),
     })?;
     Ok(())
+}
+
+/// Gives each tensor of `module` the values stored under its name, taking them out of `stored`.
+pub(super) fn assign<'s, M: TensorCollection<f32, Cpu>>(
+    module: &mut M,
+    prefix: &str,
+    architecture: &'static str,
+    stored: &mut BTreeMap<&'s str, &'s NamedTensor>,
+) -> Result<(), NetworkError> {
+    change_each(module, prefix, |name, shape, values| {
+        let (name, expected) = (name.to_owned(), shape.to_vec());
+        let Some(found) = stored.remove(name.as_str()) else {
+            return Err(NetworkError::MissingTensor {
+                name,
+                expected,
+                architecture,
+            });
+        };
+        if found.shape != expected || found.values.len() != values.len() {
+            return Err(NetworkError::MisshapenTensor {
+                name,
+                expected,
+                found: found.shape.clone(),
+                values: found.values.len(),
+            });
+        }
+        if !found.values.iter().all(|v| v.is_finite()) {
+            return Err(NetworkError::DamagedTensor { name });
+        }
+        values.copy_from_slice(&found.values);
+        Ok(())
+    })
 }
 
 /// Sets the probability of every dropout in `module`: each stored number that is named `p`, as dfdx and we do.
@@ -173,42 +183,19 @@ pub(super) fn widen_first_layer<M: TensorCollection<f32, Cpu>>(
     inputs: usize,
     padded: usize,
 ) {
-    struct Widen {
-        padded: usize,
-        factor: f32,
-        layer: Option<String>,
-    }
-    impl TensorVisitor<f32, Cpu> for Widen {
-        type Viewer = (ViewTensorMut, ViewTensorName);
-        type Err = NetworkError;
-        type E2 = f32;
-        type D2 = Cpu;
-
-        fn visit<S: Shape>(
-            &mut self,
-            _: TensorOptions<S, f32, Cpu>,
-            (tensor, name): (&mut Tensor<S, f32, Cpu>, String),
-        ) -> Visited<S> {
-            let (layer, field) = name.rsplit_once('.').unwrap_or(("", &name));
-            let first = match &self.layer {
-                None => field == "weight" && sizes(tensor).last() == Some(&self.padded),
-                Some(first) => first == layer && field == "bias",
-            };
-            if first {
-                self.layer = Some(layer.to_owned());
-                let scaled: Vec<f32> = tensor.as_vec().iter().map(|v| v * self.factor).collect();
-                tensor.copy_from(&scaled);
-            }
-            Ok(None)
+    let factor = (padded as f32 / inputs as f32).sqrt();
+    let mut first_layer = None;
+    change_each(module, "", |name, shape, values| {
+        let (layer, field) = name.rsplit_once('.').unwrap_or(("", name));
+        let is_first = match &first_layer {
+            None => field == "weight" && shape.last() == Some(&padded),
+            Some(first) => first == layer && field == "bias",
+        };
+        if is_first {
+            first_layer = Some(layer.to_owned());
+            values.iter_mut().for_each(|v| *v *= factor);
         }
-    }
-    M::iter_tensors(&mut RecursiveWalker {
-        m: (module, String::new()),
-        f: &mut Widen {
-            padded,
-            factor: (padded as f32 / inputs as f32).sqrt(),
-            layer: None,
-        },
+        Ok(())
     })
     .expect("scaling refuses nothing");
 }

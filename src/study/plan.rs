@@ -161,7 +161,7 @@ impl RecordPlan {
         if (given - expected).abs() > 1e-3 * expected {
             let (given, expected) = (number(six_digits(given)), number(expected));
             return Err(StudyError::Plan(format!(
-                "the record's step is {given} s, the study's {expected} s; resample the record (`truetwin resample R.csv --step {expected} --out R2.csv`), or set [record] step = {given} in a study file and pretrain again"
+                "the record's step is {given} s, the study's {expected} s; give --step-of-record if the features are scores, resample the record (`truetwin resample R.csv --step {expected} --out R2.csv`), or set [record] step = {given} in a study file and pretrain again"
             )));
         }
         Ok(())

@@ -139,48 +139,23 @@ impl DigitalTwin for HeldBlackBox {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::Quantity;
-    use crate::twin::Parameter;
-
-    /// y = a + 10·b.
-    struct Sum;
-    impl DigitalTwin for Sum {
-        fn parameters(&self) -> ParameterSpace {
-            ParameterSpace::new(["a", "b"].map(|n| Parameter::new(n, "", 0.0, 9.0)))
-        }
-        fn signals(&self) -> Signals {
-            Signals {
-                inputs: vec![],
-                outputs: vec![Quantity::new("y", "")],
-            }
-        }
-        fn simulate(
-            &self,
-            theta: &[f64],
-            drive: &Drive,
-            _: Noise,
-        ) -> Result<Signal, SimulationError> {
-            Ok(Signal::from_elem(
-                (drive.samples(), 1),
-                theta[0] + 10.0 * theta[1],
-            ))
-        }
-    }
+    use crate::twin::fixture::AtOnce;
 
     #[test]
     fn held_parameters_leave_theta() {
+        let sum = || AtOnce::<2>(|theta, _| theta[0] + 10.0 * theta[1]);
         let values = |pairs: &[(&str, f64)]| pairs.iter().map(|&(n, v)| (n.into(), v)).collect();
-        let twin = fix(Twin::new(Sum), &values(&[("a", 3.0)])).unwrap();
+        let twin = fix(Twin::new(sum()), &values(&[("a", 3.0)])).unwrap();
         assert_eq!(twin.parameters().names(), ["b"]);
         let drive = Drive::autonomous(1.0, 1).unwrap();
         assert_eq!(
             twin.simulate(&[2.0], &drive, Noise::OFF).unwrap()[[0, 0]],
             23.0
         );
-        let whole = fix(Twin::new(Sum), &values(&[("a", 1.0), ("b", 2.0)])).unwrap();
+        let whole = fix(Twin::new(sum()), &values(&[("a", 1.0), ("b", 2.0)])).unwrap();
         assert!(whole.parameters().is_empty());
         let run = whole.simulate(&[], &drive, Noise::OFF).unwrap();
         assert_eq!(run[[0, 0]], 21.0);
-        assert!(fix(Twin::new(Sum), &values(&[("c", 1.0)])).is_err());
+        assert!(fix(Twin::new(sum()), &values(&[("c", 1.0)])).is_err());
     }
 }

@@ -18,6 +18,8 @@ mod digital_twin;
 mod direction;
 mod error;
 mod fix;
+#[cfg(test)]
+pub(crate) mod fixture;
 mod handle;
 mod integrator;
 mod interval;

@@ -46,7 +46,12 @@ fn estimator() -> &'static Estimator {
 }
 
 fn record(nu: f64, seed: u64) -> Record {
-    let drive = Drive::autonomous(0.05, 300).unwrap();
+    stepped(nu, seed, 0.05)
+}
+
+/// Fifteen seconds of the oscillator.
+fn stepped(nu: f64, seed: u64, step: f64) -> Record {
+    let drive = Drive::autonomous(step, (15.0 / step).round() as usize).unwrap();
     let noise = Noise::new(seed, "test record", 0);
     let outputs = VanDerPol.simulate(&[nu], &drive, noise).unwrap();
     Record::new(drive, outputs).unwrap()
@@ -127,11 +132,15 @@ fn the_gate_keeps_records_of_the_twin_whatever_noise_is_declared() {
     assert!(kept.iter().all(|kept| *kept >= 21), "{kept:?} of {RECORDS}");
 }
 
-/// Four records of one ν, one of them half as long: errors shrink, 90 % intervals hold ν, and the records agree. Two of another ν do not.
+/// Four records of one ν, one of them half as long, one of half the step: errors shrink, 90 % intervals hold ν, and the records agree. Two
+/// of another ν do not.
 /// Weights without the precisions, or simulations shared by records, fail the bounds.
 #[test]
 fn records_of_one_system_are_weighed_together() {
-    let options = EstimateOptions::default();
+    let options = EstimateOptions {
+        step_of_record: true,
+        ..EstimateOptions::default()
+    };
     let all = |records: &[Record]| {
         (estimator().estimate_together(records, &options, &Progress::silent())).unwrap()
     };
@@ -139,6 +148,7 @@ fn records_of_one_system_are_weighed_together() {
     const TRIALS: u64 = 4;
     for i in 0..TRIALS {
         let mut records: Vec<Record> = (0..4).map(|r| record(3.0, 100 + 4 * i + r)).collect();
+        records[2] = stepped(3.0, 100 + 4 * i + 2, 0.025);
         let drive = Drive::autonomous(0.05, 150).unwrap();
         let outputs = records[3]
             .outputs()
@@ -339,7 +349,7 @@ fn records_of_another_step_or_channels_are_refused_with_the_remedy() {
     };
     let error = other(Drive::autonomous(0.1, 300).unwrap(), 1);
     assert!(
-        error.contains("step is 0.1 s, the study's 0.05 s; resample"),
+        error.contains("step is 0.1 s, the study's 0.05 s; give --step-of-record"),
         "{error}"
     );
     let error = other(Drive::autonomous(0.05, 300).unwrap(), 2);

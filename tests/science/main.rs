@@ -14,6 +14,7 @@ mod effects;
 mod estimator;
 mod filter;
 mod fit;
+mod misspecification;
 mod numbers;
 mod real_records;
 mod suitability;

@@ -250,6 +250,7 @@ class Twin:
         *,
         validation: Record | None = None,
         always_refine: bool = False,
+        step_of_record: bool = False,
         columns: Mapping[str, str] | None = None,
         seed: int = 1,
         out: Path_ | None = None,
@@ -259,13 +260,15 @@ class Twin:
         Parameters
         ----------
         record : record
-            One record, as for `fit`, with the estimator's step.
+            One record, as for `fit`.
         estimator : Estimator or path
             Estimator from `pretrain` of the same twin.
         validation : record, optional
             Second record of the same system, to score the calibrated twin.
         always_refine : bool, optional
             Refine even if the record is consistent with the network's estimate.
+        step_of_record : bool, optional
+            Take a record whose step is not the estimator's, as for `diagnose`.
         columns, seed, out
             As for `fit`.
 
@@ -277,8 +280,7 @@ class Twin:
             options = [*call.records([record], columns), *call.columns(columns), "--estimator", os.fspath(estimator)]
             if validation is not None:
                 options += ["--validation", *call.records(validation, columns)]
-            if always_refine:
-                options.append("--always-refine")
+            options += ["--always-refine"] * always_refine + ["--step-of-record"] * step_of_record
             folder, text = call.folder("estimate", options, seed, out)
             report = Report(text, pictures=((folder / "overlay.svg").read_text(encoding="utf-8"),))
             return Estimate._of(_json(folder / "estimate.json"), report)

@@ -39,6 +39,9 @@ pub(in crate::cli) struct Estimate {
     /// Refine though the study trusts its prior and the record is consistent with the network's estimate.
     #[arg(long)]
     always_refine: bool,
+    /// Take records whose step is not the study's: the twin steps as they do. For features that are scores.
+    #[arg(long)]
+    step_of_record: bool,
     #[command(flatten)]
     draws: PosteriorDraws,
     /// New folder for estimate.json, the page report.html, overlay.svg, trajectories.csv and, after a refit, the cloud of simulations (cloud.npz); of several records, report-1.html and so on.
@@ -59,12 +62,13 @@ impl Verb for Estimate {
             seed: context.seed,
             preset: self.preset.map(Into::into),
             always_refine: self.always_refine,
+            step_of_record: self.step_of_record,
             validation,
             draws: self.draws.count()?,
         };
         if let Some((validation, path)) = settings.validation.as_ref().zip(self.validation.as_ref())
         {
-            let checked = estimator.study().check_record(validation);
+            let checked = estimator.check_record(validation, self.step_of_record);
             checked.map_err(|error| Failure::from(error).within(path))?;
         }
         let files = self.records.iter().map(|path| ("record", path.as_path()));

@@ -127,34 +127,17 @@ impl DigitalTwin for WithFunction {
 mod tests {
     use super::*;
     use crate::diagnose::hypotheses::basis::Of;
-    use crate::twin::Parameter;
+    use crate::twin::fixture::AtOnce;
     use std::f64::consts::{PI, SQRT_2};
-
-    /// y = θ²·u, at once.
-    struct Square;
-
-    impl DigitalTwin for Square {
-        fn parameters(&self) -> ParameterSpace {
-            ParameterSpace::new([Parameter::new("a", "", 0.5, 2.0)])
-        }
-        fn signals(&self) -> Signals {
-            Signals::default()
-        }
-        fn simulate(
-            &self,
-            theta: &[f64],
-            drive: &Drive,
-            _: Noise,
-        ) -> Result<Signal, SimulationError> {
-            Ok(drive.inputs().mapv(|u| theta[0] * theta[0] * u))
-        }
-    }
 
     fn found(entry: Entry, of: Of, first: f64) -> (Drive, Signal) {
         let inputs = Signal::from_shape_fn((50, 1), |(k, _)| 1.0 + 0.02 * k as f64);
         let drive = Drive::new(0.5, inputs).unwrap();
         let ends = (0.0, 30.0);
-        let twin = with_function(Arc::new(Square), Entered { entry, of, ends });
+        let twin = with_function(
+            Arc::new(AtOnce::<1>(|a, u| a[0] * a[0] * u)),
+            Entered { entry, of, ends },
+        );
         let theta = [&[0.8, first][..], &[0.0; TERMS - 1]].concat();
         let Twin::BlackBox(twin) = twin else {
             unreachable!()

@@ -56,9 +56,8 @@ impl Estimator {
         progress: &Progress,
     ) -> Result<Estimate, EstimatorError> {
         let clock = Instant::now();
-        self.study().check_record(record)?;
-        if let Some(validation) = &options.validation {
-            self.study().check_record(validation)?;
+        for record in [record].into_iter().chain(&options.validation) {
+            self.check_record(record, options.step_of_record)?;
         }
         let preset = options.preset.unwrap_or(self.preset);
         let settings = match preset == self.preset {

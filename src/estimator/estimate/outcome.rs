@@ -25,6 +25,8 @@ pub struct EstimateOptions {
     pub preset: Option<PresetName>,
     /// Refine and tune, though the prior is trusted and the gate agrees.
     pub always_refine: bool,
+    /// Take a record whose step is not the study's, and let the twin step as it does.
+    pub step_of_record: bool,
     /// A second record to score the calibrated twin on.
     pub validation: Option<Record>,
     /// Number of posterior draws to return, of the likelihood's own fit.

@@ -109,7 +109,7 @@ pub(crate) struct Row {
     pub correlated: Option<String>,
     pub greedy: Option<Vec<String>>,
     pub repeats: Vec<Repeat>,
-    /// Share that the true effects close, where that was measured.
+    /// The true effects, fitted, where that was done.
     pub true_share: Option<TrueShare>,
 }
 
@@ -187,6 +187,11 @@ impl Row {
     pub fn is_clear(&self) -> bool {
         let rival = self.truth.rival.as_ref();
         rival.is_some_and(|rival| rival.nats > CLEAR)
+    }
+
+    /// The evidence that the record holds for its true effects, where they were fitted.
+    pub fn held(&self) -> Option<f64> {
+        self.true_share?.held
     }
 
     /// Returns true if something is missing and nothing that the library lists is right.
@@ -283,7 +288,7 @@ impl Row {
 
 impl Serialize for Row {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut object = serializer.serialize_struct("Row", 19)?;
+        let mut object = serializer.serialize_struct("Row", 20)?;
         object.serialize_field("trial", &self.trial)?;
         object.serialize_field("kind", &self.kind)?;
         object.serialize_field("truth", &self.truth.name)?;
@@ -292,6 +297,7 @@ impl Serialize for Row {
         object.serialize_field("targets", &self.targets)?;
         object.serialize_field("places", &self.truth.places)?;
         object.serialize_field("information", &self.information)?;
+        object.serialize_field("held", &self.held())?;
         object.serialize_field("step_information", &self.step)?;
         object.serialize_field("nuisance", &self.nuisance)?;
         object.serialize_field("answer", &self.answer())?;

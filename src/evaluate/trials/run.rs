@@ -27,7 +27,7 @@ use serde_json::json;
 use std::path::Path;
 
 /// Layout of the folder; raised when it changes.
-const LAYOUT: u32 = 11;
+const LAYOUT: u32 = 12;
 /// Most trials of a folder; their keys are in memory.
 pub(crate) const MOST: usize = 1_000_000;
 /// Trials that are drawn before their records are written.

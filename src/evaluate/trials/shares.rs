@@ -1,13 +1,13 @@
-//! The share of a gap that a trial's true effects close: the measure of a share must give them 1.
+//! A trial's true effects, fitted: the evidence that the record holds for them, and the share that they close, which must be 1.
 
 use super::truth::Truth;
-use crate::diagnose::{DiagnoseSettings, share_of};
+use crate::diagnose::{DiagnoseSettings, true_fit};
 use crate::record::Record;
 use crate::storage::work::Piece;
 use crate::study::Study;
 use serde::{Deserialize, Serialize};
 
-/// The share of one trial.
+/// The true effects of one trial.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct TrueShare {
@@ -15,7 +15,9 @@ pub(crate) struct TrueShare {
     pub trial: usize,
     /// True if every departure of the trial is a listed effect.
     pub is_listed: bool,
-    /// Share that these effects close, fitted whatever was answered; none where it cannot be told from noise.
+    /// Log evidence of these effects over the twin alone, in nats, fitted whatever was answered.
+    pub held: Option<f64>,
+    /// Share that these effects close; none where it cannot be told from noise.
     pub closed: Option<f64>,
     /// Its 90 % interval.
     pub interval: Option<[f64; 2]>,
@@ -28,7 +30,7 @@ impl Piece for TrueShare {
 }
 
 impl TrueShare {
-    /// Fits a trial's true effects, where they are listed ones. A fit that fails has no share.
+    /// Fits a trial's true effects, where they are listed ones. A fit that fails tells nothing.
     pub(super) fn of(
         truth: &Truth,
         study: &Study,
@@ -37,14 +39,16 @@ impl TrueShare {
     ) -> Self {
         let keys = &truth.effects;
         let is_listed = !keys.is_empty() && keys.len() == truth.departures.len();
-        let found = (is_listed)
-            .then(|| share_of(study, record, validation, keys, settings))
-            .and_then(|found| found.ok().flatten());
+        let fit = (is_listed)
+            .then(|| true_fit(study, record, validation, keys, settings))
+            .and_then(|fit| fit.ok().flatten());
+        let share = fit.as_ref().and_then(|fit| fit.share.as_ref());
         Self {
             trial: truth.trial,
             is_listed,
-            closed: found.as_ref().and_then(|share| share.closed),
-            interval: found.and_then(|share| share.interval),
+            held: fit.as_ref().map(|fit| fit.held),
+            closed: share.and_then(|share| share.closed),
+            interval: share.and_then(|share| share.interval),
         }
     }
 }

@@ -164,23 +164,7 @@ impl DigitalTwin for MeasuredBox {
 mod tests {
     use super::*;
     use crate::effect::{Catalogue, augment};
-
-    /// y = a·u, without noise.
-    struct Amplifier;
-
-    impl DigitalTwin for Amplifier {
-        fn parameters(&self) -> ParameterSpace {
-            ParameterSpace::new([Parameter::new("a", "", 0.5, 2.0)])
-        }
-        fn simulate(
-            &self,
-            theta: &[f64],
-            drive: &Drive,
-            _: Noise,
-        ) -> Result<Signal, SimulationError> {
-            Ok(drive.inputs().mapv(|u| theta[0] * u))
-        }
-    }
+    use crate::twin::fixture::AtOnce;
 
     /// A sensor's lag moves the mean and leaves the noise white; what rounds readings rounds the noise, which is then no longer known.
     #[test]
@@ -189,7 +173,7 @@ mod tests {
         let drive = Drive::new(0.1, u).unwrap();
         let outputs = drive.inputs().mapv(|u| 1.2 * u + 0.1 * (40.0 * u).sin());
         let records = [Record::new(drive.clone(), outputs).unwrap()];
-        let base = Twin::BlackBox(Arc::new(Amplifier));
+        let base = Twin::BlackBox(Arc::new(AtOnce::<1>(|a, u| a[0] * u)));
         let (measured, is_silent) = measured(&base, &records).unwrap();
         assert!(is_silent);
         let with = |id: &str| {

@@ -98,11 +98,18 @@ fn bins(card: &Scorecard) -> String {
         &head,
         &cells(&card.clear_by_information),
     );
+    let held = table(
+        "Listed truths by the evidence that their records turned out to hold: log evidence of the true effects over the twin alone, fitted \
+         once the keys are open.",
+        &head,
+        &cells(&card.by_held),
+    );
     figure(
         &svg,
         "Right and complete answers, by how much the best possible diagnoser could learn of the departure from such a record.",
     ) + &all
         + &clear
+        + &held
 }
 
 fn kinds(card: &Scorecard) -> String {

@@ -32,9 +32,9 @@ pub fn scorecard_text(card: &Scorecard) -> String {
         rows.extend(bins.iter().map(bin_cells));
         table(&rows)
     };
-    let clear: Vec<&str> = (["truth, clear"].into_iter())
-        .chain(BIN_HEAD.into_iter().skip(1))
-        .collect();
+    let [mut clear, mut held] = [BIN_HEAD; 2];
+    clear[0] = "truth, clear";
+    held[1] = "evidence held";
     let mut baselines = vec![cells(&[
         "answers of",
         "verdict right",
@@ -80,6 +80,7 @@ pub fn scorecard_text(card: &Scorecard) -> String {
         table(&scores),
         bins(&BIN_HEAD, &card.by_information),
         bins(&clear, &card.clear_by_information),
+        bins(&held, &card.by_held),
         table(&kinds),
         table(&baselines),
     ];

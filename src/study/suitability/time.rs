@@ -71,7 +71,7 @@ pub(super) fn check(
         ));
     } else if (step / plan - 1.0).abs() > SAME {
         let message = format!(
-            "{} s, {} s in the study: `fit` takes any step, `diagnose` with --step-of-record; for an estimator: truetwin resample R.csv --step {} --out R2.csv, or [record] step = {} in the study",
+            "{} s, {} s in the study: `fit` takes any step, `diagnose` and `estimate` (features that are scores) with --step-of-record; otherwise: truetwin resample R.csv --step {} --out R2.csv, or [record] step = {} in the study",
             text(step),
             text(plan),
             text(plan),

@@ -1,14 +1,14 @@
-//! Fates by expected information.
+//! Fates by expected information, or by the evidence that a record holds.
 
 use super::count::Count;
 use crate::evaluate::trials::Kind;
 use crate::evaluate::trials::row::{Fate, Row};
 use serde::Serialize;
 
-/// Ends of the bins of expected information, in nats.
+/// Ends of the bins, in nats.
 const NATS: [f64; 5] = [0.0, 3.0, 10.0, 30.0, f64::INFINITY];
 
-/// Trials of about the same expected information; each count is of all of them.
+/// Trials of about as many nats; each count is of all of them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct Bin {
     /// `listed`: a listed effect is there; `random`: a random law.
@@ -41,8 +41,8 @@ fn finite<S: serde::Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::
     value.is_finite().then_some(*value).serialize(serializer)
 }
 
-/// Bins of listed truths, then of random ones, over the rows that are asked for; empty bins are left out.
-pub(super) fn bins(rows: &[Row], asked: impl Fn(&Row) -> bool) -> Vec<Bin> {
+/// Bins of listed truths, then of random ones, over the rows that have nats; empty bins are left out.
+pub(super) fn bins(rows: &[Row], nats: impl Fn(&Row) -> Option<f64>) -> Vec<Bin> {
     let mut all = Vec::new();
     for truths in ["listed", "random"] {
         let of_group = |row: &Row| match row.kind {
@@ -51,13 +51,8 @@ pub(super) fn bins(rows: &[Row], asked: impl Fn(&Row) -> bool) -> Vec<Bin> {
             Kind::Listed | Kind::Otherwise | Kind::Pair | Kind::Beside => truths == "listed",
         };
         for (low, high) in NATS.iter().zip(&NATS[1..]) {
-            let inside = |row: &Row| {
-                of_group(row)
-                    && asked(row)
-                    && row
-                        .information
-                        .is_some_and(|nats| *low <= nats && nats < *high)
-            };
+            let within = |nats: f64| (*low == 0.0 || *low <= nats) && nats < *high;
+            let inside = |row: &Row| of_group(row) && nats(row).is_some_and(within);
             let fate = |fate: Fate| Count::over(rows, inside, |row| row.fate() == fate);
             let bin = Bin {
                 truths,

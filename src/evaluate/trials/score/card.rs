@@ -109,6 +109,8 @@ pub struct Scorecard {
     pub(crate) by_information: Vec<Bin>,
     /// The same of trials whose record decides: every wrong listed effect leaves more than 3 nats.
     pub(crate) clear_by_information: Vec<Bin>,
+    /// By the evidence that the record holds for its true effects, where all are listed.
+    pub(crate) by_held: Vec<Bin>,
     /// By kind of truth.
     pub(crate) by_kind: Vec<KindScore>,
     /// By nuisance.
@@ -175,8 +177,9 @@ impl Scorecard {
             coarse_called_structural: over(&|row| row.is_coarse() && answered(row), &Row::called),
             detected: over(&|row| !row.is_null(), &Row::called),
             coarse_delivered: over(&Row::is_coarse_gap, &|row| row.fate() == Fate::Delivered),
-            by_information: bins(&rows, |_| true),
-            clear_by_information: bins(&rows, Row::is_clear),
+            by_information: bins(&rows, |row| row.information),
+            clear_by_information: bins(&rows, |row| row.information.filter(|_| row.is_clear())),
+            by_held: bins(&rows, Row::held),
             by_kind: (Kind::ALL.into_iter())
                 .map(|kind| KindScore {
                     kind,

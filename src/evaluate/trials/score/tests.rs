@@ -290,6 +290,7 @@ fn shares_are_those_of_the_truth_and_of_right_answers() {
         row.true_share = Some(TrueShare {
             trial: 0,
             is_listed: kind == Kind::Listed,
+            held: of_truth.map(|share| 20.0 * share),
             closed: of_truth,
             interval: of_truth.map(|share| [share - 0.1, share + 0.1]),
         });

@@ -136,23 +136,8 @@ mod tests {
     use super::*;
     use crate::evaluate::trials::law::{Departure, ParameterLaw, SignalLaw};
     use crate::evaluate::trials::world::Conditions;
-    use crate::twin::{Noise, Parameter, ParameterSpace, SimulationError};
-
-    /// y = gain·u.
-    struct Static;
-    impl DigitalTwin for Static {
-        fn parameters(&self) -> ParameterSpace {
-            ParameterSpace::new([Parameter::new("gain", "1", 0.5, 2.0)])
-        }
-        fn simulate(
-            &self,
-            theta: &[f64],
-            drive: &Drive,
-            _: Noise,
-        ) -> Result<Signal, SimulationError> {
-            Ok(drive.inputs() * theta[0])
-        }
-    }
+    use crate::twin::Noise;
+    use crate::twin::fixture::AtOnce;
 
     #[test]
     fn departures_of_signals_and_parameters_reach_the_outputs() {
@@ -165,9 +150,14 @@ mod tests {
                 departures: &departures,
                 conditions: &conditions,
             };
-            run(&Static, system, &drive, Draws::of(Noise::OFF))
-                .unwrap()
-                .outputs
+            run(
+                &AtOnce::<1>(|a, u| a[0] * u),
+                system,
+                &drive,
+                Draws::of(Noise::OFF),
+            )
+            .unwrap()
+            .outputs
         };
         let bias = || {
             Law::Signal(SignalLaw::Bias {
