@@ -116,13 +116,13 @@ mod tests {
             let keys = [key.to_owned()];
             let settings = DiagnoseSettings::default();
             let fit = true_fit(&study, &record, Some(&other), &keys, &settings).unwrap();
-            let fit = fit.unwrap();
-            (fit.held, fit.share.and_then(|share| share.closed))
+            fit.map(|fit| (fit.held, fit.share.and_then(|share| share.closed)))
         };
-        let (held, own) = share("sensor-bias@sensor");
+        let (held, own) = share("sensor-bias@sensor").unwrap();
         assert!((0.8..1.2).contains(&own.unwrap()), "{own:?}");
-        let (less, wrong) = share("actuator-bias@actuator");
+        // A wrong effect may explain so little that no fit of it begins.
+        let (less, wrong) = share("actuator-bias@actuator").unwrap_or((0.0, None));
         assert!(wrong.unwrap_or(0.0) < 0.8, "{wrong:?}");
-        assert!(held > 10.0 && held > less + 10.0, "{held} and {less} nats");
+        assert!(held > less + 10.0, "{held} and {less} nats");
     }
 }

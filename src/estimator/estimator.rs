@@ -80,9 +80,8 @@ impl Estimator {
         record: &Record,
         step_of_record: bool,
     ) -> Result<(), EstimatorError> {
-        let twin = self.study().twin();
-        let about = |simulator: FeatureSimulator| simulator.about(&twin.parameters().centre());
-        if step_of_record && about(self.simulator()?).is_some() {
+        let centre = self.study().twin().parameters().centre();
+        if step_of_record && self.simulator()?.about(&centre).is_some() {
             return Ok(self.study().check_complete(record)?);
         }
         Ok(self.study().check_record(record)?)

@@ -347,8 +347,7 @@ fn augmented(twin: &Twin, effects: &[Effect]) -> Result<Twin, (usize, TwinError)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::{Drive, Signal};
-    use crate::twin::{Noise, ParameterSpace, SimulationError};
+    use crate::twin::fixture::AtOnce;
     use crate::twins::CascadedTanks;
 
     fn refused(tables: &str) -> String {
@@ -377,22 +376,8 @@ mod tests {
                 format!("[record] substeps = {n}; choose between 1 and 1000")
             );
         }
-        struct Boxed;
-        impl DigitalTwin for Boxed {
-            fn parameters(&self) -> ParameterSpace {
-                DigitalTwin::parameters(&CascadedTanks)
-            }
-            fn simulate(
-                &self,
-                theta: &[f64],
-                drive: &Drive,
-                noise: Noise,
-            ) -> Result<Signal, SimulationError> {
-                DigitalTwin::simulate(&CascadedTanks, theta, drive, noise)
-            }
-        }
         let plan = RecordPlan::levels(0.5, 60, 0.0, 3.0, 30);
-        let study = Study::new("boxed", Boxed, plan).unwrap();
+        let study = Study::new("boxed", AtOnce::<1>(|a, u| a[0] * u), plan).unwrap();
         for key in ["hold = 'linear'", "integrator = 'euler'", "substeps = 2"] {
             let text = format!("twin = 'boxed'\n[record]\n{key}");
             let file = StudyFile::parse(&text, "s.toml".as_ref()).unwrap();

@@ -40,17 +40,13 @@ pub(in crate::diagnose) fn fit_promise<'a>(
 ) -> Result<Option<Model<'a>>, StudyError> {
     let extended = model.extend(&promise.term)?;
     let chosen: Vec<&Beginning> = promise.starts.iter().take(effort.starts).collect();
-    // Times and delays stay until θ and the size have answered them: a small size would let them go anywhere.
-    let shape = extended.entries.get(1..).unwrap_or_default();
-    let held = (!shape.is_empty()).then(|| extended.problem.holding(|j| shape.contains(&j)));
     let mut from: Vec<Vec<f64>> = (chosen.iter())
         .map(|start| {
             let theta = begin(model, &extended, start)?;
-            let Some(held) = held.as_ref().filter(|_| start.scales) else {
-                return Ok(theta);
-            };
-            let settled = climb(held, &theta, HELD)?;
-            Ok(settled.map_or(theta, |settled| settled.theta))
+            match start.scales {
+                true => settled(&extended.problem, &extended, theta),
+                false => Ok(theta),
+            }
         })
         .collect::<Result<_, StudyError>>()?;
     if let Some(first) = chosen.first() {
@@ -60,6 +56,20 @@ pub(in crate::diagnose) fn fit_promise<'a>(
     let best = fit(&extended.problem, &from, effort.iterations)?;
     let problem = extended.problem.clone();
     Ok(best.and_then(|fitted| extended.fitted(model.base, fitted, problem)))
+}
+
+/// Where θ and the size of the last term answer its times and delays, which stay: a small size, or a θ far off, would let them go anywhere.
+pub(super) fn settled(
+    problem: &Problem<'_>,
+    extended: &Extended<'_>,
+    theta: Vec<f64>,
+) -> Result<Vec<f64>, StudyError> {
+    let shape = extended.entries.get(1..).unwrap_or_default();
+    if shape.is_empty() {
+        return Ok(theta);
+    }
+    let held = problem.holding(|j| shape.contains(&j));
+    Ok(climb(&held, &theta, HELD)?.map_or(theta, |settled| settled.theta))
 }
 
 /// Fits a promise from the prior's centre with loud noise: the fit of the model alone may have gone where the term is of no use.
@@ -75,8 +85,11 @@ pub(in crate::diagnose) fn fit_afresh<'a>(
         None => 1,
     };
     let from: Vec<Vec<f64>> = (promise.starts.iter().take(starts))
-        .map(|start| model.beside_at(&extended, &centre, &start.m))
-        .collect();
+        .map(|start| {
+            let theta = model.beside_at(&extended, &centre, &start.m);
+            settled(&problem, &extended, theta)
+        })
+        .collect::<Result<_, StudyError>>()?;
     let fitted = fit(&problem, &from, AFRESH)?;
     Ok(fitted.and_then(|fitted| extended.fitted(model.base, fitted, problem)))
 }

@@ -1,7 +1,7 @@
 //! Effects whose time, delay or frequency ended in a valley of its own.
 
 use super::found::{Found, own_theta};
-use super::refit::CARRIED;
+use super::refit::{CARRIED, settled};
 use crate::diagnose::hypotheses::term::Term;
 use crate::diagnose::model::Model;
 use crate::diagnose::thresholds::Thresholds;
@@ -94,8 +94,11 @@ fn begun_again<'a>(
     };
     let extended = model.extend(found.last())?;
     let from: Vec<Vec<f64>> = (starts.iter())
-        .map(|(theta, m)| extended.from(theta, model.beside(&extended, m)))
-        .collect();
+        .map(|(theta, m)| {
+            let theta = extended.from(theta, model.beside(&extended, m));
+            settled(&own.problem, &extended, theta)
+        })
+        .collect::<Result<_, StudyError>>()?;
     let begun = fit(&own.problem, &from, ITERATIONS)?;
     let Some(begun) = begun.filter(|begun| begun.objective > own.fitted.objective) else {
         return Ok(None);

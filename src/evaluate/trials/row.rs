@@ -189,9 +189,9 @@ impl Row {
         rival.is_some_and(|rival| rival.nats > CLEAR)
     }
 
-    /// The evidence that the record holds for its true effects, where they were fitted.
+    /// The evidence that the record holds for its true effect, where it was fitted; a pair has none, since it counts by its weaker one.
     pub fn held(&self) -> Option<f64> {
-        self.true_share?.held
+        self.true_share.filter(|_| self.right.len() == 1)?.held
     }
 
     /// Returns true if something is missing and nothing that the library lists is right.

@@ -111,11 +111,13 @@ impl<'a> Search<'a> {
 
     /// The problem with the magnitudes of all other effects held.
     fn opened(&self, open: &[Added<'_>]) -> Problem<'a> {
+        let is_open = |j: usize| open.iter().any(|added| added.holds(j));
+        (self.problem).holding(|j| self.is_magnitude(j) && !is_open(j))
+    }
+
+    fn is_magnitude(&self, j: usize) -> bool {
         let space = self.problem.twin.parameters();
-        self.problem.holding(|j| {
-            let is_magnitude = space.iter().nth(j).map(|p| p.role) == Some(Role::Magnitude);
-            is_magnitude && !open.iter().any(|added| added.holds(j))
-        })
+        space.iter().nth(j).map(|p| p.role) == Some(Role::Magnitude)
     }
 
     /// Short fits with an effect, best first, beside a fit without it.
@@ -127,6 +129,13 @@ impl<'a> Search<'a> {
     ) -> Result<Vec<Fitted>, FilterError> {
         let mut fits: Vec<Fitted> = climb(problem, theta, SHORT)?.into_iter().collect();
         let mut from = theta.to_vec();
+        let held = problem.holding(|j| added.holds(j) && largest(problem, j).is_none());
+        // From afar thresholds, lags and times would go anywhere: θ and the size answer them first.
+        let settled = |start: &Vec<f64>| {
+            let begun = climb(&held, start, SHORT)?;
+            let from = begun.as_ref().map_or(start, |begun| &begun.theta);
+            climb(problem, from, SHORT)
+        };
         // A second threshold is off until the first one is found.
         for _ in 0..self.switches(added).count().max(1) {
             let without = problem.holding(|j| added.holds(j));
@@ -135,11 +144,19 @@ impl<'a> Search<'a> {
             };
             let promises = self.promises(problem, &reference, &from, added)?;
             let mut starts: Vec<Vec<f64>> = promises.into_iter().map(|(_, there)| there).collect();
-            // Where the effect is large, quiet noise has narrow valleys.
-            starts.extend(starts.first().map(|there| problem.begin(there)));
-            let found: Vec<Option<Fitted>> = (starts.par_iter())
-                .map(|start| climb(problem, start, SHORT))
-                .collect::<Result<_, _>>()?;
+            // Where the effect is large, quiet noise has narrow valleys, and θ without the effect lies in another one.
+            let centre = problem.centre();
+            let afresh = |there: &Vec<f64>| {
+                let is_kept = |j: usize| problem.axes[j].held || self.is_magnitude(j);
+                let value = |j: usize| if is_kept(j) { there[j] } else { centre[j] };
+                (0..there.len()).map(value).collect::<Vec<f64>>()
+            };
+            let fresh = starts.iter().take(KEPT).map(afresh);
+            let loud = starts.first().cloned().into_iter().chain(fresh);
+            let loud: Vec<_> = loud.map(|there| problem.begin(&there)).collect();
+            starts.extend(loud);
+            let found: Vec<Option<Fitted>> =
+                (starts.par_iter().map(settled)).collect::<Result<_, _>>()?;
             let before = fits.first().map_or(f64::NEG_INFINITY, |fit| fit.objective);
             fits.extend(found.into_iter().flatten());
             sort(&mut fits);

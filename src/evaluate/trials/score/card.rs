@@ -109,7 +109,7 @@ pub struct Scorecard {
     pub(crate) by_information: Vec<Bin>,
     /// The same of trials whose record decides: every wrong listed effect leaves more than 3 nats.
     pub(crate) clear_by_information: Vec<Bin>,
-    /// By the evidence that the record holds for its true effects, where all are listed.
+    /// By the evidence that the record holds for its true effect, a listed one.
     pub(crate) by_held: Vec<Bin>,
     /// By kind of truth.
     pub(crate) by_kind: Vec<KindScore>,
