@@ -15,7 +15,7 @@ pub(crate) struct Closed {
     pub true_told: Count,
     /// Median of these shares.
     pub true_median: Option<f64>,
-    /// Their 90 % intervals that hold 1.
+    /// 90 % intervals of told shares that hold 1.
     pub true_holds_one: Count,
     /// Shares from −0.1 to 1.1, of those told beside a right and complete answer.
     pub delivered_within: Count,
@@ -30,7 +30,8 @@ pub(super) fn closed(rows: &[Row]) -> Closed {
             .map(|share| share.closed.is_some())
             .collect(),
         true_median: quantile(&told, 0.5).ok(),
-        true_holds_one: (of_truth().filter_map(|share| share.interval))
+        true_holds_one: (of_truth().filter(|share| share.closed.is_some()))
+            .filter_map(|share| share.interval)
             .map(|[low, high]| (low..=high).contains(&1.0))
             .collect(),
         delivered_within: delivered

@@ -282,7 +282,8 @@ fn the_place_of_a_right_answer_is_a_true_one() {
     assert!(!imitated.is_true_place("u"));
 }
 
-/// Shares of the true effects count whatever was answered, those of answers only where they are right.
+/// Shares of the true effects that are told count whatever was answered, those of answers only where they are right; trials whose true
+/// effect was fitted have bins by its evidence.
 #[test]
 fn shares_are_those_of_the_truth_and_of_right_answers() {
     let told = |kind, accepted: &[&str], closed, of_truth: Option<f64>| {
@@ -292,23 +293,27 @@ fn shares_are_those_of_the_truth_and_of_right_answers() {
             is_listed: kind == Kind::Listed,
             held: of_truth.map(|share| 20.0 * share),
             closed: of_truth,
-            interval: of_truth.map(|share| [share - 0.1, share + 0.1]),
+            interval: Some([-0.1, 0.1].map(|off| of_truth.unwrap_or(1.0) + off)),
         });
         row.outcome.as_mut().unwrap().closed = closed;
         row
     };
-    let closed = card(vec![
+    let card = card(vec![
         told(Kind::Listed, &["a@s"], Some(1.0), Some(0.95)),
         told(Kind::Listed, &["a@s"], Some(1.9), Some(0.8)),
         told(Kind::Listed, &["b@s"], Some(1.9), Some(1.05)),
         told(Kind::Listed, &[], None, None),
         told(Kind::Random, &[], None, None),
-    ])
-    .closed;
+    ]);
+    let closed = card.closed;
     assert_eq!(closed.true_told, count(3, 4));
     assert_eq!(closed.true_median, Some(0.95));
     assert_eq!(closed.true_holds_one, count(2, 3));
     assert_eq!(closed.delivered_within, count(1, 2));
+    let [held] = &card.by_held[..] else {
+        panic!("{:?}", card.by_held)
+    };
+    assert_eq!((held.low, held.delivered), (10.0, count(2, 3)));
 }
 
 /// A failed diagnosis improves no rate: of nulls it is left out and stated beside, of gaps it is not detected.
