@@ -369,9 +369,10 @@ impl Shrinkage {
     /// Mean log density of a sample, for effects that move no free run.
     pub const LOG_SCORE: &str = "held-out log score";
 
-    /// Errors after and of noise alone, where these are too close for a share.
+    /// Errors after and of noise alone, where these are too close for a share: it has no interval, or one that holds all and nothing.
     pub(crate) fn hidden_by_noise(&self) -> Option<(f64, f64)> {
-        (self.after.zip(self.floor)).filter(|_| self.interval.is_none())
+        let is_open = |[low, high]: [f64; 2]| low <= 0.0 && high >= 1.0;
+        (self.after.zip(self.floor)).filter(|_| self.interval.is_none_or(is_open))
     }
 }
 

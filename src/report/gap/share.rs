@@ -36,7 +36,7 @@ pub(super) fn closed_sentence(s: &Shrinkage) -> String {
 /// Returns the share of the gap, which is so much `of` it, with its 90 % interval. Where that is too wide for one number: its lower end,
 /// if all of the gap may have closed, or else both ends.
 pub(super) fn share_with_interval(s: &Shrinkage, of: &str) -> Option<String> {
-    let ends = s.interval?;
+    let ends = s.interval.filter(|_| s.hidden_by_noise().is_none())?;
     let [low, high] = ends.map(percent);
     Some(match s.closed {
         Some(closed) => format!("{}{of} ({low} to {high})", percent(closed)),
@@ -84,11 +84,10 @@ mod tests {
             open.ends_with("; −20 % to 70 % of the gap closed."),
             "{open}"
         );
-        share.interval = None;
-        let hidden = closed_sentence(&share);
-        assert!(
-            hidden.ends_with("; too near to noise for a share of the gap."),
-            "{hidden}"
-        );
+        for interval in [None, Some([-1.3, 4.9])] {
+            share.interval = interval;
+            let hidden = closed_sentence(&share);
+            assert!(hidden.ends_with("; too near to noise for a share of the gap."));
+        }
     }
 }
