@@ -98,6 +98,21 @@ pub(crate) fn climb(
     }))
 }
 
+/// Returns what moves a start to where all other entries have answered those of a shape, which stay: a threshold, a lag or a time would go
+/// anywhere from afar. With no such entry a start stays where it is.
+pub(crate) fn settling<'a>(
+    problem: &Problem<'a>,
+    is_shape: &dyn Fn(usize) -> bool,
+    iterations: usize,
+) -> impl Fn(Vec<f64>) -> Result<Vec<f64>, FilterError> + use<'a> {
+    let has_shape = (0..problem.axes.len()).any(is_shape);
+    let held = has_shape.then(|| problem.holding(is_shape));
+    move |start| match &held {
+        Some(held) => Ok(climb(held, &start, iterations)?.map_or(start, |settled| settled.theta)),
+        None => Ok(start),
+    }
+}
+
 /// The damped step, entries held at their bounds left out.
 fn step(
     problem: &Problem<'_>,

@@ -2,7 +2,7 @@
 
 use super::scan::{Beginning, Linear, Promise};
 use crate::diagnose::model::{Extended, Model};
-use crate::fit::climb::{Fitted, climb, fit};
+use crate::fit::climb::{Fitted, climb, fit, settling};
 use crate::fit::evidence::{CREDIT, laplace};
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::{FilterError, recoverable};
@@ -40,13 +40,11 @@ pub(in crate::diagnose) fn fit_promise<'a>(
 ) -> Result<Option<Model<'a>>, StudyError> {
     let extended = model.extend(&promise.term)?;
     let chosen: Vec<&Beginning> = promise.starts.iter().take(effort.starts).collect();
+    let settled = settling_last(&extended.problem, &extended);
     let mut from: Vec<Vec<f64>> = (chosen.iter())
         .map(|start| {
             let theta = begin(model, &extended, start)?;
-            match start.scales {
-                true => settled(&extended.problem, &extended, theta),
-                false => Ok(theta),
-            }
+            Ok(if start.scales { settled(theta)? } else { theta })
         })
         .collect::<Result<_, StudyError>>()?;
     if let Some(first) = chosen.first() {
@@ -58,18 +56,13 @@ pub(in crate::diagnose) fn fit_promise<'a>(
     Ok(best.and_then(|fitted| extended.fitted(model.base, fitted, problem)))
 }
 
-/// Where θ and the size of the last term answer its times and delays, which stay: a small size, or a θ far off, would let them go anywhere.
-pub(super) fn settled(
-    problem: &Problem<'_>,
+/// Returns what moves a start to where θ and the size of the last term have answered its times and delays.
+pub(super) fn settling_last<'a>(
+    problem: &Problem<'a>,
     extended: &Extended<'_>,
-    theta: Vec<f64>,
-) -> Result<Vec<f64>, StudyError> {
+) -> impl Fn(Vec<f64>) -> Result<Vec<f64>, FilterError> + use<'a> {
     let shape = extended.entries.get(1..).unwrap_or_default();
-    if shape.is_empty() {
-        return Ok(theta);
-    }
-    let held = problem.holding(|j| shape.contains(&j));
-    Ok(climb(&held, &theta, HELD)?.map_or(theta, |settled| settled.theta))
+    settling(problem, &|j| shape.contains(&j), HELD)
 }
 
 /// Fits a promise from the prior's centre with loud noise: the fit of the model alone may have gone where the term is of no use.
@@ -84,12 +77,10 @@ pub(in crate::diagnose) fn fit_afresh<'a>(
         Some(_) => AFRESH_SHAPES,
         None => 1,
     };
+    let settled = settling_last(&problem, &extended);
     let from: Vec<Vec<f64>> = (promise.starts.iter().take(starts))
-        .map(|start| {
-            let theta = model.beside_at(&extended, &centre, &start.m);
-            settled(&problem, &extended, theta)
-        })
-        .collect::<Result<_, StudyError>>()?;
+        .map(|start| settled(model.beside_at(&extended, &centre, &start.m)))
+        .collect::<Result<_, _>>()?;
     let fitted = fit(&problem, &from, AFRESH)?;
     Ok(fitted.and_then(|fitted| extended.fitted(model.base, fitted, problem)))
 }

@@ -1,7 +1,7 @@
 //! Effects whose time, delay or frequency ended in a valley of its own.
 
 use super::found::{Found, own_theta};
-use super::refit::{CARRIED, settled};
+use super::refit::{CARRIED, settling_last};
 use crate::diagnose::hypotheses::term::Term;
 use crate::diagnose::model::Model;
 use crate::diagnose::thresholds::Thresholds;
@@ -93,12 +93,10 @@ fn begun_again<'a>(
         return Ok(None);
     };
     let extended = model.extend(found.last())?;
+    let settled = settling_last(&own.problem, &extended);
     let from: Vec<Vec<f64>> = (starts.iter())
-        .map(|(theta, m)| {
-            let theta = extended.from(theta, model.beside(&extended, m));
-            settled(&own.problem, &extended, theta)
-        })
-        .collect::<Result<_, StudyError>>()?;
+        .map(|(theta, m)| settled(extended.from(theta, model.beside(&extended, m))))
+        .collect::<Result<_, _>>()?;
     let begun = fit(&own.problem, &from, ITERATIONS)?;
     let Some(begun) = begun.filter(|begun| begun.objective > own.fitted.objective) else {
         return Ok(None);

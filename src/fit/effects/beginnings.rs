@@ -7,7 +7,7 @@
 use super::magnitude::{Kind, duration};
 use crate::effect::{Effect, Magnitude};
 use crate::fit::axis::{EvidencePrior, SMALL};
-use crate::fit::climb::{Fitted, climb};
+use crate::fit::climb::{Fitted, climb, settling};
 use crate::fit::problem::Problem;
 use crate::fit::reference::Reference;
 use crate::fit::starts::sort;
@@ -112,12 +112,14 @@ impl<'a> Search<'a> {
     /// The problem with the magnitudes of all other effects held.
     fn opened(&self, open: &[Added<'_>]) -> Problem<'a> {
         let is_open = |j: usize| open.iter().any(|added| added.holds(j));
-        (self.problem).holding(|j| self.is_magnitude(j) && !is_open(j))
+        let is_magnitude = self.magnitudes();
+        (self.problem).holding(|j| is_magnitude[j] && !is_open(j))
     }
 
-    fn is_magnitude(&self, j: usize) -> bool {
+    /// True for each entry of θ that is a magnitude of an effect.
+    fn magnitudes(&self) -> Vec<bool> {
         let space = self.problem.twin.parameters();
-        space.iter().nth(j).map(|p| p.role) == Some(Role::Magnitude)
+        space.iter().map(|p| p.role == Role::Magnitude).collect()
     }
 
     /// Short fits with an effect, best first, beside a fit without it.
@@ -129,13 +131,9 @@ impl<'a> Search<'a> {
     ) -> Result<Vec<Fitted>, FilterError> {
         let mut fits: Vec<Fitted> = climb(problem, theta, SHORT)?.into_iter().collect();
         let mut from = theta.to_vec();
-        let held = problem.holding(|j| added.holds(j) && largest(problem, j).is_none());
-        // From afar thresholds, lags and times would go anywhere: θ and the size answer them first.
-        let settled = |start: &Vec<f64>| {
-            let begun = climb(&held, start, SHORT)?;
-            let from = begun.as_ref().map_or(start, |begun| &begun.theta);
-            climb(problem, from, SHORT)
-        };
+        let is_shape = |j: usize| added.holds(j) && largest(problem, j).is_none();
+        let settled = settling(problem, &is_shape, SHORT);
+        let (centre, is_magnitude) = (problem.centre(), self.magnitudes());
         // A second threshold is off until the first one is found.
         for _ in 0..self.switches(added).count().max(1) {
             let without = problem.holding(|j| added.holds(j));
@@ -145,9 +143,8 @@ impl<'a> Search<'a> {
             let promises = self.promises(problem, &reference, &from, added)?;
             let mut starts: Vec<Vec<f64>> = promises.into_iter().map(|(_, there)| there).collect();
             // Where the effect is large, quiet noise has narrow valleys, and θ without the effect lies in another one.
-            let centre = problem.centre();
             let afresh = |there: &Vec<f64>| {
-                let is_kept = |j: usize| problem.axes[j].held || self.is_magnitude(j);
+                let is_kept = |j: usize| problem.axes[j].held || is_magnitude[j];
                 let value = |j: usize| if is_kept(j) { there[j] } else { centre[j] };
                 (0..there.len()).map(value).collect::<Vec<f64>>()
             };
@@ -155,8 +152,9 @@ impl<'a> Search<'a> {
             let loud = starts.first().cloned().into_iter().chain(fresh);
             let loud: Vec<_> = loud.map(|there| problem.begin(&there)).collect();
             starts.extend(loud);
-            let found: Vec<Option<Fitted>> =
-                (starts.par_iter().map(settled)).collect::<Result<_, _>>()?;
+            let found: Vec<Option<Fitted>> = (starts.into_par_iter())
+                .map(|start| climb(problem, &settled(start)?, SHORT))
+                .collect::<Result<_, _>>()?;
             let before = fits.first().map_or(f64::NEG_INFINITY, |fit| fit.objective);
             fits.extend(found.into_iter().flatten());
             sort(&mut fits);
