@@ -169,8 +169,7 @@ mod tests {
         (0..n).map(|i| sampler.draw(i, Noise::new(7, "test", i)))
     }
 
-    /// The squared distance is χ²_d: the empirical and exact distributions differ by less than the
-    /// Kolmogorov–Smirnov bound at 1e-4.
+    /// The squared distance is χ²_d: the empirical and exact distributions differ by less than the Kolmogorov–Smirnov bound at 1e-4.
     #[test]
     fn squared_distance_in_the_ellipsoid_is_chi_squared() {
         let (n, information) = (

@@ -10,8 +10,7 @@ const COLUMNS: usize = 4;
 
 /// `A = L Lᵀ` of a symmetric positive definite matrix.
 ///
-/// Written out, for one right side: 64 µs at 128 × 128 on a busy machine, where nalgebra took 156 µs and faer 91 µs in the
-/// same run.
+/// Written out, for one right side: 64 µs at 128 × 128 on a busy machine, where nalgebra took 156 µs and faer 91 µs in the same run.
 #[derive(Debug, Clone)]
 pub(super) struct Cholesky {
     /// L in its lower triangle; the rest is undefined.

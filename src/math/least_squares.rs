@@ -41,9 +41,8 @@ impl Regressors for DMatrix<f64> {
 
 /// Least squares for tall regressors with collinear columns, from their Gram matrix.
 ///
-/// Finds β that minimises ‖y − Φ β‖ for Φ of m × n, as fast as normal equations and nearly as well as an SVD.
-/// Columns are brought to unit norm (D), and a tiny ridge is refined away with the *true* residual ("iterated
-/// Tikhonov", four solves with one factor):
+/// Finds β that minimises ‖y − Φ β‖ for Φ of m × n, as fast as normal equations and nearly as well as an SVD. Columns are brought to unit
+/// norm (D), and a tiny ridge is refined away with the *true* residual ("iterated Tikhonov", four solves with one factor):
 ///
 /// ```text
 /// (D ΦᵀΦ D + λ I) D⁻¹ Δβ = D Φᵀ (y − Φ β),   β ← β + Δβ,   λ = 1e-10

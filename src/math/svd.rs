@@ -73,8 +73,7 @@ pub(super) fn thin_svd(matrix: &DMatrix<f64>) -> Option<Svd> {
     })
 }
 
-/// Makes the columns of a square matrix orthogonal, with the same rotations of `right`; returns `false` where that does
-/// not converge.
+/// Makes the columns of a square matrix orthogonal, with the same rotations of `right`; returns `false` where that does not converge.
 struct Rotations<'a> {
     columns: usize,
     rotated: &'a mut [f64],

@@ -1,9 +1,8 @@
 //! Records and inputs as CSV files; or as Parquet files with the same columns, in a build with the feature `parquet`.
 //!
-//! A header, then one row a sample: `t` in seconds or as time stamps, increasing; inputs `u` or `u1,u2,…`; outputs `y` or
-//! `y1,y2,…`; other names by [`Columns`]. Columns are separated by commas, semicolons or tabs. An output that was not
-//! measured is an empty cell, `nan` or `NA`. Steps that are the same to 1e-3 count as one. Rows are counted as an editor counts
-//! lines: the header is row 1.
+//! A header, then one row a sample: `t` in seconds or as time stamps, increasing; inputs `u` or `u1,u2,…`; outputs `y` or `y1,y2,…`; other
+//! names by [`Columns`]. Columns are separated by commas, semicolons or tabs. An output that was not measured is an empty cell, `nan` or
+//! `NA`. Steps that are the same to 1e-3 count as one. Rows are counted as an editor counts lines: the header is row 1.
 
 use super::columns::Columns;
 use super::parquet;

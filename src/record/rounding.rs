@@ -1,7 +1,6 @@
 //! Rounded values.
 
-/// Samples for each multiple of the step within the signal's range, at least, where the step is one of digits: files round,
-/// too.
+/// Samples for each multiple of the step within the signal's range, at least, where the step is one of digits: files round, too.
 const REPEATS: f64 = 2.0;
 /// Distinct values that tell a step from chance.
 const DISTINCT: usize = 8;

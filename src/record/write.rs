@@ -10,8 +10,7 @@ pub(crate) fn drive_csv_text(drive: &Drive) -> String {
     csv_text(drive, &Signal::zeros((drive.samples(), 0)))
 }
 
-/// The text of a record file; reading it gives the same bits of u and y, and of t where steps vary. A missing output is an
-/// empty cell.
+/// The text of a record file; reading it gives the same bits of u and y, and of t where steps vary. A missing output is an empty cell.
 pub(crate) fn record_csv_text(record: &Record) -> String {
     csv_text(record.drive(), record.outputs())
 }

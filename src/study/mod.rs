@@ -323,8 +323,7 @@ impl Study {
         self.plan.prepare(&self.twin.signals())
     }
 
-    /// Checks whether features can be taken of a record: it has the step and the channels of this study, and no output is
-    /// missing.
+    /// Checks whether features can be taken of a record: it has the step and the channels of this study, and no output is missing.
     pub fn check_record(&self, record: &Record) -> Result<(), StudyError> {
         self.check_complete(record)?;
         self.plan.check_step(record)

@@ -20,8 +20,7 @@ const MOST_SAMPLES: usize = 50_000_000;
 )]
 #[non_exhaustive]
 pub enum InputPlan {
-    /// Each input an independent staircase: levels uniform in `levels`, each held for `hold` samples; fresh for each
-    /// record.
+    /// Each input an independent staircase: levels uniform in `levels`, each held for `hold` samples; fresh for each record.
     Levels(Levels),
     /// The inputs of a file, for every record; its step and length are the study's.
     File(PathBuf),

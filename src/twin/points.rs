@@ -52,9 +52,8 @@ impl Layout {
 #[doc(hidden)]
 #[derive(Debug)]
 pub struct Points<'w> {
-    /// First the `moving` points: put into the limits, advanced, constrained; the first is the centre. Behind them two for
-    /// each state: the centre after its motion, with that state shifted up and down, constrained. Those of a state
-    /// without shift hold nothing of use.
+    /// First the `moving` points: put into the limits, advanced, constrained; the first is the centre. Behind them two for each state: the
+    /// centre after its motion, with that state shifted up and down, constrained. Those of a state without shift hold nothing of use.
     pub all: &'w mut [f64],
     /// Number of moving points.
     pub moving: usize,

@@ -24,9 +24,8 @@ use crate::twin::{
 /// Row k is y(t_k), observed first; then u_k acts from t_k to t_k + Δt: [`update`](Self::update), drift, noise,
 /// [`constrain`](Self::constrain), [`limits`](Self::limits). Row 0 is the start.
 ///
-/// The integrator may take several steps within a sample, and inputs may lie on the line to the next sample
-/// ([`stepping`](Self::stepping)). The drift and the limits then act at each substep, as with a finer step; update, noise and
-/// constraints once a sample.
+/// The integrator may take several steps within a sample, and inputs may lie on the line to the next sample ([`stepping`](Self::stepping)).
+/// The drift and the limits then act at each substep, as with a finer step; update, noise and constraints once a sample.
 ///
 /// ```
 /// use truetwin::prelude::*;
@@ -107,8 +106,7 @@ pub trait StateSpace: Advance + Send + Sync {
         vec![]
     }
 
-    /// Probability and size of the outliers of [`corrupt_outputs`](Self::corrupt_outputs) for filters, by output; empty
-    /// without any.
+    /// Probability and size of the outliers of [`corrupt_outputs`](Self::corrupt_outputs) for filters, by output; empty without any.
     fn outliers(&self, _theta: &[f64]) -> Vec<Outliers> {
         vec![]
     }

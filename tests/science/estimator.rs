@@ -109,8 +109,8 @@ fn the_gate_keeps_records_of_the_twin_whatever_noise_is_declared() {
     let text = "twin = 'van-der-pol'\n[noise]\nx2 = 0.0212\n[prior]\ntrust = true";
     let file = StudyFile::parse(text, "s.toml".as_ref()).unwrap();
     let options = PretrainOptions {
-        bank_size: Some(2000),
-        epochs: Some(40),
+        bank_size: Some(1000),
+        epochs: Some(20),
         seed: 1,
         ..PretrainOptions::default()
     };

@@ -57,6 +57,8 @@ fn study() -> Study {
 enum Departure {
     Second,
     Spread,
+    /// None: σ is off the declared level by this share, which the model allows.
+    Level,
 }
 
 /// A series of the model, φ and σ from the prior, with a departure of this strength.
@@ -68,7 +70,10 @@ fn series(departure: Departure, strength: f64, noise: Noise) -> Vec<f64> {
             .unwrap()
     };
     let phi = within(0.0, 0.5, &mut || source.normal());
-    let sigma = within(1.5, 0.5, &mut || source.normal());
+    let mut sigma = within(1.5, 0.5, &mut || source.normal());
+    if matches!(departure, Departure::Level) {
+        sigma = 1.5 * (1.0 + strength);
+    }
     let mut y: Vec<f64> = vec![];
     for i in 0..SAMPLES {
         let before = |lag: usize| i.checked_sub(lag).map_or(0.0, |at| y[at]);
@@ -81,6 +86,7 @@ fn series(departure: Departure, strength: f64, noise: Noise) -> Vec<f64> {
                 let n = SAMPLES as f64;
                 spread *= 1.0 + strength * (2.0 * (i + 1) as f64 - n - 1.0) / n;
             }
+            Departure::Level => {}
         }
         y.push(mean + spread * source.normal());
     }
@@ -158,8 +164,8 @@ impl Checks {
     fn new() -> Self {
         let study = study();
         let options = PretrainOptions {
-            bank_size: Some(3000),
-            epochs: Some(60),
+            bank_size: Some(2000),
+            epochs: Some(30),
             seed: 1,
             ..PretrainOptions::default()
         };
@@ -203,7 +209,7 @@ impl Checks {
             .map(|i| normal.cdf((y[i] - i.checked_sub(1).map_or(0.0, |j| phi * y[j])) / sigma))
             .collect();
         let pairs: Vec<_> = match departure {
-            Departure::Second => u.windows(3).map(|w| (w[0], w[2])).collect(),
+            Departure::Second | Departure::Level => u.windows(3).map(|w| (w[0], w[2])).collect(),
             Departure::Spread => u[2..]
                 .iter()
                 .enumerate()
@@ -230,11 +236,14 @@ impl Checks {
 }
 
 /// A clear second lag is called by the authors' check, and by `diagnose` in half of the series: three of six have a chance of 1 in 400 at the
-/// level.
+/// level. Noise 18 % above the declared level is none of a gate's business: in the declared one the gates call 7 and 9 of twelve series.
 #[test]
-fn an_autoregressive_series_is_called_for_its_second_lag() {
-    let [diagnosed, .., authors] = Checks::new().calls(Departure::Second, 0.8, 6);
+fn a_second_lag_is_called_and_a_level_of_noise_is_not() {
+    let checks = Checks::new();
+    let [diagnosed, .., authors] = checks.calls(Departure::Second, 0.8, 6);
     assert!(diagnosed >= 3 && authors >= 5, "{diagnosed} and {authors}");
+    let [_, network, refit, _] = checks.calls(Departure::Level, 0.18, 12);
+    assert!(network <= 3 && refit <= 3, "{network} and {refit}");
 }
 
 #[test]
@@ -242,13 +251,9 @@ fn an_autoregressive_series_is_called_for_its_second_lag() {
 fn power_on_autoregressive_series() {
     println!("{CHECKS:?}");
     let checks = Checks::new();
-    // The gates take noise within a factor of 1.2 for the declared one, and call a quarter of the model's own series.
-    let [diagnosed, .., authors] = checks.calls(Departure::Second, 0.0, 100);
+    let called = checks.calls(Departure::Second, 0.0, 100);
     let bound = *binomial_bounds(100, 0.05, 0.999).end();
-    assert!(
-        diagnosed <= bound && authors <= bound,
-        "{diagnosed} and {authors}"
-    );
+    assert!(called.iter().all(|called| *called <= bound), "{called:?}");
     for departure in [Departure::Second, Departure::Spread] {
         for strength in [0.2, 0.4, 0.6, 0.8] {
             checks.calls(departure, strength, 50);

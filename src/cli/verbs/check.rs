@@ -115,8 +115,7 @@ fn lines(findings: &[Finding]) -> String {
     lines.join("\n")
 }
 
-/// Estimates the number of runs: corners of the prior, differences for each parameter; a black box's free run is the mean
-/// of 32.
+/// Estimates the number of runs: corners of the prior, differences for each parameter; a black box's free run is the mean of 32.
 fn runs(twin: &Twin) -> usize {
     let d = twin.parameters().len();
     let free = twin.runs_of_a_free_run();

@@ -62,8 +62,7 @@ impl From<ScenarioArgument> for Scenario {
 /// start, from TS-pre, and from a bad start. The paper's figures stand beside ours. If records do not determine all of θ,
 /// a second table has the errors of the combinations that they determine.
 ///
-/// Run i depends only on the seed and i. Records run in parallel, each on its share of the threads: for times of one
-/// core, use --threads 1.
+/// Run i depends only on the seed and i. Records run in parallel, each on its share of the threads: for times of one core, use --threads 1.
 #[derive(Debug, Args)]
 #[command(after_help = "The paper's table and figures:\n  \
         truetwin reproduce --twin van-der-pol --preset paper --out vdp-1\n  \

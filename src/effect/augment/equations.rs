@@ -175,8 +175,7 @@ impl AugmentedEquations {
         (self.sensors.iter()).filter(move |sensor| sensor.after_noise == after_noise)
     }
 
-    /// Advances the memories of the sensor effects; `observe` gives the outputs of points, so many at once that they need
-    /// no heap.
+    /// Advances the memories of the sensor effects; `observe` gives the outputs of points, so many at once that they need no heap.
     fn remember(
         &self,
         now: &Now<'_>,

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A twin seen through its features; counts every simulation, also those that the features make.
+#[derive(Clone)]
 pub struct FeatureSimulator {
     twin: Twin,
     calls: Arc<AtomicUsize>,

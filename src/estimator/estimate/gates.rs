@@ -8,6 +8,17 @@ use crate::estimator::refine::Refined;
 use nalgebra::DVector;
 
 impl Run<'_> {
+    /// The simulator in noise drawn from the record's fit, where there is one.
+    fn in_drawn_noise(
+        &self,
+        simulator: &FeatureSimulator,
+    ) -> Result<FeatureSimulator, EstimatorError> {
+        Ok(match self.drawn {
+            Some(twin) => simulator.of(twin, None)?,
+            None => simulator.clone(),
+        })
+    }
+
     fn gate_test<'a>(&'a self, simulator: &'a FeatureSimulator, purpose: &str) -> GateTest<'a> {
         GateTest {
             simulator,
@@ -25,6 +36,7 @@ impl Run<'_> {
         initial: &[f64],
     ) -> Result<GateOutcome, EstimatorError> {
         let settings = &self.settings.gate;
+        let simulator = &self.in_drawn_noise(simulator)?;
         let first = self.tested(simulator, initial, settings, "gate")?;
         match (first.is_unsure(), settings.form) {
             (true, GateForm::Calibrated) => {
@@ -72,10 +84,11 @@ impl Run<'_> {
         refined: &Refined,
         observed: &DVector<f64>,
     ) -> Result<Option<GateOutcome>, EstimatorError> {
+        let simulator = self.in_drawn_noise(simulator)?;
         let tested = |settings: &GateSettings, purpose: &str| {
             let test = GateTest {
                 settings,
-                ..self.gate_test(simulator, purpose)
+                ..self.gate_test(&simulator, purpose)
             };
             match test.after_refit(&answer.theta, &refined.jacobian, observed) {
                 Err(EstimatorError::Hopeless { .. } | EstimatorError::Whitening(_)) => Ok(None),

@@ -27,7 +27,7 @@ use crate::estimator::settings::Settings;
 use crate::fit::posterior::Region;
 use crate::progress::Progress;
 use crate::record::Record;
-use crate::twin::Noise;
+use crate::twin::{Noise, Twin};
 use cloud::{Around, cloud};
 use merit::{Merit, error_by_chance};
 use nalgebra::DVector;
@@ -44,7 +44,8 @@ impl Estimator {
     /// the record's own and does not lean on the prior. Where the study trusts its prior (`[prior] trust = true`; the paper's preset
     /// does), the network's estimate is kept if the gate agrees.
     ///
-    /// Simulations are in the noise that the record shows, where that is surely not the declared one ([`Estimate::noise`]).
+    /// The tests simulate in noise drawn from the record's fit; cloud and errors take its levels where they are surely not the declared ones
+    /// ([`Estimate::noise`]).
     ///
     /// # Errors
     ///
@@ -93,6 +94,9 @@ impl Estimator {
             settings,
             record,
             observed: &observed,
+            drawn: (shown.as_ref())
+                .filter(|_| !is_paper)
+                .map(|shown| &shown.drawn),
             noise: Noise::new(seed, "estimate", 0),
             seed,
             progress,
@@ -181,6 +185,8 @@ struct Run<'a> {
     settings: &'a Settings,
     record: &'a Record,
     observed: &'a DVector<f64>,
+    /// The twin in levels of noise drawn from the record's fit, for the tests.
+    drawn: Option<&'a Twin>,
     noise: Noise,
     seed: u64,
     progress: &'a Progress,

@@ -4,6 +4,7 @@ use super::*;
 use crate::estimator::estimate::EstimateOptions;
 use crate::estimator::pretrain::{PretrainOptions, pretrain};
 use crate::study::{RecordPlan, Study, StudyFile};
+use crate::twin::DigitalTwin;
 use crate::twins::CascadedTanks;
 
 /// The tanks, all physical parameters fixed.
@@ -39,7 +40,8 @@ fn a_start_alone_is_estimated() {
     assert!(estimate.std_error[0].is_finite());
 }
 
-/// About one record in twelve has a p-value within two Monte-Carlo errors of the level: it is tested again, at both gates.
+/// Of records that start higher and higher above the prior, some have a p-value within two Monte-Carlo errors of the level: they are tested
+/// again, at both gates.
 #[test]
 fn an_answer_near_the_level_is_taken_from_more_simulations() {
     let study =
@@ -49,9 +51,10 @@ fn an_answer_near_the_level_is_taken_from_more_simulations() {
         estimator.settings.gate.null,
         estimator.settings.gate.larger().null,
     );
-    let theta = study.twin().parameters().centre();
+    let mut theta = study.twin().parameters().centre();
     let (mut first, mut after) = (0, 0);
     for index in 0..40 {
+        theta[0] += 0.05;
         let noise = Noise::new(3, "record", index);
         let drive = study.drives().unwrap().draw(noise).unwrap();
         let outputs = study.twin().simulate(&theta, &drive, noise).unwrap();
@@ -67,4 +70,45 @@ fn an_answer_near_the_level_is_taken_from_more_simulations() {
         }
     }
     assert!(first > 0 && after > 0, "{first} and {after} of 40");
+}
+
+/// Tanks that declare this measurement noise in place of 0.15.
+fn tanks(declared: f64) -> Study {
+    let plan = RecordPlan::levels(0.5, 300, 0.5, 3.0, 30);
+    let study = Study::new("tanks", CascadedTanks, plan).unwrap();
+    let text = format!("twin = 'tanks'\n[noise]\ny = {declared}\n");
+    let file = StudyFile::parse(&text, "s.toml".as_ref()).unwrap();
+    study.configure(&file).unwrap()
+}
+
+fn levels_off(declared: f64, seed: u64) -> Vec<String> {
+    let study = tanks(declared);
+    let noise = Noise::new(seed, "record", 0);
+    let drive = study.drives().unwrap().draw(noise).unwrap();
+    let theta = [0.6, 0.5, 0.55, 1.0];
+    let outputs = CascadedTanks.simulate(&theta, &drive, noise).unwrap();
+    let record = Record::new(drive, outputs).unwrap();
+    let shown = noise::shown(
+        &study,
+        &record,
+        &EstimateOptions::default(),
+        &Progress::silent(),
+    )
+    .unwrap();
+    let levels = shown.unwrap().levels;
+    levels.into_iter().map(|level| level.name).collect()
+}
+
+/// A noise three times too small or too large is seen in every record; the right one is left alone.
+#[test]
+fn a_wrong_declaration_is_seen() {
+    let seeds = 0..6;
+    for declared in [0.05, 0.45] {
+        for seed in seeds.clone() {
+            let off = levels_off(declared, seed);
+            assert!(off.contains(&"y".to_owned()), "{declared}, {seed}: {off:?}");
+        }
+    }
+    let wrong = seeds.filter(|seed| !levels_off(0.15, *seed).is_empty());
+    assert!(wrong.count() <= 1);
 }

@@ -120,8 +120,7 @@ impl<'a> Pretraining<'a> {
         pretrain_from(&self.project, bank, &self.options, &checkpoints, progress)
     }
 
-    /// The bank in the folder, made as far as it is missing, as one part: rows in the order in which they would be without a
-    /// folder.
+    /// The bank in the folder, made as far as it is missing, as one part: rows in the order in which they would be without a folder.
     fn simulated(&self, path: &Path, progress: &Progress) -> Result<Draws, EstimatorError> {
         let size = settings(&self.project, &self.options)?.bank_size;
         fits_into_memory(size)?;

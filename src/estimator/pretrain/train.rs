@@ -64,8 +64,7 @@ pub fn pretrain(
     )
 }
 
-/// Trains the network on a bank that is there, of this study's prior and the preset's features; goes on with what was kept of
-/// the training.
+/// Trains the network on a bank that is there, of this study's prior and the preset's features; goes on with what was kept of the training.
 ///
 /// A bank of at most 64 MiB as 32-bit numbers gives, row for row, the estimator of [`pretrain`]; of a larger one, no more than
 /// that is in memory at a time.

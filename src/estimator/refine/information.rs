@@ -7,8 +7,7 @@ use serde::Serialize;
 
 /// Fisher information of the features, regularised: G = JᵀJ/(1 + 1/K) + λ·diag(1/width²).
 ///
-/// J (rank × d) is whitened; K seeds were averaged, which adds 1/K to the variance of the difference between mean and
-/// record.
+/// J (rank × d) is whitened; K seeds were averaged, which adds 1/K to the variance of the difference between mean and record.
 ///
 /// Source: Lakshminarayanan, Guerrero & Rojas, section IV-B.
 #[derive(Debug, Clone)]

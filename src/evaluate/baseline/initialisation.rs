@@ -30,8 +30,7 @@ impl Initialisation {
     /// All, in the order of the paper's table.
     pub const ALL: [Self; 3] = [Self::Good, Self::Ts, Self::Bad];
 
-    /// θ within the bounds, where `truth` is the true θ and `initial` is θ_init; `noise` is read by good starts, from
-    /// its source `start`.
+    /// θ within the bounds, where `truth` is the true θ and `initial` is θ_init; `noise` is read by good starts, from its source `start`.
     pub fn theta(
         self,
         space: &ParameterSpace,

@@ -19,8 +19,7 @@ pub struct Run {
     pub run: usize,
     /// True θ.
     pub truth: Vec<f64>,
-    /// The refitted estimate's 90 % interval, by parameter; `None` where it has
-    /// no finite ends, empty where the estimate failed.
+    /// The refitted estimate's 90 % interval, by parameter; `None` where it has no finite ends, empty where the estimate failed.
     pub interval: Vec<Option<[f64; 2]>>,
     /// In the order of [`Method::all`].
     pub answers: Vec<Answer>,

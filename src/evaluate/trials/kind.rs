@@ -81,8 +81,7 @@ impl fmt::Display for Kind {
     }
 }
 
-/// Assigns kinds to trials in the proportions of the weights and in random order: `pick` gives numbers below its
-/// argument.
+/// Assigns kinds to trials in the proportions of the weights and in random order: `pick` gives numbers below its argument.
 pub(super) fn assign_kinds(
     kinds: &[Kind],
     trials: usize,

@@ -46,9 +46,8 @@ impl<P: ResidualProblem + ?Sized> Jacobian for Residuals<'_, P> {
 
 /// Damped Gauss–Newton in a box, as an argmin solver.
 ///
-/// argmin's own `GaussNewtonLS` compares ‖r‖ in its line search with the slope of ½‖r‖²: where ‖r‖ is large the line
-/// search asks for more than there is, no step is taken and the unchanged cost counts as convergence. It also inverts
-/// JᵀJ, and knows no bounds.
+/// argmin's own `GaussNewtonLS` compares ‖r‖ in its line search with the slope of ½‖r‖²: where ‖r‖ is large the line search asks for more
+/// than there is, no step is taken and the unchanged cost counts as convergence. It also inverts JᵀJ, and knows no bounds.
 pub(super) struct DampedGaussNewton<'a> {
     pub bounds: &'a Bounds,
     pub scale: &'a DVector<f64>,

@@ -47,9 +47,8 @@ pub(in crate::fit) fn usual(problem: &Problem<'_>) -> usize {
 /// `count` draws of θ, or as many as fits need, from the posterior of likelihood and weak priors within the bounds; `fits` are ends of
 /// searches, best first.
 ///
-/// Draws of Student densities about the tops are weighed by posterior over their mixture; the weighted mean and covariance about each
-/// top propose a second round, as directions that the records hardly know bend; draws are taken from that in proportion to their
-/// weights.
+/// Draws of Student densities about the tops are weighed by posterior over their mixture; the weighted mean and covariance about each top
+/// propose a second round, as directions that the records hardly know bend; draws are taken from that in proportion to their weights.
 ///
 /// Source: Rubin, "Using the SIR algorithm to simulate posterior distributions" (1988).
 pub(crate) fn posterior(

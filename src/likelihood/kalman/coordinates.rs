@@ -75,8 +75,7 @@ impl Coordinates {
         DVector::from_fn(phi.len(), |j, _| phi[j].clamp(self.lower[j], self.upper[j]))
     }
 
-    /// φ with entry j moved by `share` of its step, downwards where the upper bound is nearer; and how far it moved, rounding
-    /// included.
+    /// φ with entry j moved by `share` of its step, downwards where the upper bound is nearer; and how far it moved, rounding included.
     pub(crate) fn beside(&self, phi: &[f64], j: usize, share: f64) -> (Vec<f64>, f64) {
         let step = share * self.steps[j];
         let mut moved = phi.to_vec();

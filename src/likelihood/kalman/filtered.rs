@@ -19,8 +19,7 @@ pub struct Filtered {
     pub innovations: Signal,
     /// Covariance of each innovation (N × p × p).
     pub covariances: Array3<f64>,
-    /// Innovations in their own units, uncorrelated across outputs (N × p): independent N(0, 1) if the twin is
-    /// right and linear.
+    /// Innovations in their own units, uncorrelated across outputs (N × p): independent N(0, 1) if the twin is right and linear.
     pub standardised: Signal,
     /// States given the outputs up to their own sample; only where the settings ask for them.
     pub states: Option<States>,

@@ -1,8 +1,7 @@
 //! Kalman filters over any twin with equations: likelihood, innovations, smoothed states.
 //!
-//! A filter turns a record into the log-likelihood of θ and into innovations, which are white with unit variance
-//! when the twin is right. It needs a twin with equations ([`StateSpace`](crate::twin::StateSpace)); of a black box,
-//! `diagnose` asks simulations instead.
+//! A filter turns a record into the log-likelihood of θ and into innovations, which are white with unit variance when the twin is right. It
+//! needs a twin with equations ([`StateSpace`](crate::twin::StateSpace)); of a black box, `diagnose` asks simulations instead.
 //!
 //! | to … | look at |
 //! |---|---|

@@ -53,8 +53,7 @@ pub(super) trait Sink {
 
 impl Sink for () {}
 
-/// The state given the rows so far; apart from the buffers, of which calls to the twin see some, so that it can stay in
-/// registers.
+/// The state given the rows so far; apart from the buffers, of which calls to the twin see some, so that it can stay in registers.
 struct State<S: Size> {
     mean: S::Vector,
     cov: S::Matrix,

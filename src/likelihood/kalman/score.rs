@@ -6,8 +6,7 @@ use super::{Coordinates, FilterError, Kalman};
 use crate::math::{LANES, Stencil};
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
-/// Gradient of the log-likelihood in the [`Coordinates`] φ, by central differences (one-sided at a bound); d
-/// parameters, N samples.
+/// Gradient of the log-likelihood in the [`Coordinates`] φ, by central differences (one-sided at a bound); d parameters, N samples.
 ///
 /// ```text
 /// s = Σ ∂ log p(y_k | y_0 … y_{k−1}) / ∂φ

@@ -10,8 +10,7 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Method {
-    /// Linearised at the mean, Jacobians by central differences; limits act on the moments. Exact for linear twins without
-    /// limits.
+    /// Linearised at the mean, Jacobians by central differences; limits act on the moments. Exact for linear twins without limits.
     Extended,
     /// Points at ±√3 standard deviations along each direction of state and process noise go through the real step
     /// (divided differences of second order); limits act on the moments. Exact for linear twins without limits.

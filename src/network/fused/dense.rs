@@ -22,8 +22,7 @@ use std::marker::PhantomData;
 #[derive(Debug)]
 pub struct Dense<const I: usize, const O: usize, A = Tanh>(PhantomData<A>);
 
-/// Linear map, layer normalisation, activation and dropout in one: `NormDense<I, O, A>` is
-/// `(Linear<I, O>, LayerNorm1D<O>, A, Dropout)`.
+/// Linear map, layer normalisation, activation and dropout in one: `NormDense<I, O, A>` is `(Linear<I, O>, LayerNorm1D<O>, A, Dropout)`.
 ///
 /// out = dropout(A(γ·(z − mean z)/√(var z + 1e-5) + β)), z = xWᵀ + b, x: rows × I, out: rows × O. W and b start uniform
 /// in ±1/√I, γ at 1, β at 0.

@@ -110,8 +110,7 @@ impl<'a> Axes<'a> {
         end
     }
 
-    /// The quantity, then lines with their labels: beside it, or below in as many rows as they need. Returns the last
-    /// baseline.
+    /// The quantity, then lines with their labels: beside it, or below in as many rows as they need. Returns the last baseline.
     fn legend(&self, out: &mut String, top: f64) -> f64 {
         let quantity = clipped(&self.panel.y, TEXT * BOLD, ROOM);
         let mut at = (EDGE, top + LINE);

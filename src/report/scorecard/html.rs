@@ -83,9 +83,8 @@ fn bins(card: &Scorecard) -> String {
     let Some(svg) = delivered_svg(card) else {
         return paragraph("No trial has a gap.");
     };
-    let head: Vec<_> = (BIN_HEAD.iter().enumerate())
-        .map(|(i, name)| (*name, if i < 2 { Text } else { Number }))
-        .collect();
+    let mut head = BIN_HEAD.map(|name| (name, Number));
+    (head[0].1, head[1].1) = (Text, Text);
     let cells = |bins: &[Bin]| -> Vec<Vec<String>> { bins.iter().map(bin_cells).collect() };
     let all = table(
         "Every trial with a gap, by its expected information. Missed and failed ones are the rest of the trials. Partial: right and \
@@ -98,6 +97,7 @@ fn bins(card: &Scorecard) -> String {
         &head,
         &cells(&card.clear_by_information),
     );
+    head[1].0 = "evidence held";
     let held = table(
         "Listed truths by the evidence that their records turned out to hold: log evidence of the true effects over the twin alone, fitted \
          once the keys are open.",

@@ -6,9 +6,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Does `work` on every item, in parallel; the results are in no order.
 ///
-/// The current pool's threads are divided into groups, each a pool of its own. Work that is itself parallel therefore neither
-/// waits for another item nor runs one, so that its wall-clock time is its own. The first error stops the other groups at
-/// their next item.
+/// The current pool's threads are divided into groups, each a pool of its own. Work that is itself parallel therefore neither waits for
+/// another item nor runs one, so that its wall-clock time is its own. The first error stops the other groups at their next item.
 pub(super) fn thread_groups<T: Send, E: Send + From<StorageError>>(
     items: &[usize],
     work: impl Fn(usize) -> Result<T, E> + Sync,

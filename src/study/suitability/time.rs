@@ -14,8 +14,7 @@ const UNITS: [(f64, &str); 6] = [
     (1.0 / 3600.0, "hours"),
     (1.0 / 86_400.0, "days"),
 ];
-/// Largest ratio of a step to the plan's, in the right unit: records are seldom sampled quite as planned, and units differ by 60 or
-/// more.
+/// Largest ratio of a step to the plan's, in the right unit: records are seldom sampled quite as planned, and units differ by 60 or more.
 const NEAR_PLAN: f64 = 3.0;
 /// The same for a twin without equations, where nothing but the plan tells its pace.
 const AS_PLANNED: f64 = 1.2;

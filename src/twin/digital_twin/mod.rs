@@ -64,8 +64,7 @@ pub trait DigitalTwin: Send + Sync {
         Signals::default()
     }
 
-    /// Outputs without noise (N × channels). The noise of a black box cannot be switched off from outside: by default, the
-    /// mean of 32 runs.
+    /// Outputs without noise (N × channels). The noise of a black box cannot be switched off from outside: by default, the mean of 32 runs.
     ///
     /// # Errors
     ///

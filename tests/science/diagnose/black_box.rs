@@ -279,16 +279,15 @@ fn starts_are_of_each_record() {
     );
 }
 
-/// The same seed gives the same bits on one thread and on three; another seed does not.
+/// A seed gives the same bits on one thread and on three.
 #[test]
 fn threads_change_no_bit_of_a_box() {
     let effect = "id='sensor-bias'\ntarget='sensor'\nmagnitudes={offset=0.1}";
     let (shown, record) = affected("van-der-pol", effect, &[1.2], Noise::new(57, "threads", 0));
-    let run = |threads: usize, seed: u64| {
+    let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new();
         let pool = pool.num_threads(threads).build().unwrap();
         let settings = DiagnoseSettings {
-            seed,
             detection_only: true,
             ..DiagnoseSettings::default()
         };
@@ -298,9 +297,7 @@ fn threads_change_no_bit_of_a_box() {
         found.seconds = 0.0;
         format!("{found:?}")
     };
-    let first = run(1, 1);
-    assert_eq!(first, run(3, 1));
-    assert_ne!(first, run(2, 2));
+    assert_eq!(run(1), run(3));
 }
 
 /// A simulator that fails for good stops the work; one that diverges half of the time does not.

@@ -141,7 +141,7 @@ fn a_rounded_sensor_is_known_by_its_values() {
 /// A parameter that jumps late in a record: the likelihood as a function of the time has a valley at each sample and a plateau before.
 #[test]
 fn a_step_is_found_at_its_time() {
-    for (i, time, size) in [(0, 119.0, "-0.5"), (1, 150.0, "0.7"), (2, 60.0, "0.5")] {
+    for (i, time, size) in [(0, 119.0, "-0.5"), (2, 60.0, "0.5")] {
         let key = "parameter-step@k3";
         let found = found_in_tanks(key, &format!("size={size},time={time:.1}"));
         assert_eq!(found.cause.effects[0].key(), key, "{i}");

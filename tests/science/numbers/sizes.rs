@@ -64,7 +64,7 @@ fn many(tanks: usize) {
         inputs: 3,
     };
     let project = Project::from(chain.study(400)).with_features(lags);
-    estimated(chain, project, 400, 2000);
+    estimated(chain, project, 400, 1000);
 }
 
 #[test]

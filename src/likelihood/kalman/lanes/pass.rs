@@ -22,8 +22,7 @@ pub(super) struct Job<'j> {
 /// Innovation and its variance, row by row; 0 and 1 where the output is missing.
 pub(super) type Rows = Vec<[Lanes; 2]>;
 
-/// A pass of up to eight jobs over records of the same length, step, gaps and twin; N states, P = (1 + 4·N)·N numbers of
-/// points.
+/// A pass of up to eight jobs over records of the same length, step, gaps and twin; N states, P = (1 + 4·N)·N numbers of points.
 pub(super) struct Pass<'p, const N: usize, const P: usize> {
     pub jobs: &'p [Job<'p>],
     pub rows: &'p mut Rows,

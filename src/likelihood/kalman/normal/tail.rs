@@ -14,8 +14,7 @@ pub(in crate::likelihood::kalman) struct Tail {
 /// 1/√(2π).
 pub(in crate::likelihood::kalman) const DENSITY: f64 = 0.398_942_280_401_432_7;
 
-/// (1 + 2·x)·erfcx(x) on [0, 5] by powers of s = 2.2 − 9.6/(x + 3), by Chebyshev interpolation; relative error
-/// 5e-17.
+/// (1 + 2·x)·erfcx(x) on [0, 5] by powers of s = 2.2 − 9.6/(x + 3), by Chebyshev interpolation; relative error 5e-17.
 const SCALED: [f64; 18] = [
     1.287_407_632_173_560_4,
     -0.007_658_332_791_010_506,

@@ -9,8 +9,7 @@ use crate::study::Study;
 /// Height of a panel.
 const HEIGHT: f64 = 130.0;
 
-/// Missing functions with ± one standard error, beside the twin alone and on top of the accepted effects; `None` where
-/// none was fitted.
+/// Missing functions with ± one standard error, beside the twin alone and on top of the accepted effects; `None` where none was fitted.
 pub fn functions(study: &Study, diagnosis: &Diagnosis) -> Option<String> {
     let units = Units::of(study);
     let all = &diagnosis.location.functions;
