@@ -2,7 +2,7 @@
 
 use super::words::{effect, effects, few, joined};
 use crate::diagnose::{Cause, Decision, Diagnosis, Location, Verdict};
-use crate::report::digits::{chance, percent};
+use crate::report::digits::chance;
 use crate::report::units::Units;
 
 /// Characters of a headline: two lines of a page.
@@ -95,14 +95,12 @@ fn accepted(units: &Units, cause: &Cause) -> String {
     let is_partial = cause.decision == Decision::Partial;
     let remains = match (is_partial, &cause.remains) {
         (false, _) => [String::new(), String::new()],
-        (true, None) => ["; something remains", "; something remains"].map(String::from),
-        (true, Some(rest)) => {
-            let share = percent(rest.share);
-            [
-                format!("; {share} remains at {}", units.in_words(&rest.place)),
-                format!("; {share} remains"),
-            ]
-        }
+        (true, None) => ["; more remains"; 2].map(String::from),
+        // The share of evidence that remains is told below: beside that of the error, it reads as what is left of it.
+        (true, Some(rest)) => [
+            format!("; more remains at {}", units.in_words(&rest.place)),
+            "; more remains".into(),
+        ],
     };
     let Naming {
         sure,

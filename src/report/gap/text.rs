@@ -366,7 +366,7 @@ mod tests {
             "{none}"
         );
         let partial = gap_text(&made::rig_pair());
-        let lacks = "lacks a ceiling in a_state_with_a_name_that_is_long and quantization in sensor2; 21 % remains at enthalpy.";
+        let lacks = "lacks a ceiling in a_state_with_a_name_that_is_long and quantization in sensor2; more remains at enthalpy.";
         assert!(partial.contains(lacks), "{partial}");
         let mut rivalled = made::rig_pair();
         rivalled.cause.class.push("sensor-lag@sensor2".into());

@@ -44,7 +44,7 @@ fn rivals_get_a_record_that_tells_more() {
     let text = "[[effect]]\nid='quadratic-drag'\ntarget='h1'\nmagnitudes={coefficient=0.04}\n";
     let theta = [0.6, 0.6, 0.6, 1.0];
     let mut proposed = false;
-    for i in 0..3 {
+    for i in [2, 0, 1] {
         let noise = Noise::new(42, "rivals", i);
         let record = record(study.twin(), text, &theta, drive(&study, noise), noise);
         let range = (record.drive().inputs().iter())
@@ -145,7 +145,7 @@ fn power_is_what_it_says() {
         let text = format!(
             "[[effect]]\nid='{id}'\ntarget='{target}'\n{more}magnitudes={{{name}={value}}}\n"
         );
-        for i in 0..5 {
+        for i in 0..4 {
             let noise = Noise::new(45, id, i);
             let drive = drive(&study, noise);
             let record = record(study.twin(), &text, &theta, drive, noise);

@@ -56,7 +56,7 @@ fn record(study: &Study, diagnosis: &Diagnosis) -> String {
     let marked = if diagnosis.location.maps.notable().windows.is_empty() {
         ""
     } else {
-        " Strip: share of one-step errors."
+        " Strip: shares of prediction errors."
     };
     let caption = format!("The twin runs from the inputs alone.{marked}");
     let svg = pictures::runs(study, diagnosis, false);

@@ -255,7 +255,7 @@ fn every_part_of_the_answer_has_its_place() {
     }
     let partial = gap_html(&oscillator(), &made::rig_pair());
     for text in [
-        "21 % remains at enthalpy.",
+        "more remains at enthalpy.",
         "explains most of the gap; something unknown remains.",
         "Look at enthalpy",
     ] {
