@@ -158,16 +158,14 @@ fn an_effect_is_found_that_drove_the_parameters_out() {
     let study = study("tanks");
     let gain =
         "[[effect]]\nid = 'sensor-gain'\ntarget = 'sensor'\nmagnitudes = { error = -0.06 }\n";
-    for seed in 0..2 {
-        let noise = Noise::new(38, "gain", seed);
-        let theta = [0.72, 1.03, 0.484, 0.72];
-        let record = record(study.twin(), gain, &theta, drive(&study, noise), noise);
-        let found = found(&study, record, None);
-        println!("{}", line("sensor-gain@sensor", &found));
-        let (best, class) = (&found.cause.effects[0], &found.cause.class);
-        assert_eq!(best.target, "sensor", "{class:?}");
-        assert!(class.contains(&"sensor-gain@sensor".into()), "{class:?}");
-    }
+    let noise = Noise::new(38, "gain", 0);
+    let theta = [0.72, 1.03, 0.484, 0.72];
+    let record = record(study.twin(), gain, &theta, drive(&study, noise), noise);
+    let found = found(&study, record, None);
+    println!("{}", line("sensor-gain@sensor", &found));
+    let (best, class) = (&found.cause.effects[0], &found.cause.class);
+    assert_eq!(best.target, "sensor", "{class:?}");
+    assert!(class.contains(&"sensor-gain@sensor".into()), "{class:?}");
 }
 
 /// A delay of thirty samples, far longer than any register of a filter: actuators are computed before it.
