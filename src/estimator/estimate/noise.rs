@@ -77,32 +77,27 @@ pub(super) fn shown(
         // The estimate stands on features, which may exist where the likelihood does not.
         Err(_) => return Ok(None),
     };
-    let of = |levels: &mut dyn Iterator<Item = (String, f64)>| {
-        let levels: BTreeMap<String, f64> = levels.collect();
-        with_levels(study.twin(), record, &study.beliefs(), &levels)
-            .map_err(|error| EstimatorError::from(StudyError::Adaptation(error)))
+    let with = |levels: BTreeMap<String, f64>| match levels.is_empty() {
+        true => Ok(study.twin().clone()),
+        false => with_levels(study.twin(), record, &study.beliefs(), &levels),
     };
+    let failed = |error| EstimatorError::from(StudyError::Adaptation(error));
     let levels: Vec<FittedNoise> = fit.noise.iter().filter(|l| is_off(l)).cloned().collect();
-    let twin = of(&mut levels.iter().map(|level| (level.name.clone(), level.value)))?;
+    let off = levels.iter().map(|level| (level.name.clone(), level.value));
+    let twin = with(off.collect()).map_err(failed)?;
     // A fitted level where none is declared may be no more than a floor, and hides what an exact twin would show.
-    let declared = || {
-        fit.noise
-            .iter()
-            .filter(|l| l.declared.is_some() && l.value > 0.0)
-    };
-    let draws = if declared().next().is_some() {
-        DRAWS
-    } else {
-        1
-    };
+    let is_declared = |level: &&FittedNoise| level.declared.is_some() && level.value > 0.0;
+    let declared: Vec<&FittedNoise> = fit.noise.iter().filter(is_declared).collect();
+    let draws = if declared.is_empty() { 1 } else { DRAWS };
     let drawn = (0..draws).map(|draw| {
         let mut source = Noise::new(options.seed, "levels", draw).source("normal");
-        of(&mut declared().map(|level| {
+        let levels = declared.iter().map(|level| {
             let factor = (source.normal() * level.std_error / level.value).exp();
             (level.name.clone(), level.value * factor)
-        }))
+        });
+        with(levels.collect())
     });
-    let drawn = Twin::new(Drawn(drawn.collect::<Result<_, _>>()?));
+    let drawn = Twin::new(Drawn(drawn.collect::<Result<_, _>>().map_err(failed)?));
     Ok(Some(Shown {
         fit,
         levels,

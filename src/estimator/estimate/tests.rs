@@ -4,7 +4,6 @@ use super::*;
 use crate::estimator::estimate::EstimateOptions;
 use crate::estimator::pretrain::{PretrainOptions, pretrain};
 use crate::study::{RecordPlan, Study, StudyFile};
-use crate::twin::DigitalTwin;
 use crate::twins::CascadedTanks;
 
 /// The tanks, all physical parameters fixed.
@@ -14,6 +13,13 @@ fn fixed(tables: &str) -> Study {
     let plan = RecordPlan::levels(0.5, 60, 0.0, 3.0, 30);
     let study = Study::new("tanks", CascadedTanks, plan).unwrap();
     study.configure(&file).unwrap()
+}
+
+/// A record of this twin under a drive of the study.
+fn record(study: &Study, twin: &Twin, theta: &[f64], noise: Noise) -> Record {
+    let drive = study.drives().unwrap().draw(noise).unwrap();
+    let outputs = twin.simulate(theta, &drive, noise).unwrap();
+    Record::new(drive, outputs).unwrap()
 }
 
 const SMALL: PretrainOptions = PretrainOptions {
@@ -29,10 +35,8 @@ fn a_start_alone_is_estimated() {
         fixed("[start]\nh1 = 'estimate'\n[features]\nkind = 'arx'\noutputs = 4\ninputs = 4");
     let (estimator, _) = pretrain(&study, &SMALL, &Progress::silent()).unwrap();
     let noise = Noise::new(1, "record", 0);
-    let drive = study.drives().unwrap().draw(noise).unwrap();
     let theta = study.twin().parameters().centre();
-    let outputs = study.twin().simulate(&theta, &drive, noise).unwrap();
-    let record = Record::new(drive, outputs).unwrap();
+    let record = record(&study, study.twin(), &theta, noise);
     let estimate = estimator
         .estimate(&record, &EstimateOptions::default(), &Progress::silent())
         .unwrap();
@@ -40,8 +44,7 @@ fn a_start_alone_is_estimated() {
     assert!(estimate.std_error[0].is_finite());
 }
 
-/// Of records that start higher and higher above the prior, some have a p-value within two Monte-Carlo errors of the level: they are tested
-/// again, at both gates.
+/// Some records that start above the prior have a p-value within two Monte-Carlo errors of the level: they are tested again, at both gates.
 #[test]
 fn an_answer_near_the_level_is_taken_from_more_simulations() {
     let study =
@@ -56,9 +59,7 @@ fn an_answer_near_the_level_is_taken_from_more_simulations() {
     for index in 0..20 {
         theta[0] += 0.1;
         let noise = Noise::new(3, "record", index);
-        let drive = study.drives().unwrap().draw(noise).unwrap();
-        let outputs = study.twin().simulate(&theta, &drive, noise).unwrap();
-        let record = Record::new(drive, outputs).unwrap();
+        let record = record(&study, study.twin(), &theta, noise);
         let estimate = estimator
             .estimate(&record, &EstimateOptions::default(), &Progress::silent())
             .unwrap();
@@ -84,10 +85,8 @@ fn tanks(declared: f64) -> Study {
 fn levels_off(declared: f64, seed: u64) -> Vec<String> {
     let study = tanks(declared);
     let noise = Noise::new(seed, "record", 0);
-    let drive = study.drives().unwrap().draw(noise).unwrap();
-    let theta = [0.6, 0.5, 0.55, 1.0];
-    let outputs = CascadedTanks.simulate(&theta, &drive, noise).unwrap();
-    let record = Record::new(drive, outputs).unwrap();
+    let tanks = Twin::new(CascadedTanks);
+    let record = record(&study, &tanks, &[0.6, 0.5, 0.55, 1.0], noise);
     let shown = noise::shown(
         &study,
         &record,
