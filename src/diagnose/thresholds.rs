@@ -7,10 +7,6 @@ pub(in crate::diagnose) struct Thresholds;
 
 /// Hypotheses.
 impl Thresholds {
-    /// Delays of one sensor of several, in samples, a list for each register: the shorter the register, the faster the filter.
-    pub const DELAYS: [&[f64]; 3] = [&[0.5, 1.5], &[3.0], &[5.5]];
-    /// Samples that the registers of the delays hold. One of 16 takes five times as long where a delay is likely.
-    pub const REGISTERS: [usize; 3] = [3, 5, 8];
     /// Times of a step that are tried, evenly over the record.
     pub const TIMES: usize = 9;
     /// Nats for a mark that outputs bear, such as repeated values of a quantiser.

@@ -56,7 +56,7 @@ fn check_place(
         return Err(TwinError::EffectOnBlackBox { id });
     }
     if matches!(law, Law::Sensor(_))
-        && effect.kind().memories().1 > 0
+        && effect.kind().memory_values() > 0
         && effect.kind().position() > NOISE_ENTERS
     {
         return Err(TwinError::EffectMemory {

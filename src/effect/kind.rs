@@ -59,7 +59,7 @@ pub struct EffectKind {
     only_on: Option<Vec<String>>,
     order: u32,
     memory: usize,
-    least_memory: usize,
+    dead_time: bool,
     mark: Option<fn(&[f64]) -> Mark>,
     check: Option<MagnitudeCheck>,
 }
@@ -159,7 +159,7 @@ impl EffectKind {
             only_on: None,
             order: 0,
             memory: 0,
-            least_memory: 0,
+            dead_time: false,
             mark: None,
             check: None,
         }
@@ -187,15 +187,15 @@ impl EffectKind {
     /// Sets the number of values that a signal law remembers. They begin at the first value of the signal.
     #[must_use]
     pub fn memory(mut self, values: usize) -> Self {
-        (self.memory, self.least_memory) = (values, values);
+        self.memory = values;
         self
     }
 
-    /// Allows shorter memories, down to `values`, where the magnitudes are small, as for a short delay. A filter then has
-    /// fewer states. The law must not reach beyond the memory that it is given.
+    /// Says that the law shows its signal as it was so many seconds ago, its first magnitude. Equations then keep only what lies between
+    /// samples in their states: whole samples are left to who reads or writes the outputs.
     #[must_use]
-    pub(super) fn least_memory(mut self, values: usize) -> Self {
-        self.least_memory = values;
+    pub(super) fn dead_time(mut self) -> Self {
+        self.dead_time = true;
         self
     }
 
@@ -279,9 +279,19 @@ impl EffectKind {
         self.order
     }
 
-    /// Least and largest number of memory values.
-    pub(crate) fn memories(&self) -> (usize, usize) {
-        (self.least_memory, self.memory)
+    /// Number of memory values that a signal law needs.
+    pub(crate) fn memory_values(&self) -> usize {
+        self.memory
+    }
+
+    /// Returns whether the law shows its signal as it was so many seconds ago.
+    pub(crate) fn is_dead_time(&self) -> bool {
+        self.dead_time
+    }
+
+    /// Seconds that a dead time may last at this step; `None` of other laws.
+    pub(crate) fn longest_dead_time(&self, dt: f64) -> Option<f64> {
+        self.dead_time.then(|| (self.memory - 1) as f64 * dt)
     }
 
     /// Looks for the effect's mark on measured outputs of its target.

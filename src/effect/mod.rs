@@ -28,7 +28,6 @@ mod placed;
 mod unit;
 
 pub use augment::augment;
-pub(crate) use augment::augment_short;
 pub use catalogue::Catalogue;
 pub(crate) use check::targets;
 pub use key::{EffectKey, EffectPattern};

@@ -52,5 +52,6 @@ pub use outline::Outline;
 pub(crate) use parameter::PRIOR_DEVIATION;
 pub use parameter::{Parameter, ParameterSpace, Role};
 pub(crate) use points::{LanePoints, Layout, Points};
+pub(crate) use simulation::DeadTime;
 pub(crate) use state_space::Advance;
 pub use state_space::{Outliers, StateSpace};

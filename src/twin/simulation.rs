@@ -84,6 +84,7 @@ pub(super) fn simulate_equations(
     let mut x = vec![0.0; n];
     let mut work = Workspace::new(twin);
     let acting = Acting::of(twin, theta, drive)?;
+    let mut dead_time = DeadTime::of(twin, theta, drive.dt());
     let mut outputs = vec![0.0; drive.samples() * p];
     let first = acting.at(0, theta);
     twin.start(&first, &mut x);
@@ -94,6 +95,7 @@ pub(super) fn simulate_equations(
         let now = acting.at(k, theta);
         let y = &mut outputs[k * p..(k + 1) * p];
         twin.observe(&now, &x, y);
+        dead_time.hold_back(y);
         if !noise.is_off() {
             q.fill(0.0);
             r.fill(0.0);
@@ -128,6 +130,35 @@ pub(super) fn simulate_equations(
         .map_err(|error| SimulationError::Fatal(error.into()))?;
     twin.corrupt_outputs(theta, noise, &mut outputs);
     Ok(outputs)
+}
+
+/// Holds outputs back by their dead times; before the start, the first values stand.
+pub(crate) struct DeadTime {
+    /// Samples of each output; empty where none is late.
+    late: Vec<usize>,
+    /// Outputs so far, as observed.
+    observed: Vec<f64>,
+}
+
+impl DeadTime {
+    pub fn of(twin: &(impl StateSpace + ?Sized), theta: &[f64], dt: f64) -> Self {
+        Self {
+            late: twin.dead_time(theta, dt),
+            observed: vec![],
+        }
+    }
+
+    /// Replaces the outputs of the next sample by those that are shown at it.
+    pub fn hold_back(&mut self, y: &mut [f64]) {
+        if self.late.is_empty() {
+            return;
+        }
+        let (p, k) = (y.len(), self.observed.len() / y.len());
+        self.observed.extend_from_slice(y);
+        for (j, (y, late)) in y.iter_mut().zip(&self.late).enumerate() {
+            *y = self.observed[k.saturating_sub(*late) * p + j];
+        }
+    }
 }
 
 /// Moves the start by draws of its own deviations, within the limits.

@@ -129,6 +129,12 @@ pub trait StateSpace: Advance + Send + Sync {
         Ok(None)
     }
 
+    /// Whole samples by which each output shows late what [`observe`](Self::observe) says; empty where none is. A run holds the outputs back
+    /// before their noise, the first ones in place of those before the start; a filter takes the record's values so much earlier.
+    #[doc(hidden)]
+    fn dead_time(&self, _theta: &[f64], _dt: f64) -> Vec<usize> {
+        vec![]
+    }
     /// One run. Wrappers that leave the motion alone run the twin that they hold.
     #[doc(hidden)]
     fn run(&self, theta: &[f64], drive: &Drive, noise: Noise) -> Result<Signal, SimulationError> {

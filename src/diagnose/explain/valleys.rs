@@ -13,7 +13,7 @@ use rayon::prelude::*;
 const PLACES: usize = 2;
 /// Iterations before a new start is compared with the old end.
 const ITERATIONS: usize = 12;
-/// Samples of the first move of a time, doubled up to a quarter of the distance between the times that are tried: the likelihood has a
+/// Samples of the first move of a time or a delay, doubled up to a quarter of the distance between the times that are tried: the likelihood has a
 /// kink at each sample, and θ moves with the time.
 const MOVE: f64 = 0.5;
 /// Most times that the best effects move on.
@@ -154,7 +154,7 @@ fn between(model: &Model<'_>, found: &Found<'_>) -> Result<Option<Start>, StudyE
     }))
 }
 
-/// θ of the twin and magnitudes with each time moved.
+/// θ of the twin and magnitudes with each time or delay moved.
 fn nearby(found: &Found<'_>, term: &Term) -> Vec<Start> {
     let (Some(theta), Some(m), Some(model)) =
         (own_theta(found), found.magnitudes(), found.model.as_ref())
@@ -167,7 +167,7 @@ fn nearby(found: &Found<'_>, term: &Term) -> Vec<Start> {
         .take_while(|samples| *samples <= longest.max(2.0 * MOVE))
         .collect();
     let mut all = vec![];
-    for i in term.times() {
+    for i in term.kinked() {
         for samples in moves.iter().flat_map(|samples| [-samples, *samples]) {
             let mut m = m.clone();
             m[i] += samples * record.drive().dt();

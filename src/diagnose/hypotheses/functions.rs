@@ -122,7 +122,6 @@ fn term(
         part: Part::Effect {
             effect,
             held: BTreeMap::new(),
-            kept: None,
         },
     }
 }

@@ -49,41 +49,27 @@ impl Library<'_> {
             return Ok(vec![]);
         }
         let mut terms = vec![];
-        for (off, kept) in self.ways(effect, &mark) {
-            if let Some(term) = self.term(effect, &values, &mark, &off, kept)? {
+        for off in Self::ways(effect, &mark) {
+            if let Some(term) = self.term(effect, &values, &mark, &off)? {
                 terms.push(term);
             }
         }
         Ok(terms)
     }
 
-    /// Magnitudes that are off, and the values in the memory of a sensor's delay, of each way to use an effect. A delay of the only sensor
-    /// makes the whole twin late, and needs none.
-    fn ways(&self, effect: &Effect, mark: &Mark) -> Vec<(Vec<usize>, Option<usize>)> {
+    /// Magnitudes that are off in each way to use an effect: of several thresholds, one is used at a time.
+    fn ways(effect: &Effect, mark: &Mark) -> Vec<Vec<usize>> {
         let magnitudes = effect.magnitudes();
         if let Mark::Present(m) = mark {
-            return vec![((0..m.len()).filter(|&i| m[i].is_infinite()).collect(), None)];
+            return vec![(0..m.len()).filter(|&i| m[i].is_infinite()).collect()];
         }
         let thresholds: Vec<usize> = (0..magnitudes.len())
             .filter(|&i| magnitudes[i].is_threshold())
             .collect();
-        let (least, most) = effect.kind().memories();
-        let is_sensor = matches!(effect.law(), Law::Sensor(_));
         match thresholds.len() {
-            0 | 1 if self.scales.has_equations() && is_sensor && least < most => {
-                match self.scales.outline.outputs.len() {
-                    1 => vec![(vec![], Some(0))],
-                    _ => Thresholds::REGISTERS.map(|n| (vec![], Some(n))).to_vec(),
-                }
-            }
-            0 | 1 => vec![(vec![], None)],
+            0 | 1 => vec![vec![]],
             _ => (thresholds.iter())
-                .map(|i| {
-                    (
-                        thresholds.iter().copied().filter(|j| j != i).collect(),
-                        None,
-                    )
-                })
+                .map(|i| thresholds.iter().copied().filter(|j| j != i).collect())
                 .collect(),
         }
     }
@@ -94,7 +80,6 @@ impl Library<'_> {
         values: &[f64],
         mark: &Mark,
         off: &[usize],
-        kept: Option<usize>,
     ) -> Result<Option<Term>, StudyError> {
         let magnitudes = effect.magnitudes();
         let held: BTreeMap<String, f64> = (off.iter())
@@ -119,7 +104,6 @@ impl Library<'_> {
             part: Part::Effect {
                 effect: effect.clone(),
                 held,
-                kept,
             },
             axes: vec![],
             family: None,
@@ -136,12 +120,11 @@ impl Library<'_> {
         let twin = with_terms(self.twin, std::iter::once(&term))?;
         let space = twin.parameters();
         let names = term.names();
-        let register = kept.and_then(|n| Thresholds::REGISTERS.iter().position(|r| *r == n));
         let mut grids: Vec<Vec<f64>> = vec![];
         let mut scales = false;
         for (i, (m, name)) in free.iter().zip(&names).enumerate() {
             let j = space.position(name)?;
-            let (grid, axis) = self.magnitude(m, effect, values, register, (&twin, j, &space[j]));
+            let (grid, axis) = self.magnitude(m, effect, values, (&twin, j, &space[j]));
             if matches!(axis.evidence, EvidencePrior::Magnitude { .. }) && i == 0 {
                 scales = true;
             }
@@ -167,7 +150,6 @@ impl Library<'_> {
         m: &Magnitude,
         effect: &Effect,
         values: &[f64],
-        register: Option<usize>,
         (twin, j, parameter): (&Twin, usize, &Parameter),
     ) -> (Vec<f64>, Axis) {
         let (dt, duration) = (self.scales.dt(), self.scales.duration());
@@ -227,23 +209,10 @@ impl Library<'_> {
             return (levels(values, upper), axis);
         }
         match (m.unit, m.off) {
-            ("s", Some(_)) if register.is_some() => {
-                let register = register.unwrap_or(0);
-                let reach = (Thresholds::REGISTERS[register] - 1) as f64 * dt;
-                linear(
-                    0.0,
-                    reach,
-                    Thresholds::DELAYS[register]
-                        .iter()
-                        .map(|v| v * dt)
-                        .collect(),
-                )
-            }
             ("s", Some(_)) => {
                 let mut longest = (LONGEST * duration).max(0.6 * dt);
-                let (least, most) = effect.kind().memories();
-                if least < most {
-                    longest = longest.min((most - 1) as f64 * dt);
+                if let Some(most) = effect.kind().longest_dead_time(dt) {
+                    longest = longest.min(most);
                 }
                 let octaves = std::iter::successors(Some(0.5 * dt), |tau| Some(2.0 * tau));
                 let octaves = octaves.take_while(|tau| *tau < longest);

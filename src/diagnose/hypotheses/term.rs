@@ -4,7 +4,7 @@ use super::disturbed_equations::disturbed;
 use super::entered::with_function;
 use super::entry::{Entered, Entry};
 use super::{disturbed_signals, entered_black_box};
-use crate::effect::{Effect, EffectKey, Magnitude, augment_short};
+use crate::effect::{Effect, EffectKey, Magnitude, augment};
 use crate::fit::axis::Axis;
 use crate::study::StudyError;
 use crate::twin::{Twin, fix};
@@ -33,11 +33,10 @@ pub(in crate::diagnose) enum Nature {
 /// Addition to the twin.
 #[derive(Debug, Clone)]
 pub(in crate::diagnose) enum Part {
-    /// An effect, some magnitudes of which may be held at their off value; `kept` values of a delay's memory.
+    /// An effect, some magnitudes of which may be held at their off value.
     Effect {
         effect: Effect,
         held: BTreeMap<String, f64>,
-        kept: Option<usize>,
     },
     /// A disturbance that keeps a share `memory` of itself at each step.
     Disturbance { entry: Entry, memory: f64 },
@@ -162,6 +161,14 @@ impl Term {
             .collect()
     }
 
+    /// Entries of the free magnitudes at which the likelihood has a kink at each sample: times in the record and delays.
+    pub fn kinked(&self) -> Vec<usize> {
+        match &self.part {
+            Part::Effect { effect, .. } if effect.kind().is_dead_time() => vec![0],
+            _ => self.times(),
+        }
+    }
+
     /// Names of an effect's free magnitudes in θ, in the order of the axes.
     pub fn names(&self) -> Vec<String> {
         match &self.part {
@@ -178,16 +185,15 @@ pub(in crate::diagnose) fn with_terms<'t>(
     base: &Twin,
     terms: impl Iterator<Item = &'t Term> + Clone,
 ) -> Result<Twin, StudyError> {
-    let (mut effects, mut memories) = (vec![], vec![]);
+    let mut effects = vec![];
     let mut off = BTreeMap::new();
     for term in terms.clone() {
-        if let Part::Effect { effect, held, kept } = &term.part {
+        if let Part::Effect { effect, held } = &term.part {
             effects.push(effect.clone());
-            memories.push(kept.unwrap_or(effect.kind().memories().1));
             off.extend((held.iter()).map(|(name, v)| (effect.key().magnitude(name), *v)));
         }
     }
-    let twin = fix(augment_short(base.clone(), effects, memories)?, &off)?;
+    let twin = fix(augment(base.clone(), effects)?, &off)?;
     Ok(terms.fold(twin, |twin, term| match (&term.part, twin) {
         (Part::Effect { .. }, twin) => twin,
         (part, Twin::BlackBox(twin)) => match *part {
@@ -213,7 +219,6 @@ pub(in crate::diagnose) mod fixture {
         let part = Part::Effect {
             effect: effect.unwrap(),
             held: BTreeMap::new(),
-            kept: None,
         };
         Term {
             id: "wave".into(),

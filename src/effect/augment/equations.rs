@@ -4,6 +4,7 @@ use super::finish::finish;
 use super::{Place, Placed, Slots};
 use crate::effect::batch::{Batch, Channel, ForceBatch, LimitBatch, SensorBatch};
 use crate::effect::law::{ForcePoint, Instant, Law, NoiseLaw, ParameterLaw};
+use crate::effect::library::whole_samples;
 use crate::record::{Drive, Quantity, Signal};
 use crate::twin::{Layout, Modify, Noise, Now, Outliers, Outline, SimulationError, StateSpace};
 use smallvec::SmallVec;
@@ -20,8 +21,6 @@ pub(super) struct AugmentedEquations {
     /// Number of the base twin's states.
     states: usize,
     sensors: Vec<OnSensor>,
-    /// Entries of θ by whose sum the whole twin is late, in seconds.
-    late: Vec<usize>,
     forces: Vec<Placed<dyn ForceBatch>>,
     ceilings: Vec<Placed<dyn LimitBatch>>,
     parameters: Vec<Placed<ParameterLaw>>,
@@ -36,7 +35,11 @@ struct OnSensor {
     at: Place,
     channel: Channel,
     after_noise: bool,
+    is_dead_time: bool,
 }
+
+/// Values that a dead time keeps as states: it reads between two of them, and is moved by less than a sample where a filter differentiates.
+const BETWEEN_SAMPLES: usize = 3;
 
 impl AugmentedEquations {
     pub(super) fn new(base: Arc<dyn StateSpace>, slots: Slots) -> Self {
@@ -44,18 +47,17 @@ impl AugmentedEquations {
         let states = outline.states.len();
         outline.parameters = slots.space(&outline.parameters);
         let mut sensors = Vec::new();
-        let mut late = Vec::new();
         for slot in &slots.all {
-            if slot.place.late {
-                late.push(slot.place.magnitudes.start);
-                continue;
-            }
             let kind = slot.effect.kind();
             let Batch::Sensor(law) = kind.over_points() else {
                 continue;
             };
             let from = outline.states.len();
-            let names = (0..slot.place.memory).map(|k| format!("{}/{k}", slot.effect.key()));
+            let memory = match kind.is_dead_time() {
+                true => BETWEEN_SAMPLES,
+                false => kind.memory_values(),
+            };
+            let names = (0..memory).map(|k| format!("{}/{k}", slot.effect.key()));
             outline
                 .states
                 .extend(names.map(|name| Quantity::new(&name, "")));
@@ -67,12 +69,12 @@ impl AugmentedEquations {
                     target: slot.place.target,
                 },
                 after_noise: slot.is_of_readings(),
+                is_dead_time: kind.is_dead_time(),
             });
         }
         Self {
             states,
             sensors,
-            late,
             forces: slots.of_law(|kind| match kind.over_points() {
                 Batch::Force(law) => Some(law),
                 _ => None,
@@ -99,16 +101,11 @@ impl AugmentedEquations {
         }
     }
 
-    /// Calls `with` with the base twin and its own `Now`: its part of θ, bent by the parameter effects, and its own time.
+    /// Calls `with` with the base twin and its own `Now`: its part of θ, bent by the parameter effects.
     #[inline]
     fn inner<R>(&self, now: &Now<'_>, with: impl FnOnce(&dyn StateSpace, &Now<'_>) -> R) -> R {
         let own = &now.theta[..self.slots.base];
         let base = self.base.as_ref();
-        let t = match self.late.is_empty() {
-            true => now.t,
-            false => (now.t - self.delay(now.theta)).max(0.0),
-        };
-        let now = &Now { t, ..*now };
         if self.parameters.is_empty() {
             return with(base, &Now { theta: own, ..*now });
         }
@@ -119,21 +116,6 @@ impl AugmentedEquations {
         }
         let theta = &theta[..];
         with(base, &Now { theta, ..*now })
-    }
-
-    /// Seconds by which the whole twin is late.
-    fn delay(&self, theta: &[f64]) -> f64 {
-        self.late.iter().map(|&j| theta[j]).sum()
-    }
-
-    /// Share of a step in which a late twin moves; `None` for all of it.
-    #[inline]
-    fn moving(&self, now: &Now<'_>) -> Option<f64> {
-        let share = match self.late.is_empty() {
-            true => 1.0,
-            false => (now.t + now.dt - self.delay(now.theta)) / now.dt,
-        };
-        (share < 1.0).then_some(share.max(0.0))
     }
 
     /// Adds the forces to the rates. `inner` is the base twin's.
@@ -202,16 +184,28 @@ impl AugmentedEquations {
 }
 
 impl OnSensor {
+    /// Calls `then` with its magnitudes; a dead time loses its whole samples.
+    #[inline]
+    fn magnitudes<R>(&self, now: &Now<'_>, then: impl FnOnce(&[f64]) -> R) -> R {
+        let m = self.at.m(now.theta);
+        match self.is_dead_time {
+            true => then(&[m[0] - whole_samples(m[0], now.dt) as f64 * now.dt]),
+            false => then(m),
+        }
+    }
+
     /// Passes its channel of points through the effect; advances its memory.
     fn pass(&self, now: &Now<'_>, states: (Layout, &mut [f64]), channels: (usize, &mut [f64])) {
-        let m = self.at.m(now.theta);
-        (self.law).pass(m, instant(now), &self.channel, states, channels);
+        self.magnitudes(now, |m| {
+            (self.law).pass(m, instant(now), &self.channel, states, channels);
+        });
     }
 
     /// As [`pass`](Self::pass), the memory left as it is.
     fn peek(&self, now: &Now<'_>, states: (Layout, &[f64]), channels: (usize, &mut [f64])) {
-        let m = self.at.m(now.theta);
-        (self.law).peek(m, instant(now), &self.channel, states, channels);
+        self.magnitudes(now, |m| {
+            (self.law).peek(m, instant(now), &self.channel, states, channels);
+        });
     }
 
     /// As [`pass`](Self::pass) of an effect without memory; returns whether any value changed.
@@ -262,9 +256,6 @@ impl Modify for AugmentedEquations {
             twin.drift_each(inner, own, x, dx);
             self.push(now, inner, own, x, dx);
         });
-        if let Some(share) = self.moving(now) {
-            dx.iter_mut().for_each(|dx| *dx *= share);
-        }
     }
 
     fn observe_each(&self, now: &Now<'_>, at: Layout, p: usize, x: &[f64], y: &mut [f64]) {
@@ -302,10 +293,7 @@ impl Modify for AugmentedEquations {
                 let observe = |x: &[f64], y: &mut [f64]| twin.observe_each(inner, own, p, x, y);
                 self.remember(now, at, x, observe);
             }
-            // What moves at samples only waits for a whole one.
-            if self.moving(now).is_none_or(|share| share >= 0.5) {
-                twin.update_each(inner, own, x);
-            }
+            twin.update_each(inner, own, x);
         });
     }
 
@@ -313,9 +301,6 @@ impl Modify for AugmentedEquations {
         self.inner(now, |twin, now| {
             twin.noise(now, &mut process[..self.states], measurement);
         });
-        if let Some(share) = self.moving(now) {
-            process.iter_mut().for_each(|q| *q *= share.sqrt());
-        }
         for (added, levels) in [(&self.process, process), (&self.measurement, measurement)] {
             for Placed { law, at } in added {
                 let level = &mut levels[at.target];
@@ -337,15 +322,19 @@ impl Modify for AugmentedEquations {
     }
 
     fn actuated(&self, theta: &[f64], drive: &Drive) -> Result<Option<Drive>, SimulationError> {
-        let mut own = self.slots.actuated(theta, drive)?;
-        if !self.late.is_empty() {
-            let acting = own.as_ref().unwrap_or(drive);
-            let late = acting.late(self.delay(theta));
-            own = Some(late.map_err(|error| SimulationError::Fatal(error.into()))?);
-        }
+        let own = self.slots.actuated(theta, drive)?;
         let acting = own.as_ref().unwrap_or(drive);
         let inner = self.theta(theta, |theta| self.base.actuated(theta, acting))?;
         Ok(inner.or(own))
+    }
+
+    fn dead_time(&self, theta: &[f64], dt: f64) -> Vec<usize> {
+        let mut all = self.theta(theta, |theta| self.base.dead_time(theta, dt));
+        for sensor in self.sensors.iter().filter(|sensor| sensor.is_dead_time) {
+            all.resize(self.outline.outputs.len(), 0);
+            all[sensor.channel.target] += whole_samples(sensor.at.m(theta)[0], dt);
+        }
+        all
     }
 
     fn check_parameters(&self, theta: &[f64], dt: f64) -> Result<(), SimulationError> {

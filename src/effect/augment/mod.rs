@@ -49,26 +49,13 @@ use std::sync::Arc;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn augment(base: impl Into<Twin>, effects: Vec<Effect>) -> Result<Twin, TwinError> {
-    let memories = effects.iter().map(|e| e.kind().memories().1).collect();
-    augment_short(base.into(), effects, memories)
-}
-
-/// Adds effects as [`augment`] does, with so many memory values for each of them, within what its law allows.
-///
-/// A filter's cost grows with the square of the states, and a delay's register is longer than most delays. Without any memory, a delay of
-/// the only sensor makes the whole twin late: its states stand still until then, its inputs and its time are those of before. A delay of
-/// several samples is the same to the last bits, one between samples interpolates inputs in place of outputs.
-pub(crate) fn augment_short(
-    base: Twin,
-    effects: Vec<Effect>,
-    memories: Vec<usize>,
-) -> Result<Twin, TwinError> {
+    let base = base.into();
     if effects.is_empty() {
         return Ok(base);
     }
     let outline = base.outline();
     check_effects(&effects, outline.as_ref(), &base.signals())?;
-    let slots = Slots::of(&base, &effects, &memories);
+    let slots = Slots::of(&base, &effects);
     Ok(match base {
         Twin::Equations(base) => {
             Twin::Equations(Arc::new(Modified(AugmentedEquations::new(base, slots))))
@@ -86,10 +73,6 @@ struct Place {
     target: usize,
     /// Index of the other state.
     other: Option<usize>,
-    /// Memory values.
-    memory: usize,
-    /// True of a delay of the only sensor that makes the whole twin late, and needs no memory.
-    late: bool,
 }
 
 impl Place {
@@ -123,8 +106,7 @@ impl Slot {
     fn pass(&self, law: &SignalLaw, theta: &[f64], drive: &Drive, signal: &mut Signal) {
         let m = self.place.m(theta);
         let mut channel = signal.column_mut(self.place.target);
-        // No filter pays for the states of a long register here.
-        let mut memory = vec![channel[0]; self.effect.kind().memories().1];
+        let mut memory = vec![channel[0]; self.effect.kind().memory_values()];
         for (k, value) in channel.iter_mut().enumerate() {
             let now = Instant {
                 t: drive.time(k),
@@ -152,27 +134,22 @@ struct Slots {
 
 impl Slots {
     /// Targets must have been checked.
-    fn of(base: &Twin, effects: &[Effect], memories: &[usize]) -> Self {
+    fn of(base: &Twin, effects: &[Effect]) -> Self {
         let outline = base.outline();
         let signals = base.signals();
         let states = outline.as_ref().map_or(&[][..], |o| &o.states);
         let base = base.parameters().len();
         let mut parameters = Vec::new();
         let mut all: Vec<Slot> = Vec::new();
-        for (effect, &memory) in effects.iter().zip(memories) {
+        for effect in effects {
             let known = targets(effect.law().target(), outline.as_ref(), &signals);
             let index = |name: &str| known.iter().position(|k| k == name);
             let from = base + parameters.len();
             parameters.extend(magnitude_parameters(effect, states, &signals));
-            let (least, most) = effect.kind().memories();
-            let only = signals.outputs.len() == 1 && matches!(effect.law(), Law::Sensor(_));
-            let late = memory == 0 && least < most && only && outline.is_some();
             let place = Place {
                 magnitudes: from..base + parameters.len(),
                 target: index(effect.target()).unwrap_or(0),
                 other: effect.other().and_then(index),
-                memory: if late { 0 } else { memory.clamp(least, most) },
-                late,
             };
             let effect = effect.clone();
             all.push(Slot { effect, place });
@@ -272,186 +249,4 @@ fn magnitude_parameters(effect: &Effect, states: &[Quantity], signals: &Signals)
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::effect::{Catalogue, Magnitude, OtherState};
-    use crate::twin::{Acting, Hold, Noise, Stepping};
-    use crate::twins::CascadedTanks;
-
-    #[test]
-    fn delays_that_fit_a_short_register_are_exact() {
-        let delay = Catalogue::default()
-            .effect("sensor-delay", "sensor")
-            .unwrap();
-        let base = Twin::new(CascadedTanks);
-        let long = augment(base.clone(), vec![delay.clone()]).unwrap();
-        let short = augment_short(base, vec![delay], vec![5]).unwrap();
-        let states = |twin: &Twin| twin.outline().unwrap().states.len();
-        assert_eq!((states(&long), states(&short)), (2 + 64, 2 + 5));
-        let u = Signal::from_shape_fn((80, 1), |(k, _)| (k % 17) as f64 / 6.0);
-        let drive = Drive::new(0.5, u).unwrap();
-        for delay in [0.0, 0.7, 2.0] {
-            let theta = [0.6, 0.5, 0.55, 1.0, delay];
-            let noise = Noise::new(1, "t", 0);
-            let run = |twin: &Twin| twin.simulate(&theta, &drive, noise).unwrap();
-            assert_eq!(run(&long), run(&short));
-        }
-    }
-
-    /// A twin that is late shows what a register shows, while it stands still at the start, too.
-    #[test]
-    fn a_late_twin_is_a_twin_with_a_late_sensor() {
-        let delay = || Catalogue::default().effect("sensor-delay", "sensor");
-        let base = Twin::new(CascadedTanks);
-        let register = augment(base.clone(), vec![delay().unwrap()]).unwrap();
-        let late = augment_short(base, vec![delay().unwrap()], vec![0]).unwrap();
-        assert_eq!(late.outline().unwrap().states.len(), 2);
-        let u = Signal::from_shape_fn((120, 1), |(k, _)| ((k / 9) % 5) as f64 / 2.0);
-        let drive = Drive::new(0.5, u).unwrap();
-        for (delay, near) in [(0.0, 1e-12), (10.0, 1e-12), (7.3, 0.1)] {
-            let theta = [0.6, 0.5, 0.55, 1.0, delay];
-            let run = |twin: &Twin| twin.free_run(&theta, &drive).unwrap();
-            let difference = run(&register) - run(&late);
-            let most = difference.iter().fold(0.0, |a: f64, d| a.max(d.abs()));
-            assert!(most < near, "{delay}: {most}");
-        }
-    }
-
-    /// Actuators remember nothing in the state: a delay there is the twin with its inputs later, the first one held before.
-    #[test]
-    fn a_delayed_input_costs_no_state() {
-        let delay = Catalogue::default()
-            .effect("actuator-delay", "actuator")
-            .unwrap();
-        let base = Twin::new(CascadedTanks);
-        let twin = augment(base.clone(), vec![delay]).unwrap();
-        assert_eq!(twin.outline().unwrap().states.len(), 2);
-        let input = |k: usize| (k % 17) as f64 / 6.0;
-        let drive = |late: usize| {
-            let rows = Signal::from_shape_fn((80, 1), |(k, _)| input(k.saturating_sub(late)));
-            Drive::new(0.5, rows).unwrap()
-        };
-        let theta = [0.6, 0.5, 0.55, 1.0];
-        let noise = Noise::new(1, "t", 0);
-        let later = base.simulate(&theta, &drive(30), noise).unwrap();
-        let delayed = twin.simulate(&[&theta[..], &[15.0]].concat(), &drive(0), noise);
-        assert_eq!(delayed.unwrap(), later);
-    }
-
-    /// A force of one's own sees inputs, parameters bent by other effects, all states and the time.
-    #[test]
-    fn a_force_sees_the_whole_twin() {
-        let kind = EffectKind::force("all", "", |m, at| {
-            m[0] * (at.x + at.other + at.t + at.states[1] + at.u[0] + at.theta[3])
-        })
-        .magnitude(Magnitude::signed("size", "1", &[1.0]))
-        .other(OtherState::From);
-        let library = Catalogue::default().with(kind);
-        let effects = vec![
-            library.effect("all", "h1").unwrap().with_other("h2"),
-            library.effect("actuator-bias", "actuator").unwrap(),
-            library.effect("parameter-drift", "k4").unwrap(),
-        ];
-        let twin = augment(Twin::new(CascadedTanks), effects).unwrap();
-        let equations = twin.equations().unwrap();
-        let rate = |size: f64| {
-            let theta = [0.6, 0.5, 0.55, 1.0, size, 0.25, 0.5];
-            let drive = Drive::new(0.5, Signal::from_elem((5, 1), 3.0)).unwrap();
-            let acting = Acting::of(equations, &theta, &drive).unwrap();
-            let mut rates = [0.0; 2];
-            equations.drift(&acting.at(4, &theta), &[4.0, 7.0], &mut rates);
-            rates[0]
-        };
-        let expected = 4.0 + 7.0 + 2.0 + 7.0 + 3.25 + 1.0 * (1.0 + 0.5 * 2.0);
-        assert!((rate(1.0) - rate(0.0) - expected).abs() < 1e-12);
-    }
-
-    /// Magnitudes have the units of the twin, not the placeholders of the library.
-    #[test]
-    fn magnitudes_have_units_of_the_twin() {
-        let library = Catalogue::default();
-        let effects = [
-            "state-ceiling@h1",
-            "quadratic-drag@h2",
-            "sensor-drift@sensor",
-        ];
-        let placed = |key: &&str| {
-            let (id, target) = key.split_once('@').unwrap();
-            library.effect(id, target).unwrap()
-        };
-        let effects = effects.iter().map(placed);
-        let effects = effects.map(|effect| match effect.id() {
-            "state-ceiling" => effect.with_other("h2"),
-            _ => effect,
-        });
-        let twin = augment(Twin::new(CascadedTanks), effects.collect()).unwrap();
-        let units: Vec<String> = (twin.parameters().iter().skip(4))
-            .map(|p| format!("{} {}", p.name, p.unit))
-            .collect();
-        assert_eq!(
-            units,
-            [
-                "state-ceiling@h1.level V",
-                "state-ceiling@h1.spill -",
-                "quadratic-drag@h2.coefficient 1/(V·s)",
-                "sensor-drift@sensor.rate V/s",
-            ]
-        );
-    }
-
-    /// A sensor in pascals has a bias of thousands; a fraction stays a fraction.
-    #[test]
-    fn bounds_of_magnitudes_are_the_limits_of_their_law() {
-        let library = Catalogue::default();
-        let signals = Twin::new(CascadedTanks).signals();
-        let of = |id| magnitude_parameters(&library.effect(id, "sensor").unwrap(), &[], &signals);
-        assert!(of("sensor-bias")[0].bounds.contains(-1e5));
-        let drift = &of("sensor-drift")[0];
-        assert!(drift.bounds.contains(1e3) && drift.start_range() == drift.prior);
-        let noise = of("sensor-noise")[0].bounds;
-        assert_eq!(noise.low(), 0.0);
-        assert!(noise.contains(1e4));
-        assert_eq!(of("sensor-rectification")[0].bounds.high(), 1.0);
-    }
-
-    /// Between samples, effects on inputs leave a line a line: off, no bit changes; a bias moves both ends.
-    #[test]
-    fn actuator_effects_keep_inputs_on_lines() {
-        let linear = |_: &mut _, stepping: &mut Stepping| {
-            stepping.hold = Hold::Linear;
-            stepping.substeps = 3;
-        };
-        let base = Twin::new(CascadedTanks).stepped(linear).unwrap();
-        let levels = |shift: f64| {
-            let levels = |(k, _)| shift + [1.5, 2.5, 0.5][k / 10 % 3];
-            Drive::new(0.5, Signal::from_shape_fn((60, 1), levels)).unwrap()
-        };
-        let theta = [0.6, 0.5, 0.55, 1.0];
-        let with = |magnitudes: &[f64]| [&theta[..], magnitudes].concat();
-        let plain = base
-            .simulate(&theta, &levels(0.0), Noise::new(1, "line", 0))
-            .unwrap();
-        let run = |ids: &[&str], magnitudes: &[f64]| {
-            let library = Catalogue::default();
-            let effects = ids.iter().map(|id| library.effect(id, "actuator").unwrap());
-            // One after the other, so that one twin holds another.
-            let twin = effects.fold(base.clone(), |twin, effect| {
-                augment(twin, vec![effect]).unwrap()
-            });
-            let noise = Noise::new(1, "line", 0);
-            twin.simulate(&with(magnitudes), &levels(0.0), noise)
-                .unwrap()
-        };
-        assert_eq!(run(&["actuator-bias"], &[0.0]), plain);
-        assert_eq!(run(&["actuator-lag", "actuator-bias"], &[0.0, 0.0]), plain);
-        let shifted = base
-            .simulate(&theta, &levels(0.25), Noise::new(1, "line", 0))
-            .unwrap();
-        let biased = run(&["actuator-bias"], &[0.25]);
-        assert!((&biased - &shifted).iter().all(|d| d.abs() < 1e-12));
-        assert_ne!(
-            run(&["actuator-bias", "actuator-lag"], &[0.25, 2.0]),
-            biased
-        );
-    }
-}
+mod tests;

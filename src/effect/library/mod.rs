@@ -7,6 +7,7 @@ mod sentences;
 mod shared;
 mod state;
 
+pub(super) use shared::whole_samples;
 pub(crate) use shared::{clamp, lag};
 
 use super::kind::EffectKind;

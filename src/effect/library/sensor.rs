@@ -51,7 +51,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
         )
         .magnitude(DELAY)
         .memory(DELAY_SAMPLES)
-        .least_memory(2)
+        .dead_time()
         .check(|m, dt| check_delay(m[0], dt))
         .order(50),
         // A part f of the signal is rectified.

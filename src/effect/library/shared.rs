@@ -3,8 +3,7 @@
 use super::super::magnitude::Magnitude;
 use crate::setting::number;
 
-/// Samples that a delay keeps: the present one and 63 before it. Those of a sensor are states for whoever simulates or filters
-/// the twin, so there are no more of them than delays in practice need.
+/// Samples that a delay keeps: the present one and 63 before it.
 pub(super) const DELAY_SAMPLES: usize = 64;
 
 pub(super) const TAU: Magnitude = Magnitude::positive("tau", "s", &[1.0, 4.0, 16.0]);
@@ -61,6 +60,12 @@ pub(super) fn delay(delay: f64, dt: f64, past: &mut [f64], value: f64) -> f64 {
     } else {
         (1.0 - f) * past[i] + f * past[i + 1]
     }
+}
+
+/// Whole samples of a delay; what is left lies between 0.37 and 1.37 samples, or is all of a shorter delay. Delays are often whole numbers
+/// of samples: from there, the number does not change under the small steps of a derivative.
+pub(in crate::effect) fn whole_samples(delay: f64, dt: f64) -> usize {
+    (delay / dt - 0.37).floor().max(0.0) as usize
 }
 
 /// Refuses a delay that the register does not reach at step `dt`.

@@ -2,7 +2,7 @@
 
 use crate::evaluate::EvaluateError;
 use crate::likelihood::kalman::FilterError;
-use crate::math::{Stencil, to_vector};
+use crate::math::Stencil;
 use crate::record::{Drive, Record};
 use crate::twin::{Acting, Interval, Now, ParameterSpace, StateSpace, Workspace};
 use nalgebra::{DMatrix, DVector};
@@ -52,6 +52,7 @@ pub fn dual_filter(
     let drive = record.drive();
     twin.check_parameters(&theta, drive.dt())?;
     let (n, p, d) = (outline.states.len(), outline.outputs.len(), theta.len());
+    let dead_time = twin.dead_time(&theta, drive.dt());
     let mut step = Step::new(twin, space, p);
 
     let mut x = vec![record.outputs()[[0, 0]]; n];
@@ -67,7 +68,12 @@ pub fn dual_filter(
         let diverged = || FilterError::Diverged { at: now.t };
         let seen = step.observe(&now, x.as_slice());
         let slope = step.observe_slope(&now, x.as_slice())?;
-        let error = to_vector(&record.outputs().row(k)) - seen;
+        let read = |j: usize| {
+            let late = dead_time.get(j).copied().unwrap_or(0);
+            record.outputs().get([k + late, j]).copied()
+        };
+        // Behind the end of the record, a late output says nothing.
+        let error = DVector::from_fn(p, |j, _| read(j).map_or(0.0, |y| y - seen[j]));
         let gain = kalman_gain(&spread, &slope, &noise).ok_or_else(diverged)?;
         let kept = DMatrix::identity(n, n) - &gain * &slope;
         x += &gain * &error;

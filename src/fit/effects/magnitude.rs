@@ -111,10 +111,8 @@ pub(crate) fn kinds(
         },
         ("s", Some(off)) => {
             let mut longest = LONGEST * duration;
-            let (least, most) = effect.kind().memories();
-            // A delay's register ends.
-            if least < most {
-                longest = longest.min((most - 1) as f64 * dt);
+            if let Some(most) = effect.kind().longest_dead_time(dt) {
+                longest = longest.min(most);
             }
             Kind::Switch {
                 low: 0.0,

@@ -1,13 +1,16 @@
 //! Result of a filter over a record.
 
 use super::gaussian::{Belief, Gaussian};
-use super::pass::{Innovation, Sink};
+use super::order::Order;
+use super::pass::{Bound, Innovation, Pass, Sink};
+use super::size::Any;
 use super::{FilterError, Kalman};
 use crate::record::Signal;
 use ndarray::{Array3, s};
 
 /// A record as the filter saw it; N samples, p outputs, n states. A missing output has innovation 0, variance 1, no covariance
-/// with others, and no part in a density.
+/// with others, and no part in a density. An output with a dead time is predicted beside the state that it shows: from its own past, and from
+/// that of other outputs before that state.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Filtered {
@@ -65,13 +68,19 @@ impl Filtered {
 }
 
 impl Sink for Filtered {
-    fn innovation(&mut self, k: usize, of: &Innovation<'_>) {
-        self.log_densities[k] = of.log_density();
-        let p = of.innovation.len();
+    fn innovation(&mut self, _: usize, of: &Innovation<'_>) {
+        let (p, samples) = (of.innovation.len(), self.innovations.nrows());
+        let there = |j: usize| of.sample_of(j).filter(|k| *k < samples);
+        if let Some(k) = (0..p).find_map(there) {
+            self.log_densities[k] += of.log_density();
+        }
         for j in 0..p {
+            let Some(k) = there(j) else {
+                continue;
+            };
             self.innovations[[k, j]] = of.innovation[j];
             self.standardised[[k, j]] = of.standardised[j];
-            for i in 0..p {
+            for i in (0..p).filter(|&i| there(i) == Some(k)) {
                 self.covariances[[k, i, j]] = of.covariance[i * p + j];
             }
         }
@@ -141,12 +150,29 @@ impl States {
 }
 
 /// Outputs predicted from the rows before.
-struct Predictions(Signal);
+struct Predictions {
+    values: Signal,
+    /// First sample that is written.
+    first: usize,
+    /// Outputs that are left as they are.
+    skipped: Vec<bool>,
+    /// States given the rows so far, where they are wanted.
+    states: Option<Vec<Gaussian>>,
+}
 
 impl Sink for Predictions {
-    fn innovation(&mut self, k: usize, of: &Innovation<'_>) {
-        for (to, value) in self.0.row_mut(k).iter_mut().zip(of.predicted) {
-            *to = *value;
+    fn innovation(&mut self, _: usize, of: &Innovation<'_>) {
+        for j in (0..self.skipped.len()).filter(|&j| !self.skipped[j]) {
+            let k = of.sample_of(j).filter(|k| *k >= self.first);
+            if let Some(to) = k.and_then(|k| self.values.get_mut([k, j])) {
+                *to = of.predicted[j];
+            }
+        }
+    }
+
+    fn filtered(&mut self, _: usize, state: Belief<'_>) {
+        if let Some(states) = &mut self.states {
+            states.push(Gaussian::of(state));
         }
     }
 }
@@ -168,16 +194,55 @@ impl Kalman<'_> {
     }
 
     /// Each output as predicted from the rows before it, N × p. Over rows that are missing, the prediction reaches as far ahead as they
-    /// last.
+    /// last. Beside an output with a dead time, the last rows before are left out, as many as two dead times at most.
     ///
     /// # Errors
     ///
     /// As [`log_likelihood`](Kalman::log_likelihood).
     pub(crate) fn predictions(&self, theta: &[f64]) -> Result<Signal, FilterError> {
-        let shape = self.record.outputs().dim();
-        let mut predictions = Predictions(Signal::zeros(shape));
-        self.run(theta, &mut predictions)?;
-        Ok(predictions.0)
+        let order = Order::of(self, theta);
+        let mut all = Predictions {
+            values: Signal::zeros(self.record.outputs().dim()),
+            first: 0,
+            skipped: vec![false; self.channels],
+            states: (order.before > 0).then(Vec::new),
+        };
+        self.run_in(&order, theta, &mut all as &mut dyn Sink)?;
+        if let Some(states) = all.states.take() {
+            self.predict_punctual(&order, theta, &states, &mut all)?;
+        }
+        Ok(all.values)
+    }
+
+    /// Predicts the outputs without dead time anew: in the filter's order, those with one are ahead of them. Each block of rows begins
+    /// with what had been shown by its first.
+    fn predict_punctual(
+        &self,
+        order: &Order<'_>,
+        theta: &[f64],
+        states: &[Gaussian],
+        to: &mut Predictions,
+    ) -> Result<(), FilterError> {
+        to.skipped = (0..self.channels).map(|j| order.is_late(j)).collect();
+        let acting = self.acting(theta)?;
+        let on = Bound {
+            kalman: self,
+            acting: &acting,
+            order: &order.punctual(self),
+            theta,
+        };
+        let size = Any {
+            states: self.states,
+            outputs: self.channels,
+        };
+        let (samples, block) = (self.record.samples(), order.before);
+        for first in (0..samples).step_by(block) {
+            let shown = first.checked_sub(block + 1);
+            let from = shown.map(|k| (k, states[k].as_belief()));
+            to.first = first;
+            Pass::new(size, &on).run_from(from, (first + block).min(samples), to)?;
+        }
+        Ok(())
     }
 }
 

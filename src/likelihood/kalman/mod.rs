@@ -50,7 +50,9 @@ mod likelihood;
 mod linearised;
 mod moments;
 mod normal;
+mod order;
 mod pass;
+mod run;
 mod score;
 mod settings;
 mod size;
@@ -59,7 +61,7 @@ mod start;
 mod update;
 
 #[cfg(test)]
-mod linear;
+mod tests;
 
 pub use bound::Kalman;
 pub use coordinates::Coordinates;

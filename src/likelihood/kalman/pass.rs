@@ -3,8 +3,8 @@
 use super::gaussian::{Belief, Columns, Root, regular};
 use super::likelihood::{LOG_TWO_PI, LogLikelihood};
 use super::moments::Moments;
-use super::size::{Any, Fixed, Numbers, Size};
-use super::start::spread_start;
+use super::order::Order;
+use super::size::{Numbers, Size};
 use super::update::{Measured, Update};
 use super::{FilterError, Kalman};
 use crate::twin::{Acting, Now, Outliers};
@@ -23,9 +23,16 @@ pub(super) struct Innovation<'w> {
     pivots: &'w [f64],
     /// Nats by which the density exceeds a normal one.
     excess: f64,
+    order: &'w Order<'w>,
+    row: usize,
 }
 
 impl Innovation<'_> {
+    /// Sample at which the record has output j, if it has it.
+    pub fn sample_of(&self, j: usize) -> Option<usize> {
+        self.order.sample_of(self.row, j)
+    }
+
     /// log p(y_k | y_0 … y_{k−1}), in nats.
     pub fn log_density(&self) -> f64 {
         let values = (self.standardised.iter().zip(self.pivots)).zip(self.measured);
@@ -44,7 +51,8 @@ pub(super) trait Sink {
     fn wants_carried(&self) -> bool {
         false
     }
-    fn innovation(&mut self, _k: usize, _of: &Innovation<'_>) {}
+    /// Takes that of row i in the [`Order`] of the filter.
+    fn innovation(&mut self, _i: usize, _of: &Innovation<'_>) {}
     /// State given rows up to k.
     fn filtered(&mut self, _k: usize, _state: Belief<'_>) {}
     /// State of row k + 1 given rows up to k, and cov(x_k, x_{k+1}).
@@ -92,11 +100,20 @@ impl<S: Size> State<S> {
     }
 }
 
+/// Twin, record and θ that a pass runs over.
+pub(super) struct Bound<'k> {
+    pub kalman: &'k Kalman<'k>,
+    pub acting: &'k Acting<'k>,
+    pub order: &'k Order<'k>,
+    pub theta: &'k [f64],
+}
+
 /// The filter at one θ: buffers, and the likelihood of the rows so far.
 pub(super) struct Pass<'k, S: Size> {
     size: S,
     kalman: &'k Kalman<'k>,
     acting: &'k Acting<'k>,
+    order: &'k Order<'k>,
     now: Now<'k>,
     root: Root<S::Matrix>,
     moments: Moments<'k, S>,
@@ -114,7 +131,13 @@ pub(super) struct Pass<'k, S: Size> {
 }
 
 impl<'k, S: Size> Pass<'k, S> {
-    pub fn new(size: S, kalman: &'k Kalman<'k>, acting: &'k Acting<'k>, theta: &'k [f64]) -> Self {
+    pub fn new(size: S, on: &'k Bound<'k>) -> Self {
+        let Bound {
+            kalman,
+            acting,
+            order,
+            theta,
+        } = on;
         let (n, p) = (size.states(), size.outputs());
         let (twin, method) = (kalman.twin, kalman.settings.method);
         let rounding = twin.rounding(theta);
@@ -130,6 +153,7 @@ impl<'k, S: Size> Pass<'k, S> {
             size,
             kalman,
             acting,
+            order,
             now: acting.at(0, theta),
             root: Root::new(n),
             copy: State::zero(n),
@@ -152,13 +176,44 @@ impl<'k, S: Size> Pass<'k, S> {
         self.start();
         let mut state = State::zero(n);
         state.set(self.copy.belief(n));
-        let last = self.kalman.record.samples() - 1;
-        for k in 0..last {
-            self.measure(k, &mut state, sink)?;
-            self.carry(k, &mut state, sink);
+        let last = self.order.rows() - 1;
+        for i in 0..last {
+            self.measure(i, &mut state, sink)?;
+            if i >= self.order.before {
+                self.carry(i - self.order.before, &mut state, sink);
+            }
         }
         self.measure(last, &mut state, sink)?;
         Ok(self.likelihood.total())
+    }
+
+    /// From the state given rows up to `from`, or from the start, through rows before `to`.
+    pub fn run_from<K: Sink + ?Sized>(
+        mut self,
+        from: Option<(usize, Belief<'_>)>,
+        to: usize,
+        sink: &mut K,
+    ) -> Result<(), FilterError> {
+        let mut state = State::zero(self.size.states());
+        let first = match from {
+            Some((k, belief)) => {
+                state.set(belief);
+                self.now = self.acting.at(k, self.now.theta);
+                self.noise();
+                self.carry(k, &mut state, sink);
+                k + 1
+            }
+            None => {
+                self.start();
+                state.set(self.copy.belief(self.size.states()));
+                0
+            }
+        };
+        for k in first..to {
+            self.measure(k, &mut state, sink)?;
+            self.carry(k, &mut state, sink);
+        }
+        Ok(())
     }
 
     /// The first state, into the copy.
@@ -167,25 +222,33 @@ impl<'k, S: Size> Pass<'k, S> {
         (self.kalman).start(&self.now, mean, cov, self.scale.as_mut());
     }
 
-    /// Puts row k into the state.
+    /// Noise levels of this row.
     #[inline(always)]
-    fn measure<K: Sink + ?Sized>(
-        &mut self,
-        k: usize,
-        state: &mut State<S>,
-        sink: &mut K,
-    ) -> Result<(), FilterError> {
+    fn noise(&mut self) {
         let (n, p) = (self.size.states(), self.size.outputs());
-        self.now = self.acting.at(k, self.now.theta);
         let (q, r) = (&mut self.q.as_mut()[..n], &mut self.r.as_mut()[..p]);
         q.fill(0.0);
         r.fill(0.0);
         self.kalman.twin.noise(&self.now, q, r);
+    }
+
+    /// Puts row i into the state.
+    #[inline(always)]
+    fn measure<K: Sink + ?Sized>(
+        &mut self,
+        i: usize,
+        state: &mut State<S>,
+        sink: &mut K,
+    ) -> Result<(), FilterError> {
+        let (n, p) = (self.size.states(), self.size.outputs());
+        let k = self.order.state_of(i);
+        self.now = self.acting.at(k, self.now.theta);
+        self.noise();
         let told = match self.regular(state) {
-            Some(columns) => self.tell(k, state, Columns::all(n, columns.as_ref())),
+            Some(columns) => self.tell(i, state, Columns::all(n, columns.as_ref())),
             None => {
                 let root = self.singular(state);
-                let told = self.tell(k, state, root.columns());
+                let told = self.tell(i, state, root.columns());
                 self.root = root;
                 told
             }
@@ -197,29 +260,33 @@ impl<'k, S: Size> Pass<'k, S> {
             return Err(FilterError::Diverged { at: self.now.t });
         }
         sink.innovation(
-            k,
+            i,
             &Innovation {
                 predicted: &self.predicted.as_ref()[..p],
                 innovation: &self.update.innovation.as_ref()[..p],
                 covariance: &self.update.covariance.as_ref()[..p * p],
                 standardised: &self.update.standardised.as_ref()[..p],
-                measured: &self.kalman.outputs[k * p..(k + 1) * p],
+                measured: self.order.row(i),
                 pivots: &self.update.pivots.as_ref()[..p],
                 excess: self.update.excess,
+                order: self.order,
+                row: i,
             },
         );
-        sink.filtered(k, state.belief(n));
+        if i >= self.order.before {
+            sink.filtered(k, state.belief(n));
+        }
         Ok(())
     }
 
     #[inline(always)]
-    fn tell(&mut self, k: usize, state: &mut State<S>, root: Columns<'_>) -> Option<()> {
+    fn tell(&mut self, i: usize, state: &mut State<S>, root: Columns<'_>) -> Option<()> {
         let (n, p) = (self.size.states(), self.size.outputs());
         let (mean, cov) = state.slices(n);
         let predicted = &mut self.predicted.as_mut()[..p];
         let outputs = (self.moments).observe(&self.now, mean, root, predicted);
         let row = Measured {
-            y: &self.kalman.outputs[k * p..(k + 1) * p],
+            y: self.order.row(i),
             predicted,
             noise: &self.r.as_ref()[..p],
             floor: &self.floor.as_ref()[..p],
@@ -227,7 +294,7 @@ impl<'k, S: Size> Pass<'k, S> {
             outliers: &self.outliers,
         };
         let (at, state) = ((self.kalman.twin, &self.now), (mean, cov));
-        if self.kalman.gaps && row.y.iter().any(|y| y.is_nan()) {
+        if self.order.gaps && row.y.iter().any(|y| y.is_nan()) {
             let likelihood = &mut self.likelihood;
             return (self.update).apply_present(at, &row, root, outputs, state, likelihood);
         }
@@ -315,64 +382,6 @@ impl<'k, S: Size> Pass<'k, S> {
             FilterError::NoSpread { at }
         } else {
             FilterError::Diverged { at }
-        }
-    }
-}
-
-impl Kalman<'_> {
-    /// The record's drive as the twin sees it at θ, which is checked.
-    pub(super) fn acting(&self, theta: &[f64]) -> Result<Acting<'_>, FilterError> {
-        let drive = self.record.drive();
-        self.check(theta)?;
-        self.twin.check_parameters(theta, drive.dt())?;
-        Ok(Acting::of(self.twin, theta, drive)?)
-    }
-
-    /// The first state; `cov` comes zeroed.
-    pub(super) fn start(
-        &self,
-        now: &Now<'_>,
-        mean: &mut [f64],
-        cov: &mut [f64],
-        scale: &mut [f64],
-    ) {
-        self.twin.start(now, mean);
-        match &self.start_covariance {
-            Some(covariance) => cov.copy_from_slice(covariance),
-            None if !spread_start(self.twin, now, mean, cov) => return,
-            None => {}
-        }
-        self.hold(mean, cov, scale);
-    }
-
-    /// log p(y | θ), in nats.
-    ///
-    /// # Errors
-    ///
-    /// [`FilterError`]: θ of another length, a twin that refuses it, a filter that diverged or has no spread.
-    pub fn log_likelihood(&self, theta: &[f64]) -> Result<f64, FilterError> {
-        self.run_into(theta, &mut ())
-    }
-
-    /// One pass over the record; the log-likelihood. The pass is compiled once for all sinks.
-    pub(super) fn run(&self, theta: &[f64], sink: &mut dyn Sink) -> Result<f64, FilterError> {
-        self.run_into(theta, sink)
-    }
-
-    fn run_into<K: Sink + ?Sized>(&self, theta: &[f64], sink: &mut K) -> Result<f64, FilterError> {
-        let acting = self.acting(theta)?;
-        match (self.states, self.channels) {
-            (1, 1) => Pass::new(Fixed::<1>, self, &acting, theta).run(sink),
-            (2, 1) => Pass::new(Fixed::<2>, self, &acting, theta).run(sink),
-            (3, 1) => Pass::new(Fixed::<3>, self, &acting, theta).run(sink),
-            (4, 1) => Pass::new(Fixed::<4>, self, &acting, theta).run(sink),
-            (5, 1) => Pass::new(Fixed::<5>, self, &acting, theta).run(sink),
-            (6, 1) => Pass::new(Fixed::<6>, self, &acting, theta).run(sink),
-            (7, 1) => Pass::new(Fixed::<7>, self, &acting, theta).run(sink),
-            (8, 1) => Pass::new(Fixed::<8>, self, &acting, theta).run(sink),
-            (9, 1) => Pass::new(Fixed::<9>, self, &acting, theta).run(sink),
-            (10, 1) => Pass::new(Fixed::<10>, self, &acting, theta).run(sink),
-            (states, outputs) => Pass::new(Any { states, outputs }, self, &acting, theta).run(sink),
         }
     }
 }

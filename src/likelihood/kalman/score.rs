@@ -1,6 +1,7 @@
 //! The gradient of the log-likelihood.
 
 use super::lanes::{Together, together};
+use super::order::Order;
 use super::pass::{Innovation, Sink};
 use super::{Coordinates, FilterError, Kalman};
 use crate::math::{LANES, Stencil};
@@ -38,20 +39,20 @@ struct Rows {
 }
 
 impl Rows {
-    fn new(kalman: &Kalman<'_>) -> Self {
-        let p = kalman.record.outputs().ncols();
+    fn new(kalman: &Kalman<'_>, order: &Order<'_>) -> Self {
+        let p = kalman.channels;
         let width = 1 + p + p * p;
         Self {
             width,
-            values: DVector::zeros(kalman.record.samples() * width),
+            values: DVector::zeros(order.rows() * width),
         }
     }
 }
 
 impl Sink for Rows {
-    fn innovation(&mut self, k: usize, of: &Innovation<'_>) {
+    fn innovation(&mut self, i: usize, of: &Innovation<'_>) {
         let p = of.innovation.len();
-        let row = &mut self.values.as_mut_slice()[k * self.width..(k + 1) * self.width];
+        let row = &mut self.values.as_mut_slice()[i * self.width..(i + 1) * self.width];
         row[0] = of.log_density();
         row[1..=p].copy_from_slice(of.innovation);
         row[p + 1..].copy_from_slice(of.covariance);
@@ -68,8 +69,10 @@ impl Score {
         kalman.parameters.check_point(theta)?;
         let c = Coordinates::new(&kalman.parameters);
         let stencil = Stencil::new(&c.of(theta), c.steps(), c.lower(), c.upper())?;
-        let jacobian = stencil.jacobian(|phi| rows(kalman, &c.theta(phi)).map(|(_, rows)| rows))?;
-        let (log_likelihood, centre) = rows(kalman, theta)?;
+        let order = Order::of(kalman, theta);
+        let rows = |theta: &[f64]| rows(kalman, &order, theta);
+        let jacobian = stencil.jacobian(|phi| rows(&c.theta(phi)).map(|(_, rows)| rows))?;
+        let (log_likelihood, centre) = rows(theta)?;
         Self::assemble(kalman, log_likelihood, &centre, &jacobian)
     }
 
@@ -126,12 +129,14 @@ impl Score {
         theta: &[f64],
         coordinates: &Coordinates,
     ) -> Result<Self, FilterError> {
-        let (log_likelihood, centre) = rows(kalman, theta)?;
+        let order = Order::of(kalman, theta);
+        let rows = |theta: &[f64]| rows(kalman, &order, theta);
+        let (log_likelihood, centre) = rows(theta)?;
         let phi = coordinates.of(theta);
         let mut jacobian = DMatrix::zeros(centre.len(), phi.len());
         for j in coordinates.free() {
             let (moved, distance) = coordinates.beside(&phi, j, FORWARD);
-            let (_, there) = rows(kalman, &coordinates.theta(&moved))?;
+            let (_, there) = rows(&coordinates.theta(&moved))?;
             jacobian
                 .column_mut(j)
                 .zip_zip_apply(&there, &centre, |d, there, here| {
@@ -161,8 +166,10 @@ impl Score {
         centre: &DVector<f64>,
         jacobian: &DMatrix<f64>,
     ) -> Result<Self, FilterError> {
-        let (n, p) = (kalman.record.samples(), kalman.record.outputs().ncols());
+        let p = kalman.channels;
         let (d, width) = (jacobian.ncols(), 1 + p + p * p);
+        let n = centre.len() / width;
+        let before = n - kalman.record.samples();
         let samples = DMatrix::from_fn(n, d, |k, j| jacobian[(k * width, j)]);
         let fisher = if p == 1 {
             let scale = |k: usize| centre[k * width + 2];
@@ -181,7 +188,7 @@ impl Score {
                     &mut fisher,
                 )
                 .ok_or_else(|| FilterError::NoSpread {
-                    at: kalman.record.drive().time(k),
+                    at: kalman.record.drive().time(k.saturating_sub(before)),
                 })?;
             }
             fisher
@@ -308,8 +315,13 @@ fn add_information(
     Some(())
 }
 
-fn rows(kalman: &Kalman<'_>, theta: &[f64]) -> Result<(f64, DVector<f64>), FilterError> {
-    let mut rows = Rows::new(kalman);
-    let log_likelihood = kalman.run(theta, &mut rows)?;
+fn rows(
+    kalman: &Kalman<'_>,
+    order: &Order<'_>,
+    theta: &[f64],
+) -> Result<(f64, DVector<f64>), FilterError> {
+    let mut rows = Rows::new(kalman, order);
+    let sink: &mut dyn Sink = &mut rows;
+    let log_likelihood = kalman.run_in(order, theta, sink)?;
     Ok((log_likelihood, rows.values))
 }

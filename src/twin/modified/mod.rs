@@ -133,6 +133,10 @@ pub(crate) trait Modify: Send + Sync + Sized + 'static {
         self.theta(theta, |theta| self.base().actuated(theta, drive))
     }
 
+    fn dead_time(&self, theta: &[f64], dt: f64) -> Vec<usize> {
+        self.theta(theta, |theta| self.base().dead_time(theta, dt))
+    }
+
     /// Simulates the modified equations; a change that leaves the motion alone may run the base twin instead.
     fn run(
         whole: &Modified<Self>,
@@ -202,6 +206,9 @@ impl<M: Modify> StateSpace for Modified<M> {
     }
     fn actuated(&self, theta: &[f64], drive: &Drive) -> Result<Option<Drive>, SimulationError> {
         self.0.actuated(theta, drive)
+    }
+    fn dead_time(&self, theta: &[f64], dt: f64) -> Vec<usize> {
+        self.0.dead_time(theta, dt)
     }
     fn run(&self, theta: &[f64], drive: &Drive, noise: Noise) -> Result<Signal, SimulationError> {
         M::run(self, theta, drive, noise)

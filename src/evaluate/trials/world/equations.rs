@@ -3,7 +3,7 @@
 use super::{Draws, Run, System};
 use crate::evaluate::trials::law::{Departure, Law, Moment, Place, above};
 use crate::record::{Drive, Signal};
-use crate::twin::{Acting, Interval, Noise, Now, StateSpace};
+use crate::twin::{Acting, DeadTime, Interval, Noise, Now, StateSpace};
 use ndarray::ArrayView1;
 
 /// Steps of the integrator within a sample.
@@ -44,6 +44,7 @@ pub(super) fn run(
     let (mut states, mut rates) = (Signal::zeros((samples, n)), Signal::zeros((samples, n)));
     let (mut q, mut r) = (vec![0.0; n], vec![0.0; p]);
     let (mut y, mut rate) = (vec![0.0; p], vec![0.0; n]);
+    let mut dead_time = DeadTime::of(twin, system.theta, drive.dt());
     for k in 0..samples {
         let (t, dt) = (drive.time(k), drive.step(k));
         let mut command = drive.input(k).to_vec();
@@ -59,6 +60,7 @@ pub(super) fn run(
         let theta = plant.theta(system.theta, t, dt, &x, &command);
         let now = Now::new(t, dt, &u, &theta);
         twin.observe(&now, &x, &mut y);
+        dead_time.hold_back(&mut y);
         q.fill(0.0);
         r.fill(0.0);
         twin.noise(&now, &mut q, &mut r);

@@ -58,8 +58,10 @@ pub(super) fn together(all: &[(&Kalman<'_>, &[f64])]) -> Option<Together> {
     let held: Vec<Option<Job<'_>>> = (all.iter())
         .map(|&(kalman, theta)| {
             let acting = kalman.acting(theta).ok()?;
-            let plain =
-                kalman.twin.outliers(theta).is_empty() && kalman.twin.rounding(theta).is_empty();
+            let dead_time = (kalman.twin).dead_time(theta, kalman.record.drive().dt());
+            let plain = (kalman.twin.outliers(theta).is_empty())
+                && kalman.twin.rounding(theta).is_empty()
+                && dead_time.is_empty();
             plain.then_some(Job {
                 kalman,
                 theta,

@@ -1,0 +1,169 @@
+//! Twins with effects, beside the laws of these.
+
+use super::*;
+use crate::effect::{Catalogue, Magnitude, OtherState};
+use crate::twin::{Acting, Hold, Noise, Stepping};
+use crate::twins::CascadedTanks;
+
+/// A run keeps two samples of a delay in its states, and holds its outputs back by the rest: that is the register of the law, to the
+/// last bits, and noise comes behind it.
+#[test]
+fn a_delayed_output_is_that_of_the_law() {
+    let delay = Catalogue::default().effect("sensor-delay", "sensor");
+    let delay = delay.unwrap();
+    let base = Twin::new(CascadedTanks);
+    let twin = augment(base.clone(), vec![delay.clone()]).unwrap();
+    assert_eq!(twin.outline().unwrap().states.len(), 2 + 3);
+    let u = Signal::from_shape_fn((120, 1), |(k, _)| ((k / 9) % 5) as f64 / 2.0);
+    let drive = Drive::new(0.5, u).unwrap();
+    let slots = Slots::of(&base, &[delay]);
+    let Law::Sensor(law) = slots.all[0].effect.law() else {
+        panic!("a sensor's law");
+    };
+    for delay in [0.0, 0.1, 0.7, 1.5, 10.0, 12.3, 31.5] {
+        let theta = [0.6, 0.5, 0.55, 1.0, delay];
+        let mut expected = base.free_run(&theta[..4], &drive).unwrap();
+        slots.all[0].pass(law.as_ref(), &theta, &drive, &mut expected);
+        let difference = twin.free_run(&theta, &drive).unwrap() - &expected;
+        let most = difference.iter().fold(0.0, |a: f64, d| a.max(d.abs()));
+        assert!(most < 1e-12, "{delay}: {most}");
+    }
+}
+
+/// Actuators remember nothing in the state: a delay there is the twin with its inputs later, the first one held before.
+#[test]
+fn a_delayed_input_costs_no_state() {
+    let delay = Catalogue::default()
+        .effect("actuator-delay", "actuator")
+        .unwrap();
+    let base = Twin::new(CascadedTanks);
+    let twin = augment(base.clone(), vec![delay]).unwrap();
+    assert_eq!(twin.outline().unwrap().states.len(), 2);
+    let input = |k: usize| (k % 17) as f64 / 6.0;
+    let drive = |late: usize| {
+        let rows = Signal::from_shape_fn((80, 1), |(k, _)| input(k.saturating_sub(late)));
+        Drive::new(0.5, rows).unwrap()
+    };
+    let theta = [0.6, 0.5, 0.55, 1.0];
+    let noise = Noise::new(1, "t", 0);
+    let later = base.simulate(&theta, &drive(30), noise).unwrap();
+    let delayed = twin.simulate(&[&theta[..], &[15.0]].concat(), &drive(0), noise);
+    assert_eq!(delayed.unwrap(), later);
+}
+
+/// A force of one's own sees inputs, parameters bent by other effects, all states and the time.
+#[test]
+fn a_force_sees_the_whole_twin() {
+    let kind = EffectKind::force("all", "", |m, at| {
+        m[0] * (at.x + at.other + at.t + at.states[1] + at.u[0] + at.theta[3])
+    })
+    .magnitude(Magnitude::signed("size", "1", &[1.0]))
+    .other(OtherState::From);
+    let library = Catalogue::default().with(kind);
+    let effects = vec![
+        library.effect("all", "h1").unwrap().with_other("h2"),
+        library.effect("actuator-bias", "actuator").unwrap(),
+        library.effect("parameter-drift", "k4").unwrap(),
+    ];
+    let twin = augment(Twin::new(CascadedTanks), effects).unwrap();
+    let equations = twin.equations().unwrap();
+    let rate = |size: f64| {
+        let theta = [0.6, 0.5, 0.55, 1.0, size, 0.25, 0.5];
+        let drive = Drive::new(0.5, Signal::from_elem((5, 1), 3.0)).unwrap();
+        let acting = Acting::of(equations, &theta, &drive).unwrap();
+        let mut rates = [0.0; 2];
+        equations.drift(&acting.at(4, &theta), &[4.0, 7.0], &mut rates);
+        rates[0]
+    };
+    let expected = 4.0 + 7.0 + 2.0 + 7.0 + 3.25 + 1.0 * (1.0 + 0.5 * 2.0);
+    assert!((rate(1.0) - rate(0.0) - expected).abs() < 1e-12);
+}
+
+/// Magnitudes have the units of the twin, not the placeholders of the library.
+#[test]
+fn magnitudes_have_units_of_the_twin() {
+    let library = Catalogue::default();
+    let effects = [
+        "state-ceiling@h1",
+        "quadratic-drag@h2",
+        "sensor-drift@sensor",
+    ];
+    let placed = |key: &&str| {
+        let (id, target) = key.split_once('@').unwrap();
+        library.effect(id, target).unwrap()
+    };
+    let effects = effects.iter().map(placed);
+    let effects = effects.map(|effect| match effect.id() {
+        "state-ceiling" => effect.with_other("h2"),
+        _ => effect,
+    });
+    let twin = augment(Twin::new(CascadedTanks), effects.collect()).unwrap();
+    let units: Vec<String> = (twin.parameters().iter().skip(4))
+        .map(|p| format!("{} {}", p.name, p.unit))
+        .collect();
+    assert_eq!(
+        units,
+        [
+            "state-ceiling@h1.level V",
+            "state-ceiling@h1.spill -",
+            "quadratic-drag@h2.coefficient 1/(V·s)",
+            "sensor-drift@sensor.rate V/s",
+        ]
+    );
+}
+
+/// A sensor in pascals has a bias of thousands; a fraction stays a fraction.
+#[test]
+fn bounds_of_magnitudes_are_the_limits_of_their_law() {
+    let library = Catalogue::default();
+    let signals = Twin::new(CascadedTanks).signals();
+    let of = |id| magnitude_parameters(&library.effect(id, "sensor").unwrap(), &[], &signals);
+    assert!(of("sensor-bias")[0].bounds.contains(-1e5));
+    let drift = &of("sensor-drift")[0];
+    assert!(drift.bounds.contains(1e3) && drift.start_range() == drift.prior);
+    let noise = of("sensor-noise")[0].bounds;
+    assert_eq!(noise.low(), 0.0);
+    assert!(noise.contains(1e4));
+    assert_eq!(of("sensor-rectification")[0].bounds.high(), 1.0);
+}
+
+/// Between samples, effects on inputs leave a line a line: off, no bit changes; a bias moves both ends.
+#[test]
+fn actuator_effects_keep_inputs_on_lines() {
+    let linear = |_: &mut _, stepping: &mut Stepping| {
+        stepping.hold = Hold::Linear;
+        stepping.substeps = 3;
+    };
+    let base = Twin::new(CascadedTanks).stepped(linear).unwrap();
+    let levels = |shift: f64| {
+        let levels = |(k, _)| shift + [1.5, 2.5, 0.5][k / 10 % 3];
+        Drive::new(0.5, Signal::from_shape_fn((60, 1), levels)).unwrap()
+    };
+    let theta = [0.6, 0.5, 0.55, 1.0];
+    let with = |magnitudes: &[f64]| [&theta[..], magnitudes].concat();
+    let plain = base
+        .simulate(&theta, &levels(0.0), Noise::new(1, "line", 0))
+        .unwrap();
+    let run = |ids: &[&str], magnitudes: &[f64]| {
+        let library = Catalogue::default();
+        let effects = ids.iter().map(|id| library.effect(id, "actuator").unwrap());
+        // One after the other, so that one twin holds another.
+        let twin = effects.fold(base.clone(), |twin, effect| {
+            augment(twin, vec![effect]).unwrap()
+        });
+        let noise = Noise::new(1, "line", 0);
+        twin.simulate(&with(magnitudes), &levels(0.0), noise)
+            .unwrap()
+    };
+    assert_eq!(run(&["actuator-bias"], &[0.0]), plain);
+    assert_eq!(run(&["actuator-lag", "actuator-bias"], &[0.0, 0.0]), plain);
+    let shifted = base
+        .simulate(&theta, &levels(0.25), Noise::new(1, "line", 0))
+        .unwrap();
+    let biased = run(&["actuator-bias"], &[0.25]);
+    assert!((&biased - &shifted).iter().all(|d| d.abs() < 1e-12));
+    assert_ne!(
+        run(&["actuator-bias", "actuator-lag"], &[0.25, 2.0]),
+        biased
+    );
+}

@@ -1,0 +1,104 @@
+//! Order in which a filter takes the values of a record.
+
+use super::Kalman;
+use std::borrow::Cow;
+
+/// Values of a record beside the states that they show: those of an output with a dead time come so many samples earlier.
+///
+/// ```text
+/// rows before the first   y_j(0) … y_j(d_j − 1)    which show the start, as the row after them does
+/// row k                   y_j(k + d_j)             missing behind the end of the record
+/// ```
+///
+/// A density of all values is the same in any order, and a filter need not remember d samples as states.
+pub(super) struct Order<'k> {
+    /// Samples by which each output is late; empty where none is.
+    dead_time: Vec<usize>,
+    values: Cow<'k, [f64]>,
+    channels: usize,
+    /// Rows before the first.
+    pub before: usize,
+    /// `true` if outputs are missing.
+    pub gaps: bool,
+}
+
+impl<'k> Order<'k> {
+    /// At θ.
+    pub fn of(kalman: &'k Kalman<'_>, theta: &[f64]) -> Self {
+        let dead_time = (kalman.twin).dead_time(theta, kalman.record.drive().dt());
+        let before = dead_time.iter().copied().max().unwrap_or(0);
+        let mut order = Self {
+            dead_time,
+            values: Cow::Borrowed(&kalman.outputs),
+            channels: kalman.channels,
+            before,
+            gaps: kalman.gaps || before > 0,
+        };
+        if before > 0 {
+            order.values = order.arranged(&kalman.outputs).into();
+        }
+        order
+    }
+
+    /// The same without the outputs that are late, and without rows before the first.
+    pub fn punctual(&self, kalman: &Kalman<'_>) -> Order<'static> {
+        let mut values = kalman.outputs.clone();
+        for row in values.chunks_exact_mut(self.channels) {
+            for j in (0..self.channels).filter(|&j| self.is_late(j)) {
+                row[j] = f64::NAN;
+            }
+        }
+        Order {
+            dead_time: vec![],
+            values: values.into(),
+            channels: self.channels,
+            before: 0,
+            gaps: true,
+        }
+    }
+
+    fn arranged(&self, outputs: &[f64]) -> Vec<f64> {
+        let p = self.channels;
+        let samples = outputs.len() / p;
+        (0..(self.before + samples) * p)
+            .map(|cell| match self.sample_of(cell / p, cell % p) {
+                Some(k) if k < samples => outputs[k * p + cell % p],
+                _ => f64::NAN,
+            })
+            .collect()
+    }
+
+    /// Returns whether output j has a dead time.
+    pub fn is_late(&self, j: usize) -> bool {
+        self.dead_time.get(j).is_some_and(|late| *late > 0)
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.values.len() / self.channels
+    }
+
+    /// Values of row i.
+    #[inline(always)]
+    pub fn row(&self, i: usize) -> &[f64] {
+        &self.values[i * self.channels..(i + 1) * self.channels]
+    }
+
+    /// Sample of the state that row i shows.
+    #[inline(always)]
+    pub fn state_of(&self, i: usize) -> usize {
+        i.saturating_sub(self.before)
+    }
+
+    /// Sample at which the record has output j of row i, perhaps behind its end; `None` where the row before the first has none.
+    pub fn sample_of(&self, i: usize, j: usize) -> Option<usize> {
+        let late = self.dead_time.get(j).copied().unwrap_or(0);
+        match i.checked_sub(self.before) {
+            Some(k) => Some(k + late),
+            None => (i < late).then_some(i),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
