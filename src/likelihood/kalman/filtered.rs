@@ -200,7 +200,7 @@ impl Kalman<'_> {
     ///
     /// As [`log_likelihood`](Kalman::log_likelihood).
     pub(crate) fn predictions(&self, theta: &[f64]) -> Result<Signal, FilterError> {
-        let order = Order::of(self, theta);
+        let order = Order::of(self, theta)?;
         let mut all = Predictions {
             values: Signal::zeros(self.record.outputs().dim()),
             first: 0,

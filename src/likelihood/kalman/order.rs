@@ -1,6 +1,6 @@
 //! Order in which a filter takes the values of a record.
 
-use super::Kalman;
+use super::{FilterError, Kalman};
 use std::borrow::Cow;
 
 /// Values of a record beside the states that they show: those of an output with a dead time come so many samples earlier.
@@ -23,8 +23,9 @@ pub(super) struct Order<'k> {
 }
 
 impl<'k> Order<'k> {
-    /// At θ.
-    pub fn of(kalman: &'k Kalman<'_>, theta: &[f64]) -> Self {
+    /// At θ, of which the length is checked.
+    pub fn of(kalman: &'k Kalman<'_>, theta: &[f64]) -> Result<Self, FilterError> {
+        kalman.check(theta)?;
         let dead_time = (kalman.twin).dead_time(theta, kalman.record.drive().dt());
         let before = dead_time.iter().copied().max().unwrap_or(0);
         let mut order = Self {
@@ -37,7 +38,7 @@ impl<'k> Order<'k> {
         if before > 0 {
             order.values = order.arranged(&kalman.outputs).into();
         }
-        order
+        Ok(order)
     }
 
     /// The same without the outputs that are late, and without rows before the first.

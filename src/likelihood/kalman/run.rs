@@ -48,7 +48,7 @@ impl Kalman<'_> {
     }
 
     fn run_into<K: Sink + ?Sized>(&self, theta: &[f64], sink: &mut K) -> Result<f64, FilterError> {
-        self.run_in(&Order::of(self, theta), theta, sink)
+        self.run_in(&Order::of(self, theta)?, theta, sink)
     }
 
     /// As [`run`](Self::run), the rows in this order.

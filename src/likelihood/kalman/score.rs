@@ -69,7 +69,7 @@ impl Score {
         kalman.parameters.check_point(theta)?;
         let c = Coordinates::new(&kalman.parameters);
         let stencil = Stencil::new(&c.of(theta), c.steps(), c.lower(), c.upper())?;
-        let order = Order::of(kalman, theta);
+        let order = Order::of(kalman, theta)?;
         let rows = |theta: &[f64]| rows(kalman, &order, theta);
         let jacobian = stencil.jacobian(|phi| rows(&c.theta(phi)).map(|(_, rows)| rows))?;
         let (log_likelihood, centre) = rows(theta)?;
@@ -129,7 +129,7 @@ impl Score {
         theta: &[f64],
         coordinates: &Coordinates,
     ) -> Result<Self, FilterError> {
-        let order = Order::of(kalman, theta);
+        let order = Order::of(kalman, theta)?;
         let rows = |theta: &[f64]| rows(kalman, &order, theta);
         let (log_likelihood, centre) = rows(theta)?;
         let phi = coordinates.of(theta);
