@@ -12,6 +12,10 @@ use crate::twin::{Interval, Parameter, Twin};
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
 
+/// Shares of its range at which a size with two ends is tried, besides next to nothing. A part of a signal that is rectified, the only such
+/// size of the library, folds the output at a half.
+const LARGE: [f64; 3] = [0.3, 0.6, 0.9];
+
 /// Twin and record that effects are looked for in.
 pub(in crate::diagnose) struct Library<'a> {
     pub twin: &'a Twin,
@@ -138,9 +142,19 @@ impl Library<'_> {
             term.axes.iter_mut().for_each(|axis| axis.held = true);
             scales = false;
         }
-        term.starts = (product(&grids).into_iter())
-            .map(|m| Start { m, scales })
-            .collect();
+        let small = product(&grids);
+        if let Some(limits) = free
+            .first()
+            .map(|m| m.limits)
+            .filter(|l| scales && l.is_finite())
+        {
+            // A size between two ends is as likely large, where the twin folds: from nothing, no slope leads there.
+            grids[0] = LARGE.map(|s| limits.low() + s * limits.width()).to_vec();
+            let large = product(&grids).into_iter();
+            term.starts = large.map(|m| Start { m, scales: false }).collect();
+        }
+        let small = small.into_iter().map(|m| Start { m, scales });
+        term.starts.extend(small);
         Ok((term.axes.iter().all(|a| a.bounds.low() <= a.bounds.high())).then_some(term))
     }
 
@@ -357,6 +371,25 @@ mod tests {
         let longest = lag.starts.iter().map(|start| start.m[0]);
         let duration = 4.0 * 60.0;
         assert!(longest.fold(0.0, f64::max) > duration / 16.0);
+    }
+
+    /// Of a signal of which two thirds are rectified, the twin's fit shows no way there from nothing: larger parts are tried, too. A delay is
+    /// looked for as far as it may last.
+    #[test]
+    fn folds_and_delays_are_looked_for_up_to_their_ends() {
+        let study = tanks(400);
+        let terms = listed_terms(&study, &[biased_record(&study, 0.0, 5)]);
+        let find = |id: &str| terms.iter().find(|term| term.id == id).unwrap();
+        let fraction = find("sensor-rectification");
+        let tried: Vec<(f64, bool)> = (fraction.starts.iter())
+            .map(|start| (start.m[0], start.scales))
+            .collect();
+        assert_eq!(
+            tried,
+            [(0.3, false), (0.6, false), (0.9, false), (0.0, true)]
+        );
+        let delay = find("sensor-delay");
+        assert_eq!(delay.axes[0].bounds.high(), 63.0 * 4.0);
     }
 
     /// Levels of tanks that are never empty have positive ends: their priors must be in the coordinate of the fit all the same.
