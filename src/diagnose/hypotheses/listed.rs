@@ -373,7 +373,7 @@ mod tests {
         assert!(longest.fold(0.0, f64::max) > duration / 16.0);
     }
 
-    /// Of a signal of which two thirds are rectified, the twin's fit shows no way there from nothing: larger parts are tried, too. A delay is
+    /// The twin's fit shows no way from nothing to a signal of which two thirds are rectified: larger parts are tried, too. A delay is
     /// looked for as far as it may last.
     #[test]
     fn folds_and_delays_are_looked_for_up_to_their_ends() {
