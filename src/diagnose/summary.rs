@@ -210,7 +210,8 @@ pub(in crate::diagnose) fn onset(model: &Model<'_>) -> Option<Onset> {
     })
 }
 
-/// Unknown rest on top of the accepted effects, or else of the best single one.
+/// Unknown rest on top of the accepted effects, or else of the best single one: what a function adds, or, of a part, by how much one
+/// explains more in its place.
 pub(in crate::diagnose) fn remains(
     findings: &Findings<'_>,
     conclusion: &Conclusion,
@@ -225,7 +226,12 @@ pub(in crate::diagnose) fn remains(
     };
     let (keys, on_top) = findings.beside(&keys)?;
     let own = findings.gain(keys)?;
-    let rest = on_top.first()?;
+    let mut rest = on_top.first()?;
+    if conclusion.decision == Decision::Partial {
+        // A function that holds the effect, and explains more without it.
+        let alone = findings.rivals().find(|f| findings.is_held_by(keys, f));
+        rest = alone.filter(|f| f.gain > rest.gain).unwrap_or(rest);
+    }
     let added = (rest.gain - own).max(0.0);
     Some(Remains {
         place: rest.last().target.clone(),

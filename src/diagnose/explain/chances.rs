@@ -69,6 +69,11 @@ impl<'a> Findings<'a> {
             .collect()
     }
 
+    /// Returns whether an unknown function is a set of listed effects in another form.
+    pub fn is_held_by(&self, keys: &[String], unknown: &Found<'_>) -> bool {
+        self.holding(unknown).iter().any(|(held, _)| held == keys)
+    }
+
     /// log of the evidence of nothing missing, whatever the noise, over that of the twin.
     fn nothing(&self) -> f64 {
         let [alone, pairs] = [&self.noise, &self.noise_pairs]

@@ -223,7 +223,7 @@ pub(super) fn remains_sentence(cause: &Cause) -> Option<String> {
     };
     let said = if remains.log_evidence > 0.0 {
         format!(
-            "What remains: beside {effects}, an unknown function at {} adds {} nats ({} of all).",
+            "What remains: beside {effects}, something unknown at {} adds {} nats ({} of all).",
             remains.place,
             short(remains.log_evidence),
             percent(remains.share)
@@ -353,7 +353,7 @@ mod tests {
             "h1 in 3.60 … 4.80 V",
             "nats   effect (most probable first",
             "         0.61   38.5   state-ceiling@h1 (level 4.80 V, spill 0.500)",
-            "What remains: beside state-ceiling@h1, an unknown function at h2 adds 1.20 nats (3 % of all).",
+            "What remains: beside state-ceiling@h1, something unknown at h2 adds 1.20 nats (3 % of all).",
             "separates the rivals in 18 of 20 simulations, the present inputs in 6 of 20",
             NEXT_INPUT,
         ] {

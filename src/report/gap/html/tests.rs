@@ -225,7 +225,7 @@ fn every_part_of_the_answer_has_its_place() {
         "rival, same class",
         "cannot separate it from power-law@h1, quadratic-drag@h1 within 3 nats.",
         ">unlisted only<",
-        "an unknown function at h2 adds 1.20 nats (3 % of all).",
+        "something unknown at h2 adds 1.20 nats (3 % of all).",
         "next-input.csv, beside this page, holds steps over the whole range",
         "in 18 of 20 cases",
         "again do so in 6 of 20",
