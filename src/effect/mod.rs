@@ -28,6 +28,7 @@ mod placed;
 mod unit;
 
 pub use augment::augment;
+pub(crate) use augment::augment_late;
 pub use catalogue::Catalogue;
 pub(crate) use check::targets;
 pub use key::{EffectKey, EffectPattern};

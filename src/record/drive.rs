@@ -139,6 +139,26 @@ impl Drive {
         }
     }
 
+    /// The same inputs later by so many seconds, linear between samples; the first ones before the start.
+    pub(crate) fn late(&self, delay: f64) -> Result<Self, RecordError> {
+        let times: Vec<f64> = (0..self.samples()).map(|k| self.time(k)).collect();
+        let value = |k: usize, j: usize| {
+            let t = times[k] - delay;
+            let after = times.partition_point(|time| *time <= t).min(k.max(1));
+            let Some(i) = after.checked_sub(1) else {
+                return self.inputs[[0, j]];
+            };
+            if after >= times.len() {
+                return self.inputs[[i, j]];
+            }
+            let share = ((t - times[i]) / (times[after] - times[i])).clamp(0.0, 1.0);
+            (1.0 - share) * self.inputs[[i, j]] + share * self.inputs[[after, j]]
+        };
+        self.with_inputs(Signal::from_shape_fn(self.inputs.dim(), |(k, j)| {
+            value(k, j)
+        }))
+    }
+
     /// A drive without inputs, N = `samples`.
     pub fn autonomous(dt: f64, samples: usize) -> Result<Self, RecordError> {
         Self::new(dt, Signal::zeros((samples, 0)))

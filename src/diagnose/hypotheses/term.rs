@@ -4,7 +4,7 @@ use super::disturbed_equations::disturbed;
 use super::entered::with_function;
 use super::entry::{Entered, Entry};
 use super::{disturbed_signals, entered_black_box};
-use crate::effect::{Effect, EffectKey, Magnitude, augment};
+use crate::effect::{Effect, EffectKey, Magnitude, augment_late};
 use crate::fit::axis::Axis;
 use crate::study::StudyError;
 use crate::twin::{Twin, fix};
@@ -193,7 +193,7 @@ pub(in crate::diagnose) fn with_terms<'t>(
             off.extend((held.iter()).map(|(name, v)| (effect.key().magnitude(name), *v)));
         }
     }
-    let twin = fix(augment(base.clone(), effects)?, &off)?;
+    let twin = fix(augment_late(base.clone(), effects)?, &off)?;
     Ok(terms.fold(twin, |twin, term| match (&term.part, twin) {
         (Part::Effect { .. }, twin) => twin,
         (part, Twin::BlackBox(twin)) => match *part {

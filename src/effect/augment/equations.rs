@@ -21,6 +21,8 @@ pub(super) struct AugmentedEquations {
     /// Number of the base twin's states.
     states: usize,
     sensors: Vec<OnSensor>,
+    /// Entries of θ by whose sum the whole twin is late, in seconds.
+    late: Vec<usize>,
     forces: Vec<Placed<dyn ForceBatch>>,
     ceilings: Vec<Placed<dyn LimitBatch>>,
     parameters: Vec<Placed<ParameterLaw>>,
@@ -47,7 +49,12 @@ impl AugmentedEquations {
         let states = outline.states.len();
         outline.parameters = slots.space(&outline.parameters);
         let mut sensors = Vec::new();
+        let mut late = Vec::new();
         for slot in &slots.all {
+            if slot.place.late {
+                late.push(slot.place.magnitudes.start);
+                continue;
+            }
             let kind = slot.effect.kind();
             let Batch::Sensor(law) = kind.over_points() else {
                 continue;
@@ -75,6 +82,7 @@ impl AugmentedEquations {
         Self {
             states,
             sensors,
+            late,
             forces: slots.of_law(|kind| match kind.over_points() {
                 Batch::Force(law) => Some(law),
                 _ => None,
@@ -101,11 +109,16 @@ impl AugmentedEquations {
         }
     }
 
-    /// Calls `with` with the base twin and its own `Now`: its part of θ, bent by the parameter effects.
+    /// Calls `with` with the base twin and its own `Now`: its part of θ, bent by the parameter effects, and its own time.
     #[inline]
     fn inner<R>(&self, now: &Now<'_>, with: impl FnOnce(&dyn StateSpace, &Now<'_>) -> R) -> R {
         let own = &now.theta[..self.slots.base];
         let base = self.base.as_ref();
+        let t = match self.late.is_empty() {
+            true => now.t,
+            false => (now.t - self.delay(now.theta)).max(0.0),
+        };
+        let now = &Now { t, ..*now };
         if self.parameters.is_empty() {
             return with(base, &Now { theta: own, ..*now });
         }
@@ -116,6 +129,21 @@ impl AugmentedEquations {
         }
         let theta = &theta[..];
         with(base, &Now { theta, ..*now })
+    }
+
+    /// Seconds by which the whole twin is late.
+    fn delay(&self, theta: &[f64]) -> f64 {
+        self.late.iter().map(|&j| theta[j]).sum()
+    }
+
+    /// Share of a step in which a late twin moves; `None` for all of it.
+    #[inline]
+    fn moving(&self, now: &Now<'_>) -> Option<f64> {
+        let share = match self.late.is_empty() {
+            true => 1.0,
+            false => (now.t + now.dt - self.delay(now.theta)) / now.dt,
+        };
+        (share < 1.0).then_some(share.max(0.0))
     }
 
     /// Adds the forces to the rates. `inner` is the base twin's.
@@ -256,6 +284,9 @@ impl Modify for AugmentedEquations {
             twin.drift_each(inner, own, x, dx);
             self.push(now, inner, own, x, dx);
         });
+        if let Some(share) = self.moving(now) {
+            dx.iter_mut().for_each(|dx| *dx *= share);
+        }
     }
 
     fn observe_each(&self, now: &Now<'_>, at: Layout, p: usize, x: &[f64], y: &mut [f64]) {
@@ -293,7 +324,10 @@ impl Modify for AugmentedEquations {
                 let observe = |x: &[f64], y: &mut [f64]| twin.observe_each(inner, own, p, x, y);
                 self.remember(now, at, x, observe);
             }
-            twin.update_each(inner, own, x);
+            // What moves at samples only waits for a whole one.
+            if self.moving(now).is_none_or(|share| share >= 0.5) {
+                twin.update_each(inner, own, x);
+            }
         });
     }
 
@@ -301,6 +335,9 @@ impl Modify for AugmentedEquations {
         self.inner(now, |twin, now| {
             twin.noise(now, &mut process[..self.states], measurement);
         });
+        if let Some(share) = self.moving(now) {
+            process.iter_mut().for_each(|q| *q *= share.sqrt());
+        }
         for (added, levels) in [(&self.process, process), (&self.measurement, measurement)] {
             for Placed { law, at } in added {
                 let level = &mut levels[at.target];
@@ -322,7 +359,12 @@ impl Modify for AugmentedEquations {
     }
 
     fn actuated(&self, theta: &[f64], drive: &Drive) -> Result<Option<Drive>, SimulationError> {
-        let own = self.slots.actuated(theta, drive)?;
+        let mut own = self.slots.actuated(theta, drive)?;
+        if !self.late.is_empty() {
+            let acting = own.as_ref().unwrap_or(drive);
+            let late = acting.late(self.delay(theta));
+            own = Some(late.map_err(|error| SimulationError::Fatal(error.into()))?);
+        }
         let acting = own.as_ref().unwrap_or(drive);
         let inner = self.theta(theta, |theta| self.base.actuated(theta, acting))?;
         Ok(inner.or(own))

@@ -49,13 +49,23 @@ use std::sync::Arc;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn augment(base: impl Into<Twin>, effects: Vec<Effect>) -> Result<Twin, TwinError> {
-    let base = base.into();
+    augmented(base.into(), effects, false)
+}
+
+/// Adds effects as [`augment`] does; a delay of the only sensor makes the whole twin late: its states stand still until then, its inputs and
+/// its time are those of before. A delay of several samples is the same to the last bits. One between samples interpolates inputs in
+/// place of outputs, which would take noise out of these, as a lag does.
+pub(crate) fn augment_late(base: Twin, effects: Vec<Effect>) -> Result<Twin, TwinError> {
+    augmented(base, effects, true)
+}
+
+fn augmented(base: Twin, effects: Vec<Effect>, may_be_late: bool) -> Result<Twin, TwinError> {
     if effects.is_empty() {
         return Ok(base);
     }
     let outline = base.outline();
     check_effects(&effects, outline.as_ref(), &base.signals())?;
-    let slots = Slots::of(&base, &effects);
+    let slots = Slots::of(&base, &effects, may_be_late);
     Ok(match base {
         Twin::Equations(base) => {
             Twin::Equations(Arc::new(Modified(AugmentedEquations::new(base, slots))))
@@ -73,6 +83,8 @@ struct Place {
     target: usize,
     /// Index of the other state.
     other: Option<usize>,
+    /// True of a delay of the only sensor that makes the whole twin late.
+    late: bool,
 }
 
 impl Place {
@@ -134,7 +146,7 @@ struct Slots {
 
 impl Slots {
     /// Targets must have been checked.
-    fn of(base: &Twin, effects: &[Effect]) -> Self {
+    fn of(base: &Twin, effects: &[Effect], may_be_late: bool) -> Self {
         let outline = base.outline();
         let signals = base.signals();
         let states = outline.as_ref().map_or(&[][..], |o| &o.states);
@@ -150,6 +162,10 @@ impl Slots {
                 magnitudes: from..base + parameters.len(),
                 target: index(effect.target()).unwrap_or(0),
                 other: effect.other().and_then(index),
+                late: may_be_late
+                    && effect.kind().is_dead_time()
+                    && matches!(effect.law(), Law::Sensor(_))
+                    && signals.outputs.len() == 1,
             };
             let effect = effect.clone();
             all.push(Slot { effect, place });

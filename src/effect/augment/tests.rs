@@ -16,7 +16,7 @@ fn a_delayed_output_is_that_of_the_law() {
     assert_eq!(twin.outline().unwrap().states.len(), 2 + 3);
     let u = Signal::from_shape_fn((120, 1), |(k, _)| ((k / 9) % 5) as f64 / 2.0);
     let drive = Drive::new(0.5, u).unwrap();
-    let slots = Slots::of(&base, &[delay]);
+    let slots = Slots::of(&base, &[delay], false);
     let Law::Sensor(law) = slots.all[0].effect.law() else {
         panic!("a sensor's law");
     };
@@ -27,6 +27,25 @@ fn a_delayed_output_is_that_of_the_law() {
         let difference = twin.free_run(&theta, &drive).unwrap() - &expected;
         let most = difference.iter().fold(0.0, |a: f64, d| a.max(d.abs()));
         assert!(most < 1e-12, "{delay}: {most}");
+    }
+}
+
+/// A twin that is late shows what its late sensor shows, while it stands still at the start, too.
+#[test]
+fn a_late_twin_is_a_twin_with_a_late_sensor() {
+    let delay = || Catalogue::default().effect("sensor-delay", "sensor");
+    let base = Twin::new(CascadedTanks);
+    let held = augment(base.clone(), vec![delay().unwrap()]).unwrap();
+    let late = augment_late(base, vec![delay().unwrap()]).unwrap();
+    assert_eq!(late.outline().unwrap().states.len(), 2);
+    let u = Signal::from_shape_fn((120, 1), |(k, _)| ((k / 9) % 5) as f64 / 2.0);
+    let drive = Drive::new(0.5, u).unwrap();
+    for (delay, near) in [(0.0, 1e-12), (10.0, 1e-12), (7.3, 0.1)] {
+        let theta = [0.6, 0.5, 0.55, 1.0, delay];
+        let run = |twin: &Twin| twin.free_run(&theta, &drive).unwrap();
+        let difference = run(&held) - run(&late);
+        let most = difference.iter().fold(0.0, |a: f64, d| a.max(d.abs()));
+        assert!(most < near, "{delay}: {most}");
     }
 }
 
