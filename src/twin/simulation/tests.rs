@@ -1,0 +1,69 @@
+//! Noise, divergence and lengths of a simulation.
+
+use super::*;
+use crate::twin::Parameter;
+
+/// x ← a·x + w, observed with noise; two outputs.
+struct Walk;
+impl StateSpace for Walk {
+    fn outline(&self) -> Outline {
+        Outline::new()
+            .parameter(Parameter::new("rate", "1/s", -2.0, 30.0))
+            .state("x", "m")
+            .output("y1", "m")
+            .output("y2", "m")
+    }
+    fn drift(&self, now: &Now<'_>, x: &[f64], dx: &mut [f64]) {
+        dx[0] = now.theta[0] * x[0];
+    }
+    fn observe(&self, _: &Now<'_>, x: &[f64], y: &mut [f64]) {
+        y.copy_from_slice(&[x[0], -x[0]]);
+    }
+    fn start(&self, _: &Now<'_>, x: &mut [f64]) {
+        x[0] = 1.0;
+    }
+    fn noise(&self, _: &Now<'_>, process: &mut [f64], measurement: &mut [f64]) {
+        process[0] = 0.3;
+        measurement[1] = 0.2;
+    }
+}
+
+fn drive(samples: usize) -> Drive {
+    Drive::autonomous(0.1, samples).unwrap()
+}
+
+#[test]
+fn noise_levels_are_standard_deviations() {
+    let drive = drive(2);
+    let n = 4000u32;
+    let [mut increments, mut errors] = [0.0, 0.0];
+    for i in 0..n {
+        let y = (Walk.simulate(&[0.0], &drive, Noise::new(3, "t", i.into()))).unwrap();
+        increments += (y[[1, 0]] - 1.0).powi(2) / f64::from(n);
+        errors += (y[[0, 1]] + 1.0).powi(2) / f64::from(n);
+    }
+    // Relative sd of a variance from n draws: √(2/n) = 0.022; five of them.
+    assert!((increments / 0.09 - 1.0).abs() < 0.11, "{increments}");
+    assert!((errors / 0.04 - 1.0).abs() < 0.11, "{errors}");
+}
+
+#[test]
+fn divergence_tells_the_time_and_wrong_lengths_are_fatal() {
+    let blown = Walk.simulate(&[1e300], &drive(10), Noise::OFF);
+    assert!(matches!(blown, Err(SimulationError::Diverged { at }) if at > 0.0));
+    assert!(matches!(
+        Walk.simulate(&[], &drive(10), Noise::OFF),
+        Err(SimulationError::Fatal(_))
+    ));
+    let driven = Drive::new(0.1, Signal::zeros((3, 1))).unwrap();
+    let error = Walk.simulate(&[0.0], &driven, Noise::OFF).unwrap_err();
+    assert!(error.to_string().contains("1 inputs, the twin has 0"));
+}
+
+#[test]
+fn common_noise_pairs_runs_at_different_parameters() {
+    let noise = Noise::new(5, "t", 0);
+    let a = Walk.simulate(&[-1.0], &drive(50), noise).unwrap();
+    let b = Walk.simulate(&[-1.0 + 1e-9], &drive(50), noise).unwrap();
+    assert!((&a - &b).iter().all(|d| d.abs() < 1e-7));
+}
