@@ -13,8 +13,8 @@ use rayon::prelude::*;
 const PLACES: usize = 2;
 /// Iterations before a new start is compared with the old end.
 const ITERATIONS: usize = 12;
-/// Samples of the first move of a time or a delay, doubled up to a quarter of the distance between the times that are tried: the likelihood has a
-/// kink at each sample, and θ moves with the time.
+/// Samples of the first move of a time or a delay, doubled up to a quarter of the distance between the times that are tried: the likelihood
+/// has a kink at each sample, and θ moves with the time.
 const MOVE: f64 = 0.5;
 /// Most times that the best effects move on.
 const ROUNDS: usize = 6;

@@ -142,18 +142,17 @@ impl Library<'_> {
             term.axes.iter_mut().for_each(|axis| axis.held = true);
             scales = false;
         }
-        let small = product(&grids);
-        if let Some(limits) = free
-            .first()
-            .map(|m| m.limits)
-            .filter(|l| scales && l.is_finite())
-        {
+        let starts = |grids: &[Vec<f64>], scales| {
+            let all = product(grids).into_iter();
+            all.map(move |m| Start { m, scales })
+        };
+        let small = starts(&grids, scales);
+        let limits = free[0].limits;
+        if scales && limits.is_finite() {
             // A size between two ends is as likely large, where the twin folds: from nothing, no slope leads there.
             grids[0] = LARGE.map(|s| limits.low() + s * limits.width()).to_vec();
-            let large = product(&grids).into_iter();
-            term.starts = large.map(|m| Start { m, scales: false }).collect();
+            term.starts.extend(starts(&grids, false));
         }
-        let small = small.into_iter().map(|m| Start { m, scales });
         term.starts.extend(small);
         Ok((term.axes.iter().all(|a| a.bounds.low() <= a.bounds.high())).then_some(term))
     }

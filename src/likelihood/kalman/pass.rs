@@ -172,10 +172,7 @@ impl<'k, S: Size> Pass<'k, S> {
 
     /// Over the whole record; the log-likelihood.
     pub fn run<K: Sink + ?Sized>(mut self, sink: &mut K) -> Result<f64, FilterError> {
-        let n = self.size.states();
-        self.start();
-        let mut state = State::zero(n);
-        state.set(self.copy.belief(n));
+        let mut state = self.start();
         let last = self.order.rows() - 1;
         for i in 0..last {
             self.measure(i, &mut state, sink)?;
@@ -194,20 +191,16 @@ impl<'k, S: Size> Pass<'k, S> {
         to: usize,
         sink: &mut K,
     ) -> Result<(), FilterError> {
-        let mut state = State::zero(self.size.states());
-        let first = match from {
+        let (first, mut state) = match from {
             Some((k, belief)) => {
+                let mut state = State::zero(self.size.states());
                 state.set(belief);
                 self.now = self.acting.at(k, self.now.theta);
                 self.noise();
                 self.carry(k, &mut state, sink);
-                k + 1
+                (k + 1, state)
             }
-            None => {
-                self.start();
-                state.set(self.copy.belief(self.size.states()));
-                0
-            }
+            None => (0, self.start()),
         };
         for k in first..to {
             self.measure(k, &mut state, sink)?;
@@ -216,10 +209,15 @@ impl<'k, S: Size> Pass<'k, S> {
         Ok(())
     }
 
-    /// The first state, into the copy.
-    fn start(&mut self) {
-        let (mean, cov) = self.copy.slices(self.size.states());
+    /// The first state.
+    fn start(&mut self) -> State<S> {
+        let n = self.size.states();
+        // In the copy: what a call has seen leaves the registers.
+        let (mean, cov) = self.copy.slices(n);
         (self.kalman).start(&self.now, mean, cov, self.scale.as_mut());
+        let mut state = State::zero(n);
+        state.set(self.copy.belief(n));
+        state
     }
 
     /// Noise levels of this row.
