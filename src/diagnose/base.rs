@@ -20,7 +20,7 @@ use crate::fit::starts::{Care, search};
 use crate::likelihood::Measured;
 use crate::record::Record;
 use crate::study::{Study, StudyError};
-use crate::twin::{Noise, Role, Twin};
+use crate::twin::{Noise, Role};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::sync::Arc;
 
@@ -30,10 +30,10 @@ const ITERATIONS: usize = 80;
 const INSIDE: usize = 20;
 
 /// The fitted twin and the units of its records.
-pub(in crate::diagnose) struct Base<'a> {
-    pub model: Model<'a>,
+pub(in crate::diagnose) struct Base {
+    pub model: Model,
     pub theta: Vec<f64>,
-    pub scales: Scales<'a>,
+    pub scales: Scales,
     pub frequencies: Vec<f64>,
     /// Places whose noise level is fitted.
     pub noisy: Vec<String>,
@@ -45,7 +45,7 @@ pub(in crate::diagnose) struct Base<'a> {
     pub step: Option<FinerStep>,
 }
 
-impl<'a> Base<'a> {
+impl Base {
     /// Places of the kinds of noise that the records asked for.
     pub fn noise_at(&self, is_kind: impl Fn(&Part) -> bool) -> Vec<String> {
         (self.noises.iter())
@@ -56,8 +56,8 @@ impl<'a> Base<'a> {
 
     /// Fits the twin.
     pub fn new(
-        measured: &'a Measured,
-        records: &'a [Record],
+        measured: &Measured,
+        records: Arc<[Record]>,
         settings: &DiagnoseSettings,
     ) -> Result<Self, StudyError> {
         Self::counted(measured, records, settings, &Passes::default())
@@ -65,8 +65,8 @@ impl<'a> Base<'a> {
 
     /// Fits the twin, its passes added to these.
     pub fn counted(
-        measured: &'a Measured,
-        records: &'a [Record],
+        measured: &Measured,
+        records: Arc<[Record]>,
         settings: &DiagnoseSettings,
         passes: &Passes,
     ) -> Result<Self, StudyError> {
@@ -78,7 +78,7 @@ impl<'a> Base<'a> {
             let theta: Vec<f64> = initial.iter().copied().take(own).chain(levels).collect();
             theta
         });
-        let problem = Problem::of_measured(measured, records).counted_with(passes);
+        let problem = Problem::of_measured(measured, records.clone()).counted_with(passes);
         // The same starts whatever the seed: which optimum is found must not depend on it.
         let starts = Noise::new(0, "diagnose/starts", 0);
         let fitted = if !problem.is_simulated() {
@@ -93,8 +93,13 @@ impl<'a> Base<'a> {
                 .map(|fitted| (problem, fitted))
         };
         let (problem, fitted) = fitted.ok_or(StudyError::NoStart)?;
-        let model = Model::bare(twin, problem, fitted, settings.lacks(Ablation::Evidence))
-            .ok_or(StudyError::NoStart)?;
+        let model = Model::bare(
+            twin.clone(),
+            problem,
+            fitted,
+            settings.lacks(Ablation::Evidence),
+        )
+        .ok_or(StudyError::NoStart)?;
         let outline = model.problem.outline();
         let outputs = &outline.outputs;
         let sensors = targets(TargetKind::Sensor, None, &twin.signals());
@@ -113,17 +118,10 @@ impl<'a> Base<'a> {
         })
     }
 
-    /// The twin with another kind of noise, fitted; `twin` is that of the model.
-    pub fn with_noise<'b>(
-        &self,
-        found: &Model<'a>,
-        twin: &'b Twin,
-    ) -> Result<Option<Base<'b>>, StudyError>
-    where
-        'a: 'b,
-    {
+    /// The twin with another kind of noise, fitted.
+    pub fn with_noise(&self, found: &Model) -> Result<Option<Self>, StudyError> {
         let Some(model) = Model::bare(
-            twin,
+            found.problem.twin.clone(),
             found.problem.clone(),
             found.fitted.clone(),
             found.by_bic,
@@ -135,7 +133,7 @@ impl<'a> Base<'a> {
     }
 
     /// The twin fitted again from other θ; `None` where that is no better.
-    pub fn fitted_from(&self, thetas: &[Vec<f64>]) -> Result<Option<Base<'a>>, StudyError> {
+    pub fn fitted_from(&self, thetas: &[Vec<f64>]) -> Result<Option<Base>, StudyError> {
         let problem = &self.model.problem;
         let starts: Vec<Vec<f64>> = thetas.iter().map(|theta| problem.full(theta)).collect();
         let fitted = fit(problem, &starts, ITERATIONS)?;
@@ -148,21 +146,19 @@ impl<'a> Base<'a> {
     }
 
     /// The same twin fitted to other records from where it is; `None` where that cannot be done.
-    pub fn on<'b>(&self, records: &'b [Record]) -> Result<Option<Base<'b>>, StudyError>
-    where
-        'a: 'b,
-    {
+    pub fn on(&self, records: Arc<[Record]>) -> Result<Option<Self>, StudyError> {
         let problem = self.model.problem.on(records).until(Thresholds::BETTER);
         let start = problem.full(&self.theta);
         let fitted = climb(&problem, &start, ITERATIONS)?;
-        let model = fitted
-            .and_then(|fitted| Model::bare(self.model.base, problem, fitted, self.model.by_bic));
+        let model = fitted.and_then(|fitted| {
+            Model::bare(self.model.base.clone(), problem, fitted, self.model.by_bic)
+        });
         (model.map(|model| self.carried_on(model, self.noises.clone()))).transpose()
     }
 
     /// The twin where its fit inside the prior ends, if its own has left that: what is missing may have driven it out. `None` for a black
     /// box, whose fits cost too much.
-    pub fn inside(&self) -> Result<Option<Model<'a>>, StudyError> {
+    pub fn inside(&self) -> Result<Option<Model>, StudyError> {
         let problem = &self.model.problem;
         if problem.is_simulated() || beyond(&self.model) == 0 {
             return Ok(None);
@@ -177,7 +173,7 @@ impl<'a> Base<'a> {
     /// The fitted twin with its units, as terms are made from it.
     pub fn library(&self) -> Library<'_> {
         Library {
-            twin: self.model.base,
+            twin: &self.model.base,
             theta: &self.theta,
             scales: &self.scales,
             frequencies: &self.frequencies,
@@ -195,11 +191,7 @@ impl<'a> Base<'a> {
     }
 
     /// The same records, places and step with another fitted model, and these kinds of noise.
-    fn carried_on<'b>(
-        &self,
-        model: Model<'b>,
-        noises: Vec<Arc<Term>>,
-    ) -> Result<Base<'b>, StudyError> {
+    fn carried_on(&self, model: Model, noises: Vec<Arc<Term>>) -> Result<Base, StudyError> {
         Ok(Base {
             noisy: self.noisy.clone(),
             is_silent: self.is_silent,
@@ -210,11 +202,11 @@ impl<'a> Base<'a> {
     }
 
     /// A fitted model in units of its records, of which nothing else is known yet.
-    fn of(model: Model<'a>) -> Result<Self, StudyError> {
+    fn of(model: Model) -> Result<Self, StudyError> {
         let (theta, outline) = (model.theta(), model.problem.outline());
-        let records = model.problem.records;
+        let records = model.problem.records.clone();
         Ok(Self {
-            scales: Scales::new(model.base, &theta, records, model.states()?, outline),
+            scales: Scales::new(&model.base, &theta, records, model.states()?, outline),
             frequencies: frequencies(&model)?,
             noisy: vec![],
             is_silent: false,
@@ -238,7 +230,7 @@ pub(in crate::diagnose) fn verdict(log_odds: f64, outside: bool) -> Verdict {
 }
 
 /// The problem with the twin's own parameters held within their prior box.
-fn inside<'a>(problem: &Problem<'a>) -> Problem<'a> {
+fn inside(problem: &Problem) -> Problem {
     let space = problem.twin.parameters();
     let axes = (space.iter().zip(&problem.axes))
         .map(|(p, axis)| match p.role {
@@ -250,7 +242,7 @@ fn inside<'a>(problem: &Problem<'a>) -> Problem<'a> {
 }
 
 /// Number of the twin's own parameters outside their prior.
-fn beyond(model: &Model<'_>) -> usize {
+fn beyond(model: &Model) -> usize {
     let theta = model.theta();
     let space = model.problem.twin.parameters();
     (space.iter().zip(&theta))
@@ -259,7 +251,7 @@ fn beyond(model: &Model<'_>) -> usize {
 }
 
 /// The best fit with the twin's own parameters within their prior box.
-fn fitted_inside(model: &Model<'_>) -> Result<Option<Fitted>, StudyError> {
+fn fitted_inside(model: &Model) -> Result<Option<Fitted>, StudyError> {
     let boxed = inside(&model.problem);
     let starts = [model.fitted.theta.clone(), boxed.centre()];
     Ok(fit(&boxed, &starts, INSIDE)?)
@@ -267,10 +259,10 @@ fn fitted_inside(model: &Model<'_>) -> Result<Option<Fitted>, StudyError> {
 
 /// Tests whether θ lies outside its prior box: likelihood ratio of the best θ anywhere over the best inside. Returns the model inside as
 /// well.
-pub(in crate::diagnose) fn left_the_prior<'a>(
-    model: &Model<'a>,
+pub(in crate::diagnose) fn left_the_prior(
+    model: &Model,
     alpha: f64,
-) -> Result<(bool, Option<Model<'a>>), StudyError> {
+) -> Result<(bool, Option<Model>), StudyError> {
     let beyond = beyond(model);
     if beyond == 0 {
         return Ok((false, None));
@@ -283,7 +275,7 @@ pub(in crate::diagnose) fn left_the_prior<'a>(
     let limit =
         ChiSquared::new(beyond as f64).map_or(f64::INFINITY, |c| c.inverse_cdf(1.0 - alpha));
     let boxed = inside(&model.problem);
-    let within = within.and_then(|w| Model::bare(model.base, boxed, w, model.by_bic));
+    let within = within.and_then(|w| Model::bare(model.base.clone(), boxed, w, model.by_bic));
     Ok((ratio > limit, within))
 }
 

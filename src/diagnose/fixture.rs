@@ -37,6 +37,6 @@ pub(super) fn biased_record(study: &Study, bias: f64, seed: u64) -> Record {
 pub(super) fn listed_terms(study: &Study, records: &[Record]) -> Vec<Arc<Term>> {
     let settings = DiagnoseSettings::default();
     let measured = measured(study.twin(), records, &study.beliefs()).unwrap();
-    let base = Base::new(&measured, records, &settings).unwrap();
+    let base = Base::new(&measured, records.into(), &settings).unwrap();
     base.listed(study, &settings).unwrap()
 }

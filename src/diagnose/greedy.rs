@@ -7,6 +7,7 @@ use crate::effect::EffectPattern;
 use crate::likelihood::measured;
 use crate::record::Record;
 use crate::study::{Study, StudyError};
+use std::sync::Arc;
 
 /// Most effects that are selected.
 const MOST: usize = 3;
@@ -27,9 +28,9 @@ pub(crate) fn greedy(
         quick: true,
         ..DiagnoseSettings::default()
     };
-    let records = std::slice::from_ref(record);
-    let measured = measured(study.twin(), records, &settings.beliefs(study))?;
-    let base = Base::new(&measured, records, &settings)?;
+    let records: Arc<[Record]> = Arc::from([record.clone()]);
+    let measured = measured(study.twin(), &records, &settings.beliefs(study))?;
+    let base = Base::new(&measured, records.clone(), &settings)?;
     let mut terms = base.listed(study, &settings)?;
     let mut model = base.model.clone();
     let breadth = Breadth::of(&model, settings.quick);

@@ -12,6 +12,7 @@ use super::thresholds::Thresholds;
 use crate::likelihood::measured;
 use crate::record::Record;
 use crate::study::{Study, StudyError};
+use std::sync::Arc;
 
 /// A fit of the true effects: what an answer is to be held against.
 #[derive(Debug)]
@@ -35,8 +36,8 @@ pub(crate) fn true_fit(
     if study.twin().outline().is_none() {
         return Ok(None);
     }
-    let records = std::slice::from_ref(record);
-    let measure = |base: &Base<'_>, with: &Model<'_>| {
+    let records: Arc<[Record]> = Arc::from([record.clone()]);
+    let measure = |base: &Base, with: &Model| {
         let accepted = finished(Some(with))?;
         let measures = Measures {
             base: &base.model,
@@ -51,8 +52,8 @@ pub(crate) fn true_fit(
             share: shrinkage(&measures, settings.noise())?,
         }))
     };
-    let own = measured(study.twin(), records, &settings.beliefs(study))?;
-    let base = Base::new(&own, records, settings)?;
+    let own = measured(study.twin(), &records, &settings.beliefs(study))?;
+    let base = Base::new(&own, records.clone(), settings)?;
     let Some(with) = fitted(study, &base, keys, settings)? else {
         return Ok(None);
     };
@@ -67,8 +68,8 @@ pub(crate) fn true_fit(
         initial: Some(base.theta.clone()),
         ..settings.clone()
     };
-    let finer = measured(&finer, records, &settings.beliefs(study))?;
-    let base = Base::new(&finer, records, &begin)?;
+    let finer = measured(&finer, &records, &settings.beliefs(study))?;
+    let base = Base::new(&finer, records.clone(), &begin)?;
     match fitted(study, &base, keys, settings)? {
         Some(with) => measure(&base, &with),
         None => Ok(None),
@@ -76,12 +77,12 @@ pub(crate) fn true_fit(
 }
 
 /// The twin with these effects, added one after the other; `None` where one cannot be fitted.
-fn fitted<'a>(
+fn fitted(
     study: &Study,
-    base: &Base<'a>,
+    base: &Base,
     keys: &[String],
     settings: &DiagnoseSettings,
-) -> Result<Option<Model<'a>>, StudyError> {
+) -> Result<Option<Model>, StudyError> {
     let terms = base.listed(study, settings)?;
     let mut model = base.model.clone();
     for key in keys {

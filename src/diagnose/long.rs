@@ -16,6 +16,7 @@ use crate::progress::{Progress, Stage};
 use crate::record::Record;
 use crate::study::{Study, StudyError};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Rows of all records together from which they are long. On two cores, a gap in half as many takes a minute.
 const LONG: usize = 4096;
@@ -31,10 +32,10 @@ const FUNCTIONS: usize = 2;
 /// Fits the twin, searches for what explains the records beside it, and hands it all on.
 pub(super) fn search<R>(
     study: &Study,
-    records: &[Record],
+    records: &Arc<[Record]>,
     settings: &DiagnoseSettings,
     progress: &Progress,
-    then: &dyn Fn(Explored<'_, '_>) -> Result<R, StudyError>,
+    then: &dyn Fn(Explored<'_>) -> Result<R, StudyError>,
 ) -> Result<R, StudyError> {
     match search_part(study, records, settings, progress, then)? {
         Some(found) => Ok(found),
@@ -46,10 +47,10 @@ pub(super) fn search<R>(
 /// part shows a clear gap, and where a wave explains most: its frequency is known as sharply as the record is long.
 fn search_part<R>(
     study: &Study,
-    records: &[Record],
+    records: &Arc<[Record]>,
     settings: &DiagnoseSettings,
     progress: &Progress,
-    then: &dyn Fn(Explored<'_, '_>) -> Result<R, StudyError>,
+    then: &dyn Fn(Explored<'_>) -> Result<R, StudyError>,
 ) -> Result<Option<R>, StudyError> {
     let rows: usize = records.iter().map(Record::samples).sum();
     if rows < LONG || study.twin().outline().is_none() {
@@ -60,12 +61,12 @@ fn search_part<R>(
         let Some(part) = first_rows(records, first) else {
             return Ok(None);
         };
-        let on_all = |own: Explored<'_, '_>| -> Result<Option<R>, StudyError> {
+        let on_all = |own: Explored<'_>| -> Result<Option<R>, StudyError> {
             if own.chances.log_odds < CLEAR || own.findings.leads_with_wave() {
                 return Ok(None);
             }
             let stage = progress.stage("all rows", 1);
-            let Some(base) = own.base.on(records)? else {
+            let Some(base) = own.base.on(records.clone())? else {
                 return Ok(None);
             };
             let carry = Carry {
@@ -99,7 +100,7 @@ fn search_part<R>(
 }
 
 /// The same share of each record, so many rows in all; `None` where an output has no value in them.
-fn first_rows(records: &[Record], rows: usize) -> Option<Vec<Record>> {
+fn first_rows(records: &[Record], rows: usize) -> Option<Arc<[Record]>> {
     let all: usize = records.iter().map(Record::samples).sum();
     (records.iter())
         .map(|record| record.first_part((record.samples() * rows).div_ceil(all)))
@@ -107,18 +108,18 @@ fn first_rows(records: &[Record], rows: usize) -> Option<Vec<Record>> {
 }
 
 /// Carries fits from a part of the records on to all of them.
-struct Carry<'m, 'a> {
+struct Carry<'m> {
     settings: &'m DiagnoseSettings,
     /// log Z of the twin on the part, and on all rows.
     origins: [f64; 2],
     /// All rows over those of the part.
     ratio: f64,
     /// The twin on all rows.
-    model: &'m Model<'a>,
+    model: &'m Model,
 }
 
-impl<'a> Carry<'_, 'a> {
-    fn findings(&self, old: &Findings<'_>, stage: &Stage) -> Result<Findings<'a>, StudyError> {
+impl Carry<'_> {
+    fn findings(&self, old: &Findings, stage: &Stage) -> Result<Findings, StudyError> {
         let least = FIRST * old.top();
         // Few fits, some of which take many times as long as others: all at once.
         let of = |all, most, least| self.all(all, most, least);
@@ -158,13 +159,8 @@ impl<'a> Carry<'_, 'a> {
     }
 
     /// Explanations on all rows, best first: so many of the best fitted, if they have more than these nats on the part.
-    fn all(
-        &self,
-        old: &[Found<'_>],
-        most: usize,
-        least: f64,
-    ) -> Result<Vec<Found<'a>>, StudyError> {
-        let fitted: Vec<Option<Found<'a>>> = (old.par_iter().take(most))
+    fn all(&self, old: &[Found], most: usize, least: f64) -> Result<Vec<Found>, StudyError> {
+        let fitted: Vec<Option<Found>> = (old.par_iter().take(most))
             .map(|found| match found.gain > least {
                 true => self.fitted(found),
                 false => Ok(None),
@@ -174,7 +170,7 @@ impl<'a> Carry<'_, 'a> {
             .map(|found| found.gain)
             .fold(f64::NEG_INFINITY, f64::max);
         let mut fitted = fitted.into_iter();
-        let mut all: Vec<Found<'a>> = (old.iter())
+        let mut all: Vec<Found> = (old.iter())
             .map(|found| {
                 fitted.next().flatten().unwrap_or_else(|| {
                     let mut other = found.promised();
@@ -190,7 +186,7 @@ impl<'a> Carry<'_, 'a> {
     }
 
     /// One explanation fitted to all rows; `None` where it was not fitted to the part.
-    fn fitted(&self, old: &Found<'_>) -> Result<Option<Found<'a>>, StudyError> {
+    fn fitted(&self, old: &Found) -> Result<Option<Found>, StudyError> {
         let Some(own) = &old.model else {
             return Ok(None);
         };
@@ -233,7 +229,7 @@ mod tests {
     fn no_gap_is_told_of_all_rows() {
         let study = tanks(LONG);
         let theta = study.twin().parameters().centre();
-        let records = [record(&study, study.twin(), &theta, 3)];
+        let records = Arc::from([record(&study, study.twin(), &theta, 3)]);
         let settings = DiagnoseSettings {
             detection_only: true,
             ..DiagnoseSettings::default()

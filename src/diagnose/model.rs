@@ -15,11 +15,11 @@ const TO_THE_END: usize = 40;
 
 /// A twin with terms, fitted.
 #[derive(Clone)]
-pub(in crate::diagnose) struct Model<'a> {
+pub(in crate::diagnose) struct Model {
     /// The twin without terms, its noise levels in θ.
-    pub base: &'a Twin,
+    pub base: Twin,
     pub terms: Vec<Arc<Term>>,
-    pub problem: Problem<'a>,
+    pub problem: Problem,
     pub fitted: Fitted,
     /// log Z, in nats; BIC in its place where evidence is taken out.
     pub log_evidence: f64,
@@ -28,30 +28,25 @@ pub(in crate::diagnose) struct Model<'a> {
 }
 
 /// A model with one more term, not yet fitted.
-pub(in crate::diagnose) struct Extended<'a> {
+pub(in crate::diagnose) struct Extended {
     pub terms: Vec<Arc<Term>>,
-    pub problem: Problem<'a>,
+    pub problem: Problem,
     /// Entries of the new term's magnitudes.
     pub entries: Vec<usize>,
     by_bic: bool,
 }
 
-impl<'a> Model<'a> {
+impl Model {
     /// The twin alone; `None` where its evidence cannot be told.
-    pub fn bare(
-        base: &'a Twin,
-        problem: Problem<'a>,
-        fitted: Fitted,
-        by_bic: bool,
-    ) -> Option<Self> {
+    pub fn bare(base: Twin, problem: Problem, fitted: Fitted, by_bic: bool) -> Option<Self> {
         Self::new(base, vec![], problem, fitted, by_bic)
     }
 
     /// The twin with terms; `None` where its evidence cannot be told.
     fn new(
-        base: &'a Twin,
+        base: Twin,
         terms: Vec<Arc<Term>>,
-        problem: Problem<'a>,
+        problem: Problem,
         fitted: Fitted,
         by_bic: bool,
     ) -> Option<Self> {
@@ -72,11 +67,11 @@ impl<'a> Model<'a> {
     /// The same model, carried on to another fit.
     pub fn refitted(&self, fitted: Fitted) -> Option<Self> {
         let (terms, problem) = (self.terms.clone(), self.problem.clone());
-        Self::new(self.base, terms, problem, fitted, self.by_bic)
+        Self::new(self.base.clone(), terms, problem, fitted, self.by_bic)
     }
 
     /// The problem with another twin in the place of its own, of the same parameters.
-    pub fn problem_of(&self, base: &Twin) -> Result<Problem<'a>, StudyError> {
+    pub fn problem_of(&self, base: &Twin) -> Result<Problem, StudyError> {
         let twin = with_terms(base, self.terms.iter().map(Arc::as_ref))?;
         let axes = self.problem.axes[..twin.parameters().len()].to_vec();
         let mut problem = self.problem.with_twin(twin, axes);
@@ -96,13 +91,13 @@ impl<'a> Model<'a> {
     }
 
     /// The model with one more term.
-    pub fn extend(&self, term: &Arc<Term>) -> Result<Extended<'a>, StudyError> {
+    pub fn extend(&self, term: &Arc<Term>) -> Result<Extended, StudyError> {
         self.extend_by(std::slice::from_ref(term))
     }
 
-    fn extend_by(&self, new: &[Arc<Term>]) -> Result<Extended<'a>, StudyError> {
+    fn extend_by(&self, new: &[Arc<Term>]) -> Result<Extended, StudyError> {
         let terms: Vec<Arc<Term>> = self.terms.iter().chain(new).cloned().collect();
-        let twin = with_terms(self.base, terms.iter().map(Arc::as_ref))?;
+        let twin = with_terms(&self.base, terms.iter().map(Arc::as_ref))?;
         let d = self.problem.twin.parameters().len();
         let mut axes = self.problem.axes[..d].to_vec();
         let mut families = self.problem.families.clone();
@@ -134,21 +129,21 @@ impl<'a> Model<'a> {
     }
 
     /// The terms beside another twin of the same parameters, or other records, fitted on from here.
-    pub fn beside_twin<'b>(&self, base: &Model<'b>) -> Result<Option<Model<'b>>, StudyError> {
+    pub fn beside_twin(&self, base: &Model) -> Result<Option<Model>, StudyError> {
         let extended = base.extend_by(&self.terms)?;
         let start = extended.problem.carried(&self.problem, &self.fitted.theta);
         let fitted = climb(&extended.problem, &start, TO_THE_END)?;
         let problem = extended.problem.clone();
-        Ok(fitted.and_then(|fitted| extended.fitted(base.base, fitted, problem)))
+        Ok(fitted.and_then(|fitted| extended.fitted(base.base.clone(), fitted, problem)))
     }
 
     /// Full θ of the extended model where the new term has these magnitudes.
-    pub fn beside(&self, extended: &Extended<'_>, m: &[f64]) -> Vec<f64> {
+    pub fn beside(&self, extended: &Extended, m: &[f64]) -> Vec<f64> {
         self.beside_at(extended, &self.fitted.theta, m)
     }
 
     /// The same at another full θ of this model.
-    pub fn beside_at(&self, extended: &Extended<'_>, theta: &[f64], m: &[f64]) -> Vec<f64> {
+    pub fn beside_at(&self, extended: &Extended, theta: &[f64], m: &[f64]) -> Vec<f64> {
         let mut theta = extended.problem.carried(&self.problem, theta);
         for (&j, value) in extended.entries.iter().zip(m) {
             theta[j] = extended.problem.axes[j].bounds.clamp(*value);
@@ -157,7 +152,7 @@ impl<'a> Model<'a> {
     }
 }
 
-impl<'a> Extended<'a> {
+impl Extended {
     /// Full θ of a new start: θ of the twin from elsewhere, in the first `known` entries.
     pub fn from(&self, own: &[f64], mut theta: Vec<f64>) -> Vec<f64> {
         let d = own.len();
@@ -175,7 +170,7 @@ impl<'a> Extended<'a> {
     }
 
     /// The problem with the priors of coefficients and sizes that an approximation found most probable.
-    pub fn with_sizes(&self, found: &Laplace) -> Problem<'a> {
+    pub fn with_sizes(&self, found: &Laplace) -> Problem {
         let mut problem = self.problem.clone();
         for &(j, deviation) in &found.sizes {
             if problem.axes[j].evidence == EvidencePrior::Member {
@@ -186,13 +181,13 @@ impl<'a> Extended<'a> {
     }
 
     /// The fitted model.
-    pub fn fitted(self, base: &'a Twin, fitted: Fitted, problem: Problem<'a>) -> Option<Model<'a>> {
+    pub fn fitted(self, base: Twin, fitted: Fitted, problem: Problem) -> Option<Model> {
         Model::new(base, self.terms, problem, fitted, self.by_bic)
     }
 }
 
 /// The Bayesian information criterion in nats, the larger the better.
-fn bic(problem: &Problem<'_>, fitted: &Fitted) -> f64 {
+fn bic(problem: &Problem, fitted: &Fitted) -> f64 {
     let fitted_entries = problem.axes.iter().filter(|axis| !axis.held).count();
     let values = (problem.records.iter())
         .map(|r| r.outputs().iter().filter(|y| !y.is_nan()).count())

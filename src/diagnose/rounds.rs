@@ -35,18 +35,18 @@ struct Finer {
 }
 
 /// Everything that is known once the search is over.
-pub(in crate::diagnose) struct Explored<'s, 'a> {
+pub(in crate::diagnose) struct Explored<'s> {
     pub study: &'s Study,
-    pub base: &'s Base<'a>,
+    pub base: &'s Base,
     pub listed: &'s [Arc<Term>],
-    pub findings: Findings<'a>,
+    pub findings: Findings,
     pub chances: Chances,
     pub not_tested: Vec<String>,
     /// Rows that the search saw, where it did not see all.
     pub searched: Option<usize>,
 }
 
-impl Explored<'_, '_> {
+impl Explored<'_> {
     /// log of the evidence of all hypotheses together.
     fn log_evidence(&self) -> f64 {
         self.base.model.log_evidence + self.chances.log_evidence
@@ -56,21 +56,21 @@ impl Explored<'_, '_> {
 /// Fits the twin, searches for what explains the records beside it, and hands it all on.
 pub(in crate::diagnose) fn search<R>(
     study: &Study,
-    records: &[Record],
+    records: &Arc<[Record]>,
     settings: &DiagnoseSettings,
     progress: &Progress,
-    then: &dyn Fn(Explored<'_, '_>) -> Result<R, StudyError>,
+    then: &dyn Fn(Explored<'_>) -> Result<R, StudyError>,
 ) -> Result<R, StudyError> {
     let stage = progress.stage("fit", 1);
     let measured = measured(study.twin(), records, &settings.beliefs(study))?;
-    let base = Base::new(&measured, records, settings)?;
+    let base = Base::new(&measured, records.clone(), settings)?;
     stage.tick()?;
     if let Some(step) = step_of(study, &base, settings)? {
         let (nothing, thetas) = (Before::Nothing, vec![]);
         let finer = Finer { step, thetas };
         return with_step(study, &base, finer, nothing, settings, progress, then);
     }
-    let then = |mut own: Explored<'_, '_>| {
+    let then = |mut own: Explored<'_>| {
         match likelier_with_step(&own, settings, progress, then) {
             // A twin that its own step holds together may go nowhere with a finer one.
             Ok(None) | Err(StudyError::NoStart) => {}
@@ -89,10 +89,10 @@ pub(in crate::diagnose) fn search<R>(
 /// Searches with a finer step, too, where effects explain what the step may explain as well: they may imitate its error. `None` where the
 /// step does not show, or where its hypotheses are together no likelier.
 fn likelier_with_step<R>(
-    own: &Explored<'_, '_>,
+    own: &Explored<'_>,
     settings: &DiagnoseSettings,
     progress: &Progress,
-    then: &dyn Fn(Explored<'_, '_>) -> Result<R, StudyError>,
+    then: &dyn Fn(Explored<'_>) -> Result<R, StudyError>,
 ) -> Result<Option<R>, StudyError> {
     if own.base.step.is_some() || own.findings.is_partial || own.chances.log_odds <= Thresholds::GAP
     {
@@ -107,7 +107,7 @@ fn likelier_with_step<R>(
         return Ok(None);
     }
     let least = own.log_evidence() + Thresholds::STEP_WINS;
-    let then = |other: Explored<'_, '_>| {
+    let then = |other: Explored<'_>| {
         let is_likelier = other.log_evidence() > least;
         is_likelier.then(|| then(other)).transpose()
     };
@@ -119,17 +119,17 @@ fn likelier_with_step<R>(
 }
 
 /// Returns whether the twin or one of the best explanations, each carried on with a finer step, is likelier than all are with their own.
-fn helps_explanations(own: &Explored<'_, '_>, step: FinerStep) -> Result<bool, StudyError> {
+fn helps_explanations(own: &Explored<'_>, step: FinerStep) -> Result<bool, StudyError> {
     let model = &own.base.model;
-    let Some(twin) = step.of(model.base) else {
+    let Some(twin) = step.of(&model.base) else {
         return Ok(false);
     };
     let findings = &own.findings;
     let all = [&findings.listed, &findings.unknown, &findings.several];
     let best =
         (all.iter()).flat_map(|all| all.iter().filter_map(|f| f.model.clone()).take(CARRIED));
-    let known: Vec<Model<'_>> = std::iter::once(model.clone()).chain(best).collect();
-    let log_evidence = |model: &Model<'_>| model.log_evidence;
+    let known: Vec<Model> = std::iter::once(model.clone()).chain(best).collect();
+    let log_evidence = |model: &Model| model.log_evidence;
     let least = known
         .iter()
         .map(log_evidence)
@@ -152,7 +152,7 @@ fn helps_explanations(own: &Explored<'_, '_>, step: FinerStep) -> Result<bool, S
 /// asked first.
 fn step_of(
     study: &Study,
-    base: &Base<'_>,
+    base: &Base,
     settings: &DiagnoseSettings,
 ) -> Result<Option<FinerStep>, StudyError> {
     let least = Thresholds::STEP_SHOWS;
@@ -177,14 +177,14 @@ fn step_of(
 /// Fits the twin with a finer step, and searches with it; where it matters little beside what was found, goes on from that.
 fn with_step<R>(
     study: &Study,
-    base: &Base<'_>,
+    base: &Base,
     finer: Finer,
-    before: Before<'_, '_>,
+    before: Before<'_>,
     settings: &DiagnoseSettings,
     progress: &Progress,
-    then: &dyn Fn(Explored<'_, '_>) -> Result<R, StudyError>,
+    then: &dyn Fn(Explored<'_>) -> Result<R, StudyError>,
 ) -> Result<R, StudyError> {
-    let records = base.model.problem.records;
+    let records = &base.model.problem.records;
     let twin = finer.step.of(study.twin());
     let twin = twin.as_ref().unwrap_or(study.twin());
     let measured = measured(twin, records, &settings.beliefs(study))?;
@@ -195,7 +195,7 @@ fn with_step<R>(
     let passes = base.model.problem.passes();
     let base = Base {
         step: Some(finer.step),
-        ..Base::counted(&measured, records, &begin, passes)?
+        ..Base::counted(&measured, records.clone(), &begin, passes)?
     };
     let better = base.fitted_from(&finer.thetas)?;
     let base = better.unwrap_or(base);
@@ -204,14 +204,14 @@ fn with_step<R>(
 
 /// Searches for what explains the records beside a fitted twin, from what is known with another step where that is given; again where
 /// they ask for another kind of noise, or for a finer step.
-fn explored<'a, R>(
+fn explored<R>(
     study: &Study,
-    base: Base<'a>,
-    before: Before<'_, 'a>,
+    base: Base,
+    before: Before<'_>,
     settings: &DiagnoseSettings,
     rounds: usize,
     progress: &Progress,
-    then: &dyn Fn(Explored<'_, '_>) -> Result<R, StudyError>,
+    then: &dyn Fn(Explored<'_>) -> Result<R, StudyError>,
 ) -> Result<R, StudyError> {
     let library = base.library();
     let effects = base.listed(study, settings)?;
@@ -220,7 +220,7 @@ fn explored<'a, R>(
         _ => shared(kinds(study, &settings.without, &library, &base.noisy)?),
     };
     noise.retain(|term| !base.noises.iter().any(|own| own.key() == term.key()));
-    let unlisted = |seen: &[Scales<'_>]| match settings.lacks(Ablation::UnknownFunctions) {
+    let unlisted = |seen: &[Scales]| match settings.lacks(Ablation::UnknownFunctions) {
         true => vec![],
         false => shared(unknown(&library, seen)),
     };
@@ -279,22 +279,21 @@ fn explored<'a, R>(
 
 /// Searches again where the fit of the twin had stopped early, or with the noise or the finer step that the findings ask for; `None` where
 /// nothing of that holds.
-fn again<'a, R>(
+fn again<R>(
     study: &Study,
-    base: &Base<'a>,
-    findings: &Findings<'a>,
+    base: &Base,
+    findings: &Findings,
     settings: &DiagnoseSettings,
     rounds: usize,
     progress: &Progress,
-    then: &dyn Fn(Explored<'_, '_>) -> Result<R, StudyError>,
+    then: &dyn Fn(Explored<'_>) -> Result<R, StudyError>,
 ) -> Result<Option<R>, StudyError> {
     if let Some(better) = base.fitted_from(&findings.thetas())? {
         let before = Before::Worse(findings, base.model.log_evidence);
         return explored(study, better, before, settings, rounds, progress, then).map(Some);
     }
     if let Some(model) = findings.asks_for_noise().and_then(|f| f.model.as_ref()) {
-        let twin = model.problem.twin.clone();
-        if let Some(noisier) = base.with_noise(model, &twin)? {
+        if let Some(noisier) = base.with_noise(model)? {
             let before = Before::Nothing;
             return explored(study, noisier, before, settings, rounds - 1, progress, then)
                 .map(Some);

@@ -29,6 +29,7 @@ use crate::record::Record;
 use crate::setting::SettingError;
 use crate::study::{Study, StudyError};
 use crate::twin::Noise;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Most effects that are named together.
@@ -74,7 +75,8 @@ pub fn diagnose(
 ) -> Result<Diagnosis, StudyError> {
     let clock = Instant::now();
     check(study, records, validation, settings)?;
-    let found = search(study, records, settings, progress, &|explored| {
+    let owned = Arc::from(records);
+    let found = search(study, &owned, settings, progress, &|explored| {
         report(explored, validation, settings, progress)
     })?;
     Ok(Diagnosis {
@@ -85,7 +87,7 @@ pub fn diagnose(
 
 /// Decides, locates and measures.
 fn report(
-    explored: Explored<'_, '_>,
+    explored: Explored<'_>,
     validation: Option<&Record>,
     settings: &DiagnoseSettings,
     progress: &Progress,
@@ -109,7 +111,7 @@ fn report(
         searched,
     } = &explored;
     let model = &base.model;
-    let records = model.problem.records;
+    let records = &model.problem.records;
     let mut detection = Detection {
         log_evidence: chances.log_odds,
         p_value: None,
@@ -126,7 +128,7 @@ fn report(
         };
         let log_odds = |records: &[Record]| {
             let silent = Progress::silent();
-            search(study, records, &alone, &silent, &|found| {
+            search(study, &Arc::from(records), &alone, &silent, &|found| {
                 Ok(found.chances.log_odds)
             })
         };
@@ -183,7 +185,7 @@ fn report(
     if !settings.detection_only {
         let is_class = conclusion.decision == Decision::Class && conclusion.accepted.len() == 1;
         if is_class && !settings.quick {
-            let rivals: Vec<&Model<'_>> = (conclusion.class.iter())
+            let rivals: Vec<&Model> = (conclusion.class.iter())
                 .filter_map(|key| findings.model(std::slice::from_ref(key)))
                 .collect();
             next = next_input(&rivals, noise.child("next"))?;
@@ -208,7 +210,7 @@ fn report(
         settings.ends(stage.tick())?;
     }
     let runs = |records: &[Record]| -> Result<FreeRuns, StudyError> {
-        let runner = |model: &Model<'_>| {
+        let runner = |model: &Model| {
             let problem = model.problem.on(records);
             Runner::new(&problem, &problem.full(&model.theta()))
         };
@@ -273,7 +275,7 @@ fn report(
 }
 
 /// The accepted model, its fit carried on to its end: the search stops where a hypothesis is known well enough to be compared.
-pub(super) fn finished<'a>(accepted: Option<&Model<'a>>) -> Result<Option<Model<'a>>, StudyError> {
+pub(super) fn finished(accepted: Option<&Model>) -> Result<Option<Model>, StudyError> {
     let Some(model) = accepted else {
         return Ok(None);
     };
@@ -284,9 +286,9 @@ pub(super) fn finished<'a>(accepted: Option<&Model<'a>>) -> Result<Option<Model<
 
 /// Returns whether the free run of a noisy black box's model is nearer to the record than that of the twin. Their likelihood is linearised
 /// about their runs, and says nothing where these are in another phase.
-fn is_nearer(model: Option<&Model<'_>>, twin: &Model<'_>) -> Result<bool, StudyError> {
+fn is_nearer(model: Option<&Model>, twin: &Model) -> Result<bool, StudyError> {
     let Some(model) = model else { return Ok(true) };
-    let error = |model: &Model<'_>| -> Result<f64, StudyError> {
+    let error = |model: &Model| -> Result<f64, StudyError> {
         let runner = Runner::new(&model.problem, &model.fitted.theta)?;
         let errors = runner.and_then(|runner| runner.errors(&model.problem.records[0], 0));
         Ok(errors.map_or(f64::INFINITY, |errors| root(&errors)))
@@ -296,10 +298,10 @@ fn is_nearer(model: Option<&Model<'_>>, twin: &Model<'_>) -> Result<bool, StudyE
 
 /// Places, missing functions and residuals of a structural gap.
 fn located(
-    findings: &Findings<'_>,
+    findings: &Findings,
     chances: &Chances,
     conclusion: &Conclusion,
-    model: &Model<'_>,
+    model: &Model,
 ) -> Result<Location, StudyError> {
     let mut targets: Vec<TargetShare> = (chances.places.iter())
         .map(|(target, p)| TargetShare {
@@ -337,7 +339,7 @@ fn located(
 
 /// A sparse law for what is missing, where nothing listed explains it all.
 fn discovered(
-    findings: &Findings<'_>,
+    findings: &Findings,
     conclusion: &Conclusion,
     location: &Location,
     noise: Noise,

@@ -53,7 +53,7 @@ impl FinerStep {
 /// A step shows from `least` nats on. Which finer one, the innovations say, not evidence: an error of a coarser one may imitate what is
 /// missing. Beside a model that explains so many nats, an error below a law's fine print is none.
 pub(in crate::diagnose) fn finer_step(
-    model: &Model<'_>,
+    model: &Model,
     least: f64,
     explained: f64,
 ) -> Result<Option<(FinerStep, f64)>, StudyError> {
@@ -64,8 +64,8 @@ pub(in crate::diagnose) fn finer_step(
     let Some(reference) = recoverable(Reference::new(&model.problem, theta))?.flatten() else {
         return Ok(None);
     };
-    let problem = |step: FinerStep| -> Result<Option<Problem<'_>>, StudyError> {
-        let twin = step.of(model.base);
+    let problem = |step: FinerStep| -> Result<Option<Problem>, StudyError> {
+        let twin = step.of(&model.base);
         twin.map(|twin| model.problem_of(&twin)).transpose()
     };
     let direction = |step: FinerStep| -> Result<Option<DVector<f64>>, StudyError> {
@@ -109,8 +109,8 @@ pub(in crate::diagnose) fn finer_step(
         return Ok(None);
     }
     // With less noise than the own step needs, an error of the finer one may show as well.
-    let twin = chosen.of(model.base);
-    let further = match &twin {
+    let twin = chosen.of(&model.base);
+    let further = match twin {
         Some(base) => finer_step(&Model { base, ..carried }, least, explained)?,
         None => None,
     };
@@ -144,7 +144,7 @@ mod tests {
         let settings = DiagnoseSettings::default();
         let asked = |records: &[Record]| {
             let measured = measured(study.twin(), records, &study.beliefs()).unwrap();
-            let base = Base::new(&measured, records, &settings).unwrap();
+            let base = Base::new(&measured, records.into(), &settings).unwrap();
             finer_step(&base.model, Thresholds::STEP_SHOWS, 0.0).unwrap()
         };
         for seed in 0..3 {

@@ -19,10 +19,10 @@ use std::sync::Arc;
 
 /// Listed effects as they are reported: the accepted ones first, then by probability.
 pub(in crate::diagnose) fn effects(
-    findings: &Findings<'_>,
+    findings: &Findings,
     chances: &Chances,
     conclusion: &Conclusion,
-    accepted: Option<&Model<'_>>,
+    accepted: Option<&Model>,
 ) -> Vec<EffectFit> {
     let mut all: Vec<EffectFit> = (findings.listed.iter())
         .filter_map(|found| {
@@ -51,7 +51,7 @@ pub(in crate::diagnose) fn effects(
 }
 
 /// Effects that absorb a parameter gap; each is as probable as the others.
-pub(in crate::diagnose) fn absorbed(found: &[Found<'_>]) -> Vec<EffectFit> {
+pub(in crate::diagnose) fn absorbed(found: &[Found]) -> Vec<EffectFit> {
     let share = 1.0 / found.len().max(1) as f64;
     (found.iter())
         .filter_map(|f| Some(fit_of(f.model.as_ref()?, f.last(), share, f.gain)))
@@ -60,7 +60,7 @@ pub(in crate::diagnose) fn absorbed(found: &[Found<'_>]) -> Vec<EffectFit> {
 }
 
 /// One term of a fitted model.
-fn fit_of(model: &Model<'_>, term: &Term, probability: f64, log_evidence: f64) -> EffectFit {
+fn fit_of(model: &Model, term: &Term, probability: f64, log_evidence: f64) -> EffectFit {
     let theta = model.theta();
     let space = model.problem.twin.parameters();
     let magnitudes = match &term.part {
@@ -87,7 +87,7 @@ fn fit_of(model: &Model<'_>, term: &Term, probability: f64, log_evidence: f64) -
 
 /// The twin's own parameters, with errors and intervals from posterior draws: what a record hardly knows is not normal.
 pub(in crate::diagnose) fn parameters(
-    model: &Model<'_>,
+    model: &Model,
     alone: &[f64],
     settings: &DiagnoseSettings,
 ) -> Result<Vec<FittedParameter>, StudyError> {
@@ -116,7 +116,7 @@ pub(in crate::diagnose) fn parameters(
 
 /// Noise levels, magnitudes of the study's own effects, and the first states given the records; `noises` are the last parameters.
 pub(in crate::diagnose) fn nuisance(
-    model: &Model<'_>,
+    model: &Model,
     noises: &[Arc<Term>],
 ) -> Result<Vec<Nuisance>, StudyError> {
     let errors = model.fitted.std_errors(&model.problem);
@@ -191,7 +191,7 @@ fn noise_names(term: &Term) -> Vec<String> {
 }
 
 /// The time of a change that was accepted.
-pub(in crate::diagnose) fn onset(model: &Model<'_>) -> Option<Onset> {
+pub(in crate::diagnose) fn onset(model: &Model) -> Option<Onset> {
     let theta = model.theta();
     let space = model.problem.twin.parameters();
     model.terms.iter().find_map(|term| {
@@ -213,7 +213,7 @@ pub(in crate::diagnose) fn onset(model: &Model<'_>) -> Option<Onset> {
 /// Unknown rest on top of the accepted effects, or else of the best single one: what a function adds, or, of a part, by how much one
 /// explains more in its place.
 pub(in crate::diagnose) fn remains(
-    findings: &Findings<'_>,
+    findings: &Findings,
     conclusion: &Conclusion,
 ) -> Option<Remains> {
     if conclusion.decision == Decision::NotNeeded {

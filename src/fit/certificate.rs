@@ -34,7 +34,7 @@ pub(crate) struct Certificate {
 
 impl Certificate {
     /// Certifies the best of several fits, best first.
-    pub fn new(problem: &Problem<'_>, fits: &[Fitted]) -> Option<Self> {
+    pub fn new(problem: &Problem, fits: &[Fitted]) -> Option<Self> {
         let best = fits.first()?;
         let c = &problem.coordinates;
         let phi = c.of(&best.theta);

@@ -24,7 +24,7 @@ pub(crate) struct Fitted {
 
 impl Fitted {
     /// Standard deviations of θ from information and prior, first order.
-    pub fn std_errors(&self, problem: &Problem<'_>) -> Vec<f64> {
+    pub fn std_errors(&self, problem: &Problem) -> Vec<f64> {
         let slopes = problem.coordinates.slopes(&self.theta);
         match self.information.clone().try_inverse() {
             Some(covariance) => (slopes.iter().enumerate())
@@ -44,7 +44,7 @@ impl Fitted {
 /// F holds the information of the weak prior too. Entries at a bound that want to leave it are held for the step. A trial
 /// point where the filter fails only rejects the step.
 pub(crate) fn climb(
-    problem: &Problem<'_>,
+    problem: &Problem,
     start: &[f64],
     iterations: usize,
 ) -> Result<Option<Fitted>, FilterError> {
@@ -100,11 +100,11 @@ pub(crate) fn climb(
 
 /// Returns what moves a start to where all other entries have answered those of a shape, which stay: a threshold, a lag or a time would go
 /// anywhere from afar. With no such entry a start stays where it is.
-pub(crate) fn settling<'a>(
-    problem: &Problem<'a>,
+pub(crate) fn settling(
+    problem: &Problem,
     is_shape: &dyn Fn(usize) -> bool,
     iterations: usize,
-) -> impl Fn(Vec<f64>) -> Result<Vec<f64>, FilterError> + use<'a> {
+) -> impl Fn(Vec<f64>) -> Result<Vec<f64>, FilterError> + use<> {
     let has_shape = (0..problem.axes.len()).any(is_shape);
     let held = has_shape.then(|| problem.holding(is_shape));
     move |start| match &held {
@@ -115,7 +115,7 @@ pub(crate) fn settling<'a>(
 
 /// The damped step, entries held at their bounds left out.
 fn step(
-    problem: &Problem<'_>,
+    problem: &Problem,
     slope: &Slope,
     phi: &DVector<f64>,
     damping: f64,
@@ -156,7 +156,7 @@ fn step(
 
 /// The best of several starts.
 pub(crate) fn fit(
-    problem: &Problem<'_>,
+    problem: &Problem,
     starts: &[Vec<f64>],
     iterations: usize,
 ) -> Result<Option<Fitted>, FilterError> {

@@ -15,14 +15,14 @@ const LACKS: &str = "look for what the twin lacks: truetwin diagnose";
 
 /// Warnings of a fit.
 pub(super) struct Doubts<'a> {
-    problem: &'a Problem<'a>,
+    problem: &'a Problem,
     theta: &'a [f64],
     pub all: Vec<Warning>,
 }
 
 impl<'a> Doubts<'a> {
     /// No warnings yet about a fit at θ.
-    pub fn new(problem: &'a Problem<'a>, theta: &'a [f64]) -> Self {
+    pub fn new(problem: &'a Problem, theta: &'a [f64]) -> Self {
         Self {
             problem,
             theta,

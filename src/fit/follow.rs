@@ -7,7 +7,7 @@ use crate::record::Signal;
 use crate::twin::begun;
 
 /// States at the first sample of each record, given the whole record.
-pub(crate) fn starts(problem: &Problem<'_>, smoothed: &[States]) -> Vec<FittedStart> {
+pub(crate) fn starts(problem: &Problem, smoothed: &[States]) -> Vec<FittedStart> {
     let states = problem.outline().states;
     (smoothed.iter().enumerate())
         .flat_map(|(r, smoothed)| {
@@ -28,7 +28,7 @@ pub(crate) fn starts(problem: &Problem<'_>, smoothed: &[States]) -> Vec<FittedSt
 
 /// Noise-free runs from the start given the record; none where a run diverges.
 pub(crate) fn free_runs(
-    problem: &Problem<'_>,
+    problem: &Problem,
     theta: &[f64],
     smoothed: &[States],
 ) -> Vec<Option<Signal>> {

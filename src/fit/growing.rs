@@ -21,7 +21,7 @@ const ITERATIONS: usize = 25;
 
 /// The best θ of all starts; `None` where the twin can be simulated at none.
 pub(crate) fn base_fit(
-    problem: &Problem<'_>,
+    problem: &Problem,
     initial: Option<&[f64]>,
     noise: Noise,
 ) -> Result<Option<Fitted>, FilterError> {
@@ -46,7 +46,7 @@ pub(crate) fn base_fit(
                 part.unwrap_or_else(|| r.clone())
             })
             .collect();
-        let short = problem.on(&begun);
+        let short = problem.on(begun);
         if level == 0 {
             let values: Vec<Option<f64>> = (starts.par_iter())
                 .map(|theta| {
@@ -74,7 +74,7 @@ pub(crate) fn base_fit(
 }
 
 /// Fits from all starts, best first.
-fn fits(problem: &Problem<'_>, starts: &[Vec<f64>]) -> Result<Vec<Fitted>, FilterError> {
+fn fits(problem: &Problem, starts: &[Vec<f64>]) -> Result<Vec<Fitted>, FilterError> {
     let fits: Vec<Option<Fitted>> = (starts.par_iter())
         .map(|start| climb(problem, start, ITERATIONS))
         .collect::<Result<_, _>>()?;

@@ -15,9 +15,9 @@ const LONGEST_NOISE: f64 = 2.0;
 ///
 /// The full θ is the twin's, then the starts of the second record, and so on.
 #[derive(Clone)]
-pub(crate) struct Problem<'a> {
+pub(crate) struct Problem {
     pub twin: Twin,
-    pub records: &'a [Record],
+    pub records: Arc<[Record]>,
     /// Indices of the twin's parameters in the full θ, for each record.
     pub(super) places: Vec<Vec<usize>>,
     pub axes: Vec<Axis>,
@@ -39,9 +39,10 @@ pub(super) struct Evaluation {
     pub innovations: Option<Vec<Filtered>>,
 }
 
-impl<'a> Problem<'a> {
+impl Problem {
     /// `axes` belong to the parameters of the twin; their likelihood is a filter's, or, without equations, that of an ensemble.
-    pub fn new(twin: Twin, axes: Vec<Axis>, records: &'a [Record]) -> Self {
+    pub fn new(twin: Twin, axes: Vec<Axis>, records: impl Into<Arc<[Record]>>) -> Self {
+        let records = records.into();
         let space = twin.parameters();
         let mut all = axes;
         let mut places = Vec::new();
@@ -94,7 +95,7 @@ impl<'a> Problem<'a> {
     pub fn with_twin(&self, twin: Twin, axes: Vec<Axis>) -> Self {
         Self {
             done: self.done,
-            ..Self::new(twin, axes, self.records).counted_with(&self.passes)
+            ..Self::new(twin, axes, self.records.clone()).counted_with(&self.passes)
         }
     }
 
@@ -108,7 +109,7 @@ impl<'a> Problem<'a> {
 
     /// A twin with noise levels in θ and the weak priors of its parameters. Unknown starts of equations are held: the filter integrates
     /// over the first state.
-    pub fn of_measured(measured: &Measured, records: &'a [Record]) -> Self {
+    pub fn of_measured(measured: &Measured, records: impl Into<Arc<[Record]>>) -> Self {
         let space = measured.twin.parameters();
         let own = space.len() - measured.levels.len();
         let axes: Vec<Axis> = (space.iter().take(own).map(Axis::of))
@@ -121,7 +122,7 @@ impl<'a> Problem<'a> {
     }
 
     /// A twin with the weak priors of its own parameters.
-    pub fn of_twin(twin: &Twin, records: &'a [Record]) -> Self {
+    pub fn of_twin(twin: &Twin, records: impl Into<Arc<[Record]>>) -> Self {
         let space = twin.parameters();
         let axes = space.iter().map(Axis::of).collect();
         let mut problem = Self::new(twin.clone(), axes, records);
@@ -142,12 +143,12 @@ impl<'a> Problem<'a> {
     }
 
     /// The same twin on other records.
-    pub fn on<'b>(&self, records: &'b [Record]) -> Problem<'b> {
+    pub fn on(&self, records: impl Into<Arc<[Record]>>) -> Self {
         let d = self.twin.parameters().len();
         let axes = self.axes[..d].to_vec();
-        Problem {
+        Self {
             families: self.families.clone(),
-            ..Problem::new(self.twin.clone(), axes, records).counted_with(&self.passes)
+            ..Self::new(self.twin.clone(), axes, records).counted_with(&self.passes)
         }
     }
 
@@ -190,7 +191,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Full θ from that of another problem, whose records are the first of these: others start as its first one does.
-    pub fn carried(&self, other: &Problem<'_>, theta: &[f64]) -> Vec<f64> {
+    pub fn carried(&self, other: &Problem, theta: &[f64]) -> Vec<f64> {
         let mut full = self.full(&other.of_record(0, theta));
         for r in 0..other.records.len().min(self.records.len()) {
             self.place(r, &other.of_record(r, theta), &mut full);

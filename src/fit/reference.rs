@@ -42,13 +42,13 @@ pub(crate) struct Gain {
 
 impl Reference {
     /// Filters at θ, which is as free as the weak priors leave it.
-    pub fn new(problem: &Problem<'_>, theta: &[f64]) -> Result<Option<Self>, FilterError> {
+    pub fn new(problem: &Problem, theta: &[f64]) -> Result<Option<Self>, FilterError> {
         Self::knowing(problem, theta, &weak(problem))
     }
 
     /// Filters at θ, about which the information `known` (in φ) exists already.
     pub fn knowing(
-        problem: &Problem<'_>,
+        problem: &Problem,
         theta: &[f64],
         known: &DMatrix<f64>,
     ) -> Result<Option<Self>, FilterError> {
@@ -189,7 +189,7 @@ impl Reference {
 }
 
 /// Information of the weak priors about θ, in φ.
-pub(crate) fn weak(problem: &Problem<'_>) -> DMatrix<f64> {
+pub(crate) fn weak(problem: &Problem) -> DMatrix<f64> {
     let precisions = problem.prior_terms().map(|(_, precision)| precision);
     DMatrix::from_diagonal(&DVector::from_iterator(problem.dimension(), precisions))
 }

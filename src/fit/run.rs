@@ -117,7 +117,7 @@ pub(crate) fn run(
 /// Posterior draws; where one of them is better than the best fit, another search begins there: the likelihood has kinks that no slope
 /// leads over.
 fn drawn(
-    problem: &Problem<'_>,
+    problem: &Problem,
     fits: &mut Vec<Fitted>,
     asked: Option<usize>,
     noise: Noise,
@@ -140,7 +140,7 @@ fn drawn(
 
 /// Parameters and noise levels with errors and intervals.
 fn values(
-    problem: &Problem<'_>,
+    problem: &Problem,
     fitted: &Fitted,
     certificate: &Certificate,
     levels: &[Level],
@@ -186,7 +186,7 @@ fn values(
 
 /// Errors of each output at the full θ.
 pub(super) fn errors(
-    problem: &Problem<'_>,
+    problem: &Problem,
     theta: &[f64],
     free_runs: &[Option<Signal>],
 ) -> Result<Vec<OutputErrors>, FilterError> {

@@ -20,7 +20,7 @@ pub(super) struct Slope {
 
 impl Slope {
     /// Slope of the weak prior's density alone, its gradient yet to be added.
-    fn zero(problem: &Problem<'_>, theta: &[f64]) -> Self {
+    fn zero(problem: &Problem, theta: &[f64]) -> Self {
         let d = problem.dimension();
         Self {
             log_likelihood: 0.0,
@@ -37,7 +37,7 @@ impl Slope {
 
 /// Returns gradient and information at θ; `innovations` are those of a black box at θ, where they are known.
 pub(super) fn slope(
-    problem: &Problem<'_>,
+    problem: &Problem,
     theta: &[f64],
     innovations: Option<Vec<Filtered>>,
 ) -> Result<Slope, FilterError> {
@@ -52,7 +52,7 @@ pub(super) fn slope(
 }
 
 /// Gradient and information from the filter's score of each record.
-fn by_scores(problem: &Problem<'_>, theta: &[f64]) -> Result<Slope, FilterError> {
+fn by_scores(problem: &Problem, theta: &[f64]) -> Result<Slope, FilterError> {
     let mut slope = Slope::zero(problem, theta);
     for (r, place) in problem.places.iter().enumerate() {
         let Some(score) = problem.score(r, theta)? else {
@@ -69,7 +69,7 @@ fn by_scores(problem: &Problem<'_>, theta: &[f64]) -> Result<Slope, FilterError>
     Ok(slope)
 }
 
-fn add_priors(problem: &Problem<'_>, theta: &[f64], slope: &mut Slope) {
+fn add_priors(problem: &Problem, theta: &[f64], slope: &mut Slope) {
     let phi = problem.coordinates.of(theta);
     for (j, (centre, precision)) in problem.prior_terms().enumerate() {
         slope.gradient[j] -= precision * (phi[j] - centre);
@@ -79,7 +79,7 @@ fn add_priors(problem: &Problem<'_>, theta: &[f64], slope: &mut Slope) {
 
 /// Gradient and information of an ensemble's likelihood at θ with these innovations, from differences.
 fn by_differences(
-    problem: &Problem<'_>,
+    problem: &Problem,
     theta: &[f64],
     innovations: Vec<Filtered>,
 ) -> Result<Slope, FilterError> {

@@ -34,7 +34,7 @@ pub(crate) enum Care {
 
 /// Fits from the prior's centre, the full θ that are given, and the best of random ones, each to its end; best first.
 pub(crate) fn search(
-    problem: &Problem<'_>,
+    problem: &Problem,
     initial: &[Vec<f64>],
     noise: Noise,
     iterations: usize,
@@ -89,7 +89,7 @@ impl Screen {
         ..Self::LOUD
     };
 
-    fn quiet(problem: &Problem<'_>) -> Self {
+    fn quiet(problem: &Problem) -> Self {
         let free = problem
             .axes
             .iter()
@@ -103,11 +103,7 @@ impl Screen {
 }
 
 /// The best of random points.
-fn screened(
-    problem: &Problem<'_>,
-    noise: Noise,
-    screen: Screen,
-) -> Result<Vec<Vec<f64>>, FilterError> {
+fn screened(problem: &Problem, noise: Noise, screen: Screen) -> Result<Vec<Vec<f64>>, FilterError> {
     let space = problem.twin.parameters();
     let mut screened: Vec<(f64, Vec<f64>)> = (0..screen.points)
         .into_par_iter()
@@ -141,7 +137,7 @@ fn screened(
 }
 
 /// Returns whether two points differ by a part of the prior in some entry.
-fn is_apart(problem: &Problem<'_>, one: &[f64], other: &[f64]) -> bool {
+fn is_apart(problem: &Problem, one: &[f64], other: &[f64]) -> bool {
     let c = &problem.coordinates;
     let (one, other) = (c.of(one), c.of(other));
     (problem.axes.iter().enumerate())
@@ -157,7 +153,7 @@ fn is_apart(problem: &Problem<'_>, one: &[f64], other: &[f64]) -> bool {
 }
 
 fn climbs(
-    problem: &Problem<'_>,
+    problem: &Problem,
     starts: &[Vec<f64>],
     iterations: usize,
 ) -> Result<Vec<Fitted>, FilterError> {
@@ -179,7 +175,7 @@ pub(super) fn agreeing(fits: &[Fitted]) -> usize {
 
 /// Carries fits on that are near the best, until they gain hardly anything more.
 pub(crate) fn polish(
-    problem: &Problem<'_>,
+    problem: &Problem,
     fits: Vec<Fitted>,
     iterations: usize,
 ) -> Result<Vec<Fitted>, FilterError> {

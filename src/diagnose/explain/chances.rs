@@ -36,7 +36,7 @@ impl Chances {
     }
 }
 
-impl<'a> Findings<'a> {
+impl Findings {
     /// Returns whether a second effect explains something that an unknown function beside the first does not, but for the fine print of laws:
     /// few functions are searched there.
     fn needs_second(&self) -> bool {
@@ -54,10 +54,10 @@ impl<'a> Findings<'a> {
     /// The listed effects at the place of an unknown function that explain nearly as much, and the share of each: the function is one of
     /// them in another form. Where the form of the best misses R nats, a lead of R over the others counts as one of 3 nats does where
     /// none are missed.
-    fn holding(&self, unknown: &Found<'_>) -> Vec<(Vec<String>, f64)> {
+    fn holding(&self, unknown: &Found) -> Vec<(Vec<String>, f64)> {
         let least = (1.0 - Thresholds::OUTDONE) * unknown.gain;
         let place = unknown.last().target.as_str();
-        let all: Vec<&Found<'a>> = (self.listed.iter())
+        let all: Vec<&Found> = (self.listed.iter())
             .filter(|f| f.gain > least && f.last().places().contains(&place))
             .collect();
         let best = all.iter().map(|f| f.gain).fold(f64::NEG_INFINITY, f64::max);
@@ -70,7 +70,7 @@ impl<'a> Findings<'a> {
     }
 
     /// Returns whether an unknown function is a set of listed effects in another form.
-    pub fn is_held_by(&self, keys: &[String], unknown: &Found<'_>) -> bool {
+    pub fn is_held_by(&self, keys: &[String], unknown: &Found) -> bool {
         self.holding(unknown).iter().any(|(held, _)| held == keys)
     }
 

@@ -46,7 +46,7 @@ type Candidate = (Vec<String>, f64, f64);
 
 /// Decides about a gap.
 pub(in crate::diagnose) fn decide(
-    findings: &Findings<'_>,
+    findings: &Findings,
     chances: &Chances,
     most_effects: usize,
     has_equations: bool,
@@ -118,7 +118,7 @@ pub(in crate::diagnose) fn decide(
 }
 
 /// Returns whether no listed effect outside a set has a third of its nats: a law outside the library is imitated by several.
-fn stands_alone(findings: &Findings<'_>, keys: &[String], own: f64) -> bool {
+fn stands_alone(findings: &Findings, keys: &[String], own: f64) -> bool {
     let others = findings
         .listed
         .iter()
@@ -148,7 +148,7 @@ fn likeliest<'c>(
 
 /// A set that is named, with single effects that the records cannot tell from it.
 fn named(
-    findings: &Findings<'_>,
+    findings: &Findings,
     chances: &Chances,
     keys: &[String],
     decision: Decision,

@@ -21,14 +21,14 @@ pub(in crate::diagnose) const STEPS: usize = 5;
 
 /// Looks for what explains the records alone: unknown functions, listed effects. `inside` is the twin with θ inside its prior, if its fit has
 /// left it.
-pub(in crate::diagnose) fn singles<'a>(
-    base: &Model<'a>,
-    inside: Option<&Model<'a>>,
+pub(in crate::diagnose) fn singles(
+    base: &Model,
+    inside: Option<&Model>,
     terms: &Terms<'_>,
-    before: Before<'_, 'a>,
+    before: Before<'_>,
     settings: &DiagnoseSettings,
     stage: &Stage,
-) -> Result<Singles<'a>, StudyError> {
+) -> Result<Singles, StudyError> {
     let breadth = Breadth::of(base, settings.quick);
     match before {
         Before::Nothing => one_by_one(base, inside, terms, breadth, stage),
@@ -38,13 +38,13 @@ pub(in crate::diagnose) fn singles<'a>(
 }
 
 /// Adds other kinds of noise to single explanations, what those leave, and pairs; stops early where nothing is missing.
-pub(in crate::diagnose) fn explore<'a>(
-    found: Singles<'a>,
-    base: &Model<'a>,
+pub(in crate::diagnose) fn explore(
+    found: Singles,
+    base: &Model,
     terms: &Terms<'_>,
     settings: &DiagnoseSettings,
     stage: &Stage,
-) -> Result<Findings<'a>, StudyError> {
+) -> Result<Findings, StudyError> {
     let breadth = Breadth::of(base, settings.quick);
     let Singles { findings, carried } = found;
     let (mut findings, several) = match carried {
@@ -74,41 +74,41 @@ pub(in crate::diagnose) fn explore<'a>(
 }
 
 /// Single explanations.
-pub(in crate::diagnose) struct Singles<'a> {
-    pub findings: Findings<'a>,
+pub(in crate::diagnose) struct Singles {
+    pub findings: Findings,
     /// Those that a search with another step found beside them.
-    carried: Option<Carried<'a>>,
+    carried: Option<Carried>,
 }
 
 /// Pairs, and other kinds of noise.
-struct Carried<'a> {
-    several: Vec<Found<'a>>,
-    noise: Vec<Found<'a>>,
-    noise_pairs: Vec<Found<'a>>,
+struct Carried {
+    several: Vec<Found>,
+    noise: Vec<Found>,
+    noise_pairs: Vec<Found>,
 }
 
 /// Knowledge from a search before.
 #[derive(Clone, Copy)]
-pub(in crate::diagnose) enum Before<'k, 'a> {
+pub(in crate::diagnose) enum Before<'k> {
     Nothing,
     /// Findings beside a worse fit of the same twin, and log Z of that: its fits are kept unless new ones are better.
-    Worse(&'k Findings<'a>, f64),
+    Worse(&'k Findings, f64),
     /// Findings beside the same twin with another step, and log Z of that twin: their fits are carried on.
-    OtherStep(&'k Findings<'k>, f64),
+    OtherStep(&'k Findings, f64),
 }
 
 /// Single explanations beside a better fit of the twin: fits from the prior's centre and from loud noise stay as they are, the others are begun
 /// again.
-fn beside_better<'a>(
-    old: &Findings<'a>,
+fn beside_better(
+    old: &Findings,
     old_origin: f64,
-    base: &Model<'a>,
+    base: &Model,
     terms: &Terms<'_>,
     breadth: Breadth,
     stage: &Stage,
-) -> Result<Singles<'a>, StudyError> {
+) -> Result<Singles, StudyError> {
     let origin = base.log_evidence;
-    let kept = |all: &[Found<'a>]| -> Vec<Found<'a>> {
+    let kept = |all: &[Found]| -> Vec<Found> {
         let shifted = all.iter().cloned().map(|f| f.beside(old_origin, origin));
         fitted(shifted.collect()).collect()
     };
@@ -124,19 +124,19 @@ fn beside_better<'a>(
 }
 
 /// Carries the fits that are known with another step on from where they ended: single explanations, and pairs.
-fn carried_on<'a>(
-    old: &Findings<'_>,
+fn carried_on(
+    old: &Findings,
     old_origin: f64,
-    base: &Model<'a>,
+    base: &Model,
     terms: &Terms<'_>,
     breadth: Breadth,
     stage: &Stage,
-) -> Result<Singles<'a>, StudyError> {
+) -> Result<Singles, StudyError> {
     let origin = base.log_evidence;
-    let kept = |found: &Found<'_>| found.promised().beside(old_origin, origin);
+    let kept = |found: &Found| found.promised().beside(old_origin, origin);
     // What does not stand out keeps its evidence: another step does not help it more than the others.
     let least = FIRST * old.top();
-    let carry = |found: &Found<'_>| -> Result<Found<'a>, StudyError> {
+    let carry = |found: &Found| -> Result<Found, StudyError> {
         let mut carried = kept(found);
         if let Some(old) = found.model.as_ref().filter(|_| found.gain > least)
             && let Some(new) = old.beside_twin(base)?
@@ -146,12 +146,12 @@ fn carried_on<'a>(
         }
         Ok(carried)
     };
-    let carry_all = |all: &[Found<'_>]| -> Result<Vec<Found<'a>>, StudyError> {
-        let mut all: Vec<Found<'a>> = all.par_iter().map(carry).collect::<Result<_, _>>()?;
+    let carry_all = |all: &[Found]| -> Result<Vec<Found>, StudyError> {
+        let mut all: Vec<Found> = all.par_iter().map(carry).collect::<Result<_, _>>()?;
         sort(&mut all);
         Ok(all)
     };
-    let last = |all: &[Found<'_>]| all.iter().map(|f| f.last().key()).collect::<Vec<String>>();
+    let last = |all: &[Found]| all.iter().map(|f| f.last().key()).collect::<Vec<String>>();
     let best = last(&old.unknown[..old.unknown.len().min(FEW)]);
     let seen = scales(&old.listed[..old.listed.len().min(2)])?;
     let best = of_keys(&(terms.unknown)(&seen), &best);
@@ -165,7 +165,7 @@ fn carried_on<'a>(
     stage.tick()?;
     let mut effects = carry_all(&old.listed)?;
     // Those that stand out are fitted afresh, too: the other step's error may have led them astray.
-    let near: Vec<Found<'a>> = (effects.iter().take(SINGLES))
+    let near: Vec<Found> = (effects.iter().take(SINGLES))
         .filter(|found| found.gain > least)
         .cloned()
         .collect();
@@ -182,8 +182,8 @@ fn carried_on<'a>(
     })
 }
 
-impl<'a> Singles<'a> {
-    fn alone(unknown: Vec<Found<'a>>, listed: Vec<Found<'a>>) -> Self {
+impl Singles {
+    fn alone(unknown: Vec<Found>, listed: Vec<Found>) -> Self {
         Self {
             findings: Findings {
                 listed,
@@ -196,13 +196,13 @@ impl<'a> Singles<'a> {
 }
 
 /// Unknown functions and effects alone.
-fn one_by_one<'a>(
-    base: &Model<'a>,
-    inside: Option<&Model<'a>>,
+fn one_by_one(
+    base: &Model,
+    inside: Option<&Model>,
     terms: &Terms<'_>,
     breadth: Breadth,
     stage: &Stage,
-) -> Result<Singles<'a>, StudyError> {
+) -> Result<Singles, StudyError> {
     let origin = base.log_evidence;
     let first = (terms.unknown)(&[]);
     let mut unknown_alone = unknown(base, &first, origin, breadth)?;
@@ -222,7 +222,7 @@ fn one_by_one<'a>(
         true => breadth.afresh(),
         false => breadth,
     };
-    let alone = |breadth: Breadth, top: f64| -> Result<Vec<Found<'a>>, StudyError> {
+    let alone = |breadth: Breadth, top: f64| -> Result<Vec<Found>, StudyError> {
         let mut all = listed(base, terms.listed, origin, &[], afresh(breadth, top))?;
         if let Some(inside) = inside {
             let others = listed(inside, terms.listed, origin, &[], breadth)?;
@@ -240,11 +240,11 @@ fn one_by_one<'a>(
 }
 
 /// Functions of the range that the corrected twin goes through, which the misfitted one may not.
-fn wider<'a>(
-    base: &Model<'a>,
+fn wider(
+    base: &Model,
     terms: &Terms<'_>,
     breadth: Breadth,
-    findings: &mut Findings<'a>,
+    findings: &mut Findings,
 ) -> Result<(), StudyError> {
     if findings.top() <= Thresholds::WIDER {
         return Ok(());
@@ -257,15 +257,15 @@ fn wider<'a>(
 }
 
 /// Adds what single effects leave, and pairs, which are searched unless they are given; stops where nothing is missing.
-fn beside_each_other<'a>(
-    mut findings: Findings<'a>,
-    base: &Model<'a>,
+fn beside_each_other(
+    mut findings: Findings,
+    base: &Model,
     terms: &Terms<'_>,
     breadth: Breadth,
-    several: Option<Vec<Found<'a>>>,
+    several: Option<Vec<Found>>,
     settings: &DiagnoseSettings,
     stage: &Stage,
-) -> Result<Findings<'a>, StudyError> {
+) -> Result<Findings, StudyError> {
     if explains_nothing_more(&findings) {
         return Ok(findings);
     }
@@ -306,13 +306,13 @@ fn beside_each_other<'a>(
 }
 
 /// Adds what pairs leave, and the best effect if that is not yet known: the last step, once the twin stays as it is.
-pub(in crate::diagnose) fn what_is_left<'a>(
-    mut findings: Findings<'a>,
-    base: &Model<'a>,
+pub(in crate::diagnose) fn what_is_left(
+    mut findings: Findings,
+    base: &Model,
     terms: &Terms<'_>,
     settings: &DiagnoseSettings,
     progress: &Progress,
-) -> Result<Findings<'a>, StudyError> {
+) -> Result<Findings, StudyError> {
     if settings.detection_only || explains_nothing_more(&findings) {
         return Ok(findings);
     }
@@ -321,7 +321,7 @@ pub(in crate::diagnose) fn what_is_left<'a>(
     let may_suffice = may_suffice(&findings);
     let few = (Breadth::of(base, settings.quick).for_gap(findings.best_unknown())).few();
     let mut enough = findings.some_suffices();
-    let is_new = |findings: &Findings<'a>| {
+    let is_new = |findings: &Findings| {
         (findings.listed.first().cloned()).filter(|best| findings.left(&best.keys()).is_none())
     };
     if let Some(best) = is_new(&findings).filter(&may_suffice) {
@@ -360,26 +360,26 @@ pub(in crate::diagnose) fn what_is_left<'a>(
 
 /// Returns whether the search ends with single explanations: nothing is missing, or another kind of noise comes first. Where that explains
 /// as much as one effect, two may explain more.
-fn explains_nothing_more(findings: &Findings<'_>) -> bool {
+fn explains_nothing_more(findings: &Findings) -> bool {
     findings.log_odds_alone() <= Thresholds::GAP || findings.asks_beside()
 }
 
 /// Tells effects that may leave nothing: what an unknown function alone explains better leaves something.
-fn may_suffice(findings: &Findings<'_>) -> impl Fn(&Found<'_>) -> bool + use<> {
+fn may_suffice(findings: &Findings) -> impl Fn(&Found) -> bool + use<> {
     let least = findings.best_unknown() - Thresholds::CANDIDATES;
     move |found| found.gain > least
 }
 
 /// Listed effects that explain a parameter gap with θ inside the prior, as well as θ outside does: best first.
-pub(in crate::diagnose) fn absorbing<'a>(
-    free: &Model<'a>,
-    within: &Model<'a>,
+pub(in crate::diagnose) fn absorbing(
+    free: &Model,
+    within: &Model,
     terms: &[Arc<Term>],
-) -> Result<Vec<Found<'a>>, StudyError> {
+) -> Result<Vec<Found>, StudyError> {
     let breadth = Breadth::of(within, false).of_all();
     let found = listed(within, terms, within.log_evidence, &[], breadth)?;
     let best = free.fitted.log_likelihood - Thresholds::ABSORBS;
-    let explains = |f: &Found<'a>| {
+    let explains = |f: &Found| {
         f.model
             .as_ref()
             .is_some_and(|m| m.fitted.log_likelihood >= best)

@@ -14,28 +14,28 @@ const STARTS: usize = 2;
 
 /// Everything that was found.
 #[derive(Default)]
-pub(in crate::diagnose) struct Findings<'a> {
+pub(in crate::diagnose) struct Findings {
     /// Listed effects alone, best first.
-    pub listed: Vec<Found<'a>>,
+    pub listed: Vec<Found>,
     /// Unknown functions alone, best first.
-    pub unknown: Vec<Found<'a>>,
+    pub unknown: Vec<Found>,
     /// Pairs of listed effects, best first.
-    pub several: Vec<Found<'a>>,
+    pub several: Vec<Found>,
     /// Sets of listed effects with what unknown functions add on top, best first.
-    pub beside: Vec<(Vec<String>, Vec<Found<'a>>)>,
+    pub beside: Vec<(Vec<String>, Vec<Found>)>,
     /// Other kinds of noise alone, best first.
-    pub noise: Vec<Found<'a>>,
+    pub noise: Vec<Found>,
     /// The likeliest kind of noise with each other one, best first.
-    pub noise_pairs: Vec<Found<'a>>,
+    pub noise_pairs: Vec<Found>,
     /// Another kind of noise beside the best listed effect, which makes it likelier by these nats.
     pub noise_beside: Option<(String, f64)>,
     /// True where the search was cancelled: what is here is all that was found until then.
     pub is_partial: bool,
 }
 
-impl<'a> Findings<'a> {
+impl Findings {
     /// Notes what unknown functions add on top of a set; returns whether they add nothing of weight.
-    pub fn add(&mut self, found: &Found<'a>, on_top: Option<Vec<Found<'a>>>) -> bool {
+    pub fn add(&mut self, found: &Found, on_top: Option<Vec<Found>>) -> bool {
         let Some(on_top) = on_top else { return false };
         let is_enough = suffices(found, &on_top);
         self.beside.retain(|(keys, _)| !same(keys, &found.keys()));
@@ -62,23 +62,23 @@ impl<'a> Findings<'a> {
     }
 
     /// Unknown functions on top of a set, best first.
-    pub fn beside(&self, keys: &[String]) -> Option<(&[String], &[Found<'a>])> {
+    pub fn beside(&self, keys: &[String]) -> Option<(&[String], &[Found])> {
         let found = self.beside.iter().find(|(k, _)| same(k, keys))?;
         Some((&found.0, &found.1))
     }
 
     /// A set of listed effects.
-    pub fn set(&self, keys: &[String]) -> Option<&Found<'a>> {
+    pub fn set(&self, keys: &[String]) -> Option<&Found> {
         (self.listed.iter().chain(&self.several)).find(|f| same(&f.keys(), keys))
     }
 
     /// The fitted model of a set.
-    pub fn model(&self, keys: &[String]) -> Option<&Model<'a>> {
+    pub fn model(&self, keys: &[String]) -> Option<&Model> {
         self.set(keys)?.model.as_ref()
     }
 
     /// The model that explains most.
-    pub fn best(&self) -> Option<&Model<'a>> {
+    pub fn best(&self) -> Option<&Model> {
         let on_top = self.beside.iter().flat_map(|(_, all)| all);
         (self
             .listed
@@ -93,7 +93,7 @@ impl<'a> Findings<'a> {
 
     /// θ of the twin beside the best single explanations: from there its own fit may go further than it went.
     pub fn thetas(&self) -> Vec<Vec<f64>> {
-        let best = |all: &[Found<'a>]| -> Vec<Vec<f64>> {
+        let best = |all: &[Found]| -> Vec<Vec<f64>> {
             (all.iter().take(STARTS))
                 .filter(|found| found.gain > Thresholds::BETTER)
                 .filter_map(own_theta)
@@ -104,7 +104,7 @@ impl<'a> Findings<'a> {
 
     /// Listed effects that may be what is missing: the best pair where it explains more than any single one, then all single ones near the
     /// best.
-    pub fn candidates(&self) -> impl Iterator<Item = &Found<'a>> {
+    pub fn candidates(&self) -> impl Iterator<Item = &Found> {
         let pair = (self.several.first()).filter(|pair| self.wins(pair));
         let near = self.top() - Thresholds::CANDIDATES;
         let singles = (self.listed.iter()).filter(move |found| found.gain > near);
@@ -132,21 +132,21 @@ impl<'a> Findings<'a> {
     }
 
     /// The most probable of the best single effect and those within 3 nats of it.
-    pub fn likeliest_single(&self) -> Option<&Found<'a>> {
+    pub fn likeliest_single(&self) -> Option<&Found> {
         let chances = self.chances();
-        let probability = |found: &Found<'_>| chances.effect(&found.last().key());
+        let probability = |found: &Found| chances.effect(&found.last().key());
         (self.listed.iter())
             .filter(|found| found.gain > self.top() - Thresholds::RIVALS)
             .max_by(|a, b| probability(a).total_cmp(&probability(b)))
     }
 
     /// Returns whether a pair explains more than any single effect, its price paid.
-    pub fn wins(&self, pair: &Found<'_>) -> bool {
+    pub fn wins(&self, pair: &Found) -> bool {
         pair.gain - self.price(2) > self.top()
     }
 
     /// The effect of a pair that explains more alone.
-    pub fn likelier_of(&self, pair: &Found<'_>) -> Option<&Found<'a>> {
+    pub fn likelier_of(&self, pair: &Found) -> Option<&Found> {
         let keys = pair.keys();
         self.listed.iter().find(|f| keys.contains(&f.last().key()))
     }
@@ -175,12 +175,12 @@ impl<'a> Findings<'a> {
     }
 
     /// The fitted kind of noise of this key.
-    fn noise_of(&self, key: &str) -> Option<&Found<'a>> {
+    fn noise_of(&self, key: &str) -> Option<&Found> {
         (self.noise.iter()).find(|f| f.model.is_some() && f.last().key() == key)
     }
 
     /// The kind of noise that the records ask for: where something is missing beside it, where nothing is without it.
-    pub fn asks_for_noise(&self) -> Option<&Found<'a>> {
+    pub fn asks_for_noise(&self) -> Option<&Found> {
         if let Some(key) = self.beside_noise() {
             return self.noise_of(key);
         }
@@ -192,7 +192,7 @@ impl<'a> Findings<'a> {
 
     /// Unknown functions that are not the library's. A wave at another place is no rival of a listed wave that explains as much: it is
     /// the same law with the same prior, which no evidence can tell from it.
-    pub fn rivals(&self) -> impl Iterator<Item = &Found<'a>> {
+    pub fn rivals(&self) -> impl Iterator<Item = &Found> {
         let wave = (self.listed.iter())
             .filter(|f| f.last().is_listed_wave())
             .map(|f| f.gain)
@@ -209,7 +209,7 @@ pub(in crate::diagnose) fn leaves_nothing(gain: f64, added: f64) -> bool {
 }
 
 /// Returns whether unknown functions on top of a set, best first, leave nothing that is worth a word.
-pub(in crate::diagnose) fn suffices(found: &Found<'_>, on_top: &[Found<'_>]) -> bool {
+pub(in crate::diagnose) fn suffices(found: &Found, on_top: &[Found]) -> bool {
     let added = on_top.first().map_or(0.0, |f| f.gain - found.gain);
     leaves_nothing(found.gain, added)
 }
@@ -225,7 +225,7 @@ pub(super) mod fixture {
     use std::sync::Arc;
 
     /// An explanation of this nature that was not fitted.
-    pub fn wave(nature: Nature, target: &str, gain: f64) -> Found<'static> {
+    pub fn wave(nature: Nature, target: &str, gain: f64) -> Found {
         Found {
             terms: vec![Arc::new(fixture::wave(nature, target, 0.0))],
             gain,

@@ -6,17 +6,17 @@ use std::sync::Arc;
 
 /// One explanation beside a model.
 #[derive(Clone)]
-pub(in crate::diagnose) struct Found<'a> {
+pub(in crate::diagnose) struct Found {
     pub terms: Vec<Arc<Term>>,
     /// log Z over that of the twin, in nats: one term's may be used in several ways, which share its prior.
     pub gain: f64,
     /// The fit, where it was worth one.
-    pub model: Option<Model<'a>>,
+    pub model: Option<Model>,
 }
 
-impl<'a> Found<'a> {
+impl Found {
     /// A fit beside a twin of this log Z.
-    pub fn of(model: Model<'a>, origin: f64) -> Self {
+    pub fn of(model: Model, origin: f64) -> Self {
         Self {
             terms: model.terms.clone(),
             gain: model.log_evidence - origin,
@@ -33,7 +33,7 @@ impl<'a> Found<'a> {
     }
 
     /// Terms and evidence without the fit, which belongs to its twin.
-    pub fn promised<'b>(&self) -> Found<'b> {
+    pub fn promised(&self) -> Found {
         Found {
             terms: self.terms.clone(),
             gain: self.gain,
@@ -62,24 +62,24 @@ impl<'a> Found<'a> {
 }
 
 /// Best first.
-pub(in crate::diagnose) fn sort(all: &mut [Found<'_>]) {
+pub(in crate::diagnose) fn sort(all: &mut [Found]) {
     all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
 }
 
 /// Fitted θ of the twin alone.
-pub(in crate::diagnose) fn own_theta(found: &Found<'_>) -> Option<Vec<f64>> {
+pub(in crate::diagnose) fn own_theta(found: &Found) -> Option<Vec<f64>> {
     let model = found.model.as_ref()?;
     let d = model.base.parameters().len();
     Some(model.theta()[..d].to_vec())
 }
 
 /// Those that were fitted, of fits from another θ: what those promise counts what θ gains on its way back.
-pub(super) fn fitted<'a>(all: Vec<Found<'a>>) -> impl Iterator<Item = Found<'a>> {
+pub(super) fn fitted(all: Vec<Found>) -> impl Iterator<Item = Found> {
     all.into_iter().filter(|found| found.model.is_some())
 }
 
 /// Takes the better ones of the same terms, and adds none; best first.
-pub(super) fn improve<'a>(all: &mut [Found<'a>], others: impl IntoIterator<Item = Found<'a>>) {
+pub(super) fn improve(all: &mut [Found], others: impl IntoIterator<Item = Found>) {
     for found in others {
         let keys = found.keys();
         let own = all.iter_mut().find(|own| own.keys() == keys);
@@ -91,10 +91,10 @@ pub(super) fn improve<'a>(all: &mut [Found<'a>], others: impl IntoIterator<Item 
 }
 
 /// Adds fitted pairs, of two of the same effects the better one; best first.
-pub(super) fn keep<'a>(all: &mut Vec<Found<'a>>, found: Vec<Found<'a>>) {
+pub(super) fn keep(all: &mut Vec<Found>, found: Vec<Found>) {
     for pair in found.into_iter().filter(|f| f.model.is_some()) {
         let keys = pair.keys();
-        let same = |p: &&mut Found<'a>| p.keys().iter().all(|k| keys.contains(k));
+        let same = |p: &&mut Found| p.keys().iter().all(|k| keys.contains(k));
         match all.iter_mut().find(same) {
             Some(old) if old.gain >= pair.gain => {}
             Some(old) => *old = pair,

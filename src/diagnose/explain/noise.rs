@@ -11,12 +11,12 @@ use crate::study::StudyError;
 use std::sync::Arc;
 
 /// Adds other kinds of noise to what was found alone.
-pub(super) fn with_noise<'a>(
-    base: &Model<'a>,
+pub(super) fn with_noise(
+    base: &Model,
     terms: &Terms<'_>,
     breadth: Breadth,
-    findings: Findings<'a>,
-) -> Result<Findings<'a>, StudyError> {
+    findings: Findings,
+) -> Result<Findings, StudyError> {
     let (origin, every) = (base.log_evidence, breadth.of_all());
     let noise = listed(base, terms.noise, origin, &[], every)?;
     Ok(Findings {
@@ -29,8 +29,8 @@ pub(super) fn with_noise<'a>(
 
 /// The outliers that are likeliest beside the best listed effect, at other sensors than its own. Correlated noise is not asked for here:
 /// it would pass for what an effect leaves.
-fn noise_beside<'a>(
-    singles: &[Found<'a>],
+fn noise_beside(
+    singles: &[Found],
     noise: &[Arc<Term>],
     origin: f64,
     breadth: Breadth,
@@ -51,7 +51,7 @@ fn noise_beside<'a>(
 /// The kind of noise that explains more beside one effect of the best pair than the other effect does, its price paid, and leaves nothing:
 /// what remains beside an effect, noise would hide.
 pub(super) fn instead_of_second(
-    findings: &Findings<'_>,
+    findings: &Findings,
     terms: &Terms<'_>,
     origin: f64,
     breadth: Breadth,
@@ -61,7 +61,7 @@ pub(super) fn instead_of_second(
         return Ok(None);
     };
     let keys = pair.keys();
-    let mut best: Option<(Found<'_>, f64)> = None;
+    let mut best: Option<(Found, f64)> = None;
     for single in (findings.listed.iter()).filter(|f| keys.contains(&f.last().key())) {
         let Some(model) = &single.model else { continue };
         let found = listed(model, terms.noise, origin, &[], breadth.shallow().of_all())?;
@@ -83,12 +83,12 @@ pub(super) fn instead_of_second(
 }
 
 /// Second kinds of noise beside the likeliest one.
-fn noise_pairs<'a>(
-    noise: &[Found<'a>],
+fn noise_pairs(
+    noise: &[Found],
     terms: &[Arc<Term>],
     origin: f64,
     breadth: Breadth,
-) -> Result<Vec<Found<'a>>, StudyError> {
+) -> Result<Vec<Found>, StudyError> {
     let best = noise.first().filter(|f| f.gain > Thresholds::NOISE);
     let Some((best, model)) = best.and_then(|f| Some((f, f.model.as_ref()?))) else {
         return Ok(vec![]);

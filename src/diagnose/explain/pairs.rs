@@ -16,26 +16,26 @@ pub(in crate::diagnose) const SINGLES: usize = 3;
 pub(in crate::diagnose) const FIRST: f64 = 1.0 / 3.0;
 
 /// Second effects on top of the best singles.
-pub(super) fn pairs<'a>(
-    findings: &Findings<'a>,
+pub(super) fn pairs(
+    findings: &Findings,
     terms: &Terms<'_>,
     origin: f64,
     breadth: Breadth,
     enough: bool,
-) -> Result<Vec<Found<'a>>, StudyError> {
+) -> Result<Vec<Found>, StudyError> {
     let thetas: Vec<Vec<f64>> = findings
         .listed
         .iter()
         .take(2)
         .filter_map(own_theta)
         .collect();
-    let mut all: Vec<Found<'a>> = vec![];
-    let adequate = |f: &&Found<'a>| {
+    let mut all: Vec<Found> = vec![];
+    let adequate = |f: &&Found| {
         let left = findings.left(&f.keys());
         left.is_some_and(|left| leaves_nothing(f.gain, left))
     };
-    let stands_out = |f: &&Found<'a>| f.gain > FIRST * findings.top();
-    let sources: Vec<&Found<'a>> = match enough {
+    let stands_out = |f: &&Found| f.gain > FIRST * findings.top();
+    let sources: Vec<&Found> = match enough {
         true => findings.listed.iter().find(adequate).into_iter().collect(),
         false => (findings.listed.iter().take(SINGLES))
             .filter(stands_out)
@@ -75,9 +75,9 @@ pub(super) fn pairs<'a>(
 
 /// A pair may win since the fits of its effects alone stopped early, or since one of the two stood for a coarse step: these begin again
 /// where the pair ended.
-pub(super) fn alone<'a>(
-    base: &Model<'a>,
-    findings: &mut Findings<'a>,
+pub(super) fn alone(
+    base: &Model,
+    findings: &mut Findings,
     terms: &Terms<'_>,
     origin: f64,
     breadth: Breadth,

@@ -32,12 +32,12 @@ const AFRESH_SHAPES: usize = 4;
 pub(super) const CARRIED: usize = 60;
 
 /// Fits a promise beside a model from its best starts, with θ as it answers them and with those given; `None` where it works at none.
-pub(in crate::diagnose) fn fit_promise<'a>(
-    model: &Model<'a>,
+pub(in crate::diagnose) fn fit_promise(
+    model: &Model,
     promise: &Promise,
     thetas: &[Vec<f64>],
     effort: Effort,
-) -> Result<Option<Model<'a>>, StudyError> {
+) -> Result<Option<Model>, StudyError> {
     let extended = model.extend(&promise.term)?;
     let chosen: Vec<&Beginning> = promise.starts.iter().take(effort.starts).collect();
     let settled = settling_last(&extended.problem, &extended);
@@ -53,23 +53,23 @@ pub(in crate::diagnose) fn fit_promise<'a>(
     }
     let best = fit(&extended.problem, &from, effort.iterations)?;
     let problem = extended.problem.clone();
-    Ok(best.and_then(|fitted| extended.fitted(model.base, fitted, problem)))
+    Ok(best.and_then(|fitted| extended.fitted(model.base.clone(), fitted, problem)))
 }
 
 /// Returns what moves a start to where θ and the size of the last term have answered its times and delays.
-pub(super) fn settling_last<'a>(
-    problem: &Problem<'a>,
-    extended: &Extended<'_>,
-) -> impl Fn(Vec<f64>) -> Result<Vec<f64>, FilterError> + use<'a> {
+pub(super) fn settling_last(
+    problem: &Problem,
+    extended: &Extended,
+) -> impl Fn(Vec<f64>) -> Result<Vec<f64>, FilterError> + use<> {
     let shape = extended.entries.get(1..).unwrap_or_default();
     settling(problem, &|j| shape.contains(&j), HELD)
 }
 
 /// Fits a promise from the prior's centre with loud noise: the fit of the model alone may have gone where the term is of no use.
-pub(in crate::diagnose) fn fit_afresh<'a>(
-    model: &Model<'a>,
+pub(in crate::diagnose) fn fit_afresh(
+    model: &Model,
     promise: &Promise,
-) -> Result<Option<Model<'a>>, StudyError> {
+) -> Result<Option<Model>, StudyError> {
     let extended = model.extend(&promise.term)?;
     let problem = extended.problem.clone();
     let centre = problem.begin(&problem.centre());
@@ -82,12 +82,12 @@ pub(in crate::diagnose) fn fit_afresh<'a>(
         .map(|start| settled(model.beside_at(&extended, &centre, &start.m)))
         .collect::<Result<_, _>>()?;
     let fitted = fit(&problem, &from, AFRESH)?;
-    Ok(fitted.and_then(|fitted| extended.fitted(model.base, fitted, problem)))
+    Ok(fitted.and_then(|fitted| extended.fitted(model.base.clone(), fitted, problem)))
 }
 
 /// The model with its noise held loud, θ fitted to that: predictions then hardly reach beyond a row, and the likelihood has no narrow
 /// valleys.
-pub(in crate::diagnose) fn loudly<'a>(model: &Model<'a>) -> Result<Option<Model<'a>>, StudyError> {
+pub(in crate::diagnose) fn loudly(model: &Model) -> Result<Option<Model>, StudyError> {
     let is_noise = |j: usize| model.problem.axes[j].begin.is_some();
     let problem = model.problem.holding(is_noise);
     let start = problem.begin(&model.fitted.theta);
@@ -100,8 +100,8 @@ pub(in crate::diagnose) fn loudly<'a>(model: &Model<'a>) -> Result<Option<Model<
 
 /// Fits a promise beside the loud model from its best starts, the noise let down half-way to that of the model.
 pub(in crate::diagnose) fn anneal(
-    model: &Model<'_>,
-    loud: &Model<'_>,
+    model: &Model,
+    loud: &Model,
     promise: &Promise,
     starts: usize,
 ) -> Result<Vec<Fitted>, StudyError> {
@@ -133,11 +133,11 @@ pub(in crate::diagnose) fn anneal(
 }
 
 /// Fits a promise from where its noise was let down half-way, noise free.
-pub(in crate::diagnose) fn release<'a>(
-    model: &Model<'a>,
+pub(in crate::diagnose) fn release(
+    model: &Model,
     promise: &Promise,
     begun: &[Fitted],
-) -> Result<Option<Model<'a>>, StudyError> {
+) -> Result<Option<Model>, StudyError> {
     let free = model.extend(&promise.term)?;
     let fits: Vec<Option<Fitted>> = (begun.par_iter())
         .map(|begun| climb(&free.problem, &begun.theta, RELEASED))
@@ -145,15 +145,11 @@ pub(in crate::diagnose) fn release<'a>(
     let best =
         (fits.into_iter().flatten()).reduce(|a, b| if b.objective > a.objective { b } else { a });
     let problem = free.problem.clone();
-    Ok(best.and_then(|fitted| free.fitted(model.base, fitted, problem)))
+    Ok(best.and_then(|fitted| free.fitted(model.base.clone(), fitted, problem)))
 }
 
 /// The likeliest point on the way from the model to a start: all of it, or less where the quadratic promised too much.
-fn begin(
-    model: &Model<'_>,
-    extended: &Extended<'_>,
-    start: &Beginning,
-) -> Result<Vec<f64>, StudyError> {
+fn begin(model: &Model, extended: &Extended, start: &Beginning) -> Result<Vec<f64>, StudyError> {
     let c = &model.problem.coordinates;
     let phi = c.of(&model.fitted.theta);
     let points = SHARES.map(|share| {
@@ -175,7 +171,7 @@ fn begin(
 
 /// The point of the largest objective, the first of equal ones; `None` where the filter works at none.
 fn likeliest(
-    problem: &Problem<'_>,
+    problem: &Problem,
     points: [Vec<f64>; SHARES.len()],
 ) -> Result<Option<Vec<f64>>, FilterError> {
     let mut best: Option<(f64, Vec<f64>)> = None;
@@ -191,11 +187,11 @@ fn likeliest(
 }
 
 /// Fits an unknown function's coefficients under the prior that is most probable, and once more if that moved.
-pub(in crate::diagnose) fn fit_function<'a>(
-    model: &Model<'a>,
-    linear: Linear<'a>,
+pub(in crate::diagnose) fn fit_function(
+    model: &Model,
+    linear: Linear,
     iterations: usize,
-) -> Result<Option<Model<'a>>, StudyError> {
+) -> Result<Option<Model>, StudyError> {
     let Linear {
         extended,
         found,
@@ -231,5 +227,5 @@ pub(in crate::diagnose) fn fit_function<'a>(
         kept = Some((value, fitted, problem.clone()));
         problem = extended.with_sizes(&found);
     }
-    Ok(kept.and_then(|(_, fitted, problem)| extended.fitted(model.base, fitted, problem)))
+    Ok(kept.and_then(|(_, fitted, problem)| extended.fitted(model.base.clone(), fitted, problem)))
 }

@@ -45,7 +45,7 @@ impl Promise {
 
 /// Promises of terms beside a model, best first; terms that nothing can be told of are left out.
 pub(in crate::diagnose) fn scan(
-    model: &Model<'_>,
+    model: &Model,
     terms: &[Arc<Term>],
 ) -> Result<Vec<Promise>, StudyError> {
     let Some(reference) =
@@ -77,9 +77,9 @@ pub(in crate::diagnose) fn scan(
 
 /// The gain of one start, and its magnitudes.
 fn promise(
-    model: &Model<'_>,
+    model: &Model,
     reference: &Reference,
-    extended: &Extended<'_>,
+    extended: &Extended,
     start: &Start,
 ) -> Result<Option<Beginning>, StudyError> {
     let problem = &extended.problem;
@@ -125,8 +125,8 @@ fn promise(
 }
 
 /// Evidence of an unknown function to second order, before any refit.
-pub(in crate::diagnose) struct Linear<'a> {
-    pub extended: Extended<'a>,
+pub(in crate::diagnose) struct Linear {
+    pub extended: Extended,
     /// Nats over the model.
     pub gain: f64,
     pub found: Laplace,
@@ -134,11 +134,11 @@ pub(in crate::diagnose) struct Linear<'a> {
 }
 
 /// Unknown functions beside a model, best first.
-pub(in crate::diagnose) fn functions<'a>(
-    model: &Model<'a>,
+pub(in crate::diagnose) fn functions(
+    model: &Model,
     terms: &[Arc<Term>],
-) -> Result<Vec<Linear<'a>>, StudyError> {
-    let mut all: Vec<Linear<'a>> = (terms.par_iter())
+) -> Result<Vec<Linear>, StudyError> {
+    let mut all: Vec<Linear> = (terms.par_iter())
         .map(|term| {
             let extended = model.extend(term)?;
             let mut best: Option<(f64, Laplace, Vec<f64>)> = None;

@@ -54,7 +54,7 @@ pub(in crate::diagnose) struct Breadth {
 
 impl Breadth {
     /// As many as a twin's likelihood allows: that of a black box costs an ensemble. Few for a quick look.
-    pub fn of(model: &Model<'_>, quick: bool) -> Self {
+    pub fn of(model: &Model, quick: bool) -> Self {
         let few = model.problem.is_simulated() || quick;
         Self {
             listed: 6,
@@ -109,8 +109,8 @@ impl Breadth {
 }
 
 /// The best of terms that are one hypothesis used in several ways, which share its prior.
-fn merged<'a>(all: Vec<Found<'a>>, ways: &BTreeMap<String, usize>) -> Vec<Found<'a>> {
-    let mut best: BTreeMap<Vec<String>, Found<'a>> = BTreeMap::new();
+fn merged(all: Vec<Found>, ways: &BTreeMap<String, usize>) -> Vec<Found> {
+    let mut best: BTreeMap<Vec<String>, Found> = BTreeMap::new();
     for found in all {
         let keys = found.keys();
         match best.get(&keys) {
@@ -120,7 +120,7 @@ fn merged<'a>(all: Vec<Found<'a>>, ways: &BTreeMap<String, usize>) -> Vec<Found<
             }
         }
     }
-    let mut all: Vec<Found<'a>> = (best.into_values())
+    let mut all: Vec<Found> = (best.into_values())
         .map(|mut found| {
             let ways = ways.get(&found.last().key()).copied().unwrap_or(1);
             found.gain -= (ways as f64).ln();
@@ -140,19 +140,19 @@ fn ways(terms: &[Arc<Term>]) -> BTreeMap<String, usize> {
 }
 
 /// Listed effects beside a model, refitted; best first. `origin` is log Z of the twin; `thetas` are further starts of the twin's own θ.
-pub(in crate::diagnose) fn listed<'a>(
-    model: &Model<'a>,
+pub(in crate::diagnose) fn listed(
+    model: &Model,
     terms: &[Arc<Term>],
     origin: f64,
     thetas: &[Vec<f64>],
     breadth: Breadth,
-) -> Result<Vec<Found<'a>>, StudyError> {
+) -> Result<Vec<Found>, StudyError> {
     if terms.is_empty() {
         return Ok(vec![]);
     }
     let promises = scan(model, terms)?;
-    let found = |models: Vec<Model<'a>>| models.into_iter().map(|model| Found::of(model, origin));
-    let mut all: Vec<Found<'a>> = found(first_fits(model, &promises, thetas, breadth)?).collect();
+    let found = |models: Vec<Model>| models.into_iter().map(|model| Found::of(model, origin));
+    let mut all: Vec<Found> = found(first_fits(model, &promises, thetas, breadth)?).collect();
     let mut others = match breadth.afresh {
         true => fresh_fits(model, &promises)?,
         false => vec![],
@@ -163,7 +163,7 @@ pub(in crate::diagnose) fn listed<'a>(
         others.extend(annealed_fits(model, &loud, terms, breadth)?);
     }
     for other in found(others) {
-        let is_same = |own: &&mut Found<'a>| Arc::ptr_eq(own.last(), other.last());
+        let is_same = |own: &&mut Found| Arc::ptr_eq(own.last(), other.last());
         match all.iter_mut().find(is_same) {
             Some(own) if own.gain >= other.gain => {}
             Some(own) => *own = other,
@@ -199,12 +199,12 @@ pub(in crate::diagnose) fn listed<'a>(
 }
 
 /// Short fits of the terms that promise most.
-fn first_fits<'a>(
-    model: &Model<'a>,
+fn first_fits(
+    model: &Model,
     promises: &[Promise],
     thetas: &[Vec<f64>],
     breadth: Breadth,
-) -> Result<Vec<Model<'a>>, StudyError> {
+) -> Result<Vec<Model>, StudyError> {
     let chosen: Vec<&Promise> = (promises.iter().take(breadth.listed))
         .filter(|promise| promise.nats() > breadth.least)
         .collect();
@@ -212,15 +212,15 @@ fn first_fits<'a>(
         starts: 2,
         iterations: 6,
     };
-    let fits: Vec<Option<Model<'a>>> = (chosen.par_iter())
+    let fits: Vec<Option<Model>> = (chosen.par_iter())
         .map(|promise| fit_promise(model, promise, thetas, effort))
         .collect::<Result<_, StudyError>>()?;
     Ok(fits.into_iter().flatten().collect())
 }
 
 /// Fits of all terms from the prior's centre: beside the twin where it is, the right one may promise nothing.
-fn fresh_fits<'a>(model: &Model<'a>, promises: &[Promise]) -> Result<Vec<Model<'a>>, StudyError> {
-    let fits: Vec<Option<Model<'a>>> = (promises.par_iter())
+fn fresh_fits(model: &Model, promises: &[Promise]) -> Result<Vec<Model>, StudyError> {
+    let fits: Vec<Option<Model>> = (promises.par_iter())
         .map(|promise| fit_afresh(model, promise))
         .collect::<Result<_, StudyError>>()?;
     Ok(fits.into_iter().flatten().collect())
@@ -228,12 +228,12 @@ fn fresh_fits<'a>(model: &Model<'a>, promises: &[Promise]) -> Result<Vec<Model<'
 
 /// The same from loud noise, of the terms that promise most there. Noise is let down to that of the model for those that are near the best by
 /// then.
-fn annealed_fits<'a>(
-    model: &Model<'a>,
-    loud: &Model<'a>,
+fn annealed_fits(
+    model: &Model,
+    loud: &Model,
     terms: &[Arc<Term>],
     breadth: Breadth,
-) -> Result<Vec<Model<'a>>, StudyError> {
+) -> Result<Vec<Model>, StudyError> {
     let promises: Vec<Promise> = (scan(loud, terms)?.into_iter())
         .take(breadth.annealed)
         .filter(|promise| promise.nats() > breadth.least)
@@ -244,7 +244,7 @@ fn annealed_fits<'a>(
     let best = (begun.iter().flatten())
         .map(|fitted| fitted.objective)
         .fold(f64::NEG_INFINITY, f64::max);
-    let fits: Vec<Option<Model<'a>>> = (promises.par_iter().zip(begun))
+    let fits: Vec<Option<Model>> = (promises.par_iter().zip(begun))
         .map(|(promise, mut begun)| {
             begun.retain(|fitted| fitted.objective > best - LOST);
             release(model, promise, &begun)
@@ -254,10 +254,10 @@ fn annealed_fits<'a>(
 }
 
 /// Gives those near the best more starts, and carries them on.
-fn fit_on<'a>(
-    model: &Model<'a>,
+fn fit_on(
+    model: &Model,
     promises: &[Promise],
-    all: &mut [Found<'a>],
+    all: &mut [Found],
     origin: f64,
 ) -> Result<(), StudyError> {
     let top = all.first().map_or(0.0, |f| f.gain);
@@ -265,7 +265,7 @@ fn fit_on<'a>(
     let is_near = |i: usize, gain: f64| i < 5 || gain > top - 4.0;
     let is_worth = |i: usize, gain: f64| i < 2 || gain > floor + 1.0;
     let best: Vec<Vec<f64>> = all.iter().take(2).filter_map(own_theta).collect();
-    let better: Vec<Option<Found<'a>>> = (all.par_iter().enumerate())
+    let better: Vec<Option<Found>> = (all.par_iter().enumerate())
         .map(|(i, found)| {
             if !is_near(i, found.gain) || !is_worth(i, found.gain) {
                 return Ok(None);
@@ -310,12 +310,12 @@ fn fit_on<'a>(
 }
 
 /// Unknown functions beside a model; best first.
-pub(in crate::diagnose) fn unknown<'a>(
-    model: &Model<'a>,
+pub(in crate::diagnose) fn unknown(
+    model: &Model,
     terms: &[Arc<Term>],
     origin: f64,
     breadth: Breadth,
-) -> Result<Vec<Found<'a>>, StudyError> {
+) -> Result<Vec<Found>, StudyError> {
     let floor = model.log_evidence - origin;
     let of = |natures: &[Nature]| -> Vec<Arc<Term>> {
         terms
@@ -324,7 +324,7 @@ pub(in crate::diagnose) fn unknown<'a>(
             .cloned()
             .collect()
     };
-    let mut all: Vec<Found<'a>> = vec![];
+    let mut all: Vec<Found> = vec![];
     let half = breadth.functions.div_ceil(2);
     for (natures, price, most) in [
         (&[Nature::Function], 0.0, breadth.functions),
@@ -333,7 +333,7 @@ pub(in crate::diagnose) fn unknown<'a>(
         (&[Nature::Periodic], PRICE_OF_FREQUENCY, half),
     ] {
         let linear = functions(model, &of(natures))?;
-        let fits: Vec<(Vec<Arc<Term>>, f64, Option<Model<'a>>)> = (linear.into_par_iter())
+        let fits: Vec<(Vec<Arc<Term>>, f64, Option<Model>)> = (linear.into_par_iter())
             .enumerate()
             .map(|(i, linear)| {
                 let (terms, gain) = (linear.extended.terms.clone(), linear.gain - price);
@@ -364,7 +364,7 @@ pub(in crate::diagnose) fn unknown<'a>(
         .collect();
     let mut order: Vec<usize> = (0..rough.len()).collect();
     order.sort_by(|a, b| rough[*b].total_cmp(&rough[*a]));
-    let fits: Vec<(usize, Option<Model<'a>>)> = (order.into_par_iter())
+    let fits: Vec<(usize, Option<Model>)> = (order.into_par_iter())
         .enumerate()
         .map(|(n, i)| {
             let worth = n < half && (rough[i] > 0.0 || promises[i].nats() > breadth.least);
@@ -397,7 +397,7 @@ pub(in crate::diagnose) fn unknown<'a>(
 }
 
 /// Evidence that a fit beside a model adds to it.
-fn added(model: &Model<'_>, fitted: Option<&Model<'_>>) -> Option<f64> {
+fn added(model: &Model, fitted: Option<&Model>) -> Option<f64> {
     Some(fitted?.log_evidence - model.log_evidence)
 }
 

@@ -13,7 +13,7 @@ pub(in crate::diagnose) struct Terms<'t> {
     /// Kinds of noise other than the twin's.
     pub noise: &'t [Arc<Term>],
     /// Unknown functions whose range covers these models' states as well.
-    pub unknown: &'t dyn Fn(&[Scales<'_>]) -> Vec<Arc<Term>>,
+    pub unknown: &'t dyn Fn(&[Scales]) -> Vec<Arc<Term>>,
 }
 
 /// Terms of these hypotheses, in every way that they may be used: a hypothesis pays for all its ways.
@@ -25,12 +25,12 @@ pub(super) fn of_keys(terms: &[Arc<Term>], keys: &[String]) -> Vec<Arc<Term>> {
 }
 
 /// Unknown functions on top of fitted effects.
-pub(super) fn on_top<'a>(
-    found: &Found<'a>,
+pub(super) fn on_top(
+    found: &Found,
     terms: &Terms<'_>,
     origin: f64,
     breadth: Breadth,
-) -> Result<Option<Vec<Found<'a>>>, StudyError> {
+) -> Result<Option<Vec<Found>>, StudyError> {
     let Some(model) = &found.model else {
         return Ok(None);
     };
@@ -44,11 +44,11 @@ pub(super) fn on_top<'a>(
 }
 
 /// Sizes of the states along fitted models.
-pub(super) fn scales<'a>(found: &[Found<'a>]) -> Result<Vec<Scales<'a>>, StudyError> {
+pub(super) fn scales(found: &[Found]) -> Result<Vec<Scales>, StudyError> {
     let mut all = vec![];
     for model in found.iter().filter_map(|f| f.model.as_ref()) {
         all.push(Scales {
-            records: model.problem.records,
+            records: model.problem.records.clone(),
             states: model.states()?,
             outline: model.problem.outline(),
             rates: vec![],

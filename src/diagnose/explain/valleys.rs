@@ -30,14 +30,14 @@ type Start = (Vec<f64>, Vec<f64>);
 
 /// Fits effects again that may be better, `all` being sorted, best first: from where the same law ended at places where it explains more,
 /// with either sign of its size; the best ones from times nearby.
-pub(super) fn leave_valleys<'a>(
-    model: &Model<'a>,
-    all: &mut [Found<'a>],
+pub(super) fn leave_valleys(
+    model: &Model,
+    all: &mut [Found],
     floor: f64,
 ) -> Result<(), StudyError> {
     let top = all.first().map_or(floor, |f| f.gain);
     let least = (top - Thresholds::CANDIDATES).max(floor + Thresholds::NULL_LIKE);
-    let better: Vec<Option<Found<'a>>> = (0..all.len())
+    let better: Vec<Option<Found>> = (0..all.len())
         .into_par_iter()
         .map(|i| again(model, &all[i], &all[..i], least))
         .collect::<Result<_, StudyError>>()?;
@@ -50,12 +50,12 @@ pub(super) fn leave_valleys<'a>(
 }
 
 /// One effect fitted again; `None` where no start leads further. Only effects of at least so many nats are looked at.
-fn again<'a>(
-    model: &Model<'a>,
-    found: &Found<'a>,
-    before: &[Found<'a>],
+fn again(
+    model: &Model,
+    found: &Found,
+    before: &[Found],
     least: f64,
-) -> Result<Option<Found<'a>>, StudyError> {
+) -> Result<Option<Found>, StudyError> {
     let Some(shape) = found.last().shape() else {
         return Ok(None);
     };
@@ -97,11 +97,11 @@ fn again<'a>(
 }
 
 /// The best fit from these θ and magnitudes; `None` where none is better than its own.
-fn begun_again<'a>(
-    model: &Model<'a>,
-    found: &Found<'a>,
+fn begun_again(
+    model: &Model,
+    found: &Found,
     starts: &[Start],
-) -> Result<Option<Found<'a>>, StudyError> {
+) -> Result<Option<Found>, StudyError> {
     let Some(own) = &found.model else {
         return Ok(None);
     };
@@ -125,7 +125,7 @@ fn begun_again<'a>(
 
 /// The best of times closer together than those tried first, θ and the size having answered each; `None` for a law without a time, or
 /// with several.
-fn between(model: &Model<'_>, found: &Found<'_>) -> Result<Option<Start>, StudyError> {
+fn between(model: &Model, found: &Found) -> Result<Option<Start>, StudyError> {
     let (Some(own), &[time]) = (&found.model, &found.last().times()[..]) else {
         return Ok(None);
     };
@@ -155,7 +155,7 @@ fn between(model: &Model<'_>, found: &Found<'_>) -> Result<Option<Start>, StudyE
 }
 
 /// θ of the twin and magnitudes with each time or delay moved.
-fn nearby(found: &Found<'_>, term: &Term) -> Vec<Start> {
+fn nearby(found: &Found, term: &Term) -> Vec<Start> {
     let (Some(theta), Some(m), Some(model)) =
         (own_theta(found), found.magnitudes(), found.model.as_ref())
     else {

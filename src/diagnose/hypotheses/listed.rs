@@ -21,7 +21,7 @@ pub(in crate::diagnose) struct Library<'a> {
     pub twin: &'a Twin,
     /// The fitted θ of the first record.
     pub theta: &'a [f64],
-    pub scales: &'a Scales<'a>,
+    pub scales: &'a Scales,
     /// Frequencies that the residuals show most, in Hz.
     pub frequencies: &'a [f64],
 }
@@ -268,7 +268,7 @@ impl Library<'_> {
                         *value = if k == j { 0.0 } else { p.prior.centre() };
                     }
                     let states = self.padded(outline.states.len());
-                    largest(twin, &theta, (j, parameter), self.scales.records, &states)
+                    largest(twin, &theta, (j, parameter), &self.scales.records, &states)
                 });
                 let found = found.unwrap_or_else(|| match m.unit {
                     "1" => 0.5,

@@ -91,7 +91,7 @@ pub(in crate::diagnose) fn not_tested(study: &Study, terms: &[Arc<Term>]) -> Vec
 }
 
 /// Unknown functions at every place of a twin; `seen` are states of models whose range the functions must cover.
-pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales<'_>]) -> Vec<Term> {
+pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales]) -> Vec<Term> {
     let scales = library.scales;
     let outline = &scales.outline;
     let mut terms = vec![];

@@ -4,10 +4,11 @@ use crate::effect::TargetKind;
 use crate::math::deviation;
 use crate::record::{Record, Signal};
 use crate::twin::{Acting, Outline, Twin};
+use std::sync::Arc;
 
 /// Records, the states that the twin has along them, and how fast these move.
-pub(in crate::diagnose) struct Scales<'a> {
-    pub records: &'a [Record],
+pub(in crate::diagnose) struct Scales {
+    pub records: Arc<[Record]>,
     /// Filtered states of each record; a black box's predicted outputs.
     pub states: Vec<Signal>,
     pub outline: Outline,
@@ -17,15 +18,15 @@ pub(in crate::diagnose) struct Scales<'a> {
     pub defined: Vec<bool>,
 }
 
-impl<'a> Scales<'a> {
+impl Scales {
     pub fn new(
         twin: &Twin,
         theta: &[f64],
-        records: &'a [Record],
+        records: Arc<[Record]>,
         states: Vec<Signal>,
         outline: Outline,
     ) -> Self {
-        let rates = rates(twin, theta, records, &states).unwrap_or_default();
+        let rates = rates(twin, theta, &records, &states).unwrap_or_default();
         Self {
             records,
             states,
@@ -79,7 +80,7 @@ impl<'a> Scales<'a> {
             .map(|unit| if unit > 0.0 { unit } else { 1.0 })
             .collect();
         let mut all = vec![];
-        let (records, states) = (self.records, &self.states);
+        let (records, states) = (&self.records, &self.states);
         each_moment(twin, theta, (records, states), moments, |rates, outputs| {
             let values = rates.iter().chain(outputs).zip(&units);
             all.extend(values.map(|(value, unit)| value / unit));

@@ -22,7 +22,7 @@ pub(in crate::diagnose) struct Curve {
 }
 
 /// The curve of a model's last term; `None` for other terms than functions of one variable.
-pub(in crate::diagnose) fn curve(model: &Model<'_>) -> Option<Curve> {
+pub(in crate::diagnose) fn curve(model: &Model) -> Option<Curve> {
     let term = model.terms.last()?;
     let [variable] = term.variables.as_slice() else {
         return None;
@@ -56,12 +56,12 @@ pub(in crate::diagnose) fn curve(model: &Model<'_>) -> Option<Curve> {
 /// Fitted functions of one variable, those at `place` first, then the clearest; `floor` is the evidence of the model that they stand
 /// beside.
 pub(in crate::diagnose) fn told(
-    all: &[Found<'_>],
+    all: &[Found],
     place: Option<&str>,
     on_top: bool,
     floor: f64,
 ) -> Vec<MissingFunction> {
-    let is_there = |found: &Found<'_>| Some(found.last().target.as_str()) == place;
+    let is_there = |found: &Found| Some(found.last().target.as_str()) == place;
     let there = all.iter().filter(|found| is_there(found));
     let elsewhere = all.iter().filter(|found| !is_there(found));
     (there.chain(elsewhere))

@@ -8,15 +8,12 @@ use crate::diagnose::residuals::shares::shares;
 use crate::study::StudyError;
 
 /// Describes the innovations of a model. `best` divides the shares by where it helps.
-pub(in crate::diagnose) fn maps(
-    model: &Model<'_>,
-    best: Option<&Model<'_>>,
-) -> Result<Maps, StudyError> {
+pub(in crate::diagnose) fn maps(model: &Model, best: Option<&Model>) -> Result<Maps, StudyError> {
     let states = model.problem.states(&model.fitted.theta)?;
     let after = best
         .map(|best| best.problem.filtered(&best.fitted.theta))
         .transpose()?;
-    let records = model.problem.records;
+    let records = &model.problem.records;
     let bins = Bins::new(&model.problem.outline(), &states, records);
     let shares = shares(&bins, &states, records, after.as_deref());
     let scores: Vec<f64> = (excess(&states, records, &bins).iter())

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 /// Evidence of simulated records, and the p-value of the measured ones: (p, at its floor).
 pub(in crate::diagnose) fn calibrate(
-    model: &Model<'_>,
+    model: &Model,
     count: usize,
     own: f64,
     log_odds: impl Fn(&[Record]) -> Result<f64, StudyError> + Sync,

@@ -19,7 +19,7 @@ pub(in crate::diagnose) struct Runner {
 
 impl Runner {
     /// The twin of a problem at θ, begun as a record shows; `None` where its first state cannot be told.
-    pub fn new(problem: &Problem<'_>, theta: &[f64]) -> Result<Option<Self>, StudyError> {
+    pub fn new(problem: &Problem, theta: &[f64]) -> Result<Option<Self>, StudyError> {
         let twin = match recoverable(problem.smoothed(theta))? {
             None => return Ok(None),
             Some(smoothed) => match smoothed.first() {

@@ -34,8 +34,8 @@ pub(in crate::diagnose) struct HeldOutRows<'r> {
 }
 
 /// A model at θ that has not seen the held-out data.
-pub(in crate::diagnose) struct Predictor<'a> {
-    pub problem: Problem<'a>,
+pub(in crate::diagnose) struct Predictor {
+    pub problem: Problem,
     /// θ of one record.
     pub theta: Vec<f64>,
     pub runner: Runner,
@@ -60,7 +60,7 @@ impl Reach {
     }
 }
 
-impl Predictor<'_> {
+impl Predictor {
     /// Mean log density of a row that counts, given the rows before; `None` where the filter fails.
     pub fn log_score(&self, rows: HeldOutRows<'_>) -> Result<Option<f64>, FilterError> {
         let problem = self.problem.on(std::slice::from_ref(rows.record));
@@ -117,7 +117,7 @@ impl Predictor<'_> {
 }
 
 /// Horizons that are looked at: one sample, a tenth of the record and between, the free run.
-fn reaches(problem: &Problem<'_>, rows: HeldOutRows<'_>) -> Vec<Reach> {
+fn reaches(problem: &Problem, rows: HeldOutRows<'_>) -> Vec<Reach> {
     if problem.is_simulated() {
         return vec![Reach::FreeRun];
     }
@@ -141,9 +141,9 @@ pub(in crate::diagnose) struct Compared {
 
 /// Compares the twin (`before`) with the accepted one (`after`) on held-out data; `draws` are of the accepted one's posterior.
 pub(in crate::diagnose) fn compare(
-    before: &Predictor<'_>,
-    after: &Predictor<'_>,
-    draws: &[Predictor<'_>],
+    before: &Predictor,
+    after: &Predictor,
+    draws: &[Predictor],
     rows: HeldOutRows<'_>,
     noise: Noise,
 ) -> Result<Compared, StudyError> {
@@ -156,14 +156,14 @@ pub(in crate::diagnose) fn compare(
     };
     let mut clearest = Thresholds::CLEAR;
     for reach in reaches(&after.problem, rows) {
-        let own = |p: &Predictor<'_>| p.errors(rows, reach, &compared.scale);
+        let own = |p: &Predictor| p.errors(rows, reach, &compared.scale);
         let (Some(b), Some(a)) = (own(before)?, own(after)?) else {
             continue;
         };
         if b.is_empty() {
             continue;
         }
-        let on_simulated = |p: &Predictor<'_>| -> Result<Vec<f64>, FilterError> {
+        let on_simulated = |p: &Predictor| -> Result<Vec<f64>, FilterError> {
             let all = compared.means(p, reach, rows, &simulated)?;
             Ok(all.into_iter().flatten().collect())
         };
@@ -196,7 +196,7 @@ pub(in crate::diagnose) fn compare(
 }
 
 /// Records like the measured one, each at a draw.
-fn simulated(draws: &[Predictor<'_>], record: &Record, count: u64, noise: Noise) -> Vec<Record> {
+fn simulated(draws: &[Predictor], record: &Record, count: u64, noise: Noise) -> Vec<Record> {
     (0..count)
         .into_par_iter()
         .filter_map(|i| {
@@ -211,7 +211,7 @@ impl Compared {
     /// Mean squared error of a model on each record; `None` where it fails.
     fn means(
         &self,
-        of: &Predictor<'_>,
+        of: &Predictor,
         reach: Reach,
         rows: HeldOutRows<'_>,
         records: &[Record],
@@ -228,7 +228,7 @@ impl Compared {
     pub fn error(
         &self,
         horizon: Option<usize>,
-        of: &Predictor<'_>,
+        of: &Predictor,
         rows: HeldOutRows<'_>,
     ) -> Result<Option<f64>, StudyError> {
         let Some(at) = horizon else {
@@ -241,9 +241,9 @@ impl Compared {
     /// 90 % interval of the headline's share, from records that the accepted twin simulates. Not clamped.
     pub fn interval(
         &self,
-        before: &Predictor<'_>,
-        after: &Predictor<'_>,
-        draws: &[Predictor<'_>],
+        before: &Predictor,
+        after: &Predictor,
+        draws: &[Predictor],
         rows: HeldOutRows<'_>,
         noise: Noise,
     ) -> Result<Option<[f64; 2]>, StudyError> {
@@ -251,7 +251,7 @@ impl Compared {
             return Ok(None);
         };
         let records = simulated(draws, rows.record, Thresholds::SHARE_RECORDS, noise);
-        let of = |p: &Predictor<'_>| self.means(p, self.reaches[at], rows, &records);
+        let of = |p: &Predictor| self.means(p, self.reaches[at], rows, &records);
         let pairs: Vec<[f64; 2]> = (of(before)?.into_iter().zip(of(after)?))
             .filter_map(|(b, a)| Some([b?, a?]))
             .collect();

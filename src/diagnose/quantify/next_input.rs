@@ -20,6 +20,7 @@ use crate::study::StudyError;
 use crate::twin::Noise;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Iterations of a refit.
 const WARM: usize = 4;
@@ -31,9 +32,9 @@ struct Proposal {
 }
 
 /// A rival: a twin with an effect, and θ.
-struct Rival<'a> {
+struct Rival {
     key: String,
-    problem: Problem<'a>,
+    problem: Problem,
     theta: Vec<f64>,
     /// Information of the present records about θ, in φ.
     information: DMatrix<f64>,
@@ -41,10 +42,10 @@ struct Rival<'a> {
 
 /// The input that tells the members of a class apart best; `None` where none does better than the present one once more.
 pub(in crate::diagnose) fn next_input(
-    class: &[&Model<'_>],
+    class: &[&Model],
     noise: Noise,
 ) -> Result<Option<NextInput>, StudyError> {
-    let rivals: Vec<Rival<'_>> = (class.iter().take(Thresholds::MOST_RIVALS))
+    let rivals: Vec<Rival> = (class.iter().take(Thresholds::MOST_RIVALS))
         .map(|model| Rival {
             key: keys(&model.terms).join("+"),
             problem: model.problem.clone(),
@@ -55,7 +56,7 @@ pub(in crate::diagnose) fn next_input(
     if rivals.len() < 2 {
         return Ok(None);
     }
-    let records = rivals[0].problem.records;
+    let records = &rivals[0].problem.records.clone();
     let proof = noise.child("proof");
     let again = told_apart(
         &rivals,
@@ -88,7 +89,7 @@ pub(in crate::diagnose) fn next_input(
 
 /// The best input of a record so many times as long as the present one.
 fn best_of(
-    rivals: &[Rival<'_>],
+    rivals: &[Rival],
     records: &[Record],
     times: usize,
     noise: Noise,
@@ -174,7 +175,7 @@ fn proposals(record: &Record, times: usize, noise: Noise) -> Result<Vec<Proposal
         .collect()
 }
 
-impl Rival<'_> {
+impl Rival {
     /// Simulates a record of this rival; `None` where it diverges.
     fn record(&self, drive: &Drive, noise: Noise) -> Result<Option<Record>, StudyError> {
         let theta = self.problem.of_record(0, &self.theta);
@@ -188,8 +189,8 @@ impl Rival<'_> {
     }
 
     /// Its evidence on the present records and another one together, fitted to both.
-    fn evidence(&self, records: &[Record]) -> Result<f64, StudyError> {
-        let problem = self.problem.on(records);
+    fn evidence(&self, records: &Arc<[Record]>) -> Result<f64, StudyError> {
+        let problem = self.problem.on(records.clone());
         let start = problem.carried(&self.problem, &self.theta);
         let fitted = climb(&problem, &start, WARM)?;
         let found = fitted.and_then(|fitted| laplace(&problem, &fitted, CREDIT));
@@ -199,16 +200,16 @@ impl Rival<'_> {
 
 /// Difference of the closest two rivals in nats: half of what the change from the innovations of the one to those of the
 /// other holds that θ of the other, as far as the present records leave it free, cannot imitate.
-fn first_statistics(rivals: &[Rival<'_>], drive: &Drive, noise: Noise) -> Result<f64, StudyError> {
+fn first_statistics(rivals: &[Rival], drive: &Drive, noise: Noise) -> Result<f64, StudyError> {
     let mut least = f64::INFINITY;
     for (i, truth) in rivals.iter().enumerate() {
         let noise = noise.child("look").sample(i as u64);
         let Some(record) = truth.record(drive, noise)? else {
             return Ok(0.0);
         };
-        let records = [record];
-        let at = |rival: &Rival<'_>| {
-            let problem = rival.problem.on(&records);
+        let records: Arc<[Record]> = Arc::from([record]);
+        let at = |rival: &Rival| {
+            let problem = rival.problem.on(records.clone());
             let theta = problem.full(&rival.problem.of_record(0, &rival.theta));
             (problem, theta)
         };
@@ -239,7 +240,7 @@ fn first_statistics(rivals: &[Rival<'_>], drive: &Drive, noise: Noise) -> Result
 /// Counts the simulated records, each beside the present ones, of which the rival that made them leads all others by more than a
 /// class is wide.
 fn told_apart(
-    rivals: &[Rival<'_>],
+    rivals: &[Rival],
     records: &[Record],
     drive: &Drive,
     trials: u64,
@@ -252,7 +253,7 @@ fn told_apart(
             let Some(record) = rivals[truth].record(drive, noise.sample(i))? else {
                 return Ok(false);
             };
-            let both = [records, &[record]].concat();
+            let both: Arc<[Record]> = [records, &[record]].concat().into();
             let scores: Vec<f64> = (rivals.iter())
                 .map(|rival| rival.evidence(&both))
                 .collect::<Result<_, StudyError>>()?;

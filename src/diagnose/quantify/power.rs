@@ -23,7 +23,7 @@ use std::sync::Arc;
 
 /// The smallest visible magnitude of each listed effect.
 pub(in crate::diagnose) fn power(
-    model: &Model<'_>,
+    model: &Model,
     terms: &[Arc<Term>],
 ) -> Result<Vec<Visible>, StudyError> {
     let Some(reference) =
@@ -77,7 +77,7 @@ fn first_magnitude(term: &Term) -> String {
 
 /// The smallest first magnitude that shows, and ‖d⊥‖ there over what is needed; infinite where none does.
 fn smallest(
-    model: &Model<'_>,
+    model: &Model,
     reference: &Reference,
     term: &Arc<Term>,
     need: f64,

@@ -13,6 +13,7 @@ use crate::likelihood::kalman::FilterError;
 use crate::record::Record;
 use crate::study::StudyError;
 use crate::twin::Noise;
+use std::sync::Arc;
 
 /// Samples of the shortest record whose last third is held out.
 pub const SHORTEST_SPLIT: usize = 300;
@@ -29,7 +30,7 @@ struct HeldOut<'r> {
     /// The record that it runs beside.
     record: &'r Record,
     /// Record whose start it begins with.
-    begins: &'r [Record],
+    begins: Arc<[Record]>,
     /// First sample that counts.
     from: usize,
     what: &'static str,
@@ -37,24 +38,20 @@ struct HeldOut<'r> {
 
 impl HeldOut<'_> {
     /// The problem of a model without what is held out, and its fit; `None` where it cannot be fitted.
-    fn refit<'p>(&'p self, model: &'p Model<'_>) -> Result<Option<Refit<'p>>, FilterError> {
+    fn refit(&self, model: &Model) -> Result<Option<Refit>, FilterError> {
         if self.from == 0 {
-            let problem = model.problem.on(model.problem.records);
+            let problem = model.problem.clone();
             let fitted = model.fitted.clone();
             return Ok(Some(Refit { problem, fitted }));
         }
-        let problem = model.problem.on(self.begins);
+        let problem = model.problem.on(self.begins.clone());
         let fitted = climb(&problem, &problem.full(&model.theta()), REFIT)?;
         Ok(fitted.map(|fitted| Refit { problem, fitted }))
     }
 
     /// The model at θ, begun as the held-out data show; `None` where that cannot be told.
-    fn predictor<'a>(
-        &'a self,
-        model: &Model<'_>,
-        theta: Vec<f64>,
-    ) -> Result<Option<Predictor<'a>>, StudyError> {
-        let problem = model.problem.on(self.begins);
+    fn predictor(&self, model: &Model, theta: Vec<f64>) -> Result<Option<Predictor>, StudyError> {
+        let problem = model.problem.on(self.begins.clone());
         let runner = Runner::new(&problem, &problem.full(&theta))?;
         Ok(runner.map(|runner| Predictor {
             problem,
@@ -64,7 +61,7 @@ impl HeldOut<'_> {
     }
 
     /// The model refitted without what is held out.
-    fn refitted<'a>(&'a self, model: &Model<'_>) -> Result<Option<Predictor<'a>>, StudyError> {
+    fn refitted(&self, model: &Model) -> Result<Option<Predictor>, StudyError> {
         match self.refit(model)? {
             Some(refit) => self.predictor(model, refit.theta()),
             None => Ok(None),
@@ -72,12 +69,12 @@ impl HeldOut<'_> {
     }
 
     /// The model at draws of its posterior without what is held out.
-    fn draws<'a>(
-        &'a self,
-        model: &Model<'_>,
-        refit: &Refit<'_>,
+    fn draws(
+        &self,
+        model: &Model,
+        refit: &Refit,
         noise: Noise,
-    ) -> Result<Vec<Predictor<'a>>, StudyError> {
+    ) -> Result<Vec<Predictor>, StudyError> {
         let fitted = std::slice::from_ref(&refit.fitted);
         let drawn = posterior(&refit.problem, fitted, None, noise)?;
         let mut all = vec![];
@@ -100,12 +97,12 @@ impl HeldOut<'_> {
 }
 
 /// A fit that has not seen the held-out data.
-struct Refit<'p> {
-    problem: Problem<'p>,
+struct Refit {
+    problem: Problem,
     fitted: Fitted,
 }
 
-impl Refit<'_> {
+impl Refit {
     /// θ of the first record.
     fn theta(&self) -> Vec<f64> {
         self.problem.of_record(0, &self.fitted.theta)
@@ -113,13 +110,13 @@ impl Refit<'_> {
 }
 
 /// Means to measure the share of a gap.
-pub(in crate::diagnose) struct Measures<'m, 'a> {
+pub(in crate::diagnose) struct Measures<'m> {
     /// The twin alone.
-    pub base: &'m Model<'a>,
+    pub base: &'m Model,
     /// The same with the accepted effects, if any were accepted.
-    pub accepted: Option<&'m Model<'a>>,
+    pub accepted: Option<&'m Model>,
     /// The listed effects that were fitted, best first.
-    pub others: &'m [Found<'a>],
+    pub others: &'m [Found],
     /// Rivals of the accepted effects, as `id@target`.
     pub class: &'m [String],
     /// A record that nothing before has seen.
@@ -130,16 +127,15 @@ pub(in crate::diagnose) struct Measures<'m, 'a> {
 
 /// Measures how far the accepted effects close the gap on held-out data.
 pub(in crate::diagnose) fn shrinkage(
-    measures: &Measures<'_, '_>,
+    measures: &Measures<'_>,
     noise: Noise,
 ) -> Result<Option<Shrinkage>, StudyError> {
     let base = measures.base;
     let whole = &base.problem.records[0];
-    let short: Vec<Record>;
     let held_out = match measures.validation {
         Some(records) => HeldOut {
             record: &records[0],
-            begins: records,
+            begins: records.into(),
             from: 0,
             what: "validation record",
         },
@@ -148,10 +144,9 @@ pub(in crate::diagnose) fn shrinkage(
             let Some(part) = whole.first_part(split) else {
                 return Ok(None);
             };
-            short = vec![part];
             HeldOut {
                 record: whole,
-                begins: &short,
+                begins: Arc::from([part]),
                 from: split,
                 what: "last third of the record",
             }
@@ -162,7 +157,7 @@ pub(in crate::diagnose) fn shrinkage(
     let Some(before) = held_out.refitted(base)? else {
         return Ok(None);
     };
-    let free_run = |p: Predictor<'_>| p.runner.errors(record, from).map(|e| root(&e));
+    let free_run = |p: Predictor| p.runner.errors(record, from).map(|e| root(&e));
     let Some(error) = (before.runner.errors(record, from)).filter(|errors| !errors.is_empty())
     else {
         return Ok(None);
@@ -237,21 +232,21 @@ pub(in crate::diagnose) fn shrinkage(
     result.closed = result
         .closed
         .filter(|_| result.interval.is_some_and(is_narrow));
-    let error = |p: &Predictor<'_>| compared.error(shown, p, rows);
+    let error = |p: &Predictor| compared.error(shown, p, rows);
     result.unfitted = match &unfitted {
         Some(unfitted) => error(unfitted)?,
         None => None,
     };
     // Fitted effects outside the class: the best, and some at random.
     let used = keys(&accepted.terms);
-    let outside: Vec<&Model<'_>> = (measures.others.iter())
+    let outside: Vec<&Model> = (measures.others.iter())
         .filter(|found| {
             let key = found.last().key();
             !found.last().is_noise() && !used.contains(&key) && !measures.class.contains(&key)
         })
         .filter_map(|found| found.model.as_ref())
         .collect();
-    let of_wrong = |model: &Model<'_>| match held_out.refitted(model)? {
+    let of_wrong = |model: &Model| match held_out.refitted(model)? {
         Some(predictor) => error(&predictor),
         None => Ok(None),
     };

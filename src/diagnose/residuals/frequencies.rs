@@ -13,7 +13,7 @@ const PEAKS: usize = 3;
 /// Frequencies in Hz at which periodograms of the residuals peak: those of the innovations themselves, for what is added, and of
 /// their products with the answer to each entry of θ, for what is modulated. Up to half the sampling rate, two a cycle of the record,
 /// however long that is.
-pub(in crate::diagnose) fn frequencies(model: &Model<'_>) -> Result<Vec<f64>, StudyError> {
+pub(in crate::diagnose) fn frequencies(model: &Model) -> Result<Vec<f64>, StudyError> {
     let Some(reference) =
         recoverable(Reference::new(&model.problem, &model.fitted.theta))?.flatten()
     else {

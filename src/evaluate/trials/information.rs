@@ -67,8 +67,8 @@ impl Match {
 }
 
 /// Filter at the truth of one record without departures.
-pub(super) struct Information<'a> {
-    problem: Problem<'a>,
+pub(super) struct Information {
+    problem: Problem,
     theta: Vec<f64>,
     first: Reference,
     again: Reference,
@@ -109,13 +109,13 @@ fn truth(
 }
 
 /// The problem of a twin on these records, and the truth in it.
-pub(super) fn problem<'a>(
+pub(super) fn problem(
     twin: &Twin,
     study: &Study,
     theta: &[f64],
     conditions: &Conditions,
-    records: &'a [Record],
-) -> Result<(Problem<'a>, Vec<f64>), FilterError> {
+    records: &[Record],
+) -> Result<(Problem, Vec<f64>), FilterError> {
     let measured = measured(twin, records, &study.beliefs())?;
     let (twin, levels) = (measured.twin, measured.levels);
     let declared: Vec<(String, f64)> = (levels.iter())
@@ -133,14 +133,14 @@ pub(super) fn problem<'a>(
     Ok((Problem::new(twin, axes, records), truth))
 }
 
-impl<'a> Information<'a> {
+impl Information {
     /// Filters two records without departures, one each, that share their process noise, and fits the first one and the same with all
     /// noise of the other sign; `None` where the filter fails.
     pub fn new(
         study: &Study,
         theta: &[f64],
         conditions: &Conditions,
-        [record, again, mirrored]: [&'a [Record]; 3],
+        [record, again, mirrored]: [&[Record]; 3],
     ) -> Result<Option<Self>, FilterError> {
         let (problem, theta) = problem(study.twin(), study, theta, conditions, record)?;
         let known = weak(&problem) * KNOWN;
@@ -198,7 +198,7 @@ impl<'a> Information<'a> {
     /// The change that departures make in the innovations, from the records with them; `None` where the filter fails.
     pub fn change(&self, [record, again]: [Record; 2]) -> Result<Option<Change>, FilterError> {
         let filtered =
-            |record: Record| recoverable(self.problem.on(&[record]).filtered(&self.theta));
+            |record: Record| recoverable(self.problem.on([record]).filtered(&self.theta));
         let (Some(record), Some(again)) = (filtered(record)?, filtered(again)?) else {
             return Ok(None);
         };
@@ -250,7 +250,7 @@ impl<'a> Information<'a> {
             return Ok(0.0);
         };
         let own = &self.theta[..study.twin().parameters().len()];
-        let (problem, theta) = problem(&fine, study, own, conditions, self.problem.records)?;
+        let (problem, theta) = problem(&fine, study, own, conditions, &self.problem.records)?;
         let filtered = recoverable(problem.filtered(&theta))?;
         Ok(filtered.map_or(0.0, |there| {
             let direction = self.first.direction(&there);

@@ -39,12 +39,11 @@ const WORTH: f64 = 1.0;
 type Promise = (f64, Vec<f64>);
 
 /// Fits of a problem from all starts, best first.
-pub(super) type Fits<'a> =
-    dyn Fn(&Problem<'_>, &[Vec<f64>]) -> Result<Vec<Fitted>, FilterError> + 'a;
+pub(super) type Fits<'a> = dyn Fn(&Problem, &[Vec<f64>]) -> Result<Vec<Fitted>, FilterError> + 'a;
 
 /// The effects of a study beside a fit of the twin.
 pub(super) struct Search<'a> {
-    pub problem: &'a Problem<'a>,
+    pub problem: &'a Problem,
     pub effects: &'a [Effect],
     pub kinds: &'a BTreeMap<String, Kind>,
     /// Fits from these starts and all others, best first.
@@ -110,7 +109,7 @@ impl<'a> Search<'a> {
     }
 
     /// The problem with the magnitudes of all other effects held.
-    fn opened(&self, open: &[Added<'_>]) -> Problem<'a> {
+    fn opened(&self, open: &[Added<'_>]) -> Problem {
         let is_open = |j: usize| open.iter().any(|added| added.holds(j));
         let is_magnitude = self.magnitudes();
         (self.problem).holding(|j| is_magnitude[j] && !is_open(j))
@@ -125,7 +124,7 @@ impl<'a> Search<'a> {
     /// Short fits with an effect, best first, beside a fit without it.
     fn tried(
         &self,
-        problem: &Problem<'_>,
+        problem: &Problem,
         theta: &[f64],
         added: &Added<'_>,
     ) -> Result<Vec<Fitted>, FilterError> {
@@ -181,7 +180,7 @@ impl<'a> Search<'a> {
     /// The points of an effect's grid that promise most, best first.
     fn promises(
         &self,
-        problem: &Problem<'_>,
+        problem: &Problem,
         reference: &Reference,
         theta: &[f64],
         added: &Added<'_>,
@@ -268,7 +267,7 @@ fn best_of_times(added: &Added<'_>, mut points: Vec<Promise>) -> Vec<Promise> {
     kept
 }
 
-fn largest(problem: &Problem<'_>, j: usize) -> Option<f64> {
+fn largest(problem: &Problem, j: usize) -> Option<f64> {
     match problem.axes[j].evidence {
         EvidencePrior::Magnitude { largest } => Some(largest),
         _ => None,
@@ -277,7 +276,7 @@ fn largest(problem: &Problem<'_>, j: usize) -> Option<f64> {
 
 /// Every combination of an effect's free shapes, as entries of θ.
 fn shapes(
-    problem: &Problem<'_>,
+    problem: &Problem,
     added: &Added<'_>,
     is_shape: impl Fn(usize) -> bool,
 ) -> Vec<Vec<(usize, f64)>> {
@@ -285,7 +284,7 @@ fn shapes(
         .filter_map(|(m, entry)| Some((m, (*entry)?)))
         .filter(|(_, j)| is_shape(*j))
         .fold(vec![vec![]], |all, (m, j)| {
-            let values = values(m, problem.records);
+            let values = values(m, &problem.records);
             (all.iter())
                 .flat_map(|begun| {
                     values

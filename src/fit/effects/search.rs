@@ -18,8 +18,8 @@ use std::collections::BTreeMap;
 pub(in crate::fit) const ITERATIONS: usize = 80;
 
 /// Ends of all searches.
-pub(in crate::fit) struct Searched<'a> {
-    pub problem: Problem<'a>,
+pub(in crate::fit) struct Searched {
+    pub problem: Problem,
     /// Best first.
     pub fits: Vec<Fitted>,
     /// Log-likelihood of the twin with all effects off; none without effects that are fitted.
@@ -29,12 +29,12 @@ pub(in crate::fit) struct Searched<'a> {
 }
 
 /// Fits a twin from all starts.
-pub(in crate::fit) fn searched<'a>(
+pub(in crate::fit) fn searched(
     measured: &Measured,
     effects: &[Effect],
-    records: &'a [Record],
+    records: &[Record],
     noise: Noise,
-) -> Result<Searched<'a>, FilterError> {
+) -> Result<Searched, FilterError> {
     let plain = Problem::of_measured(measured, records);
     let space = measured.twin.parameters();
     if space.iter().all(|p| p.role != Role::Magnitude) {
@@ -94,11 +94,7 @@ pub(in crate::fit) fn searched<'a>(
 }
 
 /// Fits from `initial`, from the prior's centre and from random points, best first.
-fn fits(
-    problem: &Problem<'_>,
-    initial: &[Vec<f64>],
-    noise: Noise,
-) -> Result<Vec<Fitted>, FilterError> {
+fn fits(problem: &Problem, initial: &[Vec<f64>], noise: Noise) -> Result<Vec<Fitted>, FilterError> {
     if !problem.is_simulated() {
         return search(problem, initial, noise, ITERATIONS, Care::Thorough);
     }
@@ -108,7 +104,7 @@ fn fits(
 }
 
 /// The problem with every effect held where it is off.
-fn off<'a>(problem: &Problem<'a>, kinds: &BTreeMap<String, Kind>) -> Problem<'a> {
+fn off(problem: &Problem, kinds: &BTreeMap<String, Kind>) -> Problem {
     with_axes(problem, |axis, j, space| {
         if let Some(kind) = kinds.get(&space[j].name) {
             axis.centre = kind.off(&space[j]);
@@ -119,11 +115,11 @@ fn off<'a>(problem: &Problem<'a>, kinds: &BTreeMap<String, Kind>) -> Problem<'a>
 
 /// The problem with the magnitudes of effects in the units of the record. Sizes are told from the states where the twin without effects
 /// follows the record with loud noise.
-fn scaled<'a>(
-    problem: &Problem<'a>,
-    without: &Problem<'_>,
+fn scaled(
+    problem: &Problem,
+    without: &Problem,
     kinds: &BTreeMap<String, Kind>,
-) -> Result<Problem<'a>, FilterError> {
+) -> Result<Problem, FilterError> {
     let begin = without.begin(&without.centre());
     let states: Option<Vec<Signal>> = match problem.is_simulated() {
         true => None,
@@ -135,7 +131,7 @@ fn scaled<'a>(
         match (kinds.get(&parameter.name), &states) {
             (Some(Kind::Size(_)), Some(states)) => {
                 let entry = (j, parameter);
-                let size = largest(&problem.twin, &begin, entry, problem.records, states);
+                let size = largest(&problem.twin, &begin, entry, &problem.records, states);
                 if let Some(size) = size {
                     *axis = size_axis(parameter, size);
                 }
@@ -147,10 +143,10 @@ fn scaled<'a>(
 }
 
 /// The problem with other axes.
-fn with_axes<'a>(
-    problem: &Problem<'a>,
+fn with_axes(
+    problem: &Problem,
     change: impl Fn(&mut Axis, usize, &crate::twin::ParameterSpace),
-) -> Problem<'a> {
+) -> Problem {
     let space = problem.twin.parameters();
     let mut axes = problem.axes[..space.len()].to_vec();
     for (j, axis) in axes.iter_mut().enumerate() {

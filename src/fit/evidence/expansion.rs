@@ -23,7 +23,7 @@ pub(crate) struct Laplace {
 
 /// The posterior around a fit.
 pub(super) struct Expansion<'a> {
-    pub(super) problem: &'a Problem<'a>,
+    pub(super) problem: &'a Problem,
     pub(super) fitted: &'a Fitted,
     /// Entries inside their bounds.
     pub(super) free: Vec<usize>,
@@ -39,7 +39,7 @@ pub(super) struct Expansion<'a> {
 
 impl<'a> Expansion<'a> {
     /// Expands the posterior around a fit.
-    pub(super) fn new(problem: &'a Problem<'a>, fitted: &'a Fitted) -> Self {
+    pub(super) fn new(problem: &'a Problem, fitted: &'a Fitted) -> Self {
         let c = &problem.coordinates;
         let phi = DVector::from_vec(c.of(&fitted.theta));
         let (mut gradient, mut information) = (fitted.gradient.clone(), fitted.information.clone());

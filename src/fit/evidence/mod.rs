@@ -49,11 +49,7 @@ pub(super) struct Evidence {
 
 /// Evidence by Laplace alone: averaged over all sizes, and the approximation at the most probable ones. `credit` bounds what an
 /// unfinished fit is credited with.
-pub(crate) fn laplace(
-    problem: &Problem<'_>,
-    fitted: &Fitted,
-    credit: f64,
-) -> Option<(f64, Laplace)> {
+pub(crate) fn laplace(problem: &Problem, fitted: &Fitted, credit: f64) -> Option<(f64, Laplace)> {
     let mut expansion = Expansion::new(problem, fitted);
     expansion.credit = credit;
     let blocks = expansion.blocks();
@@ -64,7 +60,7 @@ pub(crate) fn laplace(
 ///
 /// Draws of `proposals` correct what Laplace leaves; without any, and for simulated likelihoods, Laplace stands alone.
 pub(super) fn evidence(
-    problem: &Problem<'_>,
+    problem: &Problem,
     fitted: &Fitted,
     proposals: &[Proposal],
     noise: Noise,

@@ -21,11 +21,7 @@ impl Block {
     }
 
     /// Magnitudes among the free entries, with the sizes that count.
-    pub(super) fn all(
-        problem: &Problem<'_>,
-        free: &[usize],
-        information: &DMatrix<f64>,
-    ) -> Vec<Self> {
+    pub(super) fn all(problem: &Problem, free: &[usize], information: &DMatrix<f64>) -> Vec<Self> {
         let alone = (free.iter()).filter_map(|&entry| match problem.axes[entry].evidence {
             EvidencePrior::Magnitude { largest } => Some((vec![entry], vec![vec![1.0]], largest)),
             _ => None,
@@ -70,7 +66,7 @@ impl Block {
 
 /// Information about some entries that no other can imitate.
 fn own_information(
-    problem: &Problem<'_>,
+    problem: &Problem,
     free: &[usize],
     information: &DMatrix<f64>,
     entries: &[usize],

@@ -59,7 +59,7 @@ fn exact(record: &Record, v: [f64; 2]) -> f64 {
     -0.5 * (n as f64 * TAU.ln() + log_determinant + y.dot(&factor.solve(&y)))
 }
 
-fn problem(records: &[Record], size: Option<f64>) -> Problem<'_> {
+fn problem(records: &[Record], size: Option<f64>) -> Problem {
     let twin = Twin::new(Line);
     let space = twin.parameters();
     let mut axes: Vec<Axis> = space.iter().map(Axis::of).collect();
@@ -71,7 +71,7 @@ fn problem(records: &[Record], size: Option<f64>) -> Problem<'_> {
 }
 
 /// Evidence corrected by draws of proposals that follow the posterior.
-fn corrected(problem: &Problem<'_>, fitted: &Fitted, seed: u64) -> Evidence {
+fn corrected(problem: &Problem, fitted: &Fitted, seed: u64) -> Evidence {
     let noise = Noise::new(seed, "t", 0);
     let draws = posterior(problem, std::slice::from_ref(fitted), None, noise).unwrap();
     let found = evidence(problem, fitted, &draws.proposals, noise).unwrap();
@@ -139,7 +139,7 @@ fn an_entry_at_its_bound_is_integrated_on_one_side() {
     let mut problem = problem(&records, None);
     let mut axes = problem.axes.clone();
     axes[1].bounds = crate::twin::Interval::new(-3.0, 0.5).unwrap();
-    problem = Problem::new(problem.twin.clone(), axes, &records);
+    problem = Problem::new(problem.twin.clone(), axes, records.clone());
     let fitted = climb(&problem, &[0.0, 0.0], 40).unwrap().unwrap();
     assert_eq!(fitted.theta[1], 0.5);
     let found = evidence(&problem, &fitted, &[], Noise::OFF)

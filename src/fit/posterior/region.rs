@@ -31,7 +31,7 @@ impl Region {
     /// A first state that the likelihood integrates is what `start` says of it: mean and deviation. `None` where nothing is estimated, or
     /// the covariance is not finite.
     pub fn new(
-        problem: &Problem<'_>,
+        problem: &Problem,
         fitted: &Fitted,
         draws: &Draws,
         start: impl Fn(&str) -> Option<(f64, f64)>,
@@ -94,7 +94,7 @@ fn moments(draws: &[DVector<f64>]) -> (DVector<f64>, DMatrix<f64>) {
     (mean, covariance)
 }
 
-fn first_order(problem: &Problem<'_>, fitted: &Fitted, own: usize) -> (DVector<f64>, DMatrix<f64>) {
+fn first_order(problem: &Problem, fitted: &Fitted, own: usize) -> (DVector<f64>, DMatrix<f64>) {
     let slopes = DVector::from_vec(problem.coordinates.slopes(&fitted.theta));
     let slopes = DMatrix::from_diagonal(&slopes);
     let covariance = match fitted.information.clone().try_inverse() {
@@ -124,7 +124,7 @@ mod tests {
         let drive = Drive::autonomous(0.05, 100).unwrap();
         let outputs = twin.simulate(&[1.5], &drive, Noise::new(1, "region", 0));
         let records = [Record::new(drive, outputs.unwrap()).unwrap()];
-        let problem = Problem::of_twin(&twin, &records);
+        let problem = Problem::of_twin(&twin, records.clone());
         let fitted = climb(&problem, &[1.5], 10).unwrap().unwrap();
         let near = (0..58).map(|i| (1.0 + 0.01 * f64::from(i % 2), 1));
         let (values, modes): (Vec<f64>, _) = near.chain([(4.0, 0); 2]).unzip();

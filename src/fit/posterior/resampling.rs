@@ -40,7 +40,7 @@ pub(crate) struct Draws {
 }
 
 /// Number of draws whose time is that of a fit.
-pub(in crate::fit) fn usual(problem: &Problem<'_>) -> usize {
+pub(in crate::fit) fn usual(problem: &Problem) -> usize {
     (SAMPLES / problem.samples()).clamp(LEAST, MOST)
 }
 
@@ -52,7 +52,7 @@ pub(in crate::fit) fn usual(problem: &Problem<'_>) -> usize {
 ///
 /// Source: Rubin, "Using the SIR algorithm to simulate posterior distributions" (1988).
 pub(crate) fn posterior(
-    problem: &Problem<'_>,
+    problem: &Problem,
     fits: &[Fitted],
     count: Option<usize>,
     noise: Noise,
@@ -107,7 +107,7 @@ pub(crate) fn posterior(
 }
 
 /// Ends of searches that are tops of their own, best first.
-fn tops<'a>(problem: &Problem<'_>, fits: &'a [Fitted]) -> Vec<&'a Fitted> {
+fn tops<'a>(problem: &Problem, fits: &'a [Fitted]) -> Vec<&'a Fitted> {
     let c = &problem.coordinates;
     let mut tops: Vec<&Fitted> = vec![];
     for fit in fits {

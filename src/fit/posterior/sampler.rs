@@ -31,7 +31,7 @@ pub(in crate::fit) struct Proposal {
 
 impl Proposal {
     /// The proposal about the end of a search, from its information; none where nothing may move.
-    pub fn around(problem: &Problem<'_>, fit: &Fitted) -> Option<Self> {
+    pub fn around(problem: &Problem, fit: &Fitted) -> Option<Self> {
         let free: Vec<usize> = (0..fit.theta.len())
             .filter(|&j| !problem.axes[j].held)
             .collect();
@@ -113,7 +113,7 @@ pub(in crate::fit) struct Round {
 impl Round {
     /// Draws `count` points and weighs them by `log_target`, which is none where the twin does not work.
     pub fn new(
-        problem: &Problem<'_>,
+        problem: &Problem,
         proposals: &[Proposal],
         count: usize,
         source: &mut Source,

@@ -21,7 +21,7 @@ pub(crate) struct Spread {
 impl Spread {
     /// From posterior draws around a fit; of a simulated likelihood, whose draws would cost ensembles, to first order.
     pub fn drawn(
-        problem: &Problem<'_>,
+        problem: &Problem,
         fitted: &Fitted,
         level: f64,
         noise: Noise,
@@ -38,7 +38,7 @@ impl Spread {
     }
 
     /// From posterior draws, where enough of them differ; otherwise first order in φ.
-    pub fn new(problem: &Problem<'_>, fitted: &Fitted, draws: &[Vec<f64>], level: f64) -> Self {
+    pub fn new(problem: &Problem, fitted: &Fitted, draws: &[Vec<f64>], level: f64) -> Self {
         let d = problem.twin.parameters().len();
         let mut first: Vec<u64> = draws
             .iter()

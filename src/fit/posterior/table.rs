@@ -57,7 +57,7 @@ impl Posterior {
 
 /// Names and values of the draws; the first states of equations are drawn given θ and the records.
 pub(in crate::fit) fn table(
-    problem: &Problem<'_>,
+    problem: &Problem,
     draws: &Draws,
     noise: Noise,
 ) -> Result<Posterior, FilterError> {

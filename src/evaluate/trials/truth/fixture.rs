@@ -19,7 +19,7 @@ pub(super) fn plain(id: &str, place: Place) -> Draft {
 pub(super) fn on_stage<R>(
     study: &Study,
     theta: &[f64],
-    ask: impl FnOnce(&Stage<'_>, &Information<'_>) -> R,
+    ask: impl FnOnce(&Stage<'_>, &Information) -> R,
 ) -> R {
     let world = World::new(study.twin());
     let conditions = Conditions::declared();

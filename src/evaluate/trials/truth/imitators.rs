@@ -54,7 +54,7 @@ impl Imitators {
         own: Option<&String>,
         listed: &[Listed],
         stage: &Stage<'_>,
-        information: &Information<'_>,
+        information: &Information,
     ) -> Result<Self, EvaluateError> {
         let mut imitators = Self {
             right: own.into_iter().cloned().collect(),
@@ -95,7 +95,7 @@ fn left(
     sized: &Sized,
     effect: &Listed,
     stage: &Stage<'_>,
-    information: &Information<'_>,
+    information: &Information,
 ) -> Result<f64, EvaluateError> {
     let mut least = 1.0_f64;
     let mut promising = Vec::new();
@@ -135,7 +135,7 @@ fn screened(
     effect: &Listed,
     variant: Variant,
     stage: &Stage<'_>,
-    information: &Information<'_>,
+    information: &Information,
 ) -> Result<Option<Screened>, EvaluateError> {
     let draft = |variant| Draft::variant(&effect.id, effect.place, effect.other, variant);
     let Some(positive) = draft(variant) else {
@@ -186,7 +186,7 @@ fn left_at(
     screened: &Screened,
     size: f64,
     stage: &Stage<'_>,
-    information: &Information<'_>,
+    information: &Information,
 ) -> Result<f64, EvaluateError> {
     let all = information.nats(&sized.change);
     let by: Option<Change> = stage.changed(&screened.draft, size, information)?;
@@ -200,7 +200,7 @@ fn searched(
     sized: &Sized,
     screened: &Screened,
     stage: &Stage<'_>,
-    information: &Information<'_>,
+    information: &Information,
 ) -> Result<f64, EvaluateError> {
     let left = |log: f64| left_at(sized, screened, log.exp(), stage, information);
     let middle = screened.size.ln();

@@ -73,7 +73,7 @@ impl Stage<'_> {
         &self,
         draft: &Draft,
         size: f64,
-        information: &Information<'_>,
+        information: &Information,
     ) -> Result<Option<Sized>, EvaluateError> {
         let Some(departure) = draft.of_size(size, self.scene) else {
             return Ok(None);
@@ -96,7 +96,7 @@ impl Stage<'_> {
         &self,
         draft: &Draft,
         size: f64,
-        information: &Information<'_>,
+        information: &Information,
     ) -> Result<Option<Change>, EvaluateError> {
         let departure = draft.of_size(size, self.scene);
         let Some(pair) = departure.and_then(|departure| self.pair(&[departure])) else {
@@ -111,7 +111,7 @@ impl Stage<'_> {
         &self,
         drafts: &[&Draft],
         wanted: &[f64],
-        information: &Information<'_>,
+        information: &Information,
     ) -> Result<Result<Vec<Sized>, Reject>, EvaluateError> {
         let sized = |each: &[f64]| -> Result<Option<Vec<Sized>>, EvaluateError> {
             (drafts.iter().zip(each))
@@ -164,7 +164,7 @@ impl Stage<'_> {
         &self,
         draft: &Draft,
         wanted: f64,
-        information: &Information<'_>,
+        information: &Information,
     ) -> Result<Option<Sized>, EvaluateError> {
         let distance = |nats: f64| (nats / wanted).ln().abs();
         let mut best: Option<Sized> = None;

@@ -163,7 +163,7 @@ fn information_is_that_of_theory() {
     on_stage(&study, &[1.0], bias_has_its_information);
 }
 
-fn bias_has_its_information(stage: &Stage<'_>, information: &Information<'_>) {
+fn bias_has_its_information(stage: &Stage<'_>, information: &Information) {
     let scene = stage.scene;
     let draft = plain("sensor-bias", Place::Sensor(0));
     let departure = draft.of_size(0.05, scene).unwrap();
