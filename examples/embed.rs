@@ -51,7 +51,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let estimate = estimator.estimate(&record, &EstimateOptions::default(), &progress)?;
     println!(
         "gate p = {:.3}; nu: network {:.3}, calibrated {:.3} ± {:.3} (truth 3)",
-        estimate.gate.p_value, estimate.initial[0], estimate.theta[0], estimate.std_error[0]
+        estimate.gate.p_value, estimate.initial.theta[0], estimate.theta[0], estimate.std_error[0]
     );
 
     // A stop button ends long work at the next unit, with an error that says so.

@@ -28,7 +28,7 @@
 //! let outputs = VanDerPol.simulate(&[3.0], &drive, Noise::new(7, "measured", 0))?;
 //! let record = Record::new(drive, outputs)?;
 //! let estimate: Estimate = estimator.estimate(&record, &EstimateOptions::default(), &Progress::silent())?;
-//! assert!(estimate.gate.out_of_distribution && estimate.refitted);
+//! assert!(estimate.gate.out_of_distribution && estimate.refit().is_some());
 //! assert!((estimate.theta[0] - 3.0).abs() < 5.0 * estimate.std_error[0]);
 //! let tracking: &Tracking = estimate.tracking.as_ref().ok_or("the free run is finite")?;
 //! assert_eq!(tracking.outputs.dim(), (200, 1));
@@ -41,6 +41,7 @@ mod estimate;
 #[allow(clippy::module_inception)]
 mod estimator;
 mod file;
+mod paper;
 mod pretrain;
 mod project;
 pub(crate) mod readout;
@@ -51,14 +52,17 @@ mod settings;
 pub mod fuzzing;
 
 pub(crate) mod bank;
+mod cloud;
 pub(crate) mod gate;
 pub(crate) mod refine;
-pub(crate) mod sample;
 pub(crate) mod shards;
 
+pub use cloud::{CloudSampler, CloudSettings};
 pub use error::EstimatorError;
 pub(crate) use estimate::Contributions;
-pub use estimate::{Estimate, EstimateOptions, Together, Tracking};
+#[cfg(test)]
+pub(crate) use estimate::{Kept, Stages};
+pub use estimate::{Estimate, EstimateOptions, PointEstimate, Refit, Together, Tracking};
 pub use estimator::Estimator;
 pub use gate::{GateForm, GateOutcome, GateSettings};
 pub(crate) use pretrain::GivenBank;
@@ -69,5 +73,4 @@ pub(crate) use readout::INTERVAL_LEVEL;
 pub use recipe::PresetName;
 pub(crate) use recipe::Recipe;
 pub use refine::RefineSettings;
-pub use sample::CloudSampler;
-pub use settings::{CloudSettings, Inputs, Settings};
+pub use settings::{Inputs, Settings};

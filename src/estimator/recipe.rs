@@ -53,18 +53,35 @@ impl Recipe {
             settings: Settings::default(),
         }
     }
+}
 
-    /// Returns the paper's recipe: AR(5), or ARX(8, 8) of a twin with inputs, and [`Deep`].
-    pub(super) fn paper(study: &Study) -> Self {
-        Self {
-            features: regression(study),
-            architecture: architecture::<Deep>(),
-            settings: Settings::paper(),
+/// Steps of an estimate in which the presets differ.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Steps {
+    /// The record is fitted by its likelihood; tests and simulations take the noise that it shows.
+    pub fits_noise: bool,
+    /// The network's estimate is kept if the gate agrees.
+    pub trusts_prior: bool,
+    /// A refit that explains the record worse than the network's estimate is refused.
+    pub compares: bool,
+}
+
+impl Steps {
+    /// The steps of a preset.
+    pub fn of(preset: PresetName, study: &Study) -> Self {
+        match preset {
+            PresetName::Paper => Self::PAPER,
+            PresetName::Default => Self {
+                fits_noise: true,
+                trusts_prior: study.trusts_prior(),
+                compares: true,
+            },
         }
     }
 }
 
-fn regression(study: &Study) -> Arc<dyn FeatureRecipe> {
+/// The features of a twin that shows no equations, and of the paper.
+pub(super) fn regression(study: &Study) -> Arc<dyn FeatureRecipe> {
     if study.twin().signals().inputs.is_empty() {
         Arc::new(Ar { order: 5 })
     } else {

@@ -1,54 +1,14 @@
 //! Settings of training and refinement.
 
-use crate::estimator::gate::{GateForm, GateSettings};
+use crate::estimator::gate::GateSettings;
 use crate::estimator::refine::RefineSettings;
-use crate::estimator::sample::CloudSampler;
-use crate::network::Training;
+use crate::estimator::cloud::CloudSettings;
+use crate::network::{Schedule, Training};
 use crate::setting::SettingError;
 use serde::{Deserialize, Serialize};
 
 /// Largest bank.
 const MOST_SIMULATIONS: usize = 1_000_000_000_000;
-
-/// The cloud of fresh simulations around θ_GN.
-///
-/// | field | default | range | meaning |
-/// |---|---|---|---|
-/// | `size` | 1000 | ≥ 10 | simulations M_FT, at most |
-/// | `per_parameter` | 400 | ≥ 10 | simulations for each parameter, if that is fewer; not in the paper |
-/// | `sampler` | ellipsoid | | see [`CloudSampler`] |
-/// | `spread` | 2 | > 0 | standard deviations of the ellipsoid over those of the estimate; 1 in the paper |
-/// | `quadratic` | true | | a quadratic layer beside the tuned heads; not in the paper |
-/// | `rescale` | true | | standardise features and targets anew on the cloud; not in the paper |
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct CloudSettings {
-    /// Largest number of simulations.
-    pub size: usize,
-    /// Simulations for each parameter.
-    pub per_parameter: usize,
-    /// Where they are drawn.
-    pub sampler: CloudSampler,
-    /// Scale of the ellipsoid.
-    pub spread: f64,
-    /// `true` if features and targets are standardised anew on the cloud.
-    pub rescale: bool,
-    /// `true` if a quadratic layer stands beside the tuned heads.
-    pub quadratic: bool,
-}
-
-impl Default for CloudSettings {
-    fn default() -> Self {
-        Self {
-            size: 1000,
-            per_parameter: 400,
-            sampler: CloudSampler::Ellipsoid,
-            spread: 2.0,
-            rescale: true,
-            quadratic: true,
-        }
-    }
-}
 
 /// Map from features to network inputs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -60,13 +20,6 @@ pub enum Inputs {
     /// To unit covariance along the principal axes of the bank, limited to six standard deviations.
     #[default]
     Principal,
-}
-
-impl CloudSettings {
-    /// M_FT for `parameters` parameters.
-    pub fn draws(&self, parameters: usize) -> usize {
-        self.size.min(self.per_parameter.saturating_mul(parameters))
-    }
 }
 
 /// Every number of the method.
@@ -97,7 +50,7 @@ impl Default for Settings {
             training: Training {
                 epochs: 100,
                 batch: 128,
-                schedule: crate::network::Schedule::Cosine,
+                schedule: Schedule::Cosine,
                 patience: 0,
                 ..Training::default()
             },
@@ -106,7 +59,7 @@ impl Default for Settings {
             cloud: CloudSettings::default(),
             tuning: Training {
                 epochs: 15,
-                schedule: crate::network::Schedule::Cosine,
+                schedule: Schedule::Cosine,
                 weight_decay: 5e-5,
                 patience: 0,
                 ..Training::default()
@@ -116,49 +69,6 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Returns the settings of the paper and its code for every twin: K = 150 for the gate in its own form, three seeds, eight
-    /// starts, the hybrid sampler, early stop on a fifth of the cloud.
-    ///
-    /// γ, λ and epochs differ between the paper's twins; here stand the oscillator's, in units of a prior of width 1.
-    pub fn paper() -> Self {
-        Self {
-            bank_size: 10_000,
-            inputs: Inputs::Each,
-            training: Training {
-                epochs: 200,
-                holdout: 0.0,
-                patience: 0,
-                ..Training::default()
-            },
-            gate: GateSettings {
-                form: GateForm::Paper,
-                ..GateSettings::default()
-            },
-            refine: RefineSettings {
-                seeds: 3,
-                survey_seeds: 3,
-                pull: 1e-3,
-                ridge: 1e-3,
-                ..RefineSettings::default()
-            },
-            cloud: CloudSettings {
-                size: 1000,
-                per_parameter: 1000,
-                sampler: CloudSampler::Hybrid,
-                spread: 1.0,
-                rescale: false,
-                quadratic: false,
-            },
-            tuning: Training {
-                epochs: 200,
-                weight_decay: 5e-5,
-                holdout: 0.2,
-                patience: 20,
-                ..Training::default()
-            },
-        }
-    }
-
     /// Checks whether each number is in its range.
     pub fn check(&self) -> Result<(), SettingError> {
         self.training.check()?;

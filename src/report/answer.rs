@@ -13,7 +13,8 @@ use crate::twin::{Parameter, Role};
 
 /// The page of an estimate.
 pub(crate) fn estimate_html(study: &Study, record: &Record, estimate: &Estimate) -> String {
-    let before = estimate.tracking_initial.as_ref().map(|run| &run.outputs);
+    let before = (estimate.refit()).and_then(|refit| refit.tracking_initial.as_ref());
+    let before = before.map(|run| &run.outputs);
     let after = estimate.tracking.as_ref().map(|run| &run.outputs);
     let picture = after.map(|after| overlay_svg(study, record, before, after));
     let residuals = after.map(|after| record.outputs() - after);

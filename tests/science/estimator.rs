@@ -73,9 +73,9 @@ fn out_of_distribution_records_are_found_and_mended() {
     let mut square = 0.0;
     for seed in 0..5 {
         let estimate = estimate(3.0, seed);
-        assert!(estimate.gate.out_of_distribution && estimate.refitted);
-        assert!((estimate.initial[0] - 3.0).abs() > 0.3);
-        assert!(estimate.after.is_some_and(|after| after.p_value > 0.005));
+        assert!(estimate.gate.out_of_distribution && estimate.refit().is_some());
+        assert!((estimate.initial.theta[0] - 3.0).abs() > 0.3);
+        assert!(estimate.after().is_some_and(|after| after.p_value > 0.005));
         square += (estimate.theta[0] - 3.0).powi(2) / 5.0;
         let expected = estimate.std_error[0];
         assert!((0.002..0.05).contains(&expected), "{expected}");
@@ -92,8 +92,8 @@ fn in_distribution_most_records_keep_the_estimate_of_a_trusted_prior() {
         .collect();
     assert!(kept.len() >= 5, "{} of 10 kept", kept.len());
     for estimate in kept {
-        assert_eq!(estimate.theta, estimate.initial);
-        assert!(estimate.gauss_newton.is_none() && estimate.fine.is_none());
+        assert_eq!(estimate.theta, estimate.initial.theta);
+        assert!(estimate.refit().is_none());
         assert!(estimate.low[0] < estimate.theta[0] && estimate.theta[0] < estimate.high[0]);
         let directions = &estimate.json(estimator().study())["directions"];
         assert!(directions.is_array(), "directions are given all the same");
@@ -216,7 +216,7 @@ fn hold_outside_the_prior(records: u64) -> (usize, usize) {
         let estimate =
             (estimator.estimate(&record, &EstimateOptions::default(), &Progress::silent()))
                 .unwrap();
-        assert!(estimate.refitted);
+        assert!(estimate.refit().is_some());
         let json = estimate.json(study);
         let interval = &json["trusting_prior"]["interval"];
         agreed += usize::from(!estimate.gate.out_of_distribution);
@@ -260,9 +260,9 @@ fn threads_change_no_bit() {
                 .estimate(&record, &options, &Progress::silent())
                 .unwrap();
             (
-                estimate.initial,
-                estimate.gauss_newton,
-                estimate.fine,
+                estimate.initial.theta.clone(),
+                estimate.refit().map(|refit| refit.gauss_newton.clone()),
+                estimate.refit().map(|refit| refit.fine.clone()),
                 estimate.simulations,
             )
         })
@@ -416,7 +416,7 @@ fn an_estimate_in_a_corner_of_the_bounds_stands() {
     };
     let estimate = (estimator.estimate(&record, &options, &Progress::silent())).unwrap();
     let bounds = study.twin().parameters().bounds();
-    assert!(estimate.fine.is_some() && estimate.redrawn() > 0);
+    assert!(estimate.refit().is_some() && estimate.redrawn() > 0);
     assert!(
         estimate
             .theta

@@ -196,7 +196,7 @@ impl Checks {
             found.verdict == Verdict::StructuralGap
                 || !(found.correlated_noise.is_empty() && found.outliers.is_empty()),
             estimate.gate.p_value <= 0.05,
-            estimate.after.is_some_and(|gate| gate.p_value <= 0.05),
+            estimate.after().is_some_and(|gate| gate.p_value <= 0.05),
             self.authors_call(y, departure, noise),
         ]
     }

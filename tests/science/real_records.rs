@@ -74,7 +74,7 @@ fn the_cascaded_tanks_are_followed_on_a_record_never_seen() {
     assert!(estimate.gate.out_of_distribution);
     assert!(unseen <= 0.69, "{unseen}");
     assert!(
-        estimate.after.is_some_and(|after| after.p_value <= 0.05),
+        estimate.after().is_some_and(|after| after.p_value <= 0.05),
         "no parameters make this twin right, and it must say so"
     );
     let nuisance: Vec<_> = estimate

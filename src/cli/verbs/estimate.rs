@@ -159,7 +159,7 @@ pub(super) fn write_results(
     provenance: &Provenance,
 ) -> Result<(), Failure> {
     folder.write_json("estimate.json", &provenance.on(estimate.json(study)))?;
-    if let Some(cloud) = &estimate.cloud {
+    if let Some(cloud) = estimate.refit().map(|refit| &refit.cloud) {
         let names: Vec<&str> = estimate.names.iter().map(String::as_str).collect();
         file::write(&folder.file("cloud.npz"), cloud, &names)?;
     }
@@ -180,7 +180,8 @@ fn write_pictures(
 ) -> Result<(), Failure> {
     let page = provenance.in_page(&estimate.html(study, record));
     folder.write(&format!("report{part}.html"), &page)?;
-    let before = estimate.tracking_initial.as_ref().map(|t| &t.outputs);
+    let before = (estimate.refit()).and_then(|refit| refit.tracking_initial.as_ref());
+    let before = before.map(|t| &t.outputs);
     // A free run that diverged cannot be drawn; the text reports it.
     let Some(after) = estimate.tracking.as_ref().map(|t| &t.outputs) else {
         return Ok(());

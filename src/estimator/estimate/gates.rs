@@ -1,6 +1,6 @@
 //! The tests of an estimate: at the network's, and at the refitted one. An answer near its level is taken again from more simulations.
 
-use super::{Answer, Run};
+use super::Run;
 use crate::estimator::bank::FeatureSimulator;
 use crate::estimator::error::EstimatorError;
 use crate::estimator::gate::{GateForm, GateOutcome, GateSettings, GateTest};
@@ -80,7 +80,7 @@ impl Run<'_> {
     pub(super) fn after(
         &self,
         simulator: &FeatureSimulator,
-        answer: &Answer,
+        theta: &[f64],
         refined: &Refined,
         observed: &DVector<f64>,
     ) -> Result<Option<GateOutcome>, EstimatorError> {
@@ -90,7 +90,7 @@ impl Run<'_> {
                 settings,
                 ..self.gate_test(&simulator, purpose)
             };
-            match test.after_refit(&answer.theta, &refined.jacobian, observed) {
+            match test.after_refit(theta, &refined.jacobian, observed) {
                 Err(EstimatorError::Hopeless { .. } | EstimatorError::Whitening(_)) => Ok(None),
                 outcome => outcome,
             }

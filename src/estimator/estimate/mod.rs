@@ -1,51 +1,50 @@
-//! From a measured record to a calibrated twin.
+//! From a measured record to a calibrated twin: a fit of the likelihood, and the network.
+//!
+//! ```text
+//! record ─ fit ─▶ noise levels, posterior region ─────────────┐ (the paper's preset leaves the fit out)
+//!        ─ network ─▶ θ_init ─ gate ─ kept, if the prior is trusted
+//!                               └─▶ refit: Gauss–Newton, cloud, tuned heads ─▶ θ̂ ─ gate again
+//! ```
 
-mod cloud;
 mod gates;
-mod merit;
-mod noise;
 mod outcome;
+mod record_fit;
+mod refit;
 mod together;
 mod tracking;
 mod tune;
 mod warnings;
 
-pub(crate) use outcome::{Answer, Seconds};
-pub use outcome::{Estimate, EstimateOptions};
+pub use outcome::{Estimate, EstimateOptions, PointEstimate, Refit};
+pub(crate) use outcome::{Kept, Stages};
 pub use together::Together;
-pub use tracking::{Tracking, track};
+pub use tracking::Tracking;
 pub(crate) use tune::Contributions;
 
-use crate::estimator::bank::{Draws, FeatureSimulator};
+use crate::estimator::bank::FeatureSimulator;
 use crate::estimator::error::EstimatorError;
 use crate::estimator::estimator::Estimator;
-use crate::estimator::gate::GateOutcome;
 use crate::estimator::readout::{INTERVAL_LEVEL, Spread};
-use crate::estimator::recipe::PresetName;
-use crate::estimator::refine::{Information, RefineSettings, Refined, Refinement};
+use crate::estimator::recipe::Steps;
+use crate::estimator::refine::{Information, RefineSettings, Refinement};
 use crate::estimator::settings::Settings;
-use crate::fit::posterior::Region;
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::twin::{Noise, Twin};
-use cloud::{Around, cloud};
-use merit::{Merit, error_by_chance};
 use nalgebra::DVector;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use outcome::Seconds;
+use record_fit::RecordFit;
 use std::time::Instant;
-use tune::tune;
+use tracking::{explains_worse, track};
 use warnings::warnings;
-
-/// The tuned estimate is kept within this quantile of χ²_d: of its squared distance from the record's posterior, or of its whitened misfit.
-const KEEP_TUNED: f64 = 0.999;
 
 impl Estimator {
     /// Estimates θ from a record: features, network, gate; then Gauss–Newton, cloud, tuned heads, gate again, so that the answer is
     /// the record's own and does not lean on the prior. Where the study trusts its prior (`[prior] trust = true`; the paper's preset
     /// does), the network's estimate is kept if the gate agrees.
     ///
-    /// The tests simulate in noise drawn from the record's fit; cloud and errors take its levels where they are surely not the declared ones
-    /// ([`Estimate::noise`]).
+    /// The record is also fitted by its likelihood. The tests simulate in noise drawn from that fit; cloud and errors take its levels where
+    /// they are surely not the declared ones ([`Estimate::noise`]).
     ///
     /// # Errors
     ///
@@ -66,27 +65,19 @@ impl Estimator {
             false => &self.project.recipe(preset).settings,
         };
         settings.check()?;
-        // The paper takes the prior and the declared noise at their word.
-        let is_paper = preset == PresetName::Paper;
-        let (study, seed) = (self.study(), options.seed);
+        let steps = Steps::of(preset, self.study());
         let declared = self.simulator()?;
         let observed = declared.observe(record)?;
-        let initial = self.predict_one(&observed)?;
-        let mut seconds = Seconds {
-            predict: clock.elapsed().as_secs_f64(),
-            ..Seconds::default()
-        };
+        let initial = self.initial(self.predict_one(&observed)?);
+        let predict = clock.elapsed().as_secs_f64();
         let lap = Instant::now();
-        let mut shown = match is_paper && options.draws == 0 {
-            true => None,
-            false => noise::shown(study, record, options, progress)?,
+        let fit = match steps.fits_noise || options.draws > 0 {
+            true => RecordFit::new(self.study(), record, options, progress)?,
+            false => None,
         };
-        if let Some(shown) = shown.as_mut().filter(|_| is_paper) {
-            shown.levels.clear();
-        }
-        let in_noise = (shown.as_ref()).filter(|shown| !shown.levels.is_empty());
-        let simulator = match in_noise {
-            Some(shown) => declared.of(&shown.twin, None)?,
+        let taken = fit.as_ref().filter(|_| steps.fits_noise);
+        let simulator = match taken {
+            Some(fit) => declared.of(&fit.twin, None)?,
             None => declared,
         };
         let run = Run {
@@ -94,88 +85,82 @@ impl Estimator {
             settings,
             record,
             observed: &observed,
-            drawn: (shown.as_ref())
-                .filter(|_| !is_paper)
-                .map(|shown| &shown.drawn),
-            noise: Noise::new(seed, "estimate", 0),
-            seed,
+            drawn: taken.map(|fit| &fit.drawn),
+            noise: Noise::new(options.seed, "estimate", 0),
+            seed: options.seed,
             progress,
         };
-        let gate = run.gate(&simulator, &initial)?;
-        seconds.gate = lap.elapsed().as_secs_f64();
-        let trusting = run.trusting(&initial);
-        let is_trusted = is_paper || study.trusts_prior();
-        let is_kept = is_trusted && !gate.out_of_distribution && !options.always_refine;
-        let mut outcome = match is_kept {
-            true => run.keep(&simulator, &trusting)?,
-            false => {
-                let bound = in_noise.map(|shown| simulator.of(&shown.twin, Some(&*self.recipe)));
-                let bound = bound.transpose()?;
-                let bound = bound.as_ref().unwrap_or(&simulator);
-                let region = shown.as_ref().and_then(|shown| shown.fit.region.as_ref());
-                run.refit(bound, &initial, region, &mut seconds)?
-            }
-        };
+        let gate = run.gate(&simulator, &initial.theta)?;
+        let seconds = (predict, lap.elapsed().as_secs_f64());
         let twin = simulator.twin();
         // A free run may diverge where noisy runs do not; the estimate stands all the same.
         let follow = |theta: &[f64], record: &Record| track(twin, theta, record).ok();
-        let mut tracking = follow(&outcome.answer.theta, record);
-        let tracking_initial = (outcome.refitted)
-            .then(|| follow(&initial, record))
-            .flatten();
-        let mut refinement_refused = false;
-        if outcome.refitted && !is_paper {
-            let merit = |theta: &[f64], run: &Option<Tracking>| {
-                Merit::of(twin, record, theta, run.as_ref())
+        let is_kept = steps.trusts_prior && !gate.out_of_distribution && !options.always_refine;
+        let (stages, tracking) = if is_kept {
+            let information = run.information(&simulator, &initial.theta)?;
+            (Stages::Kept(Kept { information }), follow(&initial.theta, record))
+        } else {
+            let bound = taken.map(|fit| simulator.of(&fit.twin, Some(&*self.recipe)));
+            let bound = bound.transpose()?;
+            let region = taken.and_then(|fit| fit.fit.region.as_ref());
+            let bound = bound.as_ref().unwrap_or(&simulator);
+            let mut refit = run.refit(bound, &initial.theta, region)?;
+            let tracking = follow(&refit.answer.theta, record);
+            refit.tracking_initial = follow(&initial.theta, record);
+            refit.is_refused = steps.compares && {
+                let [own, first] = [
+                    (&refit.answer.theta[..], tracking.as_ref()),
+                    (&initial.theta[..], refit.tracking_initial.as_ref()),
+                ];
+                explains_worse(twin, record, own, first, Noise::new(options.seed, "merit", 0))
             };
-            let first = merit(&initial, &tracking_initial);
-            let refined = merit(&outcome.answer.theta, &tracking);
-            let by_chance = || {
-                let noise = Noise::new(seed, "merit", 0);
-                error_by_chance(twin, &outcome.answer.theta, record, noise)
+            let tracking = match refit.is_refused {
+                true => refit.tracking_initial.clone(),
+                false => tracking,
             };
-            if refined.is_worse_than(&first, initial.len(), by_chance) {
-                refinement_refused = true;
-                outcome.answer = trusting.clone();
-                tracking = tracking_initial.clone();
-            }
-        }
-        let fitted = tracking
-            .as_ref()
-            .map_or(&outcome.answer.theta, |t| &t.theta);
+            (Stages::Refitted(Box::new(refit)), tracking)
+        };
+        let answer = match &stages {
+            Stages::Refitted(refit) if !refit.is_refused => refit.answer.clone(),
+            _ => initial.clone(),
+        };
+        let fitted = tracking.as_ref().map_or(&answer.theta, |run| &run.theta);
         let validation = (options.validation.as_ref()).and_then(|record| follow(fitted, record));
         let space = twin.parameters();
         let mut estimate = Estimate {
             names: space.names().into_iter().map(str::to_owned).collect(),
             roles: space.iter().map(|p| p.role).collect(),
-            tracking_initial,
             initial,
-            trusting,
             gate,
-            noise: in_noise.map_or_else(Vec::new, |shown| shown.levels.clone()),
-            gauss_newton: outcome.gauss_newton,
-            fine: outcome.fine,
-            contributions: outcome.contributions,
-            theta: outcome.answer.theta,
-            std_error: outcome.answer.std_error,
-            low: outcome.answer.low,
-            high: outcome.answer.high,
-            information: outcome.information,
-            after: outcome.after,
-            refitted: outcome.refitted,
-            refinement_refused,
+            stages,
+            noise: taken.map_or_else(Vec::new, |fit| fit.levels.clone()),
+            theta: answer.theta,
+            std_error: answer.std_error,
+            low: answer.low,
+            high: answer.high,
             tracking,
             validation,
-            posterior: shown.as_ref().and_then(|shown| shown.fit.posterior.clone()),
+            posterior: fit.as_ref().and_then(|fit| fit.fit.posterior.clone()),
             warnings: vec![],
             simulations: simulator.calls(),
-            cloud: outcome.cloud,
-            seconds,
+            seconds: Seconds {
+                predict: seconds.0,
+                gate: seconds.1,
+                total: 0.0,
+            },
         };
-        let fit = shown.as_ref().map(|shown| &shown.fit);
-        estimate.warnings = warnings(twin, record, &estimate, fit);
+        estimate.warnings = warnings(twin, record, &estimate, fit.as_ref().map(|fit| &fit.fit));
         estimate.seconds.total = clock.elapsed().as_secs_f64();
         Ok(estimate)
+    }
+
+    /// The network's estimate, with the errors of simulations of the prior that were predicted nearby.
+    fn initial(&self, theta: Vec<f64>) -> PointEstimate {
+        let space = self.study().twin().parameters();
+        let spread = (self.calibration).spread(&theta, &space.widths(), INTERVAL_LEVEL);
+        let unknown = || Spread::normal(vec![f64::NAN; theta.len()], INTERVAL_LEVEL);
+        let spread = spread.unwrap_or_else(unknown);
+        PointEstimate::new(theta, spread, &space)
     }
 }
 
@@ -190,18 +175,6 @@ struct Run<'a> {
     noise: Noise,
     seed: u64,
     progress: &'a Progress,
-}
-
-/// Results of the stages after the gate.
-struct Outcome {
-    answer: Answer,
-    gauss_newton: Option<Vec<f64>>,
-    fine: Option<Vec<f64>>,
-    contributions: Option<Contributions>,
-    information: Option<Information>,
-    after: Option<GateOutcome>,
-    refitted: bool,
-    cloud: Option<Draws>,
 }
 
 impl Run<'_> {
@@ -222,133 +195,19 @@ impl Run<'_> {
         }
     }
 
-    /// The network's estimate, with the errors of simulations of the prior that were predicted nearby.
-    fn trusting(&self, initial: &[f64]) -> Answer {
-        let space = self.estimator.study().twin().parameters();
-        let spread = (self.estimator.calibration).spread(initial, &space.widths(), INTERVAL_LEVEL);
-        let unknown = || Spread::normal(vec![f64::NAN; initial.len()], INTERVAL_LEVEL);
-        Answer::new(initial.to_vec(), spread.unwrap_or_else(unknown), &space)
-    }
-
-    /// The gate kept the network's estimate.
-    fn keep(
+    /// Information of the record on θ at the network's estimate; `None` where the features do not tell it.
+    fn information(
         &self,
         simulator: &FeatureSimulator,
-        trusting: &Answer,
-    ) -> Result<Outcome, EstimatorError> {
-        // The estimate stands whether or not its directions can be told.
-        let information = match self
-            .refinement(simulator, self.observed, &self.settings.refine)
-            .describe_at(&trusting.theta)
-        {
-            Ok(refined) => Some(refined.information),
-            Err(error @ EstimatorError::Cancelled(_)) => return Err(error),
-            Err(_) => None,
-        };
-        Ok(Outcome {
-            answer: trusting.clone(),
-            gauss_newton: None,
-            fine: None,
-            contributions: None,
-            information,
-            after: None,
-            refitted: false,
-            cloud: None,
-        })
+        theta: &[f64],
+    ) -> Result<Option<Information>, EstimatorError> {
+        let refinement = self.refinement(simulator, self.observed, &self.settings.refine);
+        match refinement.describe_at(theta) {
+            Ok(refined) => Ok(Some(refined.information)),
+            Err(error @ EstimatorError::Cancelled(_)) => Err(error),
+            Err(_) => Ok(None),
+        }
     }
-
-    /// Gauss–Newton, cloud, tuned heads, gate again.
-    fn refit(
-        &self,
-        simulator: &FeatureSimulator,
-        initial: &[f64],
-        region: Option<&Region>,
-        seconds: &mut Seconds,
-    ) -> Result<Outcome, EstimatorError> {
-        let (settings, progress) = (self.settings, self.progress);
-        let lap = Instant::now();
-        // Features with a reference are taken about the record's own θ from here on.
-        let about = region.and_then(|region| Some((simulator.about(&region.theta)?, region)));
-        let (simulator, initial, refine) = match &about {
-            Some((simulator, region)) => {
-                let refine = settings.refine.centred();
-                (simulator, region.theta.as_slice(), refine)
-            }
-            None => (simulator, initial, settings.refine.clone()),
-        };
-        let observed = simulator.observe(self.record)?;
-        let refinement = self.refinement(simulator, &observed, &refine);
-        let refined = refinement.run(initial)?;
-        seconds.gauss_newton = Some(lap.elapsed().as_secs_f64());
-        let lap = Instant::now();
-        let around = Around {
-            simulator,
-            drive: self.record.drive(),
-            refined: &refined,
-            region: about.as_ref().map(|(_, region)| *region),
-            settings,
-        };
-        let draws = cloud(&around, self.noise.child("cloud"), progress)?;
-        seconds.cloud = Some(lap.elapsed().as_secs_f64());
-        let lap = Instant::now();
-        let tuned = tune(
-            self.estimator,
-            &draws,
-            &refined,
-            &observed,
-            settings,
-            self.seed,
-            progress,
-        )?;
-        seconds.tune = Some(lap.elapsed().as_secs_f64());
-        let gauss_newton = refined.theta.as_slice().to_vec();
-        let fine = tuned.theta;
-        let space = simulator.twin().parameters();
-        // What is kept while nothing speaks against it, and what stands in for it.
-        let (keeps, instead, std_error) = match around.region {
-            Some(region) => (
-                is_likely(region.squared_distance(&fine), fine.len()),
-                &region.theta,
-                region.std_errors(),
-            ),
-            None => (
-                self.keeps(&refinement, &refined, &fine),
-                &gauss_newton,
-                refined.information.std_error.clone(),
-            ),
-        };
-        let answer = match tuned.spread {
-            Some(spread) if keeps => Answer::new(fine.clone(), spread, &space),
-            _ => {
-                let spread = Spread::normal(std_error, INTERVAL_LEVEL);
-                Answer::new(instead.clone(), spread, &space)
-            }
-        };
-        let after = self.after(simulator, &answer, &refined, &observed)?;
-        Ok(Outcome {
-            answer,
-            gauss_newton: Some(gauss_newton),
-            fine: Some(fine),
-            contributions: tuned.contributions,
-            information: Some(refined.information),
-            after,
-            refitted: true,
-            cloud: Some(draws),
-        })
-    }
-
-    /// Returns whether the tuned estimate stays within the misfit that θ could still explain by chance: the part of its whitened
-    /// residual in the Jacobian's column space against χ²_d(0.999).
-    fn keeps(&self, refinement: &Refinement<'_>, refined: &Refined, theta: &[f64]) -> bool {
-        (refinement.whitened_residual(refined, theta))
-            .map(|residual| refined.explainable_misfit(&residual))
-            .is_ok_and(|misfit| is_likely(misfit, theta.len()))
-    }
-}
-
-/// Returns whether a squared distance of so many degrees of freedom is one of chance.
-fn is_likely(square: f64, freedom: usize) -> bool {
-    ChiSquared::new(freedom as f64).is_ok_and(|chi| square <= chi.inverse_cdf(KEEP_TUNED))
 }
 
 #[cfg(test)]

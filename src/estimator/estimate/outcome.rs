@@ -10,7 +10,6 @@ use crate::estimator::refine::Information;
 use crate::fit::{FittedNoise, Nuisance, Posterior, Warning};
 use crate::record::Record;
 use crate::twin::{ParameterSpace, Role};
-use serde::Serialize;
 
 /// Codes of warnings that no estimate is consistent with.
 pub(super) const NO_BETTER: &str = "no-better-than-constant";
@@ -35,15 +34,18 @@ pub struct EstimateOptions {
 
 /// Parameters with their errors.
 #[derive(Debug, Clone)]
-pub(crate) struct Answer {
+pub struct PointEstimate {
+    /// Values, within the bounds.
     pub theta: Vec<f64>,
+    /// Standard errors.
     pub std_error: Vec<f64>,
-    /// Ends of the 90 % interval.
+    /// Lower ends of the 90 % interval, within the bounds.
     pub low: Vec<f64>,
+    /// Upper ends.
     pub high: Vec<f64>,
 }
 
-impl Answer {
+impl PointEstimate {
     pub(super) fn new(theta: Vec<f64>, spread: Spread, space: &ParameterSpace) -> Self {
         let shifted = |by: &[f64]| {
             let moved: Vec<f64> = theta.iter().zip(by).map(|(t, b)| t + b).collect();
@@ -58,7 +60,69 @@ impl Answer {
     }
 }
 
-/// Estimate with the results of its stages. Skipped stages are `None`.
+/// Stages after the gate at the network's estimate.
+#[derive(Debug, Clone)]
+pub(crate) enum Stages {
+    /// The prior is trusted and the gate agrees: the network's estimate is the answer.
+    Kept(Kept),
+    /// The record was refitted.
+    Refitted(Box<Refit>),
+}
+
+/// Description of the record's information at the network's estimate.
+#[derive(Debug, Clone)]
+pub(crate) struct Kept {
+    /// Information and directions; `None` where the features do not tell them.
+    pub(crate) information: Option<Information>,
+}
+
+/// Refit of a record: Gauss–Newton, cloud, tuned heads, the test again.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Refit {
+    /// The record's own estimate: the tuned one, unless it is too far from the record's posterior or its misfit too large; else the
+    /// posterior's mean, or Gauss–Newton's.
+    pub answer: PointEstimate,
+    /// `true` if that explains the record worse than the network's estimate, which is then kept.
+    pub is_refused: bool,
+    /// Gauss–Newton's estimate.
+    pub gauss_newton: Vec<f64>,
+    /// The tuned heads' estimate.
+    pub fine: Vec<f64>,
+    /// Contributions of layer and heads to it; `None` without a quadratic layer.
+    pub(crate) contributions: Option<Contributions>,
+    /// Information and directions at Gauss–Newton's estimate.
+    pub(crate) information: Information,
+    /// The test of the answer; `None` where no degree of freedom is left.
+    pub after: Option<GateOutcome>,
+    /// The free run at the network's estimate, for comparison; `None` where it diverges.
+    pub tracking_initial: Option<Tracking>,
+    /// The cloud that the heads were tuned on, and measured on: its last rows they never saw.
+    pub(crate) cloud: Draws,
+    pub(crate) seconds: RefitSeconds,
+}
+
+/// Wall-clock seconds of the stages of a refit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct RefitSeconds {
+    pub gauss_newton: f64,
+    pub cloud: f64,
+    /// Tuning of the heads.
+    pub tune: f64,
+}
+
+/// Wall-clock seconds of an estimate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Seconds {
+    /// Features and network.
+    pub predict: f64,
+    /// The record's fit and the test at the network's estimate.
+    pub gate: f64,
+    /// Everything, free runs included.
+    pub total: f64,
+}
+
+/// Estimate with the results of its stages.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Estimate {
@@ -66,23 +130,15 @@ pub struct Estimate {
     pub names: Vec<String>,
     /// Role of each parameter.
     pub roles: Vec<Role>,
-    /// The network's estimate.
-    pub initial: Vec<f64>,
-    /// The network's estimate with its errors, for those who trust the prior.
-    pub(crate) trusting: Answer,
+    /// The network's estimate, for those who trust the prior.
+    pub initial: PointEstimate,
     /// The test of the network's estimate.
     pub gate: GateOutcome,
+    /// What followed.
+    pub(crate) stages: Stages,
     /// Noise levels that the record shows in place of those that the twin declares; simulations take them.
     pub noise: Vec<FittedNoise>,
-    /// Gauss–Newton's estimate.
-    pub gauss_newton: Option<Vec<f64>>,
-    /// The tuned heads' estimate.
-    pub fine: Option<Vec<f64>>,
-    /// Contributions of layer and heads to it.
-    pub(crate) contributions: Option<Contributions>,
-    /// The estimate: the record's own, within the bounds. That is the tuned one, unless it is too far from the record's posterior or its
-    /// misfit too large: else the posterior's mean, or Gauss–Newton's. The network's is kept where the prior is trusted and the gate
-    /// agrees, and where refined ones explain the record worse.
+    /// The estimate: the refit's, or the network's where that was kept.
     pub theta: Vec<f64>,
     /// Standard errors of `theta`.
     pub std_error: Vec<f64>,
@@ -90,18 +146,8 @@ pub struct Estimate {
     pub low: Vec<f64>,
     /// Upper ends.
     pub high: Vec<f64>,
-    /// Information and directions at Gauss–Newton's estimate, or at the network's where the gate kept it.
-    pub(crate) information: Option<Information>,
-    /// The test after the refit; `None` where no degree of freedom is left.
-    pub after: Option<GateOutcome>,
-    /// `true` if a refit was made at all.
-    pub refitted: bool,
-    /// `true` if its answer explains the record worse than the network's, which is kept.
-    pub(crate) refinement_refused: bool,
     /// The free run at `theta`, unknown starts refitted; `None` where it diverges.
     pub tracking: Option<Tracking>,
-    /// The free run at the network's estimate, for comparison; `None` without a refit, or where it diverges.
-    pub tracking_initial: Option<Tracking>,
     /// The free run on the validation record; `None` without one, or where it diverges.
     pub validation: Option<Tracking>,
     /// Draws of everything unknown from likelihood and weak priors, where they were asked for.
@@ -110,30 +156,39 @@ pub struct Estimate {
     pub warnings: Vec<Warning>,
     /// Simulator calls.
     pub simulations: usize,
-    /// The cloud that the heads were tuned on, and measured on: its last rows they never saw.
-    pub(crate) cloud: Option<Draws>,
-    /// Wall-clock times.
     pub(crate) seconds: Seconds,
 }
 
-/// Wall-clock seconds of each stage; `None` for skipped ones.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub(crate) struct Seconds {
-    /// Features and network.
-    pub predict: f64,
-    /// The test.
-    pub gate: f64,
-    /// Gauss–Newton.
-    pub gauss_newton: Option<f64>,
-    /// The cloud.
-    pub cloud: Option<f64>,
-    /// The heads.
-    pub tune: Option<f64>,
-    /// Everything, free runs included.
-    pub total: f64,
-}
-
 impl Estimate {
+    /// The refit, where one was made.
+    pub fn refit(&self) -> Option<&Refit> {
+        match &self.stages {
+            Stages::Kept(_) => None,
+            Stages::Refitted(refit) => Some(refit),
+        }
+    }
+
+    #[cfg(test)]
+    pub(crate) fn refit_mut(&mut self) -> &mut Refit {
+        match &mut self.stages {
+            Stages::Kept(_) => panic!("not refitted"),
+            Stages::Refitted(refit) => refit,
+        }
+    }
+
+    /// The test after the refit; `None` without one, or where no degree of freedom is left.
+    pub fn after(&self) -> Option<GateOutcome> {
+        self.refit().and_then(|refit| refit.after)
+    }
+
+    /// Information and directions at Gauss–Newton's estimate, or at the network's where the gate kept it.
+    pub(crate) fn information(&self) -> Option<&Information> {
+        match &self.stages {
+            Stages::Kept(kept) => kept.information.as_ref(),
+            Stages::Refitted(refit) => Some(&refit.information),
+        }
+    }
+
     /// Start states, noise levels and magnitudes among θ.
     pub fn nuisance(&self) -> Vec<Nuisance> {
         (0..self.names.len())
@@ -156,13 +211,12 @@ impl Estimate {
             .collect()
     }
 
-    /// Returns whether the record is what the twin makes at the estimate: no test rejects, and the free run of every output is better
-    /// than a constant.
+    /// Returns whether the record is what the twin makes at the estimate: the last test does not reject, and the free run of every output
+    /// is better than a constant.
     pub fn is_consistent(&self) -> bool {
-        let test = if self.refitted {
-            self.after
-        } else {
-            Some(self.gate)
+        let test = match self.refit() {
+            Some(refit) => refit.after,
+            None => Some(self.gate),
         };
         test.is_some_and(|test| !test.out_of_distribution) && !self.is_no_better_than_constant()
     }
@@ -175,11 +229,11 @@ impl Estimate {
 
     /// Returns whether the answer is the network's.
     pub(crate) fn leans_on_prior(&self) -> bool {
-        !self.refitted || self.refinement_refused
+        self.refit().is_none_or(|refit| refit.is_refused)
     }
 
     /// Draws of the cloud that were drawn again: out of bounds, diverged, or without features.
     pub fn redrawn(&self) -> usize {
-        self.cloud.as_ref().map_or(0, |draws| draws.redrawn)
+        self.refit().map_or(0, |refit| refit.cloud.redrawn)
     }
 }

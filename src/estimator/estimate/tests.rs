@@ -63,7 +63,7 @@ fn an_answer_near_the_level_is_taken_from_more_simulations() {
         let estimate = estimator
             .estimate(&record, &EstimateOptions::default(), &Progress::silent())
             .unwrap();
-        let tests = [Some(estimate.gate), estimate.after];
+        let tests = [Some(estimate.gate), estimate.after()];
         for (test, repeated) in tests.into_iter().flatten().zip([&mut first, &mut after]) {
             assert!(test.simulations == larger || !test.is_unsure(), "{test:?}");
             assert!([null, larger].contains(&test.simulations), "{test:?}");
@@ -87,14 +87,14 @@ fn levels_off(declared: f64, seed: u64) -> Vec<String> {
     let noise = Noise::new(seed, "record", 0);
     let tanks = Twin::new(CascadedTanks);
     let record = record(&study, &tanks, &[0.6, 0.5, 0.55, 1.0], noise);
-    let shown = noise::shown(
+    let fit = RecordFit::new(
         &study,
         &record,
         &EstimateOptions::default(),
         &Progress::silent(),
     )
     .unwrap();
-    let levels = shown.unwrap().levels;
+    let levels = fit.unwrap().levels;
     levels.into_iter().map(|level| level.name).collect()
 }
 

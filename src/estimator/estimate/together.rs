@@ -1,6 +1,6 @@
 //! Several records of one system: one estimate of what they share.
 
-use super::{Answer, Estimate, EstimateOptions};
+use super::{Estimate, EstimateOptions, PointEstimate};
 use crate::estimator::error::EstimatorError;
 use crate::estimator::estimator::Estimator;
 use crate::estimator::readout::{INTERVAL_LEVEL, Spread};
@@ -77,7 +77,7 @@ fn shared(space: &ParameterSpace) -> Vec<usize> {
 fn precision(estimate: &Estimate, shared: &[usize]) -> DMatrix<f64> {
     let n = shared.len();
     let error = |a: usize| estimate.std_error[shared[a]];
-    let correlation = |a: usize, b: usize| match &estimate.information {
+    let correlation = |a: usize, b: usize| match estimate.information() {
         Some(known) => {
             let at = |i: usize, j: usize| known.covariance[(shared[i], shared[j])];
             at(a, b) / (at(a, a) * at(b, b)).sqrt()
@@ -119,7 +119,7 @@ fn together(records: Vec<Estimate>, space: &ParameterSpace) -> Together {
     let std_error: Vec<f64> = covariance.diagonal().iter().map(|v| v.sqrt()).collect();
     let own = ParameterSpace::new(shared.iter().map(|&j| space[j].clone()));
     let spread = Spread::normal(std_error, INTERVAL_LEVEL);
-    let answer = Answer::new(theta.as_slice().to_vec(), spread, &own);
+    let answer = PointEstimate::new(theta.as_slice().to_vec(), spread, &own);
     Together {
         names: own.names().into_iter().map(str::to_owned).collect(),
         theta: own.clamp(&answer.theta),

@@ -32,6 +32,24 @@ pub(crate) struct Contributions {
     pub theta: Vec<f64>,
 }
 
+/// A cloud with all that its tuning depends on.
+pub struct Tuning<'a> {
+    /// Network, standardisation.
+    pub estimator: &'a Estimator,
+    /// The cloud.
+    pub draws: &'a Draws,
+    /// Gauss–Newton's estimate, whose information weighs the targets.
+    pub refined: &'a Refined,
+    /// The record's features.
+    pub observed: &'a DVector<f64>,
+    /// Settings of the estimate.
+    pub settings: &'a Settings,
+    /// Seed of the training.
+    pub seed: u64,
+    /// Progress sink.
+    pub progress: &'a Progress,
+}
+
 /// Heads tuned to one record.
 #[derive(Debug, Clone)]
 pub struct Tuned {
@@ -48,15 +66,16 @@ pub struct Tuned {
 /// Each target's weight is w_j = d·G_jj/Σ G_kk, with G in the units that the targets are standardised in.
 ///
 /// Source: Lakshminarayanan, Guerrero & Rojas, section IV-C; the quadratic layer is ours.
-pub fn tune(
-    estimator: &Estimator,
-    draws: &Draws,
-    refined: &Refined,
-    observed: &DVector<f64>,
-    settings: &Settings,
-    seed: u64,
-    progress: &Progress,
-) -> Result<Tuned, EstimatorError> {
+pub fn tune(tuning: &Tuning<'_>) -> Result<Tuned, EstimatorError> {
+    let &Tuning {
+        estimator,
+        draws,
+        refined,
+        observed,
+        settings,
+        seed,
+        progress,
+    } = tuning;
     let size = (settings.cloud.draws(draws.theta.ncols())).min(draws.theta.nrows());
     let rows = |all: &Array2<f64>, from: usize, to: usize| all.slice(s![from..to, ..]).to_owned();
     let (features, theta) = (rows(&draws.features, 0, size), rows(&draws.theta, 0, size));

@@ -66,7 +66,7 @@ pub(super) fn warnings(
             "declare that level in [noise]; if it is louder than it can be, look for what the twin lacks: truetwin diagnose",
         );
     }
-    if estimate.refinement_refused {
+    if estimate.refit().is_some_and(|refit| refit.is_refused) {
         warn(
             "refinement-worse",
             "refined parameters explain the record worse than the network's, which are kept"
@@ -87,7 +87,7 @@ pub(super) fn warnings(
             "widen [bounds] if other values are possible; its error means little here",
         );
     }
-    if let Some(information) = estimate.information.as_ref().filter(|_| !estimate.refitted) {
+    if let Some(information) = estimate.information().filter(|_| estimate.refit().is_none()) {
         let leaning: Vec<&str> = (space.iter().zip(&information.std_error))
             .filter(|(p, error)| {
                 let prior = PRIOR_DEVIATION * p.prior.width();
@@ -106,7 +106,7 @@ pub(super) fn warnings(
     }
     let tests = [
         ("the test", Some(estimate.gate)),
-        ("the test after the refit", estimate.after),
+        ("the test after the refit", estimate.after()),
     ];
     for (name, test) in tests {
         let Some(test) = test.filter(GateOutcome::is_unsure) else {

@@ -71,7 +71,7 @@ impl Run {
         };
         let start = |from: Initialisation| {
             let initial = match (&estimate, from) {
-                (Some(estimate), _) => estimate.initial.as_slice(),
+                (Some(estimate), _) => estimate.initial.theta.as_slice(),
                 (None, Initialisation::Ts) => return None,
                 (None, _) => &[],
             };
@@ -117,7 +117,8 @@ impl Run {
             truth: truth.clone(),
             interval: estimate.as_ref().map(interval).unwrap_or_default(),
             answers: Method::all().into_iter().map(answer).collect(),
-            contributions: estimate.and_then(|estimate| estimate.contributions),
+            contributions: estimate
+                .and_then(|estimate| estimate.refit().and_then(|refit| refit.contributions.clone())),
             failure,
         })
     }
@@ -136,14 +137,15 @@ impl Run {
 
 /// Estimate and seconds of one stage of the estimator.
 fn of_stage(method: Method, estimate: &Estimate) -> (Option<Vec<f64>>, Option<f64>) {
-    let seconds = &estimate.seconds;
-    let initial = (Some(estimate.initial.clone()), seconds.predict);
-    let gauss_newton = seconds.predict + seconds.gate + seconds.gauss_newton.unwrap_or(0.0);
+    let (seconds, refit) = (&estimate.seconds, estimate.refit());
+    let initial = (Some(estimate.initial.theta.clone()), seconds.predict);
+    let refined = refit.map_or(0.0, |refit| refit.seconds.gauss_newton);
+    let gauss_newton = seconds.predict + seconds.gate + refined;
     let (theta, seconds) = match method {
-        Method::GaussNewton => (estimate.gauss_newton.clone(), gauss_newton),
+        Method::GaussNewton => (refit.map(|refit| refit.gauss_newton.clone()), gauss_newton),
         Method::TsFine => {
-            let cloud = seconds.cloud.unwrap_or(0.0) + seconds.tune.unwrap_or(0.0);
-            (estimate.fine.clone(), gauss_newton + cloud)
+            let tuning = refit.map_or(0.0, |refit| refit.seconds.cloud + refit.seconds.tune);
+            (refit.map(|refit| refit.fine.clone()), gauss_newton + tuning)
         }
         // What would have been answered without being told to refine.
         Method::Final if estimate.gate.out_of_distribution => {

@@ -29,34 +29,36 @@ use serde_json::{Value, json};
 /// All keys are always there. Stages that were skipped are null, and so are numbers that are not finite.
 pub fn estimate_json(study: &Study, estimate: &Estimate) -> Value {
     let own = |all: &[f64]| estimate.physical(all);
-    let stage = |all: &Option<Vec<f64>>| all.as_deref().map(own);
-    let after = estimate.refitted.then(|| {
+    let refit = estimate.refit();
+    let after = refit.map(|refit| {
+        let test = refit.after;
         json!({
-            "p_value": estimate.after.map(|test| test.p_value),
-            "consistent": estimate.after.map(|_| estimate.is_consistent()),
-            "alpha": estimate.after.map(|test| test.alpha),
-            "statistic": estimate.after.map(|test| test.statistic),
-            "p_error": estimate.after.map(|test| test.p_error),
-            "simulations": estimate.after.map(|test| test.simulations),
-            "at_floor": estimate.after.map(|test| test.at_floor()),
+            "p_value": test.map(|test| test.p_value),
+            "consistent": test.map(|_| estimate.is_consistent()),
+            "alpha": test.map(|test| test.alpha),
+            "statistic": test.map(|test| test.statistic),
+            "p_error": test.map(|test| test.p_error),
+            "simulations": test.map(|test| test.simulations),
+            "at_floor": test.map(|test| test.at_floor()),
         })
     });
     let mut gate = json!(estimate.gate);
     gate["at_floor"] = json!(estimate.gate.at_floor());
-    let directions = estimate.information.as_ref().map(|known| &known.directions);
-    let weak: Vec<_> = (estimate.information.iter())
+    let directions = estimate.information().map(|known| &known.directions);
+    let weak: Vec<_> = (estimate.information().into_iter())
         .flat_map(|known| known.weak())
         .collect();
-    let trusting = &estimate.trusting;
+    let trusting = &estimate.initial;
+    let seconds = estimate.seconds;
     json!({
         "schema": "truetwin.estimate/1",
         "twin": study.name(),
         "names": estimate.physical(&estimate.names),
         "gate": gate,
         "theta": {
-            "initial": own(&estimate.initial),
-            "gauss_newton": stage(&estimate.gauss_newton),
-            "fine": stage(&estimate.fine),
+            "initial": own(&estimate.initial.theta),
+            "gauss_newton": refit.map(|refit| own(&refit.gauss_newton)),
+            "fine": refit.map(|refit| own(&refit.fine)),
             "final": own(&estimate.theta),
         },
         "std_error": own(&estimate.std_error),
@@ -71,10 +73,17 @@ pub fn estimate_json(study: &Study, estimate: &Estimate) -> Value {
         "free_run": {
             "rmse": estimate.tracking.as_ref().map(|run| run.rmse),
             "validation_rmse": estimate.validation.as_ref().map(|run| run.rmse),
-            "initial_rmse": estimate.tracking_initial.as_ref().map(|run| run.rmse),
+            "initial_rmse": (refit.and_then(|refit| refit.tracking_initial.as_ref())).map(|run| run.rmse),
         },
         "simulations": estimate.simulations,
-        "seconds": estimate.seconds,
+        "seconds": {
+            "predict": seconds.predict,
+            "gate": seconds.gate,
+            "gauss_newton": refit.map(|refit| refit.seconds.gauss_newton),
+            "cloud": refit.map(|refit| refit.seconds.cloud),
+            "tune": refit.map(|refit| refit.seconds.tune),
+            "total": seconds.total,
+        },
         "answer": if estimate.leans_on_prior() { "prior" } else { "record" },
         "trusting_prior": {
             "theta": own(&trusting.theta),
@@ -85,7 +94,7 @@ pub fn estimate_json(study: &Study, estimate: &Estimate) -> Value {
                 "high": own(&trusting.high),
             },
         },
-        "heads": estimate.contributions.as_ref().map(|parts| json!({
+        "heads": refit.and_then(|refit| refit.contributions.as_ref()).map(|parts| json!({
             "alpha": own(&parts.alpha),
             "explained_layer": own(&parts.layer),
             "explained_both": own(&parts.both),
@@ -96,7 +105,7 @@ pub fn estimate_json(study: &Study, estimate: &Estimate) -> Value {
         "warnings": estimate.warnings,
         "parameters": estimate.physical(&rows(study, estimate)),
         "directions": directions,
-        "refitted": estimate.refitted,
+        "refitted": refit.is_some(),
         "redrawn": estimate.redrawn(),
     })
 }
@@ -104,6 +113,7 @@ pub fn estimate_json(study: &Study, estimate: &Estimate) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimator::{Kept, Stages};
     use crate::report::fixture::{estimates, validator};
 
     fn checked(estimate: &Estimate) -> Value {
@@ -174,10 +184,9 @@ mod tests {
     #[test]
     fn what_cannot_be_told_is_null() {
         let mut estimate = estimates().refined.clone();
-        estimate.after = None;
+        estimate.refit_mut().after = None;
         estimate.std_error.fill(f64::NAN);
         estimate.tracking = None;
-        estimate.information = None;
         let value = checked(&estimate);
         for key in ["p_value", "p_error", "simulations", "at_floor"] {
             assert_eq!(value["after"][key], Value::Null, "{key}");
@@ -185,6 +194,9 @@ mod tests {
         assert_eq!(value["std_error"], json!([null]));
         assert_eq!(value["nuisance"][0]["std_error"], Value::Null);
         assert_eq!(value["free_run"]["rmse"], Value::Null);
+        let mut estimate = estimates().kept.clone();
+        estimate.stages = Stages::Kept(Kept { information: None });
+        let value = checked(&estimate);
         assert_eq!(
             (&value["weak_directions"], &value["directions"]),
             (&json!([]), &Value::Null)

@@ -116,7 +116,7 @@ mod tests {
     fn before_and_after_are_told_apart_with_their_errors() {
         let found = estimates();
         let (before, after) = (
-            found.refined.tracking_initial.as_ref(),
+            found.refined.refit().unwrap().tracking_initial.as_ref(),
             found.refined.tracking.as_ref().unwrap(),
         );
         let svg = overlay_svg(

@@ -53,10 +53,10 @@ fn gate(study: &Study, estimate: &Estimate) -> String {
         false if estimate.is_no_better_than_constant() => "the test does not reject",
         false => "the record is consistent with",
     };
-    let answer = match (estimate.refitted, estimate.refinement_refused) {
-        (false, _) => "estimate kept, as the prior is trusted",
-        (true, true) => "estimate kept: refitted parameters explain the record worse",
-        (true, false) => "parameters refitted: the answer is the record's own, whatever the prior",
+    let answer = match estimate.refit().map(|refit| refit.is_refused) {
+        None => "estimate kept, as the prior is trusted",
+        Some(true) => "estimate kept: refitted parameters explain the record worse",
+        Some(false) => "parameters refitted: the answer is the record's own, whatever the prior",
     };
     format!("{name}: {found} the network's estimate ({p}); {answer}.")
 }
@@ -81,7 +81,7 @@ fn table(study: &Study, estimate: &Estimate, lines: usize) -> Vec<String> {
         (space.iter().enumerate()).partition(|(_, p)| p.role == Role::Parameter);
     let table = rows(study, estimate);
     let all: Vec<Line> = (own.into_iter().chain(others))
-        .map(|(j, parameter)| line(estimate.initial[j], &table[j], parameter))
+        .map(|(j, parameter)| line(estimate.initial.theta[j], &table[j], parameter))
         .collect();
     let room = lines.saturating_sub(1).max(2);
     let shown = if all.len() > room {
@@ -149,7 +149,7 @@ fn line(initial: f64, row: &ParameterRow, parameter: &Parameter) -> Line {
 
 /// Returns the weak combinations after an empty line; nothing if there are none.
 fn weak(estimate: &Estimate) -> Vec<String> {
-    let Some(information) = &estimate.information else {
+    let Some(information) = estimate.information() else {
         return [
             vec![String::new()],
             paragraph("The features do not determine which parameters the record identifies."),
@@ -184,10 +184,8 @@ fn weak(estimate: &Estimate) -> Vec<String> {
 
 /// Returns the test of the calibrated twin; `None` without a refit.
 fn after(estimate: &Estimate) -> Option<String> {
-    if !estimate.refitted || estimate.refinement_refused {
-        return None;
-    }
-    Some(match estimate.after {
+    let refit = estimate.refit().filter(|refit| !refit.is_refused)?;
+    Some(match refit.after {
         Some(test) if !test.out_of_distribution && estimate.is_no_better_than_constant() => {
             format!(
                 "The test after the refit does not reject ({}), but the free run shows nothing of the record.",
@@ -222,11 +220,12 @@ fn tracking(study: &Study, estimate: &Estimate) -> String {
         return "The free run at the estimate diverges.".into();
     };
     let after = short(after.rmse);
-    let mut text = match &estimate.tracking_initial {
-        Some(before) if estimate.refitted => {
+    let before = (estimate.refit()).and_then(|refit| refit.tracking_initial.as_ref());
+    let mut text = match before {
+        Some(before) => {
             format!("Free-run RMSE {} → {after}{unit}", short(before.rmse))
         }
-        _ => format!("Free-run RMSE {after}{unit}"),
+        None => format!("Free-run RMSE {after}{unit}"),
     };
     if let Some(validation) = &estimate.validation {
         text.push_str(&format!(

@@ -60,7 +60,7 @@ fn an_incomplete_twin_is_reported() {
         (Some(test(0.5)), "is consistent with the record (p = 0.500)"),
         (None, "cannot be tested"),
     ] {
-        estimate.after = after;
+        estimate.refit_mut().after = after;
         let text = joined(&estimate_text(&found.study, &estimate));
         assert!(text.contains(expected), "{text}");
     }
@@ -87,7 +87,7 @@ fn any_number_of_parameters_fits_the_terminal() {
     estimate.names = space.names().into_iter().map(str::to_owned).collect();
     estimate.roles = vec![Role::Parameter; 40];
     for all in [
-        &mut estimate.initial,
+        &mut estimate.initial.theta,
         &mut estimate.theta,
         &mut estimate.low,
         &mut estimate.high,
@@ -101,7 +101,7 @@ fn any_number_of_parameters_fits_the_terminal() {
         weak: true,
         combination: crate::twin::combination(&space.names(), &vec![40f64.powf(-0.5); 40]),
     };
-    estimate.information.as_mut().unwrap().directions = vec![weak; 40];
+    estimate.refit_mut().information.directions = vec![weak; 40];
     let text = estimate_text(&study, &estimate);
     fits(&text);
     assert!(
