@@ -60,9 +60,9 @@ pub(crate) mod shards;
 pub use cloud::{CloudSampler, CloudSettings};
 pub use error::EstimatorError;
 pub(crate) use estimate::Contributions;
+pub use estimate::{Estimate, EstimateOptions, PointEstimate, Refit, Together, Tracking};
 #[cfg(test)]
 pub(crate) use estimate::{Kept, Stages};
-pub use estimate::{Estimate, EstimateOptions, PointEstimate, Refit, Together, Tracking};
 pub use estimator::Estimator;
 pub use gate::{GateForm, GateOutcome, GateSettings};
 pub(crate) use pretrain::GivenBank;

@@ -1,8 +1,8 @@
 //! Settings of training and refinement.
 
+use crate::estimator::cloud::CloudSettings;
 use crate::estimator::gate::GateSettings;
 use crate::estimator::refine::RefineSettings;
-use crate::estimator::cloud::CloudSettings;
 use crate::network::{Schedule, Training};
 use crate::setting::SettingError;
 use serde::{Deserialize, Serialize};

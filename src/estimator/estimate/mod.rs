@@ -98,7 +98,10 @@ impl Estimator {
         let is_kept = steps.trusts_prior && !gate.out_of_distribution && !options.always_refine;
         let (stages, tracking) = if is_kept {
             let information = run.information(&simulator, &initial.theta)?;
-            (Stages::Kept(Kept { information }), follow(&initial.theta, record))
+            (
+                Stages::Kept(Kept { information }),
+                follow(&initial.theta, record),
+            )
         } else {
             let bound = taken.map(|fit| simulator.of(&fit.twin, Some(&*self.recipe)));
             let bound = bound.transpose()?;
@@ -112,7 +115,13 @@ impl Estimator {
                     (&refit.answer.theta[..], tracking.as_ref()),
                     (&initial.theta[..], refit.tracking_initial.as_ref()),
                 ];
-                explains_worse(twin, record, own, first, Noise::new(options.seed, "merit", 0))
+                explains_worse(
+                    twin,
+                    record,
+                    own,
+                    first,
+                    Noise::new(options.seed, "merit", 0),
+                )
             };
             let tracking = match refit.is_refused {
                 true => refit.tracking_initial.clone(),

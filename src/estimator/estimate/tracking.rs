@@ -180,12 +180,7 @@ impl Agreement {
 }
 
 /// Largest free-run error of [`OWN_RECORDS`] records that `twin` makes at `theta` under the record's input; `None` where one fails.
-fn error_by_chance(
-    twin: &Twin,
-    theta: &[f64],
-    record: &Record,
-    noise: Noise,
-) -> Option<f64> {
+fn error_by_chance(twin: &Twin, theta: &[f64], record: &Record, noise: Noise) -> Option<f64> {
     let drive = record.drive();
     let errors = (0..OWN_RECORDS).map(|i| {
         let outputs = twin.simulate(theta, drive, noise.sample(i)).ok()?;

@@ -87,7 +87,10 @@ pub(super) fn warnings(
             "widen [bounds] if other values are possible; its error means little here",
         );
     }
-    if let Some(information) = estimate.information().filter(|_| estimate.refit().is_none()) {
+    if let Some(information) = estimate
+        .information()
+        .filter(|_| estimate.refit().is_none())
+    {
         let leaning: Vec<&str> = (space.iter().zip(&information.std_error))
             .filter(|(p, error)| {
                 let prior = PRIOR_DEVIATION * p.prior.width();

@@ -117,8 +117,11 @@ impl Run {
             truth: truth.clone(),
             interval: estimate.as_ref().map(interval).unwrap_or_default(),
             answers: Method::all().into_iter().map(answer).collect(),
-            contributions: estimate
-                .and_then(|estimate| estimate.refit().and_then(|refit| refit.contributions.clone())),
+            contributions: estimate.and_then(|estimate| {
+                estimate
+                    .refit()
+                    .and_then(|refit| refit.contributions.clone())
+            }),
             failure,
         })
     }
