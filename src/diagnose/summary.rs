@@ -201,7 +201,7 @@ pub(in crate::diagnose) fn onset(model: &Model) -> Option<Onset> {
         let change = effect
             .magnitudes()
             .iter()
-            .find(|m| m.unit == "s" && m.off.is_none())?;
+            .find(|m| m.shape == crate::effect::Shape::Time)?;
         let j = space.position(&effect.key().magnitude(change.name)).ok()?;
         Some(Onset {
             time: theta[j],

@@ -36,7 +36,7 @@ pub use kind::{EffectKind, OtherState};
 pub use law::{ForcePoint, Instant};
 pub(crate) use law::{Law, TargetKind};
 pub(crate) use library::{clamp, lag};
-pub use magnitude::Magnitude;
+pub use magnitude::{Magnitude, Shape};
 pub(crate) use marks::{Mark, clipped, on_levels, rounded, stops};
 pub use placed::Effect;
 pub(crate) use placed::EffectEntry;

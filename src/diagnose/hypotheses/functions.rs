@@ -12,7 +12,7 @@
 use super::basis::{Of, TERMS, pairs, sum_of_one, sum_of_two};
 use super::entry::{Entered, Entry};
 use super::term::{Nature, Part, Start, Term};
-use crate::effect::{Effect, EffectKind, Instant, Magnitude, clamp, lag};
+use crate::effect::{Effect, EffectKind, Instant, Magnitude, Shape, clamp, lag};
 use crate::fit::axis::{Axis, EvidencePrior};
 use crate::twin::{Interval, Parameter};
 use std::collections::BTreeMap;
@@ -330,7 +330,7 @@ pub(super) fn wave(kind: &str, target: &str, largest: f64, frequency: Axis) -> T
         }),
     };
     let effect = with_coefficients(effect, 2)
-        .magnitude(Magnitude::positive("frequency", "Hz", &[0.1]).shape());
+        .magnitude(Magnitude::positive("frequency", "Hz", &[0.1]).shape(Shape::Frequency));
     let mut term = term(
         effect,
         target,

@@ -3,7 +3,7 @@
 use super::scales::Scales;
 use super::term::{Nature, Part, Start, Term, with_terms};
 use crate::diagnose::thresholds::Thresholds;
-use crate::effect::{Effect, Law, Magnitude, Mark, TargetKind, on_levels, targets};
+use crate::effect::{Effect, Law, Magnitude, Mark, Shape, TargetKind, on_levels, targets};
 use crate::fit::axis::{Axis, EvidencePrior};
 use crate::fit::magnitude::{LONGEST, largest, level_axis, levels, size_axis, uniform_axis};
 use crate::math::ends;
@@ -196,8 +196,8 @@ impl Library<'_> {
             (grid.into_iter().map(|v| v.clamp(low, high)).collect(), axis)
         };
         if matches!(law, Law::Outliers(_)) {
-            return match m.unit {
-                "1" => logarithmic(0.003, 0.3, vec![0.03, 0.08]),
+            return match m.shape {
+                Shape::Share => logarithmic(0.003, 0.3, vec![0.03, 0.08]),
                 _ => logarithmic(0.05 * size, 10.0 * size, vec![0.5 * size, 2.0 * size]),
             };
         }
@@ -208,7 +208,7 @@ impl Library<'_> {
                 vec![3e-3 * size, 0.02 * size, 0.1 * size],
             );
         }
-        if m.is_threshold() && m.unit == "signal/s" {
+        if m.is_threshold() && m.shape == Shape::Rate {
             let grid = [0.05, 0.2].map(|v| v * size / dt).to_vec();
             return logarithmic(2.0 * size / duration, 2.0 * size / dt, grid);
         }
@@ -221,8 +221,8 @@ impl Library<'_> {
             };
             return (levels(values, upper), axis);
         }
-        match (m.unit, m.off) {
-            ("s", Some(_)) => {
+        match (m.shape, m.off) {
+            (Shape::Delay | Shape::TimeConstant, Some(_)) => {
                 let mut longest = (LONGEST * duration).max(0.6 * dt);
                 if let Some(most) = effect.kind().longest_dead_time(dt) {
                     longest = longest.min(most);
@@ -232,7 +232,7 @@ impl Library<'_> {
                 let grid = octaves.chain([longest]).collect();
                 logarithmic(0.3 * dt, longest, grid)
             }
-            ("s", None) => {
+            (Shape::Time, _) => {
                 let times = (1..=Thresholds::TIMES)
                     .map(|i| duration * i as f64 / (Thresholds::TIMES + 1) as f64);
                 let (grid, axis) = linear(0.0, duration, times.collect());
@@ -244,15 +244,15 @@ impl Library<'_> {
                     },
                 )
             }
-            ("Hz", _) => self.frequency(parameter),
-            ("rad", _) => {
+            (Shape::Frequency, _) => self.frequency(parameter),
+            (Shape::Phase, _) => {
                 let grid = vec![-FRAC_PI_2, 0.0, FRAC_PI_2, 2.0 * FRAC_PI_2];
                 let (grid, axis) = linear(m.limits.low(), m.limits.high(), grid);
                 // Each angle counts once, however often the limits hold it.
                 let evidence = EvidencePrior::Uniform { low: -PI, high: PI };
                 (grid, Axis { evidence, ..axis })
             }
-            ("signal", Some(_)) if m.limits.low() >= 0.0 => {
+            (Shape::Level, Some(_)) => {
                 // Beyond, a dead zone or a play of that width lets nothing pass.
                 let widest = (2.0 * low.abs().max(high.abs())).max(span);
                 let grid = [0.2, 0.6, 1.5, 3.0].map(|share| share * size);
@@ -270,12 +270,14 @@ impl Library<'_> {
                     let states = self.padded(outline.states.len());
                     largest(twin, &theta, (j, parameter), &self.scales.records, &states)
                 });
-                let found = found.unwrap_or_else(|| match m.unit {
-                    "1" => 0.5,
-                    "signal" => size,
-                    "signal/s" => 2.0 * size / duration,
-                    "1/s" => 1.0 / duration,
-                    _ => size,
+                let found = found.unwrap_or_else(|| {
+                    // Laws on parameters are relative.
+                    let is_share = m.shape == Shape::Share || values.is_empty();
+                    let whole = if is_share { 0.5 } else { size };
+                    match m.shape {
+                        Shape::Rate => 2.0 * whole / duration,
+                        _ => whole,
+                    }
                 });
                 let axis = Axis {
                     counts: false,

@@ -4,7 +4,7 @@ use super::disturbed_equations::disturbed;
 use super::entered::with_function;
 use super::entry::{Entered, Entry};
 use super::{disturbed_signals, entered_black_box};
-use crate::effect::{Effect, EffectKey, Magnitude, augment_late};
+use crate::effect::{Effect, EffectKey, Magnitude, Shape, augment_late};
 use crate::fit::axis::Axis;
 use crate::study::StudyError;
 use crate::twin::{Twin, fix};
@@ -125,7 +125,8 @@ impl Term {
     pub fn is_listed_wave(&self) -> bool {
         match &self.part {
             Part::Effect { effect, .. } => {
-                self.nature == Nature::Listed && effect.magnitudes().iter().any(|m| m.unit == "Hz")
+                self.nature == Nature::Listed
+                    && (effect.magnitudes().iter()).any(|m| m.shape == Shape::Frequency)
             }
             Part::Disturbance { .. } | Part::Function(_) => false,
         }
@@ -156,7 +157,7 @@ impl Term {
     /// Entries of the free magnitudes that are times in the record.
     pub fn times(&self) -> Vec<usize> {
         (self.free().iter().enumerate())
-            .filter(|(_, m)| m.unit == "s" && m.off.is_none())
+            .filter(|(_, m)| m.shape == Shape::Time)
             .map(|(i, _)| i)
             .collect()
     }

@@ -1,7 +1,7 @@
 //! Effects of actuators, in the order in which they act along the signal u.
 
 use super::super::kind::EffectKind;
-use super::super::magnitude::Magnitude;
+use super::super::magnitude::{Magnitude, Shape};
 use super::shared::{
     DELAY, DELAY_SAMPLES, HIGH, LOW, TAU, check_delay, clamp, delay, lag, limit_rate,
 };
@@ -13,7 +13,9 @@ pub(super) fn rows() -> Vec<EffectKind> {
             u * (1.0 + m[0])
         })
         .magnitude(
-            Magnitude::signed("error", "1", &[-0.2, -0.05, 0.05, 0.2]).within(-1.0, f64::INFINITY),
+            Magnitude::signed("error", "1", &[-0.2, -0.05, 0.05, 0.2])
+                .within(-1.0, f64::INFINITY)
+                .shape(Shape::Share),
         )
         .order(10),
         // A constant error of the zero.
@@ -30,7 +32,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
             "u − clamp(u, ±width/2)",
             |m, _, _, u| u - clamp(u, -0.5 * m[0], 0.5 * m[0]),
         )
-        .magnitude(Magnitude::positive("width", "signal", &[0.1, 0.4, 1.0]))
+        .magnitude(Magnitude::positive("width", "signal", &[0.1, 0.4, 1.0]).shape(Shape::Level))
         .order(30),
         // Play: after a reversal nothing moves until it is used up; v starts at the first u.
         EffectKind::actuator(
@@ -41,7 +43,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
                 memory[0]
             },
         )
-        .magnitude(Magnitude::positive("width", "signal", &[0.1, 0.4, 1.0]))
+        .magnitude(Magnitude::positive("width", "signal", &[0.1, 0.4, 1.0]).shape(Shape::Level))
         .memory(1)
         .order(40),
         // A limited range. Where low exceeds high, high wins.
@@ -59,7 +61,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
             "v ← v + clamp(u − v, ±rate·Δt)",
             |m, now, memory, u| limit_rate(m[0] * now.dt, &mut memory[0], u),
         )
-        .magnitude(Magnitude::positive("rate", "signal/s", &[0.1, 0.5, 2.0]).off(f64::INFINITY))
+        .magnitude(Magnitude::positive("rate", "signal/s", &[0.1, 0.5, 2.0]).shape(Shape::Rate).off(f64::INFINITY))
         .memory(1)
         .order(60),
         // A first-order lag; v starts at the first u.

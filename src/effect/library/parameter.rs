@@ -1,7 +1,7 @@
 //! Effects on a parameter θ over time t.
 
 use super::super::kind::EffectKind;
-use super::super::magnitude::Magnitude;
+use super::super::magnitude::{Magnitude, Shape};
 
 pub(super) fn rows() -> Vec<EffectKind> {
     vec![
@@ -13,7 +13,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
             "rate",
             "1/s",
             &[-0.01, -0.001, 0.001, 0.01],
-        )),
+        ).shape(Shape::Rate)),
         // A fault or a switch, that instant included; −1 is all gone.
         EffectKind::parameter(
             "parameter-step",
@@ -27,8 +27,8 @@ pub(super) fn rows() -> Vec<EffectKind> {
             },
         )
         .magnitude(
-            Magnitude::signed("size", "1", &[-0.3, -0.1, 0.1, 0.3]).within(-1.0, f64::INFINITY),
+            Magnitude::signed("size", "1", &[-0.3, -0.1, 0.1, 0.3]).within(-1.0, f64::INFINITY).shape(Shape::Share),
         )
-        .magnitude(Magnitude::positive("time", "s", &[30.0, 100.0, 200.0, 300.0]).shape()),
+        .magnitude(Magnitude::positive("time", "s", &[30.0, 100.0, 200.0, 300.0]).shape(Shape::Time)),
     ]
 }

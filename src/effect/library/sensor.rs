@@ -1,7 +1,7 @@
 //! Effects of sensors, in the order in which they act along the signal s.
 
 use super::super::kind::EffectKind;
-use super::super::magnitude::Magnitude;
+use super::super::magnitude::{Magnitude, Shape};
 use super::super::marks::{clipped, rounded};
 use super::shared::{DELAY, DELAY_SAMPLES, HIGH, LOW, TAU, check_delay, clamp, delay, lag};
 use crate::twin::Outliers;
@@ -21,7 +21,9 @@ pub(super) fn rows() -> Vec<EffectKind> {
             s * (1.0 + m[0])
         })
         .magnitude(
-            Magnitude::signed("error", "1", &[-0.2, -0.05, 0.05, 0.2]).within(-1.0, f64::INFINITY),
+            Magnitude::signed("error", "1", &[-0.2, -0.05, 0.05, 0.2])
+                .within(-1.0, f64::INFINITY)
+                .shape(Shape::Share),
         )
         .order(20),
         // A zero that moves steadily from the first sample on.
@@ -32,7 +34,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
             "rate",
             "signal/s",
             &[-0.01, -0.001, 0.001, 0.01],
-        ))
+        ).shape(Shape::Rate))
         .order(30),
         // A first-order lag; the reading is z, which starts at the first s.
         EffectKind::sensor(
@@ -60,7 +62,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
             "(1 − f)·s + f·abs(s)",
             |m, _, _, s| (1.0 - m[0]) * s + m[0] * s.abs(),
         )
-        .magnitude(Magnitude::positive("fraction", "1", &[0.1, 0.5, 0.9]).within(0.0, 1.0))
+        .magnitude(Magnitude::positive("fraction", "1", &[0.1, 0.5, 0.9]).within(0.0, 1.0).shape(Shape::Share))
         .order(60),
         // White noise. A black box's own is already in its outputs; independent draws are added there.
         EffectKind::measurement_noise(
@@ -79,7 +81,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
         .order(80),
         // Rounding to a multiple of the step, halves upwards.
         EffectKind::rounding("sensor-quantization", "step·⌊s/step + ½⌋", |m| m[0])
-            .magnitude(Magnitude::positive("step", "signal", &[0.02, 0.1, 0.5]))
+            .magnitude(Magnitude::positive("step", "signal", &[0.02, 0.1, 0.5]).shape(Shape::Level))
             .mark(rounded),
         // Rare large errors, after everything else.
         EffectKind::outliers(
@@ -90,7 +92,7 @@ pub(super) fn rows() -> Vec<EffectKind> {
                 scale: m[1],
             },
         )
-        .magnitude(Magnitude::positive("probability", "1", &[0.01, 0.05]).within(0.0, 1.0))
-        .magnitude(Magnitude::positive("scale", "signal", &[0.5, 2.0]).shape()),
+        .magnitude(Magnitude::positive("probability", "1", &[0.01, 0.05]).within(0.0, 1.0).shape(Shape::Share))
+        .magnitude(Magnitude::positive("scale", "signal", &[0.5, 2.0]).never_off()),
     ]
 }

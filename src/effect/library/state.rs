@@ -1,7 +1,7 @@
 //! Effects on states: forces on the rate of x, a ceiling, noise.
 
 use super::super::kind::{EffectKind, OtherState};
-use super::super::magnitude::Magnitude;
+use super::super::magnitude::{Magnitude, Shape};
 use super::shared::sign;
 use std::f64::consts::TAU;
 
@@ -25,7 +25,8 @@ pub(super) fn rows() -> Vec<EffectKind> {
         .magnitude(
             Magnitude::positive("spill", "1", &[0.0, 0.5, 1.0])
                 .within(0.0, 1.0)
-                .shape(),
+                .shape(Shape::Share)
+                .never_off(),
         )
         .other(OtherState::To),
         // White noise: an increment N(0, std²) a step.
@@ -95,7 +96,7 @@ fn forces() -> Vec<EffectKind> {
             // Below a quarter, over a decade of x a factor of 1.8, the law is Coulomb friction.
             Magnitude::positive("exponent", "1", &[0.5, 1.5, 2.5])
                 .within(0.25, 4.0)
-                .shape(),
+                .shape(Shape::Exponent),
         ),
         // Vibration, mains hum, tides.
         EffectKind::force(
@@ -108,12 +109,12 @@ fn forces() -> Vec<EffectKind> {
             // A period of eleven days stands for "above 0".
             Magnitude::positive("frequency", "Hz", &[0.003, 0.01, 0.03, 0.1])
                 .within(1e-6, f64::INFINITY)
-                .shape(),
+                .shape(Shape::Frequency),
         )
         .magnitude(
             Magnitude::signed("phase", "rad", &[0.0, 2.0, 4.0])
                 .within(-TAU, TAU)
-                .shape(),
+                .shape(Shape::Phase),
         ),
     ]
 }

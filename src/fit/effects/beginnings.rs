@@ -5,7 +5,7 @@
 //! much it promises. The best of the grid are fitted for a while, and the best of these are starts.
 
 use super::magnitude::{Kind, duration};
-use crate::effect::{Effect, Magnitude};
+use crate::effect::{Effect, Magnitude, Shape};
 use crate::fit::axis::{EvidencePrior, SMALL};
 use crate::fit::climb::{Fitted, climb, settling};
 use crate::fit::problem::Problem;
@@ -253,7 +253,7 @@ impl<'a> Search<'a> {
 fn best_of_times(added: &Added<'_>, mut points: Vec<Promise>) -> Vec<Promise> {
     points.sort_by(|a, b| b.0.total_cmp(&a.0));
     let time = (added.effect.magnitudes().iter().zip(&added.entries))
-        .find_map(|(m, entry)| (*entry).filter(|_| m.unit == "s" && m.off.is_none()));
+        .find_map(|(m, entry)| (*entry).filter(|_| m.shape == Shape::Time));
     let Some(time) = time else {
         points.truncate(KEPT);
         return points;
@@ -299,15 +299,15 @@ fn shapes(
 fn values(m: &Magnitude, records: &[Record]) -> Vec<f64> {
     let duration = duration(records);
     let dt = records[0].drive().dt();
-    match m.unit {
-        "Hz" => {
+    match m.shape {
+        Shape::Frequency => {
             let count = (HIGHEST / dt * duration * FREQUENCIES_PER_CYCLE) as usize;
             (2..=count.clamp(2, MOST))
                 .map(|i| i as f64 / (FREQUENCIES_PER_CYCLE * duration))
                 .collect()
         }
-        "rad" => vec![0.0, FRAC_PI_2],
-        "s" => (1..=TIMES)
+        Shape::Phase => vec![0.0, FRAC_PI_2],
+        Shape::Time => (1..=TIMES)
             .map(|i| duration * i as f64 / (TIMES + 1) as f64)
             .collect(),
         _ => {

@@ -1,6 +1,6 @@
 //! Sizes of effects: as large as the twin's own terms.
 
-use crate::effect::{Effect, Magnitude, TargetKind, targets};
+use crate::effect::{Effect, Magnitude, Shape, TargetKind, targets};
 use crate::fit::axis::{Axis, EvidencePrior};
 use crate::math::{ends, quantile};
 use crate::record::{Record, Signal};
@@ -97,19 +97,19 @@ pub(crate) fn kinds(
 ) -> BTreeMap<String, Kind> {
     let duration = duration(records);
     let dt = records[0].drive().dt();
-    let kind = |effect: &Effect, m: &Magnitude| match (m.unit, m.off) {
-        ("signal/s", Some(off)) if off.is_infinite() => {
+    let kind = |effect: &Effect, m: &Magnitude| match (m.shape, m.off) {
+        (Shape::Rate, Some(off)) if off.is_infinite() => {
             rate_limit(&values_at(twin, effect, records, states), dt, duration)
         }
         (_, Some(off)) if off.is_infinite() => {
             let is_known = effect.law().target() == TargetKind::Actuator;
             threshold(&values_at(twin, effect, records, states), off, is_known)
         }
-        ("Hz", _) => Kind::Shape {
+        (Shape::Frequency, _) => Kind::Shape {
             low: 0.5 / duration,
             high: 0.5 / dt,
         },
-        ("s", Some(off)) => {
+        (Shape::Delay | Shape::TimeConstant, Some(off)) => {
             let mut longest = LONGEST * duration;
             if let Some(most) = effect.kind().longest_dead_time(dt) {
                 longest = longest.min(most);
@@ -124,7 +124,7 @@ pub(crate) fn kinds(
                     .collect(),
             }
         }
-        ("s", None) => Kind::Shape {
+        (Shape::Time, _) => Kind::Shape {
             low: 0.0,
             high: duration,
         },

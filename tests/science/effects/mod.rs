@@ -6,6 +6,7 @@ mod golden;
 mod library;
 mod noise;
 mod off;
+mod shapes;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
