@@ -120,6 +120,8 @@ pub mod fit;
 pub mod feature;
 pub mod network;
 
+mod hypothesis;
+
 pub mod study;
 
 pub mod external;

@@ -1,12 +1,7 @@
 //! The twin as it is, fitted: where a diagnosis begins.
 
-use super::hypotheses::listed::Library;
-use super::hypotheses::scales::Scales;
-use super::hypotheses::term::{Part, Term};
-use super::hypotheses::{listed, shared};
-use super::model::Model;
+use super::candidates;
 use super::outcome::Verdict;
-use super::residuals::frequencies::frequencies;
 use super::settings::{Ablation, DiagnoseSettings};
 use super::step::FinerStep;
 use super::thresholds::Thresholds;
@@ -17,6 +12,12 @@ use crate::fit::growing::base_fit;
 use crate::fit::passes::Passes;
 use crate::fit::problem::Problem;
 use crate::fit::starts::{Care, search};
+use crate::hypothesis::frequencies::frequencies;
+use crate::hypothesis::listed::Library;
+use crate::hypothesis::model::Model;
+use crate::hypothesis::scales::Scales;
+use crate::hypothesis::shared;
+use crate::hypothesis::term::{Part, Term};
 use crate::likelihood::Measured;
 use crate::record::Record;
 use crate::study::{Study, StudyError};
@@ -186,7 +187,7 @@ impl Base {
         study: &Study,
         settings: &DiagnoseSettings,
     ) -> Result<Vec<Arc<Term>>, StudyError> {
-        let terms = listed(study, &settings.without, &self.library(), &self.noisy)?;
+        let terms = candidates::listed(study, &settings.without, &self.library(), &self.noisy)?;
         Ok(shared(terms))
     }
 

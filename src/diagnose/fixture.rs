@@ -1,9 +1,9 @@
 //! Records of the tanks that tests of several parts begin with.
 
 use super::base::Base;
-use super::hypotheses::term::Term;
 use super::settings::DiagnoseSettings;
 use crate::effect::{Catalogue, augment};
+use crate::hypothesis::term::Term;
 use crate::likelihood::measured;
 use crate::record::Record;
 use crate::study::{RecordPlan, Study};
@@ -18,7 +18,7 @@ pub(crate) fn tanks(samples: usize) -> Study {
 }
 
 /// A record of a twin under a drive of the study.
-pub(super) fn record(study: &Study, twin: &Twin, theta: &[f64], seed: u64) -> Record {
+pub(crate) fn record(study: &Study, twin: &Twin, theta: &[f64], seed: u64) -> Record {
     let drives = study.drives().unwrap();
     let drive = drives.draw(Noise::new(seed, "drive", 0)).unwrap();
     let outputs = twin.simulate(theta, &drive, Noise::new(seed, "record", 0));
@@ -26,7 +26,7 @@ pub(super) fn record(study: &Study, twin: &Twin, theta: &[f64], seed: u64) -> Re
 }
 
 /// A record of the study's twin at the centre of its prior, its sensor biased.
-pub(super) fn biased_record(study: &Study, bias: f64, seed: u64) -> Record {
+pub(crate) fn biased_record(study: &Study, bias: f64, seed: u64) -> Record {
     let effect = Catalogue::default().effect("sensor-bias", "sensor");
     let twin = augment(study.twin().clone(), vec![effect.unwrap()]).unwrap();
     let theta = [study.twin().parameters().centre(), vec![bias]].concat();
@@ -34,7 +34,7 @@ pub(super) fn biased_record(study: &Study, bias: f64, seed: u64) -> Record {
 }
 
 /// Listed effects as hypotheses beside the fitted twin of a study.
-pub(super) fn listed_terms(study: &Study, records: &[Record]) -> Vec<Arc<Term>> {
+pub(crate) fn listed_terms(study: &Study, records: &[Record]) -> Vec<Arc<Term>> {
     let settings = DiagnoseSettings::default();
     let measured = measured(study.twin(), records, &study.beliefs()).unwrap();
     let base = Base::new(&measured, records.into(), &settings).unwrap();

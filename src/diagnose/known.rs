@@ -2,13 +2,13 @@
 
 use super::base::Base;
 use super::explain::search::{Breadth, listed};
-use super::model::Model;
 use super::outcome::Shrinkage;
 use super::quantify::share::{Measures, shrinkage};
 use super::run::finished;
 use super::settings::DiagnoseSettings;
 use super::step::finer_step;
 use super::thresholds::Thresholds;
+use crate::hypothesis::model::Model;
 use crate::likelihood::measured;
 use crate::record::Record;
 use crate::study::{Study, StudyError};

@@ -9,9 +9,9 @@
 use super::explain::findings::Findings;
 use super::explain::found::{Found, sort};
 use super::explain::pairs::{FIRST, SINGLES};
-use super::model::Model;
 use super::rounds::{self, Explored};
 use super::settings::DiagnoseSettings;
+use crate::hypothesis::model::Model;
 use crate::progress::{Progress, Stage};
 use crate::record::Record;
 use crate::study::{Study, StudyError};

@@ -5,12 +5,11 @@
 //! | `run.rs`, `base.rs`, `summary.rs` | order of the steps; the fitted twin that they begin with; the summary of their results |
 //! | `rounds.rs` | the search, again with another kind of noise or a finer step |
 //! | `long.rs` | long records: searched in part, fitted whole |
-//! | `model.rs` | a twin with terms, fitted |
 //! | `greedy.rs` | a baseline: forward selection by BIC |
 //! | `known.rs` | the share that effects close which are known to be there |
 //! | `step.rs` | whether a finer step of the integrator explains the records better |
-//! | `hypotheses/` | what could be missing: listed effects, unknown functions |
-//! | `explain/` | which of them: screened, refitted, weighed, decided |
+//! | `candidates.rs` | effects that the study lets a diagnosis name |
+//! | `explain/` | which hypotheses of the engine (`hypothesis`): weighed, decided |
 //! | `residuals/` | innovations cut by time, state, lag and frequency |
 //! | `locate/` | where: places, missing functions, maps of the residuals |
 //! | `quantify/` | how far: share closed, smallest visible effect, next input, calibration |
@@ -20,15 +19,14 @@
 //! See docs/diagnosing-a-gap.md for the mathematics and how to read the answer.
 
 mod base;
+mod candidates;
 mod explain;
 #[cfg(test)]
 pub(crate) mod fixture;
 mod greedy;
-mod hypotheses;
 mod known;
 mod locate;
 mod long;
-mod model;
 mod outcome;
 mod quantify;
 mod residuals;

@@ -1,19 +1,21 @@
 //! Rounds of the search: the twin as it is, with another kind of noise, with a finer step.
 
 use super::base::Base;
+use super::candidates::{not_tested, outliers};
 use super::explain::chances::Chances;
 use super::explain::explore::{Before, STEPS, explore, singles, what_is_left};
 use super::explain::findings::Findings;
 use super::explain::search::{Breadth, listed};
 use super::explain::terms::Terms;
-use super::hypotheses::noise::kinds;
-use super::hypotheses::scales::Scales;
-use super::hypotheses::term::Term;
-use super::hypotheses::{not_tested, shared, unknown};
-use super::model::Model;
 use super::settings::{Ablation, DiagnoseSettings};
 use super::step::{FinerStep, finer_step};
 use super::thresholds::Thresholds;
+use crate::hypothesis::model::Model;
+use crate::hypothesis::noise::kinds;
+use crate::hypothesis::scales::Scales;
+use crate::hypothesis::shared;
+use crate::hypothesis::term::Term;
+use crate::hypothesis::unknown::unknown;
 use crate::likelihood::measured;
 use crate::progress::Progress;
 use crate::record::Record;
@@ -217,7 +219,11 @@ fn explored<R>(
     let effects = base.listed(study, settings)?;
     let mut noise = match rounds {
         0 => vec![],
-        _ => shared(kinds(study, &settings.without, &library, &base.noisy)?),
+        _ => shared(kinds(
+            &outliers(study, &settings.without),
+            &library,
+            &base.noisy,
+        )?),
     };
     noise.retain(|term| !base.noises.iter().any(|own| own.key() == term.key()));
     let unlisted = |seen: &[Scales]| match settings.lacks(Ablation::UnknownFunctions) {

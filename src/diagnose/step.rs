@@ -1,9 +1,9 @@
 //! The step of a twin's own integrator as a rival of every gap: what a finer step explains, the system does not lack.
 
-use super::model::Model;
 use super::thresholds::Thresholds;
 use crate::fit::problem::Problem;
 use crate::fit::reference::Reference;
+use crate::hypothesis::model::Model;
 use crate::likelihood::kalman::recoverable;
 use crate::study::StudyError;
 use crate::twin::{Integrator, MOST_SUBSTEPS, Twin};
@@ -66,7 +66,7 @@ pub(in crate::diagnose) fn finer_step(
     };
     let problem = |step: FinerStep| -> Result<Option<Problem>, StudyError> {
         let twin = step.of(&model.base);
-        twin.map(|twin| model.problem_of(&twin)).transpose()
+        Ok(twin.map(|twin| model.problem_of(&twin)).transpose()?)
     };
     let direction = |step: FinerStep| -> Result<Option<DVector<f64>>, StudyError> {
         let Some(problem) = problem(step)? else {

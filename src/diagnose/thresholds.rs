@@ -1,17 +1,11 @@
 //! Tuning constants of a diagnosis, in one place.
 
+use crate::hypothesis::search;
+
 /// Tuning constants of a diagnosis: unit and reason of each.
 ///
 /// Numerical tolerances, iterations of a fit and sizes of a search stand beside their use.
 pub(in crate::diagnose) struct Thresholds;
-
-/// Hypotheses.
-impl Thresholds {
-    /// Times of a step that are tried, evenly over the record.
-    pub const TIMES: usize = 9;
-    /// Nats for a mark that outputs bear, such as repeated values of a quantiser.
-    pub const MARK_PRESENT: f64 = 12.0;
-}
 
 /// Records and reports.
 impl Thresholds {
@@ -85,7 +79,7 @@ impl Thresholds {
     pub const STEP_WINS: f64 = 2.0;
     /// Evidence by which a fit of the twin from the θ of an explanation must be better than its own to count: fits end where they
     /// promise a hundredth of it.
-    pub const BETTER: f64 = 1.0;
+    pub const BETTER: f64 = search::BETTER;
     /// Evidence from which noise of another kind becomes the noise of the twin: 20 to 1.
     pub const NOISE: f64 = 3.0;
     /// Prior share of listed effects among what could be missing; the rest belongs to unknown functions. At 0.4 or 0.8 evidence moves by 0.4.
@@ -97,7 +91,7 @@ impl Thresholds {
     /// effect 5, with none 10.
     pub const FINE_PRINT: f64 = 0.02;
     /// Distance to the best within which a single effect may still be the explanation.
-    pub const CANDIDATES: f64 = 6.0;
+    pub const CANDIDATES: f64 = search::CANDIDATES;
     /// Lead that a larger set of effects needs over a smaller one, its price paid.
     pub const WORTH_ANOTHER: f64 = 2.0;
     /// Most of the twin's free-run error that may be left with an effect of a black box's signals.
@@ -117,9 +111,7 @@ impl Thresholds {
     /// lag of a real heater is not named; without it, three of 24 closed records of a law outside the library get a name more.
     pub const OUTDONE: f64 = 0.15;
     /// Evidence up to which few hypotheses are refitted: nothing seems to be missing.
-    pub const NULL_LIKE: f64 = 4.0;
-    /// Evidence from which fits begin with loud noise, too: where much is missing, the likelihood of quiet noise has narrow valleys.
-    pub const DEEP: f64 = 30.0;
+    pub const NULL_LIKE: f64 = search::NULL_LIKE;
     /// Evidence from which functions are drawn over the states of the corrected twin, too.
     pub const WIDER: f64 = 5.0;
     /// Pairs that are kept.

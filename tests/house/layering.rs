@@ -4,7 +4,7 @@ use crate::source::Crate;
 use std::collections::BTreeMap;
 
 /// The rooms of docs/architecture.md, lowest first.
-const ROOMS: [&str; 20] = [
+const ROOMS: [&str; 21] = [
     "setting",
     "math",
     "progress",
@@ -17,6 +17,7 @@ const ROOMS: [&str; 20] = [
     "fit",
     "feature",
     "network",
+    "hypothesis",
     "study",
     "external",
     "estimator",

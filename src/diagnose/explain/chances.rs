@@ -7,10 +7,10 @@
 
 use super::findings::Findings;
 use super::found::Found;
-use crate::diagnose::hypotheses::term::Term;
 use crate::diagnose::outcome::Probabilities;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::evidence::log_mean;
+use crate::hypothesis::term::Term;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -245,7 +245,7 @@ fn log_sum(logs: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::diagnose::explain::findings::fixture::wave;
-    use crate::diagnose::hypotheses::term::Nature;
+    use crate::hypothesis::term::Nature;
 
     /// A function beside the first effect is no reason to believe in the second.
     #[test]

@@ -185,7 +185,7 @@ fn named(
 mod tests {
     use super::*;
     use crate::diagnose::explain::findings::fixture::wave;
-    use crate::diagnose::hypotheses::term::Nature;
+    use crate::hypothesis::term::Nature;
 
     /// An effect that leaves a little is told as a part while it and the rest are more probable than what is unknown alone.
     #[test]

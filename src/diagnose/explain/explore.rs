@@ -4,13 +4,12 @@ use super::findings::Findings;
 use super::found::{Found, fitted, improve, sort};
 use super::noise::{instead_of_second, with_noise};
 use super::pairs::{FIRST, SINGLES, alone, pairs};
-use super::search::{Breadth, FEW, listed, unknown};
+use super::search::{Breadth, FEW, leave_valleys, listed, unknown};
 use super::terms::{Terms, of_keys, on_top, scales};
-use super::valleys::leave_valleys;
-use crate::diagnose::hypotheses::term::Term;
-use crate::diagnose::model::Model;
 use crate::diagnose::settings::DiagnoseSettings;
 use crate::diagnose::thresholds::Thresholds;
+use crate::hypothesis::model::Model;
+use crate::hypothesis::term::Term;
 use crate::progress::{Progress, Stage};
 use crate::study::StudyError;
 use rayon::prelude::*;
@@ -117,7 +116,7 @@ fn beside_better(
     stage.tick()?;
     let mut effects = listed(base, terms.listed, origin, &[], breadth.of_all())?;
     improve(&mut effects, kept(&old.listed));
-    leave_valleys(base, &mut effects, 0.0)?;
+    leave_valleys(base, &mut effects, origin)?;
     sort(&mut effects);
     stage.tick()?;
     Ok(Singles::alone(functions, effects))

@@ -5,9 +5,9 @@
 //! ```
 
 use super::found::{Found, own_theta};
-use crate::diagnose::hypotheses::term::Nature;
-use crate::diagnose::model::Model;
 use crate::diagnose::thresholds::Thresholds;
+use crate::hypothesis::model::Model;
+use crate::hypothesis::term::Nature;
 
 /// Explanations of a kind from whose θ the twin is fitted again.
 const STARTS: usize = 2;
@@ -221,7 +221,7 @@ fn same(a: &[String], b: &[String]) -> bool {
 #[cfg(test)]
 pub(super) mod fixture {
     use super::*;
-    use crate::diagnose::hypotheses::term::fixture;
+    use crate::hypothesis::term::fixture;
     use std::sync::Arc;
 
     /// An explanation of this nature that was not fitted.

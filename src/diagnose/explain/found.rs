@@ -1,7 +1,7 @@
 //! One explanation of the records.
 
-use crate::diagnose::hypotheses::term::Term;
-use crate::diagnose::model::Model;
+use crate::hypothesis::model::Model;
+use crate::hypothesis::term::Term;
 use std::sync::Arc;
 
 /// One explanation beside a model.
@@ -15,15 +15,6 @@ pub(in crate::diagnose) struct Found {
 }
 
 impl Found {
-    /// A fit beside a twin of this log Z.
-    pub fn of(model: Model, origin: f64) -> Self {
-        Self {
-            terms: model.terms.clone(),
-            gain: model.log_evidence - origin,
-            model: Some(model),
-        }
-    }
-
     /// Evidence over another twin, of this log Z instead of `old`.
     pub fn beside(self, old: f64, origin: f64) -> Self {
         Self {
@@ -44,15 +35,6 @@ impl Found {
     /// Keys of the terms.
     pub fn keys(&self) -> Vec<String> {
         self.terms.iter().map(|t| t.key()).collect()
-    }
-
-    /// Fitted magnitudes of the effect that was added last.
-    pub(super) fn magnitudes(&self) -> Option<Vec<f64>> {
-        let model = self.model.as_ref()?;
-        let (theta, space) = (model.theta(), model.problem.twin.parameters());
-        (self.last().names().iter())
-            .map(|name| Some(theta[space.position(name).ok()?]))
-            .collect()
     }
 
     /// The term that was added last.

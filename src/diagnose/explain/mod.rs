@@ -7,8 +7,5 @@ pub(in crate::diagnose) mod findings;
 pub(in crate::diagnose) mod found;
 mod noise;
 pub(in crate::diagnose) mod pairs;
-pub(in crate::diagnose) mod refit;
-pub(in crate::diagnose) mod scan;
 pub(in crate::diagnose) mod search;
 pub(in crate::diagnose) mod terms;
-mod valleys;

@@ -4,9 +4,9 @@ use super::findings::{Findings, suffices};
 use super::found::Found;
 use super::search::{Breadth, listed};
 use super::terms::{Terms, on_top};
-use crate::diagnose::hypotheses::term::{Part, Term};
-use crate::diagnose::model::Model;
 use crate::diagnose::thresholds::Thresholds;
+use crate::hypothesis::model::Model;
+use crate::hypothesis::term::{Part, Term};
 use crate::study::StudyError;
 use std::sync::Arc;
 

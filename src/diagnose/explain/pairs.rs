@@ -4,9 +4,9 @@ use super::findings::{Findings, leaves_nothing};
 use super::found::{Found, improve, keep, own_theta};
 use super::search::{Breadth, listed};
 use super::terms::{Terms, of_keys};
-use crate::diagnose::hypotheses::term::Term;
-use crate::diagnose::model::Model;
 use crate::diagnose::thresholds::Thresholds;
+use crate::hypothesis::model::Model;
+use crate::hypothesis::term::Term;
 use crate::study::StudyError;
 use std::sync::Arc;
 

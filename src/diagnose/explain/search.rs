@@ -1,142 +1,31 @@
-//! Search for what a model lacks: all hypotheses are screened, the promising ones refitted.
+//! What the engine of hypotheses finds, as evidence over that of the twin.
 
-use super::found::{Found, own_theta, sort};
-use super::refit::{
-    CARRIED, Effort, anneal, fit_afresh, fit_function, fit_promise, loudly, release,
-};
-use super::scan::{Promise, functions, scan};
-use super::valleys::leave_valleys;
-use crate::diagnose::hypotheses::term::{Nature, Term, marks};
-use crate::diagnose::model::Model;
-use crate::diagnose::thresholds::Thresholds;
-use crate::fit::climb::{Fitted, climb};
-use crate::fit::evidence::log_mean;
-use crate::math::median;
+use super::found::Found;
+use crate::hypothesis::explanation::Explanation;
+use crate::hypothesis::model::Model;
+use crate::hypothesis::term::Term;
+use crate::hypothesis::{leave_valleys as leave, search};
 use crate::study::StudyError;
-use rayon::prelude::*;
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Functions that are refitted, of those of one or two variables: what they promise says little of what a refit gains. With 5, the mean
-/// logarithm of the probability of the truth is −1.75 on open trials, with 12 −1.34, in 1.35 times the time.
-const FUNCTIONS: usize = 12;
-/// Starts of an effect with a time, a delay or a shape, each of which has a valley of its own, if it stands out. With 3, a delay beside a lag
-/// was 52 nats short on an open trial; 12 take 8 % more time in all.
-const STARTS_OF_SHAPE: usize = 12;
-/// Functions that are refitted where it is known about what is missing.
-pub(super) const FEW: usize = 3;
-/// Nats that averaging over its size takes off an effect that nothing speaks for.
-const AVERAGED: f64 = 2.0;
-/// Nats that the best of all frequencies is worth less than it looks, before a refit says how sharp it is.
-const PRICE_OF_FREQUENCY: f64 = 2.5;
+pub(in crate::diagnose) use crate::hypothesis::search::{Breadth, FEW};
 
-/// Nats below the best, with noise half-way down, from which an effect is given up: loud noise makes differences smaller than they will be.
-const LOST: f64 = 25.0;
-
-/// Numbers of hypotheses that are refitted.
-#[derive(Clone, Copy)]
-pub(in crate::diagnose) struct Breadth {
-    /// Listed effects in the first round.
-    pub listed: usize,
-    /// Listed effects that are fitted from loud noise.
-    pub annealed: usize,
-    /// Functions; of those of an output, of the past and of time, half as many.
-    pub functions: usize,
-    /// Nats that a screened hypothesis must promise.
-    pub least: f64,
-    /// True where much is missing, so that fits begin with loud noise, too.
-    pub deep: bool,
-    /// True if fits of listed effects begin at the prior's centre, too.
-    pub afresh: bool,
-    /// True if pairs of effects are searched.
-    pub pairs: bool,
-}
-
-impl Breadth {
-    /// As many as a twin's likelihood allows: that of a black box costs an ensemble. Few for a quick look.
-    pub fn of(model: &Model, quick: bool) -> Self {
-        let few = model.problem.is_simulated() || quick;
+impl Found {
+    fn of_explanation(explanation: Explanation, origin: f64) -> Self {
         Self {
-            listed: 6,
-            annealed: if few { 0 } else { usize::MAX },
-            functions: if few { 2 } else { FUNCTIONS },
-            least: 2.5,
-            deep: false,
-            afresh: false,
-            pairs: !quick,
+            gain: explanation.log_z - origin,
+            terms: explanation.terms,
+            model: explanation.model,
         }
     }
 
-    /// The same for a gap of so many nats, as unknown functions tell it.
-    pub fn for_gap(self, nats: f64) -> Self {
-        Self {
-            deep: nats > Thresholds::DEEP && self.annealed > 0,
-            ..self
+    fn explanation(&self, origin: f64) -> Explanation {
+        Explanation {
+            terms: self.terms.clone(),
+            log_z: self.gain + origin,
+            model: self.model.clone(),
         }
     }
-
-    /// The same, fits from the prior's centre as well, where a likelihood is cheap.
-    pub fn afresh(self) -> Self {
-        Self {
-            afresh: self.annealed > 0,
-            ..self
-        }
-    }
-
-    /// The same without fits from loud noise: what changes the noise itself has no valley that loud noise would fill.
-    pub fn shallow(self) -> Self {
-        Self {
-            deep: false,
-            ..self
-        }
-    }
-
-    /// The same, fewer functions: where it is known about what is missing.
-    pub fn few(self) -> Self {
-        Self {
-            functions: FEW.min(self.functions),
-            ..self
-        }
-    }
-
-    /// The same, every listed effect that promises something refitted.
-    pub fn of_all(self) -> Self {
-        Self {
-            listed: usize::MAX,
-            ..self
-        }
-    }
-}
-
-/// The best of terms that are one hypothesis used in several ways, which share its prior.
-fn merged(all: Vec<Found>, ways: &BTreeMap<String, usize>) -> Vec<Found> {
-    let mut best: BTreeMap<Vec<String>, Found> = BTreeMap::new();
-    for found in all {
-        let keys = found.keys();
-        match best.get(&keys) {
-            Some(old) if old.gain >= found.gain => {}
-            _ => {
-                best.insert(keys, found);
-            }
-        }
-    }
-    let mut all: Vec<Found> = (best.into_values())
-        .map(|mut found| {
-            let ways = ways.get(&found.last().key()).copied().unwrap_or(1);
-            found.gain -= (ways as f64).ln();
-            found
-        })
-        .collect();
-    sort(&mut all);
-    all
-}
-
-fn ways(terms: &[Arc<Term>]) -> BTreeMap<String, usize> {
-    let mut ways = BTreeMap::new();
-    for term in terms {
-        *ways.entry(term.key()).or_insert(0) += 1;
-    }
-    ways
 }
 
 /// Listed effects beside a model, refitted; best first. `origin` is log Z of the twin; `thetas` are further starts of the twin's own θ.
@@ -147,166 +36,8 @@ pub(in crate::diagnose) fn listed(
     thetas: &[Vec<f64>],
     breadth: Breadth,
 ) -> Result<Vec<Found>, StudyError> {
-    if terms.is_empty() {
-        return Ok(vec![]);
-    }
-    let promises = scan(model, terms)?;
-    let found = |models: Vec<Model>| models.into_iter().map(|model| Found::of(model, origin));
-    let mut all: Vec<Found> = found(first_fits(model, &promises, thetas, breadth)?).collect();
-    let mut others = match breadth.afresh {
-        true => fresh_fits(model, &promises)?,
-        false => vec![],
-    };
-    if breadth.deep
-        && let Some(loud) = loudly(model)?
-    {
-        others.extend(annealed_fits(model, &loud, terms, breadth)?);
-    }
-    for other in found(others) {
-        let is_same = |own: &&mut Found| Arc::ptr_eq(own.last(), other.last());
-        match all.iter_mut().find(is_same) {
-            Some(own) if own.gain >= other.gain => {}
-            Some(own) => *own = other,
-            None => all.push(other),
-        }
-    }
-    sort(&mut all);
-    let floor = model.log_evidence - origin;
-    fit_on(model, &promises, &mut all, origin)?;
-    sort(&mut all);
-    leave_valleys(model, &mut all, floor)?;
-    // A filter sees rounding by its first two moments, and may be worse off with it than with louder noise; the values bear its mark
-    // all the same.
-    for found in &mut all {
-        let mark = marks(&found.terms) - marks(&model.terms);
-        if mark > 0.0 {
-            found.gain = found.gain.max(floor + mark);
-        }
-    }
-    // What was not refitted is no better than its promise.
-    for promise in &promises {
-        if !all.iter().any(|f| Arc::ptr_eq(f.last(), &promise.term)) {
-            all.push(Found {
-                terms: (model.terms.iter().chain([&promise.term]))
-                    .cloned()
-                    .collect(),
-                gain: floor + (promise.nats() - AVERAGED).min(-0.5),
-                model: None,
-            });
-        }
-    }
-    Ok(merged(all, &ways(terms)))
-}
-
-/// Short fits of the terms that promise most.
-fn first_fits(
-    model: &Model,
-    promises: &[Promise],
-    thetas: &[Vec<f64>],
-    breadth: Breadth,
-) -> Result<Vec<Model>, StudyError> {
-    let chosen: Vec<&Promise> = (promises.iter().take(breadth.listed))
-        .filter(|promise| promise.nats() > breadth.least)
-        .collect();
-    let effort = Effort {
-        starts: 2,
-        iterations: 6,
-    };
-    let fits: Vec<Option<Model>> = (chosen.par_iter())
-        .map(|promise| fit_promise(model, promise, thetas, effort))
-        .collect::<Result<_, StudyError>>()?;
-    Ok(fits.into_iter().flatten().collect())
-}
-
-/// Fits of all terms from the prior's centre: beside the twin where it is, the right one may promise nothing.
-fn fresh_fits(model: &Model, promises: &[Promise]) -> Result<Vec<Model>, StudyError> {
-    let fits: Vec<Option<Model>> = (promises.par_iter())
-        .map(|promise| fit_afresh(model, promise))
-        .collect::<Result<_, StudyError>>()?;
-    Ok(fits.into_iter().flatten().collect())
-}
-
-/// The same from loud noise, of the terms that promise most there. Noise is let down to that of the model for those that are near the best by
-/// then.
-fn annealed_fits(
-    model: &Model,
-    loud: &Model,
-    terms: &[Arc<Term>],
-    breadth: Breadth,
-) -> Result<Vec<Model>, StudyError> {
-    let promises: Vec<Promise> = (scan(loud, terms)?.into_iter())
-        .take(breadth.annealed)
-        .filter(|promise| promise.nats() > breadth.least)
-        .collect();
-    let begun: Vec<Vec<Fitted>> = (promises.par_iter())
-        .map(|promise| anneal(model, loud, promise, 2))
-        .collect::<Result<_, StudyError>>()?;
-    let best = (begun.iter().flatten())
-        .map(|fitted| fitted.objective)
-        .fold(f64::NEG_INFINITY, f64::max);
-    let fits: Vec<Option<Model>> = (promises.par_iter().zip(begun))
-        .map(|(promise, mut begun)| {
-            begun.retain(|fitted| fitted.objective > best - LOST);
-            release(model, promise, &begun)
-        })
-        .collect::<Result<_, StudyError>>()?;
-    Ok(fits.into_iter().flatten().collect())
-}
-
-/// Gives those near the best more starts, and carries them on.
-fn fit_on(
-    model: &Model,
-    promises: &[Promise],
-    all: &mut [Found],
-    origin: f64,
-) -> Result<(), StudyError> {
-    let top = all.first().map_or(0.0, |f| f.gain);
-    let floor = model.log_evidence - origin;
-    let is_near = |i: usize, gain: f64| i < 5 || gain > top - 4.0;
-    let is_worth = |i: usize, gain: f64| i < 2 || gain > floor + 1.0;
-    let best: Vec<Vec<f64>> = all.iter().take(2).filter_map(own_theta).collect();
-    let better: Vec<Option<Found>> = (all.par_iter().enumerate())
-        .map(|(i, found)| {
-            if !is_near(i, found.gain) || !is_worth(i, found.gain) {
-                return Ok(None);
-            }
-            let own = own_theta(found);
-            let thetas: Vec<Vec<f64>> = (best.iter())
-                .filter(|theta| own.as_ref() != Some(theta))
-                .cloned()
-                .collect();
-            let effort = Effort {
-                starts: match found.last().shape() {
-                    Some(_) => STARTS_OF_SHAPE,
-                    None => 3,
-                },
-                iterations: 12,
-            };
-            let promise = promises.iter().find(|p| Arc::ptr_eq(&p.term, found.last()));
-            let fitted = match promise {
-                Some(promise) => fit_promise(model, promise, &thetas, effort)?,
-                None => None,
-            };
-            let carried = match &found.model {
-                Some(m) => climb(&m.problem, &m.fitted.theta, CARRIED)?
-                    .and_then(|fitted| m.refitted(fitted)),
-                None => None,
-            };
-            let best = [fitted, carried].into_iter().flatten().reduce(|a, b| {
-                match b.fitted.objective > a.fitted.objective {
-                    true => b,
-                    false => a,
-                }
-            });
-            Ok(best.map(|model| Found::of(model, origin)))
-        })
-        .collect::<Result<_, StudyError>>()?;
-    for (own, better) in all.iter_mut().zip(better) {
-        if let Some(better) = better.filter(|better| better.gain > own.gain) {
-            *own = better;
-        }
-    }
-    Ok(())
+    let all = search::listed(model, terms, thetas, breadth)?.into_iter();
+    Ok(all.map(|one| Found::of_explanation(one, origin)).collect())
 }
 
 /// Unknown functions beside a model; best first.
@@ -316,126 +47,20 @@ pub(in crate::diagnose) fn unknown(
     origin: f64,
     breadth: Breadth,
 ) -> Result<Vec<Found>, StudyError> {
-    let floor = model.log_evidence - origin;
-    let of = |natures: &[Nature]| -> Vec<Arc<Term>> {
-        terms
-            .iter()
-            .filter(|t| natures.contains(&t.nature))
-            .cloned()
-            .collect()
-    };
-    let mut all: Vec<Found> = vec![];
-    let half = breadth.functions.div_ceil(2);
-    for (natures, price, most) in [
-        (&[Nature::Function], 0.0, breadth.functions),
-        (&[Nature::Past], 0.0, half),
-        (&[Nature::Reading], 0.0, half),
-        (&[Nature::Periodic], PRICE_OF_FREQUENCY, half),
-    ] {
-        let linear = functions(model, &of(natures))?;
-        let fits: Vec<(Vec<Arc<Term>>, f64, Option<Model>)> = (linear.into_par_iter())
-            .enumerate()
-            .map(|(i, linear)| {
-                let (terms, gain) = (linear.extended.terms.clone(), linear.gain - price);
-                let iterations = if gain > 10.0 { 6 } else { 4 };
-                let fitted = match i < most && linear.gain > breadth.least {
-                    true => fit_function(model, linear, iterations)?,
-                    false => None,
-                };
-                Ok((terms, gain, fitted))
-            })
-            .collect::<Result<_, StudyError>>()?;
-        let refits: Vec<(f64, Option<f64>)> = (fits.iter())
-            .map(|(_, gain, m)| (*gain, added(model, m.as_ref())))
-            .collect();
-        let estimates = of_promises(&refits, breadth.least);
-        all.extend(
-            (fits.into_iter().zip(estimates)).map(|((terms, _, model), gain)| Found {
-                gain: floor + gain,
-                terms,
-                model,
-            }),
-        );
+    let all = search::unknown(model, terms, breadth)?.into_iter();
+    Ok(all.map(|one| Found::of_explanation(one, origin)).collect())
+}
+
+/// Fits effects again that may be better from where other laws ended.
+pub(super) fn leave_valleys(
+    model: &Model,
+    all: &mut [Found],
+    origin: f64,
+) -> Result<(), StudyError> {
+    let mut found: Vec<Explanation> = all.iter().map(|one| one.explanation(origin)).collect();
+    leave(model, &mut found, model.log_evidence)?;
+    for (old, new) in all.iter_mut().zip(found) {
+        *old = Found::of_explanation(new, origin);
     }
-    let promises = scan(model, &of(&[Nature::Time]))?;
-    // The starts of a disturbance are sizes from its prior: their mean likelihood is the evidence, but for what θ answers.
-    let rough: Vec<f64> = (promises.iter())
-        .map(|p| log_mean(&p.starts.iter().map(|start| start.nats).collect::<Vec<_>>()))
-        .collect();
-    let mut order: Vec<usize> = (0..rough.len()).collect();
-    order.sort_by(|a, b| rough[*b].total_cmp(&rough[*a]));
-    let fits: Vec<(usize, Option<Model>)> = (order.into_par_iter())
-        .enumerate()
-        .map(|(n, i)| {
-            let worth = n < half && (rough[i] > 0.0 || promises[i].nats() > breadth.least);
-            let effort = Effort {
-                starts: 2,
-                iterations: 6,
-            };
-            let fitted = if worth {
-                fit_promise(model, &promises[i], &[], effort)?
-            } else {
-                None
-            };
-            Ok((i, fitted))
-        })
-        .collect::<Result<_, StudyError>>()?;
-    let refits: Vec<(f64, Option<f64>)> = (fits.iter())
-        .map(|(i, m)| (rough[*i], added(model, m.as_ref())))
-        .collect();
-    let estimates = of_promises(&refits, breadth.least);
-    all.extend(
-        (fits.into_iter().zip(estimates)).map(|((i, fitted), gain)| Found {
-            terms: (model.terms.iter().chain([&promises[i].term]))
-                .cloned()
-                .collect(),
-            gain: floor + gain,
-            model: fitted,
-        }),
-    );
-    Ok(merged(all, &ways(terms)))
-}
-
-/// Evidence that a fit beside a model adds to it.
-fn added(model: &Model, fitted: Option<&Model>) -> Option<f64> {
-    Some(fitted?.log_evidence - model.log_evidence)
-}
-
-/// Nats of hypotheses that promise nats and of which the best were refitted: of the others the share of their promise that the refits kept,
-/// by the median, and no more than the best refit. A promise counts what a step far beyond the quadratic's reach would gain.
-fn of_promises(all: &[(f64, Option<f64>)], least: f64) -> Vec<f64> {
-    let refits = || {
-        all.iter()
-            .filter_map(|(gain, refit)| Some((*gain, (*refit)?)))
-    };
-    let shares: Vec<f64> = refits()
-        .filter(|(gain, _)| *gain > 0.0)
-        .map(|(gain, refit)| refit / gain)
-        .collect();
-    let share = median(&shares).unwrap_or(1.0).clamp(0.0, 1.0);
-    let best = refits().map(|(_, refit)| refit).fold(least, f64::max);
-    (all.iter())
-        .map(|(gain, refit)| {
-            refit.unwrap_or((gain * if *gain > 0.0 { share } else { 1.0 }).min(best))
-        })
-        .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Three refits kept a half, so the fourth is worth half its promise; what promises a loss keeps it.
-    #[test]
-    fn what_is_not_refitted_is_no_better_than_the_refits_tell() {
-        let all = [
-            (40.0, Some(20.0)),
-            (30.0, Some(18.0)),
-            (20.0, Some(8.0)),
-            (16.0, None),
-            (-1.0, None),
-        ];
-        assert_eq!(of_promises(&all, 2.5), [20.0, 18.0, 8.0, 8.0, -1.0]);
-        assert_eq!(of_promises(&[(5.0, None)], 2.5), [2.5]);
-    }
+    Ok(())
 }

@@ -2,8 +2,8 @@
 
 use super::found::Found;
 use super::search::{Breadth, unknown};
-use crate::diagnose::hypotheses::scales::Scales;
-use crate::diagnose::hypotheses::term::Term;
+use crate::hypothesis::scales::Scales;
+use crate::hypothesis::term::Term;
 use crate::study::StudyError;
 use std::sync::Arc;
 

@@ -1,10 +1,10 @@
 //! Missing functions as they were fitted: values, errors, the range that the records show.
 
 use crate::diagnose::explain::found::Found;
-use crate::diagnose::hypotheses::basis::basis;
-use crate::diagnose::hypotheses::term::Nature;
-use crate::diagnose::model::Model;
 use crate::diagnose::outcome::MissingFunction;
+use crate::hypothesis::basis::basis;
+use crate::hypothesis::model::Model;
+use crate::hypothesis::term::Nature;
 use nalgebra::{DMatrix, DVector};
 
 /// Points at which a function is told.

@@ -1,10 +1,10 @@
 //! Maps of the residuals: where in time, at which values, in which output, at which lags and frequencies they exceed white noise.
 
-use crate::diagnose::model::Model;
 use crate::diagnose::outcome::{Band, Cell, Channel, Lag, Maps, Region, Window};
 use crate::diagnose::residuals::cut::{Bins, Cut, Past};
 use crate::diagnose::residuals::local::excess;
 use crate::diagnose::residuals::shares::shares;
+use crate::hypothesis::model::Model;
 use crate::study::StudyError;
 
 /// Describes the innovations of a model. `best` divides the shares by where it helps.

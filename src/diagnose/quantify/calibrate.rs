@@ -1,6 +1,6 @@
 //! Calibration: how much evidence for a gap do records show that the fitted twin itself has made?
 
-use crate::diagnose::model::Model;
+use crate::hypothesis::model::Model;
 use crate::progress::Stage;
 use crate::record::Record;
 use crate::study::StudyError;

@@ -7,13 +7,13 @@
 //!
 //! Source of the criterion: Hunter & Reiner, "Designs for discriminating between two rival models" (1965).
 
-use crate::diagnose::model::{Model, keys};
 use crate::diagnose::outcome::NextInput;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::climb::climb;
 use crate::fit::evidence::{CREDIT, laplace};
 use crate::fit::problem::Problem;
 use crate::fit::reference::Reference;
+use crate::hypothesis::model::{Model, keys};
 use crate::likelihood::kalman::recoverable;
 use crate::record::{Drive, Record, Signal};
 use crate::study::StudyError;

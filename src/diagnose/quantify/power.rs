@@ -9,12 +9,12 @@
 //!
 //! Sizes are linear in d⊥; of thresholds the values on the grid of the search are looked at, the mildest that shows.
 
-use crate::diagnose::hypotheses::term::{Part, Term};
-use crate::diagnose::model::Model;
 use crate::diagnose::outcome::Visible;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::axis::SMALL;
 use crate::fit::reference::Reference;
+use crate::hypothesis::model::Model;
+use crate::hypothesis::term::{Part, Term};
 use crate::likelihood::kalman::recoverable;
 use crate::study::StudyError;
 use rayon::prelude::*;

@@ -3,12 +3,12 @@
 use super::free_run::{Runner, root};
 use super::horizon::{HeldOutRows, Predictor, compare};
 use crate::diagnose::explain::found::Found;
-use crate::diagnose::model::{Model, keys};
 use crate::diagnose::outcome::Shrinkage;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::climb::{Fitted, climb};
 use crate::fit::posterior::posterior;
 use crate::fit::problem::Problem;
+use crate::hypothesis::model::{Model, keys};
 use crate::likelihood::kalman::FilterError;
 use crate::record::Record;
 use crate::study::StudyError;

@@ -2,6 +2,5 @@
 
 pub(super) mod correlation;
 pub(super) mod cut;
-pub(super) mod frequencies;
 pub(super) mod local;
 pub(super) mod shares;

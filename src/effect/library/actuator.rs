@@ -61,7 +61,11 @@ pub(super) fn rows() -> Vec<EffectKind> {
             "v ← v + clamp(u − v, ±rate·Δt)",
             |m, now, memory, u| limit_rate(m[0] * now.dt, &mut memory[0], u),
         )
-        .magnitude(Magnitude::positive("rate", "signal/s", &[0.1, 0.5, 2.0]).shape(Shape::Rate).off(f64::INFINITY))
+        .magnitude(
+            Magnitude::positive("rate", "signal/s", &[0.1, 0.5, 2.0])
+                .shape(Shape::Rate)
+                .off(f64::INFINITY),
+        )
         .memory(1)
         .order(60),
         // A first-order lag; v starts at the first u.

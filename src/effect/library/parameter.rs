@@ -9,11 +9,9 @@ pub(super) fn rows() -> Vec<EffectKind> {
         EffectKind::parameter("parameter-drift", "θ·(1 + rate·t)", |m, t, value| {
             value * (1.0 + m[0] * t)
         })
-        .magnitude(Magnitude::signed(
-            "rate",
-            "1/s",
-            &[-0.01, -0.001, 0.001, 0.01],
-        ).shape(Shape::Rate)),
+        .magnitude(
+            Magnitude::signed("rate", "1/s", &[-0.01, -0.001, 0.001, 0.01]).shape(Shape::Rate),
+        ),
         // A fault or a switch, that instant included; −1 is all gone.
         EffectKind::parameter(
             "parameter-step",
@@ -27,8 +25,12 @@ pub(super) fn rows() -> Vec<EffectKind> {
             },
         )
         .magnitude(
-            Magnitude::signed("size", "1", &[-0.3, -0.1, 0.1, 0.3]).within(-1.0, f64::INFINITY).shape(Shape::Share),
+            Magnitude::signed("size", "1", &[-0.3, -0.1, 0.1, 0.3])
+                .within(-1.0, f64::INFINITY)
+                .shape(Shape::Share),
         )
-        .magnitude(Magnitude::positive("time", "s", &[30.0, 100.0, 200.0, 300.0]).shape(Shape::Time)),
+        .magnitude(
+            Magnitude::positive("time", "s", &[30.0, 100.0, 200.0, 300.0]).shape(Shape::Time),
+        ),
     ]
 }

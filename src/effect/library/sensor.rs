@@ -30,11 +30,9 @@ pub(super) fn rows() -> Vec<EffectKind> {
         EffectKind::sensor("sensor-drift", "s + rate·t", |m, now, _, s| {
             s + m[0] * now.t
         })
-        .magnitude(Magnitude::signed(
-            "rate",
-            "signal/s",
-            &[-0.01, -0.001, 0.001, 0.01],
-        ).shape(Shape::Rate))
+        .magnitude(
+            Magnitude::signed("rate", "signal/s", &[-0.01, -0.001, 0.001, 0.01]).shape(Shape::Rate),
+        )
         .order(30),
         // A first-order lag; the reading is z, which starts at the first s.
         EffectKind::sensor(
@@ -62,7 +60,11 @@ pub(super) fn rows() -> Vec<EffectKind> {
             "(1 − f)·s + f·abs(s)",
             |m, _, _, s| (1.0 - m[0]) * s + m[0] * s.abs(),
         )
-        .magnitude(Magnitude::positive("fraction", "1", &[0.1, 0.5, 0.9]).within(0.0, 1.0).shape(Shape::Share))
+        .magnitude(
+            Magnitude::positive("fraction", "1", &[0.1, 0.5, 0.9])
+                .within(0.0, 1.0)
+                .shape(Shape::Share),
+        )
         .order(60),
         // White noise. A black box's own is already in its outputs; independent draws are added there.
         EffectKind::measurement_noise(
@@ -92,7 +94,11 @@ pub(super) fn rows() -> Vec<EffectKind> {
                 scale: m[1],
             },
         )
-        .magnitude(Magnitude::positive("probability", "1", &[0.01, 0.05]).within(0.0, 1.0).shape(Shape::Share))
+        .magnitude(
+            Magnitude::positive("probability", "1", &[0.01, 0.05])
+                .within(0.0, 1.0)
+                .shape(Shape::Share),
+        )
         .magnitude(Magnitude::positive("scale", "signal", &[0.5, 2.0]).never_off()),
     ]
 }

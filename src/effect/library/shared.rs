@@ -6,9 +6,9 @@ use crate::setting::number;
 /// Samples that a delay keeps: the present one and 63 before it.
 pub(super) const DELAY_SAMPLES: usize = 64;
 
-pub(super) const TAU: Magnitude = 
+pub(super) const TAU: Magnitude =
     Magnitude::positive("tau", "s", &[1.0, 4.0, 16.0]).shape(Shape::TimeConstant);
-pub(super) const DELAY: Magnitude = 
+pub(super) const DELAY: Magnitude =
     Magnitude::positive("delay", "s", &[0.5, 2.0, 6.0]).shape(Shape::Delay);
 pub(super) const LOW: Magnitude =
     Magnitude::signed("low", "signal", &[-1.0, 0.0, 0.5]).off(f64::NEG_INFINITY);

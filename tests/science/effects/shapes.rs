@@ -34,13 +34,21 @@ fn own(unit: &'static str) -> Vec<EffectKind> {
     let size = |name| Magnitude::signed(name, unit, &[-0.1, 0.1]);
     let number = |name| Magnitude::positive(name, unit, &[0.3, 1.0]);
     vec![
-        EffectKind::sensor("own-step", "", |m, now, _, s| {
-            if now.t >= m[1] { s + m[0] } else { s }
-        })
+        EffectKind::sensor(
+            "own-step",
+            "",
+            |m, now, _, s| {
+                if now.t >= m[1] { s + m[0] } else { s }
+            },
+        )
         .magnitude(size("size"))
         .magnitude(number("time").shape(Shape::Time)),
         EffectKind::sensor("own-lag", "", |m, now, memory, s| {
-            let kept = if m[0] > 0.0 { (-now.dt / m[0]).exp() } else { 0.0 };
+            let kept = if m[0] > 0.0 {
+                (-now.dt / m[0]).exp()
+            } else {
+                0.0
+            };
             memory[0] = kept * memory[0] + (1.0 - kept) * s;
             memory[0]
         })
@@ -66,7 +74,9 @@ fn own(unit: &'static str) -> Vec<EffectKind> {
 
 fn study(unit: &'static str, effect: &str) -> Study {
     let plan = RecordPlan::levels(0.1, 80, 0.0, 1.0, 10);
-    let study = Study::new("leak", Leak, plan).unwrap().with_effects(own(unit));
+    let study = Study::new("leak", Leak, plan)
+        .unwrap()
+        .with_effects(own(unit));
     let text = format!("twin = 'leak'\n{effect}");
     study
         .configure(&StudyFile::parse(&text, "own.toml".as_ref()).unwrap())
@@ -119,7 +129,14 @@ fn diagnosis(unit: &'static str, record: &Record) -> String {
         ..DiagnoseSettings::default()
     };
     let records = std::slice::from_ref(record);
-    let found = diagnose(&study(unit, ""), records, None, &settings, &Progress::silent()).unwrap();
+    let found = diagnose(
+        &study(unit, ""),
+        records,
+        None,
+        &settings,
+        &Progress::silent(),
+    )
+    .unwrap();
     format!("{:?} {:?}", found.detection, found.cause)
 }
 

@@ -3,18 +3,17 @@
 //! The innovations of the model with a little of the term give a direction; the gain along it, θ free to answer, is the promise of a
 //! listed effect. An unknown function's coefficients have a score each, so that its evidence has a closed form.
 
-use crate::diagnose::hypotheses::term::{Start, Term, marks};
-use crate::diagnose::model::{Extended, Model};
+use super::model::{Extended, Model};
+use super::term::{Start, Term, marks};
 use crate::fit::evidence::{Laplace, laplace};
 use crate::fit::reference::Reference;
-use crate::likelihood::kalman::recoverable;
-use crate::study::StudyError;
+use crate::likelihood::kalman::{FilterError, recoverable};
 use nalgebra::DVector;
 use rayon::prelude::*;
 use std::sync::Arc;
 
 /// A term and its best starts.
-pub(in crate::diagnose) struct Promise {
+pub(crate) struct Promise {
     pub term: Arc<Term>,
     /// Nats that the outputs themselves speak for it, beside what they speak for the model.
     pub mark: f64,
@@ -24,7 +23,7 @@ pub(in crate::diagnose) struct Promise {
 
 /// Where a fit of a term may begin.
 #[derive(Clone)]
-pub(in crate::diagnose) struct Beginning {
+pub(crate) struct Beginning {
     /// Gain to second order, in nats.
     pub nats: f64,
     /// Magnitudes.
@@ -44,10 +43,7 @@ impl Promise {
 }
 
 /// Promises of terms beside a model, best first; terms that nothing can be told of are left out.
-pub(in crate::diagnose) fn scan(
-    model: &Model,
-    terms: &[Arc<Term>],
-) -> Result<Vec<Promise>, StudyError> {
+pub(crate) fn scan(model: &Model, terms: &[Arc<Term>]) -> Result<Vec<Promise>, FilterError> {
     let Some(reference) =
         recoverable(Reference::new(&model.problem, &model.fitted.theta))?.flatten()
     else {
@@ -58,7 +54,7 @@ pub(in crate::diagnose) fn scan(
             let extended = model.extend(term)?;
             let mut starts: Vec<Beginning> = (term.starts.par_iter())
                 .map(|start| promise(model, &reference, &extended, start))
-                .collect::<Result<Vec<_>, StudyError>>()?
+                .collect::<Result<Vec<_>, FilterError>>()?
                 .into_iter()
                 .flatten()
                 .collect();
@@ -69,7 +65,7 @@ pub(in crate::diagnose) fn scan(
                 starts,
             })
         })
-        .collect::<Result<_, StudyError>>()?;
+        .collect::<Result<_, FilterError>>()?;
     all.retain(|promise| !promise.starts.is_empty());
     all.sort_by(|a, b| b.nats().total_cmp(&a.nats()));
     Ok(all)
@@ -81,7 +77,7 @@ fn promise(
     reference: &Reference,
     extended: &Extended,
     start: &Start,
-) -> Result<Option<Beginning>, StudyError> {
+) -> Result<Option<Beginning>, FilterError> {
     let problem = &extended.problem;
     let first = &problem.axes[extended.entries[0]];
     let mut m = start.m.clone();
@@ -125,7 +121,7 @@ fn promise(
 }
 
 /// Evidence of an unknown function to second order, before any refit.
-pub(in crate::diagnose) struct Linear {
+pub(crate) struct Linear {
     pub extended: Extended,
     /// Nats over the model.
     pub gain: f64,
@@ -134,10 +130,7 @@ pub(in crate::diagnose) struct Linear {
 }
 
 /// Unknown functions beside a model, best first.
-pub(in crate::diagnose) fn functions(
-    model: &Model,
-    terms: &[Arc<Term>],
-) -> Result<Vec<Linear>, StudyError> {
+pub(crate) fn functions(model: &Model, terms: &[Arc<Term>]) -> Result<Vec<Linear>, FilterError> {
     let mut all: Vec<Linear> = (terms.par_iter())
         .map(|term| {
             let extended = model.extend(term)?;
@@ -164,7 +157,7 @@ pub(in crate::diagnose) fn functions(
                 theta,
             }))
         })
-        .collect::<Result<Vec<_>, StudyError>>()?
+        .collect::<Result<Vec<_>, FilterError>>()?
         .into_iter()
         .flatten()
         .collect();

@@ -2,22 +2,26 @@
 
 use super::scales::Scales;
 use super::term::{Nature, Part, Start, Term, with_terms};
-use crate::diagnose::thresholds::Thresholds;
 use crate::effect::{Effect, Law, Magnitude, Mark, Shape, TargetKind, on_levels, targets};
 use crate::fit::axis::{Axis, EvidencePrior};
 use crate::fit::magnitude::{LONGEST, largest, level_axis, levels, size_axis, uniform_axis};
+use crate::likelihood::kalman::FilterError;
 use crate::math::ends;
-use crate::study::StudyError;
 use crate::twin::{Interval, Parameter, Twin};
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Shares of its range at which a size with two ends is tried, besides next to nothing. A part of a signal that is rectified, the only such
 /// size of the library, folds the output at a half.
-const LARGE: [f64; 3] = [0.3, 0.6, 0.9];
+const LARGE: [f64; 4] = [0.3, 0.6, 0.9, 1.0];
+
+/// Times of a change that are tried, evenly over the record.
+pub(super) const TIMES: usize = 9;
+/// Nats for a mark that outputs bear, such as repeated values of a quantiser.
+const MARK_PRESENT: f64 = 12.0;
 
 /// Twin and record that effects are looked for in.
-pub(in crate::diagnose) struct Library<'a> {
+pub(crate) struct Library<'a> {
     pub twin: &'a Twin,
     /// The fitted θ of the first record.
     pub theta: &'a [f64],
@@ -28,7 +32,7 @@ pub(in crate::diagnose) struct Library<'a> {
 
 impl Library<'_> {
     /// Hypotheses of one effect: one for each way to use its magnitudes.
-    pub fn terms(&self, effect: &Effect) -> Result<Vec<Term>, StudyError> {
+    pub fn terms(&self, effect: &Effect) -> Result<Vec<Term>, FilterError> {
         let known = targets(
             effect.law().target(),
             Some(&self.scales.outline),
@@ -84,7 +88,7 @@ impl Library<'_> {
         values: &[f64],
         mark: &Mark,
         off: &[usize],
-    ) -> Result<Option<Term>, StudyError> {
+    ) -> Result<Option<Term>, FilterError> {
         let magnitudes = effect.magnitudes();
         let held: BTreeMap<String, f64> = (off.iter())
             .map(|&i| {
@@ -117,7 +121,7 @@ impl Library<'_> {
                 Mark::Unmarked | Mark::Absent => 0.0,
                 // Values on few levels repeat at an end without a limit there.
                 Mark::Present(_) if !rounds && on_levels(values) => 0.0,
-                Mark::Present(_) => Thresholds::MARK_PRESENT,
+                Mark::Present(_) => MARK_PRESENT,
             },
             also: vec![],
         };
@@ -233,8 +237,7 @@ impl Library<'_> {
                 logarithmic(0.3 * dt, longest, grid)
             }
             (Shape::Time, _) => {
-                let times = (1..=Thresholds::TIMES)
-                    .map(|i| duration * i as f64 / (Thresholds::TIMES + 1) as f64);
+                let times = (1..=TIMES).map(|i| duration * i as f64 / (TIMES + 1) as f64);
                 let (grid, axis) = linear(0.0, duration, times.collect());
                 (
                     grid,

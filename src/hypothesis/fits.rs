@@ -1,12 +1,11 @@
 //! Fits of terms together with θ and noise levels.
 
-use super::scan::{Beginning, Linear, Promise};
-use crate::diagnose::model::{Extended, Model};
+use super::model::{Extended, Model};
+use super::screen::{Beginning, Linear, Promise};
 use crate::fit::climb::{Fitted, climb, fit, settling};
 use crate::fit::evidence::{CREDIT, laplace};
 use crate::fit::problem::Problem;
 use crate::likelihood::kalman::{FilterError, recoverable};
-use crate::study::StudyError;
 use rayon::prelude::*;
 
 /// Shares of the step to the top of the quadratic that a function's fit may begin at.
@@ -14,7 +13,7 @@ const SHARES: [f64; 4] = [1.0, 0.5, 0.2, 0.0];
 
 /// Effort of a fit.
 #[derive(Clone, Copy)]
-pub(in crate::diagnose) struct Effort {
+pub(crate) struct Effort {
     /// Starts of the term.
     pub starts: usize,
     pub iterations: usize,
@@ -32,12 +31,12 @@ const AFRESH_SHAPES: usize = 4;
 pub(super) const CARRIED: usize = 60;
 
 /// Fits a promise beside a model from its best starts, with θ as it answers them and with those given; `None` where it works at none.
-pub(in crate::diagnose) fn fit_promise(
+pub(crate) fn fit_promise(
     model: &Model,
     promise: &Promise,
     thetas: &[Vec<f64>],
     effort: Effort,
-) -> Result<Option<Model>, StudyError> {
+) -> Result<Option<Model>, FilterError> {
     let extended = model.extend(&promise.term)?;
     let chosen: Vec<&Beginning> = promise.starts.iter().take(effort.starts).collect();
     let settled = settling_last(&extended.problem, &extended);
@@ -46,7 +45,7 @@ pub(in crate::diagnose) fn fit_promise(
             let theta = begin(model, &extended, start)?;
             Ok(if start.scales { settled(theta)? } else { theta })
         })
-        .collect::<Result<_, StudyError>>()?;
+        .collect::<Result<_, FilterError>>()?;
     if let Some(first) = chosen.first() {
         let first = model.beside(&extended, &first.m);
         from.extend(thetas.iter().map(|own| extended.from(own, first.clone())));
@@ -66,10 +65,7 @@ pub(super) fn settling_last(
 }
 
 /// Fits a promise from the prior's centre with loud noise: the fit of the model alone may have gone where the term is of no use.
-pub(in crate::diagnose) fn fit_afresh(
-    model: &Model,
-    promise: &Promise,
-) -> Result<Option<Model>, StudyError> {
+pub(crate) fn fit_afresh(model: &Model, promise: &Promise) -> Result<Option<Model>, FilterError> {
     let extended = model.extend(&promise.term)?;
     let problem = extended.problem.clone();
     let centre = problem.begin(&problem.centre());
@@ -85,9 +81,28 @@ pub(in crate::diagnose) fn fit_afresh(
     Ok(fitted.and_then(|fitted| extended.fitted(model.base.clone(), fitted, problem)))
 }
 
+/// Fits a sensor's law from where the twin without it follows the record unfolded: on each side of a fold on which the record may begin.
+pub(super) fn fit_unfolded(model: &Model, promise: &Promise) -> Result<Option<Model>, FilterError> {
+    let Some((m, sides)) = promise.term.unfolded(&model.base, &model.problem.records) else {
+        return Ok(None);
+    };
+    let extended = model.extend(&promise.term)?;
+    let mut from = vec![];
+    for records in sides {
+        let problem = model.problem.on(records);
+        let starts = [problem.begin(&problem.centre()), model.fitted.theta.clone()];
+        if let Some(fitted) = fit(&problem, &starts, RELEASED)? {
+            from.push(model.beside_at(&extended, &fitted.theta, &m));
+        }
+    }
+    let fitted = fit(&extended.problem, &from, RELEASED)?;
+    let problem = extended.problem.clone();
+    Ok(fitted.and_then(|fitted| extended.fitted(model.base.clone(), fitted, problem)))
+}
+
 /// The model with its noise held loud, θ fitted to that: predictions then hardly reach beyond a row, and the likelihood has no narrow
 /// valleys.
-pub(in crate::diagnose) fn loudly(model: &Model) -> Result<Option<Model>, StudyError> {
+pub(crate) fn loudly(model: &Model) -> Result<Option<Model>, FilterError> {
     let is_noise = |j: usize| model.problem.axes[j].begin.is_some();
     let problem = model.problem.holding(is_noise);
     let start = problem.begin(&model.fitted.theta);
@@ -99,12 +114,12 @@ pub(in crate::diagnose) fn loudly(model: &Model) -> Result<Option<Model>, StudyE
 }
 
 /// Fits a promise beside the loud model from its best starts, the noise let down half-way to that of the model.
-pub(in crate::diagnose) fn anneal(
+pub(crate) fn anneal(
     model: &Model,
     loud: &Model,
     promise: &Promise,
     starts: usize,
-) -> Result<Vec<Fitted>, StudyError> {
+) -> Result<Vec<Fitted>, FilterError> {
     let held = loud.extend(&promise.term)?;
     let c = &held.problem.coordinates;
     let quiet = (model.problem.coordinates).of(&model.fitted.theta);
@@ -128,16 +143,16 @@ pub(in crate::diagnose) fn anneal(
             }
             Ok(last)
         })
-        .collect::<Result<_, StudyError>>()?;
+        .collect::<Result<_, FilterError>>()?;
     Ok(fits.into_iter().flatten().collect())
 }
 
 /// Fits a promise from where its noise was let down half-way, noise free.
-pub(in crate::diagnose) fn release(
+pub(crate) fn release(
     model: &Model,
     promise: &Promise,
     begun: &[Fitted],
-) -> Result<Option<Model>, StudyError> {
+) -> Result<Option<Model>, FilterError> {
     let free = model.extend(&promise.term)?;
     let fits: Vec<Option<Fitted>> = (begun.par_iter())
         .map(|begun| climb(&free.problem, &begun.theta, RELEASED))
@@ -149,7 +164,7 @@ pub(in crate::diagnose) fn release(
 }
 
 /// The likeliest point on the way from the model to a start: all of it, or less where the quadratic promised too much.
-fn begin(model: &Model, extended: &Extended, start: &Beginning) -> Result<Vec<f64>, StudyError> {
+fn begin(model: &Model, extended: &Extended, start: &Beginning) -> Result<Vec<f64>, FilterError> {
     let c = &model.problem.coordinates;
     let phi = c.of(&model.fitted.theta);
     let points = SHARES.map(|share| {
@@ -187,11 +202,11 @@ fn likeliest(
 }
 
 /// Fits an unknown function's coefficients under the prior that is most probable, and once more if that moved.
-pub(in crate::diagnose) fn fit_function(
+pub(crate) fn fit_function(
     model: &Model,
     linear: Linear,
     iterations: usize,
-) -> Result<Option<Model>, StudyError> {
+) -> Result<Option<Model>, FilterError> {
     let Linear {
         extended,
         found,

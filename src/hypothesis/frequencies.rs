@@ -1,9 +1,8 @@
 //! Frequencies that the residuals show: where a search for a periodic effect begins.
 
-use crate::diagnose::model::Model;
+use super::model::Model;
 use crate::fit::reference::Reference;
-use crate::likelihood::kalman::recoverable;
-use crate::study::StudyError;
+use crate::likelihood::kalman::{FilterError, recoverable};
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
@@ -13,7 +12,7 @@ const PEAKS: usize = 3;
 /// Frequencies in Hz at which periodograms of the residuals peak: those of the innovations themselves, for what is added, and of
 /// their products with the answer to each entry of θ, for what is modulated. Up to half the sampling rate, two a cycle of the record,
 /// however long that is.
-pub(in crate::diagnose) fn frequencies(model: &Model) -> Result<Vec<f64>, StudyError> {
+pub(crate) fn frequencies(model: &Model) -> Result<Vec<f64>, FilterError> {
     let Some(reference) =
         recoverable(Reference::new(&model.problem, &model.fitted.theta))?.flatten()
     else {

@@ -1,34 +1,19 @@
-//! Hypotheses of what could be missing: listed effects, and unknown functions of states, of the past, of time.
+//! Unknown functions and disturbances at every place of a twin: they stand for whatever is not in the library.
 
-mod alike;
-pub(in crate::diagnose) mod basis;
-pub(in crate::diagnose) mod disturbed_equations;
-mod disturbed_signals;
-mod entered;
-mod entered_black_box;
-pub(in crate::diagnose) mod entry;
-pub(in crate::diagnose) mod functions;
-pub(in crate::diagnose) mod listed;
-pub(in crate::diagnose) mod noise;
-pub(in crate::diagnose) mod scales;
-pub(in crate::diagnose) mod term;
-
-use self::basis::Of;
-use self::entry::Entry;
-use self::functions::{
+use super::basis::Of;
+use super::entry::Entry;
+use super::functions::{
     PASTS, Trace, Variable, entered, of_past, of_signal, of_state, of_trace, wave,
 };
-use self::listed::Library;
-use self::scales::Scales;
-use self::term::{Nature, Part, Start, Term};
-use crate::effect::{EffectPattern, TargetKind, targets};
+use super::listed::Library;
+use super::scales::Scales;
+use super::term::{Nature, Part, Start, Term};
+use crate::effect::{TargetKind, targets};
 use crate::fit::axis::Axis;
 use crate::fit::magnitude::uniform_axis;
 use crate::math::quantile;
 use crate::record::Record;
-use crate::study::{Study, StudyError};
 use crate::twin::{Interval, Parameter, Role, is_memory};
-use std::sync::Arc;
 
 /// Time constants of disturbances between three steps and a sixth of the record.
 const TIMES: usize = 3;
@@ -39,59 +24,8 @@ const MOST_STATES: usize = 4;
 /// Widths of a play that a signal is seen through, in ranges of it.
 const PLAYS: [f64; 2] = [0.25, 0.5];
 
-/// Terms that several models hold.
-pub(in crate::diagnose) fn shared(terms: Vec<Term>) -> Vec<Arc<Term>> {
-    terms.into_iter().map(Arc::new).collect()
-}
-
-/// Every listed effect that the study lets a diagnosis name, in the units of the record.
-pub(in crate::diagnose) fn listed(
-    study: &Study,
-    without: &[EffectPattern],
-    library: &Library<'_>,
-    fitted_noise: &[String],
-) -> Result<Vec<Term>, StudyError> {
-    if let Some(name) = without.iter().find(|name| !study.knows_effect(name)) {
-        return Err(StudyError::Without(study.with_nearest_effect(name)));
-    }
-    let already = already(study);
-    let mut terms = vec![];
-    for effect in study.candidates() {
-        let key = effect.key().to_string();
-        if without.iter().any(|pattern| pattern.matches(effect.key())) || already.contains(&key) {
-            continue;
-        }
-        if effect.law().is_noise() && fitted_noise.contains(&effect.target().to_owned()) {
-            // Levels are fitted in every hypothesis; outliers are a kind of noise.
-            continue;
-        }
-        terms.extend(library.terms(&effect)?);
-    }
-    alike::merged(terms, library)
-}
-
-/// Effects that the study has added to its twin.
-fn already(study: &Study) -> Vec<String> {
-    (study.file().effect.iter())
-        .map(|e| crate::effect::EffectKey::new(&e.id, &e.target).to_string())
-        .collect()
-}
-
-/// Effects that the twin may lack beside these and its own effects.
-pub(in crate::diagnose) fn not_tested(study: &Study, terms: &[Arc<Term>]) -> Vec<String> {
-    let known: Vec<String> = (terms.iter().flat_map(|t| t.keys()))
-        .chain(already(study))
-        .collect();
-    let mut keys: Vec<String> = (study.effects().iter())
-        .map(|e| e.key().to_string())
-        .filter(|key| !known.contains(key))
-        .collect();
-    keys.dedup();
-    keys
-}
-
 /// Unknown functions at every place of a twin; `seen` are states of models whose range the functions must cover.
-pub(in crate::diagnose) fn unknown(library: &Library<'_>, seen: &[Scales]) -> Vec<Term> {
+pub(crate) fn unknown(library: &Library<'_>, seen: &[Scales]) -> Vec<Term> {
     let scales = library.scales;
     let outline = &scales.outline;
     let mut terms = vec![];
@@ -262,7 +196,7 @@ fn periodic(
     (!term.starts.is_empty()).then_some(term)
 }
 
-fn disturbances(
+pub(super) fn disturbances(
     target: &str,
     entry: Entry,
     largest: f64,

@@ -1,12 +1,12 @@
 //! A twin with terms, fitted to the records.
 
-use super::hypotheses::term::{Term, marks, with_terms};
+use super::term::{Term, marks, with_terms};
 use crate::fit::axis::{EvidencePrior, Family};
 use crate::fit::climb::{Fitted, climb};
 use crate::fit::evidence::{CREDIT, Laplace, laplace};
 use crate::fit::problem::Problem;
+use crate::likelihood::kalman::FilterError;
 use crate::record::Signal;
-use crate::study::StudyError;
 use crate::twin::Twin;
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ const TO_THE_END: usize = 40;
 
 /// A twin with terms, fitted.
 #[derive(Clone)]
-pub(in crate::diagnose) struct Model {
+pub(crate) struct Model {
     /// The twin without terms, its noise levels in θ.
     pub base: Twin,
     pub terms: Vec<Arc<Term>>,
@@ -28,7 +28,7 @@ pub(in crate::diagnose) struct Model {
 }
 
 /// A model with one more term, not yet fitted.
-pub(in crate::diagnose) struct Extended {
+pub(crate) struct Extended {
     pub terms: Vec<Arc<Term>>,
     pub problem: Problem,
     /// Entries of the new term's magnitudes.
@@ -71,7 +71,7 @@ impl Model {
     }
 
     /// The problem with another twin in the place of its own, of the same parameters.
-    pub fn problem_of(&self, base: &Twin) -> Result<Problem, StudyError> {
+    pub fn problem_of(&self, base: &Twin) -> Result<Problem, FilterError> {
         let twin = with_terms(base, self.terms.iter().map(Arc::as_ref))?;
         let axes = self.problem.axes[..twin.parameters().len()].to_vec();
         let mut problem = self.problem.with_twin(twin, axes);
@@ -85,17 +85,17 @@ impl Model {
     }
 
     /// Filtered states of each record.
-    pub fn states(&self) -> Result<Vec<Signal>, StudyError> {
+    pub fn states(&self) -> Result<Vec<Signal>, FilterError> {
         let all = self.problem.states(&self.fitted.theta)?;
         Ok(all.into_iter().map(|(_, states)| states).collect())
     }
 
     /// The model with one more term.
-    pub fn extend(&self, term: &Arc<Term>) -> Result<Extended, StudyError> {
+    pub fn extend(&self, term: &Arc<Term>) -> Result<Extended, FilterError> {
         self.extend_by(std::slice::from_ref(term))
     }
 
-    fn extend_by(&self, new: &[Arc<Term>]) -> Result<Extended, StudyError> {
+    fn extend_by(&self, new: &[Arc<Term>]) -> Result<Extended, FilterError> {
         let terms: Vec<Arc<Term>> = self.terms.iter().chain(new).cloned().collect();
         let twin = with_terms(&self.base, terms.iter().map(Arc::as_ref))?;
         let d = self.problem.twin.parameters().len();
@@ -123,13 +123,13 @@ impl Model {
     }
 
     /// The model fitted to the end of a climb: a search stops before.
-    pub fn carried_on(&self) -> Result<Option<Self>, StudyError> {
+    pub fn carried_on(&self) -> Result<Option<Self>, FilterError> {
         let fitted = climb(&self.problem, &self.fitted.theta, TO_THE_END)?;
         Ok(fitted.and_then(|fitted| self.refitted(fitted)))
     }
 
     /// The terms beside another twin of the same parameters, or other records, fitted on from here.
-    pub fn beside_twin(&self, base: &Model) -> Result<Option<Model>, StudyError> {
+    pub fn beside_twin(&self, base: &Model) -> Result<Option<Model>, FilterError> {
         let extended = base.extend_by(&self.terms)?;
         let start = extended.problem.carried(&self.problem, &self.fitted.theta);
         let fitted = climb(&extended.problem, &start, TO_THE_END)?;
@@ -165,7 +165,7 @@ impl Extended {
     }
 
     /// Slope and information at θ, without a step.
-    pub fn at(&self, theta: &[f64]) -> Result<Option<Fitted>, StudyError> {
+    pub fn at(&self, theta: &[f64]) -> Result<Option<Fitted>, FilterError> {
         Ok(climb(&self.problem, theta, 0)?)
     }
 
@@ -196,6 +196,6 @@ fn bic(problem: &Problem, fitted: &Fitted) -> f64 {
 }
 
 /// Keys of terms, in their order.
-pub(in crate::diagnose) fn keys(terms: &[Arc<Term>]) -> Vec<String> {
+pub(crate) fn keys(terms: &[Arc<Term>]) -> Vec<String> {
     terms.iter().map(|t| t.key()).collect()
 }

@@ -1,12 +1,13 @@
 //! Effects whose time, delay or frequency ended in a valley of its own.
 
-use super::found::{Found, own_theta};
-use super::refit::{CARRIED, settling_last};
-use crate::diagnose::hypotheses::term::Term;
-use crate::diagnose::model::Model;
-use crate::diagnose::thresholds::Thresholds;
+use super::explanation::Explanation;
+use super::fits::{CARRIED, settling_last};
+use super::listed::TIMES;
+use super::model::Model;
+use super::search::{BETTER, CANDIDATES, NULL_LIKE};
+use super::term::Term;
 use crate::fit::climb::{Fitted, climb, fit};
-use crate::study::StudyError;
+use crate::likelihood::kalman::FilterError;
 use rayon::prelude::*;
 
 /// Places from which the same law begins again elsewhere.
@@ -30,19 +31,19 @@ type Start = (Vec<f64>, Vec<f64>);
 
 /// Fits effects again that may be better, `all` being sorted, best first: from where the same law ended at places where it explains more,
 /// with either sign of its size; the best ones from times nearby.
-pub(super) fn leave_valleys(
+pub(crate) fn leave_valleys(
     model: &Model,
-    all: &mut [Found],
+    all: &mut [Explanation],
     floor: f64,
-) -> Result<(), StudyError> {
-    let top = all.first().map_or(floor, |f| f.gain);
-    let least = (top - Thresholds::CANDIDATES).max(floor + Thresholds::NULL_LIKE);
-    let better: Vec<Option<Found>> = (0..all.len())
+) -> Result<(), FilterError> {
+    let top = all.first().map_or(floor, |f| f.log_z);
+    let least = (top - CANDIDATES).max(floor + NULL_LIKE);
+    let better: Vec<Option<Explanation>> = (0..all.len())
         .into_par_iter()
         .map(|i| again(model, &all[i], &all[..i], least))
-        .collect::<Result<_, StudyError>>()?;
+        .collect::<Result<_, FilterError>>()?;
     for (old, new) in all.iter_mut().zip(better) {
-        if let Some(new) = new.filter(|new| new.gain > old.gain) {
+        if let Some(new) = new.filter(|new| new.log_z > old.log_z) {
             *old = new;
         }
     }
@@ -52,17 +53,17 @@ pub(super) fn leave_valleys(
 /// One effect fitted again; `None` where no start leads further. Only effects of at least so many nats are looked at.
 fn again(
     model: &Model,
-    found: &Found,
-    before: &[Found],
+    found: &Explanation,
+    before: &[Explanation],
     least: f64,
-) -> Result<Option<Found>, StudyError> {
+) -> Result<Option<Explanation>, FilterError> {
     let Some(shape) = found.last().shape() else {
         return Ok(None);
     };
     let term = found.last();
     let alike = (before.iter())
-        .filter(|other| other.gain > least && other.last().shape().as_ref() == Some(&shape))
-        .filter_map(|other| Some((own_theta(other)?, other.magnitudes()?)));
+        .filter(|other| other.log_z > least && other.last().shape().as_ref() == Some(&shape))
+        .filter_map(|other| Some((other.own_theta()?, other.magnitudes()?)));
     let mut starts: Vec<Start> = vec![];
     for (theta, m) in alike.take(PLACES) {
         if term.starts.iter().all(|start| start.scales) {
@@ -73,7 +74,7 @@ fn again(
         starts.push((theta, m));
     }
     let is_beaten = !starts.is_empty();
-    if found.gain > least {
+    if found.log_z > least {
         starts.extend(nearby(found, term));
     }
     if is_beaten {
@@ -84,11 +85,11 @@ fn again(
     }
     let mut best = begun_again(model, found, &starts)?;
     for _ in 1..ROUNDS {
-        let Some(old) = best.as_ref().filter(|old| old.gain > least) else {
+        let Some(old) = best.as_ref().filter(|old| old.log_z > least) else {
             break;
         };
         let next = begun_again(model, old, &nearby(old, term))?;
-        match next.filter(|next| next.gain > old.gain + Thresholds::BETTER) {
+        match next.filter(|next| next.log_z > old.log_z + BETTER) {
             Some(next) => best = Some(next),
             None => break,
         }
@@ -99,9 +100,9 @@ fn again(
 /// The best fit from these θ and magnitudes; `None` where none is better than its own.
 fn begun_again(
     model: &Model,
-    found: &Found,
+    found: &Explanation,
     starts: &[Start],
-) -> Result<Option<Found>, StudyError> {
+) -> Result<Option<Explanation>, FilterError> {
     let Some(own) = &found.model else {
         return Ok(None);
     };
@@ -116,16 +117,16 @@ fn begun_again(
     };
     let carried = climb(&own.problem, &begun.theta, CARRIED)?;
     let better = own.refitted(carried.unwrap_or(begun));
-    Ok(better.map(|m| Found {
+    Ok(better.map(|m| Explanation {
         terms: m.terms.clone(),
-        gain: found.gain + m.log_evidence - own.log_evidence,
+        log_z: found.log_z + m.log_evidence - own.log_evidence,
         model: Some(m),
     }))
 }
 
 /// The best of times closer together than those tried first, θ and the size having answered each; `None` for a law without a time, or
 /// with several.
-fn between(model: &Model, found: &Found) -> Result<Option<Start>, StudyError> {
+fn between(model: &Model, found: &Explanation) -> Result<Option<Start>, FilterError> {
     let (Some(own), &[time]) = (&found.model, &found.last().times()[..]) else {
         return Ok(None);
     };
@@ -133,7 +134,7 @@ fn between(model: &Model, found: &Found) -> Result<Option<Start>, StudyError> {
     let time = extended.entries[time];
     let held = own.problem.holding(|j| j == time);
     let record = &own.problem.records[0];
-    let (count, mut theta) = (CLOSER * (Thresholds::TIMES + 1), own.fitted.theta.clone());
+    let (count, mut theta) = (CLOSER * (TIMES + 1), own.fitted.theta.clone());
     let mut best: Option<Fitted> = None;
     for i in 1..count {
         theta[time] = record.drive().dt() * (record.samples() * i) as f64 / count as f64;
@@ -155,14 +156,14 @@ fn between(model: &Model, found: &Found) -> Result<Option<Start>, StudyError> {
 }
 
 /// θ of the twin and magnitudes with each time or delay moved.
-fn nearby(found: &Found, term: &Term) -> Vec<Start> {
+fn nearby(found: &Explanation, term: &Term) -> Vec<Start> {
     let (Some(theta), Some(m), Some(model)) =
-        (own_theta(found), found.magnitudes(), found.model.as_ref())
+        (found.own_theta(), found.magnitudes(), found.model.as_ref())
     else {
         return vec![];
     };
     let record = &model.problem.records[0];
-    let longest = 0.25 * record.samples() as f64 / (Thresholds::TIMES + 1) as f64;
+    let longest = 0.25 * record.samples() as f64 / (TIMES + 1) as f64;
     let moves: Vec<f64> = std::iter::successors(Some(MOVE), |samples| Some(2.0 * samples))
         .take_while(|samples| *samples <= longest.max(2.0 * MOVE))
         .collect();

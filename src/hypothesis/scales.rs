@@ -7,7 +7,7 @@ use crate::twin::{Acting, Outline, Twin};
 use std::sync::Arc;
 
 /// Records, the states that the twin has along them, and how fast these move.
-pub(in crate::diagnose) struct Scales {
+pub(crate) struct Scales {
     pub records: Arc<[Record]>,
     /// Filtered states of each record; a black box's predicted outputs.
     pub states: Vec<Signal>,

@@ -36,7 +36,13 @@ fn folds_and_delays_are_looked_for_up_to_their_ends() {
         .collect();
     assert_eq!(
         tried,
-        [(0.3, false), (0.6, false), (0.9, false), (0.0, true)]
+        [
+            (0.3, false),
+            (0.6, false),
+            (0.9, false),
+            (1.0, false),
+            (0.0, true)
+        ]
     );
     let delay = find("sensor-delay");
     assert_eq!(delay.axes[0].bounds.high(), 63.0 * 4.0);

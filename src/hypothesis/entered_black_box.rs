@@ -125,8 +125,8 @@ impl DigitalTwin for WithFunction {
 
 #[cfg(test)]
 mod tests {
+    use super::super::basis::Of;
     use super::*;
-    use crate::diagnose::hypotheses::basis::Of;
     use crate::twin::fixture::AtOnce;
     use std::f64::consts::{PI, SQRT_2};
 

@@ -34,7 +34,7 @@ static NAMES: [&str; 21] = [
 
 /// A variable of a function and the range that it is seen in.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::diagnose) struct Variable {
+pub(crate) struct Variable {
     pub name: String,
     pub of: Of,
     pub low: f64,

@@ -11,7 +11,7 @@ const HIGHEST: usize = 6;
 
 /// Kind of a function's variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::diagnose) enum Of {
+pub(crate) enum Of {
     /// State of this index.
     State(usize),
     /// Input of this index.
@@ -89,11 +89,7 @@ fn is_nothing(m: &[f64]) -> bool {
 }
 
 /// The value of a fitted function where its variable is `value`; of one variable.
-pub(in crate::diagnose) fn basis(
-    value: f64,
-    variable: &(String, f64, f64),
-    count: usize,
-) -> Vec<f64> {
+pub(crate) fn basis(value: f64, variable: &(String, f64, f64), count: usize) -> Vec<f64> {
     let mut phi = vec![0.0; count];
     sines(value, (variable.1, variable.2), &mut phi);
     phi

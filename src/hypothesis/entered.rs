@@ -11,7 +11,7 @@ use smallvec::SmallVec;
 use std::sync::Arc;
 
 /// The twin with a function; θ is longer by its coefficients. A black box stays.
-pub(in crate::diagnose) fn with_function(base: Twin, function: Entered) -> Twin {
+pub(crate) fn with_function(base: Twin, function: Entered) -> Twin {
     base.modified(|base| {
         let mut outline = base.outline();
         outline.parameters = with_coefficients(&outline.parameters);

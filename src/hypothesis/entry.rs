@@ -5,7 +5,7 @@ use crate::twin::{Parameter, ParameterSpace, Role};
 
 /// Point at which a disturbance or a function enters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(in crate::diagnose) enum Entry {
+pub(crate) enum Entry {
     /// Added to the rate of a state.
     State(usize),
     /// Added to an output, before its noise.
@@ -17,12 +17,12 @@ pub(in crate::diagnose) enum Entry {
 }
 
 /// Standard deviation of a disturbance at the first sample, in units of σ: it began long before, unless it forgets nothing.
-pub(in crate::diagnose) fn started(memory: f64) -> f64 {
+pub(crate) fn started(memory: f64) -> f64 {
     if memory < 1.0 { 1.0 } else { 0.0 }
 }
 
 /// √(1 − a²), and 1 for a = 1: how much of σ comes anew at each step.
-pub(in crate::diagnose) fn share(memory: f64) -> f64 {
+pub(crate) fn share(memory: f64) -> f64 {
     match 1.0 - memory * memory {
         s if s > 0.0 => s.sqrt(),
         _ => 1.0,
@@ -34,7 +34,7 @@ pub(super) const LARGEST: f64 = 5.0;
 
 /// A function, where it enters, and the range that it is drawn over.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::diagnose) struct Entered {
+pub(crate) struct Entered {
     /// A sensor or a parameter.
     pub entry: Entry,
     pub of: Of,

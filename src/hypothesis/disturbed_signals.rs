@@ -1,6 +1,6 @@
 //! Disturbances of a black box's signals: what stands for an effect that nobody listed.
 
-use crate::diagnose::hypotheses::entry::{Entry, share, started};
+use super::entry::{Entry, share, started};
 use crate::record::{Drive, Signal, Signals};
 use crate::twin::{
     DigitalTwin, KnownNoise, Noise, NoisePart, Parameter, ParameterSpace, Role, SimulationError,
@@ -14,11 +14,7 @@ use std::sync::Arc;
 /// d ← a·d + σ·√(1 − a²)·w        (a = 1: d ← d + σ·w)        y_j + d   or   u_j + d
 /// d ~ N(0, σ²) at the start      (a = 1: 0)
 /// ```
-pub(in crate::diagnose) fn disturbed(
-    base: Arc<dyn DigitalTwin>,
-    entry: Entry,
-    memory: f64,
-) -> Twin {
+pub(crate) fn disturbed(base: Arc<dyn DigitalTwin>, entry: Entry, memory: f64) -> Twin {
     Twin::BlackBox(Arc::new(Disturbed {
         base,
         entry,

@@ -6,14 +6,14 @@ use super::entry::{Entered, Entry};
 use super::{disturbed_signals, entered_black_box};
 use crate::effect::{Effect, EffectKey, Magnitude, Shape, augment_late};
 use crate::fit::axis::Axis;
-use crate::study::StudyError;
+use crate::likelihood::kalman::FilterError;
 use crate::twin::{Twin, fix};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Kind of hypothesis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::diagnose) enum Nature {
+pub(crate) enum Nature {
     /// An effect of the library.
     Listed,
     /// An unknown function of states, inputs, signals or time.
@@ -32,7 +32,7 @@ pub(in crate::diagnose) enum Nature {
 
 /// Addition to the twin.
 #[derive(Debug, Clone)]
-pub(in crate::diagnose) enum Part {
+pub(crate) enum Part {
     /// An effect, some magnitudes of which may be held at their off value.
     Effect {
         effect: Effect,
@@ -46,7 +46,7 @@ pub(in crate::diagnose) enum Part {
 
 /// Values of a term's magnitudes at which a search looks.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::diagnose) struct Start {
+pub(crate) struct Start {
     pub m: Vec<f64>,
     /// True where the first magnitude is a size: a small value of it gives a direction, and the best multiple is the start.
     pub scales: bool,
@@ -54,7 +54,7 @@ pub(in crate::diagnose) struct Start {
 
 /// A term that a twin may lack.
 #[derive(Debug, Clone)]
-pub(in crate::diagnose) struct Term {
+pub(crate) struct Term {
     /// Id of the effect, or a word for the unknown.
     pub id: String,
     /// State, sensor, actuator or parameter.
@@ -75,7 +75,7 @@ pub(in crate::diagnose) struct Term {
 }
 
 /// Nats that the outputs themselves speak for terms together. Repeated values are one mark of a sensor, whatever limits or rounds it.
-pub(in crate::diagnose) fn marks<'t>(terms: impl IntoIterator<Item = &'t Arc<Term>>) -> f64 {
+pub(crate) fn marks<'t>(terms: impl IntoIterator<Item = &'t Arc<Term>>) -> f64 {
     let mut clearest: BTreeMap<&str, f64> = BTreeMap::new();
     for term in terms {
         let mark = clearest.entry(&term.target).or_default();
@@ -182,10 +182,10 @@ impl Term {
 }
 
 /// The twin with terms: effects first, a disturbance or a function that is no effect last.
-pub(in crate::diagnose) fn with_terms<'t>(
+pub(crate) fn with_terms<'t>(
     base: &Twin,
     terms: impl Iterator<Item = &'t Term> + Clone,
-) -> Result<Twin, StudyError> {
+) -> Result<Twin, FilterError> {
     let mut effects = vec![];
     let mut off = BTreeMap::new();
     for term in terms.clone() {
@@ -210,7 +210,7 @@ pub(in crate::diagnose) fn with_terms<'t>(
 }
 
 #[cfg(test)]
-pub(in crate::diagnose) mod fixture {
+pub(crate) mod fixture {
     use super::*;
     use crate::effect::Catalogue;
 

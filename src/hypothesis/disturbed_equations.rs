@@ -1,6 +1,6 @@
 //! Disturbances that stand for whatever is not in the library.
 
-use crate::diagnose::hypotheses::entry::{Entry, LARGEST, share, started};
+use super::entry::{Entry, LARGEST, share, started};
 use crate::record::Quantity;
 use crate::twin::{
     Layout, Modify, Now, Outline, Parameter, ParameterSpace, Role, StateSpace, Twin,
@@ -16,7 +16,7 @@ use std::sync::Arc;
 /// ```
 ///
 /// θ is longer by σ > 0; a black box stays. A filter that may follow d gains on every gap at the right place, and on one elsewhere less.
-pub(in crate::diagnose) fn disturbed(base: Twin, entry: Entry, memory: f64) -> Twin {
+pub(crate) fn disturbed(base: Twin, entry: Entry, memory: f64) -> Twin {
     base.modified(|base| {
         let mut outline = base.outline();
         // Noise may be coloured where something else is disturbed.

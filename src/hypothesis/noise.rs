@@ -1,11 +1,11 @@
 //! Kinds of noise that are no gap: with outliers, or coloured.
 
-use super::disturbances;
 use super::entry::Entry;
 use super::listed::Library;
 use super::term::{Nature, Term};
-use crate::effect::{EffectPattern, Law, TargetKind, targets};
-use crate::study::{Study, StudyError};
+use super::unknown::disturbances;
+use crate::effect::{Effect, TargetKind, targets};
+use crate::likelihood::kalman::FilterError;
 use crate::twin::is_memory;
 
 /// Steps over which coloured noise forgets itself: correlations of 0.37 and 0.85 from a sample to the next. What lasts longer is a
@@ -15,20 +15,16 @@ const COLOURS: [f64; 2] = [1.0, 6.0];
 const COLOURED: &str = "coloured-noise";
 
 /// Kinds of noise that the records may have at the places whose level is fitted, beside independent normal noise.
-pub(in crate::diagnose) fn kinds(
-    study: &Study,
-    without: &[EffectPattern],
+pub(crate) fn kinds(
+    outliers: &[Effect],
     library: &Library<'_>,
     fitted_noise: &[String],
-) -> Result<Vec<Term>, StudyError> {
+) -> Result<Vec<Term>, FilterError> {
     let scales = library.scales;
     let is_fitted = |target: &str| fitted_noise.iter().any(|place| place == target);
     let mut terms = vec![];
-    for effect in study.candidates() {
-        let excluded = without.iter().any(|p| p.matches(effect.key()));
-        if matches!(effect.law(), Law::Outliers(_)) && is_fitted(effect.target()) && !excluded {
-            terms.extend(library.terms(&effect)?);
-        }
+    for effect in outliers.iter().filter(|effect| is_fitted(effect.target())) {
+        terms.extend(library.terms(effect)?);
     }
     let dt = scales.dt();
     let mut coloured = |target: &str, entry: Entry, largest: f64| {

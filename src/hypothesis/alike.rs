@@ -6,7 +6,7 @@
 use super::listed::Library;
 use super::term::{Nature, Part, Term, with_terms};
 use crate::effect::{EffectKey, TargetKind};
-use crate::study::StudyError;
+use crate::likelihood::kalman::FilterError;
 
 /// Moments of each record at which equations are compared: many more than a law that is not the same could agree at by chance.
 const MOMENTS: usize = 48;
@@ -15,7 +15,7 @@ const SAME: f64 = 1e-6;
 
 /// Merges terms that add the same to the equations, at small sizes and at the largest. The first by place (state, actuator, sensor,
 /// parameter), then by name, stands for the others. A black box shows no equations, and keeps all.
-pub(super) fn merged(terms: Vec<Term>, library: &Library<'_>) -> Result<Vec<Term>, StudyError> {
+pub(crate) fn merged(terms: Vec<Term>, library: &Library<'_>) -> Result<Vec<Term>, FilterError> {
     let (twin, theta) = (library.twin, library.theta);
     let Some(own) = library.scales.equations_at(twin, theta, MOMENTS) else {
         return Ok(terms);
@@ -74,7 +74,7 @@ struct Additions<'t> {
 
 impl<'t> Additions<'t> {
     /// Additions of a term; `None` where more than its size is to be found, or where it adds nothing here.
-    fn of(term: &'t Term, beside: &Beside<'_>) -> Result<Option<Self>, StudyError> {
+    fn of(term: &'t Term, beside: &Beside<'_>) -> Result<Option<Self>, FilterError> {
         let is_effect = term.nature == Nature::Listed && !term.is_noise();
         let [axis] = &term.axes[..] else {
             return Ok(None);
@@ -95,7 +95,7 @@ impl<'t> Additions<'t> {
     }
 
     /// Returns whether some multiple of another term adds the same, small or large.
-    fn are_alike(&self, other: &Self, beside: &Beside<'_>) -> Result<bool, StudyError> {
+    fn are_alike(&self, other: &Self, beside: &Beside<'_>) -> Result<bool, FilterError> {
         // A friction is no force that may as well push.
         if self.term.axes[0].is_one_sided() != other.term.axes[0].is_one_sided() {
             return Ok(false);
@@ -135,7 +135,7 @@ struct Beside<'l> {
 
 impl Beside<'_> {
     /// Changes of rates and outputs by a term of this size; empty where it adds states.
-    fn added(&self, term: &Term, size: f64) -> Result<Vec<f64>, StudyError> {
+    fn added(&self, term: &Term, size: f64) -> Result<Vec<f64>, FilterError> {
         let Library {
             twin,
             theta,

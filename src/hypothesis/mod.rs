@@ -1,0 +1,48 @@
+//! Hypotheses of what a twin lacks, and their fit beside it: one engine for fits with effects and for diagnoses.
+//!
+//! | file | question |
+//! |---|---|
+//! | `term.rs`, `set.rs` | one term that a twin may lack; a set of terms by their keys |
+//! | `listed.rs`, `alike.rs` | effects of the library, in the units of the record; those that are one term of the equations |
+//! | `unknown.rs`, `functions.rs`, `basis.rs` | unknown functions and disturbances at every place |
+//! | `noise.rs` | other kinds of noise |
+//! | `scales.rs`, `magnitude.rs`, `frequencies.rs` | sizes of signals, states and rates; ranges of magnitudes; frequencies that residuals show |
+//! | `model.rs` | a twin with a set of terms, fitted: its evidence |
+//! | `screen.rs` | promise of each term along a grid of its magnitudes, before any fit |
+//! | `fits.rs`, `fold.rs`, `valleys.rs` | fits of a term from all starts: answered, annealed, from the prior's centre, unfolded, from other laws' tops |
+//! | `search.rs` | all terms screened, the promising ones fitted |
+//! | `effects.rs` | a fit with the effects of a study |
+
+mod alike;
+pub(crate) mod basis;
+pub(crate) mod disturbed_equations;
+mod disturbed_signals;
+mod entered;
+mod entered_black_box;
+pub(crate) mod entry;
+pub(crate) mod explanation;
+mod fits;
+mod fold;
+pub(crate) mod frequencies;
+pub(crate) mod functions;
+pub(crate) mod listed;
+pub(crate) mod model;
+pub(crate) mod noise;
+pub(crate) mod scales;
+mod screen;
+pub(crate) mod search;
+pub(crate) mod set;
+pub(crate) mod term;
+pub(crate) mod unknown;
+mod valleys;
+
+use self::term::Term;
+use std::sync::Arc;
+
+pub(crate) use alike::merged;
+pub(crate) use valleys::leave_valleys;
+
+/// Terms that several models hold.
+pub(crate) fn shared(terms: Vec<Term>) -> Vec<Arc<Term>> {
+    terms.into_iter().map(Arc::new).collect()
+}
