@@ -72,8 +72,9 @@
 //! | show progress, stop long work | [`progress`] |
 //! | import the usual names | [`prelude`] |
 //!
-//! The library never prints, never exits and sets no global thread pool. Cargo features: `cli` (command line; default),
-//! `mpi` (ranks of a cluster share work), `fmi` (FMUs as twins), `parquet` (records in Parquet files).
+//! The library never prints, never exits and sets no global thread pool. Cargo features: `cli` (command
+//! line), `report` (results as JSON, text and pages), `evaluate` (scores of estimators and diagnoses), all three default; `mpi` (ranks of a
+//! cluster share work), `fmi` (FMUs as twins), `parquet` (records in Parquet files).
 //!
 //! Public items, the command line and the schemas of files follow semantic versioning; bits of results do not
 //! ([docs/architecture.md](../../../docs/architecture.md#versions)).
@@ -130,8 +131,10 @@ pub mod estimator;
 
 pub mod diagnose;
 
+#[cfg(feature = "evaluate")]
 pub mod evaluate;
 
+#[cfg(feature = "report")]
 pub mod report;
 
 #[cfg(feature = "cli")]

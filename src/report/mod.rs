@@ -38,8 +38,10 @@ mod fixture;
 mod gap;
 mod page;
 mod parameters;
+#[cfg(feature = "evaluate")]
 mod reproduce;
 mod residuals;
+#[cfg(feature = "evaluate")]
 mod scorecard;
 mod table;
 mod units;
@@ -49,13 +51,16 @@ pub(crate) use estimate::{overlay_svg, together_json, together_text, trajectorie
 pub(crate) use fit::posterior_svg;
 pub(crate) use gap::NEXT_INPUT;
 pub(crate) use page::with_footer;
+#[cfg(feature = "evaluate")]
 pub(crate) use reproduce::{
     coverage_svg, first_run_svg, mean_runs_svg, reproduce_json, reproduce_text,
 };
+#[cfg(feature = "evaluate")]
 pub(crate) use scorecard::{scorecard_json, scorecard_text};
 
 use crate::diagnose::Diagnosis;
 use crate::estimator::Estimate;
+#[cfg(feature = "evaluate")]
 use crate::evaluate::trials::Scorecard;
 use crate::fit::Fit;
 use crate::record::Record;
@@ -128,6 +133,7 @@ impl Diagnosis {
     }
 }
 
+#[cfg(feature = "evaluate")]
 impl Scorecard {
     /// Page of its own: what was found of what was there, place, probabilities, every trial.
     pub fn html(&self) -> String {
