@@ -31,6 +31,8 @@ mod answer;
 mod chart;
 mod compare;
 mod digits;
+#[allow(dead_code)]
+mod document;
 mod estimate;
 mod fit;
 #[cfg(test)]
