@@ -1,7 +1,6 @@
 //! The twin as it is, fitted: where a diagnosis begins.
 
 use super::candidates;
-use super::outcome::Verdict;
 use super::settings::{Ablation, DiagnoseSettings};
 use super::step::FinerStep;
 use super::thresholds::Thresholds;
@@ -219,17 +218,6 @@ impl Base {
     }
 }
 
-/// The kind of gap: structural where the evidence says so, otherwise by whether θ left its prior significantly.
-pub(in crate::diagnose) fn verdict(log_odds: f64, outside: bool) -> Verdict {
-    if log_odds > Thresholds::GAP {
-        Verdict::StructuralGap
-    } else if outside {
-        Verdict::ParameterGap
-    } else {
-        Verdict::NoGap
-    }
-}
-
 /// The problem with the twin's own parameters held within their prior box.
 fn inside(problem: &Problem) -> Problem {
     let space = problem.twin.parameters();
@@ -278,16 +266,4 @@ pub(in crate::diagnose) fn left_the_prior(
     let boxed = inside(&model.problem);
     let within = within.and_then(|w| Model::bare(model.base.clone(), boxed, w, model.by_bic));
     Ok((ratio > limit, within))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn evidence_comes_before_the_prior() {
-        assert_eq!(verdict(4.0, true), Verdict::StructuralGap);
-        assert_eq!(verdict(-1.0, true), Verdict::ParameterGap);
-        assert_eq!(verdict(-1.0, false), Verdict::NoGap);
-    }
 }

@@ -62,7 +62,7 @@ fn search_part<R>(
             return Ok(None);
         };
         let on_all = |own: Explored<'_>| -> Result<Option<R>, StudyError> {
-            if own.chances.log_odds < CLEAR || own.findings.leads_with_wave() {
+            if own.posterior.log_odds < CLEAR || own.findings.leads_with_wave() {
                 return Ok(None);
             }
             let stage = progress.stage("all rows", 1);
@@ -81,7 +81,7 @@ fn search_part<R>(
                 study,
                 base: &base,
                 listed: own.listed,
-                chances: findings.chances(),
+                posterior: findings.posterior(),
                 findings,
                 not_tested: own.not_tested,
                 searched: Some(first),
@@ -235,7 +235,7 @@ mod tests {
             ..DiagnoseSettings::default()
         };
         let seen = search(&study, &records, &settings, &Progress::silent(), &|found| {
-            Ok((found.searched, found.chances.log_odds))
+            Ok((found.searched, found.posterior.log_odds))
         });
         let (searched, log_odds) = seen.unwrap();
         assert_eq!(searched, None);

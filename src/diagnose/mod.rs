@@ -2,14 +2,15 @@
 //!
 //! | room | question |
 //! |---|---|
-//! | `run.rs`, `base.rs`, `summary.rs` | order of the steps; the fitted twin that they begin with; the summary of their results |
+//! | `run.rs`, `base.rs` | order of the steps; the fitted twin that they begin with |
 //! | `rounds.rs` | the search, again with another kind of noise or a finer step |
 //! | `long.rs` | long records: searched in part, fitted whole |
 //! | `greedy.rs` | a baseline: forward selection by BIC |
 //! | `known.rs` | the share that effects close which are known to be there |
 //! | `step.rs` | whether a finer step of the integrator explains the records better |
 //! | `candidates.rs` | effects that the study lets a diagnosis name |
-//! | `explain/` | which hypotheses of the engine (`hypothesis`): weighed, decided |
+//! | `explain/` | which hypotheses of the engine (`hypothesis`): weighed, compared |
+//! | `answer/` | the answer: posterior of what was found, decision, names, places |
 //! | `residuals/` | innovations cut by time, state, lag and frequency |
 //! | `locate/` | where: places, missing functions, maps of the residuals |
 //! | `quantify/` | how far: share closed, smallest visible effect, next input, calibration |
@@ -18,6 +19,7 @@
 //! Everything is decided by evidence: the likelihood of the records averaged over what is unknown, noise levels and starts included.
 //! See docs/diagnosing-a-gap.md for the mathematics and how to read the answer.
 
+pub(crate) mod answer;
 mod base;
 mod candidates;
 mod explain;
@@ -34,7 +36,6 @@ mod rounds;
 mod run;
 mod settings;
 mod step;
-mod summary;
 mod thresholds;
 
 pub(crate) use greedy::greedy;
@@ -51,3 +52,5 @@ pub use settings::{Ablation, DiagnoseSettings};
 
 /// Nats within which explanations are rivals.
 pub(crate) const RIVALS: f64 = thresholds::Thresholds::RIVALS;
+/// Level of the intervals.
+pub(crate) const INTERVAL_LEVEL: f64 = thresholds::Thresholds::INTERVAL_LEVEL;

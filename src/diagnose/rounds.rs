@@ -1,8 +1,8 @@
 //! Rounds of the search: the twin as it is, with another kind of noise, with a finer step.
 
+use super::answer::Posterior;
 use super::base::Base;
 use super::candidates::{not_tested, outliers};
-use super::explain::chances::Chances;
 use super::explain::explore::{Before, STEPS, explore, singles, what_is_left};
 use super::explain::findings::Findings;
 use super::explain::search::{Breadth, listed};
@@ -42,7 +42,7 @@ pub(in crate::diagnose) struct Explored<'s> {
     pub base: &'s Base,
     pub listed: &'s [Arc<Term>],
     pub findings: Findings,
-    pub chances: Chances,
+    pub posterior: Posterior,
     pub not_tested: Vec<String>,
     /// Rows that the search saw, where it did not see all.
     pub searched: Option<usize>,
@@ -51,7 +51,7 @@ pub(in crate::diagnose) struct Explored<'s> {
 impl Explored<'_> {
     /// log of the evidence of all hypotheses together.
     fn log_evidence(&self) -> f64 {
-        self.base.model.log_evidence + self.chances.log_evidence
+        self.base.model.log_evidence + self.posterior.log_evidence
     }
 }
 
@@ -96,7 +96,9 @@ fn likelier_with_step<R>(
     progress: &Progress,
     then: &dyn Fn(Explored<'_>) -> Result<R, StudyError>,
 ) -> Result<Option<R>, StudyError> {
-    if own.base.step.is_some() || own.findings.is_partial || own.chances.log_odds <= Thresholds::GAP
+    if own.base.step.is_some()
+        || own.findings.is_partial
+        || own.posterior.log_odds <= Thresholds::GAP
     {
         return Ok(None);
     }
@@ -274,7 +276,7 @@ fn explored<R>(
     }
     then(Explored {
         study,
-        chances: findings.chances(),
+        posterior: findings.posterior(),
         findings,
         base: &base,
         listed: &effects,

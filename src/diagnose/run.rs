@@ -1,8 +1,8 @@
 //! Entry of a diagnosis, and the order of its steps.
 
-use super::base::{left_the_prior, verdict};
-use super::explain::chances::Chances;
-use super::explain::decide::{Conclusion, decide};
+use super::answer::summary::{effects, nuisance, onset, parameters, remains};
+use super::answer::{Answer, Hypotheses};
+use super::base::left_the_prior;
 use super::explain::explore::absorbing;
 use super::explain::findings::Findings;
 use super::locate::discover::discover;
@@ -17,7 +17,6 @@ use super::quantify::power::power;
 use super::quantify::share::{Measures, shrinkage};
 use super::rounds::Explored;
 use super::settings::DiagnoseSettings;
-use super::summary::{effects, nuisance, onset, parameters, remains};
 use super::thresholds::Thresholds;
 use crate::fit::climb::climb;
 use crate::hypothesis::model::Model;
@@ -32,8 +31,6 @@ use crate::twin::Noise;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Most effects that are named together.
-const MOST_EFFECTS: usize = 2;
 /// Most iterations of the last fit of what is accepted.
 const FINISH: usize = 80;
 
@@ -106,14 +103,14 @@ fn report(
         base,
         listed,
         findings,
-        chances,
+        posterior,
         not_tested,
         searched,
     } = &explored;
     let model = &base.model;
     let records = &model.problem.records;
     let mut detection = Detection {
-        log_evidence: chances.log_odds,
+        log_evidence: posterior.log_odds,
         p_value: None,
         simulations: settings.calibrate,
         at_floor: false,
@@ -129,10 +126,10 @@ fn report(
         let log_odds = |records: &[Record]| {
             let silent = Progress::silent();
             search(study, &Arc::from(records), &alone, &silent, &|found| {
-                Ok(found.chances.log_odds)
+                Ok(found.posterior.log_odds)
             })
         };
-        let own = chances.log_odds;
+        let own = posterior.log_odds;
         let p = calibrate(
             model,
             settings.calibrate,
@@ -150,42 +147,44 @@ fn report(
         }
     }
     let (outside, within) = left_the_prior(model, settings.alpha)?;
-    let verdict = verdict(chances.log_odds, outside);
-    let mut conclusion = Conclusion::default();
+    let hypotheses = Hypotheses {
+        has_equations: base.scales.has_equations(),
+        ..findings.hypotheses()
+    };
+    let mut answer = Answer::new(hypotheses.posterior(), outside);
     let mut absorbed = vec![];
-    match (verdict, within) {
-        (Verdict::StructuralGap, _) if !settings.detection_only => {
-            conclusion = decide(findings, chances, MOST_EFFECTS, base.scales.has_equations())
-        }
+    match (answer.verdict, within) {
+        (Verdict::StructuralGap, _) if !settings.detection_only => answer = answer.decided(),
         (Verdict::ParameterGap, Some(within)) if !settings.detection_only => {
             absorbed = absorbing(model, &within, listed)?;
             if !absorbed.is_empty() {
-                conclusion.decision = Decision::Absorbed;
-                conclusion.class = absorbed.iter().flat_map(|f| f.last().keys()).collect();
+                answer.decision = Decision::Absorbed;
+                answer.class = absorbed.iter().flat_map(|f| f.last().keys()).collect();
             }
         }
         _ => {}
     }
     let is_linearised = !base.scales.has_equations() && !base.is_silent;
-    if is_linearised && !is_nearer(findings.model(&conclusion.accepted), model)? {
-        conclusion = Conclusion::none_of_these();
+    if is_linearised && !is_nearer(findings.model(&answer.accepted), model)? {
+        answer = answer.refuted();
     }
-    let finished = finished(findings.model(&conclusion.accepted))?;
+    let verdict = answer.verdict;
+    let finished = finished(findings.model(&answer.accepted))?;
     let accepted = finished.as_ref();
     let last = accepted.unwrap_or(model);
     let stage = progress.stage("where and how far", 4);
     let mut location = Location::default();
     let (mut next, mut discovery, mut visible, mut shrunk) = (None, None, vec![], None);
     if verdict == Verdict::StructuralGap && !settings.detection_only {
-        location = located(findings, chances, &conclusion, model)?;
+        location = located(findings, &answer, model)?;
         location.after = accepted.map(|m| maps(m, None)).transpose()?;
-        discovery = discovered(findings, &conclusion, &location, noise);
+        discovery = discovered(findings, &answer, &location, noise);
     }
     settings.ends(stage.tick())?;
     if !settings.detection_only {
-        let is_class = conclusion.decision == Decision::Class && conclusion.accepted.len() == 1;
+        let is_class = answer.decision == Decision::Class && answer.accepted.len() == 1;
         if is_class && !settings.quick {
-            let rivals: Vec<&Model> = (conclusion.class.iter())
+            let rivals: Vec<&Model> = (answer.class.iter())
                 .filter_map(|key| findings.model(std::slice::from_ref(key)))
                 .collect();
             next = next_input(&rivals, noise.child("next"))?;
@@ -200,7 +199,7 @@ fn report(
             base: model,
             accepted,
             others: &findings.listed,
-            class: &conclusion.class,
+            class: &answer.class,
             validation,
             initial: settings.initial.as_deref(),
         };
@@ -241,18 +240,18 @@ fn report(
             ..location
         },
         cause: Cause {
-            decision: conclusion.decision,
+            decision: answer.decision,
             effects: match verdict {
                 Verdict::StructuralGap if !settings.detection_only => {
-                    effects(findings, chances, &conclusion, accepted)
+                    effects(findings, &answer, accepted)
                 }
-                _ => super::summary::absorbed(&absorbed),
+                _ => super::answer::summary::absorbed(&absorbed),
             },
-            probabilities: chances.kinds,
-            remains: remains(findings, &conclusion),
+            probabilities: answer.posterior.kinds,
+            remains: remains(findings, &answer),
             next_input: next,
-            class: conclusion.class,
-            accepted: conclusion.accepted,
+            class: answer.class,
+            accepted: answer.accepted,
         },
         shrinkage: shrunk,
         discovery,
@@ -297,32 +296,20 @@ fn is_nearer(model: Option<&Model>, twin: &Model) -> Result<bool, StudyError> {
 }
 
 /// Places, missing functions and residuals of a structural gap.
-fn located(
-    findings: &Findings,
-    chances: &Chances,
-    conclusion: &Conclusion,
-    model: &Model,
-) -> Result<Location, StudyError> {
-    let mut targets: Vec<TargetShare> = (chances.places.iter())
-        .map(|(target, p)| TargetShare {
-            target: target.clone(),
-            probability: p / (1.0 - chances.kinds.nothing).max(f64::MIN_POSITIVE),
-        })
-        .collect();
-    targets.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    let accepted: Vec<&str> = (findings.model(&conclusion.accepted).iter())
+fn located(findings: &Findings, answer: &Answer, model: &Model) -> Result<Location, StudyError> {
+    let targets = answer.posterior.targets();
+    let accepted: Vec<&str> = (findings.model(&answer.accepted).iter())
         .flat_map(|m| &m.terms)
         .map(|term| term.target.as_str())
         .collect();
-    let most = targets.first().map(|t| t.target.as_str());
-    let target = (accepted.first().copied().or(most)).map(str::to_owned);
+    let target = answer.place();
     let several = accepted.iter().any(|place| *place != accepted[0]);
     let class = match &target {
         Some(target) if !several => TargetShare::alike(&targets, target),
         _ => vec![],
     };
     let mut functions = told(&findings.unknown, target.as_deref(), false, 0.0);
-    if let Some((keys, on_top)) = findings.beside(&conclusion.accepted) {
+    if let Some((keys, on_top)) = findings.beside(&answer.accepted) {
         let floor = findings.gain(keys).unwrap_or(0.0);
         functions.extend(told(on_top, target.as_deref(), true, floor));
     }
@@ -340,16 +327,16 @@ fn located(
 /// A sparse law for what is missing, where nothing listed explains it all.
 fn discovered(
     findings: &Findings,
-    conclusion: &Conclusion,
+    answer: &Answer,
     location: &Location,
     noise: Noise,
 ) -> Option<Discovery> {
     // The place that the answer states: of the gap, or of what remains beside the accepted effects.
-    let (all, place) = match conclusion.decision {
+    let (all, place) = match answer.decision {
         Decision::NoneOfThese => (&findings.unknown[..], location.target.clone()?),
         Decision::Partial => (
-            findings.beside(&conclusion.accepted)?.1,
-            remains(findings, conclusion)?.place,
+            findings.beside(&answer.accepted)?.1,
+            remains(findings, answer)?.place,
         ),
         _ => return None,
     };

@@ -92,14 +92,10 @@ impl Thresholds {
     pub const FINE_PRINT: f64 = 0.02;
     /// Distance to the best within which a single effect may still be the explanation.
     pub const CANDIDATES: f64 = search::CANDIDATES;
-    /// Lead that a larger set of effects needs over a smaller one, its price paid.
-    pub const WORTH_ANOTHER: f64 = 2.0;
     /// Most of the twin's free-run error that may be left with an effect of a black box's signals.
     pub const NEARER: f64 = 0.95;
-    /// Least probability of a name together with its rivals.
+    /// Least probability of a name, or of rivals together.
     pub const SAID: f64 = 0.5;
-    /// Probability below which an effect is not accepted, whatever its rivals: the best set is then one that leaves something.
-    pub const REFUTED: f64 = 0.1;
     /// Distance within which effects are rivals.
     pub const RIVALS: f64 = 3.0;
     /// Prior probability that something else is missing beside a listed effect, shared among listed effects and unknown functions as what

@@ -133,8 +133,8 @@ impl Findings {
 
     /// The most probable of the best single effect and those within 3 nats of it.
     pub fn likeliest_single(&self) -> Option<&Found> {
-        let chances = self.chances();
-        let probability = |found: &Found| chances.effect(&found.last().key());
+        let posterior = self.posterior();
+        let probability = |found: &Found| posterior.name(&found.last().key());
         (self.listed.iter())
             .filter(|found| found.gain > self.top() - Thresholds::RIVALS)
             .max_by(|a, b| probability(a).total_cmp(&probability(b)))
@@ -186,7 +186,7 @@ impl Findings {
         }
         let best = self.noise.first()?;
         let explains = best.gain > Thresholds::NOISE;
-        let enough = self.chances().log_odds <= Thresholds::GAP;
+        let enough = self.posterior().log_odds <= Thresholds::GAP;
         (explains && enough).then(|| self.noise_of(&best.last().key()))?
     }
 

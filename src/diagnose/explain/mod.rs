@@ -1,7 +1,5 @@
 //! Which hypothesis explains the records: screened, refitted, weighed.
 
-pub(in crate::diagnose) mod chances;
-pub(in crate::diagnose) mod decide;
 pub(in crate::diagnose) mod explore;
 pub(in crate::diagnose) mod findings;
 pub(in crate::diagnose) mod found;

@@ -169,6 +169,19 @@ pub struct Probabilities {
     pub nothing: f64,
 }
 
+impl Probabilities {
+    /// The same, adding up to one.
+    pub(in crate::diagnose) fn normalised(self) -> Self {
+        let sum = self.listed + self.partial + self.unknown + self.nothing;
+        Self {
+            listed: self.listed / sum,
+            partial: self.partial / sum,
+            unknown: self.unknown / sum,
+            nothing: self.nothing / sum,
+        }
+    }
+}
+
 /// Something unknown on top of effects.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Remains {

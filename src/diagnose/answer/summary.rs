@@ -1,12 +1,11 @@
 //! Summary of fits for a report.
 
-use super::explain::chances::Chances;
-use super::explain::decide::Conclusion;
-use super::explain::findings::Findings;
-use super::explain::found::Found;
-use super::outcome::{Decision, EffectFit, FittedParameter, Onset, Remains};
-use super::settings::DiagnoseSettings;
-use super::thresholds::Thresholds;
+use super::Answer;
+use crate::diagnose::explain::findings::Findings;
+use crate::diagnose::explain::found::Found;
+use crate::diagnose::outcome::{Decision, EffectFit, FittedParameter, Onset, Remains};
+use crate::diagnose::settings::DiagnoseSettings;
+use crate::diagnose::thresholds::Thresholds;
 use crate::fit::Nuisance;
 use crate::fit::follow::starts;
 use crate::fit::posterior::Spread;
@@ -20,14 +19,13 @@ use std::sync::Arc;
 /// Listed effects as they are reported: the accepted ones first, then by probability.
 pub(in crate::diagnose) fn effects(
     findings: &Findings,
-    chances: &Chances,
-    conclusion: &Conclusion,
+    answer: &Answer,
     accepted: Option<&Model>,
 ) -> Vec<EffectFit> {
     let mut all: Vec<EffectFit> = (findings.listed.iter())
         .filter_map(|found| {
             let model = found.model.as_ref()?;
-            let probability = chances.effect(&found.last().key());
+            let probability = answer.posterior.name(&found.last().key());
             Some(fit_of(model, found.last(), probability, found.gain))
         })
         .collect();
@@ -35,14 +33,14 @@ pub(in crate::diagnose) fn effects(
         (b.probability.total_cmp(&a.probability)).then(b.log_evidence.total_cmp(&a.log_evidence))
     });
     if let Some(model) = accepted {
-        let gain = findings.gain(&conclusion.accepted).unwrap_or(0.0);
+        let gain = findings.gain(&answer.accepted).unwrap_or(0.0);
         let mut first: Vec<EffectFit> = (model.terms.iter())
             .map(|term| {
-                let probability = chances.effect(&term.key());
+                let probability = answer.posterior.name(&term.key());
                 fit_of(model, term, probability, gain)
             })
             .collect();
-        all.retain(|e| !conclusion.accepted.contains(&e.key()));
+        all.retain(|e| !answer.accepted.contains(&e.key()));
         first.append(&mut all);
         all = first;
     }
@@ -210,28 +208,19 @@ pub(in crate::diagnose) fn onset(model: &Model) -> Option<Onset> {
     })
 }
 
-/// Unknown rest on top of the accepted effects, or else of the best single one: what a function adds, or, of a part, by how much one
-/// explains more in its place.
-pub(in crate::diagnose) fn remains(
-    findings: &Findings,
-    conclusion: &Conclusion,
-) -> Option<Remains> {
-    if conclusion.decision == Decision::NotNeeded {
+/// Unknown rest on top of the accepted effects, or else of the best single one: what a function adds.
+pub(in crate::diagnose) fn remains(findings: &Findings, answer: &Answer) -> Option<Remains> {
+    if answer.decision == Decision::NotNeeded {
         return None;
     }
     let best = || findings.listed.first().map(Found::keys);
-    let keys = match conclusion.accepted.is_empty() {
+    let keys = match answer.accepted.is_empty() {
         true => best()?,
-        false => conclusion.accepted.clone(),
+        false => answer.accepted.clone(),
     };
     let (keys, on_top) = findings.beside(&keys)?;
     let own = findings.gain(keys)?;
-    let mut rest = on_top.first()?;
-    if conclusion.decision == Decision::Partial {
-        // A function that holds the effect, and explains more without it.
-        let alone = findings.rivals().find(|f| findings.is_held_by(keys, f));
-        rest = alone.filter(|f| f.gain > rest.gain).unwrap_or(rest);
-    }
+    let rest = on_top.first()?;
     let added = (rest.gain - own).max(0.0);
     Some(Remains {
         place: rest.last().target.clone(),

@@ -1,0 +1,102 @@
+//! Findings of the search as hypotheses to be weighed.
+
+use super::posterior::{Function, Hypotheses, Places, Posterior, Set, log_sum};
+use crate::diagnose::explain::findings::Findings;
+use crate::diagnose::explain::found::Found;
+use crate::effect::TargetKind;
+use crate::fit::evidence::log_mean;
+use crate::hypothesis::term::{Nature, Part, Term};
+use std::sync::Arc;
+
+impl Findings {
+    /// What was found, as hypotheses.
+    pub fn hypotheses(&self) -> Hypotheses {
+        let sets = (self.listed.iter().chain(&self.several)).map(|found| {
+            let keys = found.keys();
+            let beside = (self.beside(&keys))
+                .map(|(_, on_top)| on_top.iter().map(|f| self.function(f)).collect());
+            Set {
+                log_z: found.gain,
+                places: places(&found.terms),
+                keys,
+                beside,
+            }
+        });
+        let aliased = (self.listed.iter()).filter(|found| !found.last().also.is_empty());
+        Hypotheses {
+            nothing: self.nothing(),
+            sets: sets.collect(),
+            functions: self.rivals().map(|f| self.function(f)).collect(),
+            searched: self.unknown.len(),
+            has_equations: true,
+            aliases: (aliased.map(|f| (f.last().key(), f.last().keys().split_off(1)))).collect(),
+        }
+    }
+
+    /// Posterior probabilities of what was found.
+    pub fn posterior(&self) -> Posterior {
+        self.hypotheses().posterior()
+    }
+
+    /// log of the odds of a gap against none, noise being of the twin's own kind.
+    pub fn log_odds_alone(&self) -> f64 {
+        self.posterior().log_odds + self.nothing()
+    }
+
+    fn function(&self, found: &Found) -> Function {
+        let function = found.last();
+        let held = (self.listed.iter()).filter(|f| holds(function, f.last()));
+        Function {
+            log_z: found.gain,
+            places: places(std::slice::from_ref(function)),
+            holds: held.map(|f| f.last().key()).collect(),
+        }
+    }
+
+    /// log of the evidence of nothing missing, whatever the noise, over that of the twin.
+    fn nothing(&self) -> f64 {
+        let [alone, pairs] = [&self.noise, &self.noise_pairs]
+            .map(|all| log_mean(&all.iter().map(|f| f.gain).collect::<Vec<f64>>()));
+        // The best of n kinds makes n − 1 of the n(n − 1)/2 pairs.
+        let pairs = pairs - (0.5 * self.noise.len() as f64).ln();
+        log_sum([0.0, alone, pairs].into_iter().filter(|z| z.is_finite()))
+    }
+}
+
+/// Places of terms, and the share of each: a term's part of one is shared by the places of its names.
+fn places(terms: &[Arc<Term>]) -> Places {
+    let mut all = vec![];
+    for term in terms {
+        let places = term.places();
+        let share = 1.0 / (terms.len() * places.len()) as f64;
+        all.extend(places.into_iter().map(|place| (place.to_owned(), share)));
+    }
+    all
+}
+
+/// Returns whether an effect is a function of the same variable at the same place, so that an unknown function there is the effect in
+/// another form.
+fn holds(function: &Term, effect: &Term) -> bool {
+    let Part::Effect { effect: law, .. } = &effect.part else {
+        return false;
+    };
+    if !effect.places().contains(&function.target.as_str()) {
+        return false;
+    }
+    let [(variable, ..)] = function.variables.as_slice() else {
+        return false;
+    };
+    // Every function contains a constant.
+    if law.id().ends_with("-bias") || law.id() == "constant-forcing" {
+        return true;
+    }
+    let of_time = variable == "t";
+    match law.law().target() {
+        TargetKind::State if law.id() == "periodic-disturbance" => of_time,
+        TargetKind::State => law.entry().from.as_deref().unwrap_or(law.target()) == variable,
+        TargetKind::Parameter => of_time,
+        TargetKind::Sensor | TargetKind::Actuator => {
+            function.nature == Nature::Function && of_time == (law.id() == "sensor-drift")
+        }
+    }
+}
