@@ -1,6 +1,6 @@
 //! Embedding: arrays in, result out, with progress and cancellation; nothing is printed by the library.
 //!
-//! `cargo run --release --example embed` (add `-- small` for a run of a few seconds)
+//! `cargo run --release --example embed`
 
 use ndarray::Array2;
 use std::sync::Arc;
@@ -29,34 +29,30 @@ impl Listener for Window {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let small = std::env::args().any(|a| a == "small");
-    let window = Arc::new(Window::default());
-    let progress = Progress::new(window.clone());
-
-    // A twin, and what its records look like: 300 samples, 0.05 s apart.
-    let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 300))?;
-    let options = PretrainOptions {
-        bank_size: Some(if small { 500 } else { 5000 }),
-        epochs: Some(if small { 10 } else { 60 }),
-        seed: 1,
-        ..PretrainOptions::default()
-    };
-    let (estimator, _history) = pretrain(&study, &options, &progress)?;
-
     // The measurement, as an application has it: plain arrays. Here ν = 3, outside of the prior [0, 2.5].
     let drive = Drive::autonomous(0.05, 300)?;
     let measured: Array2<f64> = VanDerPol.simulate(&[3.0], &drive, Noise::new(7, "measured", 0))?;
-    let record = Record::new(drive, measured)?;
+    let no_input = Array2::zeros((300, 0));
+    let record = Record::from_views(0.05, no_input.view(), measured.view())?;
 
-    let estimate = estimator.estimate(&record, &EstimateOptions::default(), &progress)?;
+    let study = Study::of(VanDerPol)?;
+    let nu = &study.fit(&[record.clone()])?.parameters[0];
     println!(
-        "gate p = {:.3}; nu: network {:.3}, calibrated {:.3} ± {:.3} (truth 3)",
-        estimate.gate.p_value, estimate.initial.theta[0], estimate.theta[0], estimate.std_error[0]
+        "nu {:.3}, {:.3} to {:.3} (truth 3)",
+        nu.value, nu.low, nu.high
     );
 
-    // A stop button ends long work at the next unit, with an error that says so.
+    // With progress, and a stop button that ends long work at the next unit.
+    let window = Arc::new(Window::default());
+    let progress = Progress::new(window.clone());
+    let quick = DiagnoseSettings {
+        quick: true,
+        ..DiagnoseSettings::default()
+    };
+    let diagnosis = diagnose(&study, &[record.clone()], None, &quick, &progress)?;
+    println!("{:?}", diagnosis.verdict);
     window.stop.store(true, Ordering::Relaxed);
-    match pretrain(&study, &options, &progress) {
+    match diagnose(&study, &[record], None, &quick, &progress) {
         Err(error) => println!("stopped: {error}"),
         Ok(_) => return Err("the stop button did nothing".into()),
     }

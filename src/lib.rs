@@ -36,22 +36,17 @@
 //!     }
 //! }
 //!
-//! // Records: 200 samples, 0.1 s apart; input levels in [0, 1], each held for 20 samples.
-//! let study = Study::new("tank", Tank, RecordPlan::levels(0.1, 200, 0.0, 1.0, 20))?;
-//! let small = PretrainOptions { bank_size: Some(300), epochs: Some(5), ..PretrainOptions::default() };
-//! let (estimator, _) = pretrain(&study, &small, &Progress::silent())?;
-//!
-//! // The measured record, here of a tank with k = 1.5, outside the prior.
-//! let noise = Noise::new(7, "measured", 0);
-//! let drive = study.drive(noise)?;
-//! let outputs = Tank.simulate(&[1.5], &drive, noise)?;
+//! // The measured record: 200 samples, 0.1 s apart; here of a tank with k = 1.5, outside its prior.
+//! let u: Vec<f64> = (0..200).map(|k| [0.9, 0.2, 0.6][k / 20 % 3]).collect();
+//! let drive = Drive::from_slices(0.1, &[&u])?;
+//! let outputs = Tank.simulate(&[1.5], &drive, Noise::new(7, "measured", 0))?;
 //! let record = Record::new(drive, outputs)?;
 //!
-//! let estimate = estimator.estimate(&record, &EstimateOptions::default(), &Progress::silent())?;
-//! assert!((estimate.theta[0] - 1.5).abs() < 4.0 * estimate.std_error[0]);
+//! let study = Study::of(Tank)?;
+//! let fit = study.fit(&[record.clone()])?;
+//! assert!((fit.parameters[0].value - 1.5).abs() < 4.0 * fit.parameters[0].std_error);
 //!
-//! let settings = DiagnoseSettings { detection_only: true, ..DiagnoseSettings::default() };
-//! let diagnosis = diagnose(&study, &[record], None, &settings, &Progress::silent())?;
+//! let diagnosis = study.diagnose(&[record])?;
 //! assert_eq!(diagnosis.verdict, Verdict::ParameterGap); // k is outside its prior; the equations are right
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -62,6 +57,7 @@
 //! | use a program in any language, or an FMU | [`external`] |
 //! | read and write records | [`record`] |
 //! | combine twin, record plan and effects | [`study`] |
+//! | fit measured records | [`fit`], [`study::Study::fit`] |
 //! | train, save, load, estimate; own features and networks | [`estimator`], [`feature`], [`network`] |
 //! | find missing effects | [`diagnose`] |
 //! | add effects to a twin | [`effect`] |

@@ -41,7 +41,8 @@ pub fn run(clock: &Clock) {
             always_refine: true,
             ..EstimateOptions::default()
         };
-        let refined = || (estimator.estimate(&record, &options, &silent)).expect("it is estimated");
+        let refined =
+            || (estimator.estimate_with(&record, &options, &silent)).expect("it is estimated");
         for (part, key) in [("gate", "gate"), ("Gauss–Newton", "gauss_newton")] {
             clock.print(&name(part), 1, |calls| {
                 let seconds = (0..calls).filter_map(|_| {

@@ -1,5 +1,6 @@
 //! Turns errors into one line and an exit code.
 
+use super::remedy::with_remedy;
 use super::say::say;
 use crate::estimator::EstimatorError;
 use crate::evaluate::EvaluateError;
@@ -171,12 +172,18 @@ macro_rules! users {
     ($($error:ty),* $(,)?) => {
         $(impl From<$error> for Failure {
             fn from(error: $error) -> Self {
-                Self::user(error)
+                Self::user(with_remedy(&error))
             }
         })*
     };
 }
-users!(RecordError, SimulationError, StorageError, TwinError);
+users!(RecordError, StorageError, TwinError);
+
+impl From<SimulationError> for Failure {
+    fn from(error: SimulationError) -> Self {
+        Self::user(error)
+    }
+}
 
 impl From<FeatureError> for Failure {
     fn from(error: FeatureError) -> Self {
@@ -188,7 +195,7 @@ impl From<StudyError> for Failure {
     fn from(error: StudyError) -> Self {
         match error {
             StudyError::Cancelled(_) => Self::internal(error),
-            _ => Self::study(error),
+            _ => Self::study(with_remedy(&error)),
         }
     }
 }
@@ -199,8 +206,8 @@ impl From<EvaluateError> for Failure {
             EvaluateError::Cancelled(_) => Self::internal(error),
             EvaluateError::NoDeparture { .. }
             | EvaluateError::NoTruth { .. }
-            | EvaluateError::Plan(_) => Self::study(error),
-            _ => Self::user(error),
+            | EvaluateError::Plan(_) => Self::study(with_remedy(&error)),
+            _ => Self::user(with_remedy(&error)),
         }
     }
 }
@@ -225,7 +232,7 @@ impl From<EstimatorError> for Failure {
             E::Simulation(_) | E::Rejected(_) | E::Hopeless { .. } | E::Inputs(_) => {
                 Self::study(error)
             }
-            _ => Self::user(error),
+            _ => Self::user(with_remedy(&error)),
         }
     }
 }

@@ -24,6 +24,7 @@ mod posterior;
 mod progress;
 mod provenance;
 mod records;
+mod remedy;
 mod say;
 mod stop;
 mod verbs;

@@ -42,19 +42,16 @@ const FINISH: usize = 80;
 /// seed gives the same bits on any number of threads.
 ///
 /// ```
-/// use truetwin::diagnose::{DiagnoseSettings, Verdict, diagnose};
-/// use truetwin::progress::Progress;
-/// use truetwin::study::{RecordPlan, Study};
-/// use truetwin::effect::*;
-/// use truetwin::record::*;
-/// use truetwin::twin::*;
+/// use truetwin::diagnose::Verdict;
+/// use truetwin::prelude::*;
 /// use truetwin::twins::VanDerPol;
 ///
-/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 300))?;
 /// let drive = Drive::autonomous(0.05, 300)?;
 /// let outputs = VanDerPol.simulate(&[1.5], &drive, Noise::new(1, "doc", 0))?;
 /// let record = Record::new(drive, outputs)?;
-/// let diagnosis = diagnose(&study, &[record], None, &DiagnoseSettings::default(), &Progress::silent())?;
+/// let settings = DiagnoseSettings { seed: 7, ..DiagnoseSettings::default() };
+/// let study = Study::of(VanDerPol)?;
+/// let diagnosis = diagnose(&study, &[record], None, &settings, &Progress::silent())?;
 /// assert_eq!(diagnosis.verdict, Verdict::NoGap);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -71,6 +68,7 @@ pub fn diagnose(
     progress: &Progress,
 ) -> Result<Diagnosis, StudyError> {
     let clock = Instant::now();
+    let study = &*study.for_records(records)?;
     check(study, records, validation, settings)?;
     let owned = Arc::from(records);
     let found = search(study, &owned, settings, progress, &|explored| {
@@ -80,6 +78,18 @@ pub fn diagnose(
         seconds: clock.elapsed().as_secs_f64(),
         ..found
     })
+}
+
+impl Study {
+    /// Diagnoses the gap between the twin and records of one system, as [`diagnose`] does with its default settings.
+    ///
+    /// # Errors
+    ///
+    /// As [`diagnose`].
+    pub fn diagnose(&self, records: &[Record]) -> Result<Diagnosis, StudyError> {
+        let settings = DiagnoseSettings::default();
+        diagnose(self, records, None, &settings, &Progress::silent())
+    }
 }
 
 /// Decides, locates and measures.

@@ -84,7 +84,7 @@ pub enum EstimatorError {
     },
     /// The features simulated at an estimate have no covariance.
     #[error(
-        "the features simulated at the estimate cannot be whitened: {0}; a twin without noise has no statistics: give it noise levels ([noise] in a study)"
+        "the features simulated at the estimate cannot be whitened: {0}; a twin without noise has no statistics: give it noise levels"
     )]
     Whitening(MathError),
     /// The record does not determine the parameters.

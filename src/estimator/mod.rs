@@ -27,7 +27,7 @@
 //! let drive = Drive::autonomous(0.05, 200)?;
 //! let outputs = VanDerPol.simulate(&[3.0], &drive, Noise::new(7, "measured", 0))?;
 //! let record = Record::new(drive, outputs)?;
-//! let estimate: Estimate = estimator.estimate(&record, &EstimateOptions::default(), &Progress::silent())?;
+//! let estimate: Estimate = estimator.estimate(&record)?;
 //! assert!(estimate.gate.out_of_distribution && estimate.refit().is_some());
 //! assert!((estimate.theta[0] - 3.0).abs() < 5.0 * estimate.std_error[0]);
 //! let tracking: &Tracking = estimate.tracking.as_ref().ok_or("the free run is finite")?;

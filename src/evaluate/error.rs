@@ -15,13 +15,11 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum EvaluateError {
     /// The twin has no published test points.
-    #[error(
-        "the paper has no test points for twin \"{0}\"; take --scenario 0 (θ from the prior) or --scenario uniform (θ from the bounds)"
-    )]
+    #[error("the paper has no test points for twin \"{0}\"; draw θ from the prior or the bounds")]
     NoPoint(String),
     /// A published test point lies outside the study's bounds.
     #[error(
-        "the paper's test point {name} = {} lies outside the study's bounds {bounds}; widen [bounds], or take --scenario 0 (θ from the prior) or --scenario uniform (θ from the bounds)",
+        "the paper's test point {name} = {} lies outside the study's bounds {bounds}; widen the bounds, or draw θ from the prior or the bounds",
         number(*value)
     )]
     Outside {
@@ -39,7 +37,7 @@ pub enum EvaluateError {
     #[error("no {0}; ask for at least one")]
     Nothing(&'static str),
     /// A twin and its study allow no truth of a kind.
-    #[error("kind {kind}: {reason}, or choose other --kinds")]
+    #[error("kind {kind}: {reason}, or choose other kinds")]
     NoDeparture {
         /// Kind of truth.
         kind: &'static str,
@@ -48,7 +46,7 @@ pub enum EvaluateError {
     },
     /// Every draw of a truth was given up.
     #[error(
-        "trial {trial}, kind {kind}: no truth in {of} draws: {reasons}; narrow [prior] and [bounds], or choose other --kinds"
+        "trial {trial}, kind {kind}: no truth in {of} draws: {reasons}; narrow prior and bounds, or choose other kinds"
     )]
     NoTruth {
         /// Number of the trial.

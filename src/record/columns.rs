@@ -129,7 +129,7 @@ impl FromStr for Columns {
                 .filter(|(key, column)| !key.is_empty() && !column.is_empty())
                 .ok_or_else(|| {
                     format!(
-                        "\"{}\" is not name=column; write t=time,u=pump, and columns with a comma in [record] columns of a study file",
+                        "\"{}\" is not name=column; write t=time,u=pump",
                         quoted(part)
                     )
                 })?;

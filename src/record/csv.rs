@@ -95,8 +95,7 @@ impl RecordReader {
         let columns = self.columns.clone();
         let record = self.read(path, &columns)?.record(path)?;
         if let Some((twin, signals)) = self.twin.as_ref().zip(self.signals.as_ref()) {
-            (record.check_channels(signals))
-                .map_err(|error| RecordError::file(path, error.of_twin(twin)))?;
+            (record.check_channels(signals)).map_err(|error| error.of_twin(twin).within(path))?;
         }
         Ok(record)
     }

@@ -58,6 +58,11 @@ impl Drive {
         })
     }
 
+    /// A drive of step Δt = `dt` seconds whose inputs come as one slice a channel.
+    pub fn from_slices(dt: f64, inputs: &[impl AsRef<[f64]>]) -> Result<Self, RecordError> {
+        Self::new(dt, signal(inputs)?)
+    }
+
     /// A drive with one row of `inputs` at each of `times`, in seconds. Times increase; their steps may vary. Steps that
     /// are the same to 1e-3 become one step Δt, else Δt is the median step.
     ///
@@ -211,6 +216,21 @@ impl Drive {
             .as_slice()
             .map_or(&[], |all| &all[k * m..(k + 1) * m])
     }
+}
+
+/// A signal of one slice a channel.
+pub(super) fn signal(channels: &[impl AsRef<[f64]>]) -> Result<Signal, RecordError> {
+    let rows = channels.first().map_or(0, |first| first.as_ref().len());
+    let other = |channel: &&_| AsRef::<[f64]>::as_ref(*channel).len() != rows;
+    if let Some(other) = channels.iter().find(other) {
+        return Err(RecordError::SliceLengths {
+            rows,
+            other: other.as_ref().len(),
+        });
+    }
+    Ok(Signal::from_shape_fn((rows, channels.len()), |(k, j)| {
+        channels[j].as_ref()[k]
+    }))
 }
 
 #[cfg(test)]

@@ -23,6 +23,14 @@ pub enum RecordError {
         /// Rows of outputs.
         outputs: usize,
     },
+    /// Channels of one signal with different lengths.
+    #[error("channels of {rows} and of {other} samples; all of a signal need the same number")]
+    SliceLengths {
+        /// Samples of the first channel.
+        rows: usize,
+        /// Samples of another one.
+        other: usize,
+    },
     /// Times and inputs of different lengths.
     #[error("{times} times and {inputs} rows of inputs; both need the same number")]
     Times {
@@ -55,7 +63,7 @@ pub enum RecordError {
     },
     /// A missing output where every one is needed.
     #[error(
-        "row {row}, column {column} is missing; features need every output: fill it in (`truetwin resample R.csv --step S --out R2.csv` closes short gaps; --longest-gap for longer ones), or use `truetwin fit` or `truetwin diagnose`, which take such records"
+        "row {row}, column {column} is missing; features need every output: resample the record, or fit or diagnose it without an estimator"
     )]
     Incomplete {
         /// Row of the file; the header is row 1.
@@ -65,9 +73,8 @@ pub enum RecordError {
     },
     /// A step that differs from the others where all need to be the same.
     #[error(
-        "row {row}, column t: a step of {} s where {} s is usual; features need one step: resample the record (`truetwin resample R.csv --step {} --out R2.csv`), or use `truetwin fit` or `truetwin diagnose`, which take such records",
+        "row {row}, column t: a step of {} s where {} s is usual; features need one step: resample the record, or fit or diagnose it without an estimator",
         number(*given),
-        number(*expected),
         number(*expected)
     )]
     Uneven {
@@ -80,7 +87,7 @@ pub enum RecordError {
     },
     /// Steps that vary where a twin takes one.
     #[error(
-        "column t: the steps vary, and a black-box twin is simulated with one step; resample the record (`truetwin resample R.csv --step s --out R2.csv`)"
+        "column t: the steps vary, and a black-box twin is simulated with one step; resample the record"
     )]
     OneStep,
     /// A step that a record cannot be resampled to.
@@ -106,7 +113,7 @@ pub enum RecordError {
     },
     /// Channels other than the twin's.
     #[error(
-        "the record has {given} {kind}, the twin has {expected}{names}; {twin}: choose the twin that this record is of (`truetwin twins` lists them), or correct the columns"
+        "the record has {given} {kind}, the twin has {expected}{names}; {twin}: choose the twin that this record is of, or correct the columns"
     )]
     Channels {
         /// "inputs" or "outputs".
@@ -128,6 +135,22 @@ pub enum RecordError {
         /// The system's error.
         error: std::io::Error,
     },
+    /// A file whose columns are not those of a record.
+    #[error("{}: {problem}", path.display())]
+    Columns {
+        /// File.
+        path: PathBuf,
+        /// Columns, what is wrong with them, and the remedy.
+        problem: String,
+    },
+    /// A file whose numbers make no record.
+    #[error("{}: {error}", path.display())]
+    Within {
+        /// File.
+        path: PathBuf,
+        /// The fault of the record.
+        error: Box<RecordError>,
+    },
     /// A file that holds no record.
     #[error("{}{problem}", path.display())]
     File {
@@ -145,6 +168,14 @@ impl RecordError {
             *twin = twin.replacen("the twin", name, 1);
         }
         self
+    }
+
+    /// Adds the file that the record was read from.
+    pub(crate) fn within(self, path: &Path) -> Self {
+        Self::Within {
+            path: path.into(),
+            error: Box::new(self),
+        }
     }
 
     /// Creates an error about a file as a whole.

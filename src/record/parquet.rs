@@ -12,7 +12,7 @@ pub(super) fn with_rows<T>(
 ) -> Result<T, RecordError> {
     Err(RecordError::file(
         path,
-        "this build reads no Parquet; install it with `--features parquet`, or save the record as CSV",
+        "this build reads no Parquet; build it with the feature parquet, or save the record as CSV",
     ))
 }
 

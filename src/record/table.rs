@@ -32,7 +32,7 @@ impl Table {
                 format!("{names}: an input file has t and inputs alone; remove the output columns");
             return Err(RecordError::file(path, problem));
         }
-        Drive::with_times(&self.times, self.inputs).map_err(|error| RecordError::file(path, error))
+        Drive::with_times(&self.times, self.inputs).map_err(|error| error.within(path))
     }
 
     /// The table as a record, which needs outputs.
@@ -43,7 +43,7 @@ impl Table {
         }
         (Drive::with_times(&self.times, self.inputs))
             .and_then(|drive| Record::new(drive, self.outputs))
-            .map_err(|error| RecordError::file(path, error))
+            .map_err(|error| error.within(path))
     }
 
     /// Parses a table; `left` is how many numbers may be read yet, in this file and those that follow.
@@ -76,7 +76,10 @@ impl Table {
                 let (inputs, outputs) = channels(&names, columns)?;
                 Ok((usual, inputs, outputs))
             })
-            .map_err(|problem| RecordError::file(path, problem))?;
+            .map_err(|problem| RecordError::Columns {
+                path: path.into(),
+                problem,
+            })?;
         let width = 1 + inputs + outputs;
         // Index of column j of the file in a row ordered t, u1, u2, …, y1, y2, …; none for one that is left out.
         let places: Vec<Option<usize>> = (usual.iter())
@@ -294,7 +297,7 @@ fn channels(names: &[&str], columns: &Columns) -> Result<(usize, usize), String>
         |name: &str| name.starts_with(['u', 'y']) && name[1..].chars().all(|c| c.is_ascii_digit());
     if let Some(name) = names.iter().find(|name| **name != "t" && !channel(name)) {
         return Err(format!(
-            "column \"{}\" is not part of a record; name the columns t, u or u1,u2,…, y or y1,y2,… and remove others, or give --columns t=NAME,u=NAME,y=NAME",
+            "column \"{}\" is not part of a record; name the columns t, u or u1,u2,…, y or y1,y2,…, and remove others",
             quoted(name)
         ));
     }
@@ -311,10 +314,7 @@ fn channels(names: &[&str], columns: &Columns) -> Result<(usize, usize), String>
         ));
     }
     if !names.contains(&"t") {
-        return Err(
-            "column t is missing; add the time of each row in seconds, or give --columns t=NAME"
-                .into(),
-        );
+        return Err("column t is missing; add the time of each row in seconds".into());
     }
     Ok((inputs, outputs))
 }

@@ -1,6 +1,7 @@
 //! Text of a record file: encoding, separator, decimal sign.
 
 use crate::storage::untrusted::quoted;
+use encoding_rs_io::DecodeReaderBytesBuilder;
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 
 /// Longest beginning that is looked at to find the header, in bytes: two thousand names of thirty letters.
@@ -18,16 +19,14 @@ pub(super) struct Text<'a> {
 }
 
 impl<'a> Text<'a> {
-    /// Finds out encoding and separator of a file.
-    pub fn open(mut file: impl Read + 'a) -> io::Result<Result<Self, String>> {
-        let mut mark = Vec::new();
-        file.by_ref().take(4).read_to_end(&mut mark)?;
-        let whole: Box<dyn Read + 'a> = match mark[..] {
-            [0xff, 0xfe, ..] => Box::new(Utf16::new(Cursor::new(mark).chain(file), false)),
-            [0xfe, 0xff, ..] => Box::new(Utf16::new(Cursor::new(mark).chain(file), true)),
-            _ => Box::new(Cursor::new(mark).chain(file)),
-        };
-        let mut reader = BufReader::new(whole);
+    /// Finds out encoding and separator of a file. UTF-16 is known by its byte-order mark.
+    pub fn open(file: impl Read + 'a) -> io::Result<Result<Self, String>> {
+        let decoder = DecodeReaderBytesBuilder::new()
+            .bom_sniffing(true)
+            .utf8_passthru(true)
+            .strip_bom(true)
+            .build(file);
+        let mut reader = BufReader::new(decoder);
         let mut start = Vec::new();
         let mut header = 0..0;
         // Empty lines before the header are none.
@@ -43,13 +42,9 @@ impl<'a> Text<'a> {
             let remedy = "save it as UTF-8 text, or as UTF-16 with a byte-order mark";
             return Ok(Err(format!("the file is UTF-16 or binary; {remedy}")));
         }
-        let separator = separator(&start[header]);
-        if start.starts_with(b"\xef\xbb\xbf") {
-            start.drain(..3);
-        }
         Ok(Ok(Self {
+            separator: separator(&start[header]),
             text: Box::new(Cursor::new(start).chain(reader)),
-            separator,
         }))
     }
 
@@ -122,73 +117,6 @@ impl Decimals {
             ));
         }
         Ok(Some(value))
-    }
-}
-
-/// UTF-16 as UTF-8, decoded while it is read. What is no UTF-16 becomes a replacement character.
-struct Utf16<R> {
-    from: R,
-    is_big: bool,
-    /// First half of a pair of units.
-    high: Option<u16>,
-    /// Decoded bytes that were not handed out yet.
-    ready: Vec<u8>,
-    given: usize,
-    is_start: bool,
-}
-
-impl<R: Read> Utf16<R> {
-    /// Bytes of the file that are decoded at once.
-    const BLOCK: u64 = 8192;
-
-    fn new(from: R, is_big: bool) -> Self {
-        Self {
-            from,
-            is_big,
-            high: None,
-            ready: Vec::new(),
-            given: 0,
-            is_start: true,
-        }
-    }
-
-    /// Decodes the next block.
-    fn fill(&mut self) -> io::Result<()> {
-        let mut bytes = Vec::new();
-        self.from
-            .by_ref()
-            .take(Self::BLOCK)
-            .read_to_end(&mut bytes)?;
-        let is_end = bytes.len() < Self::BLOCK as usize;
-        let units = (bytes.as_chunks::<2>().0.iter()).map(|pair| match self.is_big {
-            true => u16::from_be_bytes(*pair),
-            false => u16::from_le_bytes(*pair),
-        });
-        let mut units: Vec<u16> = self.high.take().into_iter().chain(units).collect();
-        if !is_end && units.last().is_some_and(|u| (0xd800..0xdc00).contains(u)) {
-            self.high = units.pop();
-        }
-        let mut text: String = char::decode_utf16(units)
-            .map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER))
-            .collect();
-        if std::mem::take(&mut self.is_start) && text.starts_with('\u{feff}') {
-            text.remove(0);
-        }
-        (self.ready, self.given) = (text.into_bytes(), 0);
-        Ok(())
-    }
-}
-
-impl<R: Read> Read for Utf16<R> {
-    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
-        if self.given == self.ready.len() {
-            self.fill()?;
-        }
-        let rest = &self.ready[self.given..];
-        let length = rest.len().min(to.len());
-        to[..length].copy_from_slice(&rest[..length]);
-        self.given += length;
-        Ok(length)
     }
 }
 

@@ -169,7 +169,10 @@ mod tests {
             ..FitSettings::default()
         };
         let records = [found.record.clone()];
-        let fit = (found.study.fit(&records, &settings, &Progress::silent())).unwrap();
+        let fit = (found
+            .study
+            .fit_with(&records, &settings, &Progress::silent()))
+        .unwrap();
         let of_fit = fit_html(&found.study, &records, &fit);
         assert!(of_fit.contains("id=\"draws\""));
         for page in [

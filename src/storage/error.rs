@@ -24,7 +24,7 @@ pub enum StorageError {
     },
     /// An output path that holds something else.
     #[error(
-        "{} exists already and is no folder of `truetwin {verb}` ({reason}); choose another --out or remove it",
+        "{} exists already and is no {verb} folder ({reason}); choose another folder or remove it",
         path.display()
     )]
     Taken {
@@ -37,7 +37,7 @@ pub enum StorageError {
     },
     /// An input folder that the verb did not make, or whose manifest is damaged.
     #[error(
-        "{}: no folder of `truetwin {verb}` ({reason}); name a folder that it made, or make this one again",
+        "{}: no {verb} folder ({reason}); name one, or make this one again",
         path.display()
     )]
     Foreign {
@@ -50,7 +50,7 @@ pub enum StorageError {
     },
     /// A folder of another call.
     #[error(
-        "{} holds the work of another call: {difference}; rerun that call to resume it, choose another --out, or remove it",
+        "{} holds the work of another call: {difference}; rerun that call to resume it, choose another folder, or remove it",
         path.display()
     )]
     OtherCall {
@@ -61,7 +61,7 @@ pub enum StorageError {
     },
     /// An output that another process is writing.
     #[error(
-        "another run is writing to {}; wait until it is done or stop it, or choose another --out",
+        "another run is writing to {}; wait until it is done or stop it, or choose another place",
         path.display()
     )]
     Busy {
@@ -81,7 +81,7 @@ pub enum StorageError {
     Share(String),
     /// Threads that the system refuses to start.
     #[error(
-        "cannot start {threads} threads ({error}); choose fewer with --threads, or raise the limits of memory and processes (ulimit -v, ulimit -u)"
+        "cannot start {threads} threads ({error}); choose fewer, or raise the limits of memory and processes (ulimit -v, ulimit -u)"
     )]
     Threads {
         /// Number of threads asked for.
@@ -91,7 +91,7 @@ pub enum StorageError {
     },
     /// Several ranks of a build without MPI: each would do all of the work.
     #[error(
-        "started as {ranks} ranks, but this build has no MPI; install it with `--features mpi`, or use --shard i/n in a job array"
+        "started as {ranks} ranks, but this build has no MPI; build it with the feature mpi, or divide the work into shares"
     )]
     NoMpi {
         /// Number of ranks.

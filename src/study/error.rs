@@ -54,12 +54,36 @@ pub enum StudyError {
         /// The problem there, and the remedy.
         error: TwinError,
     },
-    /// The twin is missing, its own parameters, `[fixed]` or `[library]` are wrong.
+    /// The study file names no twin.
+    #[error("{}: the key twin is missing; add twin = \"NAME\"", .0.display())]
+    NoTwin(PathBuf),
+    /// The twin's own parameters, or values of the study, are wrong.
     #[error("{0}")]
     Table(String),
-    /// Step, length or input are wrong, or a record has another step.
+    /// No parameter is left to estimate.
+    #[error("all parameters are fixed, nothing is left to estimate; free one")]
+    AllFixed,
+    /// The library of a study names an unknown effect.
+    #[error("library: {0} is no effect of this twin; correct or remove it")]
+    UnknownEffect(String),
+    /// Step, length or input of simulated records are wrong.
     #[error("{0}")]
     Plan(String),
+    /// A twin with inputs whose simulated records have none.
+    #[error("the twin has {0} inputs; give simulated records levels or a file as input")]
+    NoInput(usize),
+    /// A record with another step than the study's.
+    #[error(
+        "the record's step is {} s, the study's {} s; resample the record, or change the step of the study",
+        number(*given),
+        number(*expected)
+    )]
+    OtherStep {
+        /// Step of the record, in seconds.
+        given: f64,
+        /// Step of the study.
+        expected: f64,
+    },
     /// The likelihood of a record cannot be computed.
     #[error(transparent)]
     Filter(#[from] FilterError),
@@ -68,15 +92,18 @@ pub enum StudyError {
     Cancelled(#[from] Cancelled),
     /// No parameters fit a record.
     #[error(
-        "the twin cannot be filtered at any parameters that were tried; check units, step and [bounds]"
+        "the twin cannot be filtered at any parameters that were tried; check units, step and bounds"
     )]
     NoFit,
     /// A record, its file, or its channels are wrong.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// A diagnosis of no record.
+    /// A fit or a diagnosis of no record.
     #[error("no record given; pass at least one")]
     NoRecord,
+    /// Simulated records of a study that does not say what they look like.
+    #[error("the study has no plan of simulated records; give it their step, samples and input")]
+    NoPlan,
     /// Records of a diagnosis have different steps.
     #[error("{} has a step of {} s, the first record {} s; resample it", name(*record), number(*given), number(*expected))]
     Steps {
@@ -109,7 +136,7 @@ pub enum StudyError {
     #[error(transparent)]
     Setting(#[from] SettingError),
     /// A diagnosis is to leave out an effect that is unknown.
-    #[error("unknown effect {0} in --without; `truetwin effects --twin T` lists those of a twin")]
+    #[error("unknown effect {0}; leave out effects of this twin")]
     Without(String),
     /// A diagnosis finds no starting point that can be fitted.
     #[error(

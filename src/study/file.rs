@@ -175,7 +175,7 @@ impl StudyFile {
                 || record.samples.is_some_and(|n| n != samples);
             if other {
                 return Err(StudyError::Plan(format!(
-                    "{}: [record] contradicts {}, which has {samples} samples, step {} s; leave step and samples out",
+                    "{}: step or samples contradict {}, which has {samples} samples, step {} s; leave them out",
                     path.display(),
                     input.display(),
                     number(step)
@@ -206,10 +206,7 @@ impl StudyFile {
         let mut file: Self = toml::from_str(text).map_err(syntax)?;
         check_names(&table).map_err(|problem| wrong(1, &problem))?;
         if !table.contains_key("twin") {
-            return Err(StudyError::Table(format!(
-                "{}: the key twin is missing; add twin = \"NAME\" (`truetwin twins` lists them)",
-                path.display()
-            )));
+            return Err(StudyError::NoTwin(path.into()));
         }
         file.origin = Some((path.into(), text.into()));
         Ok(file)

@@ -13,28 +13,35 @@ impl Study {
     /// Finds the most probable parameters of the twin, given measured records of one system: no training, no simulations of a prior.
     ///
     /// Noise levels are fitted with the parameters, and the first state is uncertain, unless the study says that they are known.
-    /// θ has a weak normal prior in φ (log θ where bounds are positive) of the prior box's width, 0.6 at least; `[bounds]` hold.
-    /// The same seed gives the same bits on any number of threads.
+    /// θ has a weak normal prior in φ (log θ where bounds are positive) of the prior box's width, 0.6 at least; bounds hold.
     ///
     /// ```
-    /// use truetwin::fit::FitSettings;
     /// use truetwin::prelude::*;
     /// use truetwin::twins::CascadedTanks;
     ///
-    /// let study = Study::new("tanks", CascadedTanks, RecordPlan::levels(0.5, 300, 0.0, 3.0, 30))?;
-    /// let noise = Noise::new(1, "measured", 0);
-    /// let drive = study.drive(noise)?;
-    /// let outputs = CascadedTanks.simulate(&[0.6, 0.5, 0.55, 1.0], &drive, noise)?;
-    /// let record = Record::new(drive, outputs)?;
-    /// let fit = study.fit(&[record], &FitSettings::default(), &Progress::silent())?;
+    /// // 300 samples, 0.5 s apart; each level of the pump is held for 30 samples.
+    /// let pump: Vec<f64> = (0..300).map(|k| [0.6, 2.1, 1.2, 2.8][k / 30 % 4]).collect();
+    /// let drive = Drive::from_slices(0.5, &[&pump])?;
+    /// let level = CascadedTanks.simulate(&[0.6, 0.5, 0.55, 1.0], &drive, Noise::new(1, "measured", 0))?;
+    /// let record = Record::new(drive, level)?;
+    /// let fit = Study::of(CascadedTanks)?.fit(&[record])?;
     /// assert!(fit.convergence.converged);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
     /// # Errors
     ///
-    /// [`StudyError`]: records that do not fit the twin, settings that cannot be used, a twin that no start fits, cancellation.
-    pub fn fit(
+    /// [`StudyError`]: records that do not fit the twin, a twin that no start fits.
+    pub fn fit(&self, records: &[Record]) -> Result<Fit, StudyError> {
+        self.fit_with(records, &FitSettings::default(), &Progress::silent())
+    }
+
+    /// As [`fit`](Self::fit), with settings, and progress that can cancel it. The same seed gives the same bits on any number of threads.
+    ///
+    /// # Errors
+    ///
+    /// As [`fit`](Self::fit); settings that cannot be used, cancellation.
+    pub fn fit_with(
         &self,
         records: &[Record],
         settings: &FitSettings,
@@ -50,16 +57,12 @@ impl Study {
         for record in records {
             record.check_channels(&self.twin.signals())?;
         }
-        if records.is_empty() {
-            return Err(StudyError::Plan(
-                "no record is given; give at least one".into(),
-            ));
-        }
-        let effects = self.added_effects()?;
+        let study = self.for_records(records)?;
+        let effects = study.added_effects()?;
         let subject = Subject {
-            twin: &self.twin,
+            twin: &study.twin,
             effects: &effects,
-            beliefs: &self.beliefs(),
+            beliefs: &study.beliefs(),
         };
         let stage = progress.stage("fit", 1);
         let fit = run(&subject, records, settings)?.ok_or(StudyError::NoFit)?;
@@ -74,11 +77,12 @@ impl Study {
     /// [`StudyError`]: a record that does not fit the twin, a twin that cannot be filtered there.
     pub fn score(&self, fit: &Fit, record: &Record) -> Result<FitScore, StudyError> {
         record.check_channels(&self.twin.signals())?;
-        let effects = self.added_effects()?;
+        let study = self.for_records(std::slice::from_ref(record))?;
+        let effects = study.added_effects()?;
         let subject = Subject {
-            twin: &self.twin,
+            twin: &study.twin,
             effects: &effects,
-            beliefs: &self.beliefs(),
+            beliefs: &study.beliefs(),
         };
         score(&subject, fit, record)?.ok_or(StudyError::NoFit)
     }
@@ -102,7 +106,8 @@ impl Study {
         let starts = (self.file.start.iter())
             .filter(|(_, level)| matches!(level, StartLevel::Declared { .. }));
         Beliefs {
-            step: self.plan.step,
+            // A study without a plan has been given the one of its records.
+            step: self.plan.as_ref().map_or(1.0, |plan| plan.step),
             known: (declared.clone().filter(|(_, known, _)| *known))
                 .map(|(name, ..)| name)
                 .collect(),

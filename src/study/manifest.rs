@@ -15,14 +15,13 @@ impl Study {
         let parameters: Vec<Value> = (space.iter())
             .map(|p| json!({ "name": p.name, "prior": p.prior, "bounds": p.bounds }))
             .collect();
-        let plan = self.plan();
         let manifest = Manifest::new(verb, layout)
             .with("twin", self.name())
             .with("parameters", parameters)
             // A file that was read can be written.
             .with("study", toml::to_string(self.file()).unwrap_or_default())
-            .with("record", json!([plan.step, plan.samples]));
-        let manifest = match &plan.input {
+            .with("record", json!(self.plan().map(|p| (p.step, p.samples))));
+        let manifest = match self.plan().and_then(|plan| plan.input.as_ref()) {
             Some(InputPlan::File(path)) => manifest.with("input file", checksum(path)?),
             input => manifest.with("input", json!(input)),
         };

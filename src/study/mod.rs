@@ -23,19 +23,28 @@ use crate::effect::{Catalogue, Effect, EffectKey, EffectKind, EffectPattern, aug
 use crate::record::{Drive, Record};
 use crate::setting::did_you_mean;
 use crate::twin::{
-    Adaptation, DigitalTwin, Integrator, MOST_SUBSTEPS, Noise, Role, Stepping, Twin, TwinError,
-    adapt, check_twin, fix,
+    Adaptation, DigitalTwin, Integrator, MOST_SUBSTEPS, Noise, NoiseLevel, Role, Stepping, Twin,
+    TwinError, adapt, check_twin, fix,
 };
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+
+/// Name of a twin that was given none.
+const UNNAMED: &str = "twin";
 
 /// A twin, the records it is compared with, and the effects it may lack.
 ///
 /// ```
 /// use truetwin::study::{RecordPlan, Study};
 /// use truetwin::twins::VanDerPol;
-/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 300))?;
+///
+/// // To fit and diagnose measured records.
+/// let study = Study::of(VanDerPol)?;
 /// assert_eq!(study.twin().parameters().names(), ["nu"]);
+/// // To simulate records as well, as an estimator needs it: 300 samples, 0.05 s apart.
+/// let study = Study::new("oscillator", VanDerPol, RecordPlan::autonomous(0.05, 300))?;
+/// assert_eq!(study.plan().map(|plan| plan.samples), Some(300));
 /// # Ok::<(), truetwin::study::StudyError>(())
 /// ```
 #[derive(Clone)]
@@ -45,7 +54,8 @@ pub struct Study {
     base: Twin,
     /// In the setting of `file`.
     twin: Twin,
-    plan: RecordPlan,
+    /// Plan of simulated records, which measured ones do not need.
+    plan: Option<RecordPlan>,
     file: StudyFile,
     demo: Option<Arc<(StudyFile, Record)>>,
     /// The library's effects and the study's own.
@@ -63,11 +73,24 @@ impl std::fmt::Debug for Study {
 }
 
 impl Study {
-    /// Creates a study of `twin` under `name`.
+    /// Creates a study of measured records. To simulate records, it needs a plan ([`Study::new`], or the study file).
+    pub fn of(twin: impl DigitalTwin + 'static) -> Result<Self, StudyError> {
+        Self::named(UNNAMED, twin, None)
+    }
+
+    /// Creates a study of `twin` under `name`, whose simulated records follow `plan`.
     pub fn new(
         name: &str,
         twin: impl DigitalTwin + 'static,
         plan: RecordPlan,
+    ) -> Result<Self, StudyError> {
+        Self::named(name, twin, Some(plan))
+    }
+
+    fn named(
+        name: &str,
+        twin: impl DigitalTwin + 'static,
+        plan: Option<RecordPlan>,
     ) -> Result<Self, StudyError> {
         let base = Twin::new(twin);
         check_twin(&base)
@@ -84,6 +107,11 @@ impl Study {
             demo: None,
             catalogue: Catalogue::default(),
         })
+    }
+
+    /// Creates a study of another twin, which has this study's name and plan.
+    pub fn with_twin(&self, twin: impl DigitalTwin + 'static) -> Result<Self, StudyError> {
+        Self::named(&self.name, twin, self.plan.clone())
     }
 
     /// Adds effects that the twin may lack and the library does not have. Each is offered at every place that it can stand at,
@@ -118,11 +146,17 @@ impl Study {
                 .map(|(name, value)| (name.clone(), *value))
                 .collect()
         };
-        let step = file.record.step.unwrap_or(self.plan.step);
+        let plan = self.plan_of(&file.record)?;
+        let declares = |level: &NoiseLevel| matches!(level, NoiseLevel::Declared { .. });
+        let step = match &plan {
+            Some(plan) => plan.step,
+            None if !file.noise.values().any(declares) => 1.0,
+            None => return Err(StudyError::NoPlan),
+        };
         for (table, boxes) in [("prior", &file.prior.boxes), ("bounds", &file.bounds)] {
             if let Some(name) = boxes.keys().find(|name| file.fixed.contains_key(*name)) {
                 return Err(StudyError::Table(format!(
-                    "{name} appears in both [fixed] and [{table}]; remove one"
+                    "{name} appears in both fixed and {table}; remove one"
                 )));
             }
         }
@@ -151,7 +185,7 @@ impl Study {
         if second != Adaptation::default() {
             twin = adapt(twin, &second, step)?;
         }
-        let fixed = |error: TwinError| StudyError::Table(format!("[fixed]: {error}"));
+        let fixed = |error: TwinError| StudyError::Table(format!("fixed: {error}"));
         let space = twin.parameters();
         for (name, &value) in &file.fixed {
             let parameter = &space[space.position(name).map_err(fixed)?];
@@ -160,18 +194,9 @@ impl Study {
         let mut held = file.fixed.clone();
         held.extend(effects.iter().flat_map(Effect::given_by_parameter));
         twin = fix(twin, &held).map_err(fixed)?;
-        let RecordTable {
-            step,
-            samples,
-            input,
-            ..
-        } = file.record.clone();
-        let plan = RecordPlan {
-            step: step.unwrap_or(self.plan.step),
-            samples: samples.unwrap_or(self.plan.samples),
-            input: input.or_else(|| self.plan.input.clone()),
-        };
-        plan.check(&twin.signals())?;
+        if let Some(plan) = &plan {
+            plan.check(&twin.signals())?;
+        }
         Ok(Self {
             twin,
             plan,
@@ -180,15 +205,41 @@ impl Study {
         })
     }
 
+    /// Returns the plan of the study with what a file changes in it.
+    fn plan_of(&self, record: &RecordTable) -> Result<Option<RecordPlan>, StudyError> {
+        let own = self.plan.as_ref();
+        let step = record.step.or(own.map(|plan| plan.step));
+        let samples = record.samples.or(own.map(|plan| plan.samples));
+        let input = (record.input.clone()).or_else(|| own?.input.clone());
+        match (step, samples) {
+            (Some(step), Some(samples)) => Ok(Some(RecordPlan {
+                step,
+                samples,
+                input,
+            })),
+            _ if record.is_plan() => Err(StudyError::NoPlan),
+            _ => Ok(None),
+        }
+    }
+
+    /// Returns the study with a plan: its own, or that of the first of these records.
+    pub(crate) fn for_records(&self, records: &[Record]) -> Result<Cow<'_, Self>, StudyError> {
+        let first = records.first().ok_or(StudyError::NoRecord)?;
+        Ok(match &self.plan {
+            Some(_) => Cow::Borrowed(self),
+            None => Cow::Owned(Self {
+                plan: Some(RecordPlan::like(first)),
+                ..self.clone()
+            }),
+        })
+    }
+
     /// Refuses a study of which nothing is left to estimate, where simulations are to teach an estimator.
     pub(crate) fn check_estimated(&self) -> Result<(), StudyError> {
         if !self.twin.parameters().is_empty() {
             return Ok(());
         }
-        Err(StudyError::Table(
-            "[fixed] holds every parameter, nothing is left to estimate; free one, or test the twin on a record with `truetwin fit`"
-                .into(),
-        ))
+        Err(StudyError::AllFixed)
     }
 
     /// Returns whether estimates may lean on the prior: `[prior] trust = true`.
@@ -209,7 +260,7 @@ impl Study {
         };
         if let Some(n) = substeps.filter(|n| !(1..=MOST_SUBSTEPS).contains(n)) {
             return Err(StudyError::Plan(format!(
-                "[record] substeps = {n}; choose between 1 and {MOST_SUBSTEPS}"
+                "substeps = {n}; choose between 1 and {MOST_SUBSTEPS}"
             )));
         }
         let change = |rule: &mut Integrator, stepping: &mut Stepping| {
@@ -219,7 +270,7 @@ impl Study {
         };
         self.base.stepped(change).ok_or_else(|| {
             StudyError::Plan(format!(
-                "[record] {key} needs the twin's equations, which a black box does not show; remove it"
+                "{key} needs the twin's equations, which a black box does not show; remove it"
             ))
         })
     }
@@ -248,10 +299,7 @@ impl Study {
         let mut named = library.only.iter().chain(&library.without);
         let unknown = named.find(|name| !self.knows_effect(name));
         unknown.map_or(Ok(()), |name| {
-            Err(StudyError::Table(format!(
-                "[library] names {}, which is no effect of this twin; `truetwin effects --twin T` lists them",
-                self.with_nearest_effect(name)
-            )))
+            Err(StudyError::UnknownEffect(self.with_nearest_effect(name)))
         })
     }
 
@@ -303,9 +351,13 @@ impl Study {
         &self.twin
     }
 
-    /// Step, length and input of simulated records.
-    pub fn plan(&self) -> &RecordPlan {
-        &self.plan
+    /// Step, length and input of simulated records; none of a study of measured records alone.
+    pub fn plan(&self) -> Option<&RecordPlan> {
+        self.plan.as_ref()
+    }
+
+    fn needed_plan(&self) -> Result<&RecordPlan, StudyError> {
+        self.plan.as_ref().ok_or(StudyError::NoPlan)
     }
 
     /// The file that would make this study from the registered one.
@@ -315,18 +367,18 @@ impl Study {
 
     /// Draws the input of a record; a fixed one is the same for any noise.
     pub fn drive(&self, noise: Noise) -> Result<Drive, StudyError> {
-        self.plan.drive(&self.twin.signals(), noise)
+        self.needed_plan()?.drive(&self.twin.signals(), noise)
     }
 
     /// Prepares the source of drives.
     pub(crate) fn drives(&self) -> Result<DriveSource, StudyError> {
-        self.plan.prepare(&self.twin.signals())
+        self.needed_plan()?.prepare(&self.twin.signals())
     }
 
     /// Checks whether features can be taken of a record: it has the step and the channels of this study, and no output is missing.
     pub fn check_record(&self, record: &Record) -> Result<(), StudyError> {
         self.check_complete(record)?;
-        self.plan.check_step(record)
+        self.needed_plan()?.check_step(record)
     }
 
     /// Checks that a record has the channels of this study, and that no output is missing.
@@ -372,7 +424,7 @@ mod tests {
             let message = refused(&format!("[record]\nsubsteps = {n}"));
             assert_eq!(
                 message,
-                format!("[record] substeps = {n}; choose between 1 and 1000")
+                format!("substeps = {n}; choose between 1 and 1000")
             );
         }
         let plan = RecordPlan::levels(0.5, 60, 0.0, 3.0, 30);
@@ -382,10 +434,7 @@ mod tests {
             let file = StudyFile::parse(&text, "s.toml".as_ref()).unwrap();
             let message = study.configure(&file).unwrap_err().to_string();
             let name = key.split(' ').next().unwrap();
-            assert!(
-                message.starts_with(&format!("[record] {name} needs")),
-                "{message}"
-            );
+            assert!(message.starts_with(&format!("{name} needs")), "{message}");
             assert!(message.ends_with("remove it"), "{message}");
         }
     }
@@ -434,9 +483,6 @@ mod tests {
     #[test]
     fn a_parameter_in_two_tables_is_refused() {
         let message = refused("[fixed]\nk1 = 0.5\n[bounds]\nk1 = [0.1, 1.0]");
-        assert_eq!(
-            message,
-            "k1 appears in both [fixed] and [bounds]; remove one"
-        );
+        assert_eq!(message, "k1 appears in both fixed and bounds; remove one");
     }
 }

@@ -2,7 +2,6 @@
 
 use crate::math::six_digits;
 use crate::record::{Drive, Record, RecordError, Signal, Signals};
-use crate::setting::number;
 use crate::storage::untrusted::MOST_NUMBERS;
 use crate::study::error::StudyError;
 use crate::twin::{Interval, Noise};
@@ -11,6 +10,8 @@ use std::path::{Path, PathBuf};
 
 /// Longest record that is simulated; as long as the longest that is read.
 const MOST_SAMPLES: usize = 50_000_000;
+/// Stretches of constant input in a record that is like a measured one.
+const HOLDS: usize = 15;
 
 /// Where the inputs of simulated records come from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -75,29 +76,49 @@ impl RecordPlan {
         }
     }
 
+    /// A record like a measured one: its step and length, levels in the range of its inputs.
+    pub(super) fn like(record: &Record) -> Self {
+        let drive = record.drive();
+        let ends = drive.inputs().iter().fold(None, |ends, &u| match ends {
+            None => Some((u, u)),
+            Some((low, high)) => Some((u.min(low), u.max(high))),
+        });
+        let levels = ends.map(|(low, high)| {
+            InputPlan::Levels(Levels {
+                levels: Interval::unchecked(low, high),
+                hold: (record.samples() / HOLDS).max(1),
+            })
+        });
+        Self {
+            step: drive.dt(),
+            samples: record.samples(),
+            input: levels,
+        }
+    }
+
     /// Checks step, length and levels; a file of inputs is not read.
     pub(super) fn check(&self, signals: &Signals) -> Result<(), StudyError> {
         let channels = signals.inputs.len();
         let all = channels + signals.outputs.len();
         if self.samples > MOST_SAMPLES {
             return Err(StudyError::Plan(format!(
-                "[record] samples = {}; at most {MOST_SAMPLES} can be simulated: take a larger step or a shorter record",
+                "samples = {}; at most {MOST_SAMPLES} can be simulated: take a larger step or a shorter record",
                 self.samples
             )));
         }
         if self.samples.saturating_mul(all) > MOST_NUMBERS {
             return Err(StudyError::Plan(format!(
-                "[record] samples = {} for {all} inputs and outputs; at most {MOST_NUMBERS} numbers can be simulated: take a shorter record",
+                "samples = {} for {all} inputs and outputs; at most {MOST_NUMBERS} numbers can be simulated: take a shorter record",
                 self.samples
             )));
         }
         let levels = match &self.input {
             Some(_) if channels == 0 => {
-                let problem = "[record] input is given, but the twin has no input; remove it";
+                let problem = "input is given, but the twin has none; remove it";
                 return Err(StudyError::Plan(problem.into()));
             }
             Some(InputPlan::Levels(Levels { hold: 0, .. })) => {
-                let problem = "[record] hold = 0; a level is held for at least 1 sample";
+                let problem = "hold = 0; a level is held for at least 1 sample";
                 return Err(StudyError::Plan(problem.into()));
             }
             Some(InputPlan::Levels(Levels { levels, .. })) => [levels.low(), levels.high()],
@@ -122,9 +143,7 @@ impl RecordPlan {
         let fixed = match &self.input {
             None if channels == 0 => Some(Drive::autonomous(self.step, self.samples)?),
             None => {
-                return Err(StudyError::Plan(format!(
-                    "the twin has {channels} inputs; give [record] input = {{ levels = [low, high], hold = n }}, or a file"
-                )));
+                return Err(StudyError::NoInput(channels));
             }
             Some(InputPlan::File(path)) => Some(self.read(path, channels)?),
             Some(InputPlan::Levels(_)) => None,
@@ -158,10 +177,10 @@ impl RecordPlan {
     pub fn check_step(&self, record: &Record) -> Result<(), StudyError> {
         let (given, expected) = (record.drive().dt(), self.step);
         if (given - expected).abs() > 1e-3 * expected {
-            let (given, expected) = (number(six_digits(given)), number(expected));
-            return Err(StudyError::Plan(format!(
-                "the record's step is {given} s, the study's {expected} s; give --step-of-record if the features are scores, resample the record (`truetwin resample R.csv --step {expected} --out R2.csv`), or set [record] step = {given} in a study file and pretrain again"
-            )));
+            return Err(StudyError::OtherStep {
+                given: six_digits(given),
+                expected,
+            });
         }
         Ok(())
     }

@@ -87,7 +87,7 @@ pub enum TwinError {
         names: String,
     },
     /// A name in a study file's table that the twin does not have.
-    #[error("[{table}] names {name}{}, the twin has {known}; use one of these", did_you_mean(name, known.split(", ")))]
+    #[error("{table} names {name}{}, the twin has {known}; use one of these", did_you_mean(name, known.split(", ")))]
     UnknownIn {
         /// Table of the study file.
         table: &'static str,
@@ -98,11 +98,11 @@ pub enum TwinError {
     },
     /// Limits, noise levels or starts of a black box.
     #[error(
-        "[{0}] needs the twin's equations, which a black box does not show; remove the table or implement StateSpace"
+        "{0} needs the twin's equations, which a black box does not show; remove the table or implement StateSpace"
     )]
     BlackBox(&'static str),
     /// A noise level or start that the twin cannot have.
-    #[error("[{table}] {name} = {}; {remedy}", number(*value))]
+    #[error("{table} {name} = {}; {remedy}", number(*value))]
     Value {
         /// Table of the study file.
         table: &'static str,
@@ -114,7 +114,7 @@ pub enum TwinError {
         remedy: &'static str,
     },
     /// An unknown start or noise level without a prior.
-    #[error("no prior for the unknown {0}; add [prior] \"{0}\" = [low, high]")]
+    #[error("no prior for the unknown {0}; give it one, from low to high")]
     NoPrior(String),
     /// The effect file cannot be read.
     #[error("{}: {error}; give the path of an effect file", path.display())]
@@ -126,7 +126,7 @@ pub enum TwinError {
     },
     /// The text is no list of effects: bad TOML, an unknown id, an unknown or a missing key.
     #[error(
-        "{}, line {line}: {problem}; write [[effect]], then id, target and magnitudes = {{ name = value }}",
+        "{}, line {line}: {problem}; an effect has id, target and magnitudes = {{ name = value }}",
         path.display()
     )]
     EffectText {

@@ -42,7 +42,7 @@ fn check_outline(outline: &Outline) -> Result<(), TwinError> {
             } else if matches!(kind, "parameter" | "state") && is_channel(name) {
                 "is what effects call a channel; rename it"
             } else if kind == "output" && states.contains(name) {
-                "is a state's name too; rename one, since [noise] goes by both"
+                "is a state's name too; rename one, since noise levels go by both"
             } else {
                 continue;
             };

@@ -19,7 +19,7 @@ use truetwin::diagnose::{
     FreeRuns, Horizon, Lag, Location, Maps, MissingFunction, NextInput, Onset, Probabilities,
     Region, Remains, Shrinkage, TargetShare, Term, Verdict, Visible, Window,
 };
-use truetwin::estimator::{EstimateOptions, PretrainOptions, pretrain};
+use truetwin::estimator::{PretrainOptions, pretrain};
 use truetwin::evaluate::paper::reference_studies;
 use truetwin::evaluate::trials::{Scorecard, Settings, Withheld};
 use truetwin::fit::{FitSettings, Nuisance};
@@ -143,7 +143,9 @@ fn fit() -> String {
         draws: 50,
         ..FitSettings::default()
     };
-    let fit = study.fit(&records, &settings, &Progress::silent()).unwrap();
+    let fit = study
+        .fit_with(&records, &settings, &Progress::silent())
+        .unwrap();
     fit.html(&study, &records)
 }
 
@@ -158,7 +160,7 @@ fn estimate() -> String {
     let silent = Progress::silent();
     let (estimator, _) = pretrain(&study, &options, &silent).unwrap();
     let record = oscillation(2, 200);
-    let estimate = estimator.estimate(&record, &EstimateOptions::default(), &silent);
+    let estimate = estimator.estimate(&record);
     estimate.unwrap().html(&study, &record)
 }
 

@@ -63,7 +63,7 @@ fn estimate(nu: f64, seed: u64) -> truetwin::estimator::Estimate {
         ..EstimateOptions::default()
     };
     estimator()
-        .estimate(&record(nu, seed), &options, &Progress::silent())
+        .estimate_with(&record(nu, seed), &options, &Progress::silent())
         .unwrap()
 }
 
@@ -121,7 +121,8 @@ fn the_gate_keeps_records_of_the_twin_whatever_noise_is_declared() {
         let of = |seed: &u64| {
             let nu = space.draw_prior(Noise::new(*seed, "prior", 0))[0];
             let options = EstimateOptions::default();
-            let found = estimator.estimate(&record(nu, 400 + seed), &options, &Progress::silent());
+            let found =
+                estimator.estimate_with(&record(nu, 400 + seed), &options, &Progress::silent());
             !found.unwrap().gate.out_of_distribution
         };
         (0..RECORDS).filter(of).count() as u64
@@ -213,9 +214,7 @@ fn hold_outside_the_prior(records: u64) -> (usize, usize) {
         let drive = study.drive(noise).unwrap();
         let outputs = study.twin().simulate(&theta, &drive, noise).unwrap();
         let record = Record::new(drive, outputs).unwrap();
-        let estimate =
-            (estimator.estimate(&record, &EstimateOptions::default(), &Progress::silent()))
-                .unwrap();
+        let estimate = (estimator.estimate(&record)).unwrap();
         assert!(estimate.refit().is_some());
         let json = estimate.json(study);
         let interval = &json["trusting_prior"]["interval"];
@@ -257,7 +256,7 @@ fn threads_change_no_bit() {
                 ..EstimateOptions::default()
             };
             let estimate = estimator
-                .estimate(&record, &options, &Progress::silent())
+                .estimate_with(&record, &options, &Progress::silent())
                 .unwrap();
             (
                 estimate.initial.theta.clone(),
@@ -344,7 +343,7 @@ fn records_of_another_step_or_channels_are_refused_with_the_remedy() {
         let y = Signal::from_shape_fn((drive.samples(), outputs), |(k, _)| (k as f64).sin());
         let record = Record::new(drive, y).unwrap();
         let options = EstimateOptions::default();
-        let error = estimator().estimate(&record, &options, &Progress::silent());
+        let error = estimator().estimate_with(&record, &options, &Progress::silent());
         error.unwrap_err().to_string()
     };
     let error = other(Drive::autonomous(0.1, 300).unwrap(), 1);
@@ -379,7 +378,7 @@ fn long_work_can_be_cancelled_in_every_stage() {
         ..EstimateOptions::default()
     };
     let run = |listener: Arc<StopAt>| {
-        estimator().estimate(&record(3.0, 1), &options, &Progress::new(listener))
+        estimator().estimate_with(&record(3.0, 1), &options, &Progress::new(listener))
     };
     run(total.clone()).unwrap();
     let units = total.1.load(Ordering::Relaxed);
@@ -414,7 +413,7 @@ fn an_estimate_in_a_corner_of_the_bounds_stands() {
         always_refine: true,
         ..EstimateOptions::default()
     };
-    let estimate = (estimator.estimate(&record, &options, &Progress::silent())).unwrap();
+    let estimate = (estimator.estimate_with(&record, &options, &Progress::silent())).unwrap();
     let bounds = study.twin().parameters().bounds();
     assert!(estimate.refit().is_some() && estimate.redrawn() > 0);
     assert!(
@@ -469,7 +468,7 @@ fn study_of_the_parts() {
                     seed: i,
                     ..EstimateOptions::default()
                 };
-                let found = estimator.estimate(&record, &options, &Progress::silent());
+                let found = estimator.estimate_with(&record, &options, &Progress::silent());
                 let found = found.unwrap().json(&study);
                 let parts = ["/theta/gauss_newton", "/heads/layer", "/theta/fine"];
                 for (square, part) in squares.iter_mut().zip(parts) {

@@ -29,9 +29,7 @@ fn simulated(seed: u64) -> Record {
 }
 
 fn fitted(study: &Study, records: &[Record]) -> Fit {
-    study
-        .fit(records, &FitSettings::default(), &Progress::silent())
-        .unwrap()
+    study.fit(records).unwrap()
 }
 
 fn value(fit: &Fit, name: &str) -> f64 {
@@ -300,7 +298,7 @@ fn the_seed_hardly_moves_the_evidence_of_the_tanks() {
                 ..FitSettings::default()
             };
             let fit = tanks()
-                .fit(&records, &settings, &Progress::silent())
+                .fit_with(&records, &settings, &Progress::silent())
                 .unwrap();
             let evidence = fit.evidence.unwrap();
             assert!(evidence.std_error.unwrap() < 0.05, "{evidence:?}");

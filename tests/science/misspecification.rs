@@ -190,7 +190,7 @@ impl Checks {
         let records = std::slice::from_ref(&record);
         let found = diagnose(&self.study, records, None, &settings, &Progress::silent()).unwrap();
         let options = EstimateOptions::default();
-        let estimate = (self.estimator).estimate(&record, &options, &Progress::silent());
+        let estimate = (self.estimator).estimate_with(&record, &options, &Progress::silent());
         let estimate = estimate.unwrap();
         [
             found.verdict == Verdict::StructuralGap

@@ -66,7 +66,7 @@ fn the_cascaded_tanks_are_followed_on_a_record_never_seen() {
         ..EstimateOptions::default()
     };
     let estimate = estimator
-        .estimate(&record, &options, &Progress::silent())
+        .estimate_with(&record, &options, &Progress::silent())
         .unwrap();
     let after = estimate.tracking.as_ref().unwrap().rmse;
     let unseen = estimate.validation.as_ref().map(|v| v.rmse).unwrap();

@@ -63,7 +63,7 @@ impl Verb for Compare {
                 ..FitSettings::default()
             };
             let at = |failure: Failure| failure.within(path);
-            let fit = (study.fit(&measured, &settings, context.progress))
+            let fit = (study.fit_with(&measured, &settings, context.progress))
                 .map_err(|error| at(error.into()))?;
             let score = study
                 .score(&fit, &validation)

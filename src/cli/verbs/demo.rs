@@ -67,7 +67,7 @@ impl Verb for Demo {
             seed: context.seed,
             ..EstimateOptions::default()
         };
-        let estimate = estimator.estimate(&record, &settings, context.progress)?;
+        let estimate = estimator.estimate_with(&record, &settings, context.progress)?;
         let provenance = Provenance::new(context, None, []);
         if let (Some(folder), Some(out)) = (folder, &self.out) {
             record.write(&folder.file("record.csv"))?;

@@ -128,23 +128,21 @@ impl Diagnose {
     /// Checks that the first record has the study's step, as all others then must: equations that hold for one step may lack something with
     /// another.
     fn check_step(&self, study: &Study, record: &Record) -> Result<(), Failure> {
-        let plan = study.plan();
         let other_twin = record.check_channels(&study.twin().signals()).is_err();
-        if other_twin || plan.check_step(record).is_ok() {
+        let Some(plan) = study.plan().filter(|_| !other_twin) else {
             return Ok(());
-        }
-        let (given, expected) = (number(six_digits(record.drive().dt())), number(plan.step));
+        };
+        let Err(refused) = plan.check_step(record) else {
+            return Ok(());
+        };
         if self.step_of_record {
+            let (given, expected) = (number(six_digits(record.drive().dt())), number(plan.step));
             output::say(&format!(
                 "the twin steps {given} s, as the record does, in place of the study's {expected} s; its process noise is scaled to that"
             ));
             return Ok(());
         }
-        let refused = Failure::user(format!(
-            "the record's step is {given} s, the study's {expected} s; give --step-of-record, and the twin steps as the record does, or set \
-             [record] step = {given} in a study file"
-        ));
-        Err(refused.within(&self.records[0]))
+        Err(Failure::diagnosis(refused).within(&self.records[0]))
     }
 }
 

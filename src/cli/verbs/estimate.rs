@@ -77,7 +77,7 @@ impl Verb for Estimate {
         let files: Vec<_> = files.chain(validation).collect();
         let provenance = || Provenance::new(context, None, files.clone());
         if let [record] = &records[..] {
-            let estimate = (estimator.estimate(record, &settings, context.progress))
+            let estimate = (estimator.estimate_with(record, &settings, context.progress))
                 .map_err(|error| Failure::from(error).within(&self.records[0]))?;
             let provenance = provenance();
             if let Some(folder) = folder {

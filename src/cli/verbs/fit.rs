@@ -48,7 +48,7 @@ impl Verb for Fit {
             draws: self.draws.count()?,
             ..FitSettings::default()
         };
-        let fit = study.fit(&records, &settings, context.progress)?;
+        let fit = study.fit_with(&records, &settings, context.progress)?;
         let files = self.records.iter().map(|path| ("record", path.as_path()));
         let provenance = Provenance::new(context, Some(&self.subject), files);
         let json = provenance.on(fit.json(&study));

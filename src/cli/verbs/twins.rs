@@ -48,7 +48,7 @@ fn describe(study: &Study) -> Value {
         "states": states.unwrap_or_default(),
         "inputs": signals.inputs,
         "outputs": signals.outputs,
-        "record": { "step": study.plan().step, "samples": study.plan().samples },
+        "record": study.plan().map(|plan| json!({ "step": plan.step, "samples": plan.samples })),
     })
 }
 
@@ -67,12 +67,13 @@ fn in_words(study: &Study) -> String {
         None => "hidden (black box)".into(),
     };
     let mut text = format!(
-        "{}\n  states  {states}\n  inputs  {}\n  outputs {}\n  record  {} samples, step {} s\n  {:<12} {:<8} {:<16} bounds\n",
+        "{}\n  states  {states}\n  inputs  {}\n  outputs {}\n  record  {}\n  {:<12} {:<8} {:<16} bounds\n",
         study.name(),
         names(&signals.inputs),
         names(&signals.outputs),
-        study.plan().samples,
-        study.plan().step,
+        study.plan().map_or("as measured".into(), |plan| {
+            format!("{} samples, step {} s", plan.samples, plan.step)
+        }),
         "parameter",
         "unit",
         "prior",

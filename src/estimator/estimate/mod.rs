@@ -48,8 +48,17 @@ impl Estimator {
     ///
     /// # Errors
     ///
-    /// A record that does not fit, simulations that fail, a listener that cancels: [`EstimatorError`].
-    pub fn estimate(
+    /// A record that does not fit, simulations that fail: [`EstimatorError`].
+    pub fn estimate(&self, record: &Record) -> Result<Estimate, EstimatorError> {
+        self.estimate_with(record, &EstimateOptions::default(), &Progress::silent())
+    }
+
+    /// As [`estimate`](Self::estimate), with options, and progress that can cancel it.
+    ///
+    /// # Errors
+    ///
+    /// As [`estimate`](Self::estimate); options that cannot be used, cancellation.
+    pub fn estimate_with(
         &self,
         record: &Record,
         options: &EstimateOptions,

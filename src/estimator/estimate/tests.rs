@@ -37,9 +37,7 @@ fn a_start_alone_is_estimated() {
     let noise = Noise::new(1, "record", 0);
     let theta = study.twin().parameters().centre();
     let record = record(&study, study.twin(), &theta, noise);
-    let estimate = estimator
-        .estimate(&record, &EstimateOptions::default(), &Progress::silent())
-        .unwrap();
+    let estimate = estimator.estimate(&record).unwrap();
     assert_eq!(estimate.names, ["start.h1"]);
     assert!(estimate.std_error[0].is_finite());
 }
@@ -60,9 +58,7 @@ fn an_answer_near_the_level_is_taken_from_more_simulations() {
         theta[0] += 0.1;
         let noise = Noise::new(3, "record", index);
         let record = record(&study, study.twin(), &theta, noise);
-        let estimate = estimator
-            .estimate(&record, &EstimateOptions::default(), &Progress::silent())
-            .unwrap();
+        let estimate = estimator.estimate(&record).unwrap();
         let tests = [Some(estimate.gate), estimate.after()];
         for (test, repeated) in tests.into_iter().flatten().zip([&mut first, &mut after]) {
             assert!(test.simulations == larger || !test.is_unsure(), "{test:?}");

@@ -54,7 +54,7 @@ impl Estimator {
                 seed: options.seed.wrapping_add(r as u64),
                 ..options.clone()
             };
-            let estimate = self.estimate(record, &options, progress);
+            let estimate = self.estimate_with(record, &options, progress);
             all.push(estimate.map_err(|error| EstimatorError::Record {
                 number: r + 1,
                 error: Box::new(error),

@@ -14,12 +14,12 @@ const SCHEMA: u32 = 2;
 
 /// The problem of a file that is something else, or cut off.
 pub(super) fn not_whole(reason: &str) -> String {
-    format!("not a whole estimator file ({reason}); make one with `truetwin pretrain`")
+    format!("not a whole estimator file ({reason}); pretrain one again")
 }
 
 /// The problem of a file of another kind.
 pub(super) fn foreign() -> String {
-    "not an estimator file; give one that `truetwin pretrain` has made".into()
+    "not an estimator file; give one that was pretrained".into()
 }
 
 /// The header. The order of its fields is part of the format.

@@ -127,7 +127,7 @@ fn project(header: &Header, path: &Path, known: &[Project]) -> Result<Project, S
     let registered = registered.ok_or_else(|| {
         let known: Vec<_> = known.iter().map(|p| p.study().name()).collect();
         format!(
-            "made for twin \"{}\", known are {}; use the program that has this twin, or name it with --program or --fmu",
+            "made for twin \"{}\", known are {}; use the program that has this twin",
             file.twin,
             known.join(", ")
         )

@@ -83,7 +83,7 @@ impl<'a> Pretraining<'a> {
         let place = beside(path);
         sweep_beside(path);
         if path.symlink_metadata().is_ok() && WorkFolder::resume(&place, &manifest).is_err() {
-            let problem = "exists already; choose another --out, or remove it";
+            let problem = "exists already; choose another name, or remove it";
             return Err(EstimatorError::file(path, problem));
         }
         let folder = WorkFolder::open::<EstimatorError>(&place, &manifest, &[], |_| Ok(()))?;

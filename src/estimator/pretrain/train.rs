@@ -102,7 +102,7 @@ pub(super) fn fits_into_memory(size: usize) -> Result<(), EstimatorError> {
         return Ok(());
     }
     Err(EstimatorError::Bank(format!(
-        "bank size = {size}; at most {MOST_IN_MEMORY} fit into memory: make a bank on disk with `truetwin bank`, then pretrain --bank"
+        "bank size = {size}; at most {MOST_IN_MEMORY} fit into memory: make a bank on disk, then pretrain from it"
     )))
 }
 

@@ -24,7 +24,7 @@ const MOST_ROWS: usize = 16_384;
 /// Folder of the shards.
 pub(super) const SHARDS: &str = "shards";
 /// Remedy for a damaged shard.
-const AGAIN: &str = "run the same `truetwin bank` call again, and it is made again";
+const AGAIN: &str = "make the same bank again, and it is replaced";
 
 /// Content of a folder of shards.
 #[derive(Debug, Clone)]
@@ -159,9 +159,8 @@ impl Shards {
 
     fn incomplete(&self) -> EstimatorError {
         let (there, of) = (self.there.len(), self.of);
-        let problem = format!(
-            "{there} of {of} shards are there; run the same `truetwin bank` call again to make the others"
-        );
+        let problem =
+            format!("{there} of {of} shards are there; make the same bank again to add the others");
         EstimatorError::file(self.folder.path(), problem)
     }
 

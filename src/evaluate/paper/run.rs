@@ -62,7 +62,7 @@ impl Run {
             always_refine: true,
             ..EstimateOptions::default()
         };
-        let estimate = estimator.estimate(record, &options, &progress.unshown());
+        let estimate = estimator.estimate_with(record, &options, &progress.unshown());
         // Whatever a stop looks like from inside, it is no failure of the estimator.
         progress.checkpoint()?;
         let (estimate, failure) = match estimate {

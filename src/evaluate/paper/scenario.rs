@@ -4,7 +4,7 @@ use super::{Invariant, Method, Symmetry};
 use crate::evaluate::EvaluateError;
 use crate::fit::least_squares::{Bounds, space_filling};
 use crate::record::{Drive, RecordError, Signal};
-use crate::study::{DriveSource, Study};
+use crate::study::{DriveSource, RecordPlan, Study, StudyError};
 use crate::twin::{Interval, Noise, Parameter, ParameterSpace};
 use nalgebra::DVector;
 use serde::Serialize;
@@ -136,7 +136,9 @@ impl<'a> Draws<'a> {
         let inputs = if own {
             Inputs::Study(study.drives()?)
         } else {
-            Inputs::Fixed(staircase(study, benchmark)?)
+            let plan = study.plan().ok_or(StudyError::NoPlan)?;
+            let channels = study.twin().signals().inputs.len();
+            Inputs::Fixed(staircase(plan, channels, benchmark)?)
         };
         let grid = match scenario {
             Scenario::Grid => grid(&study.twin().parameters())?,
@@ -199,8 +201,11 @@ fn grid(space: &ParameterSpace) -> Result<Vec<Vec<f64>>, EvaluateError> {
 }
 
 /// The benchmark's levels, over and over, as every input of the study's records.
-fn staircase(study: &Study, benchmark: &Benchmark) -> Result<Drive, RecordError> {
-    let (plan, channels) = (study.plan(), study.twin().signals().inputs.len());
+fn staircase(
+    plan: &RecordPlan,
+    channels: usize,
+    benchmark: &Benchmark,
+) -> Result<Drive, RecordError> {
     let levels = Signal::from_shape_fn((plan.samples, channels), |(k, _)| {
         benchmark.levels[(k / benchmark.hold.max(1)) % benchmark.levels.len()]
     });
@@ -211,7 +216,7 @@ fn staircase(study: &Study, benchmark: &Benchmark) -> Result<Drive, RecordError>
 mod tests {
     use super::*;
     use crate::evaluate::paper::reference_studies;
-    use crate::study::{RecordPlan, StudyFile};
+    use crate::study::StudyFile;
     use crate::twins::CascadedTanks;
     use std::path::Path;
 
@@ -267,7 +272,7 @@ mod tests {
         let study = Study::new("mine", CascadedTanks, plan).unwrap();
         let error = draws(&study, Scenario::First).err().unwrap().to_string();
         assert!(
-            error.contains("\"mine\"") && error.contains("--scenario uniform"),
+            error.contains("\"mine\"") && error.contains("the bounds"),
             "{error}"
         );
         let uniform = draws(&study, Scenario::Uniform).unwrap();

@@ -40,7 +40,7 @@ pub(super) fn rescaled(
         library: file.library.clone(),
         ..StudyFile::default()
     };
-    let new = Study::new(study.name(), Modified(Rescaled(twin)), study.plan().clone())?;
+    let new = study.with_twin(Modified(Rescaled(twin)))?;
     let kinds = study.catalogue().kinds().iter();
     let new = new.with_effects(kinds.map(|kind| kind.as_ref().clone()));
     let scaled = |record: &Record| Record::new(record.drive().clone(), record.outputs() * FACTOR);

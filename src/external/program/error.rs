@@ -20,6 +20,6 @@ pub(super) fn start(command: &ProgramCommand, error: &std::io::Error) -> StudyEr
 /// The program does not describe itself.
 pub(super) fn describe(command: &ProgramCommand, problem: &str) -> StudyError {
     StudyError::Simulator(format!(
-        "the program `{command}` {problem}; asked to describe itself, it must answer one line of JSON with name, parameters, outputs and record, within the time-out (--timeout)"
+        "the program `{command}` {problem}; asked to describe itself, it must answer one line of JSON with name, parameters, outputs and record, within the time-out"
     ))
 }

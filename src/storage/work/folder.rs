@@ -266,7 +266,7 @@ mod tests {
         open(&path, 2).unwrap();
         let refused = |path: &Path, runs| open(path, runs).unwrap_err().to_string();
         assert!(refused(&path, 3).contains("runs was 2, now it is 3"));
-        assert!(refused(place.path(), 2).contains("no folder of `truetwin reproduce`"));
+        assert!(refused(place.path(), 2).contains("no reproduce folder"));
         assert!(refused(&place.path().join("a/b"), 2).contains("make it first"));
         let failed: Result<_, StorageError> =
             WorkFolder::open(&place.path().join("new"), &manifest(1), &[], |_| {

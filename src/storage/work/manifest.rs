@@ -92,7 +92,7 @@ impl Manifest {
                 .strip_prefix("truetwin.")
                 .and_then(|s| s.split_once("-folder/"))
             {
-                Some((other, _)) => format!("it is one of `truetwin {}`", excerpt(other)),
+                Some((other, _)) => format!("it is a {} folder", excerpt(other)),
                 None => "its manifest.json has another schema".into(),
             },
         )
@@ -154,7 +154,7 @@ mod tests {
         let text = manifest().text();
         assert_eq!(Manifest::parse("reproduce", &text), Ok(manifest()));
         let other = Manifest::parse("withheld", &text).unwrap_err();
-        assert!(other.contains("`truetwin reproduce`"), "{other}");
+        assert!(other.contains("a reproduce folder"), "{other}");
         for text in ["", "[]", "{}", r#"{"schema": "truetwin.gap/2"}"#] {
             assert!(Manifest::parse("reproduce", text).is_err(), "{text}");
         }

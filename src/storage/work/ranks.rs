@@ -121,6 +121,6 @@ mod tests {
     fn ranks_without_mpi_are_told_what_to_do() {
         assert!(Ranks::of_launch(1).is_ok_and(|ranks| ranks.is_alone()));
         let error = Ranks::of_launch(4).map(|_| ()).unwrap_err().to_string();
-        assert!(error.contains("--features mpi"), "{error}");
+        assert!(error.contains("feature mpi"), "{error}");
     }
 }

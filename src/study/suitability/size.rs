@@ -39,7 +39,7 @@ pub(super) fn check_inputs(
         return (findings, factors);
     };
     for (j, input) in inputs.iter().enumerate() {
-        let (low, high) = match &study.plan().input {
+        let (low, high) = match study.plan().and_then(|plan| plan.input.as_ref()) {
             Some(InputPlan::Levels(levels)) => (levels.levels.low(), levels.levels.high()),
             _ => ends(&present(planned.inputs(), j).1),
         };

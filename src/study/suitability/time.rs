@@ -28,7 +28,8 @@ pub(super) fn check(
     constants: Option<(f64, f64)>,
 ) -> (Vec<Finding>, f64) {
     let drive = record.drive();
-    let (step, plan) = (drive.dt(), study.plan().step);
+    let step = drive.dt();
+    let plan = study.plan().map_or(step, |plan| plan.step);
     let length = drive.time(record.samples() - 1);
     let fits = |unit: f64| match constants {
         Some((fast, slow)) => step / unit <= 0.5 * fast && length / unit >= slow,

@@ -34,7 +34,7 @@ impl DigitalTwin for Boxed {
 /// The study of a twin with its equations hidden.
 pub fn boxed(study: &Study) -> Study {
     let twin = Boxed(study.twin().clone());
-    Study::new(study.name(), twin, study.plan().clone()).unwrap()
+    study.with_twin(twin).unwrap()
 }
 
 /// θ within the prior, or within the middle of the bounds and outside of the prior.

@@ -60,7 +60,7 @@ fn estimates_do_not_depend_on_units() {
     let estimate = |units: Units| -> Estimate {
         let record = Chain::pair(units).record(1.7, SAMPLES, 5);
         let options = EstimateOptions::default();
-        (estimator(units).estimate(&record, &options, &Progress::silent())).unwrap()
+        (estimator(units).estimate_with(&record, &options, &Progress::silent())).unwrap()
     };
     let plain = estimate(Units::PLAIN);
     assert!(plain.refit().is_some(), "nothing but the network was tried");

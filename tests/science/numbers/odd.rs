@@ -2,7 +2,7 @@
 
 use super::chain::{Chain, Units};
 use truetwin::diagnose::{DiagnoseSettings, diagnose};
-use truetwin::estimator::{EstimateOptions, PretrainOptions, pretrain};
+use truetwin::estimator::{PretrainOptions, pretrain};
 use truetwin::progress::Progress;
 use truetwin::record::{Record, Signal};
 
@@ -40,7 +40,7 @@ fn odd_records_give_numbers_or_reasons() {
         let outputs = plain.outputs();
         let changed = Signal::from_shape_fn(outputs.dim(), |(k, j)| change(k, outputs[[k, j]]));
         let record = Record::new(plain.drive().clone(), changed).unwrap();
-        match estimator.estimate(&record, &EstimateOptions::default(), &silent) {
+        match estimator.estimate(&record) {
             Ok(estimate) => {
                 assert!(
                     estimate.theta.iter().all(|v| v.is_finite()),

@@ -3,7 +3,7 @@
 use super::chain::{Chain, Units};
 use std::time::Instant;
 use truetwin::diagnose::{DiagnoseSettings, diagnose};
-use truetwin::estimator::{EstimateOptions, PretrainOptions, Project, pretrain};
+use truetwin::estimator::{PretrainOptions, Project, pretrain};
 use truetwin::feature::Arx;
 use truetwin::progress::Progress;
 
@@ -19,7 +19,7 @@ fn estimated(chain: Chain, project: impl Into<Project>, samples: usize, bank: us
     let (estimator, history) = pretrain(project, &options, &silent).unwrap();
     assert!(history.training.iter().all(|loss| loss.is_finite()));
     let record = chain.record(1.1, samples, 3);
-    let estimate = (estimator.estimate(&record, &EstimateOptions::default(), &silent)).unwrap();
+    let estimate = (estimator.estimate(&record)).unwrap();
     for j in 0..chain.tanks {
         let truth = 1.1 * chain.rate(j);
         let (theta, error) = (estimate.theta[j], estimate.std_error[j]);

@@ -117,7 +117,7 @@ impl<'a> TruthSampler<'a> {
         };
         let first = self.listed.first();
         if kind.is_outside() && !has_room(&self.space) {
-            return refused("[bounds] leave no room outside [prior]; widen them");
+            return refused("the bounds leave no room outside the prior; widen them");
         }
         match kind {
             Kind::None | Kind::Outside => Ok(()),
@@ -126,7 +126,7 @@ impl<'a> TruthSampler<'a> {
             }
             Kind::Random => Ok(()),
             _ if first.is_none() => {
-                refused("[library] leaves no effect that trials can make; allow more effects")
+                refused("the library leaves no effect that trials can make; allow more effects")
             }
             Kind::Pair
                 if self
@@ -134,7 +134,7 @@ impl<'a> TruthSampler<'a> {
                     .iter()
                     .all(|l| Some(l.place) == first.map(|f| f.place)) =>
             {
-                refused("[library] leaves effects at one place only; allow more effects")
+                refused("the library leaves effects at one place only; allow more effects")
             }
             _ => Ok(()),
         }

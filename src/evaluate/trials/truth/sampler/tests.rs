@@ -212,7 +212,7 @@ fn twins_without_departures_say_why() {
     let sampler = sampler(&study);
     let error = sampler.check(Kind::Listed).unwrap_err().to_string();
     assert!(
-        error.contains("kind listed") && error.contains("[library]"),
+        error.contains("kind listed") && error.contains("the library"),
         "{error}"
     );
     assert!(sampler.check(Kind::Random).is_ok());

@@ -1,0 +1,132 @@
+//! Remedies in the words of the command line: options, verbs, tables of the study file.
+//!
+//! Errors of the library say what is wrong, where, and what to do in general; these lines say how the command line does it.
+
+use crate::estimator::EstimatorError;
+use crate::evaluate::EvaluateError;
+use crate::record::RecordError;
+use crate::setting::number;
+use crate::storage::StorageError;
+use crate::study::StudyError;
+use crate::twin::TwinError;
+
+/// An error that the command line has a remedy for.
+pub(super) trait Remedy {
+    /// Returns options, verbs or tables that help.
+    fn remedy(&self) -> Option<String>;
+}
+
+impl Remedy for RecordError {
+    fn remedy(&self) -> Option<String> {
+        Some(match self {
+            Self::Within { error, .. } => return error.remedy(),
+            Self::Incomplete { .. } => {
+                "`truetwin resample R.csv --step S --out R2.csv` closes short gaps, with --longest-gap longer ones; `truetwin fit` and `truetwin diagnose` take such records".into()
+            }
+            Self::Uneven { expected, .. } => format!(
+                "`truetwin resample R.csv --step {} --out R2.csv`; `truetwin fit` and `truetwin diagnose` take such records",
+                number(*expected)
+            ),
+            Self::OneStep => "`truetwin resample R.csv --step S --out R2.csv`".into(),
+            Self::Channels { .. } => "`truetwin twins` lists the twins".into(),
+            Self::Columns { .. } => {
+                "--columns t=NAME,u=NAME,y=NAME, or [record] columns of a study file, takes other names".into()
+            }
+            _ => return None,
+        })
+    }
+}
+
+impl Remedy for StorageError {
+    fn remedy(&self) -> Option<String> {
+        Some(match self {
+            Self::Taken { .. } | Self::OtherCall { .. } | Self::Busy { .. } => {
+                "--out names another place".into()
+            }
+            Self::Foreign { verb, .. } => format!("`truetwin {verb}` makes such folders"),
+            Self::Threads { .. } => "--threads N takes fewer".into(),
+            Self::NoMpi { .. } => {
+                "`cargo install --features mpi`, or --shard i/n in a job array".into()
+            }
+            _ => return None,
+        })
+    }
+}
+
+impl Remedy for TwinError {
+    fn remedy(&self) -> Option<String> {
+        Some(match self {
+            Self::NoPrior(name) => format!("[prior] \"{name}\" = [low, high] in the study file"),
+            Self::EffectText { .. } => "each effect is a table [[effect]]".into(),
+            _ => return None,
+        })
+    }
+}
+
+impl Remedy for StudyError {
+    fn remedy(&self) -> Option<String> {
+        Some(match self {
+            Self::Record(error) | Self::Channels { error, .. } => return error.remedy(),
+            Self::Adaptation(error) => return error.remedy(),
+            Self::NoTwin(_) | Self::Twin { .. } => "`truetwin twins` lists them".into(),
+            Self::AllFixed => "`truetwin fit` tests the twin on a record".into(),
+            Self::UnknownEffect(_) | Self::Without(_) => {
+                "`truetwin effects --twin T` lists those of a twin".into()
+            }
+            Self::NoInput(_) => {
+                "[record] input = { levels = [low, high], hold = n }, or a file, in the study file"
+                    .into()
+            }
+            Self::NoPlan => "[record] step, samples and input of the study file".into(),
+            Self::Steps { expected, .. } => format!(
+                "`truetwin resample R.csv --step {} --out R2.csv`",
+                number(*expected)
+            ),
+            Self::OtherStep { given, expected } => format!(
+                "--step-of-record takes it, for `estimate` if the features are scores; `truetwin resample R.csv --step {} --out R2.csv`; [record] step = {} in the study file",
+                number(*expected),
+                number(*given)
+            ),
+            Self::NoFit => "[bounds] of the study file".into(),
+            _ => return None,
+        })
+    }
+}
+
+impl Remedy for EstimatorError {
+    fn remedy(&self) -> Option<String> {
+        Some(match self {
+            Self::Record { error, .. } => return error.remedy(),
+            Self::Study(error) => return error.remedy(),
+            Self::Work(error) => return error.remedy(),
+            Self::Whitening(_) => "[noise] of the study file".into(),
+            _ => return None,
+        })
+    }
+}
+
+impl Remedy for EvaluateError {
+    fn remedy(&self) -> Option<String> {
+        Some(match self {
+            Self::NoPoint(_) | Self::Outside { .. } => {
+                "--scenario 0 draws from the prior, --scenario uniform from the bounds".into()
+            }
+            Self::NoDeparture { .. } | Self::NoTruth { .. } => {
+                "--kinds; [prior], [bounds] and [library] of the study file".into()
+            }
+            Self::Work(error) => return error.remedy(),
+            Self::Plan(error) => return error.remedy(),
+            Self::Record(error) => return error.remedy(),
+            Self::Parameter(error) => return error.remedy(),
+            _ => return None,
+        })
+    }
+}
+
+/// An error in one line, with the command line's remedy.
+pub(super) fn with_remedy(error: &(impl Remedy + std::fmt::Display)) -> String {
+    match error.remedy() {
+        Some(remedy) => format!("{error} ({remedy})"),
+        None => error.to_string(),
+    }
+}
