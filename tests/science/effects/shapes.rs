@@ -105,7 +105,7 @@ fn fits(unit: &'static str, record: &Record) -> Vec<Vec<u64>> {
     let fit = |effect: &String| {
         let records = std::slice::from_ref(record);
         let fit = (study(unit, effect))
-            .fit(records, &FitSettings::default(), &Progress::silent())
+            .fit_with(records, &FitSettings::default(), &Progress::silent())
             .unwrap();
         let values = fit.parameters.iter().flat_map(|p| [p.value, p.std_error]);
         let evidence = fit.evidence.map(|evidence| evidence.log_evidence);
