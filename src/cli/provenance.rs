@@ -5,7 +5,7 @@ use super::context::Context;
 use super::failure::Failure;
 use super::output;
 use super::say::say;
-use crate::report::with_footer;
+use crate::report::{Document, with_footer};
 use crate::storage::files::sha256_of;
 use jiff::Timestamp;
 use serde::Serialize;
@@ -24,6 +24,8 @@ const SILENT: [(&str, bool); 6] = [
 ];
 /// Digits of a checksum in a line of text.
 const SHORT: usize = 12;
+/// Characters of `2026-11-21`.
+const DAY: usize = 10;
 
 /// Everything that repeats a result. The same call on the same files has the same provenance.
 #[derive(Debug, Clone, Serialize)]
@@ -114,6 +116,23 @@ impl Provenance {
             true => output::print_json(json),
             false => output::print(&self.below(&text())),
         }
+    }
+
+    /// The document as a page: files and date below its heading, where it comes from at its end.
+    pub fn page(&self, document: Document) -> String {
+        let measured = |file: &&File| ["record", "validation"].contains(&file.role);
+        let names = self.files.iter().filter(measured).map(|file| {
+            let name = file.path.file_name().unwrap_or(file.path.as_os_str());
+            name.to_string_lossy().into_owned()
+        });
+        let day = self.date.clone().unwrap_or_else(|| Timestamp::now().to_string());
+        let byline: Vec<String> = names.chain([day.chars().take(DAY).collect()]).collect();
+        let document = Document {
+            byline: byline.join(", "),
+            footer: vec![self.call.clone(), self.line(usize::MAX)],
+            ..document
+        };
+        document.html()
     }
 
     /// The page with a footer on where it comes from.

@@ -1,10 +1,12 @@
 //! Several studies on one record: a table and an overlay.
 
-use super::chart::{Chart, Panel, Series, Style};
+use super::chart::Style;
 use super::digits::{short, unit_suffix};
-use super::table::table;
+use super::document::Column::{Number, Text};
+use super::document::{Block, Document};
+use super::record::{RecordPicture, Run, times};
 use crate::fit::{Fit, FitScore, OutputErrors};
-use crate::record::{Record, Signal};
+use crate::record::Record;
 use crate::study::Study;
 use serde_json::{Value, json};
 
@@ -47,23 +49,17 @@ pub(crate) fn compare_json(all: &[Compared]) -> Value {
     })
 }
 
-/// The comparison as a table, one study a line.
-pub(crate) fn compare_text(all: &[Compared], what: &str) -> String {
-    let head = [
-        "study",
-        "parameters",
-        "evidence",
-        "log score",
-        "one step",
-        "free run",
-        "",
-    ];
-    let mut rows = vec![head.map(str::to_owned).to_vec()];
-    for own in all {
-        rows.push(vec![
+/// The comparison for people: the best study, then a table, one study a line.
+pub(crate) fn compare_document(all: &[Compared], what: &str) -> Document {
+    let rows = all.iter().map(|own| {
+        let evidence = gain(all, own).map_or("–".into(), |nats| match nats > 0.0 {
+            true => format!("+{}", short(nats)),
+            false => short(nats),
+        });
+        vec![
             own.name.clone(),
             own.fit.parameters.len().to_string(),
-            gain(all, own).map_or("–".into(), signed),
+            evidence,
             short(own.score.log_score),
             errors(&own.score.errors, |e| Some(e.one_step)),
             errors(&own.score.errors, |e| e.free_run),
@@ -73,18 +69,33 @@ pub(crate) fn compare_text(all: &[Compared], what: &str) -> String {
                 "not converged"
             }
             .into(),
-        ]);
-    }
-    format!(
-        "{}\nEvidence: log evidence over the first study, in nats. Log score (nats a row, higher is better) and errors: {what}.\n",
-        table(&rows)
-    )
-}
-
-fn signed(nats: f64) -> String {
-    match nats > 0.0 {
-        true => format!("+{}", short(nats)),
-        false => short(nats),
+        ]
+    });
+    let head = [
+        ("study", Text),
+        ("parameters", Number),
+        ("evidence", Number),
+        ("log score", Number),
+        ("one step", Number),
+        ("free run", Number),
+        ("", Text),
+    ];
+    let best = all
+        .iter()
+        .max_by(|a, b| a.score.log_score.total_cmp(&b.score.log_score));
+    let headline = best.map_or(String::new(), |best| {
+        format!("{} predicts best: highest log score {what}.", best.name)
+    });
+    Document {
+        title: "Studies on one record".into(),
+        answer: vec![
+            Block::Headline(headline),
+            Block::table("", &head, rows.collect()),
+            Block::Paragraph(format!(
+                "Evidence: log evidence over the first study, in nats. Log score (nats a row, higher is better) and errors: {what}."
+            )),
+        ],
+        ..Document::default()
     }
 }
 
@@ -97,38 +108,22 @@ fn errors(all: &[OutputErrors], of: impl Fn(&OutputErrors) -> Option<f64>) -> St
     all.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// The validation record with the free run of each study over it, a panel an output.
+/// The validation record with the free run of each study over it, and what each leaves.
 pub(crate) fn compare_svg(all: &[Compared], record: &Record) -> String {
     let outputs = all
         .first()
         .map_or_else(Vec::new, |own| own.study.twin().signals().outputs);
-    let timed = |values: &Signal, channel: usize| -> Vec<(f64, f64)> {
-        let values = values.column(channel);
-        (values.iter().enumerate())
-            .map(|(k, v)| (record.drive().time(k), *v))
-            .collect()
-    };
-    let panels = (outputs.iter().enumerate()).map(|(channel, output)| {
-        let measured = timed(record.outputs(), channel);
-        let mut lines = vec![Series::new("measured", Style::RECORD, measured)];
-        for (own, style) in all.iter().zip(Style::OTHERS.iter().cycle()) {
-            let Some(run) = &own.score.free_run else {
-                continue;
-            };
-            lines.push(Series::new(&own.name, *style, timed(run, channel)));
-        }
-        let unit = match unit_suffix(&output.unit) {
-            unit if unit.is_empty() => unit,
-            unit => format!(" in{unit}"),
-        };
-        Panel::new(&format!("{}{unit}", output.name), lines)
-    });
-    let names: Vec<&str> = all.iter().map(|own| own.name.as_str()).collect();
-    Chart {
+    let runs = all.iter().zip(Style::OTHERS.iter().cycle());
+    let runs =
+        runs.filter_map(|(own, style)| Some(Run(&own.name, *style, own.score.free_run.as_ref()?)));
+    RecordPicture {
         title: "Studies on one record".into(),
-        description: format!("Measured outputs and free runs of {}.", names.join(", ")),
-        x: "t in s".into(),
-        panels: panels.collect(),
+        outputs: &outputs,
+        times: &times(record),
+        measured: record.outputs(),
+        runs: runs.collect(),
+        spans: &|_| vec![],
+        marks: vec![],
     }
     .svg()
 }

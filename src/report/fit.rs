@@ -1,10 +1,14 @@
-//! A fit as JSON and as text.
+//! A fit as JSON and as a document.
 
 use super::chart::Pairs;
-use super::digits::{self, Digits, short, unit_suffix};
-use super::parameters::{Line, ParameterRow, parameter_rows};
-use super::table::table;
-use crate::fit::{Fit, FittedNoise, FittedValue, Posterior, Side};
+use super::digits::{self, Digits, percent, short, unit_suffix};
+use super::document::Column::{Number, Text};
+use super::document::{Block, Document, Picture, Section};
+use super::parameters::{ParameterRow, priors, values};
+use super::record::overlay_svg;
+use super::residuals::{Left, residual_blocks};
+use crate::fit::{Fit, FittedNoise, FittedStart, FittedValue, Posterior, Side};
+use crate::record::Record;
 use crate::study::Study;
 use crate::twin::{Parameter, ParameterSpace};
 use serde_json::{Value, json};
@@ -29,7 +33,7 @@ pub(super) fn fit_json(study: &Study, fit: &Fit) -> Value {
     {
         all.extend(own);
         let space = study.twin().parameters();
-        let described = fit.parameters.iter().map(|p| described(p, &space).1);
+        let described = fit.parameters.iter().map(|p| described(p, &space));
         all["parameters"] = (described.zip(&fit.parameters))
             .map(|(line, p)| {
                 let mut line = json!(line);
@@ -55,127 +59,167 @@ pub(super) fn posterior_json(posterior: Option<&Posterior>) -> Value {
     })
 }
 
-/// Quantities that a pair plot has room for.
-const PAIRED: usize = 6;
-
-/// A picture of posterior draws: histograms of the twin's parameters, or of whatever else was fitted, and each against each.
-pub fn posterior_svg(study: &Study, posterior: &Posterior) -> String {
+/// The fit for people; without records there are no pictures of them.
+pub(super) fn fit_document(study: &Study, records: &[Record], fit: &Fit) -> Document {
     let space = study.twin().parameters();
-    let unit = |name: &str| (space.iter().find(|p| p.name == name)).map(|p| unit_suffix(&p.unit));
-    let own = |j: &usize| unit(&posterior.names[*j]).is_some();
-    let all = 0..posterior.names.len();
-    let (own, others): (Vec<usize>, Vec<usize>) = all.partition(own);
-    let columns = own.into_iter().chain(others).take(PAIRED);
-    let modes = posterior.modes.iter().copied().max().unwrap_or(1);
-    Pairs {
-        title: format!(
-            "{}: {} posterior draws",
-            study.name(),
-            posterior.values.nrows()
-        ),
-        description: format!(
-            "Histograms of posterior draws and each parameter against each; {modes} {}",
-            if modes == 1 {
-                "mode"
-            } else {
-                "modes, each in its colour"
-            }
-        ),
-        columns: columns
-            .map(|j| {
-                let name = &posterior.names[j];
-                let name = format!("{name}{}", unit(name).unwrap_or_default());
-                (name, posterior.values.column(j).to_vec())
-            })
-            .collect(),
-        groups: posterior.modes.iter().map(|mode| mode - 1).collect(),
-    }
-    .svg()
-}
-
-/// One line on posterior draws.
-pub(super) fn posterior_text(posterior: &Posterior) -> String {
-    let modes = posterior.summary();
-    let several = match modes.len() {
-        0 | 1 => String::new(),
-        n => {
-            let shares: Vec<String> = modes.iter().map(|m| digits::percent(m.share)).collect();
-            format!(" {n} modes hold {}.", shares.join(", "))
-        }
+    let rows: Vec<ParameterRow> = fit
+        .parameters
+        .iter()
+        .map(|p| described(p, &space))
+        .collect();
+    let values = match rows.is_empty() {
+        true => Block::paragraph("All parameters are fixed: noise alone is fitted."),
+        false => values("", fit.level, &rows),
     };
-    format!(
-        "{} posterior draws, worth {:.0} independent ones.{several}",
-        posterior.values.nrows(),
-        posterior.effective
-    )
-}
-
-/// The fit as text: parameters, noise, starts, errors, warnings.
-pub(super) fn fit_text(study: &Study, fit: &Fit) -> String {
-    let level = format!("{:.0} % interval", 100.0 * fit.level);
-    let space = study.twin().parameters();
-    let lines: Vec<Line> = (fit.parameters.iter())
-        .map(|p| {
-            let (own, line) = described(p, &space);
-            (p.name.clone(), own.role, line, vec![])
+    let mut pictures = (records.iter().zip(&fit.free_runs))
+        .map(|(record, run)| overlay_svg(study, record, None, run.as_ref()));
+    let picture = pictures.next().map(|svg| Picture {
+        svg,
+        caption: "The twin runs from the inputs alone, without noise. Below: record − twin.".into(),
+    });
+    let mut sections = vec![
+        Section::new(
+            "parameters",
+            "Parameters, noise and starts",
+            vec![priors(&[], &rows)],
+        )
+        .brief(levels(fit)),
+        Section::new("errors", "Errors and convergence", vec![]).brief(quality(fit)),
+    ];
+    sections.extend(fit.posterior.as_ref().map(|p| draws(study, p)));
+    let others: Vec<Block> = pictures
+        .map(|svg| Block::picture(svg, "A further record."))
+        .collect();
+    if !others.is_empty() {
+        sections.push(Section::new("records", "Further records", others));
+    }
+    let residuals: Vec<Left<'_>> = (records.iter().zip(&fit.residuals))
+        .map(|(record, outputs)| Left {
+            inputs: record.drive().inputs(),
+            outputs,
         })
         .collect();
-    let parameters = parameter_rows(["value", &level], &[], &lines);
-    let mut noise = vec![row([
-        "noise of",
-        "unit",
-        "level",
-        "± std error",
-        "declared",
-        "",
-    ])];
-    noise.extend(fit.noise.iter().map(noise_level));
-    let mut text = format!("{}: fitted to {} samples.\n\n", study.name(), fit.samples);
-    text += &match fit.parameters.is_empty() {
-        true => "All parameters are fixed: noise alone is fitted.\n".to_owned(),
-        false => table(&parameters),
+    if !residuals.is_empty() {
+        let of_what = "one-step errors over their standard deviation";
+        let blocks = residual_blocks(study, of_what, true, &residuals);
+        sections.push(Section::new("residuals", "Residuals", blocks));
+    }
+    Document {
+        title: format!("{}: fit", study.name()),
+        answer: vec![
+            Block::Headline(headline(fit)),
+            values,
+            Block::Doubts(fit.warnings.clone()),
+            Block::paragraph(match off(fit) {
+                Some(off) if off < 1.0 && fit.convergence.converged => {
+                    "Next: diagnose whether the twin lacks something."
+                }
+                _ => "Next: diagnose what the twin lacks.",
+            }),
+        ],
+        picture,
+        sections,
+        ..Document::default()
+    }
+}
+
+/// The largest free-run error of an output over its deviation; none where a free run diverges.
+fn off(fit: &Fit) -> Option<f64> {
+    let each = fit.errors.iter().map(|e| Some(e.free_run? / e.deviation));
+    each.collect::<Option<Vec<f64>>>()
+        .map(|all| all.into_iter().fold(0.0, f64::max))
+}
+
+fn headline(fit: &Fit) -> String {
+    let (count, samples) = (fit.parameters.len(), fit.samples);
+    let fitted = format!("{count} parameters fitted to {samples} samples");
+    match off(fit) {
+        _ if !fit.convergence.converged => {
+            format!("Not converged: {fitted}, the search has not arrived.")
+        }
+        None => format!("{fitted}: the free run diverges."),
+        Some(off) if off >= 1.0 => format!("{fitted}: the free run does not follow the record."),
+        Some(off) => format!(
+            "{fitted}: the free run follows the record, with an error of {} of its deviation.",
+            percent(off)
+        ),
+    }
+}
+
+/// Fitted noise levels and starts.
+fn levels(fit: &Fit) -> Vec<Block> {
+    let unit = |unit: &str| unit_suffix(unit).trim_start().to_owned();
+    let noise = |level: &FittedNoise| {
+        let digits = Digits::supported(level.value, level.std_error);
+        vec![
+            level.name.clone(),
+            digits.write(level.value),
+            digits::error(level.std_error),
+            level.declared.map_or(String::new(), short),
+            unit(&level.unit),
+            level.at_bound.map_or("", |_| "at its bound").to_owned(),
+        ]
     };
+    let several = fit.starts.iter().any(|start| start.record > 1);
+    let start = |start: &FittedStart| {
+        let record = match several {
+            true => format!(" (record {})", start.record),
+            false => String::new(),
+        };
+        let digits = Digits::supported(start.value, start.std_error);
+        vec![
+            start.name.clone() + &record,
+            digits.write(start.value),
+            digits::error(start.std_error),
+            unit(&start.unit),
+        ]
+    };
+    let [value, error] = [("value", Number), ("± std error", Number)];
+    let head = [
+        ("noise of", Text),
+        value,
+        error,
+        ("declared", Number),
+        ("unit", Text),
+        ("", Text),
+    ];
+    let mut all = vec![];
     if !fit.noise.is_empty() {
-        text += "\n";
-        text += &table(&noise);
+        all.push(Block::table(
+            "",
+            &head,
+            fit.noise.iter().map(noise).collect(),
+        ));
     }
     if !fit.starts.is_empty() {
-        let several = fit.starts.iter().any(|start| start.record > 1);
-        let mut starts = vec![row(["start of", "unit", "value", "± std error", "", ""])];
-        starts.extend(fit.starts.iter().map(|start| {
-            let name = match several {
-                true => format!("{} (record {})", start.name, start.record),
-                false => start.name.clone(),
-            };
-            let digits = Digits::supported(start.value, start.std_error);
-            let error = digits::error(start.std_error);
-            row([
-                &name,
-                &start.unit,
-                &digits.write(start.value),
-                &error,
-                "",
-                "",
-            ])
-        }));
-        text += "\n";
-        text += &table(&starts);
+        let head = [("start of", Text), value, error, ("unit", Text)];
+        all.push(Block::table(
+            "",
+            &head,
+            fit.starts.iter().map(start).collect(),
+        ));
     }
-    text += "\n";
-    for error in &fit.errors {
-        let free = error.free_run.map_or("diverges".into(), |rmse| {
-            format!("{}{}", short(rmse), unit_suffix(&error.unit))
-        });
-        text += &format!(
-            "{}: one-step error {}, free run {free}; the record varies by {}{}.\n",
-            error.name,
-            short(error.one_step),
-            short(error.deviation),
-            unit_suffix(&error.unit),
-        );
-    }
+    all
+}
+
+/// Errors of each output, convergence and evidence.
+fn quality(fit: &Fit) -> Vec<Block> {
+    let mut all: Vec<Block> = (fit.errors.iter())
+        .map(|error| {
+            let unit = unit_suffix(&error.unit);
+            let free = error
+                .free_run
+                .map_or("diverges".into(), |rmse| format!("{}{unit}", short(rmse)));
+            Block::Paragraph(format!(
+                "{}: one-step error {}, free run {free}; the record varies by {}{unit}.",
+                error.name,
+                short(error.one_step),
+                short(error.deviation),
+            ))
+        })
+        .collect();
     let c = fit.convergence;
-    text += &match c.converged {
+    let mut search = match c.converged {
         true => format!(
             "Converged: {} of {} searches agree.",
             c.agreeing, c.searches
@@ -186,46 +230,107 @@ pub(super) fn fit_text(study: &Study, fit: &Fit) -> String {
         let error = evidence
             .std_error
             .map_or(String::new(), |e| format!(" ± {}", short(e)));
-        text += &format!(" Log evidence {:.2}{error} nats.", evidence.log_evidence);
+        search += &format!(" Log evidence {:.2}{error} nats.", evidence.log_evidence);
     }
-    text += &format!(" {} s.\n", short(fit.seconds));
-    if let Some(posterior) = &fit.posterior {
-        text += &posterior_text(posterior);
-        text += "\n";
-    }
-    for warning in &fit.warnings {
-        text += &format!("warning: {}; {}\n", warning.what, warning.remedy);
-    }
-    text
+    all.push(Block::Paragraph(format!(
+        "{search} {} s.",
+        short(fit.seconds)
+    )));
+    all
 }
 
-fn row<const N: usize>(cells: [&str; N]) -> Vec<String> {
-    cells.map(str::to_owned).to_vec()
+/// Posterior draws in a line and a picture.
+pub(super) fn draws(study: &Study, posterior: &Posterior) -> Section {
+    let modes = posterior.summary();
+    let several = match modes.len() {
+        0 | 1 => String::new(),
+        n => {
+            let shares: Vec<String> = modes.iter().map(|m| percent(m.share)).collect();
+            format!(" {n} modes hold {}.", shares.join(", "))
+        }
+    };
+    let brief = Block::Paragraph(format!(
+        "{} posterior draws, worth {:.0} independent ones.{several}",
+        posterior.values.nrows(),
+        posterior.effective
+    ));
+    let caption = "Each dot is a draw of the posterior: a system that the record allows.";
+    let rest = vec![Block::picture(posterior_svg(study, posterior), caption)];
+    Section::new("draws", "Posterior draws", rest).brief(vec![brief])
 }
 
-/// The parameter of a fitted value, and its line in the table.
-pub(super) fn described(p: &FittedValue, space: &ParameterSpace) -> (Parameter, ParameterRow) {
+/// Quantities that a pair plot has room for.
+const PAIRED: usize = 6;
+
+/// A picture of posterior draws: histograms of the twin's parameters, or of whatever else was fitted, and each against each.
+pub(crate) fn posterior_svg(study: &Study, posterior: &Posterior) -> String {
+    let space = study.twin().parameters();
+    let unit = |name: &str| (space.iter().find(|p| p.name == name)).map(|p| unit_suffix(&p.unit));
+    let own = |j: &usize| unit(&posterior.names[*j]).is_some();
+    let (own, others): (Vec<usize>, Vec<usize>) = (0..posterior.names.len()).partition(own);
+    let columns = own.into_iter().chain(others).take(PAIRED).map(|j| {
+        let name = &posterior.names[j];
+        let named = format!("{name}{}", unit(name).unwrap_or_default());
+        (named, posterior.values.column(j).to_vec())
+    });
+    let modes = match posterior.modes.iter().copied().max().unwrap_or(1) {
+        1 => "1 mode".to_owned(),
+        modes => format!("{modes} modes, each in its colour"),
+    };
+    Pairs {
+        title: format!(
+            "{}: {} posterior draws",
+            study.name(),
+            posterior.values.nrows()
+        ),
+        description: format!(
+            "Histograms of posterior draws and each parameter against each; {modes}"
+        ),
+        columns: columns.collect(),
+        groups: posterior.modes.iter().map(|mode| mode - 1).collect(),
+    }
+    .svg()
+}
+
+/// The line of a fitted value in the table.
+fn described(p: &FittedValue, space: &ParameterSpace) -> ParameterRow {
     let own = (space.iter().find(|own| own.name == p.name).cloned())
         .unwrap_or_else(|| Parameter::new(&p.name, &p.unit, p.low, p.high));
-    let mut line = ParameterRow::new(&own, p.value, p.std_error, [p.low, p.high]);
-    line.at_bound = p.at_bound.map(|side| match side {
+    let at_bound = p.at_bound.map(|side| match side {
         Side::Low => "low",
         Side::High => "high",
     });
-    (own, line)
+    ParameterRow {
+        at_bound,
+        ..ParameterRow::new(&own, p.value, p.std_error, [p.low, p.high])
+    }
 }
 
-fn noise_level(level: &FittedNoise) -> Vec<String> {
-    let digits = Digits::supported(level.value, level.std_error);
-    let declared = level.declared.map_or(String::new(), short);
-    let error = digits::error(level.std_error);
-    let note = level.at_bound.map_or("", |_| "at its bound");
-    row([
-        &level.name,
-        &level.unit,
-        &digits.write(level.value),
-        &error,
-        &declared,
-        note,
-    ])
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::FitSettings;
+    use crate::progress::Progress;
+    use crate::report::fixture::estimates;
+
+    #[test]
+    fn a_fit_opens_with_its_values_and_has_all_parts() {
+        let found = estimates();
+        let settings = FitSettings {
+            draws: 50,
+            ..FitSettings::default()
+        };
+        let records = [found.record.clone()];
+        let fit = (found.study.fit(&records, &settings, &Progress::silent())).unwrap();
+        let document = fit_document(&found.study, &records, &fit);
+        let page = document.html();
+        let head = page.split("</header>").next().unwrap();
+        assert!(head.contains("<th scope=\"row\">nu</th>") && head.contains("record − twin"));
+        for part in ["id=\"draws\"", "id=\"residuals\"", "95 % of white noise"] {
+            assert!(page.contains(part), "{part}");
+        }
+        assert!(!page.contains("NaN") && !page.contains("<script"));
+        let text = document.text();
+        assert!(text.lines().nth(3).unwrap().starts_with("nu "), "{text}");
+    }
 }

@@ -27,32 +27,36 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod answer;
 mod chart;
 mod compare;
 mod digits;
-#[allow(dead_code)]
 mod document;
 mod estimate;
 mod fit;
 #[cfg(test)]
 mod fixture;
 mod gap;
+#[cfg(feature = "evaluate")]
 mod page;
 mod parameters;
+mod record;
 #[cfg(feature = "evaluate")]
 mod reproduce;
 mod residuals;
 #[cfg(feature = "evaluate")]
 mod scorecard;
+#[cfg(feature = "evaluate")]
 mod table;
 mod units;
 
-pub(crate) use compare::{Compared, compare_json, compare_svg, compare_text};
-pub(crate) use estimate::{overlay_svg, together_json, together_text, trajectories_csv};
+pub(crate) use compare::{Compared, compare_document, compare_json, compare_svg};
+pub(crate) use document::Document;
+pub(crate) use estimate::{together_document, together_json};
 pub(crate) use fit::posterior_svg;
 pub(crate) use gap::NEXT_INPUT;
+#[cfg(feature = "evaluate")]
 pub(crate) use page::with_footer;
+pub(crate) use record::{overlay_svg, trajectories_csv};
 #[cfg(feature = "evaluate")]
 pub(crate) use reproduce::{
     coverage_svg, first_run_svg, mean_runs_svg, reproduce_json, reproduce_text,
@@ -84,7 +88,7 @@ impl Report for Estimate {
         estimate::estimate_json(study, self)
     }
     fn text(&self, study: &Study) -> String {
-        estimate::estimate_text(study, self)
+        self.document(study, None).text()
     }
 }
 
@@ -93,7 +97,7 @@ impl Report for Fit {
         fit::fit_json(study, self)
     }
     fn text(&self, study: &Study) -> String {
-        fit::fit_text(study, self)
+        self.document(study, &[]).text()
     }
 }
 
@@ -102,21 +106,29 @@ impl Report for Diagnosis {
         gap::gap_json(self)
     }
     fn text(&self, study: &Study) -> String {
-        gap::gap_text(study, self)
+        self.document(study).text()
     }
 }
 
 impl Estimate {
     /// Page of its own: record and free run, parameters with prior and bounds, draws, residuals, warnings.
     pub fn html(&self, study: &Study, record: &Record) -> String {
-        answer::estimate_html(study, record, self)
+        self.document(study, Some(record)).html()
+    }
+
+    pub(crate) fn document(&self, study: &Study, record: Option<&Record>) -> Document {
+        estimate::estimate_document(study, record, self)
     }
 }
 
 impl Fit {
     /// Page of its own, as [`Estimate::html`]; the records in the order of the fit.
     pub fn html(&self, study: &Study, records: &[Record]) -> String {
-        answer::fit_html(study, records, self)
+        self.document(study, records).html()
+    }
+
+    pub(crate) fn document(&self, study: &Study, records: &[Record]) -> Document {
+        fit::fit_document(study, records, self)
     }
 }
 
@@ -126,7 +138,11 @@ impl Diagnosis {
     /// Pictures are SVG inside the page with descriptions for screen readers; colour never carries information alone. The page
     /// has no scripts and loads nothing.
     pub fn html(&self, study: &Study) -> String {
-        gap::gap_html(study, self)
+        self.document(study).html()
+    }
+
+    pub(crate) fn document(&self, study: &Study) -> Document {
+        gap::gap_document(study, self)
     }
 
     /// Pictures of the page as files of their own: name, SVG.

@@ -1,8 +1,8 @@
-//! The table of parameters that `estimate`, `fit` and `diagnose` share.
+//! The tables of parameters that `estimate`, `fit` and `diagnose` share.
 
-use super::digits::{self, Digits, unit_suffix};
-use super::page::Column::{Number, Text};
-use super::page::table;
+use super::digits::{self, Digits};
+use super::document::Block;
+use super::document::Column::{Number, Text};
 use crate::diagnose::FittedParameter;
 use crate::math::three_digits;
 use crate::setting::number;
@@ -36,6 +36,11 @@ pub(super) struct ParameterRow {
     /// The value itself owes this share to the prior: it is an estimate of a network that has learnt the prior.
     #[serde(skip)]
     pub leans: bool,
+    #[serde(skip)]
+    pub role: Role,
+    /// Values at other stages, in the order of their names.
+    #[serde(skip)]
+    pub stages: Vec<Option<f64>>,
 }
 
 impl ParameterRow {
@@ -52,6 +57,8 @@ impl ParameterRow {
             prior_share: (std_error / prior).powi(2).min(1.0),
             at_bound: parameter.bound_at(value, std_error),
             leans: false,
+            role: parameter.role,
+            stages: vec![],
         }
     }
 
@@ -62,27 +69,24 @@ impl ParameterRow {
         Self::new(&parameter, p.refitted, p.std_error, p.interval)
     }
 
-    /// Cells of a table: value, standard error, interval, prior, bounds, remark.
-    fn cells(&self, role: Role) -> [String; 6] {
-        let digits = Digits::supported(self.value, self.std_error);
-        let [low, high] = self.interval.map(|end| digits.write(end));
-        let [prior, bounds] = match role {
-            Role::Parameter | Role::Start => [range(self.prior), range(self.bounds)],
-            Role::Noise | Role::Magnitude => [String::new(), String::new()],
-        };
-        [
-            digits.write(self.value),
-            digits::error(self.std_error),
-            format!("[{low}, {high}]"),
-            prior,
-            bounds,
-            self.remark(role),
-        ]
+    /// The same with values at other stages.
+    pub fn stages(self, stages: Vec<Option<f64>>) -> Self {
+        Self { stages, ..self }
     }
 
-    /// Remark of a table: the note, or else how much of the prior is left in the value.
-    fn remark(&self, role: Role) -> String {
-        match (self.note(role), role) {
+    /// Name of a start or a noise level in words.
+    fn label(&self) -> String {
+        let target = self.role.target(&self.name);
+        match self.role {
+            Role::Parameter | Role::Magnitude => self.name.clone(),
+            Role::Start => format!("start of {target}"),
+            Role::Noise => format!("noise of {target}"),
+        }
+    }
+
+    /// Remark: the note, or else how much of the prior is left in the value.
+    fn remark(&self) -> String {
+        match (self.note(), self.role) {
             ("", Role::Parameter) if self.prior_share >= LEANING => {
                 let share = digits::percent(self.prior_share);
                 match self.leans {
@@ -94,19 +98,15 @@ impl ParameterRow {
         }
     }
 
-    /// Returns whether no value of the interval is in the prior.
-    fn is_outside(&self) -> bool {
+    /// What is special about the value; empty where nothing is.
+    fn note(&self) -> &'static str {
         let [low, high] = self.interval;
-        high < self.prior.low() || low > self.prior.high()
-    }
-
-    /// Remark on the value; empty where there is nothing to remark.
-    pub fn note(&self, role: Role) -> &'static str {
-        match (self.at_bound, role) {
+        let is_outside = high < self.prior.low() || low > self.prior.high();
+        match (self.at_bound, self.role) {
             (Some("low"), _) => "at lower bound",
             (Some(_), _) => "at upper bound",
             (None, Role::Parameter) if self.prior_share >= 1.0 => "not identified",
-            (None, Role::Parameter) if self.is_outside() => "outside prior",
+            (None, Role::Parameter) if is_outside => "outside prior",
             (None, _) => "",
         }
     }
@@ -122,50 +122,51 @@ fn range(interval: Interval) -> String {
     format!("{}…{}", end(interval.low()), end(interval.high()))
 }
 
-/// A line of the table: the name, the role, the row, and cells of further columns before the value.
-pub(super) type Line = (String, Role, ParameterRow, Vec<String>);
-
-/// Head and rows of the table as text: name, unit, further columns with the heads `more`, value, error, interval, prior, bounds, remark.
-pub(super) fn parameter_rows(
-    [value, interval]: [&str; 2],
-    more: &[&str],
-    lines: &[Line],
-) -> Vec<Vec<String>> {
-    let mut head = vec!["parameter", "unit"];
-    head.extend(more);
-    head.extend([value, "± std error", interval, "prior", "bounds", ""]);
-    let head = head.into_iter().map(str::to_owned).collect();
-    let rows = lines.iter().map(|(name, role, row, more)| {
-        let start = [name.clone(), row.unit.clone()];
-        [&start[..], more, &row.cells(*role)].concat()
-    });
-    std::iter::once(head).chain(rows).collect()
-}
-
-/// Table of a page; `more` are the heads of further columns.
-pub(super) fn parameter_table(caption: &str, more: &[&str], lines: &[Line]) -> String {
-    let mut head = vec![("parameter", Text)];
-    head.extend(more.iter().map(|name| (*name, Number)));
-    head.extend([
+/// Values with errors and intervals of this level, in few columns.
+pub(super) fn values(caption: &str, level: f64, rows: &[ParameterRow]) -> Block {
+    let level = format!("{:.0} % interval", 100.0 * level);
+    let head = [
+        ("parameter", Text),
         ("value", Number),
         ("± std error", Number),
-        ("interval", Number),
+        (&level, Number),
         ("unit", Text),
-        ("prior", Number),
-        ("bounds", Number),
         ("", Text),
-    ]);
-    let rows: Vec<Vec<String>> = (lines.iter())
-        .map(|(name, role, row, more)| {
-            let [value, error, interval, prior, bounds, remark] = row.cells(*role);
-            let unit = unit_suffix(&row.unit).trim_start().to_owned();
-            let mut cells = vec![name.clone()];
-            cells.extend(more.iter().cloned());
-            cells.extend([value, error, interval, unit, prior, bounds, remark]);
-            cells
-        })
-        .collect();
-    table(caption, &head, &rows)
+    ];
+    let cells = |row: &ParameterRow| {
+        let digits = Digits::supported(row.value, row.std_error);
+        let [low, high] = row.interval.map(|end| digits.write(end));
+        vec![
+            row.label(),
+            digits.write(row.value),
+            digits::error(row.std_error),
+            format!("[{low}, {high}]"),
+            digits::unit_suffix(&row.unit).trim_start().to_owned(),
+            row.remark(),
+        ]
+    };
+    Block::table(caption, &head, rows.iter().map(cells).collect())
+}
+
+/// Priors, bounds and values at other stages, which `stages` names.
+pub(super) fn priors(stages: &[&str], rows: &[ParameterRow]) -> Block {
+    let mut head = vec![("parameter", Text), ("prior", Number), ("bounds", Number)];
+    head.extend(stages.iter().map(|name| (*name, Number)));
+    let cells = |row: &ParameterRow| {
+        let digits = Digits::supported(row.value, row.std_error);
+        let stages = row.stages.iter();
+        let stages = stages.map(|value| value.map_or("–".to_owned(), |v| digits.write(v)));
+        let ranges = match row.role {
+            Role::Parameter | Role::Start => [range(row.prior), range(row.bounds)],
+            Role::Noise | Role::Magnitude => ["–", "–"].map(String::from),
+        };
+        std::iter::once(row.label())
+            .chain(ranges)
+            .chain(stages)
+            .collect()
+    };
+    let caption = "Prior: the range that was trained on or expected. Not identified: the record says no more than the prior.";
+    Block::table(caption, &head, rows.iter().map(cells).collect())
 }
 
 #[cfg(test)]
@@ -176,8 +177,7 @@ mod tests {
     fn notes_say_what_is_special() {
         let parameter = Parameter::new("k", "1/s", 0.0, 1.0).within(0.0, 2.0);
         let note = |value: f64, error: f64| {
-            let row = ParameterRow::new(&parameter, value, error, [value - error, value + error]);
-            row.cells(Role::Parameter)[5].clone()
+            ParameterRow::new(&parameter, value, error, [value - error, value + error]).remark()
         };
         assert_eq!(note(0.5, 0.01), "");
         assert_eq!(note(0.5, 0.3), "not identified");
@@ -188,41 +188,18 @@ mod tests {
         assert_eq!(note(0.0, 0.01), "at lower bound");
     }
 
-    /// Text and page have the same columns.
     #[test]
     fn a_line_can_be_read_alone() {
         let parameter = Parameter::new("k", "1/s", -0.25, 1.0).within(f64::NEG_INFINITY, 2e9);
-        let mut row = ParameterRow::new(&parameter, 0.5, 0.18, [0.2, 0.8]);
+        let mut row = ParameterRow::new(&parameter, 0.5, 0.18, [0.2, 0.8]).stages(vec![Some(0.4)]);
         row.leans = true;
-        let line = || {
-            (
-                "k".to_owned(),
-                Role::Parameter,
-                row.clone(),
-                vec!["0.4".to_owned()],
-            )
+        let cells = |block: Block| match block {
+            Block::Table(table) => table.rows[0].join("|"),
+            _ => String::new(),
         };
-        let text = parameter_rows(["final", "90 % interval"], &["initial"], &[line()]);
-        assert_eq!(text[0].len(), text[1].len());
-        assert_eq!(
-            text[1].join("|"),
-            "k|1/s|0.4|0.50|0.18|[0.20, 0.80]|−0.25…1|−∞…2e9|leans on prior: 25 %"
-        );
-        let page = parameter_table("", &["initial"], &[line()]);
-        assert!(
-            page.contains("−∞…2e9") && page.contains("leans on prior: 25 %"),
-            "{page}"
-        );
-        let level = parameter.with_role(Role::Noise);
-        let row = ParameterRow::new(&level, 0.5, 0.18, [0.2, 0.8]);
-        assert_eq!(row.cells(Role::Noise)[3..], ["", "", ""]);
-    }
-
-    #[test]
-    fn the_prior_share_is_one_where_the_record_is_mute() {
-        let parameter = Parameter::new("k", "", 0.0, 1.0);
-        let share = |error| ParameterRow::new(&parameter, 0.5, error, [0.0, 1.0]).prior_share;
-        assert_eq!(share(1.0), 1.0);
-        assert!((share(PRIOR_DEVIATION / 10.0) - 0.01).abs() < 1e-12);
+        let rows = [row];
+        let line = cells(values("", 0.9, &rows));
+        assert_eq!(line, "k|0.50|0.18|[0.20, 0.80]|1/s|leans on prior: 25 %");
+        assert_eq!(cells(priors(&["first"], &rows)), "k|−0.25…1|−∞…2e9|0.40");
     }
 }

@@ -1,7 +1,7 @@
 //! Residuals as people know them: auto-correlation, cross-correlation with the inputs, quantiles.
 
 use super::chart::{Area, Chart, Curves, Dot, Dots, Panel, Series, Style};
-use super::page::{figure, paragraph};
+use super::document::Block;
 use crate::record::Signal;
 use crate::study::Study;
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -25,13 +25,13 @@ pub(super) struct Left<'a> {
     pub outputs: &'a Signal,
 }
 
-/// Returns the pictures of the residuals of all records, which are `of_what`; those of a right twin are white, or are not.
-pub(super) fn residual_figures(
+/// The pictures of the residuals of all records, which are `of_what`; those of a right twin are white, or are not.
+pub(super) fn residual_blocks(
     study: &Study,
     of_what: &str,
     is_white: bool,
     all: &[Left<'_>],
-) -> String {
+) -> Vec<Block> {
     let signals = study.twin().signals();
     let names = |channels: Vec<crate::record::Quantity>| -> Vec<String> {
         channels.into_iter().map(|q| q.name).collect()
@@ -41,18 +41,19 @@ pub(super) fn residual_figures(
         1 => format!("Residuals are {of_what}."),
         n => format!("Residuals are {of_what}, of all {n} records."),
     };
-    let mut body = paragraph(&of);
     let whiteness = match is_white {
         true => "Band: 95 % of white noise. Residuals of a right twin's predictions are white.",
         false => {
-            "Errors of a right twin's free run are white only without process noise. `truetwin fit` shows one-step errors, which are white for every \
-             right twin."
+            "Errors of a right twin's free run are white only without process noise; one-step errors of a fit are white for every right twin."
         }
     };
-    body += &figure(&auto_correlations(&outputs, is_white, all), whiteness);
+    let mut blocks = vec![
+        Block::Paragraph(of),
+        Block::picture(auto_correlations(&outputs, is_white, all), whiteness),
+    ];
     if let Some(svg) = cross_correlations(&outputs, &inputs, is_white, all) {
-        body += &figure(
-            &svg,
+        blocks.push(Block::picture(
+            svg,
             match is_white {
                 true => {
                     "Residuals against inputs some samples before. Band: 95 % of white noise. Outside it, the twin misses a part of what the \
@@ -60,13 +61,13 @@ pub(super) fn residual_figures(
                 }
                 false => "Residuals against inputs some samples before.",
             },
-        );
+        ));
     }
-    body += &figure(
-        &quantiles(&outputs, all),
+    blocks.push(Block::picture(
+        quantiles(&outputs, all),
         "Sorted, against those of a normal distribution of the same size: on the line if they are normal.",
-    );
-    body
+    ));
+    blocks
 }
 
 /// A column less its mean over all records; missing values are 0, which adds nothing to a product.
@@ -141,7 +142,7 @@ fn auto_correlations(names: &[String], is_white: bool, all: &[Left<'_>]) -> Stri
         panel(&label, at, [1, LAGS], is_white.then(|| count(all, j)))
     });
     Chart {
-        title: "Residuals against themselves".into(),
+        title: "Autocorrelation of residuals".into(),
         description: format!("Auto-correlations of the residuals at lags 1 to {LAGS}."),
         x: "lag in samples".into(),
         panels: panels.collect(),
@@ -171,7 +172,7 @@ fn cross_correlations(
         return None;
     }
     let chart = Chart {
-        title: "Residuals against inputs".into(),
+        title: "Correlation of residuals with inputs".into(),
         description: format!(
             "Cross-correlations of residuals with inputs at lags 0 to {LAGS}, {} panels.",
             panels.len()
@@ -207,7 +208,7 @@ fn quantiles(names: &[String], all: &[Left<'_>]) -> String {
         )
     });
     Curves {
-        title: "Sizes of residuals".into(),
+        title: "Quantiles of residuals".into(),
         description: "Sorted residuals against quantiles of a normal distribution.".into(),
         panels: panels.collect(),
     }

@@ -6,7 +6,7 @@ use crate::cli::failure::Failure;
 use crate::cli::provenance::Provenance;
 use crate::cli::{output, records};
 use crate::fit::FitSettings;
-use crate::report::{Compared, compare_json, compare_svg, compare_text};
+use crate::report::{Compared, compare_document, compare_json, compare_svg};
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -94,7 +94,7 @@ impl Verb for Compare {
             true => "on the whole of the record whose first two thirds were fitted",
             false => "on the validation record",
         };
-        provenance.print(context, &json, || compare_text(&compared, what))?;
+        provenance.print(context, &json, || compare_document(&compared, what).text())?;
         Ok(ExitCode::SUCCESS)
     }
 }

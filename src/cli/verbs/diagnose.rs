@@ -109,8 +109,7 @@ impl Verb for Diagnose {
         let json = provenance.on(found.json(&study));
         if let Some(folder) = folder {
             folder.write_json("report.json", &json)?;
-            let page = provenance.in_page(&found.html(&study));
-            folder.write("report.html", &page)?;
+            folder.write("report.html", &provenance.page(found.document(&study)))?;
             if let Some(next) = &found.cause.next_input {
                 folder.write(NEXT_INPUT, &drive_csv_text(&next.drive))?;
             }

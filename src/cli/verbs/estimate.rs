@@ -9,7 +9,7 @@ use crate::cli::{output, records};
 use crate::estimator::bank::file;
 use crate::estimator::{self, EstimateOptions, Estimator, EstimatorError};
 use crate::record::Record;
-use crate::report::{Report, overlay_svg, together_json, together_text, trajectories_csv};
+use crate::report::{Report, overlay_svg, together_document, together_json, trajectories_csv};
 use crate::study::Study;
 use clap::Args;
 use std::path::PathBuf;
@@ -135,7 +135,9 @@ impl Estimate {
             }
             folder.finish()?;
         }
-        provenance.print(context, &json, || together_text(study, all, &names))
+        provenance.print(context, &json, || {
+            together_document(study, all, &names).text()
+        })
     }
 }
 
@@ -178,7 +180,7 @@ fn write_pictures(
     provenance: &Provenance,
     part: &str,
 ) -> Result<(), Failure> {
-    let page = provenance.in_page(&estimate.html(study, record));
+    let page = provenance.page(estimate.document(study, Some(record)));
     folder.write(&format!("report{part}.html"), &page)?;
     let before = (estimate.refit()).and_then(|refit| refit.tracking_initial.as_ref());
     let before = before.map(|t| &t.outputs);
@@ -186,7 +188,7 @@ fn write_pictures(
     let Some(after) = estimate.tracking.as_ref().map(|t| &t.outputs) else {
         return Ok(());
     };
-    let overlay = overlay_svg(study, record, before, after);
+    let overlay = overlay_svg(study, record, before, Some(after));
     folder.write(&format!("overlay{part}.svg"), &overlay)?;
     let rows = trajectories_csv(record, before, after);
     folder.write(&format!("trajectories{part}.csv"), &rows)

@@ -54,7 +54,7 @@ impl Verb for Fit {
         let json = provenance.on(fit.json(&study));
         if let Some(folder) = folder {
             folder.write_json("fit.json", &json)?;
-            let page = provenance.in_page(&fit.html(&study, &records));
+            let page = provenance.page(fit.document(&study, &records));
             folder.write("report.html", &page)?;
             for (r, (record, run)) in records.iter().zip(&fit.free_runs).enumerate() {
                 let Some(run) = run else { continue };
@@ -62,7 +62,7 @@ impl Verb for Fit {
                     0 => "overlay.svg".to_owned(),
                     r => format!("overlay-{}.svg", r + 1),
                 };
-                folder.write(&name, &overlay_svg(&study, record, None, run))?;
+                folder.write(&name, &overlay_svg(&study, record, None, Some(run)))?;
             }
             if let Some(draws) = &fit.posterior {
                 posterior::write(&folder, &study, draws)?;

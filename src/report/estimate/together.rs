@@ -1,12 +1,13 @@
-//! Several estimates as one: JSON and text.
+//! Several estimates as one: JSON and document.
 
 use super::estimate_json;
 use crate::estimator::{INTERVAL_LEVEL, Together};
+use crate::fit::Warning;
 use crate::report::digits::{Digits, error, probability, short};
-use crate::report::parameters::{Line, ParameterRow, parameter_rows};
-use crate::report::table::table;
+use crate::report::document::Column::{Number, Text};
+use crate::report::document::{Block, Document, Section};
+use crate::report::parameters::{ParameterRow, values};
 use crate::study::Study;
-use crate::twin::Role;
 use serde_json::{Value, json};
 
 /// Level below which records are said to disagree.
@@ -15,20 +16,24 @@ const LEVEL: f64 = 0.01;
 const SHOWN: usize = 6;
 
 /// One line of the shared table a parameter.
-fn rows(study: &Study, all: &Together) -> Vec<(ParameterRow, Role)> {
+fn rows(study: &Study, all: &Together) -> Vec<ParameterRow> {
     let space = study.twin().parameters();
     (all.names.iter().enumerate())
         .filter_map(|(a, name)| {
             let p = space.iter().find(|p| p.name == *name)?;
             let interval = [all.low[a], all.high[a]];
-            let row = ParameterRow::new(p, all.theta[a], all.std_error[a], interval);
-            Some((row, p.role))
+            Some(ParameterRow::new(
+                p,
+                all.theta[a],
+                all.std_error[a],
+                interval,
+            ))
         })
         .collect()
 }
 
 /// `truetwin.estimates/1`: what the records say together, and `records`, each as `truetwin.estimate/1` with its `file`.
-pub fn together_json(study: &Study, all: &Together, files: &[String]) -> Value {
+pub(crate) fn together_json(study: &Study, all: &Together, files: &[String]) -> Value {
     let records = (all.records.iter().zip(files)).map(|(estimate, file)| {
         let mut one = estimate_json(study, estimate);
         one["file"] = json!(file);
@@ -41,7 +46,7 @@ pub fn together_json(study: &Study, all: &Together, files: &[String]) -> Value {
         "theta": all.theta,
         "std_error": all.std_error,
         "interval": { "level": INTERVAL_LEVEL, "low": all.low, "high": all.high },
-        "parameters": rows(study, all).into_iter().map(|(row, _)| row).collect::<Vec<_>>(),
+        "parameters": rows(study, all),
         "agreement": {
             "statistic": all.disagreement,
             "degrees": all.degrees,
@@ -52,28 +57,24 @@ pub fn together_json(study: &Study, all: &Together, files: &[String]) -> Value {
     })
 }
 
-/// The shared table, then one line a record, then whether they agree, then the warnings of each.
-pub fn together_text(study: &Study, all: &Together, files: &[String]) -> String {
-    let level = format!("{:.0} % interval", 100.0 * INTERVAL_LEVEL);
-    let shown: Vec<Line> = (rows(study, all).into_iter())
-        .map(|(row, role)| (row.name.clone(), role, row, vec![]))
-        .collect();
-    let lines = parameter_rows(["value", &level], &[], &shown);
+/// Whether the records agree, the shared table, then one line a record, and the warnings of each.
+pub(crate) fn together_document(study: &Study, all: &Together, files: &[String]) -> Document {
     let names: Vec<&String> = all.names.iter().take(SHOWN).collect();
-    let mut head = vec!["record".to_owned()];
-    head.extend(names.iter().map(|name| (*name).clone()));
-    head.push("consistent".into());
-    let mut each = vec![head];
+    let mut head = vec![("record", Text)];
+    head.extend(names.iter().map(|name| (name.as_str(), Number)));
+    head.push(("consistent", Text));
+    let mut each = vec![];
+    let mut doubts = vec![];
     for (estimate, file) in all.records.iter().zip(files) {
         let mut row = vec![file.clone()];
-        for name in &names {
+        row.extend(names.iter().map(|name| {
             let j = estimate.names.iter().position(|own| own == *name);
-            row.push(j.map_or_else(String::new, |j| {
+            j.map_or_else(String::new, |j| {
                 let (value, std_error) = (estimate.theta[j], estimate.std_error[j]);
                 let digits = Digits::supported(value, std_error);
                 format!("{} ± {}", digits.write(value), error(std_error))
-            }));
-        }
+            })
+        }));
         row.push(
             if estimate.is_consistent() {
                 "yes"
@@ -83,32 +84,43 @@ pub fn together_text(study: &Study, all: &Together, files: &[String]) -> String 
             .into(),
         );
         each.push(row);
+        doubts.extend(estimate.warnings.iter().map(|w| Warning {
+            what: format!("{file}: {}", w.what),
+            ..w.clone()
+        }));
     }
     let (q, n, p) = (
         short(all.disagreement),
         all.degrees,
         probability(all.p_value),
     );
-    let agreement = match all.p_value >= LEVEL {
-        true => format!("The records agree (χ² = {q}, {n} degrees of freedom, {p})."),
-        false => format!(
-            "The records disagree (χ² = {q}, {n} degrees of freedom, {p}): the system has changed between them, or the twin lacks something. Next: truetwin diagnose."
-        ),
+    let agree = all.p_value >= LEVEL;
+    let [word, why, next] = match agree {
+        true => [
+            "agree",
+            "",
+            "Next: use the twin, within the range of these records.",
+        ],
+        false => [
+            "disagree",
+            ": the system has changed between them, or the twin lacks something",
+            "Next: diagnose what the twin lacks.",
+        ],
     };
-    let mut text = format!(
-        "{}: {} records, each estimated, the answers weighed by their precision.\n\n{}\n{}\n{agreement}\n",
-        study.name(),
-        all.records.len(),
-        table(&lines),
-        table(&each),
-    );
-    for (estimate, file) in all.records.iter().zip(files) {
-        for warning in &estimate.warnings {
-            text.push_str(&format!(
-                "warning: {file}: {}; {}\n",
-                warning.what, warning.remedy
-            ));
-        }
+    Document {
+        title: format!("{}: {} records", study.name(), all.records.len()),
+        answer: vec![
+            Block::Headline(format!(
+                "The records {word} (χ² = {q}, {n} degrees of freedom, {p}){why}."
+            )),
+            values("", INTERVAL_LEVEL, &rows(study, all)),
+            Block::paragraph("Each record is estimated, the answers weighed by their precision."),
+            Block::paragraph(next),
+        ],
+        sections: vec![
+            Section::new("records", "Each record", vec![])
+                .brief(vec![Block::table("", &head, each), Block::Doubts(doubts)]),
+        ],
+        ..Document::default()
     }
-    text
 }

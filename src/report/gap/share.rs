@@ -52,7 +52,7 @@ pub(super) fn no_share(diagnosis: &Diagnosis) -> String {
     }
     if diagnosis.validation_runs.is_none() && diagnosis.free_runs.times.len() < SHORTEST_SPLIT {
         return format!(
-            "No share of the gap closed: the record is too short to hold data back. Give --validation, or a record of at least {SHORTEST_SPLIT} samples."
+            "No share of the gap closed: the record is too short to hold data back. Give a validation record, or a record of at least {SHORTEST_SPLIT} samples."
         );
     }
     "No share of the gap closed: the free run on the held-out data diverges.".into()

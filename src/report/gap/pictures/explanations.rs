@@ -3,7 +3,6 @@
 use crate::diagnose::{Decision, Diagnosis, EffectFit};
 use crate::report::chart::{Bar, BarChart, BarGroup};
 use crate::report::digits::{chance, short};
-use crate::report::gap::headline::rivals;
 
 /// Explanations that are drawn.
 const SHOWN: usize = 8;
@@ -18,7 +17,8 @@ pub fn explanations(diagnosis: &Diagnosis) -> Option<String> {
         Bar::new(&key, effect.probability, &note).clear(which.accepted.contains(&key))
     };
     let shown = || which.effects.iter().take(SHOWN);
-    let has_class = which.decision != Decision::Absorbed && !rivals(which).is_empty();
+    let has_class =
+        which.decision != Decision::Absorbed && which.class.len() > which.accepted.len();
     let is_inside = |e: &&EffectFit| has_class && which.class.contains(&e.key());
     let inside: Vec<Bar> = shown().filter(is_inside).map(bar).collect();
     let others: Vec<Bar> = shown().filter(|e| !is_inside(e)).map(bar).collect();

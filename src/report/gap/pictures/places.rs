@@ -3,7 +3,7 @@
 use crate::diagnose::{Band, Cell, Diagnosis, Lag, Region};
 use crate::report::chart::{Bar, BarChart, BarGroup};
 use crate::report::digits::{chance, percent, short, unit_suffix};
-use crate::report::gap::headline::places;
+use crate::report::gap::statement::places;
 use crate::report::units::Units;
 use crate::study::Study;
 

@@ -4,7 +4,7 @@ use super::windows::{largest, mark, spans};
 use crate::diagnose::{Diagnosis, Maps, Onset};
 use crate::report::chart::{HeatGroup, HeatMap, HeatRow};
 use crate::report::digits::{percent, short};
-use crate::report::gap::headline::accepted_ids;
+use crate::report::gap::statement::accepted_ids;
 
 /// Windows of time by output, of the refitted twin and, below, with the accepted effects added; `None` where nothing was looked for.
 ///

@@ -1,22 +1,19 @@
 //! Section on the share of the gap that closes on held-out data.
 
+use super::pictures;
+use super::share::{closed_sentence, no_share};
 use crate::diagnose::{Diagnosis, Shrinkage};
 use crate::report::digits::short;
-use crate::report::gap::pictures;
-use crate::report::gap::share::{closed_sentence, no_share};
-use crate::report::page::{Section, figure, paragraph};
+use crate::report::document::{Block, Section};
 
-pub(super) fn section_of(diagnosis: &Diagnosis) -> Section {
-    Section::new("extent", "How far the gap closes", body(diagnosis))
-}
-
-fn body(diagnosis: &Diagnosis) -> String {
+pub(super) fn section(diagnosis: &Diagnosis) -> Section {
+    let section = Section::new("extent", "How far the gap closes", vec![]);
     let Some(s) = &diagnosis.shrinkage else {
-        return paragraph(&no_share(diagnosis));
+        return section.brief(vec![Block::Paragraph(no_share(diagnosis))]);
     };
-    let mut body = paragraph(&closed_sentence(s));
+    let mut rest = vec![];
     if s.metric == Shrinkage::LOG_SCORE {
-        body.push_str(&paragraph(
+        rest.push(Block::paragraph(
             "The score is the mean log density of a held-out sample in nats; higher is better. The accepted effects change the noise \
              only, so predictions do not change.",
         ));
@@ -28,31 +25,30 @@ fn body(diagnosis: &Diagnosis) -> String {
             }
             None => "",
         };
-        let caption = "Root mean squares over the standard deviation of the output. The share counts squared errors above the floor: the \
-             true system has 100 % in expectation.";
-        body.push_str(&figure(&svg, &format!("{caption}{wrong}")));
+        rest.push(Block::picture(svg, format!(
+            "Root mean squares over the standard deviation of the output. The share counts squared errors above the floor: the true \
+             system has 100 % in expectation. It says how much a correction helps, not that its name is right.{wrong}"
+        )));
     }
-    if let Some(svg) = pictures::horizons(diagnosis) {
-        body.push_str(&figure(
-            &svg,
-            "Predictions begin anew from what the record has shown, and reach so far ahead; a free run never does. Floor: errors of records \
-             that the twin with effects makes itself, with its fitted noise.",
-        ));
-    }
+    rest.extend(pictures::horizons(diagnosis).map(|svg| Block::picture(
+        svg,
+        "Predictions begin anew from what the record has shown, and reach so far ahead; a free run never does. Floor: errors of records \
+         that the twin with effects makes itself, with its fitted noise.",
+    )));
     if let Some([before, after]) = s.log_score.filter(|_| s.metric != Shrinkage::LOG_SCORE) {
-        body.push_str(&paragraph(&format!(
+        rest.push(Block::Paragraph(format!(
             "Mean log density of a held-out sample: {} → {} nats; higher is better.",
             short(before),
             short(after)
         )));
     }
     if let Some((after, floor)) = s.hidden_by_noise() {
-        body.push_str(&paragraph(&format!(
+        rest.push(Block::Paragraph(format!(
             "No share is given: the error before ({}) and the floor ({}) are too close; the error after is {}.",
             short(s.before),
             short(floor),
             short(after)
         )));
     }
-    body
+    Section { rest, ..section }.brief(vec![Block::Paragraph(closed_sentence(s))])
 }
