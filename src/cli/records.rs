@@ -3,7 +3,6 @@
 use super::failure::Failure;
 use super::output;
 use crate::record::{Record, RecordReader};
-use crate::study::Study;
 use std::path::{Path, PathBuf};
 
 /// A value is an outlier if it exceeds this multiple of nearly all magnitudes of its channel.
@@ -47,43 +46,6 @@ pub(super) fn read(
 
 fn warn(text: &str) {
     output::say(&format!("warning: {text}"));
-}
-
-/// Warns of channels that never change, in records that have the channels of the study.
-pub(super) fn warn_of_still(study: &Study, paths: &[PathBuf], records: &[Record]) {
-    let signals = study.twin().signals();
-    for (path, record) in paths.iter().zip(records) {
-        if record.check_channels(&signals).is_ok() {
-            warn_of_still_channels(path, record);
-        }
-    }
-}
-
-fn warn_of_still_channels(path: &Path, record: &Record) {
-    let channels = [
-        (
-            "u",
-            record.drive().inputs(),
-            "what acts through it cannot be told from a constant",
-        ),
-        (
-            "y",
-            record.outputs(),
-            "a sensor that is stuck tells nothing of the twin",
-        ),
-    ];
-    for (letter, signal, meaning) in channels {
-        for (j, channel) in signal.columns().into_iter().enumerate() {
-            let mut there = channel.iter().filter(|value| !value.is_nan());
-            if there.next().is_some_and(|first| there.all(|v| v == first)) {
-                warn(&format!(
-                    "{}: {} never changes; {meaning}",
-                    path.display(),
-                    column(letter, signal.ncols(), j)
-                ));
-            }
-        }
-    }
 }
 
 /// Name of the column of channel `j` of `count`.

@@ -1,17 +1,141 @@
-//! Reasons to doubt a fit.
+//! Reasons to doubt a result: one list for `fit`, `estimate` and `diagnose`, one wording each.
 
 use super::certificate::Side;
 use super::effects::magnitude::Kind;
 use super::outcome::{Convergence, FittedNoise, FittedValue, NOT_CONVERGED, OutputErrors, Warning};
 use super::problem::Problem;
-use crate::math::three_digits;
-use crate::record::Signal;
+use crate::math::{is_constant, three_digits};
+use crate::record::{Quantity, Record, Signal, Signals};
 use crate::setting::number;
-use crate::twin::conformance::{Severity, check_step};
+use crate::twin::Twin;
+use crate::twin::conformance::coarse_step;
 use std::collections::BTreeMap;
 
-const BOUNDS: &str = "widen [bounds] if other values are possible; its error means little here";
-const LACKS: &str = "look for what the twin lacks: truetwin diagnose";
+/// Code of a free run that diverges.
+pub(crate) const DIVERGES: &str = "free-run-diverges";
+/// Code of a free run that shows nothing of the record.
+pub(crate) const NO_BETTER: &str = "no-better-than-constant";
+
+/// Remedy of each reason.
+const REMEDIES: [(&str, &str); 17] = [
+    (
+        "at-bound",
+        "widen its bounds if other values are possible; its error means little here",
+    ),
+    (
+        "below-the-twin-alone",
+        "give the magnitudes of the effects narrower bounds, or leave effects out",
+    ),
+    (
+        "coarse-step",
+        "give the study the integrator and the substeps that this report has",
+    ),
+    (
+        "constant-input",
+        "what acts through it cannot be told from a constant; take a record in which it moves",
+    ),
+    (
+        "constant-output",
+        "a sensor that is stuck tells nothing of the twin; take a record in which it moves",
+    ),
+    (
+        "first-rows",
+        "if something may begin later, diagnose that part of the record alone",
+    ),
+    (
+        DIVERGES,
+        "narrow the bounds, judge by one-step errors, or diagnose what the twin lacks",
+    ),
+    ("gate-near-level", "take neither answer of the test as sure"),
+    (
+        "leans-on-prior",
+        "do not trust the prior, or refine always, for what the record says alone",
+    ),
+    (NO_BETTER, "diagnose what the twin lacks"),
+    (
+        "noise-at-bound",
+        "declare the level of noise, or hold it there as known",
+    ),
+    (
+        "noise-not-declared",
+        "declare that level of noise; if it is louder than it can be, diagnose what the twin lacks",
+    ),
+    (
+        NOT_CONVERGED,
+        "narrow the priors, or fix a parameter that the record does not identify",
+    ),
+    (
+        "refinement-worse",
+        "widen the prior and train again, or diagnose what the twin lacks",
+    ),
+    ("repeated-record", "give each record once"),
+    ("step-matters", "fit or train again with such a step"),
+    (
+        "validation-is-record",
+        "give a second measurement: the share closed is otherwise that of fitted data",
+    ),
+];
+
+impl Warning {
+    /// A reason with the remedy of its code.
+    pub(crate) fn new(code: &'static str, what: String) -> Self {
+        let remedy = REMEDIES.iter().find(|(own, _)| *own == code);
+        Self {
+            code,
+            what,
+            remedy: remedy.map_or("", |(_, remedy)| remedy),
+        }
+    }
+
+    /// A value that lies at a bound: `low` or `high`.
+    pub(crate) fn at_bound(code: &'static str, what: &str, side: &str) -> Self {
+        let side = if side == "low" { "lower" } else { "upper" };
+        Self::new(code, format!("{what} lies at its {side} bound"))
+    }
+
+    /// A free run that is no better than a constant.
+    pub(crate) fn no_better(output: &str) -> Self {
+        Self::new(
+            NO_BETTER,
+            format!("the free run of {output} is no better than a constant"),
+        )
+    }
+
+    /// A step that moves outputs by more than their noise; `of` names the record.
+    pub(crate) fn step(twin: &Twin, theta: &[f64], record: &Record, of: &str) -> Option<Self> {
+        let coarse = coarse_step(twin, theta, record.drive())?.ok()??;
+        Some(Self::new(
+            "step-matters",
+            format!("the step{of} is {coarse}"),
+        ))
+    }
+
+    /// Channels that have one value in all records.
+    pub(crate) fn still(signals: &Signals, records: &[Record]) -> Vec<Self> {
+        let one = |code, word: &str, quantities: &[Quantity], of: fn(&Record) -> &Signal| {
+            let is_still = |j: usize| {
+                let all = records.iter().filter(|record| j < of(record).ncols());
+                let values: Vec<f64> = all.flat_map(|r| of(r).column(j).to_vec()).collect();
+                is_constant(&values)
+            };
+            let still = quantities.iter().enumerate().filter(|(j, _)| is_still(*j));
+            let told = still.map(|(_, q)| format!("the {word} {} never changes", q.name));
+            told.map(|what| Self::new(code, what)).collect::<Vec<_>>()
+        };
+        [
+            one("constant-input", "input", &signals.inputs, |r| {
+                r.drive().inputs()
+            }),
+            one(
+                "constant-output",
+                "output",
+                &signals.outputs,
+                Record::outputs,
+            ),
+        ]
+        .concat()
+    }
+}
 
 /// Warnings of a fit.
 pub(super) struct Doubts<'a> {
@@ -30,8 +154,8 @@ impl<'a> Doubts<'a> {
         }
     }
 
-    fn warn(&mut self, code: &'static str, what: String, remedy: &'static str) {
-        self.all.push(Warning { code, what, remedy });
+    fn warn(&mut self, code: &'static str, what: String) {
+        self.all.push(Warning::new(code, what));
     }
 
     /// Warns of a fit that is less likely than one without effects.
@@ -41,7 +165,6 @@ impl<'a> Doubts<'a> {
         self.warn(
             "below-the-twin-alone",
             format!("the fit is {less} nats less likely than with its effects off"),
-            "give the magnitudes of [[effect]] a narrower [bounds], or leave effects out",
         );
     }
 
@@ -54,11 +177,7 @@ impl<'a> Doubts<'a> {
             "the search has not arrived: {:.2} standard deviations from the top, {} of {} searches agree",
             convergence.distance, convergence.agreeing, convergence.searches
         );
-        self.warn(
-            NOT_CONVERGED,
-            what,
-            "narrow [prior], or fix a parameter that the record does not identify",
-        );
+        self.warn(NOT_CONVERGED, what);
     }
 
     /// Warns of parameters, magnitudes and noise levels at a bound.
@@ -68,24 +187,20 @@ impl<'a> Doubts<'a> {
         noise: &[FittedNoise],
         kinds: &BTreeMap<String, Kind>,
     ) {
-        let word = |side: Side| match side {
-            Side::Low => "lower",
-            Side::High => "upper",
+        let id = |side: Side| match side {
+            Side::Low => "low",
+            Side::High => "high",
         };
         for p in parameters {
             let Some(side) = p.at_bound else { continue };
-            match kinds.get(&p.name) {
-                Some(Kind::Switch { off, .. } | Kind::Size(off)) if p.value == *off => self.warn(
-                    "at-bound",
-                    format!("{} lies where the effect is off", p.name),
-                    "leave the [[effect]] out: the record does not ask for it",
-                ),
-                _ => self.warn(
-                    "at-bound",
-                    format!("{} lies at its {} bound", p.name, word(side)),
-                    BOUNDS,
-                ),
+            let mut doubt = Warning::at_bound("at-bound", &p.name, id(side));
+            if let Some(Kind::Switch { off, .. } | Kind::Size(off)) = kinds.get(&p.name)
+                && p.value == *off
+            {
+                doubt.what = format!("{} lies where the effect is off", p.name);
+                doubt.remedy = "leave the effect out: the record does not ask for it";
             }
+            self.all.push(doubt);
         }
         for level in noise {
             let Some(side) = level.at_bound else { continue };
@@ -93,17 +208,9 @@ impl<'a> Doubts<'a> {
             if side == Side::Low && self.problem.is_simulated() {
                 continue;
             }
-            let what = format!(
-                "the {} noise of {} lies at its {} bound",
-                level.role,
-                level.name,
-                word(side)
-            );
-            self.warn(
-                "noise-at-bound",
-                what,
-                "declare the level in [noise], or hold it there with known = true",
-            );
+            let what = format!("the {} noise of {}", level.role, level.name);
+            self.all
+                .push(Warning::at_bound("noise-at-bound", &what, id(side)));
         }
     }
 
@@ -111,16 +218,8 @@ impl<'a> Doubts<'a> {
     pub fn runs(&mut self, errors: &[OutputErrors]) {
         for e in errors {
             match e.free_run {
-                None => self.warn(
-                    "free-run-diverges",
-                    format!("the free run of {} diverges", e.name),
-                    "judge by one-step errors, or look for what the twin lacks: truetwin diagnose",
-                ),
-                Some(rmse) if rmse >= e.deviation => self.warn(
-                    "no-better-than-constant",
-                    format!("the free run of {} is no better than a constant", e.name),
-                    LACKS,
-                ),
+                None => self.warn(DIVERGES, format!("the free run of {} diverges", e.name)),
+                Some(rmse) if rmse >= e.deviation => self.all.push(Warning::no_better(&e.name)),
                 Some(_) => {}
             }
         }
@@ -130,51 +229,51 @@ impl<'a> Doubts<'a> {
     /// the step.
     pub fn records(&mut self, runs: bool) {
         let (problem, theta) = (self.problem, self.theta);
-        let signals = problem.twin.signals();
-        for (r, record) in problem.records.iter().enumerate() {
+        self.all
+            .extend(Warning::still(&problem.twin.signals(), &problem.records));
+        for (r, record) in problem.records.iter().enumerate().filter(|_| runs) {
             let of = match problem.records.len() {
                 1 => String::new(),
                 _ => format!(" of record {}", r + 1),
             };
-            for (name, values) in signals.inputs.iter().zip(columns(record.drive().inputs())) {
-                if is_constant(&values) {
-                    self.warn(
-                        "constant-input",
-                        format!("the input {}{of} never moves", name.name),
-                        "what shows only when it moves cannot be known from this record; take one in which it moves",
-                    );
-                }
-            }
-            for (name, values) in signals.outputs.iter().zip(columns(record.outputs())) {
-                if is_constant(&values) {
-                    self.warn(
-                        "constant-output",
-                        format!("the output {}{of} never moves", name.name),
-                        "a sensor that is stuck tells nothing of the twin; take a record in which it moves",
-                    );
-                }
-            }
-            if !runs {
-                continue;
-            }
-            let step = check_step(&problem.twin, &problem.of_record(r, theta), record.drive());
-            if let Some(finding) = step.filter(|f| f.severity == Severity::Warning) {
-                self.warn(
-                    "step-matters",
-                    format!("the step{of} is {}", finding.message),
-                    "fit again with such a study",
-                );
-            }
+            let theta = problem.of_record(r, theta);
+            self.all
+                .extend(Warning::step(&problem.twin, &theta, record, &of));
         }
     }
 }
 
-fn columns(signal: &Signal) -> Vec<Vec<f64>> {
-    signal.columns().into_iter().map(|c| c.to_vec()).collect()
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::Drive;
 
-/// Returns whether every value that is there is the same.
-fn is_constant(values: &[f64]) -> bool {
-    let mut there = values.iter().filter(|v| !v.is_nan());
-    there.next().is_some_and(|first| there.all(|v| v == first))
+    /// A channel is still if it has one value in all records together, missing values apart.
+    #[test]
+    fn a_channel_that_differs_between_records_moves() {
+        let record = |u: f64| {
+            let mut y = Signal::from_elem((3, 1), 1.0);
+            y[[1, 0]] = f64::NAN;
+            let drive = Drive::new(1.0, Signal::from_elem((3, 1), u)).unwrap();
+            Record::new(drive, y).unwrap()
+        };
+        let signals = Signals {
+            inputs: vec![Quantity::new("u", "V")],
+            outputs: vec![Quantity::new("y", "V")],
+        };
+        let codes = |records: &[Record]| -> Vec<&str> {
+            Warning::still(&signals, records)
+                .iter()
+                .map(|w| w.code)
+                .collect()
+        };
+        assert_eq!(codes(&[record(1.0)]), ["constant-input", "constant-output"]);
+        assert_eq!(codes(&[record(1.0), record(2.0)]), ["constant-output"]);
+    }
+
+    #[test]
+    fn every_reason_has_a_remedy() {
+        assert!(REMEDIES.is_sorted());
+        assert!(!Warning::no_better("y").remedy.is_empty());
+    }
 }

@@ -13,14 +13,14 @@
 //! | `passes.rs` | what a search costs |
 //! | `evidence.rs` | the likelihood averaged over the prior |
 //! | `reference.rs` | linear gain of a direction beside θ |
-//! | `doubts.rs` | reasons to doubt a fit |
+//! | `doubts.rs` | reasons to doubt a result, in one list |
 //! | `posterior/` | draws of θ given the records, as a table, as errors and intervals, as a region |
 //! | `least_squares/` | Gauss–Newton on residuals, on argmin |
 
 pub(crate) mod axis;
 pub(crate) mod certificate;
 pub(crate) mod climb;
-mod doubts;
+pub(crate) mod doubts;
 mod effects;
 pub(crate) mod evidence;
 pub(crate) mod follow;

@@ -35,7 +35,7 @@ pub(crate) use least_squares::{Fit, LeastSquares, Regressors};
 pub(crate) use principal_axes::principal_axes;
 pub(crate) use quantile::{median, quantile, rank_p_value};
 pub(crate) use rounding::{six_digits, three_digits};
-pub(crate) use sample::{correlation, deviation, ends, largest};
+pub(crate) use sample::{CONSTANT, correlation, deviation, ends, is_constant, largest};
 pub(crate) use solve::{solve_above, solve_truncated};
 pub(crate) use whitening::Whitening;
 pub(crate) use widest::{Kernel, widest};

@@ -21,6 +21,16 @@ pub(crate) fn ends(values: &[f64]) -> (f64, f64) {
         })
 }
 
+/// Difference of values, as a share of their size, below which they are one.
+pub(crate) const CONSTANT: f64 = 1e-9;
+
+/// Returns whether all finite values are the same; false where there is none.
+pub(crate) fn is_constant(values: &[f64]) -> bool {
+    let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    let (low, high) = ends(&finite);
+    !finite.is_empty() && high - low <= CONSTANT * low.abs().max(high.abs())
+}
+
 /// Pearson's correlation; 0 where one of the two does not vary.
 pub(crate) fn correlation(pairs: &[(f64, f64)]) -> f64 {
     let n = pairs.len().max(1) as f64;

@@ -70,7 +70,6 @@ impl Verb for Diagnose {
         let (records, validation) =
             records::read(reader, &self.records, self.validation.as_deref())?;
         self.check_step(&study, &records[0])?;
-        records::warn_of_still(&study, &self.records, &records);
         let initial = match &self.estimator {
             Some(path) => Some(first_estimate(context, &study, path, &records[0])?),
             None => None,

@@ -42,7 +42,6 @@ impl Verb for Fit {
         let folder = folder.transpose()?;
         let study = context.study(&self.subject)?;
         let (records, _) = records::read(self.columns.reader(&study), &self.records, None)?;
-        records::warn_of_still(&study, &self.records, &records);
         let settings = FitSettings {
             seed: context.seed,
             draws: self.draws.count()?,

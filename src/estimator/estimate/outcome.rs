@@ -7,13 +7,10 @@ use crate::estimator::gate::GateOutcome;
 use crate::estimator::readout::Spread;
 use crate::estimator::recipe::PresetName;
 use crate::estimator::refine::Information;
+use crate::fit::doubts::{DIVERGES, NO_BETTER};
 use crate::fit::{FittedNoise, Nuisance, Posterior, Warning};
 use crate::record::Record;
 use crate::twin::{ParameterSpace, Role};
-
-/// Codes of warnings that no estimate is consistent with.
-pub(super) const NO_BETTER: &str = "no-better-than-constant";
-pub(super) const DIVERGES: &str = "free-run-diverges";
 
 /// Options of an estimate.
 #[derive(Debug, Clone, Default)]

@@ -1,12 +1,12 @@
 //! Reasons to doubt an estimate.
 
-use super::outcome::{DIVERGES, Estimate, NO_BETTER};
+use super::outcome::Estimate;
 use crate::estimator::gate::GateOutcome;
+use crate::fit::doubts::DIVERGES;
 use crate::fit::{Fit, NOT_CONVERGED, Warning};
 use crate::math::{deviation, three_digits};
 use crate::record::{Record, Signal};
 use crate::setting::number;
-use crate::twin::conformance::{Severity, check_step};
 use crate::twin::{PRIOR_DEVIATION, Role, Twin};
 
 /// Share of a prior's information in an answer from which on the answer leans on it: the prior then moves the answer by this share of
@@ -20,72 +20,38 @@ pub(super) fn warnings(
     estimate: &Estimate,
     fit: Option<&Fit>,
 ) -> Vec<Warning> {
-    let mut all = Vec::new();
-    let mut warn = |code, what, remedy| all.push(Warning { code, what, remedy });
     let signals = twin.signals();
-    for (input, values) in (signals.inputs.iter()).zip(record.drive().inputs().columns()) {
-        if values.iter().all(|v| *v == values[0]) {
-            warn(
-                "constant-input",
-                format!("the input {} never moves", input.name),
-                "what shows only when it moves cannot be known from this record; take one in which it moves",
-            );
-        }
-    }
-    if let Some(run) = &estimate.tracking {
-        for (j, output) in signals.outputs.iter().enumerate() {
-            if no_better_than_constant(record, &run.outputs, j) {
-                warn(
-                    NO_BETTER,
-                    format!(
-                        "the free run of {} is no better than a constant",
-                        output.name
-                    ),
-                    "look for what the twin lacks: truetwin diagnose",
-                );
-            }
-        }
-    } else {
-        warn(
+    let mut all = Warning::still(&signals, std::slice::from_ref(record));
+    match &estimate.tracking {
+        Some(run) => all.extend(
+            (signals.outputs.iter().enumerate())
+                .filter(|(j, _)| no_better_than_constant(record, &run.outputs, *j))
+                .map(|(_, output)| Warning::no_better(&output.name)),
+        ),
+        None => all.push(Warning::new(
             DIVERGES,
             "the free run at the estimate diverges".to_owned(),
-            "narrow [bounds], or look for what the twin lacks: truetwin diagnose",
-        );
+        )),
     }
     for level in &estimate.noise {
         let declared = three_digits(level.declared.unwrap_or(0.0));
-        warn(
-            "noise-not-declared",
-            format!(
-                "the record shows a noise of {} of {} {}, {} is declared; simulations take what it shows",
-                level.name,
-                number(three_digits(level.value)),
-                level.unit,
-                number(declared),
-            ),
-            "declare that level in [noise]; if it is louder than it can be, look for what the twin lacks: truetwin diagnose",
+        let what = format!(
+            "the record shows a noise of {} of {} {}, {} is declared; simulations take what it shows",
+            level.name,
+            number(three_digits(level.value)),
+            level.unit,
+            number(declared),
         );
+        all.push(Warning::new("noise-not-declared", what));
     }
     if estimate.refit().is_some_and(|refit| refit.is_refused) {
-        warn(
-            "refinement-worse",
-            "refined parameters explain the record worse than the network's, which are kept"
-                .to_owned(),
-            "widen [prior] and train again, or look for what the twin lacks: truetwin diagnose",
-        );
+        let what = "refined parameters explain the record worse than the network's, which are kept";
+        all.push(Warning::new("refinement-worse", what.to_owned()));
     }
     let space = twin.parameters();
     for (j, parameter) in space.iter().enumerate() {
-        let side = match parameter.bound_at(estimate.theta[j], estimate.std_error[j]) {
-            Some("low") => "lower",
-            Some(_) => "upper",
-            None => continue,
-        };
-        warn(
-            "at-bound",
-            format!("{} lies at its {side} bound", parameter.name),
-            "widen [bounds] if other values are possible; its error means little here",
-        );
+        let side = parameter.bound_at(estimate.theta[j], estimate.std_error[j]);
+        all.extend(side.map(|side| Warning::at_bound("at-bound", &parameter.name, side)));
     }
     if let Some(information) = estimate
         .information()
@@ -100,11 +66,8 @@ pub(super) fn warnings(
             .map(|(p, _)| p.name.as_str())
             .collect();
         if !leaning.is_empty() {
-            warn(
-                "leans-on-prior",
-                format!("{} lean on the prior", leaning.join(", ")),
-                "leave [prior] trust out, or take --always-refine, for what the record says alone",
-            );
+            let what = format!("{} lean on the prior", leaning.join(", "));
+            all.push(Warning::new("leans-on-prior", what));
         }
     }
     let tests = [
@@ -115,25 +78,15 @@ pub(super) fn warnings(
         let Some(test) = test.filter(GateOutcome::is_unsure) else {
             continue;
         };
-        warn(
-            "gate-near-level",
-            format!(
-                "the p-value of {name}, {} ± {}, is near its level {}",
-                number(three_digits(test.p_value)),
-                number(three_digits(test.p_error)),
-                number(test.alpha),
-            ),
-            "take neither answer of the test as sure",
+        let what = format!(
+            "the p-value of {name}, {} ± {}, is near its level {}",
+            number(three_digits(test.p_value)),
+            number(three_digits(test.p_error)),
+            number(test.alpha),
         );
+        all.push(Warning::new("gate-near-level", what));
     }
-    let step = check_step(twin, &estimate.theta, record.drive());
-    if let Some(finding) = step.filter(|f| f.severity == Severity::Warning) {
-        warn(
-            "step-matters",
-            format!("the step is {}", finding.message),
-            "train again with such a study",
-        );
-    }
+    all.extend(Warning::step(twin, &estimate.theta, record, ""));
     let of_fit = fit.into_iter().flat_map(|fit| &fit.warnings);
     all.extend(of_fit.filter(|w| w.code == NOT_CONVERGED).cloned());
     all

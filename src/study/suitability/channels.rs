@@ -2,13 +2,11 @@
 
 use super::{or_pass, present, text, with_unit};
 use crate::effect::{Mark, clipped, rounded};
-use crate::math::{ends, median, quantile};
+use crate::math::{CONSTANT, ends, is_constant, median, quantile};
 use crate::record::{Drive, Record, Signal};
 use crate::study::Study;
 use crate::twin::conformance::Finding;
 
-/// Values that differ by less than this share of their size are one.
-const SAME: f64 = 1e-9;
 /// Levels within the range of a channel below which rounding shapes it: with 50, rounding adds 2 % of the range to each row, as much as
 /// the noise of a common sensor.
 const FEW_LEVELS: f64 = 50.0;
@@ -45,7 +43,7 @@ pub(super) fn check(
             let value = with_unit(values[0], &input.unit);
             findings.push(Finding::warning(
                 "constant",
-                format!("input {name} is {value} in every row: it cannot tell what {name} does; record with an input that moves, or fix its parameters in [fixed]"),
+                format!("input {name} is {value} in every row: what acts through it cannot be told from a constant; take a record in which it moves, or fix its parameters"),
             ));
         }
     }
@@ -116,12 +114,6 @@ pub(super) fn check(
     )
 }
 
-/// Returns `true` if all values are the same.
-pub(super) fn is_constant(values: &[f64]) -> bool {
-    let (low, high) = ends(values);
-    high - low <= SAME * low.abs().max(high.abs())
-}
-
 /// The end that values pile up at, and how many of them.
 fn clipped_ends(values: &[f64]) -> Option<(&'static str, f64, usize)> {
     let Mark::Present(limits) = clipped(values) else {
@@ -131,7 +123,7 @@ fn clipped_ends(values: &[f64]) -> Option<(&'static str, f64, usize)> {
     let at = |end: f64| {
         values
             .iter()
-            .filter(move |v| (**v - end).abs() <= SAME * (high - low))
+            .filter(move |v| (**v - end).abs() <= CONSTANT * (high - low))
     };
     match limits[1].is_finite() {
         true => Some(("largest", high, at(high).count())),

@@ -17,7 +17,7 @@ mod step;
 mod tests;
 
 pub use finding::{Finding, Severity};
-pub(crate) use step::check_step;
+pub(crate) use step::{check_step, coarse_step};
 
 use crate::record::{Drive, Signal};
 use crate::twin::{

@@ -29,14 +29,28 @@ pub(crate) fn step_error(
 /// Compares the [`step_error`] at θ with the measurement noise of each output; `None` for a black box.
 pub(crate) fn check_step(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<Finding> {
     const CHECK: &str = "step";
+    Some(match coarse_step(twin, theta, drive)? {
+        Ok(Some(coarse)) => Finding::warning(CHECK, coarse),
+        Ok(None) => Finding::pass(
+            CHECK,
+            "half the step moves no output by more than its noise",
+        ),
+        Err(error) => Finding::warning(CHECK, format!("not known: {error}")),
+    })
+}
+
+/// Outputs that half of the step moves by more than their noise, with the remedy; `None` for a black box.
+pub(crate) fn coarse_step(
+    twin: &Twin,
+    theta: &[f64],
+    drive: &Drive,
+) -> Option<Result<Option<String>, SimulationError>> {
     let equations = twin.equations()?;
-    let errors = match step_error(twin, theta, drive) {
-        Ok(errors) => errors,
-        Err(error) => return Some(Finding::warning(CHECK, format!("not known: {error}"))),
-    };
-    let levels = match step_levels(equations, theta, drive) {
-        Ok(levels) => levels,
-        Err(error) => return Some(Finding::warning(CHECK, format!("not known: {error}"))),
+    let known = step_error(twin, theta, drive)
+        .and_then(|errors| Ok((errors, step_levels(equations, theta, drive)?)));
+    let (errors, levels) = match known {
+        Ok(known) => known,
+        Err(error) => return Some(Err(error)),
     };
     let units = twin.signals().outputs.into_iter().map(|output| output.unit);
     let coarse: Vec<String> = (errors.iter().zip(&levels).zip(units))
@@ -47,19 +61,13 @@ pub(crate) fn check_step(twin: &Twin, theta: &[f64], drive: &Drive) -> Option<Fi
         })
         .collect();
     if coarse.is_empty() {
-        return Some(Finding::pass(
-            CHECK,
-            "half the step moves no output by more than its noise",
-        ));
+        return Some(Ok(None));
     }
     let substeps = (4 * equations.stepping().substeps).min(MOST_SUBSTEPS);
-    Some(Finding::warning(
-        CHECK,
-        format!(
-            "too long: with half the step, {}; set [record] substeps = {substeps} in a study file, or integrator = \"runge-kutta-4\"",
-            coarse.join("; ")
-        ),
-    ))
+    Some(Ok(Some(format!(
+        "too long: with half the step, {}; give the study {substeps} substeps, or the integrator runge-kutta-4",
+        coarse.join("; ")
+    ))))
 }
 
 /// Limit of each output's move, and the limit's name.
