@@ -125,7 +125,10 @@ impl Provenance {
             let name = file.path.file_name().unwrap_or(file.path.as_os_str());
             name.to_string_lossy().into_owned()
         });
-        let day = self.date.clone().unwrap_or_else(|| Timestamp::now().to_string());
+        let day = self
+            .date
+            .clone()
+            .unwrap_or_else(|| Timestamp::now().to_string());
         let byline: Vec<String> = names.chain([day.chars().take(DAY).collect()]).collect();
         let document = Document {
             byline: byline.join(", "),
