@@ -321,7 +321,10 @@ mod tests {
             ..FitSettings::default()
         };
         let records = [found.record.clone()];
-        let fit = (found.study.fit(&records, &settings, &Progress::silent())).unwrap();
+        let fit = (found
+            .study
+            .fit_with(&records, &settings, &Progress::silent()))
+        .unwrap();
         let document = fit_document(&found.study, &records, &fit);
         let page = document.html();
         let head = page.split("</header>").next().unwrap();
