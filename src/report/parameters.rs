@@ -98,7 +98,7 @@ impl ParameterRow {
         }
     }
 
-    /// What is special about the value; empty where nothing is.
+    /// Special standing of the value; empty where it has none.
     fn note(&self) -> &'static str {
         let [low, high] = self.interval;
         let is_outside = high < self.prior.low() || low > self.prior.high();

@@ -9,6 +9,7 @@
 use super::posterior::{Mass, Posterior};
 use crate::diagnose::outcome::{Decision, TargetShare, Verdict};
 use crate::diagnose::thresholds::Thresholds;
+use crate::effect::EffectKey;
 
 /// Verdict, decision, the effects that the twin is given, their rivals, and the probabilities behind them.
 #[derive(Debug, Clone, PartialEq)]
@@ -84,9 +85,9 @@ impl Answer {
 
     /// The place of the first accepted effect, or else the most probable one.
     pub fn place(&self) -> Option<String> {
-        let first = self.accepted.first().and_then(|key| key.split_once('@'));
+        let first: Option<EffectKey> = self.accepted.first().and_then(|key| key.parse().ok());
         let most = || self.posterior.targets().into_iter().next();
-        first.map_or_else(|| most().map(|t| t.target), |(_, at)| Some(at.to_owned()))
+        first.map_or_else(|| most().map(|t| t.target), |key| Some(key.target))
     }
 }
 

@@ -9,7 +9,7 @@ use crate::hypothesis::term::{Nature, Part, Term};
 use std::sync::Arc;
 
 impl Findings {
-    /// What was found, as hypotheses.
+    /// The findings as hypotheses.
     pub fn hypotheses(&self) -> Hypotheses {
         let sets = (self.listed.iter().chain(&self.several)).map(|found| {
             let keys = found.keys();

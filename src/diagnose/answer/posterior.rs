@@ -59,9 +59,9 @@ pub(in crate::diagnose) struct Hypotheses {
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::diagnose) struct Mass {
     pub keys: Vec<String>,
-    /// Of exactly these effects.
+    /// Mass of exactly these effects.
     pub alone: f64,
-    /// Of these effects beside something unknown.
+    /// Mass of these effects beside something unknown.
     pub beside: f64,
 }
 
@@ -246,9 +246,9 @@ impl Odds {
 
 /// Masses while they are added up.
 struct Sums {
-    /// Of each set alone, in the order of the sets.
+    /// Mass of each set alone, in the order of the sets.
     alone: Vec<f64>,
-    /// Of something unknown beside so many effects, and the part of its evidence that is theirs.
+    /// Mass of something unknown beside each number of effects, and the part of its evidence that is theirs.
     beside: BTreeMap<usize, [f64; 2]>,
     unknown: f64,
     places: BTreeMap<String, f64>,

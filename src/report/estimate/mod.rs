@@ -88,7 +88,7 @@ pub(super) fn estimate_document(
     }
 }
 
-/// Whether the calibrated twin explains the record.
+/// Verdict on the calibrated twin.
 fn headline(estimate: &Estimate) -> String {
     let refit = estimate.refit();
     let test = match refit {

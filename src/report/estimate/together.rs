@@ -57,7 +57,7 @@ pub(crate) fn together_json(study: &Study, all: &Together, files: &[String]) -> 
     })
 }
 
-/// Whether the records agree, the shared table, then one line a record, and the warnings of each.
+/// Agreement of the records, the shared table, then one line a record, and the warnings of each.
 pub(crate) fn together_document(study: &Study, all: &Together, files: &[String]) -> Document {
     let names: Vec<&String> = all.names.iter().take(SHOWN).collect();
     let mut head = vec![("record", Text)];

@@ -148,7 +148,7 @@ fn row(units: &Units, cause: &Cause, effect: &EffectFit) -> Vec<String> {
     ]
 }
 
-/// What an unknown function adds to effects; none where that was not asked.
+/// Evidence that an unknown function adds to effects; none where that was not asked.
 fn remains(cause: &Cause) -> Option<String> {
     let remains = cause.remains.as_ref()?;
     let effects = match cause.accepted.as_slice() {

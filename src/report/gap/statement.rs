@@ -256,7 +256,7 @@ pub(super) fn accepted_ids(cause: &Cause) -> String {
     }
 }
 
-/// What follows: how sure, how far, the effects with their sizes.
+/// Sentences behind the headline: how sure, how far, the effects with their sizes.
 pub(super) fn details(units: &Units, diagnosis: &Diagnosis) -> Vec<String> {
     let cause = &diagnosis.cause;
     let names = Names::of(cause);
