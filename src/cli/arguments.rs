@@ -1,6 +1,6 @@
 //! The whole command line.
 
-use super::args::External;
+use super::options::External;
 use super::verbs::Command as Verbs;
 use clap::{Arg, Command, CommandFactory, Parser};
 

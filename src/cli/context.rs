@@ -1,12 +1,15 @@
 //! The interface between the command line and its verbs.
 
-use super::args::Subject;
 use super::failure::Failure;
+use super::options::Subject;
+use super::output;
 use crate::estimator::Project;
 use crate::progress::Progress;
 use crate::storage::work::{Ranks, Share};
 use crate::study::{Study, StudyError, StudyFile};
 use clap::Command;
+use serde_json::{Value, json};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// A verb: its options and its work.
@@ -110,15 +113,43 @@ impl Context<'_> {
     }
 
     pub fn named(&self, name: &str) -> Result<&Project, Failure> {
-        let project = (self.projects.iter()).find(|project| project.study().name() == name);
-        Ok(project.ok_or_else(|| StudyError::Twin {
+        let names = || self.projects.iter().map(|project| project.study().name());
+        let project = names().position(|other| other == name);
+        let unknown = || StudyError::Twin {
             given: name.into(),
-            known: self
-                .projects
-                .iter()
-                .map(|project| project.study().name())
-                .collect::<Vec<_>>()
-                .join(", "),
-        })?)
+            known: names().collect::<Vec<_>>().join(", "),
+        };
+        Ok(&self.projects[project.ok_or_else(unknown)?])
+    }
+
+    /// Prints a result: JSON if asked for, else text, if there is any.
+    pub fn print(&self, json: &Value, text: impl FnOnce() -> String) -> Result<ExitCode, Failure> {
+        if self.json {
+            output::print_json(json)?;
+        } else if let text = text()
+            && !text.is_empty()
+        {
+            output::print(&text)?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+
+    /// Prints how much of a job array is done.
+    pub fn print_share(
+        &self,
+        folder: &Path,
+        pieces: &str,
+        done: usize,
+        of: usize,
+    ) -> Result<ExitCode, Failure> {
+        let json = json!({
+            "schema": "truetwin.share/1", "folder": folder, "pieces": pieces, "there": done, "of": of,
+        });
+        self.print(&json, || {
+            format!(
+                "{}: {done} of {of} {pieces} done; when all shards are done, rerun without --shard to merge",
+                folder.display()
+            )
+        })
     }
 }

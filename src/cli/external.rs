@@ -1,7 +1,7 @@
 //! The external twin of a call: `--program` or `--fmu`.
 
-use super::args::External;
 use super::failure::Failure;
+use super::options::External;
 use crate::estimator::Project;
 use crate::external::program::{ProgramSettings, ProgramTwin};
 use crate::setting::number;

@@ -14,13 +14,14 @@
 //! Results go to standard output, progress and messages to standard error. Exit codes: 0 done; 2 wrong call or file, with
 //! one line that has the remedy; 1 anything else.
 
-mod args;
 mod arguments;
 mod context;
 mod external;
 mod failure;
+mod options;
 mod output;
 mod posterior;
+mod prelude;
 mod progress;
 mod provenance;
 mod records;

@@ -1,17 +1,15 @@
-//! Output: standard output, and folders that appear complete.
+//! Output: standard output and error, and folders that appear complete.
 
-use super::context::Context;
 use super::failure::Failure;
 pub(super) use super::say::say;
 use crate::storage::files::{folder, with_remedy};
 use crate::storage::untrusted::{hidden, printable};
 use crate::storage::{self, StorageError, sweep_beside};
-use serde_json::{Value, json};
+use serde_json::Value;
 use std::borrow::Cow;
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 /// Prints a result; a closed pipe (`| head`) is no failure. Control characters from names and units are escaped.
 pub(super) fn print(text: &str) -> Result<(), Failure> {
@@ -48,27 +46,6 @@ fn hidden_escaped(json: &str) -> Cow<'_, str> {
         }
     }
     Cow::Owned(text)
-}
-
-/// Prints how much of a job array is done.
-pub(super) fn print_share(
-    context: &Context<'_>,
-    folder: &Path,
-    what: &str,
-    there: usize,
-    of: usize,
-) -> Result<ExitCode, Failure> {
-    if context.json {
-        print_json(&json!({
-            "schema": "truetwin.share/1", "folder": folder, "pieces": what, "there": there, "of": of,
-        }))?
-    } else {
-        print(&format!(
-            "{}: {there} of {of} {what} done; when all shards are done, rerun without --shard to merge",
-            folder.display()
-        ))?
-    }
-    Ok(ExitCode::SUCCESS)
 }
 
 /// Refuses an existing path or a missing parent folder, before the work starts; removes leftovers of killed processes there.
@@ -109,6 +86,11 @@ impl NewFolder {
         })
     }
 
+    /// As [`new`](Self::new), for an option that may be absent.
+    pub fn asked(place: &Option<PathBuf>) -> Result<Option<Self>, Failure> {
+        place.as_deref().map(Self::new).transpose()
+    }
+
     /// Path of a file while the folder is filled.
     pub fn file(&self, name: &str) -> PathBuf {
         self.filling.file(name)
@@ -134,6 +116,7 @@ impl NewFolder {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::json;
 
     #[test]
     fn hidden_characters_survive_json_as_escapes() {

@@ -1,10 +1,9 @@
 //! Where a result comes from: version, call, seed, files.
 
-use super::args::Subject;
 use super::context::Context;
 use super::failure::Failure;
+use super::options::Subject;
 use super::output;
-use super::say::say;
 use crate::report::{Document, with_footer};
 use crate::storage::files::sha256_of;
 use jiff::Timestamp;
@@ -12,6 +11,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
 /// Options that change no result, and whether a value follows.
 const SILENT: [(&str, bool); 6] = [
@@ -51,32 +51,34 @@ struct File {
 }
 
 impl Provenance {
-    /// The provenance of a call on these files, beside the study file of its subject.
-    pub fn new<'p>(
-        context: &Context<'_>,
-        subject: Option<&'p Subject>,
-        files: impl IntoIterator<Item = (&'static str, &'p Path)>,
-    ) -> Self {
-        let study = subject.and_then(|subject| subject.study.as_deref());
-        let file = |(role, path): (&'static str, &Path)| File {
-            role,
-            path: path.into(),
-            sha256: sha256_of(path).ok(),
-        };
+    /// The provenance of a call about `subject`; files are added.
+    pub fn new(context: &Context<'_>, subject: Option<&Subject>) -> Self {
         let epoch = std::env::var("SOURCE_DATE_EPOCH").ok();
-        Self {
+        let provenance = Self {
             version: env!("CARGO_PKG_VERSION"),
             call: context.call.clone(),
             seed: context.seed,
-            files: (files.into_iter())
-                .chain(study.map(|path| ("study", path)))
-                .map(file)
-                .collect(),
+            files: vec![],
             date: epoch.and_then(|epoch| {
                 let date = Timestamp::from_second(epoch.parse().ok()?).ok()?;
                 Some(date.to_string())
             }),
-        }
+        };
+        provenance.files("study", subject.and_then(|subject| subject.study.as_ref()))
+    }
+
+    /// Adds files of one role.
+    pub fn files(
+        mut self,
+        role: &'static str,
+        paths: impl IntoIterator<Item = impl AsRef<Path>>,
+    ) -> Self {
+        self.files.extend(paths.into_iter().map(|path| File {
+            role,
+            path: path.as_ref().into(),
+            sha256: sha256_of(path.as_ref()).ok(),
+        }));
+        self
     }
 
     /// The result with its provenance.
@@ -98,24 +100,28 @@ impl Provenance {
         format!("{}; call: {}", self.line(SHORT), self.call)
     }
 
-    /// Tells where a result comes from on standard error, which no script reads; nothing with `--json`.
-    pub fn tell(&self, context: &Context<'_>) {
-        if !context.json {
-            say(&self.last_line());
-        }
-    }
-
     /// Prints a result: its JSON, which has its provenance, or else its text with the last line.
     pub fn print(
         &self,
         context: &Context<'_>,
         json: &Value,
         text: impl FnOnce() -> String,
-    ) -> Result<(), Failure> {
-        match context.json {
-            true => output::print_json(json),
-            false => output::print(&self.below(&text())),
+    ) -> Result<ExitCode, Failure> {
+        context.print(json, || self.below(&text()))
+    }
+
+    /// Prints a result that scripts read; where it comes from goes to standard error, without `--json`.
+    pub fn print_beside(
+        &self,
+        context: &Context<'_>,
+        json: Value,
+        text: impl FnOnce() -> String,
+    ) -> Result<ExitCode, Failure> {
+        let code = context.print(&self.on(json), text)?;
+        if !context.json {
+            output::say(&self.last_line());
         }
+        Ok(code)
     }
 
     /// The document as a page: files and date below its heading, where it comes from at its end.

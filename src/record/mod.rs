@@ -26,6 +26,6 @@ pub(crate) use csv::{RecordReader, parse_record};
 pub use drive::{Drive, Signal};
 pub use error::RecordError;
 pub use measured::Record;
-pub(crate) use resample::{InputRule, resample};
+pub(crate) use resample::{InputRule, Resampled, resample};
 pub(crate) use rounding::{distinct, step_of};
 pub(crate) use write::{drive_csv_text, record_csv_text};

@@ -3,8 +3,11 @@
 pub(crate) use super::remedy::{folder, with_remedy};
 use super::unfinished::file_beside;
 use sha2::{Digest, Sha256};
-use std::io::{self, Write};
+use std::io::{self, BufRead, BufReader, Write};
 use std::path::Path;
+
+/// Bytes of a file that are hashed at once.
+const PIECE: usize = 1 << 16;
 
 /// Writes a new file.
 pub(crate) fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
@@ -35,7 +38,12 @@ pub(crate) fn sha256(bytes: &[u8]) -> String {
 /// Returns the SHA-256 of a file, without reading it into memory.
 pub(crate) fn sha256_of(path: &Path) -> io::Result<String> {
     let mut hash = Sha256::new();
-    io::copy(&mut std::fs::File::open(path)?, &mut hash)?;
+    let mut file = BufReader::with_capacity(PIECE, std::fs::File::open(path)?);
+    while let piece @ [_, ..] = file.fill_buf()? {
+        hash.update(piece);
+        let length = piece.len();
+        file.consume(length);
+    }
     Ok(hexadecimal(&hash.finalize()))
 }
 

@@ -1,4 +1,4 @@
-//! The science: filters, effects, features, estimates, diagnoses, and records from real rigs.
+//! The science: filters, effects, features, estimates, diagnoses.
 //!
 //! Names with `study` in them, or `#[ignore]`, are studies of minutes: run them by name and in release.
 
@@ -16,7 +16,6 @@ mod filter;
 mod fit;
 mod misspecification;
 mod numbers;
-mod real_records;
 mod suitability;
 
 /// Counts that `trials` of this probability give with at least `level`; each tail outside has at most (1 − level)/2.

@@ -1,16 +1,8 @@
 //! `bank`: simulates a bank to disk.
 
-use crate::cli::args::{PresetArgument, Subject, at_least_one};
-use crate::cli::context::{Context, Verb};
-use crate::cli::failure::Failure;
-use crate::cli::output;
-use crate::cli::provenance::Provenance;
+use crate::cli::prelude::*;
 use crate::estimator::shards::BankPlan;
 use crate::storage::work::Share;
-use clap::Args;
-use serde_json::json;
-use std::path::PathBuf;
-use std::process::ExitCode;
 use std::time::Instant;
 
 /// Simulate a bank from the prior to disk; rerunning the same command resumes it.
@@ -76,8 +68,7 @@ impl Verb for Bank {
         let made = filled.rows.saturating_sub(before);
         let rate = made as f64 / seconds;
         let folder = self.out.display();
-        if context.json {
-            output::print_json(&json!({
+        let json = json!({
                 "schema": "truetwin.bank/1",
                 "twin": project.study().name(),
                 "folder": self.out,
@@ -87,19 +78,17 @@ impl Verb for Bank {
                 "simulated": made,
                 "simulations_per_second": rate,
                 "seconds": seconds,
-            }))?;
-        } else {
+        });
+        Provenance::new(context, Some(&self.subject)).print_beside(context, json, || {
             let next = if filled.there == filled.of {
                 format!("next: truetwin pretrain … --bank {folder} --out EST")
             } else {
                 "other jobs make the other shards; merge their folders with truetwin merge".into()
             };
-            output::print(&format!(
+            format!(
                 "{folder}: {} of {} shards, {} of {} simulations; {made} new in {seconds:.1} s ({rate:.0} per second)\n{next}",
                 filled.there, filled.of, filled.rows, self.size,
-            ))?;
-        }
-        Provenance::new(context, Some(&self.subject), []).tell(context);
-        Ok(ExitCode::SUCCESS)
+            )
+        })
     }
 }

@@ -1,18 +1,9 @@
 //! `check`: tests a twin before training, or a record before a fit.
 
-use crate::cli::args::{FileColumns, Subject};
-use crate::cli::context::{Context, Verb};
-use crate::cli::failure::Failure;
-use crate::cli::output;
-use crate::cli::provenance::Provenance;
+use crate::cli::prelude::*;
 use crate::estimator::PresetName;
-use crate::study::Study;
 use crate::twin::conformance::{Finding, Severity, check, check_step};
 use crate::twin::{Noise, SimulationError, Twin};
-use clap::Args;
-use serde_json::json;
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use std::sync::Arc;
 
 /// Check a twin before training (repeatable, paired noise, finite outputs, identifiable parameters), or whether a record suits it.
@@ -61,20 +52,12 @@ impl Verb for Check {
             findings.push(project.check_features(PresetName::Default, &drive, context.seed)?);
         }
         let failed = findings.iter().any(|f| f.severity == Severity::Failure);
-        if context.json {
-            let provenance = Provenance::new(context, Some(&self.subject), []);
-            output::print_json(&provenance.on(json!({
-                "schema": "truetwin.check/1", "twin": study.name(), "passed": !failed, "findings": findings,
-            })))?;
-        } else {
-            output::print(&lines(&findings))?;
-            Provenance::new(context, Some(&self.subject), []).tell(context);
-        }
-        Ok(if failed {
-            ExitCode::FAILURE
-        } else {
-            ExitCode::SUCCESS
-        })
+        let json = json!({
+            "schema": "truetwin.check/1", "twin": study.name(), "passed": !failed, "findings": findings,
+        });
+        let provenance = Provenance::new(context, Some(&self.subject));
+        let done = provenance.print_beside(context, json, || lines(&findings))?;
+        Ok(if failed { ExitCode::FAILURE } else { done })
     }
 }
 
@@ -88,17 +71,12 @@ impl Check {
     ) -> Result<ExitCode, Failure> {
         let record = self.columns.reader_of_any(study).record(path)?;
         let result = study.suitability(&record, context.seed, context.progress)?;
-        if context.json {
-            let provenance = Provenance::new(context, Some(&self.subject), [("record", path)]);
-            output::print_json(&provenance.on(json!({
-                "schema": "truetwin.suitability/1", "twin": study.name(), "record": path, "suits": result.suits(),
-                "findings": result.findings, "parameters": result.parameters,
-            })))?;
-        } else {
-            output::print(&lines(&result.findings))?;
-            Provenance::new(context, Some(&self.subject), [("record", path)]).tell(context);
-        }
-        Ok(ExitCode::SUCCESS)
+        let json = json!({
+            "schema": "truetwin.suitability/1", "twin": study.name(), "record": path, "suits": result.suits(),
+            "findings": result.findings, "parameters": result.parameters,
+        });
+        let provenance = Provenance::new(context, Some(&self.subject)).files("record", [path]);
+        provenance.print_beside(context, json, || lines(&result.findings))
     }
 }
 

@@ -1,15 +1,8 @@
 //! `compare`: several studies, fitted to the same records and scored on another.
 
-use crate::cli::args::{FileColumns, Subject};
-use crate::cli::context::{Context, Verb};
-use crate::cli::failure::Failure;
-use crate::cli::provenance::Provenance;
-use crate::cli::{output, records};
+use crate::cli::prelude::*;
 use crate::fit::FitSettings;
 use crate::report::{Compared, compare_document, compare_json, compare_svg};
-use clap::Args;
-use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Share of a record that is fitted where no other is given.
 const FITTED: f64 = 2.0 / 3.0;
@@ -38,8 +31,7 @@ pub(in crate::cli) struct Compare {
 
 impl Verb for Compare {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        let folder = self.out.as_deref().map(output::NewFolder::new);
-        let folder = folder.transpose()?;
+        let folder = NewFolder::asked(&self.out)?;
         let mut compared = vec![];
         let mut shown = None;
         for path in &self.studies {
@@ -79,11 +71,10 @@ impl Verb for Compare {
             });
             shown = Some(validation);
         }
-        let files = [("validation", &self.validation)].into_iter();
-        let files = files.chain(self.studies.iter().map(|path| ("study", path)));
-        let files = files.chain(self.records.iter().map(|path| ("record", path)));
-        let files = files.map(|(role, path)| (role, path.as_path()));
-        let provenance = Provenance::new(context, None, files);
+        let provenance = Provenance::new(context, None)
+            .files("validation", [&self.validation])
+            .files("study", &self.studies)
+            .files("record", &self.records);
         let json = provenance.on(compare_json(&compared));
         if let (Some(folder), Some(record)) = (folder, &shown) {
             folder.write_json("compare.json", &json)?;
@@ -94,7 +85,6 @@ impl Verb for Compare {
             true => "on the whole of the record whose first two thirds were fitted",
             false => "on the validation record",
         };
-        provenance.print(context, &json, || compare_document(&compared, what).text())?;
-        Ok(ExitCode::SUCCESS)
+        provenance.print(context, &json, || compare_document(&compared, what).text())
     }
 }

@@ -1,17 +1,10 @@
 //! `demo`: estimates the parameters behind an embedded record.
 
-use super::estimate::{show, write_results};
-use crate::cli::context::{Context, Verb};
-use crate::cli::failure::Failure;
-use crate::cli::output;
-use crate::cli::provenance::Provenance;
+use super::estimate::Answer;
+use crate::cli::prelude::*;
 use crate::estimator::{EstimateOptions, PresetName, PretrainOptions, pretrain};
 use crate::record::Record;
-use crate::study::Study;
 use crate::twin::Noise;
-use clap::Args;
-use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// A small bank and few epochs keep the demo short; the refinement corrects the rough network.
 const BANK: usize = 2000;
@@ -33,8 +26,7 @@ pub(in crate::cli) struct Demo {
 
 impl Verb for Demo {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        let folder = self.out.as_deref().map(output::NewFolder::new);
-        let folder = folder.transpose()?;
+        let folder = NewFolder::asked(&self.out)?;
         let project = match &self.twin {
             Some(name) => context.named(name)?,
             None => (context.projects.iter().find(|p| p.study().demo().is_some()))
@@ -68,18 +60,22 @@ impl Verb for Demo {
             ..EstimateOptions::default()
         };
         let estimate = estimator.estimate_with(&record, &settings, context.progress)?;
-        let provenance = Provenance::new(context, None, []);
+        let provenance = Provenance::new(context, None);
+        let answer = Answer {
+            study,
+            record: &record,
+            estimate: &estimate,
+        };
         if let (Some(folder), Some(out)) = (folder, &self.out) {
             record.write(&folder.file("record.csv"))?;
-            write_results(&folder, study, &record, &estimate, &provenance)?;
+            answer.write(&folder, &provenance)?;
             folder.finish()?;
             output::say(&format!(
                 "demo: {0}/overlay.svg shows measured and twin, {0}/record.csv is the record",
                 out.display()
             ));
         }
-        show(context, study, &estimate, &provenance)?;
-        Ok(ExitCode::SUCCESS)
+        answer.print(context, &provenance)
     }
 }
 

@@ -1,10 +1,7 @@
 //! `diagnose`: tests whether the twin explains the record, and finds what it lacks.
 
-use crate::cli::args::{FileColumns, Subject};
-use crate::cli::context::{Context, Verb};
-use crate::cli::failure::Failure;
-use crate::cli::provenance::Provenance;
-use crate::cli::{output, records, stop};
+use crate::cli::prelude::*;
+use crate::cli::stop;
 use crate::diagnose::{DiagnoseSettings, diagnose};
 use crate::effect::EffectPattern;
 use crate::estimator::Estimator;
@@ -12,10 +9,6 @@ use crate::math::six_digits;
 use crate::record::{Record, drive_csv_text};
 use crate::report::{NEXT_INPUT, Report};
 use crate::setting::number;
-use crate::study::Study;
-use clap::Args;
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 /// Diagnose what the twin lacks: can parameters explain the record; if not, where, which effect, how much of the gap closes.
 ///
@@ -63,17 +56,15 @@ impl Verb for Diagnose {
     }
 
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        let folder = self.out.as_deref().map(output::NewFolder::new);
-        let folder = folder.transpose()?;
+        let folder = NewFolder::asked(&self.out)?;
         let study = context.study(&self.subject)?;
         let reader = self.columns.reader(&study);
         let (records, validation) =
             records::read(reader, &self.records, self.validation.as_deref())?;
         self.check_step(&study, &records[0])?;
-        let initial = match &self.estimator {
-            Some(path) => Some(first_estimate(context, &study, path, &records[0])?),
-            None => None,
-        };
+        let initial = (self.estimator.as_ref())
+            .map(|path| first_estimate(context, &study, path, &records[0]))
+            .transpose()?;
         let settings = DiagnoseSettings {
             seed: context.seed,
             calibrate: self.calibrate,
@@ -98,13 +89,10 @@ impl Verb for Diagnose {
                 None => failure,
             }
         })?;
-        let files = self.records.iter().map(|path| ("record", path.as_path()));
-        let others = [
-            ("validation", &self.validation),
-            ("estimator", &self.estimator),
-        ];
-        let others = (others.into_iter()).filter_map(|(role, path)| Some((role, path.as_deref()?)));
-        let provenance = Provenance::new(context, Some(&self.subject), files.chain(others));
+        let provenance = Provenance::new(context, Some(&self.subject))
+            .files("record", &self.records)
+            .files("validation", &self.validation)
+            .files("estimator", &self.estimator);
         let json = provenance.on(found.json(&study));
         if let Some(folder) = folder {
             folder.write_json("report.json", &json)?;
@@ -114,10 +102,10 @@ impl Verb for Diagnose {
             }
             folder.finish()?;
         }
-        provenance.print(context, &json, || found.text(&study))?;
+        let done = provenance.print(context, &json, || found.text(&study))?;
         Ok(match found.interrupted {
             true => ExitCode::from(stop::CODE),
-            false => ExitCode::SUCCESS,
+            false => done,
         })
     }
 }

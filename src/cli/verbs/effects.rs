@@ -1,12 +1,6 @@
 //! `effects`: lists the effects that a twin may lack.
 
-use crate::cli::args::Subject;
-use crate::cli::context::{Context, Verb};
-use crate::cli::failure::Failure;
-use crate::cli::output;
-use clap::Args;
-use serde_json::{Value, json};
-use std::process::ExitCode;
+use crate::cli::prelude::*;
 
 /// List the effects that a twin may lack, with targets and magnitudes.
 #[derive(Debug, Args)]
@@ -42,8 +36,7 @@ impl Verb for Effects {
                 (!places.is_empty()).then_some((kind, places))
             })
             .collect();
-        if context.json {
-            let effects: Vec<Value> = (described.iter())
+        let effects: Vec<Value> = (described.iter())
                 .map(|(d, places)| {
                     let magnitudes: Vec<Value> = (d.magnitudes().iter())
                         .map(|m| {
@@ -58,10 +51,10 @@ impl Verb for Effects {
                     json!({ "id": d.id(), "targets": places, "law": d.formula(), "magnitudes": magnitudes })
                 })
                 .collect();
-            output::print_json(&json!({
-                "schema": "truetwin.effects/1", "twin": study.name(), "effects": effects,
-            }))?;
-        } else {
+        let json = json!({
+            "schema": "truetwin.effects/1", "twin": study.name(), "effects": effects,
+        });
+        context.print(&json, || {
             let lines: Vec<String> = (described.iter())
                 .map(|(d, places)| {
                     let magnitudes: Vec<String> = (d.magnitudes().iter())
@@ -80,8 +73,7 @@ impl Verb for Effects {
                     )
                 })
                 .collect();
-            output::print(&lines.join("\n"))?;
-        }
-        Ok(ExitCode::SUCCESS)
+            lines.join("\n")
+        })
     }
 }

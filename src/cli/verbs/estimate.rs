@@ -1,19 +1,11 @@
 //! `estimate`: estimates the parameters behind a record.
 
-use crate::cli::args::{FileColumns, PresetArgument};
-use crate::cli::context::{Context, Verb};
-use crate::cli::failure::Failure;
 use crate::cli::posterior::{self, PosteriorDraws};
-use crate::cli::provenance::Provenance;
-use crate::cli::{output, records};
+use crate::cli::prelude::*;
 use crate::estimator::bank::file;
 use crate::estimator::{self, EstimateOptions, Estimator, EstimatorError};
 use crate::record::Record;
 use crate::report::{Report, overlay_svg, together_document, together_json, trajectories_csv};
-use crate::study::Study;
-use clap::Args;
-use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Estimate the parameters behind a measured record.
 #[derive(Debug, Args)]
@@ -51,8 +43,7 @@ pub(in crate::cli) struct Estimate {
 
 impl Verb for Estimate {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        let folder = self.out.as_deref().map(output::NewFolder::new);
-        let folder = folder.transpose()?;
+        let folder = NewFolder::asked(&self.out)?;
         let estimator = Estimator::load(&self.estimator, context.projects)?;
         context.check_external_is(estimator.study().name(), "--estimator")?;
         let reader = self.columns.reader(estimator.study());
@@ -71,21 +62,27 @@ impl Verb for Estimate {
             let checked = estimator.check_record(validation, self.step_of_record);
             checked.map_err(|error| Failure::from(error).within(path))?;
         }
-        let files = self.records.iter().map(|path| ("record", path.as_path()));
-        let files = files.chain([("estimator", self.estimator.as_path())]);
-        let validation = self.validation.as_deref().map(|path| ("validation", path));
-        let files: Vec<_> = files.chain(validation).collect();
-        let provenance = || Provenance::new(context, None, files.clone());
+        let provenance = || {
+            Provenance::new(context, None)
+                .files("record", &self.records)
+                .files("estimator", [&self.estimator])
+                .files("validation", &self.validation)
+        };
         if let [record] = &records[..] {
             let estimate = (estimator.estimate_with(record, &settings, context.progress))
                 .map_err(|error| Failure::from(error).within(&self.records[0]))?;
-            let provenance = provenance();
+            let (provenance, estimate) = (provenance(), &estimate);
+            let study = estimator.study();
+            let answer = Answer {
+                study,
+                record,
+                estimate,
+            };
             if let Some(folder) = folder {
-                write_results(&folder, estimator.study(), record, &estimate, &provenance)?;
+                answer.write(&folder, &provenance)?;
                 folder.finish()?;
             }
-            show(context, estimator.study(), &estimate, &provenance)?;
-            return Ok(ExitCode::SUCCESS);
+            return answer.print(context, &provenance);
         }
         if settings.draws > 0 {
             return Err(Failure::user(
@@ -100,96 +97,82 @@ impl Verb for Estimate {
                 }
                 other => other.into(),
             })?;
-        self.finish_together(
-            context,
-            estimator.study(),
-            &records,
-            &all,
-            folder,
-            &provenance(),
-        )?;
-        Ok(ExitCode::SUCCESS)
-    }
-}
-
-impl Estimate {
-    /// Prints several estimates as one; `estimate.json` holds all, and each record has page, overlay and trajectories of its own.
-    fn finish_together(
-        &self,
-        context: &Context<'_>,
-        study: &Study,
-        records: &[Record],
-        all: &estimator::Together,
-        folder: Option<output::NewFolder>,
-        provenance: &Provenance,
-    ) -> Result<(), Failure> {
         let names: Vec<String> = (self.records.iter())
             .map(|path| path.display().to_string())
             .collect();
-        let json = provenance.on(together_json(study, all, &names));
+        let (study, provenance) = (estimator.study(), provenance());
+        let json = provenance.on(together_json(study, &all, &names));
         if let Some(folder) = folder {
             folder.write_json("estimate.json", &json)?;
             for (r, (record, estimate)) in records.iter().zip(&all.records).enumerate() {
-                let part = format!("-{}", r + 1);
-                write_pictures(&folder, study, record, estimate, provenance, &part)?;
+                let answer = Answer {
+                    study,
+                    record,
+                    estimate,
+                };
+                answer.write_pictures(&folder, &provenance, &format!("-{}", r + 1))?;
             }
             folder.finish()?;
         }
-        provenance.print(context, &json, || {
-            together_document(study, all, &names).text()
-        })
+        provenance.print(context, &json, || together_document(study, &all, &names).text())
     }
 }
 
-/// Prints an estimate.
-pub(super) fn show(
-    context: &Context<'_>,
-    study: &Study,
-    estimate: &estimator::Estimate,
-    provenance: &Provenance,
-) -> Result<(), Failure> {
-    let json = provenance.on(estimate.json(study));
-    provenance.print(context, &json, || estimate.text(study))
+/// An estimate, its record, and its study.
+pub(super) struct Answer<'a> {
+    pub study: &'a Study,
+    pub record: &'a Record,
+    pub estimate: &'a estimator::Estimate,
 }
 
-/// Writes `estimate.json`, `report.html`, `overlay.svg`, `trajectories.csv`, `cloud.npz`.
-pub(super) fn write_results(
-    folder: &output::NewFolder,
-    study: &Study,
-    record: &Record,
-    estimate: &estimator::Estimate,
-    provenance: &Provenance,
-) -> Result<(), Failure> {
-    folder.write_json("estimate.json", &provenance.on(estimate.json(study)))?;
-    if let Some(cloud) = estimate.refit().map(|refit| &refit.cloud) {
-        let names: Vec<&str> = estimate.names.iter().map(String::as_str).collect();
-        file::write(&folder.file("cloud.npz"), cloud, &names)?;
+impl Answer<'_> {
+    /// Prints the estimate.
+    pub fn print(
+        &self,
+        context: &Context<'_>,
+        provenance: &Provenance,
+    ) -> Result<ExitCode, Failure> {
+        let json = provenance.on(self.estimate.json(self.study));
+        provenance.print(context, &json, || self.estimate.text(self.study))
     }
-    if let Some(draws) = &estimate.posterior {
-        posterior::write(folder, study, draws)?;
-    }
-    write_pictures(folder, study, record, estimate, provenance, "")
-}
 
-/// Writes `report.html`, `overlay.svg` and `trajectories.csv`, with `part` before the dot.
-fn write_pictures(
-    folder: &output::NewFolder,
-    study: &Study,
-    record: &Record,
-    estimate: &estimator::Estimate,
-    provenance: &Provenance,
-    part: &str,
-) -> Result<(), Failure> {
-    let page = provenance.page(estimate.document(study, Some(record)));
-    folder.write(&format!("report{part}.html"), &page)?;
-    let before = (estimate.refit()).and_then(|refit| refit.tracking_initial.as_ref());
-    let before = before.map(|t| &t.outputs);
-    // A free run that diverged cannot be drawn; the text reports it.
-    let Some(after) = estimate.tracking.as_ref().map(|t| &t.outputs) else {
-        return Ok(());
-    };
-    let overlay = overlay_svg(study, record, before, Some(after));
-    folder.write(&format!("overlay{part}.svg"), &overlay)?;
-    let rows = trajectories_csv(record, before, after);
-    folder.write(&format!("trajectories{part}.csv"), &rows)
+    /// Writes `estimate.json`, `report.html`, `overlay.svg`, `trajectories.csv`, `cloud.npz`.
+    pub fn write(&self, folder: &NewFolder, provenance: &Provenance) -> Result<(), Failure> {
+        let json = provenance.on(self.estimate.json(self.study));
+        folder.write_json("estimate.json", &json)?;
+        if let Some(cloud) = self.estimate.refit().map(|refit| &refit.cloud) {
+            let names: Vec<&str> = self.estimate.names.iter().map(String::as_str).collect();
+            file::write(&folder.file("cloud.npz"), cloud, &names)?;
+        }
+        if let Some(draws) = &self.estimate.posterior {
+            posterior::write(folder, self.study, draws)?;
+        }
+        self.write_pictures(folder, provenance, "")
+    }
+
+    /// Writes `report.html`, `overlay.svg` and `trajectories.csv`, with `part` before the dot.
+    fn write_pictures(
+        &self,
+        folder: &NewFolder,
+        provenance: &Provenance,
+        part: &str,
+    ) -> Result<(), Failure> {
+        let Self {
+            study,
+            record,
+            estimate,
+        } = self;
+        let page = provenance.page(estimate.document(study, Some(record)));
+        folder.write(&format!("report{part}.html"), &page)?;
+        let before = (estimate.refit()).and_then(|refit| refit.tracking_initial.as_ref());
+        let before = before.map(|t| &t.outputs);
+        // A free run that diverged cannot be drawn; the text reports it.
+        let Some(after) = estimate.tracking.as_ref().map(|t| &t.outputs) else {
+            return Ok(());
+        };
+        let overlay = overlay_svg(study, record, before, Some(after));
+        folder.write(&format!("overlay{part}.svg"), &overlay)?;
+        let rows = trajectories_csv(record, before, after);
+        folder.write(&format!("trajectories{part}.csv"), &rows)
+    }
 }

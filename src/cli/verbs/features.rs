@@ -1,15 +1,8 @@
 //! `features`: compresses records to features.
 
-use crate::cli::args::{FileColumns, PresetArgument, Subject};
-use crate::cli::context::{Context, Verb};
-use crate::cli::failure::Failure;
-use crate::cli::output;
+use crate::cli::prelude::*;
 use crate::estimator::bank::file;
-use clap::Args;
 use ndarray::Array2;
-use serde_json::json;
-use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Compress records to the features that the network sees.
 #[derive(Debug, Args)]
@@ -60,22 +53,17 @@ impl Verb for Features {
         if let Some(out) = &self.out {
             file::write_features(out, &features)?;
         }
-        match (context.json, &self.out) {
-            (true, _) => {
-                let rows: Vec<Vec<f64>> = features.rows().into_iter().map(|r| r.to_vec()).collect();
-                output::print_json(&json!({
-                    "schema": "truetwin.features/1", "twin": study.name(), "features": rows,
-                }))?;
-            }
-            (false, None) => {
-                let text = file::features_csv_text(&features).map_err(Failure::internal)?;
-                output::print(&text)?;
-            }
-            (false, Some(out)) => {
+        let rows: Vec<Vec<f64>> = features.rows().into_iter().map(|r| r.to_vec()).collect();
+        let json = json!({
+            "schema": "truetwin.features/1", "twin": study.name(), "features": rows,
+        });
+        let text = match &self.out {
+            None => file::features_csv_text(&features).map_err(Failure::internal)?,
+            Some(out) => {
                 let (rows, n) = features.dim();
-                output::print(&format!("{}: {rows} × {n} features", out.display()))?;
+                format!("{}: {rows} × {n} features", out.display())
             }
-        }
-        Ok(ExitCode::SUCCESS)
+        };
+        context.print(&json, || text)
     }
 }

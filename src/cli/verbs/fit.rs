@@ -1,16 +1,9 @@
 //! `fit`: finds the most probable parameters of a twin, given records.
 
-use crate::cli::args::{FileColumns, Subject};
-use crate::cli::context::{Context, Verb};
-use crate::cli::failure::Failure;
 use crate::cli::posterior::{self, PosteriorDraws};
-use crate::cli::provenance::Provenance;
-use crate::cli::{output, records};
+use crate::cli::prelude::*;
 use crate::fit::FitSettings;
 use crate::report::{Report, overlay_svg};
-use clap::Args;
-use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Fit the parameters, noise levels and starts of a twin to measured records; no training.
 #[derive(Debug, Args)]
@@ -38,8 +31,7 @@ impl Verb for Fit {
     }
 
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        let folder = self.out.as_deref().map(output::NewFolder::new);
-        let folder = folder.transpose()?;
+        let folder = NewFolder::asked(&self.out)?;
         let study = context.study(&self.subject)?;
         let (records, _) = records::read(self.columns.reader(&study), &self.records, None)?;
         let settings = FitSettings {
@@ -48,8 +40,8 @@ impl Verb for Fit {
             ..FitSettings::default()
         };
         let fit = study.fit_with(&records, &settings, context.progress)?;
-        let files = self.records.iter().map(|path| ("record", path.as_path()));
-        let provenance = Provenance::new(context, Some(&self.subject), files);
+        let provenance =
+            Provenance::new(context, Some(&self.subject)).files("record", &self.records);
         let json = provenance.on(fit.json(&study));
         if let Some(folder) = folder {
             folder.write_json("fit.json", &json)?;
@@ -68,7 +60,6 @@ impl Verb for Fit {
             }
             folder.finish()?;
         }
-        provenance.print(context, &json, || fit.text(&study))?;
-        Ok(ExitCode::SUCCESS)
+        provenance.print(context, &json, || fit.text(&study))
     }
 }

@@ -1,15 +1,8 @@
 //! `merge`: merges the banks of a job array.
 
-use crate::cli::context::{Context, Verb};
-use crate::cli::failure::Failure;
-use crate::cli::output;
-use crate::cli::provenance::Provenance;
+use crate::cli::prelude::*;
 use crate::estimator::bank::file;
 use crate::estimator::shards::{merge, merge_into_file};
-use clap::Args;
-use serde_json::json;
-use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Merge the banks of a job array, or convert a bank into one .npz or .csv file.
 #[derive(Debug, Args)]
@@ -32,10 +25,7 @@ const FILES: [&str; 6] = ["csv", "json", "npy", "npz", "parquet", "txt"];
 impl Verb for Merge {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         output::check_new(&self.out)?;
-        let ending = self
-            .out
-            .extension()
-            .map(|e| e.to_string_lossy().to_lowercase());
+        let ending = (self.out.extension()).map(|e| e.to_string_lossy().to_lowercase());
         if ending.is_some_and(|e| FILES.contains(&e.as_str())) && !file::is_named(&self.out) {
             return Err(Failure::user(format!(
                 "{}: a file of a bank ends with .npz or .csv; name it so, or a folder without such an ending",
@@ -43,22 +33,18 @@ impl Verb for Merge {
             )));
         }
         let out = self.out.display();
-        let (what, count) = if file::is_named(&self.out) {
-            (
+        let progress = context.progress;
+        let (what, count) = match file::is_named(&self.out) {
+            true => (
                 "simulations",
-                merge_into_file(&self.from, &self.out, context.progress)?,
-            )
-        } else {
-            ("shards", merge(&self.from, &self.out, context.progress)?)
+                merge_into_file(&self.from, &self.out, progress)?,
+            ),
+            false => ("shards", merge(&self.from, &self.out, progress)?),
         };
-        if context.json {
-            output::print_json(&json!({
-                "schema": "truetwin.merge/1", "out": self.out, "what": what, "count": count,
-            }))?
-        } else {
-            output::print(&format!("{out}: {count} {what}"))?
-        }
-        Provenance::new(context, None, []).tell(context);
-        Ok(ExitCode::SUCCESS)
+        let json = json!({
+            "schema": "truetwin.merge/1", "out": self.out, "what": what, "count": count,
+        });
+        let text = || format!("{out}: {count} {what}");
+        Provenance::new(context, None).print_beside(context, json, text)
     }
 }

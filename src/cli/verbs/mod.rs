@@ -21,51 +21,44 @@ mod withheld;
 use super::context::Verb;
 use clap::Subcommand;
 
-/// The verbs, in the order of `--help`. A new verb needs a file, a `mod`, a variant and an arm here.
-#[derive(Debug, Subcommand)]
-pub(super) enum Command {
-    Twins(twins::Twins),
-    Effects(effects::Effects),
-    Check(check::Check),
-    Resample(resample::Resample),
-    Simulate(simulate::Simulate),
-    Bank(bank::Bank),
-    Features(features::Features),
-    Merge(merge::Merge),
-    Pretrain(pretrain::Pretrain),
-    Fit(fit::Fit),
-    Estimate(estimate::Estimate),
-    Compare(compare::Compare),
-    Diagnose(diagnose::Diagnose),
-    Reproduce(reproduce::Reproduce),
-    Withheld(withheld::Withheld),
-    Demo(demo::Demo),
-    Completions(shell::Completions),
-    Man(shell::Man),
+/// Defines the verbs of the command line.
+macro_rules! verbs {
+    ($($verb:ident($module:ident)),+ $(,)?) => {
+        /// The verbs, in the order of `--help`.
+        #[derive(Debug, Subcommand)]
+        pub(super) enum Command {
+            $($verb($module::$verb)),+
+        }
+
+        impl Command {
+            /// Returns the verb of a call.
+            pub fn verb(&self) -> &dyn Verb {
+                match self {
+                    $(Self::$verb(verb) => verb),+
+                }
+            }
+        }
+    };
 }
 
-impl Command {
-    /// Returns the verb of a call.
-    pub fn verb(&self) -> &dyn Verb {
-        match self {
-            Self::Twins(verb) => verb,
-            Self::Effects(verb) => verb,
-            Self::Check(verb) => verb,
-            Self::Resample(verb) => verb,
-            Self::Simulate(verb) => verb,
-            Self::Bank(verb) => verb,
-            Self::Features(verb) => verb,
-            Self::Merge(verb) => verb,
-            Self::Pretrain(verb) => verb,
-            Self::Fit(verb) => verb,
-            Self::Estimate(verb) => verb,
-            Self::Compare(verb) => verb,
-            Self::Diagnose(verb) => verb,
-            Self::Reproduce(verb) => verb,
-            Self::Withheld(verb) => verb,
-            Self::Demo(verb) => verb,
-            Self::Completions(verb) => verb,
-            Self::Man(verb) => verb,
-        }
-    }
+// A new verb needs a file, a `mod`, and a line here.
+verbs! {
+    Twins(twins),
+    Effects(effects),
+    Check(check),
+    Resample(resample),
+    Simulate(simulate),
+    Bank(bank),
+    Features(features),
+    Merge(merge),
+    Pretrain(pretrain),
+    Fit(fit),
+    Estimate(estimate),
+    Compare(compare),
+    Diagnose(diagnose),
+    Reproduce(reproduce),
+    Withheld(withheld),
+    Demo(demo),
+    Completions(shell),
+    Man(shell),
 }

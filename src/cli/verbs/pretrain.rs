@@ -1,18 +1,11 @@
 //! `pretrain`: simulates a bank and trains the network.
 
-use crate::cli::args::{PresetArgument, Subject, seconds};
-use crate::cli::context::{Context, Verb};
-use crate::cli::failure::Failure;
-use crate::cli::output;
-use crate::cli::provenance::Provenance;
+use crate::cli::options::seconds;
+use crate::cli::prelude::*;
 use crate::estimator::bank::{Bank, file};
 use crate::estimator::shards::{BankPlan, ShardedBank};
 use crate::estimator::{GivenBank, PretrainOptions, Pretraining, Project};
 use crate::storage::work::checksum;
-use clap::Args;
-use serde_json::json;
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 /// Simulate a bank from the prior, train the network, write one estimator file.
@@ -78,8 +71,7 @@ impl Verb for Pretrain {
         let seconds = clock.elapsed().as_secs_f64();
         let bank = estimator.settings().bank_size;
         let loss = history.training.last().copied().unwrap_or(f64::NAN);
-        if context.json {
-            output::print_json(&json!({
+        let json = json!({
                 "schema": "truetwin.pretrain/1",
                 "twin": study.name(),
                 "estimator": self.out,
@@ -90,9 +82,9 @@ impl Verb for Pretrain {
                 "loss": if loss.is_finite() { Some(loss) } else { None },
                 "seed": context.seed,
                 "seconds": seconds,
-            }))?;
-        } else {
-            output::print(&format!(
+        });
+        Provenance::new(context, Some(&self.subject)).print_beside(context, json, || {
+            format!(
                 "{}: estimator of {} from {bank} simulations, {} features, {} epochs, loss {loss:.4}, {seconds:.1} s\n\
                  next: truetwin estimate RECORD.csv --estimator {}",
                 self.out.display(),
@@ -100,10 +92,8 @@ impl Verb for Pretrain {
                 estimator.network().inputs(),
                 history.epochs_run,
                 self.out.display(),
-            ))?;
-        }
-        Provenance::new(context, Some(&self.subject), []).tell(context);
-        Ok(ExitCode::SUCCESS)
+            )
+        })
     }
 }
 

@@ -1,10 +1,6 @@
 //! `reproduce`: the paper's table and figures, on any twin.
 
-use crate::cli::args::{PresetArgument, Subject, at_least_one};
-use crate::cli::context::{Context, Verb};
-use crate::cli::failure::Failure;
-use crate::cli::output;
-use crate::cli::provenance::Provenance;
+use crate::cli::prelude::*;
 use crate::estimator::{
     Estimator, EstimatorError, PretrainOptions, Pretraining, Project, pretrain,
 };
@@ -14,10 +10,7 @@ use crate::evaluate::paper::{
 use crate::report::{coverage_svg, first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
 use crate::storage::StorageError;
 use crate::storage::work::{Share, WorkFolder};
-use crate::study::Study;
 use clap::{Args, ValueEnum};
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use std::time::Duration;
 
 /// Interval between checks whether another job has trained the estimator.
@@ -161,7 +154,7 @@ impl Verb for Reproduce {
                 .run_share(&estimator, Some(folder), share, context.progress)?
                 .len();
             if self.shard.is_some() && there < self.runs {
-                return output::print_share(context, out, "records", there, self.runs);
+                return context.print_share(out, "records", there, self.runs);
             }
             context.ranks.wait();
             if !context.ranks.is_root() {
@@ -170,8 +163,8 @@ impl Verb for Reproduce {
         }
         let runs = plan.run_in(&estimator, folder.as_ref(), context.progress)?;
         let scores = score(study, &plan, &runs);
-        let file = self.estimator.as_deref().map(|path| ("estimator", path));
-        let provenance = Provenance::new(context, Some(&self.subject), file);
+        let provenance =
+            Provenance::new(context, Some(&self.subject)).files("estimator", &self.estimator);
         let json = provenance.on(reproduce_json(study, &plan, estimator.preset(), &scores));
         let text = reproduce_text(study, &plan, estimator.preset(), &scores);
         if let Some(folder) = &folder {
@@ -185,8 +178,7 @@ impl Verb for Reproduce {
             // Written last: it marks the folder as complete.
             folder.write("reproduce.json", &format!("{json:#}\n"))?;
         }
-        provenance.print(context, &json, || text)?;
-        Ok(ExitCode::SUCCESS)
+        provenance.print(context, &json, || text)
     }
 }
 

@@ -1,17 +1,10 @@
 //! `resample`: puts a record on a time grid of one step.
 
-use crate::cli::args::FileColumns;
-use crate::cli::context::{Context, Verb};
-use crate::cli::failure::Failure;
-use crate::cli::output;
-use crate::cli::provenance::Provenance;
+use crate::cli::prelude::*;
 use crate::math::six_digits;
-use crate::record::{InputRule, Record, resample};
+use crate::record::{InputRule, Record, Resampled, resample};
 use crate::setting::number;
 use clap::{Args, ValueEnum};
-use serde_json::json;
-use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Resample a record to one step: inputs averaged or held, outputs interpolated linearly, longer gaps left empty.
 #[derive(Debug, Args)]
@@ -61,24 +54,29 @@ impl Verb for Resample {
         let new = resample(&record, self.step, rule, self.longest_gap)
             .map_err(|error| Failure::from(error).within(&self.record))?;
         new.record.write(&self.out)?;
-        if context.json {
-            let grid = |record: &Record| {
-                let (shortest, longest) = steps(record);
-                json!({
-                    "samples": record.samples(), "missing": record.missing(),
-                    "shortest_step": shortest, "longest_step": longest,
-                })
-            };
-            output::print_json(&json!({
-                "schema": "truetwin.resample/1", "record": self.out,
-                "inputs": match self.inputs { Inputs::Mean => "mean", Inputs::Hold => "hold" },
-                "before": grid(&record), "after": grid(&new.record),
-                "interpolated": new.interpolated, "longest_gap": new.longest_gap,
-            }))?;
-            return Ok(ExitCode::SUCCESS);
-        }
+        let grid = |record: &Record| {
+            let (shortest, longest) = steps(record);
+            json!({
+                "samples": record.samples(), "missing": record.missing(),
+                "shortest_step": shortest, "longest_step": longest,
+            })
+        };
+        let json = json!({
+            "schema": "truetwin.resample/1", "record": self.out,
+            "inputs": match self.inputs { Inputs::Mean => "mean", Inputs::Hold => "hold" },
+            "before": grid(&record), "after": grid(&new.record),
+            "interpolated": new.interpolated, "longest_gap": new.longest_gap,
+        });
+        Provenance::new(context, None)
+            .files("record", [&self.record])
+            .print_beside(context, json, || self.text(&record, &new))
+    }
+}
+
+impl Resample {
+    fn text(&self, record: &Record, new: &Resampled) -> String {
         let mut lines = vec![
-            grid_line(&self.record.display().to_string(), &record),
+            grid_line(&self.record.display().to_string(), record),
             grid_line(&self.out.display().to_string(), &new.record),
         ];
         if record.drive().inputs().ncols() > 0 {
@@ -98,9 +96,7 @@ impl Verb for Resample {
                 new.record.missing()
             ));
         }
-        output::print(&lines.join("\n"))?;
-        Provenance::new(context, None, [("record", self.record.as_path())]).tell(context);
-        Ok(ExitCode::SUCCESS)
+        lines.join("\n")
     }
 }
 

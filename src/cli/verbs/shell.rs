@@ -1,16 +1,11 @@
 //! `completions` and `man`: shell completion and manual pages, generated from the options.
 
-use crate::cli::context::{Context, Verb};
-use crate::cli::failure::Failure;
-use crate::cli::output;
+use crate::cli::prelude::*;
 use crate::setting::did_you_mean;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Command};
 use clap_complete::Shell;
 use clap_mangen::Man as Page;
-use serde_json::json;
-use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Print a shell script that completes verbs, options and twin names.
 #[derive(Debug, Args)]
@@ -32,14 +27,10 @@ impl Verb for Completions {
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut command, context.program, &mut script);
         let script = String::from_utf8(script).map_err(Failure::internal)?;
-        if context.json {
-            output::print_json(&json!({
-                "schema": "truetwin.completions/1", "shell": self.shell.to_string(), "script": script,
-            }))?
-        } else {
-            output::print(&script)?
-        }
-        Ok(ExitCode::SUCCESS)
+        let json = json!({
+            "schema": "truetwin.completions/1", "shell": self.shell.to_string(), "script": script,
+        });
+        context.print(&json, || script)
     }
 }
 
@@ -61,25 +52,17 @@ impl Verb for Man {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
         let pages = pages(context)?;
         if let Some(out) = &self.out {
-            let folder = output::NewFolder::new(out)?;
+            let folder = NewFolder::new(out)?;
             for (name, text) in &pages {
                 folder.write(&format!("{name}.1"), text)?;
             }
             folder.finish()?;
             let names: Vec<&String> = pages.iter().map(|(name, _)| name).collect();
-            if context.json {
-                output::print_json(&json!({
-                    "schema": "truetwin.man/1", "folder": out, "pages": names,
-                }))?
-            } else {
-                output::print(&format!(
-                    "{0}: {1} pages\nnext: man {0}/{2}.1",
-                    out.display(),
-                    names.len(),
-                    context.program
-                ))?
-            }
-            return Ok(ExitCode::SUCCESS);
+            let json = json!({ "schema": "truetwin.man/1", "folder": out, "pages": names });
+            return context.print(&json, || {
+                let (out, program) = (out.display(), context.program);
+                format!("{out}: {} pages\nnext: man {out}/{program}.1", names.len())
+            });
         }
         let asked = match &self.verb {
             Some(verb) => format!("{}-{verb}", context.program),
@@ -96,14 +79,8 @@ impl Verb for Man {
                 known.join(", ")
             )));
         };
-        if context.json {
-            output::print_json(&json!({
-                "schema": "truetwin.man/1", "page": name, "text": text,
-            }))?
-        } else {
-            output::print(text)?
-        }
-        Ok(ExitCode::SUCCESS)
+        let json = json!({ "schema": "truetwin.man/1", "page": name, "text": text });
+        context.print(&json, || text.clone())
     }
 }
 

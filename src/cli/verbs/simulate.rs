@@ -1,19 +1,11 @@
 //! `simulate`: simulates a record.
 
-use crate::cli::args::{FileColumns, Subject};
-use crate::cli::context::{Context, Verb};
-use crate::cli::failure::Failure;
-use crate::cli::output;
-use crate::cli::provenance::Provenance;
+use crate::cli::prelude::*;
 use crate::effect::{Effect, augment};
 use crate::record::{Drive, Record, record_csv_text};
 use crate::setting::{did_you_mean, number};
 use crate::twin::{Noise, ParameterSpace, Role, Twin};
-use clap::Args;
-use serde_json::json;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Simulate a record at given parameters, with noise and optional effects.
 #[derive(Debug, Args)]
@@ -74,32 +66,30 @@ impl Verb for Simulate {
         let noise = if self.noise_free { Noise::OFF } else { noise };
         let outputs = twin.simulate(&theta, &drive, noise)?;
         let record = Record::complete(drive, outputs)?;
-        match &self.out {
-            Some(out) => record.write(out)?,
-            None if !context.json => output::print(&record_csv_text(&record))?,
-            None => {}
+        if let Some(out) = &self.out {
+            record.write(out)?;
         }
-        if context.json {
-            let names = twin.parameters();
-            output::print_json(&json!({
-                "schema": "truetwin.simulate/1",
-                "twin": study.name(),
-                "names": names.names(),
-                "theta": theta,
-                "seed": context.seed,
-                "noise_free": self.noise_free,
-                "samples": record.samples(),
-                "step": record.drive().dt(),
-                "record": self.out,
-                "y": if self.out.is_none() { Some(record.outputs().rows().into_iter().map(|r| r.to_vec()).collect::<Vec<_>>()) } else { None },
-            }))?;
-        }
-        let files = [("input", &self.input), ("effect", &self.effect)];
-        let files = files
-            .into_iter()
-            .filter_map(|(role, path)| Some((role, path.as_deref()?)));
-        Provenance::new(context, Some(&self.subject), files).tell(context);
-        Ok(ExitCode::SUCCESS)
+        let rows = || record.outputs().rows().into_iter().map(|row| row.to_vec());
+        let json = json!({
+            "schema": "truetwin.simulate/1",
+            "twin": study.name(),
+            "names": twin.parameters().names(),
+            "theta": theta,
+            "seed": context.seed,
+            "noise_free": self.noise_free,
+            "samples": record.samples(),
+            "step": record.drive().dt(),
+            "record": self.out,
+            "y": self.out.is_none().then(|| rows().collect::<Vec<_>>()),
+        });
+        let text = || match &self.out {
+            Some(_) => String::new(),
+            None => record_csv_text(&record),
+        };
+        Provenance::new(context, Some(&self.subject))
+            .files("input", &self.input)
+            .files("effect", &self.effect)
+            .print_beside(context, json, text)
     }
 }
 
@@ -169,10 +159,7 @@ fn complete(
 
 fn check_inputs(twin: &Twin, drive: &Drive, options: &Simulate) -> Result<(), Failure> {
     let (given, expected) = (drive.inputs().ncols(), twin.signals().inputs.len());
-    let path = options
-        .input
-        .as_deref()
-        .unwrap_or(std::path::Path::new("input"));
+    let path = options.input.as_deref().unwrap_or(Path::new("input"));
     if given == expected {
         let checked = twin.check_drive(drive);
         return checked.map_err(|error| Failure::from(error).within(path));

@@ -1,13 +1,8 @@
 //! `twins`: lists the twins.
 
-use crate::cli::context::{Context, Verb};
-use crate::cli::failure::Failure;
-use crate::cli::output;
+use crate::cli::prelude::*;
+use crate::estimator::Project;
 use crate::record::Quantity;
-use crate::study::Study;
-use clap::Args;
-use serde_json::{Value, json};
-use std::process::ExitCode;
 
 /// List the twins: parameters, units, prior, bounds, channels.
 #[derive(Debug, Args)]
@@ -18,22 +13,12 @@ pub(in crate::cli) struct Twins {}
 
 impl Verb for Twins {
     fn run(&self, context: &Context<'_>) -> Result<ExitCode, Failure> {
-        if context.json {
-            let twins: Vec<Value> = context
-                .projects
-                .iter()
-                .map(|p| describe(p.study()))
-                .collect();
-            output::print_json(&json!({ "schema": "truetwin.twins/1", "twins": twins }))?;
-        } else {
-            let blocks: Vec<String> = context
-                .projects
-                .iter()
-                .map(|p| in_words(p.study()))
-                .collect();
-            output::print(&blocks.join("\n"))?;
-        }
-        Ok(ExitCode::SUCCESS)
+        let studies = || context.projects.iter().map(Project::study);
+        let twins: Vec<Value> = studies().map(describe).collect();
+        let json = json!({ "schema": "truetwin.twins/1", "twins": twins });
+        context.print(&json, || {
+            studies().map(in_words).collect::<Vec<_>>().join("\n")
+        })
     }
 }
 

@@ -1,18 +1,11 @@
 //! `withheld`: scores `diagnose` on trials with sealed truth.
 
-use crate::cli::args::{FileColumns, Subject, at_least_one};
-use crate::cli::context::{Context, Verb};
-use crate::cli::failure::Failure;
-use crate::cli::output;
-use crate::cli::provenance::Provenance;
+use crate::cli::prelude::*;
 use crate::diagnose::Ablation;
 use crate::evaluate::trials::{self, Families, Kind, Settings};
 use crate::report::{scorecard_json, scorecard_text};
 use crate::setting::did_you_mean;
 use crate::storage::work::Share;
-use clap::Args;
-use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Score `diagnose` on trials with sealed truth: false alarms, detection, effect, location, abstention.
 ///
@@ -96,21 +89,19 @@ impl Verb for Withheld {
         let share = context.share(self.shard)?;
         let answers = sealed.answer(share, context.progress)?.len();
         if self.shard.is_some() && answers < self.trials {
-            return output::print_share(context, &self.out, "trials", answers, self.trials);
+            return context.print_share(&self.out, "trials", answers, self.trials);
         }
         context.ranks.wait();
         if !context.ranks.is_root() {
             return Ok(ExitCode::SUCCESS);
         }
         let card = sealed.score(context.progress)?;
-        let like = self.like.as_deref().map(|path| ("record", path));
-        let provenance = Provenance::new(context, Some(&self.subject), like);
+        let provenance = Provenance::new(context, Some(&self.subject)).files("record", &self.like);
         let json = provenance.on(scorecard_json(&card));
         sealed.write("scorecard.html", &provenance.in_page(&card.html()))?;
         // Written last: it marks the folder as complete.
         sealed.write("scorecard.json", &format!("{json:#}\n"))?;
-        provenance.print(context, &json, || scorecard_text(&card))?;
-        Ok(ExitCode::SUCCESS)
+        provenance.print(context, &json, || scorecard_text(&card))
     }
 }
 

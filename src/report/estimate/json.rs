@@ -121,7 +121,7 @@ mod tests {
         // As a reader gets it.
         let read: Value = serde_json::from_str(&value.to_string()).unwrap();
         let complaints: Vec<String> = (validator("estimate").iter_errors(&read))
-            .map(|error| format!("{}: {error}", error.instance_path))
+            .map(|error| format!("{}: {error}", error.instance_path()))
             .collect();
         assert!(complaints.is_empty(), "{complaints:?}");
         read

@@ -264,7 +264,7 @@ fn every_verdict_keeps_to_the_contract() {
     {
         let read: Value = serde_json::from_str(&gap_json(&diagnosis).to_string()).unwrap();
         let complaints: Vec<String> = (validator("gap").iter_errors(&read))
-            .map(|error| format!("{}: {error}", error.instance_path))
+            .map(|error| format!("{}: {error}", error.instance_path()))
             .collect();
         assert!(complaints.is_empty(), "{complaints:?}");
         for (list, key) in [("targets", "probability"), ("windows", "share")] {

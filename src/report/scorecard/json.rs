@@ -23,7 +23,7 @@ mod tests {
         for card in [full, empty, made_scores::scorecard()] {
             let read: Value = serde_json::from_str(&scorecard_json(&card).to_string()).unwrap();
             let complaints: Vec<String> = (validator("scorecard").iter_errors(&read))
-                .map(|error| format!("{}: {error}", error.instance_path))
+                .map(|error| format!("{}: {error}", error.instance_path()))
                 .collect();
             assert!(complaints.is_empty(), "{complaints:?}");
         }

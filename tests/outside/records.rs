@@ -1,7 +1,6 @@
-//! Measured records, where they are at hand: `../shared/data`, or the folder that `TRUETWIN_DATA` names.
+//! Diagnoses and estimates of measured records: `../shared/data`, or the folder that `TRUETWIN_DATA` names.
 
-use crate::fit::rigs::{Carriage, Heater};
-use std::io::Write;
+use crate::rigs::{Carriage, Heater};
 use std::path::{Path, PathBuf};
 use truetwin::diagnose::{Decision, DiagnoseSettings, Diagnosis, FreeRuns, Verdict, diagnose};
 use truetwin::estimator::{EstimateOptions, PretrainOptions, pretrain};
@@ -10,19 +9,30 @@ use truetwin::progress::Progress;
 use truetwin::record::{Drive, Record, Signal};
 use truetwin::study::{RecordPlan, Study, StudyFile};
 
-/// The path of a file of measured data; says in the output of the tests, past libtest's capture, whether it is at hand.
-pub(crate) fn data(name: &str) -> Option<PathBuf> {
+/// Files that the tests read.
+const FILES: [&str; 4] = [
+    "cascaded-tanks-estimation.csv",
+    "cascaded-tanks-validation.csv",
+    "emps-estimation.csv",
+    "tclab-first.csv",
+];
+
+/// Returns whether all records are at hand.
+pub fn are_at_hand() -> bool {
+    FILES.iter().all(|name| path(name).exists())
+}
+
+fn path(name: &str) -> PathBuf {
     let folder = std::env::var_os("TRUETWIN_DATA").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
         PathBuf::from,
     );
-    let path = folder.join(name);
-    let found = path.exists();
-    let what = if found { "ran with" } else { "skipped, no" };
-    // `eprintln!` would be captured by the test harness.
-    #[allow(clippy::explicit_write)]
-    writeln!(std::io::stderr(), "real records: {what} {}", path.display()).unwrap();
-    found.then_some(path)
+    folder.join(name)
+}
+
+/// Reads a measured record.
+pub fn measured(name: &str) -> Record {
+    Record::read(&path(name)).unwrap()
 }
 
 /// The study of the real tanks.
@@ -37,21 +47,14 @@ fn tanks() -> Study {
     tanks.configure(&file).unwrap()
 }
 
-/// The record to fit and the one to validate, where the data are at hand.
-fn tanks_records() -> Option<(Record, Record)> {
-    let read = |name| data(name).map(|path| Record::read(&path).unwrap());
-    Some((
-        read("cascaded-tanks-estimation.csv")?,
-        read("cascaded-tanks-validation.csv")?,
-    ))
+/// The record to fit and the one to validate.
+fn tanks_records() -> (Record, Record) {
+    (measured(FILES[0]), measured(FILES[1]))
 }
 
 /// Four k and two start levels cannot explain these tanks, which overflow; but they can follow them to 0.69 V.
-#[test]
-fn the_cascaded_tanks_are_followed_on_a_record_never_seen() {
-    let Some((record, validation)) = tanks_records() else {
-        return;
-    };
+pub fn the_cascaded_tanks_are_followed_on_a_record_never_seen() {
+    let (record, validation) = tanks_records();
     let study = tanks();
     let options = PretrainOptions {
         bank_size: Some(2000),
@@ -88,11 +91,8 @@ fn the_cascaded_tanks_are_followed_on_a_record_never_seen() {
 /// These tanks overflow at the upper one, which the twin lacks. The share that closes is on a record that no fit has seen.
 ///
 /// With `TRUETWIN_PICTURES=docs/pictures` the picture of docs/real-records.md is drawn anew.
-#[test]
-fn the_cascaded_tanks_lack_their_overflow() {
-    let Some((record, validation)) = tanks_records() else {
-        return;
-    };
+pub fn the_cascaded_tanks_lack_their_overflow() {
+    let (record, validation) = tanks_records();
     let study = tanks();
     let settings = DiagnoseSettings::default();
     let silent = Progress::silent();
@@ -125,11 +125,8 @@ fn the_cascaded_tanks_lack_their_overflow() {
 }
 
 /// With nothing in the library that these tanks lack, the diagnosis abstains, and regresses what an equation misses.
-#[test]
-fn what_the_cascaded_tanks_lack_is_explored() {
-    let Some((record, validation)) = tanks_records() else {
-        return;
-    };
+pub fn what_the_cascaded_tanks_lack_is_explored() {
+    let (record, validation) = tanks_records();
     let study = tanks();
     let every = study.effects();
     let settings = DiagnoseSettings {
@@ -165,12 +162,8 @@ fn what_the_cascaded_tanks_lack_is_explored() {
 
 /// The positioning rig at 20 ms, its force averaged over each step: friction that hardly depends on the speed, and an offset of the
 /// force, by the defaults of a newcomer.
-#[test]
-fn the_positioning_rig_lacks_dry_friction_and_an_offset() {
-    let Some(path) = data("emps-estimation.csv") else {
-        return;
-    };
-    let whole = Record::read(&path).unwrap();
+pub fn the_positioning_rig_lacks_dry_friction_and_an_offset() {
+    let whole = measured("emps-estimation.csv");
     let (u, y) = (whole.drive().inputs(), whole.outputs());
     let rows = whole.samples() / 2;
     let force = Signal::from_shape_fn((rows, 1), |(k, _)| {
@@ -208,12 +201,8 @@ fn the_positioning_rig_lacks_dry_friction_and_an_offset() {
 }
 
 /// The heater: a lag, at the sensor or the actuator; what radiates has no weight.
-#[test]
-fn the_heater_lacks_a_lag() {
-    let Some(path) = data("tclab-first.csv") else {
-        return;
-    };
-    let record = Record::read(&path).unwrap();
+pub fn the_heater_lacks_a_lag() {
+    let record = measured("tclab-first.csv");
     let plan = RecordPlan::levels(1.0, 600, 0.0, 100.0, 60);
     let study = Study::new("heater", Heater, plan).unwrap();
     let settings = DiagnoseSettings::default();

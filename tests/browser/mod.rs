@@ -1,10 +1,8 @@
 //! The pages that are written, in a real browser: nothing is cut off, nothing lies over anything, no script fails, the keyboard
 //! reaches everything, everything has a name, and it prints.
 //!
-//! Needs Chromium on the path (or `TRUETWIN_CHROMIUM`); without one the test says so and is skipped, unless
+//! Needs Chromium on the path (or `TRUETWIN_CHROMIUM`); without one the tests are ignored, unless
 //! `TRUETWIN_BROWSER=required`. `TRUETWIN_PAGES=DIR` keeps the pages there with pictures of them at each width and as PDF.
-#![cfg(unix)]
-
 mod devtools;
 #[path = "../../src/report/fixture/made.rs"]
 mod made;
@@ -52,20 +50,19 @@ const JARGON: [&str; 8] = [
 const FIRST_SCREEN: &str = include_str!("first_screen.js");
 const MEASURE: &str = include_str!("measure.js");
 
-/// The browser; `None` where the test is to be skipped.
-fn browser() -> Option<Browser> {
-    let Some(path) = chromium() else {
-        let required = std::env::var("TRUETWIN_BROWSER").is_ok_and(|v| v == "required");
-        assert!(
-            !required,
-            "TRUETWIN_BROWSER=required, and no chromium is on the path; install it, or name it in TRUETWIN_CHROMIUM"
-        );
-        println!(
-            "skipped: no chromium is on the path; install it, or name it in TRUETWIN_CHROMIUM"
-        );
-        return None;
-    };
-    Some(Browser::start(&path))
+/// Returns whether there is a browser; one that is required and missing is a failure.
+pub fn is_at_hand() -> bool {
+    let found = chromium().is_some();
+    let required = std::env::var("TRUETWIN_BROWSER").is_ok_and(|v| v == "required");
+    assert!(
+        found || !required,
+        "TRUETWIN_BROWSER=required, and no chromium is on the path; install it, or name it in TRUETWIN_CHROMIUM"
+    );
+    found
+}
+
+fn browser() -> Browser {
+    Browser::start(&chromium().expect("the test is ignored without a browser"))
 }
 
 /// A plant of three states, two inputs and two outputs, with long names.
@@ -249,9 +246,8 @@ fn unnamed(browser: &mut Browser) -> Vec<String> {
     all
 }
 
-#[test]
-fn every_page_is_whole_at_every_width_and_in_print() {
-    let Some(mut browser) = browser() else { return };
+pub fn every_page_is_whole_at_every_width_and_in_print() {
+    let mut browser = browser();
     let folder = tempfile::tempdir().unwrap();
     let mut all = vec![];
     for (name, page) in pages() {
@@ -266,9 +262,8 @@ fn every_page_is_whole_at_every_width_and_in_print() {
 }
 
 /// A diagnosis is answered on the first screen of a desktop, in few words and without those of the method.
-#[test]
-fn the_first_screen_answers_in_sixty_words() {
-    let Some(mut browser) = browser() else { return };
+pub fn the_first_screen_answers_in_sixty_words() {
+    let mut browser = browser();
     let folder = tempfile::tempdir().unwrap();
     browser.media("screen");
     browser.resize(1280, HEIGHT);
@@ -292,9 +287,8 @@ fn the_first_screen_answers_in_sixty_words() {
 }
 
 /// The test sees what it is to see: pages broken on purpose.
-#[test]
-fn a_broken_page_is_complained_of() {
-    let Some(mut browser) = browser() else { return };
+pub fn a_broken_page_is_complained_of() {
+    let mut browser = browser();
     let folder = tempfile::tempdir().unwrap();
     let page = made::oscillator_no_gap().html(&reference_studies().unwrap()[0]);
     let body = |extra: &str| page.replacen("</main>", &format!("{extra}</main>"), 1);

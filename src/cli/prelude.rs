@@ -1,0 +1,13 @@
+//! Names that every verb uses.
+
+pub(super) use crate::cli::context::{Context, Verb};
+pub(super) use crate::cli::failure::Failure;
+pub(super) use crate::cli::options::{FileColumns, PresetArgument, Subject, at_least_one};
+pub(super) use crate::cli::output::{self, NewFolder};
+pub(super) use crate::cli::provenance::Provenance;
+pub(super) use crate::cli::records;
+pub(super) use crate::study::Study;
+pub(super) use clap::Args;
+pub(super) use serde_json::{Value, json};
+pub(super) use std::path::{Path, PathBuf};
+pub(super) use std::process::ExitCode;

@@ -1,0 +1,141 @@
+//! `Study::fit` of measured records.
+
+use crate::records::measured;
+use crate::rigs::{Carriage, Heater};
+use truetwin::evaluate::paper::reference_studies;
+use truetwin::fit::Fit;
+use truetwin::prelude::*;
+use truetwin::study::StudyFile;
+
+const CEILING: &str = "[[effect]]\nid = 'state-ceiling'\ntarget = 'h1'\nto = 'h2'\n";
+const DRAG: &str = "[[effect]]\nid = 'power-law'\ntarget = 'h2'\n";
+
+fn tanks() -> Study {
+    let mut all = reference_studies().unwrap().into_iter();
+    all.find(|study| study.name() == "tanks").unwrap()
+}
+
+fn fitted(study: &Study, records: &[Record]) -> Fit {
+    study.fit(records).unwrap()
+}
+
+fn value(fit: &Fit, name: &str) -> f64 {
+    let found = fit.parameters.iter().find(|p| p.name == name);
+    found.unwrap_or_else(|| panic!("{name}")).value
+}
+
+/// A free ceiling on the tanks of Schoukens et al., whose upper one overflows.
+pub fn the_overflow_of_real_tanks_is_found_by_fits() {
+    let records = [measured("cascaded-tanks-estimation.csv")];
+    let example =
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/cascaded-tanks.toml");
+    let text = std::fs::read_to_string(example).unwrap();
+    let fit = |effects: &str| {
+        let text = format!("{text}\n{effects}");
+        let file = StudyFile::parse(&text, "tanks.toml".as_ref()).unwrap();
+        fitted(&tanks().configure(&file).unwrap(), &records)
+    };
+    let held = "magnitudes = { level = 10.0, spill = 0.33 }\n";
+    let (base, held, free) = (fit(""), fit(&format!("{CEILING}{held}")), fit(CEILING));
+    let both = fit(&format!("{CEILING}{DRAG}"));
+    let all = [&base, &held, &free, &both].map(|fit| fit.log_likelihood);
+    println!("{all:?}");
+    assert!(free.log_likelihood > base.log_likelihood + 200.0, "{all:?}");
+    // Where the twin stops at its own limit, measurement noise stays at the least that stopped outputs need.
+    assert!(base.noise.iter().any(|level| level.at_bound.is_some()));
+    assert!(base.warnings.iter().any(|w| w.code == "noise-at-bound"));
+    assert!(free.log_likelihood > held.log_likelihood - 5.0, "{all:?}");
+    assert!(both.log_likelihood > free.log_likelihood - 0.5, "{all:?}");
+}
+
+/// The carriage's record at 20 ms: forces averaged over each step, every other position.
+fn carriage() -> Record {
+    let record = measured("emps-estimation.csv");
+    let n = record.samples() / 2;
+    let mean =
+        |k: usize| 0.5 * (record.drive().input(2 * k)[0] + record.drive().input(2 * k + 1)[0]);
+    let inputs = Signal::from_shape_fn((n, 1), |(k, _)| mean(k));
+    let outputs = Signal::from_shape_fn((n, 1), |(k, _)| record.outputs()[[2 * k, 0]]);
+    Record::new(Drive::new(0.02, inputs).unwrap(), outputs).unwrap()
+}
+
+fn positioning(effects: &str) -> Study {
+    let plan = RecordPlan::levels(0.02, 1242, -100.0, 100.0, 50);
+    let file = StudyFile::parse(
+        &format!("twin = 'positioning'\n{effects}"),
+        "s.toml".as_ref(),
+    );
+    Study::new("positioning", Carriage, plan)
+        .unwrap()
+        .configure(&file.unwrap())
+        .unwrap()
+}
+
+fn effect(id: &str, rest: &str) -> String {
+    format!("[[effect]]\nid = '{id}'\ntarget = 'v'\n{rest}\n")
+}
+
+/// Nothing declared, nothing tuned: friction and offset of a real carriage, as its authors publish them (95.1 kg, 203.5 N·s/m,
+/// 20.4 N, 3.2 N).
+pub fn the_carriage_shows_its_friction() {
+    let records = [carriage()];
+    let base = fitted(&positioning(""), &records);
+    assert!((value(&base, "M") - 97.0).abs() < 1.5 && (value(&base, "Fv") - 413.0).abs() < 6.0);
+    let evidence = |fit: &Fit| fit.evidence.unwrap().log_evidence;
+    let gain = |effects: &str| {
+        let fit = fitted(&positioning(effects), &records);
+        let gain = evidence(&fit) - evidence(&base);
+        println!("{gain:.1} nats: {}", effects.replace('\n', " "));
+        (gain, fit)
+    };
+    let (friction, _) = gain(&effect("coulomb-friction", ""));
+    let (periodic, _) = gain(&effect("periodic-disturbance", ""));
+    let (coupling, _) = gain(&effect("cross-coupling", "from = 'q'"));
+    assert!(friction > periodic + 300.0 && periodic > coupling && coupling > 30.0);
+    let (both, fit) = gain(
+        &[
+            effect("coulomb-friction", ""),
+            effect("constant-forcing", ""),
+        ]
+        .concat(),
+    );
+    assert!(both > friction + 200.0);
+    let mass = value(&fit, "M");
+    assert!((mass - 92.0).abs() < 4.0, "{mass}");
+    assert!((value(&fit, "Fv") - 197.0).abs() < 20.0);
+    assert!((value(&fit, "coulomb-friction@v.force") * mass - 21.0).abs() < 2.0);
+    assert!((value(&fit, "constant-forcing@v.force") * mass - 3.2).abs() < 0.4);
+}
+
+/// A real heater lacks a lag, and nothing else.
+pub fn the_heater_shows_its_lag() {
+    let records = [measured("tclab-first.csv")];
+    let evidence = |effects: &str| {
+        let text = format!("twin = 'heater'\n{effects}");
+        let file = StudyFile::parse(&text, "s.toml".as_ref()).unwrap();
+        let plan = RecordPlan::levels(1.0, 600, 0.0, 100.0, 60);
+        let study = Study::new("heater", Heater, plan)
+            .unwrap()
+            .configure(&file)
+            .unwrap();
+        fitted(&study, &records).evidence.unwrap().log_evidence
+    };
+    let base = evidence("");
+    let of = |id: &str, target: &str| {
+        let gain = evidence(&format!("[[effect]]\nid = '{id}'\ntarget = '{target}'\n")) - base;
+        println!("{gain:.1} nats: {id}@{target}");
+        gain
+    };
+    let lag = of("sensor-lag", "sensor");
+    assert!(lag > 100.0);
+    assert!(of("actuator-lag", "actuator") > 100.0);
+    assert!(of("periodic-disturbance", "T") < lag - 50.0);
+    for (id, target) in [
+        ("linear-loss", "T"),
+        ("quadratic-drag", "T"),
+        ("sensor-drift", "sensor"),
+        ("actuator-dead-zone", "actuator"),
+    ] {
+        assert!(of(id, target) < 3.0, "{id}");
+    }
+}
