@@ -114,7 +114,9 @@ impl Verb for Estimate {
             }
             folder.finish()?;
         }
-        provenance.print(context, &json, || together_document(study, &all, &names).text())
+        provenance.print(context, &json, || {
+            together_document(study, &all, &names).text()
+        })
     }
 }
 
