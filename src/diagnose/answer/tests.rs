@@ -68,8 +68,9 @@ fn hypotheses(dice: &mut Dice) -> Hypotheses {
             beside: None,
         })
         .collect();
+    let singles = sets.len();
     for _ in 0..dice.below(4) {
-        let pair = [0, 1].map(|_| dice.below(sets.len()));
+        let pair = [0, 1].map(|_| dice.below(singles));
         if pair[0] != pair[1] {
             let keys = pair.map(|i| sets[i].keys[0].clone()).to_vec();
             let places = keys.iter().map(|key| (place(key), 0.5)).collect();
