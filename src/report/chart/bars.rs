@@ -1,10 +1,7 @@
 //! Horizontal bars with their names on the left, their numbers on the right, and a scale below.
 
-use super::frame::{EDGE, LINE, ROOM, TEXT, WIDTH};
-use super::picture::Picture;
-use super::text::{BOLD, clipped, text, width};
-use super::ticks::Ticks;
-use std::fmt::Write;
+use super::axis::Ticks;
+use super::canvas::{BOLD, Canvas, EDGE, GRID, LINE, ROOM, TEXT, WIDTH, clipped, width};
 
 /// Height of a row and of the bar inside it.
 const ROW: f64 = 25.0;
@@ -113,13 +110,13 @@ impl BarChart {
             .map(|bar| bar.value)
             .filter(|value| value.is_finite())
             .fold(0.0, f64::max);
-        let mut picture = Picture::new(&self.title, &self.description);
-        let mut y = picture.top() + 4.0;
+        let (mut canvas, top) = Canvas::new(&self.title, &self.description);
+        let mut y = top + 4.0;
         for (i, group) in self.groups.iter().enumerate() {
             if !group.label.is_empty() {
                 y += LINE;
                 let label = clipped(&group.label, TEXT * BOLD, ROOM);
-                text(picture.body(), (EDGE, y), "start", TEXT, true, &label);
+                canvas.text((EDGE, y), "start", true, &label);
                 y += 4.0;
             }
             let scale = Scale {
@@ -129,17 +126,19 @@ impl BarChart {
                 per_cent: group.per_cent,
             };
             let bottom = y + ROW * group.bars.len() as f64;
-            scale.draw_lines(picture.body(), (y, bottom));
+            for (x, _) in scale.ticks() {
+                canvas.vertical(x, (y, bottom), GRID);
+            }
             for bar in &group.bars {
-                bar.draw(picture.body(), &scale, names, y);
+                bar.draw(&mut canvas, &scale, names, y);
                 y += ROW;
             }
             let next = self.groups.get(i + 1);
             if next.is_none_or(|next| (next.full, next.per_cent) != (group.full, group.per_cent)) {
-                y = scale.draw_labels(picture.body(), bottom);
+                y = scale.draw_labels(&mut canvas, bottom);
             }
         }
-        picture.svg(y + EDGE)
+        canvas.svg(y + EDGE)
     }
 }
 
@@ -174,69 +173,53 @@ impl Scale {
             .collect()
     }
 
-    /// Draws a line for each tick.
-    fn draw_lines(&self, out: &mut String, (top, bottom): (f64, f64)) {
-        for (x, _) in self.ticks() {
-            let _ = writeln!(
-                out,
-                r##"<path d="M{x:.1} {top:.1}V{bottom:.1}" stroke="#e4e4e4"/>"##
-            );
-        }
-    }
-
     /// Names the ticks below; returns where that ends.
-    fn draw_labels(&self, out: &mut String, top: f64) -> f64 {
+    fn draw_labels(&self, canvas: &mut Canvas, top: f64) -> f64 {
         let ticks = self.ticks();
-        if ticks.is_empty() {
-            return top;
+        let per_cent = if self.per_cent { " %" } else { "" };
+        for (x, label) in &ticks {
+            let at = (*x, top + LINE - 4.0);
+            canvas.text(at, "middle", false, &format!("{label}{per_cent}"));
         }
-        for (x, label) in ticks {
-            let label = if self.per_cent {
-                format!("{label} %")
-            } else {
-                label
-            };
-            let at = (x, top + LINE - 4.0);
-            text(out, at, "middle", TEXT, false, &label);
-        }
-        top + LINE
+        if ticks.is_empty() { top } else { top + LINE }
     }
 }
 
 impl Bar {
     /// Draws the row that begins at `top`.
-    fn draw(&self, out: &mut String, scale: &Scale, names: f64, top: f64) {
+    fn draw(&self, canvas: &mut Canvas, scale: &Scale, names: f64, top: f64) {
         let middle = top + 0.5 * ROW;
         let baseline = middle + 0.35 * TEXT;
         let label = clipped(&self.label, TEXT * BOLD, names);
-        let at = (scale.left - GAP, baseline);
-        text(out, at, "end", TEXT, self.clear, &label);
-        let (left, mut end) = (scale.left, scale.left);
+        canvas.text((scale.left - GAP, baseline), "end", self.clear, &label);
+        let mut end = scale.left;
         if self.value.is_finite() && self.value > 0.0 {
             end = scale.x(self.value);
             let fill = if self.clear { "#0072b2" } else { "#ffffff" };
-            let _ = writeln!(
-                out,
-                r##"<rect x="{left:.1}" y="{:.1}" width="{:.1}" height="{BAR}" fill="{fill}" stroke="#0072b2"/>"##,
-                middle - 0.5 * BAR,
-                end - left,
+            let fill = format!(r##"fill="{fill}" stroke="#0072b2""##);
+            canvas.rectangle(
+                (scale.left, middle - 0.5 * BAR),
+                end - scale.left,
+                BAR,
+                &fill,
             );
         }
-        if let Some([low, high]) = self
+        if let Some(ends) = self
             .interval
             .filter(|ends| ends.iter().all(|v| v.is_finite()))
         {
-            let (low, high) = (scale.x(low), scale.x(high));
+            let [low, high] = ends.map(|value| scale.x(value));
             let (up, down) = (middle - 5.0, middle + 5.0);
+            let path = format!(
+                "M{low:.1} {up:.1}V{down:.1}M{low:.1} {middle:.1}H{high:.1}M{high:.1} {up:.1}V{down:.1}"
+            );
             // White below black: it is seen on a filled bar and beyond it.
             for (colour, width) in [("#ffffff", 4.0), ("#222222", 1.5)] {
-                let _ = writeln!(
-                    out,
-                    r#"<path d="M{low:.1} {up:.1}V{down:.1}M{low:.1} {middle:.1}H{high:.1}M{high:.1} {up:.1}V{down:.1}" fill="none" stroke="{colour}" stroke-width="{width}"/>"#
-                );
+                let line = format!(r#"fill="none" stroke="{colour}" stroke-width="{width}""#);
+                canvas.path(&path, &line);
             }
             end = end.max(high);
         }
-        text(out, (end + GAP, baseline), "start", TEXT, false, &self.note);
+        canvas.text((end + GAP, baseline), "start", false, &self.note);
     }
 }

@@ -1,13 +1,8 @@
 //! Heat maps: rows of stretches along one x axis.
 
-use super::frame::Frame;
-use super::frame::{EDGE, LINE, ROOM, TEXT, WIDTH, widest};
-use super::layers::Mark;
-use super::picture::Picture;
-use super::strip::Span;
-use super::text::{BOLD, clipped, text, width};
-use super::ticks::{Ticks, padded};
-use std::fmt::Write;
+use super::axis::{Across, Ticks, padded};
+use super::canvas::{AXIS, BOLD, Canvas, EDGE, LINE, ROOM, TEXT, WIDTH, clipped, width};
+use super::panel::{Mark, Span};
 
 /// Height of a row and of the cells inside it.
 const ROW: f64 = 30.0;
@@ -55,59 +50,40 @@ impl HeatMap {
     pub fn svg(&self) -> String {
         let rows = || self.groups.iter().flat_map(|group| &group.rows);
         let ends = (rows().flat_map(|row| &row.cells)).flat_map(|cell| [cell.from, cell.to]);
-        let x = padded(ends, 0.0);
-        let ticks = Ticks::new(x, 5);
+        let range = padded(ends, 0.0);
+        let ticks = Ticks::new(range, 5);
         let names = (rows().map(|row| width(&row.label, TEXT))).fold(0.0, f64::max);
-        let frame = Frame {
-            x,
+        let across = Across {
+            range,
             left: EDGE + names.min(NAMES) + GAP,
-            right: WIDTH - EDGE.max(widest(&ticks) / 2.0 + 4.0),
+            right: WIDTH - EDGE.max(ticks.widest() / 2.0 + 4.0),
             ticks,
-            columns: 1,
         };
-        let mut picture = Picture::new(&self.title, &self.description);
-        let mut y = picture.top() + 4.0;
+        let (mut canvas, top) = Canvas::new(&self.title, &self.description);
+        let mut y = top + 4.0;
         for group in &self.groups {
-            y = group.draw(picture.body(), &frame, y);
+            y = group.draw(&mut canvas, &across, y);
         }
-        self.axis(picture.body(), &frame, y);
-        picture.svg(y + 2.0 * LINE + EDGE)
-    }
-
-    /// Ticks below everything, and what they are.
-    fn axis(&self, out: &mut String, frame: &Frame, y: f64) {
-        let (left, right) = (frame.left, frame.right);
-        let _ = writeln!(
-            out,
-            r##"<path d="M{left:.1} {y:.1}H{right:.1}" stroke="#555555"/>"##
-        );
-        for (value, label) in frame.ticks.labelled() {
-            let (x, end) = (frame.x(value), y + 4.0);
-            let _ = writeln!(
-                out,
-                r##"<path d="M{x:.1} {y:.1}V{end:.1}" stroke="#555555"/>"##
-            );
-            text(out, (x, y + LINE - 1.0), "middle", TEXT, false, &label);
+        let (left, right) = (across.left, across.right);
+        canvas.horizontal((left, right), y, AXIS);
+        for (value, label) in across.ticks.labelled() {
+            let x = across.x(value);
+            canvas.vertical(x, (y, y + 4.0), AXIS);
+            canvas.text((x, y + LINE - 1.0), "middle", false, &label);
         }
         let at = (0.5 * (left + right), y + 2.0 * LINE);
-        text(
-            out,
-            at,
-            "middle",
-            TEXT,
-            false,
-            &clipped(&self.x, TEXT, ROOM),
-        );
+        canvas.text(at, "middle", false, &clipped(&self.x, TEXT, ROOM));
+        canvas.svg(y + 2.0 * LINE + EDGE)
     }
 }
 
 impl HeatGroup {
     /// Draws below `top`; returns where it ends.
-    fn draw(&self, out: &mut String, frame: &Frame, top: f64) -> f64 {
+    fn draw(&self, canvas: &mut Canvas, across: &Across, top: f64) -> f64 {
         let mut y = top;
         if !self.label.is_empty() {
             let label = clipped(&self.label, TEXT * BOLD, ROOM);
-            text(out, (EDGE, y + LINE - 4.0), "start", TEXT, true, &label);
+            canvas.text((EDGE, y + LINE - 4.0), "start", true, &label);
             y += LINE + 2.0;
         }
         for row in &self.rows {
@@ -116,15 +92,14 @@ impl HeatGroup {
                 // Its name stands above the cells.
                 y += LINE;
             }
-            let label = clipped(&row.label, TEXT, NAMES);
-            let at = (frame.left - GAP, y + 0.5 * CELL + 0.35 * TEXT);
-            text(out, at, "end", TEXT, false, &label);
+            let at = (across.left - GAP, y + 0.5 * CELL + 0.35 * TEXT);
+            canvas.text(at, "end", false, &clipped(&row.label, TEXT, NAMES));
             for cell in &row.cells {
-                cell.draw(out, frame, y, CELL);
+                cell.draw(canvas, across, y, CELL);
             }
             if let Some(mark) = &row.mark {
                 // Down to the cells, not through their text.
-                mark.draw(out, frame, (head, y));
+                mark.draw(canvas, across, (head, y));
             }
             y += ROW;
         }

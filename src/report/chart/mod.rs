@@ -3,30 +3,27 @@
 //! Drawn here, in as few bytes as a page of a dozen pictures needs: text in the reader's own font, colours that colour-blind
 //! people can tell apart (Okabe & Ito), dashes beside colours, a scale that follows the width of the page, words for screen
 //! readers. A plotting crate would bring its own layout, and none of these.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `canvas.rs` | the picture that is drawn on, its sizes and its text |
+//! | `axis.rs` | ticks and the horizontal axis |
+//! | `panel.rs` | what a panel shows: lines, bands, points, marks, stretches |
+//! | `lines.rs`, `bars.rs`, `heat.rs`, `pairs.rs` | the kinds of pictures |
 
-mod axes;
+mod axis;
 mod bars;
-mod decimate;
-mod frame;
+mod canvas;
 mod heat;
-mod layers;
 mod lines;
 mod pairs;
 mod panel;
-mod picture;
-mod strip;
-mod style;
 #[cfg(test)]
 mod tests;
-mod text;
-mod ticks;
 
 pub use bars::{Bar, BarChart, BarGroup};
+pub(super) use canvas::escaped;
 pub use heat::{HeatGroup, HeatMap, HeatRow};
-pub use layers::{Area, Dot, Dots, Mark};
 pub use lines::{Chart, Curves};
 pub use pairs::Pairs;
-pub use panel::{Panel, Series, roomy};
-pub use strip::Span;
-pub use style::Style;
-pub(super) use text::escaped;
+pub use panel::{Area, Dot, Dots, Mark, Panel, Series, Span, Style, roomy};

@@ -1,10 +1,8 @@
 //! Draws of several quantities, each against each.
 
-use super::frame::{EDGE, LINE, ROOM, TEXT, WIDTH};
-use super::picture::Picture;
-use super::style::Style;
-use super::text::{clipped, text, width};
-use super::ticks::padded;
+use super::axis::padded;
+use super::canvas::{Canvas, EDGE, LINE, ROOM, TEXT, WIDTH, clipped, width};
+use super::panel::Style;
 use crate::report::digits::short;
 use std::fmt::Write;
 
@@ -33,26 +31,25 @@ impl Pairs {
     /// The picture, to stand in a file or inside a page.
     pub fn svg(&self) -> String {
         let k = self.columns.len().max(1) as f64;
-        let mut picture = Picture::new(&self.title, &self.description);
-        let top = picture.top() + LINE;
+        let (mut canvas, top) = Canvas::new(&self.title, &self.description);
+        let top = top + LINE;
         let cell = (WIDTH - 2.0 * EDGE - (k - 1.0) * GAP) / k;
         let ranges: Vec<(f64, f64)> = (self.columns.iter())
             .map(|(_, values)| padded(values.iter().copied(), 0.0))
             .collect();
         let at = |i: usize| EDGE + i as f64 * (cell + GAP);
-        let out = picture.body();
         for (row, (name, values)) in self.columns.iter().enumerate() {
             let y = top + row as f64 * (cell + GAP);
             for (column, (_, across)) in self.columns[..row].iter().enumerate() {
-                let place = Cell::new(out, (at(column), y), cell);
+                let place = Cell::new(&mut canvas, (at(column), y), cell);
                 let ranges = (ranges[column], ranges[row]);
-                self.dots(out, &place, ranges, across, values);
+                self.dots(&mut canvas, &place, ranges, across, values);
             }
-            let place = Cell::new(out, (at(row), y), cell);
-            histogram(out, &place, ranges[row], values);
+            let place = Cell::new(&mut canvas, (at(row), y), cell);
+            histogram(&mut canvas, &place, ranges[row], values);
             let room = ROOM - at(row) + EDGE;
             let name = clipped(name, TEXT, room);
-            text(out, (at(row) + 2.0, y - 4.0), "start", TEXT, true, &name);
+            canvas.text((at(row) + 2.0, y - 4.0), "start", true, &name);
         }
         let bottom = top + k * (cell + GAP) - GAP;
         for (column, range) in ranges.iter().enumerate() {
@@ -63,15 +60,15 @@ impl Pairs {
             for (i, ((_, anchor, off), label)) in ends.iter().zip(&labels).enumerate() {
                 let line = if is_narrow { i as f64 } else { 0.0 };
                 let place = (at(column) + off, bottom + (line + 1.0) * LINE - 3.0);
-                text(out, place, anchor, TEXT, false, label);
+                canvas.text(place, anchor, false, label);
             }
         }
-        picture.svg(bottom + 2.0 * LINE + EDGE)
+        canvas.svg(bottom + 2.0 * LINE + EDGE)
     }
 
     fn dots(
         &self,
-        out: &mut String,
+        canvas: &mut Canvas,
         place: &Cell,
         (x, y): ((f64, f64), (f64, f64)),
         across: &[f64],
@@ -88,11 +85,10 @@ impl Pairs {
                     let _ = write!(path, "M{px:.1} {py:.1}h0");
                 }
             }
-            let _ = writeln!(
-                out,
-                r#"<path d="{path}" stroke="{}" stroke-opacity="0.4" stroke-width="2.6" stroke-linecap="round"/>"#,
-                style.colour
-            );
+            let colour = style.colour;
+            canvas.path(&path, &format!(
+                r#"stroke="{colour}" stroke-opacity="0.4" stroke-width="2.6" stroke-linecap="round""#
+            ));
         }
     }
 }
@@ -102,7 +98,7 @@ fn share((low, high): (f64, f64), value: f64) -> f64 {
     ((value - low) / (high - low)).clamp(0.0, 1.0)
 }
 
-fn histogram(out: &mut String, place: &Cell, range: (f64, f64), values: &[f64]) {
+fn histogram(canvas: &mut Canvas, place: &Cell, range: (f64, f64), values: &[f64]) {
     let mut counts = [0usize; BINS];
     for value in values.iter().filter(|v| v.is_finite()) {
         counts[((share(range, *value) * BINS as f64) as usize).min(BINS - 1)] += 1;
@@ -115,10 +111,8 @@ fn histogram(out: &mut String, place: &Cell, range: (f64, f64), values: &[f64]) 
         let (x, _) = place.point((i + 1) as f64 / BINS as f64, 0.0);
         let _ = write!(path, "V{y:.1}H{x:.1}");
     }
-    let _ = writeln!(
-        out,
-        r##"<path d="{path}V{y:.1}Z" fill="#0072b2" fill-opacity="0.3" stroke="#0072b2"/>"##
-    );
+    let fill = r##"fill="#0072b2" fill-opacity="0.3" stroke="#0072b2""##;
+    canvas.path(&format!("{path}V{y:.1}Z"), fill);
 }
 
 /// A square.
@@ -130,11 +124,9 @@ struct Cell {
 
 impl Cell {
     /// Draws its frame.
-    fn new(out: &mut String, (left, top): (f64, f64), size: f64) -> Self {
-        let _ = writeln!(
-            out,
-            r##"<rect x="{left:.1}" y="{top:.1}" width="{size:.1}" height="{size:.1}" fill="none" stroke="#bbbbbb"/>"##
-        );
+    fn new(canvas: &mut Canvas, (left, top): (f64, f64), size: f64) -> Self {
+        let frame = r##"fill="none" stroke="#bbbbbb""##;
+        canvas.rectangle((left, top), size, size, frame);
         Self { left, top, size }
     }
 

@@ -1,4 +1,4 @@
-use super::text::{BOLD, width};
+use super::canvas::{BOLD, width};
 use super::*;
 
 fn chart(panels: usize, lines: usize, samples: usize) -> Chart {

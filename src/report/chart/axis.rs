@@ -1,5 +1,6 @@
-//! Round numbers along an axis.
+//! Round numbers along an axis, and the horizontal axis that everything in a picture shares.
 
+use super::canvas::{TEXT, width};
 use crate::report::digits::Digits;
 
 /// Positions of ticks and how they are labelled.
@@ -35,9 +36,32 @@ impl Ticks {
         }
     }
 
+    /// Width of the widest label.
+    pub(super) fn widest(&self) -> f64 {
+        self.labelled()
+            .map(|(_, label)| width(&label, TEXT))
+            .fold(0.0, f64::max)
+    }
+
     /// Each tick with its label.
     pub(super) fn labelled(&self) -> impl Iterator<Item = (f64, String)> + '_ {
         self.at.iter().map(|&v| (v, self.digits.write(v)))
+    }
+}
+
+/// The horizontal axis.
+pub(super) struct Across {
+    pub range: (f64, f64),
+    pub ticks: Ticks,
+    pub left: f64,
+    pub right: f64,
+}
+
+impl Across {
+    /// Position of a value.
+    pub fn x(&self, value: f64) -> f64 {
+        let share = (value - self.range.0) / (self.range.1 - self.range.0);
+        self.left + share * (self.right - self.left)
     }
 }
 
