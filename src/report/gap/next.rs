@@ -15,7 +15,7 @@ pub(super) fn section(study: &Study, units: &Units, diagnosis: &Diagnosis) -> Se
     let mut rest = vec![Block::List(steps(units, diagnosis))];
     let names = Names::of(&diagnosis.cause);
     let tables: Vec<String> = names
-        .sure
+        .known
         .iter()
         .filter_map(|e| study_table(units, e))
         .collect();

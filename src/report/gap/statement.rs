@@ -16,44 +16,52 @@ const MOST_NAMES: usize = 3;
 pub(super) const SAID: f64 = 0.5;
 /// Probability that nothing is missing below which *no gap* is said with a reservation.
 const CLEAR: f64 = 0.9;
+/// Words of the answer: with heading and caption there are at most 60 on the first screen.
+const WORDS: usize = 44;
 const APART: &str = "this record cannot tell which";
 
 /// The effects of an answer by how sure they are.
 pub(super) struct Names<'d> {
-    /// More probable than not.
-    pub sure: Vec<&'d EffectFit>,
-    /// Rivals that are not, most probable first.
+    /// More probable than not, whichever of the others there is.
+    pub known: Vec<&'d EffectFit>,
+    /// Rivals, one of which is there, or may be; most probable first.
     pub open: Vec<&'d EffectFit>,
     /// Probability of the rivals together.
     pub together: f64,
+    /// True where an accepted effect is among the rivals: one of them is there.
+    pub is_one_there: bool,
 }
 
 impl<'d> Names<'d> {
     pub fn of(cause: &'d Cause) -> Self {
-        let is_meant = |e: &&EffectFit| {
-            let key = e.key();
-            cause.accepted.contains(&key) || cause.class.contains(&key)
-        };
-        let (sure, open): (Vec<_>, Vec<_>) = (cause.effects.iter())
-            .filter(is_meant)
-            .partition(|e| e.probability >= SAID);
-        let mut open: Vec<&EffectFit> = open;
+        let is_in = |list: &[String], e: &EffectFit| list.contains(&e.key());
+        let meant =
+            (cause.effects.iter()).filter(|e| is_in(&cause.accepted, e) || is_in(&cause.class, e));
+        let (sure, mut open): (Vec<_>, Vec<_>) = meant.partition(|e| e.probability >= SAID);
+        let most = open.iter().map(|e| e.probability).fold(0.0, f64::max);
+        // Of two that are together more probable than one, one is no rival of the other.
+        let (known, rivals): (Vec<_>, Vec<_>) = sure
+            .into_iter()
+            .partition(|e| open.is_empty() || e.probability + most > 1.0);
+        open.extend(rivals);
         open.sort_by(|a, b| b.probability.total_cmp(&a.probability));
         Self {
             together: open.iter().map(|e| e.probability).sum::<f64>().min(1.0),
-            sure,
+            is_one_there: open.iter().any(|e| is_in(&cause.accepted, e)),
+            known,
             open,
         }
     }
 
     /// Returns whether the answer is names alone.
     pub fn is_complete(&self) -> bool {
-        !self.sure.is_empty() && self.open.is_empty() && self.sure.iter().all(|e| e.also.is_empty())
+        let known = &self.known;
+        !known.is_empty() && self.open.is_empty() && known.iter().all(|e| e.also.is_empty())
     }
 
-    /// Keys of the sure effects.
+    /// Keys of the known effects.
     pub fn keys(&self) -> Vec<String> {
-        self.sure.iter().map(|e| e.key()).collect()
+        self.known.iter().map(|e| e.key()).collect()
     }
 }
 
@@ -123,52 +131,58 @@ fn unnamed(units: &Units, diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// A gap with names: those that are sure, then rivals, then what remains.
+/// A gap with names: those that are known, then rivals, then what remains.
 fn lacking(units: &Units, diagnosis: &Diagnosis) -> String {
     let cause = &diagnosis.cause;
     let names = Names::of(cause);
     let is_partial = cause.decision == Decision::Partial;
-    let in_words = |all: &[&EffectFit], last: &str| {
+    let is_alias = names.known.iter().any(|e| !e.also.is_empty());
+    let count = all_keys(&names.open).len();
+    // A list of effects, in words, by id, or by their number.
+    let told = |list: &dyn Fn(&[&EffectFit], &str) -> String| {
+        let last = if is_alias && names.known.len() == 1 {
+            "or"
+        } else {
+            "and"
+        };
+        let known = list(&names.known, last);
+        let open = match (count <= MOST_NAMES, names.open.first()) {
+            (false, Some(first)) if first.probability >= SAID => {
+                format!(
+                    "one of {count} effects, most likely {}",
+                    list(&[*first], "or")
+                )
+            }
+            (false, _) => format!("one of {count} effects"),
+            (true, _) => list(&names.open, "or"),
+        };
+        match (names.known.is_empty(), names.open.is_empty()) {
+            (false, true) if is_alias => format!("the twin lacks {known}; {APART}"),
+            (_, true) => format!("the twin lacks {known}"),
+            (false, false) if names.is_one_there => {
+                format!("the twin lacks {known} and {open}; {APART}")
+            }
+            (false, false) => format!("the twin lacks {known}, and perhaps {open}"),
+            (true, false) if is_partial => {
+                let p = chance(names.together);
+                format!("most of it is explained by {open} (together {p}); {APART}")
+            }
+            (true, false) => format!("the twin lacks {open}; {APART}"),
+        }
+    };
+    let full = told(&|all, last| {
         let keys = all_keys(all);
         effects(
             units,
             &keys.iter().map(String::as_str).collect::<Vec<_>>(),
             last,
         )
-    };
-    let in_ids = |all: &[&EffectFit], last: &str| joined(&all_keys(all), last);
-    let counted = |all: &[&EffectFit], _: &str| match all {
+    });
+    let ids = told(&|all, last| joined(&all_keys(all), last));
+    let counted = told(&|all, _| match all {
         [one] if one.also.is_empty() => effect(units, &one.key()),
         all => format!("{} effects", all_keys(all).len()),
-    };
-    let is_alias = names.sure.iter().any(|e| !e.also.is_empty());
-    let told = |named: &dyn Fn(&[&EffectFit], &str) -> String, count: bool| {
-        let sure = match is_alias && names.sure.len() == 1 {
-            true => named(&names.sure, "or"),
-            false => named(&names.sure, "and"),
-        };
-        let open = match count {
-            true => format!("one of {}", named(&names.open, "or")),
-            false => named(&names.open, "or"),
-        };
-        match (names.sure.is_empty(), names.open.is_empty()) {
-            (false, true) if is_alias => format!("the twin lacks {sure}; {APART}"),
-            (_, true) => format!("the twin lacks {sure}"),
-            (false, false) => format!("the twin lacks {sure}, and perhaps {open}"),
-            (true, false) if is_partial => {
-                let all = if count {
-                    open
-                } else {
-                    format!("one of {}", named(&names.open, "and"))
-                };
-                format!(
-                    "most of it is explained by {all} (together {})",
-                    chance(names.together)
-                )
-            }
-            (true, false) => format!("the twin lacks {open}; {APART}"),
-        }
-    };
+    });
     let remains = match (is_partial, &cause.remains) {
         (false, _) => [String::new(), String::new()],
         (true, None) => ["; more remains"; 2].map(String::from),
@@ -177,13 +191,9 @@ fn lacking(units: &Units, diagnosis: &Diagnosis) -> String {
             "; more remains".into(),
         ],
     };
-    let few_names = all_keys(&names.open).len() <= MOST_NAMES;
-    let full = told(&in_words, !few_names);
-    let ids = told(&in_ids, !few_names);
-    let short = told(&counted, true);
     let gap = gap(diagnosis);
     short_enough(
-        [(&full, 0), (&full, 1), (&ids, 0), (&ids, 1), (&short, 1)]
+        [(&full, 0), (&full, 1), (&ids, 0), (&ids, 1), (&counted, 1)]
             .map(|(told, i)| format!("{gap}: {told}{}.", remains[i])),
     )
 }
@@ -248,28 +258,35 @@ fn short_enough(sentences: impl IntoIterator<Item = String>) -> String {
 
 /// The accepted effects by id where each is more probable than not, or else without names.
 pub(super) fn accepted_ids(cause: &Cause) -> String {
-    let names = Names::of(cause);
-    let is_sure = |key: &String| names.sure.iter().any(|e| e.key() == *key);
-    match cause.accepted.iter().all(is_sure) {
+    let is_said = |e: &&EffectFit| e.probability >= SAID && cause.accepted.contains(&e.key());
+    match cause.effects.iter().filter(is_said).count() == cause.accepted.len() {
         true => cause.accepted.join(" and "),
         false => "the accepted effects".into(),
     }
 }
 
-/// Sentences behind the headline: how sure, how far, the effects with their sizes.
+/// Sentences behind the headline: how sure, how far, and the effects with their sizes as far as the first screen has room.
 pub(super) fn details(units: &Units, diagnosis: &Diagnosis) -> Vec<String> {
     let cause = &diagnosis.cause;
     let names = Names::of(cause);
     let mut all: Vec<String> = how_sure(diagnosis, &names).into_iter().collect();
     all.extend(how_far(diagnosis));
-    if cause.decision != Decision::Class {
-        let accepted = names
-            .sure
-            .iter()
-            .filter(|e| cause.accepted.contains(&e.key()));
-        all.extend(accepted.filter_map(|e| sentence(units, e)));
+    let told = [headline(units, diagnosis), next(diagnosis), all.join(" ")];
+    let mut left = WORDS.saturating_sub(told.iter().map(|text| words(text)).sum());
+    let accepted = (names.known.iter()).filter(|e| cause.accepted.contains(&e.key()));
+    for text in accepted.filter_map(|e| sentence(units, e)) {
+        if cause.decision != Decision::Class && words(&text) <= left {
+            left -= words(&text);
+            all.push(text);
+        }
     }
     all
+}
+
+/// Number of words; signs such as % are none.
+fn words(text: &str) -> usize {
+    let is_word = |word: &&str| word.contains(char::is_alphanumeric);
+    text.split_whitespace().filter(is_word).count()
 }
 
 /// The probability of the headline; none where it has it.
@@ -280,9 +297,13 @@ fn how_sure(diagnosis: &Diagnosis, names: &Names<'_>) -> Option<String> {
         (Verdict::NoGap | Verdict::ParameterGap, _) if diagnosis.interrupted => return None,
         (Verdict::NoGap, _) if kinds.nothing >= CLEAR => kinds.nothing,
         (Verdict::StructuralGap, Decision::Named | Decision::Partial) if names.open.is_empty() => {
-            names.sure.iter().map(|e| e.probability).fold(1.0, f64::min)
+            names
+                .known
+                .iter()
+                .map(|e| e.probability)
+                .fold(1.0, f64::min)
         }
-        (Verdict::StructuralGap, Decision::Class) if names.sure.is_empty() => names.together,
+        (Verdict::StructuralGap, Decision::Class) if names.known.is_empty() => names.together,
         (Verdict::StructuralGap, Decision::NoneOfThese) => {
             let is_unknown = kinds.unknown >= kinds.listed + kinds.partial;
             if is_unknown {

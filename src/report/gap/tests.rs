@@ -213,6 +213,72 @@ fn a_thousand_answers_do_not_contradict_themselves() {
     );
 }
 
+/// Tanks with these effects and probabilities, so many of them accepted.
+fn told(decision: Decision, effects: &[(&str, f64)], count: usize) -> String {
+    let mut diagnosis = made::tanks_class();
+    let cause = &mut diagnosis.cause;
+    let first = cause.effects[0].clone();
+    cause.decision = decision;
+    cause.effects = (effects.iter())
+        .map(|(key, probability)| {
+            let (id, target) = key.split_once('@').unwrap();
+            let mut fit = first.clone();
+            (fit.id, fit.target) = (id.into(), target.into());
+            fit.probability = *probability;
+            fit
+        })
+        .collect();
+    cause.class = cause.effects.iter().map(EffectFit::key).collect();
+    cause.accepted = cause.class[..count].to_vec();
+    headline(&Units::of(&tanks()), &diagnosis)
+}
+
+#[test]
+fn rivals_and_what_is_beside_them_are_told_apart() {
+    let ceiling = ("state-ceiling@h1", 0.61);
+    let power = ("power-law@h1", 0.25);
+    let limit = ("actuator-rate-limit@actuator", 0.98);
+    let lag = ("sensor-lag@sensor", 0.4);
+    let bias = ("sensor-bias@sensor", 0.35);
+    for (decision, effects, count, expected) in [
+        (
+            Decision::Named,
+            &[limit][..],
+            1,
+            "the twin lacks a rate limit at the actuator of",
+        ),
+        (
+            Decision::Class,
+            &[ceiling, power],
+            1,
+            "the twin lacks a ceiling or a power law at the upper tank (h1); this record cannot tell which.",
+        ),
+        (
+            Decision::Partial,
+            &[ceiling, power],
+            1,
+            "most of it is explained by a ceiling or a power law at the upper tank (h1) (together 0.86); this record cannot tell",
+        ),
+        (
+            Decision::Class,
+            &[limit, lag, bias],
+            2,
+            "the twin lacks actuator-rate-limit@actuator and sensor-lag@sensor or sensor-bias@sensor; this record",
+        ),
+        (Decision::Named, &[limit, lag], 1, "and perhaps"),
+        (
+            Decision::Partial,
+            &[limit],
+            1,
+            "; more remains at the lower tank (h2).",
+        ),
+    ] {
+        let told = told(decision, effects, count);
+        assert!(told.contains(expected), "{told}");
+        assert!(told.chars().count() <= 140, "{told}");
+    }
+}
+
 #[test]
 fn real_answers_do_not_contradict_themselves() {
     for diagnosis in diagnoses() {
