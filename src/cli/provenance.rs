@@ -4,7 +4,7 @@ use super::context::Context;
 use super::failure::Failure;
 use super::options::Subject;
 use super::output;
-use crate::report::{Document, with_footer};
+use crate::report::Document;
 use crate::storage::files::sha256_of;
 use jiff::Timestamp;
 use serde::Serialize;
@@ -142,11 +142,6 @@ impl Provenance {
             ..document
         };
         document.html()
-    }
-
-    /// The page with a footer on where it comes from.
-    pub fn in_page(&self, page: &str) -> String {
-        with_footer(page, &[self.call.clone(), self.line(usize::MAX)])
     }
 
     fn line(&self, digits: usize) -> String {

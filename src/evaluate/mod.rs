@@ -6,10 +6,12 @@
 //! | diagnose sealed records whose missing effect is withheld | [`trials`] |
 
 pub(crate) mod baseline;
+mod count;
 mod error;
 #[doc(hidden)]
 pub mod fuzzing;
 pub mod paper;
 pub mod trials;
 
+pub(crate) use count::{Count, LEVEL};
 pub use error::EvaluateError;

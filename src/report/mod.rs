@@ -5,7 +5,7 @@
 //! | `estimate` | [`Report::json`] | [`Report::text`] | [`Estimate::html`] |
 //! | `fit` | [`Report::json`] | [`Report::text`] | [`Fit::html`] |
 //! | `diagnose` | [`Report::json`] | [`Report::text`] | [`Diagnosis::html`], [`Diagnosis::pictures`] |
-//! | `withheld` | | | [`Scorecard::html`] |
+//! | `withheld` | `Scorecard::json` | `Scorecard::text` | `Scorecard::html` |
 //!
 //! ```
 //! use truetwin::diagnose::{DiagnoseSettings, diagnose};
@@ -36,8 +36,6 @@ mod fit;
 #[cfg(test)]
 mod fixture;
 mod gap;
-#[cfg(feature = "evaluate")]
-mod page;
 mod parameters;
 mod record;
 #[cfg(feature = "evaluate")]
@@ -45,8 +43,6 @@ mod reproduce;
 mod residuals;
 #[cfg(feature = "evaluate")]
 mod scorecard;
-#[cfg(feature = "evaluate")]
-mod table;
 mod units;
 
 pub(crate) use compare::{Compared, compare_document, compare_json, compare_svg};
@@ -54,20 +50,14 @@ pub(crate) use document::Document;
 pub(crate) use estimate::{together_document, together_json};
 pub(crate) use fit::posterior_svg;
 pub(crate) use gap::NEXT_INPUT;
-#[cfg(feature = "evaluate")]
-pub(crate) use page::with_footer;
 pub(crate) use record::{overlay_svg, trajectories_csv};
 #[cfg(feature = "evaluate")]
 pub(crate) use reproduce::{
     coverage_svg, first_run_svg, mean_runs_svg, reproduce_json, reproduce_text,
 };
-#[cfg(feature = "evaluate")]
-pub(crate) use scorecard::{scorecard_json, scorecard_text};
 
 use crate::diagnose::Diagnosis;
 use crate::estimator::Estimate;
-#[cfg(feature = "evaluate")]
-use crate::evaluate::trials::Scorecard;
 use crate::fit::Fit;
 use crate::record::Record;
 use crate::study::Study;
@@ -148,13 +138,5 @@ impl Diagnosis {
     /// Pictures of the page as files of their own: name, SVG.
     pub fn pictures(&self, study: &Study) -> Vec<(&'static str, String)> {
         gap::gap_pictures(study, self)
-    }
-}
-
-#[cfg(feature = "evaluate")]
-impl Scorecard {
-    /// Page of its own: what was found of what was there, place, probabilities, every trial.
-    pub fn html(&self) -> String {
-        scorecard::scorecard_html(self)
     }
 }

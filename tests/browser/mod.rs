@@ -19,7 +19,7 @@ use truetwin::diagnose::{
 };
 use truetwin::estimator::{PretrainOptions, pretrain};
 use truetwin::evaluate::paper::reference_studies;
-use truetwin::evaluate::trials::{Scorecard, Settings, Withheld};
+use truetwin::evaluate::trials::{Scorecard, TrialSettings, Withheld};
 use truetwin::fit::{FitSettings, Nuisance};
 use truetwin::progress::Progress;
 use truetwin::record::{Drive, Quantity, Record, Signal};
@@ -96,9 +96,9 @@ impl StateSpace for Rig {
 
 /// Scores of a few trials.
 fn scorecard(study: &Study) -> Scorecard {
-    let settings = Settings {
+    let settings = TrialSettings {
         trials: 4,
-        ..Settings::default()
+        ..TrialSettings::default()
     };
     let place = tempfile::tempdir().unwrap();
     let (trials, silent) = (place.path().join("trials"), Progress::silent());

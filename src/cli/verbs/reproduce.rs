@@ -5,7 +5,7 @@ use crate::estimator::{
     Estimator, EstimatorError, PretrainOptions, Pretraining, Project, pretrain,
 };
 use crate::evaluate::paper::{
-    AnswerRuns, Benchmark, MeanRuns, MonteCarlo, Origin, Run, Scenario, score,
+    AnswerRuns, Benchmark, BenchmarkRun, MeanRuns, MonteCarlo, Origin, Scenario, score,
 };
 use crate::report::{coverage_svg, first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
 use crate::storage::StorageError;
@@ -224,7 +224,7 @@ fn draw(
     folder: &WorkFolder,
     study: &Study,
     plan: &MonteCarlo,
-    runs: &[Run],
+    runs: &[BenchmarkRun],
 ) -> Result<(), Failure> {
     if let Some(means) = MeanRuns::of(study, plan, runs)?
         && let Some(svg) = mean_runs_svg(study, &means)

@@ -2,8 +2,7 @@
 
 use crate::cli::prelude::*;
 use crate::diagnose::Ablation;
-use crate::evaluate::trials::{self, Families, Kind, Settings};
-use crate::report::{scorecard_json, scorecard_text};
+use crate::evaluate::trials::{self, Families, Kind, TrialSettings};
 use crate::setting::did_you_mean;
 use crate::storage::work::Share;
 
@@ -69,7 +68,7 @@ impl Verb for Withheld {
         let study = context.study(&self.subject)?;
         let like = (self.like.as_deref()).map(|path| self.columns.reader(&study).record(path));
         let like = like.transpose()?;
-        let settings = Settings {
+        let settings = TrialSettings {
             trials: self.trials,
             seed: context.seed,
             kinds: self.kinds.clone().unwrap_or(Kind::ALL.to_vec()),
@@ -97,11 +96,11 @@ impl Verb for Withheld {
         }
         let card = sealed.score(context.progress)?;
         let provenance = Provenance::new(context, Some(&self.subject)).files("record", &self.like);
-        let json = provenance.on(scorecard_json(&card));
-        sealed.write("scorecard.html", &provenance.in_page(&card.html()))?;
+        let json = provenance.on(card.json());
+        sealed.write("scorecard.html", &provenance.page(card.document()))?;
         // Written last: it marks the folder as complete.
         sealed.write("scorecard.json", &format!("{json:#}\n"))?;
-        provenance.print(context, &json, || scorecard_text(&card))
+        provenance.print(context, &json, || card.text())
     }
 }
 

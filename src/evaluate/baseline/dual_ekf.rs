@@ -53,7 +53,7 @@ pub fn dual_filter(
     twin.check_parameters(&theta, drive.dt())?;
     let (n, p, d) = (outline.states.len(), outline.outputs.len(), theta.len());
     let dead_time = twin.dead_time(&theta, drive.dt());
-    let mut step = Step::new(twin, space, p);
+    let mut step = TwinStep::new(twin, space, p);
 
     let mut x = vec![record.outputs()[[0, 0]]; n];
     step.hold(&mut x);
@@ -126,7 +126,7 @@ fn symmetric(matrix: DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// One step of the twin without noise, and its derivatives.
-struct Step<'a> {
+struct TwinStep<'a> {
     twin: &'a dyn StateSpace,
     limits: Vec<Interval>,
     p: usize,
@@ -136,7 +136,7 @@ struct Step<'a> {
     work: Workspace,
 }
 
-impl<'a> Step<'a> {
+impl<'a> TwinStep<'a> {
     fn new(twin: &'a dyn StateSpace, space: &ParameterSpace, p: usize) -> Self {
         Self {
             twin,

@@ -22,7 +22,7 @@ pub enum Origin<'a> {
 
 impl MonteCarlo {
     /// A folder for the runs of this plan over `study`, a new one or the one of the same call: `runs/0000.json`, … hold a
-    /// [`Run`](super::Run) each; `estimator.est` is for an estimator that is trained for the study.
+    /// [`BenchmarkRun`](super::Run) each; `estimator.est` is for an estimator that is trained for the study.
     pub(crate) fn folder(
         &self,
         path: &Path,

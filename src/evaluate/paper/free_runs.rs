@@ -1,7 +1,7 @@
 //! Noise-free runs of the twin at the methods' answers.
 
 use super::record::simulated;
-use super::{Method, MonteCarlo, Run};
+use super::{BenchmarkRun, MonteCarlo, ScoredMethod};
 use crate::evaluate::EvaluateError;
 use crate::record::{Record, Signal};
 use crate::study::Study;
@@ -14,13 +14,13 @@ pub struct AnswerRuns {
     pub record: Record,
     /// N × channels.
     pub truth: Option<Signal>,
-    /// In the order of [`Method::all`]; `None` without an answer, or where the twin diverges there.
-    pub answers: Vec<(Method, Option<Signal>)>,
+    /// In the order of [`ScoredMethod::all`]; `None` without an answer, or where the twin diverges there.
+    pub answers: Vec<(ScoredMethod, Option<Signal>)>,
 }
 
 impl AnswerRuns {
     /// Simulates the twin at the truth and the answers of a run of `plan`.
-    pub fn of(study: &Study, plan: &MonteCarlo, run: &Run) -> Result<Self, EvaluateError> {
+    pub fn of(study: &Study, plan: &MonteCarlo, run: &BenchmarkRun) -> Result<Self, EvaluateError> {
         let draws = plan.draws(study)?;
         let record = simulated(study, &draws, plan.seed, run.run)?.record;
         // A free run may diverge where noisy runs do not.
@@ -44,8 +44,8 @@ pub struct MeanRuns {
     pub times: Vec<f64>,
     /// At the truth, N × channels; `None` where the twin diverges there.
     pub truth: Option<Signal>,
-    /// At the answers, in the order of [`Method::all`]; `None` without any run to draw.
-    pub answers: Vec<(Method, Option<Signal>)>,
+    /// At the answers, in the order of [`ScoredMethod::all`]; `None` without any run to draw.
+    pub answers: Vec<(ScoredMethod, Option<Signal>)>,
     /// Number of runs.
     pub runs: usize,
 }
@@ -55,13 +55,13 @@ impl MeanRuns {
     pub fn of(
         study: &Study,
         plan: &MonteCarlo,
-        runs: &[Run],
+        runs: &[BenchmarkRun],
     ) -> Result<Option<Self>, EvaluateError> {
         if !plan.scenario.is_point() || runs.is_empty() {
             return Ok(None);
         }
         let mut truth = Sum::default();
-        let mut answers: Vec<Sum> = Method::all().iter().map(|_| Sum::default()).collect();
+        let mut answers: Vec<Sum> = ScoredMethod::all().iter().map(|_| Sum::default()).collect();
         let mut times = Vec::new();
         for run in runs {
             let one = AnswerRuns::of(study, plan, run)?;
@@ -77,7 +77,7 @@ impl MeanRuns {
         Ok(Some(Self {
             times,
             truth: truth.mean(),
-            answers: (Method::all().into_iter())
+            answers: (ScoredMethod::all().into_iter())
                 .zip(answers.into_iter().map(Sum::mean))
                 .collect(),
             runs: runs.len(),

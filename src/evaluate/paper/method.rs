@@ -8,7 +8,7 @@ use std::fmt;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 #[non_exhaustive]
-pub enum Method {
+pub enum ScoredMethod {
     /// The pretrained network.
     TsPre,
     /// Gauss–Newton, whatever the gate says.
@@ -23,7 +23,7 @@ pub enum Method {
     DualFilter(Initialisation),
 }
 
-impl Method {
+impl ScoredMethod {
     /// Every row, in the order of a table.
     pub fn all() -> Vec<Self> {
         let mut all = vec![Self::TsPre, Self::GaussNewton, Self::TsFine, Self::Final];
@@ -49,7 +49,7 @@ impl Method {
     }
 }
 
-impl fmt::Display for Method {
+impl fmt::Display for ScoredMethod {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::TsPre => "TS-pre",
@@ -62,13 +62,13 @@ impl fmt::Display for Method {
     }
 }
 
-impl From<Method> for String {
-    fn from(method: Method) -> Self {
+impl From<ScoredMethod> for String {
+    fn from(method: ScoredMethod) -> Self {
         method.label()
     }
 }
 
-impl TryFrom<String> for Method {
+impl TryFrom<String> for ScoredMethod {
     type Error = String;
 
     fn try_from(label: String) -> Result<Self, String> {
@@ -83,9 +83,9 @@ mod tests {
 
     #[test]
     fn every_label_is_read_again() {
-        for method in Method::all() {
-            assert_eq!(Method::try_from(String::from(method)), Ok(method));
+        for method in ScoredMethod::all() {
+            assert_eq!(ScoredMethod::try_from(String::from(method)), Ok(method));
         }
-        assert!(Method::try_from("PEM (worst)".to_owned()).is_err());
+        assert!(ScoredMethod::try_from("PEM (worst)".to_owned()).is_err());
     }
 }

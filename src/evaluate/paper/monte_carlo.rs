@@ -1,8 +1,8 @@
 //! Every method on many simulated records.
 
 use super::record::simulated;
-use super::scenario::Draws;
-use super::{Benchmark, Run, Scenario};
+use super::scenario::ScenarioDraws;
+use super::{Benchmark, BenchmarkRun, Scenario};
 use crate::estimator::Estimator;
 use crate::evaluate::EvaluateError;
 use crate::progress::Progress;
@@ -37,8 +37,8 @@ impl MonteCarlo {
         self.draws(study).map(|_| ())
     }
 
-    pub(super) fn draws<'a>(&self, study: &'a Study) -> Result<Draws<'a>, EvaluateError> {
-        Draws::new(study, &self.benchmark, self.scenario)
+    pub(super) fn draws<'a>(&self, study: &'a Study) -> Result<ScenarioDraws<'a>, EvaluateError> {
+        ScenarioDraws::new(study, &self.benchmark, self.scenario)
     }
 
     /// Runs every stage of `estimator`, and the baselines, on simulated records, in order. Records are independent:
@@ -52,7 +52,7 @@ impl MonteCarlo {
         estimator: &Estimator,
         folder: Option<&WorkFolder>,
         progress: &Progress,
-    ) -> Result<Vec<Run>, EvaluateError> {
+    ) -> Result<Vec<BenchmarkRun>, EvaluateError> {
         let runs = self.run_share(estimator, folder, Share::WHOLE, progress)?;
         if runs.iter().all(|run| run.failure.is_some()) {
             let failure = runs.into_iter().find_map(|run| run.failure);
@@ -68,7 +68,7 @@ impl MonteCarlo {
         folder: Option<&WorkFolder>,
         share: Share,
         progress: &Progress,
-    ) -> Result<Vec<Run>, EvaluateError> {
+    ) -> Result<Vec<BenchmarkRun>, EvaluateError> {
         let study = estimator.study();
         let draws = self.draws(study)?;
         let parameters = study.twin().parameters().len();
@@ -80,19 +80,19 @@ impl MonteCarlo {
         };
         pieces.all(
             &progress.stage("records", self.runs),
-            |run: &Run| match run.fits(parameters) {
+            |run: &BenchmarkRun| match run.fits(parameters) {
                 true => Ok(()),
                 false => Err("its methods or parameters are those of another study"),
             },
             |run| {
                 let record = simulated(study, &draws, self.seed, run)?;
-                Run::new(estimator, run, &record, progress)
+                BenchmarkRun::new(estimator, run, &record, progress)
             },
         )
     }
 }
 
-impl Piece for Run {
+impl Piece for BenchmarkRun {
     fn number(&self) -> usize {
         self.run
     }
@@ -143,8 +143,8 @@ mod tests {
     }
 
     /// All but the times.
-    fn answers(runs: Vec<Run>) -> Vec<Run> {
-        let timeless = |mut run: Run| {
+    fn answers(runs: Vec<BenchmarkRun>) -> Vec<BenchmarkRun> {
+        let timeless = |mut run: BenchmarkRun| {
             run.answers.iter_mut().for_each(|answer| answer.ms = 0.0);
             run
         };

@@ -5,7 +5,7 @@
 //!
 //! Source: Lakshminarayanan, Guerrero & Rojas, section V.
 
-use super::{Benchmark, Invariant, Method, Published, Symmetry, TestPoint};
+use super::{Benchmark, Invariant, Published, ScoredMethod, Symmetry, TestPoint};
 use crate::estimator::{CloudSettings, PresetName, Project, Recipe, RefineSettings, Settings};
 use crate::evaluate::baseline::Initialisation::{Bad, Good, Ts};
 use crate::feature::{Ar, Arx};
@@ -176,32 +176,32 @@ const TANKS_SCALE: Symmetry = Symmetry {
     direction: |k| vec![k[0] / 2.0, -k[1] / 2.0, k[2]],
 };
 
-const fn row(method: Method, mse: f64, milliseconds: f64) -> (Method, Published) {
+const fn row(method: ScoredMethod, mse: f64, milliseconds: f64) -> (ScoredMethod, Published) {
     (method, Published { mse, milliseconds })
 }
 
 /// Table "OOD 1 results", columns "VDP OOD 1".
-const VAN_DER_POL_TABLE: [(Method, Published); 8] = [
-    row(Method::TsPre, 0.3204, 1.885488),
-    row(Method::TsFine, 0.0005501, 13087.631394),
-    row(Method::DualFilter(Good), 0.003269, 8.289987),
-    row(Method::DualFilter(Ts), 0.00673, 8.401977),
-    row(Method::PredictionError(Good), 0.001154, 138.949625),
-    row(Method::PredictionError(Ts), 0.001154, 115.814819),
-    row(Method::DualFilter(Bad), 15.78, 8.368522),
-    row(Method::PredictionError(Bad), 14.67, 83.472527),
+const VAN_DER_POL_TABLE: [(ScoredMethod, Published); 8] = [
+    row(ScoredMethod::TsPre, 0.3204, 1.885488),
+    row(ScoredMethod::TsFine, 0.0005501, 13087.631394),
+    row(ScoredMethod::DualFilter(Good), 0.003269, 8.289987),
+    row(ScoredMethod::DualFilter(Ts), 0.00673, 8.401977),
+    row(ScoredMethod::PredictionError(Good), 0.001154, 138.949625),
+    row(ScoredMethod::PredictionError(Ts), 0.001154, 115.814819),
+    row(ScoredMethod::DualFilter(Bad), 15.78, 8.368522),
+    row(ScoredMethod::PredictionError(Bad), 14.67, 83.472527),
 ];
 
 /// Table "OOD 1 results", columns "Tanks OOD 1".
-const TANKS_TABLE: [(Method, Published); 8] = [
-    row(Method::TsPre, 0.1189, 3.994949),
-    row(Method::TsFine, 0.07051, 50854.723691),
-    row(Method::DualFilter(Good), 6.112, 18.850671),
-    row(Method::DualFilter(Ts), 8.345, 19.106957),
-    row(Method::PredictionError(Good), 0.07367, 8564.443639),
-    row(Method::PredictionError(Ts), 0.186, 8783.367652),
-    row(Method::DualFilter(Bad), 8.978, 19.033702),
-    row(Method::PredictionError(Bad), 0.3924, 7086.184831),
+const TANKS_TABLE: [(ScoredMethod, Published); 8] = [
+    row(ScoredMethod::TsPre, 0.1189, 3.994949),
+    row(ScoredMethod::TsFine, 0.07051, 50854.723691),
+    row(ScoredMethod::DualFilter(Good), 6.112, 18.850671),
+    row(ScoredMethod::DualFilter(Ts), 8.345, 19.106957),
+    row(ScoredMethod::PredictionError(Good), 0.07367, 8564.443639),
+    row(ScoredMethod::PredictionError(Ts), 0.186, 8783.367652),
+    row(ScoredMethod::DualFilter(Bad), 8.978, 19.033702),
+    row(ScoredMethod::PredictionError(Bad), 0.3924, 7086.184831),
 ];
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The records of a Monte-Carlo study.
 
-use super::scenario::Draws;
+use super::scenario::ScenarioDraws;
 use crate::evaluate::EvaluateError;
 use crate::record::Record;
 use crate::study::Study;
@@ -19,7 +19,7 @@ pub(super) struct Simulated {
 /// Record number `run` under `seed`. Where θ is drawn, a draw that diverges is drawn again.
 pub(super) fn simulated(
     study: &Study,
-    draws: &Draws<'_>,
+    draws: &ScenarioDraws<'_>,
     seed: u64,
     run: usize,
 ) -> Result<Simulated, EvaluateError> {

@@ -1,6 +1,6 @@
 //! Every method on one simulated record.
 
-use super::Method;
+use super::ScoredMethod;
 use super::record::Simulated;
 use crate::estimator::{Contributions, Estimate, EstimateOptions, Estimator};
 use crate::evaluate::EvaluateError;
@@ -14,15 +14,15 @@ use std::time::Instant;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
-pub struct Run {
+pub struct BenchmarkRun {
     /// Number, from 0.
     pub run: usize,
     /// True θ.
     pub truth: Vec<f64>,
     /// The refitted estimate's 90 % interval, by parameter; `None` where it has no finite ends, empty where the estimate failed.
     pub interval: Vec<Option<[f64; 2]>>,
-    /// In the order of [`Method::all`].
-    pub answers: Vec<Answer>,
+    /// In the order of [`ScoredMethod::all`].
+    pub answers: Vec<MethodAnswer>,
     /// Contributions of layer and heads to TS-fine.
     #[serde(default)]
     pub(crate) contributions: Option<Contributions>,
@@ -34,16 +34,16 @@ pub struct Run {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
-pub struct Answer {
+pub struct MethodAnswer {
     /// Method.
-    pub method: Method,
+    pub method: ScoredMethod,
     /// θ; `None` where the method cannot be used on this twin, or failed.
     pub theta: Option<Vec<f64>>,
     /// Wall-clock time in milliseconds.
     pub ms: f64,
 }
 
-impl Run {
+impl BenchmarkRun {
     /// Runs every method. A method that fails leaves no answer: its row says that it cannot be relied on.
     pub(super) fn new(
         estimator: &Estimator,
@@ -78,14 +78,14 @@ impl Run {
             let noise = noise.child("start");
             (from.theta(&twin.parameters(), truth, initial, noise)).ok()
         };
-        let answer = |method: Method| {
+        let answer = |method: ScoredMethod| {
             let clock = Instant::now();
             let (theta, seconds) = match method {
-                Method::PredictionError(from) => {
+                ScoredMethod::PredictionError(from) => {
                     let fit = |start: Vec<f64>| prediction_error(twin, record, &start).ok();
                     (start(from).and_then(fit), None)
                 }
-                Method::DualFilter(from) => {
+                ScoredMethod::DualFilter(from) => {
                     let theta = match twin {
                         Twin::Equations(equations) => start(from)
                             .and_then(|start| dual_filter(equations.as_ref(), record, &start).ok()),
@@ -99,7 +99,7 @@ impl Run {
                 },
             };
             let seconds = seconds.unwrap_or_else(|| clock.elapsed().as_secs_f64());
-            Answer {
+            MethodAnswer {
                 method,
                 theta: theta.filter(|theta| theta.iter().all(|v| v.is_finite())),
                 ms: 1000.0 * seconds,
@@ -116,7 +116,7 @@ impl Run {
             run,
             truth: truth.clone(),
             interval: estimate.as_ref().map(interval).unwrap_or_default(),
-            answers: Method::all().into_iter().map(answer).collect(),
+            answers: ScoredMethod::all().into_iter().map(answer).collect(),
             contributions: estimate.and_then(|estimate| {
                 estimate
                     .refit()
@@ -133,28 +133,28 @@ impl Run {
         whole(&self.truth)
             && (self.interval.len() == parameters
                 || (self.interval.is_empty() && self.failure.is_some()))
-            && methods.eq(Method::all())
+            && methods.eq(ScoredMethod::all())
             && (self.answers.iter()).all(|answer| answer.theta.as_ref().is_none_or(whole))
     }
 }
 
 /// Estimate and seconds of one stage of the estimator.
-fn of_stage(method: Method, estimate: &Estimate) -> (Option<Vec<f64>>, Option<f64>) {
+fn of_stage(method: ScoredMethod, estimate: &Estimate) -> (Option<Vec<f64>>, Option<f64>) {
     let (seconds, refit) = (&estimate.seconds, estimate.refit());
     let initial = (Some(estimate.initial.theta.clone()), seconds.predict);
     let refined = refit.map_or(0.0, |refit| refit.seconds.gauss_newton);
     let gauss_newton = seconds.predict + seconds.gate + refined;
     let (theta, seconds) = match method {
-        Method::GaussNewton => (refit.map(|refit| refit.gauss_newton.clone()), gauss_newton),
-        Method::TsFine => {
+        ScoredMethod::GaussNewton => (refit.map(|refit| refit.gauss_newton.clone()), gauss_newton),
+        ScoredMethod::TsFine => {
             let tuning = refit.map_or(0.0, |refit| refit.seconds.cloud + refit.seconds.tune);
             (refit.map(|refit| refit.fine.clone()), gauss_newton + tuning)
         }
         // What would have been answered without being told to refine.
-        Method::Final if estimate.gate.out_of_distribution => {
+        ScoredMethod::Final if estimate.gate.out_of_distribution => {
             (Some(estimate.theta.clone()), seconds.total)
         }
-        Method::Final => (initial.0, seconds.predict + seconds.gate),
+        ScoredMethod::Final => (initial.0, seconds.predict + seconds.gate),
         _ => initial,
     };
     (theta, Some(seconds))

@@ -1,6 +1,6 @@
 //! Sources of true parameters and inputs of simulated records.
 
-use super::{Invariant, Method, Symmetry};
+use super::{Invariant, ScoredMethod, Symmetry};
 use crate::evaluate::EvaluateError;
 use crate::fit::least_squares::{Bounds, space_filling};
 use crate::record::{Drive, RecordError, Signal};
@@ -62,7 +62,7 @@ pub struct Benchmark {
     /// Change of θ that a record hardly shows.
     pub symmetry: Option<Symmetry>,
     /// Published figures, of [`Scenario::First`].
-    pub published: &'static [(Method, Published)],
+    pub published: &'static [(ScoredMethod, Published)],
 }
 
 /// One parameter at the test points.
@@ -85,24 +85,24 @@ pub struct Published {
 }
 
 /// A scenario of one study, ready to be drawn from.
-pub(super) struct Draws<'a> {
+pub(super) struct ScenarioDraws<'a> {
     study: &'a Study,
     scenario: Scenario,
     /// Values that are not drawn, in the order of θ.
     held: Vec<Option<f64>>,
     /// Points of [`Scenario::Grid`].
     grid: Vec<Vec<f64>>,
-    inputs: Inputs,
+    inputs: InputSource,
 }
 
-enum Inputs {
+enum InputSource {
     /// The same for all.
     Fixed(Drive),
     /// The study's.
     Study(DriveSource),
 }
 
-impl<'a> Draws<'a> {
+impl<'a> ScenarioDraws<'a> {
     /// Checks that the study has such a scenario.
     pub(super) fn new(
         study: &'a Study,
@@ -134,11 +134,11 @@ impl<'a> Draws<'a> {
         // A study that says what its records look like means its own.
         let own = benchmark.levels.is_empty() || study.file().record.is_plan();
         let inputs = if own {
-            Inputs::Study(study.drives()?)
+            InputSource::Study(study.drives()?)
         } else {
             let plan = study.plan().ok_or(StudyError::NoPlan)?;
             let channels = study.twin().signals().inputs.len();
-            Inputs::Fixed(staircase(plan, channels, benchmark)?)
+            InputSource::Fixed(staircase(plan, channels, benchmark)?)
         };
         let grid = match scenario {
             Scenario::Grid => grid(&study.twin().parameters())?,
@@ -170,8 +170,8 @@ impl<'a> Draws<'a> {
             .map(|(held, drawn)| held.unwrap_or(drawn))
             .collect();
         let drive = match &self.inputs {
-            Inputs::Fixed(drive) => drive.clone(),
-            Inputs::Study(source) => source.draw(noise)?,
+            InputSource::Fixed(drive) => drive.clone(),
+            InputSource::Study(source) => source.draw(noise)?,
         };
         Ok((theta, drive))
     }
@@ -225,8 +225,8 @@ mod tests {
         (reference_studies().unwrap()[1].configure(&file)).unwrap()
     }
 
-    fn draws(study: &Study, scenario: Scenario) -> Result<Draws<'_>, EvaluateError> {
-        Draws::new(study, &Benchmark::of(study), scenario)
+    fn draws(study: &Study, scenario: Scenario) -> Result<ScenarioDraws<'_>, EvaluateError> {
+        ScenarioDraws::new(study, &Benchmark::of(study), scenario)
     }
 
     #[test]

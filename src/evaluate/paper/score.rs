@@ -1,21 +1,19 @@
 //! Errors and coverage over many runs.
 
-use super::{Method, MonteCarlo, Published, Run, Scenario};
+use super::{BenchmarkRun, MonteCarlo, Published, Scenario, ScoredMethod};
 use crate::estimator::Contributions;
-use crate::math::{clopper_pearson, median};
+use crate::evaluate::Count;
+use crate::math::median;
 use crate::study::Study;
 use crate::twin::ParameterSpace;
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
-/// Level of the intervals of a coverage.
-pub const COVERAGE_LEVEL: f64 = 0.95;
-
 /// Errors and coverage of the runs of a study.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Scores {
-    /// In the order of [`Method::all`].
+    /// In the order of [`ScoredMethod::all`].
     pub methods: Vec<MethodScore>,
     /// Coverage of the truth by the refitted estimate's interval, by parameter.
     pub coverage: Vec<Coverage>,
@@ -60,7 +58,7 @@ pub struct PointScore {
 pub struct MethodScore {
     /// Method.
     #[serde(flatten, serialize_with = "named")]
-    pub method: Method,
+    pub method: ScoredMethod,
     /// Mean over runs and parameters of the squared error; NaN where the method cannot be used or failed on a run.
     pub mse: f64,
     /// Standard error of `mse`, from its scatter over runs; NaN for a single run.
@@ -82,25 +80,19 @@ pub struct MethodScore {
     pub published: Option<Published>,
 }
 
-/// Coverage of the true value by an interval.
+/// Runs with an estimate, and those whose interval held the true value.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-#[non_exhaustive]
 pub struct Coverage {
     /// Parameter.
     pub name: String,
-    /// Runs whose interval held it.
-    #[serde(rename = "count")]
-    pub covered: u64,
-    /// Runs with an estimate.
-    pub of: u64,
-    /// `covered` over `of`; NaN without estimates.
+    #[serde(flatten)]
+    pub(crate) held: Count,
+    /// Share of the runs; NaN without estimates.
     pub share: f64,
-    /// Ends of the exact (Clopper–Pearson) interval of the probability, at 95 %.
-    pub interval: [f64; 2],
 }
 
 /// Writes a method's name and its start.
-fn named<S: Serializer>(method: &Method, serializer: S) -> Result<S::Ok, S::Error> {
+fn named<S: Serializer>(method: &ScoredMethod, serializer: S) -> Result<S::Ok, S::Error> {
     let mut object = serializer.serialize_struct("Method", 2)?;
     object.serialize_field("method", &method.to_string())?;
     let start = method.initialisation().map(|start| start.to_string());
@@ -114,13 +106,13 @@ fn as_map<S: Serializer>(pairs: &[(&str, f64)], serializer: S) -> Result<S::Ok, 
 }
 
 /// Scores the runs of `plan`.
-pub fn score(study: &Study, plan: &MonteCarlo, runs: &[Run]) -> Scores {
+pub fn score(study: &Study, plan: &MonteCarlo, runs: &[BenchmarkRun]) -> Scores {
     let space = study.twin().parameters();
     let across = (plan.benchmark.symmetry).and_then(|symmetry| symmetry.bind(&space));
     let invariants: Vec<_> = (plan.benchmark.invariants.iter())
         .filter_map(|invariant| Some((invariant.name, invariant.bind(&space)?)))
         .collect();
-    let methods = (Method::all().into_iter().enumerate())
+    let methods = (ScoredMethod::all().into_iter().enumerate())
         .map(|(m, method)| {
             let errors = |of: &dyn Fn(&[f64], &[f64]) -> f64| -> Vec<f64> {
                 (runs.iter())
@@ -163,7 +155,7 @@ pub fn score(study: &Study, plan: &MonteCarlo, runs: &[Run]) -> Scores {
         })
         .collect();
     let coverage = (space.names().into_iter().enumerate())
-        .map(|(j, name)| covered(name, j, &runs.iter().collect::<Vec<_>>()))
+        .map(|(j, name)| covered(name, j, runs))
         .collect();
     let points = match plan.scenario {
         Scenario::Grid => points(&space, runs),
@@ -179,8 +171,8 @@ pub fn score(study: &Study, plan: &MonteCarlo, runs: &[Run]) -> Scores {
 }
 
 /// Means over the runs that have a layer.
-fn heads(runs: &[Run]) -> Option<HeadScore> {
-    let all: Vec<(&Contributions, &Run)> = (runs.iter())
+fn heads(runs: &[BenchmarkRun]) -> Option<HeadScore> {
+    let all: Vec<(&Contributions, &BenchmarkRun)> = (runs.iter())
         .filter_map(|run| Some((run.contributions.as_ref()?, run)))
         .collect();
     let (first, _) = all.first()?;
@@ -202,7 +194,7 @@ fn heads(runs: &[Run]) -> Option<HeadScore> {
 }
 
 /// Scores of the runs at each true θ, in the order of their first runs.
-fn points(space: &ParameterSpace, runs: &[Run]) -> Vec<PointScore> {
+fn points(space: &ParameterSpace, runs: &[BenchmarkRun]) -> Vec<PointScore> {
     let mut truths: Vec<&Vec<f64>> = vec![];
     for run in runs {
         if !truths.contains(&&run.truth) {
@@ -211,9 +203,12 @@ fn points(space: &ParameterSpace, runs: &[Run]) -> Vec<PointScore> {
     }
     (truths.into_iter())
         .map(|theta| {
-            let own: Vec<&Run> = runs.iter().filter(|run| run.truth == *theta).collect();
-            let fine = |run: &Run| {
-                let answer = run.answers.iter().find(|a| a.method == Method::TsFine);
+            let own: Vec<&BenchmarkRun> = runs.iter().filter(|run| run.truth == *theta).collect();
+            let fine = |run: &BenchmarkRun| {
+                let answer = run
+                    .answers
+                    .iter()
+                    .find(|a| a.method == ScoredMethod::TsFine);
                 answer.and_then(|answer| answer.theta.clone())
             };
             let rmse = |j: usize| {
@@ -225,7 +220,9 @@ fn points(space: &ParameterSpace, runs: &[Run]) -> Vec<PointScore> {
             PointScore {
                 in_prior: (space.iter().zip(theta)).all(|(p, value)| p.prior.contains(*value)),
                 rmse: (0..theta.len()).map(rmse).collect(),
-                coverage: names.map(|(j, name)| covered(name, j, &own)).collect(),
+                coverage: names
+                    .map(|(j, name)| covered(name, j, own.iter().copied()))
+                    .collect(),
                 theta: theta.clone(),
             }
         })
@@ -233,23 +230,17 @@ fn points(space: &ParameterSpace, runs: &[Run]) -> Vec<PointScore> {
 }
 
 /// Coverage of parameter number `j`.
-fn covered(name: &str, j: usize, runs: &[&Run]) -> Coverage {
-    let (mut covered, mut of) = (0, 0);
-    for run in runs {
-        if let Some(interval) = run.interval.get(j) {
-            of += 1;
-            let holds = interval.is_some_and(|[low, high]| (low..=high).contains(&run.truth[j]));
-            covered += u64::from(holds);
-        }
-    }
-    // Nothing is known where the interval cannot be computed.
-    let (low, high) = clopper_pearson(covered, of, COVERAGE_LEVEL).unwrap_or((0.0, 1.0));
+fn covered<'r>(name: &str, j: usize, runs: impl IntoIterator<Item = &'r BenchmarkRun>) -> Coverage {
+    let case = |run: &BenchmarkRun| {
+        let interval = run.interval.get(j).copied();
+        let holds = |[low, high]: [f64; 2]| (low..=high).contains(&run.truth[j]);
+        Count::case(interval.is_some(), interval.flatten().is_some_and(holds))
+    };
+    let held: Count = runs.into_iter().map(case).sum();
     Coverage {
         name: name.into(),
-        covered,
-        of,
-        share: covered as f64 / of as f64,
-        interval: [low, high],
+        held,
+        share: held.share().unwrap_or(f64::NAN),
     }
 }
 
@@ -270,23 +261,23 @@ fn std_error(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::paper::run::Answer;
+    use crate::evaluate::paper::run::MethodAnswer;
     use crate::evaluate::paper::{Benchmark, reference_studies};
 
     const TRUTH: [f64; 4] = [1.2, 1.2, 0.9, 1.0];
 
     /// A run in which every method answers θ, with this interval for each parameter.
-    fn run(number: usize, theta: Option<[f64; 4]>, interval: [f64; 2]) -> Run {
-        let answer = |method| Answer {
+    fn run(number: usize, theta: Option<[f64; 4]>, interval: [f64; 2]) -> BenchmarkRun {
+        let answer = |method| MethodAnswer {
             method,
             theta: theta.map(Vec::from),
             ms: 2.0 + number as f64,
         };
-        Run {
+        BenchmarkRun {
             run: number,
             truth: TRUTH.into(),
             interval: theta.map_or(vec![], |_| vec![Some(interval); 4]),
-            answers: Method::all().into_iter().map(answer).collect(),
+            answers: ScoredMethod::all().into_iter().map(answer).collect(),
             failure: theta.is_none().then(|| "no start".to_owned()),
             contributions: None,
         }
@@ -308,7 +299,7 @@ mod tests {
         assert_eq!(super::heads(&runs[2..]), None);
     }
 
-    fn scored(scenario: Scenario, runs: &[Run]) -> Scores {
+    fn scored(scenario: Scenario, runs: &[BenchmarkRun]) -> Scores {
         let study = &reference_studies().unwrap()[1];
         let plan = MonteCarlo {
             benchmark: Benchmark::of(study),
@@ -336,14 +327,17 @@ mod tests {
         assert_eq!(names, ["k1·k2", "k3", "k4·k2²"]);
         assert!(values[0] == 0.0 && (values[1] - 0.1).abs() < 1e-12 && values[2] == 0.0);
         assert!((row.mse_without_scale.unwrap() - 0.025).abs() < 1e-12);
-        let held: Vec<u64> = scores.coverage.iter().map(|c| c.covered).collect();
+        let held: Vec<u64> = scores.coverage.iter().map(|c| c.held.count).collect();
         assert_eq!(
             held,
             [1, 1, 1, 2],
             "1.2, 1.2, 0.9, 1.0 in [0.8, 1.1], [0.95, 2.0]"
         );
         assert_eq!(
-            (scores.coverage[3].of, scores.coverage[3].interval[1]),
+            (
+                scores.coverage[3].held.of,
+                scores.coverage[3].held.interval().1
+            ),
             (2, 1.0)
         );
     }
@@ -372,6 +366,6 @@ mod tests {
         let row = &scores.methods[3];
         assert!(row.mse.is_nan() && (row.median - 0.01).abs() < 1e-12);
         assert_eq!((row.failed, scores.failed, row.milliseconds), (1, 1, 3.0));
-        assert_eq!((scores.coverage[0].covered, scores.coverage[0].of), (2, 2));
+        assert_eq!(scores.coverage[0].held, Count { count: 2, of: 2 });
     }
 }

@@ -5,12 +5,11 @@ use crate::progress::{Cancelled, Progress};
 use crate::record::Record;
 use crate::study::{Study, StudyError};
 use serde::{Deserialize, Serialize};
-use std::time::Instant;
 
 /// The answer of a trial.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Answer {
+pub(crate) struct TrialAnswer {
     /// From 0.
     pub trial: usize,
     /// Result; none where the diagnosis failed.
@@ -54,7 +53,7 @@ pub(crate) struct Outcome {
     /// The place and those that it cannot tell from it.
     pub places: Vec<String>,
     /// Effects, best first.
-    pub effects: Vec<Named>,
+    pub effects: Vec<NamedEffect>,
     /// Effects added to the twin, as `id@target`.
     pub accepted: Vec<String>,
     /// Rivals that the data cannot tell apart.
@@ -70,7 +69,7 @@ pub(crate) struct Outcome {
 /// An effect with its probability.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Named {
+pub(crate) struct NamedEffect {
     /// `id@target`.
     pub key: String,
     /// Among all explanations; what is left is that of none of these.
@@ -87,47 +86,31 @@ pub(crate) struct Refitted {
     pub interval: [f64; 2],
 }
 
-/// Diagnoses records. A diagnosis that fails is an answer, too; only a stop is an error.
-pub(super) fn ask(
-    study: &Study,
-    record: &Record,
-    validation: Option<&Record>,
-    settings: &DiagnoseSettings,
-    progress: &Progress,
-) -> Result<Result<Outcome, String>, Cancelled> {
-    let records = [record.clone()];
-    match diagnose(study, &records, validation, settings, &progress.unshown()) {
-        Ok(found) => Ok(Ok(Outcome::of(&found))),
-        Err(StudyError::Cancelled(stop)) => Err(stop),
-        Err(error) => Ok(Err(error.to_string())),
-    }
+/// Everything that a diagnosis is given.
+#[derive(Clone)]
+pub(super) struct Question<'q> {
+    pub study: &'q Study,
+    pub record: &'q Record,
+    pub validation: Option<&'q Record>,
+    pub settings: DiagnoseSettings,
 }
 
-impl Answer {
-    /// Diagnoses a trial.
-    pub fn of(
-        trial: usize,
-        study: &Study,
-        (record, validation): (&Record, Option<&Record>),
-        settings: &DiagnoseSettings,
-        progress: &Progress,
-    ) -> Result<Self, Cancelled> {
-        let clock = Instant::now();
-        let answer = ask(study, record, validation, settings, progress)?;
-        let seconds = clock.elapsed().as_secs_f64();
-        let (outcome, failure) = match answer {
-            Ok(outcome) => (Some(outcome), None),
-            Err(failure) => (None, Some(failure)),
-        };
-        Ok(Self {
-            trial,
-            outcome,
-            failure,
-            seconds,
-            correlated: None,
-            greedy: None,
-            repeats: vec![],
-        })
+impl Question<'_> {
+    /// Diagnoses. A diagnosis that fails is an answer, too, with its reason; only a stop is an error.
+    pub fn ask(&self, progress: &Progress) -> Result<Result<Outcome, String>, Cancelled> {
+        let records = [self.record.clone()];
+        let progress = progress.unshown();
+        match diagnose(
+            self.study,
+            &records,
+            self.validation,
+            &self.settings,
+            &progress,
+        ) {
+            Ok(found) => Ok(Ok(Outcome::of(&found))),
+            Err(StudyError::Cancelled(stop)) => Err(stop),
+            Err(error) => Ok(Err(error.to_string())),
+        }
     }
 }
 
@@ -156,7 +139,7 @@ impl Outcome {
             },
             target: found.location.target.clone(),
             effects: (found.cause.effects.iter())
-                .map(|e| Named {
+                .map(|e| NamedEffect {
                     key: keyed(&e.id, &e.target),
                     probability: e.probability,
                 })
@@ -180,13 +163,8 @@ impl Outcome {
         self.verdict == Verdict::StructuralGap
     }
 
-    /// Returns true if a structural gap was found, and no listed effect for it.
-    pub fn abstains(&self) -> bool {
-        self.decision == Decision::NoneOfThese
-    }
-
     /// The effect on top: of an accepted pair, the first.
-    pub fn top(&self) -> Option<&Named> {
+    pub fn top(&self) -> Option<&NamedEffect> {
         self.effects.first()
     }
 

@@ -1,8 +1,8 @@
 //! A baseline: the signal that the residuals of the twin correlate with most.
 
 use super::information::problem;
-use super::law::Place;
-use super::places::Places;
+use super::law::DeparturePlace;
+use super::places::TwinPlaces;
 use super::world::Conditions;
 use crate::fit::climb::climb;
 use crate::likelihood::kalman::{FilterError, recoverable};
@@ -18,7 +18,7 @@ const LEVEL: f64 = 0.05;
 
 /// Place of the signal that the next residual correlates with most; `None` where no correlation stands out, or for a black box.
 pub(super) fn correlated(study: &Study, record: &Record) -> Result<Option<String>, FilterError> {
-    let places = Places::new(study.twin());
+    let places = TwinPlaces::new(study.twin());
     if places.states.is_empty() {
         return Ok(None);
     }
@@ -43,20 +43,22 @@ pub(super) fn correlated(study: &Study, record: &Record) -> Result<Option<String
     };
     let inputs = record.drive().inputs();
     let (rows, outputs) = filtered.standardised.dim();
-    let mut signals: Vec<(Place, Vec<f64>)> = Vec::new();
+    let mut signals: Vec<(DeparturePlace, Vec<f64>)> = Vec::new();
     for place in places.all() {
         match place {
-            Place::State(i) => signals.push((place, states.column(i).to_vec())),
-            Place::Actuator(j) => signals.push((place, inputs.column(j).to_vec())),
-            Place::Sensor(_) => signals.push((place, (0..rows).map(|k| k as f64).collect())),
-            Place::Parameter(_) => {}
+            DeparturePlace::State(i) => signals.push((place, states.column(i).to_vec())),
+            DeparturePlace::Actuator(j) => signals.push((place, inputs.column(j).to_vec())),
+            DeparturePlace::Sensor(_) => {
+                signals.push((place, (0..rows).map(|k| k as f64).collect()))
+            }
+            DeparturePlace::Parameter(_) => {}
         }
     }
     let tests = (signals.len() * outputs).max(1) as f64;
-    let mut best: Option<(f64, Place)> = None;
+    let mut best: Option<(f64, DeparturePlace)> = None;
     for (place, signal) in &signals {
         for j in 0..outputs {
-            if matches!(place, Place::Sensor(own) if *own != j) {
+            if matches!(place, DeparturePlace::Sensor(own) if *own != j) {
                 continue;
             }
             let pairs: Vec<(f64, f64)> = (1..rows)

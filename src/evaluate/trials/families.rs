@@ -1,6 +1,6 @@
 //! Halves of the generator's families: one to choose constants with, one for reports.
 
-use super::law::{Family, Place};
+use super::law::{DeparturePlace, LawFamily};
 use crate::twin::Noise;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -44,19 +44,19 @@ impl FromStr for Families {
 }
 
 /// Kinds of place, which families are told apart by.
-fn kind_of(place: Place) -> &'static str {
+fn kind_of(place: DeparturePlace) -> &'static str {
     match place {
-        Place::State(_) => "state",
-        Place::Sensor(_) => "sensor",
-        Place::Actuator(_) => "actuator",
-        Place::Parameter(_) => "parameter",
+        DeparturePlace::State(_) => "state",
+        DeparturePlace::Sensor(_) => "sensor",
+        DeparturePlace::Actuator(_) => "actuator",
+        DeparturePlace::Parameter(_) => "parameter",
     }
 }
 
 impl Families {
     /// Families of this half at a place. Each kind of place has half of them in either half.
-    pub(super) fn at(self, place: Place) -> Vec<Family> {
-        let mut all: Vec<(f64, Family)> = (Family::all().into_iter())
+    pub(super) fn at(self, place: DeparturePlace) -> Vec<LawFamily> {
+        let mut all: Vec<(f64, LawFamily)> = (LawFamily::all().into_iter())
             .map(|family| {
                 let name = format!("{family}/{}", kind_of(place));
                 let lot = Noise::new(SPLIT, "families", 0).source(&name).uniform();
@@ -81,18 +81,18 @@ mod tests {
     #[test]
     fn halves_share_no_family_and_leave_none_out() {
         for place in [
-            Place::State(0),
-            Place::Sensor(1),
-            Place::Actuator(0),
-            Place::Parameter(2),
+            DeparturePlace::State(0),
+            DeparturePlace::Sensor(1),
+            DeparturePlace::Actuator(0),
+            DeparturePlace::Parameter(2),
         ] {
             let (open, closed) = (Families::Open.at(place), Families::Closed.at(place));
             assert_eq!((open.len(), closed.len()), (4, 4));
             assert!(open.iter().all(|family| !closed.contains(family)));
         }
         assert_eq!(
-            Families::Open.at(Place::State(0)),
-            Families::Open.at(Place::State(5))
+            Families::Open.at(DeparturePlace::State(0)),
+            Families::Open.at(DeparturePlace::State(5))
         );
         assert!("odd".parse::<Families>().is_err());
         assert_eq!("closed".parse::<Families>(), Ok(Families::Closed));

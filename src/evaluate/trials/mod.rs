@@ -14,7 +14,7 @@
 //! use truetwin::evaluate::trials::*;
 //!
 //! let study = &reference_studies()?[0];
-//! let settings = Settings { trials: 2, kinds: vec![Kind::None], detection_only: true, ..Settings::default() };
+//! let settings = TrialSettings { trials: 2, kinds: vec![Kind::None], detection_only: true, ..TrialSettings::default() };
 //! let place = tempfile::tempdir()?;
 //! let folder = place.path().join("trials");
 //! let sealed: Sealed = Withheld::new(study, settings)?.seal(&folder, &Progress::silent())?;
@@ -30,10 +30,13 @@ mod answer;
 mod correlation;
 mod draft;
 mod families;
+#[cfg(test)]
+pub(crate) mod fixture;
 mod folder;
 mod information;
 mod kind;
 mod law;
+mod listed;
 mod places;
 mod row;
 mod run;
@@ -44,19 +47,12 @@ mod steadiness;
 mod structure;
 mod truth;
 mod units;
-mod variant;
 mod world;
 
-#[cfg(test)]
-pub(crate) use answer::{Named, Outcome, Refitted, Repeat};
 pub use families::Families;
 pub use kind::Kind;
-pub(crate) use row::Row;
+pub(crate) use row::TrialRow;
 pub(crate) use run::MOST;
-pub use run::{Sealed, Settings, Withheld};
+pub use run::{Sealed, TrialSettings, Withheld};
 pub use score::Scorecard;
-#[cfg(test)]
-pub(crate) use score::Setup;
-pub(crate) use score::{Baseline, Bin, Count};
-#[cfg(test)]
-pub(crate) use shares::TrueShare;
+pub(crate) use score::{Breakdown, BreakdownLine};

@@ -1,19 +1,19 @@
 //! Names of places in a twin, as the library of effects names its targets.
 
 use super::draft::index;
-use super::law::Place;
+use super::law::DeparturePlace;
 use crate::effect::{TargetKind, targets};
 use crate::twin::{Role, Source, Twin, is_memory};
 
 /// Places of a twin and their names.
 #[derive(Debug, Clone)]
-pub(super) struct Places {
-    named: Vec<(Place, String)>,
+pub(super) struct TwinPlaces {
+    named: Vec<(DeparturePlace, String)>,
     /// Names of the states.
     pub states: Vec<String>,
 }
 
-impl Places {
+impl TwinPlaces {
     /// Sensors, actuators, states that are neither memory nor defined by another state, and parameters of a twin.
     pub fn new(twin: &Twin) -> Self {
         let (outline, signals) = (twin.outline(), twin.signals());
@@ -23,33 +23,34 @@ impl Places {
         let defined = twin.defined_states();
         let mut named = Vec::new();
         let signals_of = |kind| targets(kind, None, &signals);
-        let is_defined = |place| matches!(place, Place::State(i) if defined.get(i) == Some(&true));
-        let mut add = |names: Vec<String>, place: fn(usize) -> Place| {
+        let is_defined =
+            |place| matches!(place, DeparturePlace::State(i) if defined.get(i) == Some(&true));
+        let mut add = |names: Vec<String>, place: fn(usize) -> DeparturePlace| {
             for (i, name) in names.into_iter().enumerate() {
                 if !is_memory(&name) && !is_defined(place(i)) {
                     named.push((place(i), name));
                 }
             }
         };
-        add(signals_of(TargetKind::Sensor), Place::Sensor);
-        add(signals_of(TargetKind::Actuator), Place::Actuator);
-        add(states.clone(), Place::State);
+        add(signals_of(TargetKind::Sensor), DeparturePlace::Sensor);
+        add(signals_of(TargetKind::Actuator), DeparturePlace::Actuator);
+        add(states.clone(), DeparturePlace::State);
         let parameters = twin.parameters();
         for (i, parameter) in parameters.iter().enumerate() {
             if parameter.role == Role::Parameter {
-                named.push((Place::Parameter(i), parameter.name.clone()));
+                named.push((DeparturePlace::Parameter(i), parameter.name.clone()));
             }
         }
         Self { named, states }
     }
 
     /// The place with this name that suits an effect of this id, whose first word is its kind of place.
-    pub fn find(&self, id: &str, target: &str) -> Option<Place> {
-        let suits = |place: &Place| match id.split('-').next() {
-            Some("sensor") => matches!(place, Place::Sensor(_)),
-            Some("actuator") => matches!(place, Place::Actuator(_)),
-            Some("parameter") => matches!(place, Place::Parameter(_)),
-            _ => matches!(place, Place::State(_)),
+    pub fn find(&self, id: &str, target: &str) -> Option<DeparturePlace> {
+        let suits = |place: &DeparturePlace| match id.split('-').next() {
+            Some("sensor") => matches!(place, DeparturePlace::Sensor(_)),
+            Some("actuator") => matches!(place, DeparturePlace::Actuator(_)),
+            Some("parameter") => matches!(place, DeparturePlace::Parameter(_)),
+            _ => matches!(place, DeparturePlace::State(_)),
         };
         (self.named.iter())
             .find(|(place, name)| suits(place) && name == target)
@@ -57,21 +58,21 @@ impl Places {
     }
 
     /// The name of a place.
-    pub fn name(&self, place: Place) -> &str {
+    pub fn name(&self, place: DeparturePlace) -> &str {
         (self.named.iter())
             .find(|(known, _)| *known == place)
             .map_or("", |(_, name)| name)
     }
 
     /// Draws a kind of place, then a place: a twin of many parameters has sensors all the same.
-    pub fn draw(&self, source: &mut Source) -> Option<Place> {
-        let kinds: [fn(&Place) -> bool; 4] = [
-            |place| matches!(place, Place::Sensor(_)),
-            |place| matches!(place, Place::Actuator(_)),
-            |place| matches!(place, Place::State(_)),
-            |place| matches!(place, Place::Parameter(_)),
+    pub fn draw(&self, source: &mut Source) -> Option<DeparturePlace> {
+        let kinds: [fn(&DeparturePlace) -> bool; 4] = [
+            |place| matches!(place, DeparturePlace::Sensor(_)),
+            |place| matches!(place, DeparturePlace::Actuator(_)),
+            |place| matches!(place, DeparturePlace::State(_)),
+            |place| matches!(place, DeparturePlace::Parameter(_)),
         ];
-        let mut groups: Vec<Vec<Place>> = (kinds.iter())
+        let mut groups: Vec<Vec<DeparturePlace>> = (kinds.iter())
             .map(|is| self.all().filter(is).collect())
             .collect();
         groups.retain(|group| !group.is_empty());
@@ -83,7 +84,7 @@ impl Places {
     }
 
     /// All places.
-    pub fn all(&self) -> impl Iterator<Item = Place> + '_ {
+    pub fn all(&self) -> impl Iterator<Item = DeparturePlace> + '_ {
         self.named.iter().map(|(place, _)| *place)
     }
 }

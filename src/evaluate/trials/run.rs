@@ -1,11 +1,11 @@
 //! The trials from end to end: sealed, diagnosed, opened, scored.
 
-use super::answer::Answer;
+use super::answer::{Question, TrialAnswer};
 use super::correlation::correlated;
 use super::draft::index;
 use super::folder::{ANSWERS, Filling, Folder, SHARES, Which};
 use super::kind::assign_kinds;
-use super::row::Row;
+use super::row::TrialRow;
 use super::score::Setup;
 use super::shares::TrueShare;
 use super::steadiness::repeats;
@@ -25,6 +25,8 @@ use crate::twin::Noise;
 use rayon::prelude::*;
 use serde_json::json;
 use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
 
 /// Layout of the folder; raised when it changes.
 const LAYOUT: u32 = 12;
@@ -48,7 +50,7 @@ const PART: usize = 64;
 /// | `ablated` | none | parts taken out of the diagnosis, to measure what they are worth |
 /// | `steadiness` | 0 | first trials whose diagnosis is repeated with other seeds, a doubled record, other units, another order of the library |
 #[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
+pub struct TrialSettings {
     /// Records.
     pub trials: usize,
     /// Seed of everything random.
@@ -71,7 +73,7 @@ pub struct Settings {
     pub steadiness: usize,
 }
 
-impl Default for Settings {
+impl Default for TrialSettings {
     fn default() -> Self {
         Self {
             trials: 100,
@@ -96,7 +98,7 @@ impl Default for Settings {
 /// use truetwin::evaluate::trials::{Kind, Settings, Withheld};
 ///
 /// let study = &reference_studies()?[0];
-/// let settings = Settings { trials: 1, kinds: vec![Kind::None], ..Settings::default() };
+/// let settings = TrialSettings { trials: 1, kinds: vec![Kind::None], ..TrialSettings::default() };
 /// let place = tempfile::tempdir()?;
 /// let sealed = Withheld::new(study, settings)?.seal(&place.path().join("trials"), &Progress::silent())?;
 /// println!("sha256 {}", sealed.seal());
@@ -106,7 +108,7 @@ impl Default for Settings {
 /// ```
 pub struct Withheld<'a> {
     sampler: TruthSampler<'a>,
-    settings: Settings,
+    settings: TrialSettings,
 }
 
 debug_by_name!(Withheld<'_>);
@@ -117,7 +119,7 @@ impl<'a> Withheld<'a> {
     /// # Errors
     ///
     /// [`EvaluateError`]: kinds that cannot be drawn, no trials or too many, a record that does not fit the twin.
-    pub fn new(study: &'a Study, settings: Settings) -> Result<Self, EvaluateError> {
+    pub fn new(study: &'a Study, settings: TrialSettings) -> Result<Self, EvaluateError> {
         if settings.trials == 0 {
             return Err(EvaluateError::Nothing("trials"));
         }
@@ -148,7 +150,7 @@ impl<'a> Withheld<'a> {
     }
 
     fn fill(&self, filling: &Filling<'_>, progress: &Progress) -> Result<(), EvaluateError> {
-        let Settings { trials, seed, .. } = self.settings;
+        let TrialSettings { trials, seed, .. } = self.settings;
         let stage = progress.stage("seal", trials);
         let mut source = Noise::new(seed, "withheld kinds", 0).source("deal");
         let kinds = assign_kinds(&self.settings.kinds, trials, |n| index(&mut source, n));
@@ -240,12 +242,12 @@ impl Sealed<'_> {
         // Every answer is there: now, and not before, the keys.
         let keys = self.folder.keys(settings.trials)?;
         let sampler = &self.trials.sampler;
-        let parameters = sampler.parameters();
+        let parameters: Arc<[String]> = sampler.parameters().into();
         let mut shares = self.true_shares(&keys, progress)?.into_iter();
-        let rows = (keys.iter().zip(&answers))
+        let rows = (keys.into_iter().zip(answers))
             .map(|(truth, answer)| {
-                let share = shares.next();
-                Row::new(truth, answer, share, &parameters, settings.without)
+                let (share, names) = (shares.next(), parameters.clone());
+                TrialRow::new(truth, answer, share, names, settings.without)
             })
             .collect();
         let setup = Setup {
@@ -271,12 +273,17 @@ impl Sealed<'_> {
         &self,
         share: Share,
         progress: &Progress,
-    ) -> Result<Vec<Answer>, EvaluateError> {
+    ) -> Result<Vec<TrialAnswer>, EvaluateError> {
         let left_out = self.left_out()?;
         self.pieces(ANSWERS, share).all(
             &progress.stage("trials", self.trials.settings.trials),
-            |_: &Answer| Ok(()),
-            |trial| self.one(trial, left_out[trial].clone(), progress),
+            |_: &TrialAnswer| Ok(()),
+            |trial| {
+                let without = left_out[trial].clone();
+                self.asked(trial, without, |question| {
+                    self.one(trial, question, progress)
+                })
+            },
         )
     }
 
@@ -290,50 +297,77 @@ impl Sealed<'_> {
         if own.without || own.detection_only || !own.ablated.is_empty() {
             return Ok(vec![]);
         }
-        let study = self.trials.sampler.study();
         self.pieces(SHARES, Share::WHOLE).all(
             &progress.stage("shares", own.trials),
             |_: &TrueShare| Ok(()),
             |trial| {
-                let (record, validation) = self.given(trial)?;
-                let settings = self.diagnosis(trial, vec![]);
-                let given = (&record, validation.as_ref());
-                Ok(TrueShare::of(&keys[trial], study, given, &settings))
+                self.asked(trial, vec![], |question| {
+                    Ok(TrueShare::new(&keys[trial], question))
+                })
             },
         )
     }
 
-    /// A trial's record, and that which validates.
-    fn given(&self, trial: usize) -> Result<(Record, Option<Record>), EvaluateError> {
-        let validation = (self.trials.settings.validation)
+    /// Reads a trial's records and does something with its question, without some effects of the library.
+    fn asked<T>(
+        &self,
+        trial: usize,
+        without: Vec<String>,
+        act: impl FnOnce(&Question<'_>) -> Result<T, EvaluateError>,
+    ) -> Result<T, EvaluateError> {
+        let own = &self.trials.settings;
+        let noise = Noise::new(own.seed, "withheld diagnosis", trial as u64);
+        let record = self.folder.record(trial, Which::Own)?;
+        let validation = (own.validation)
             .then(|| self.folder.record(trial, Which::Validation))
             .transpose()?;
-        Ok((self.folder.record(trial, Which::Own)?, validation))
+        act(&Question {
+            study: self.trials.sampler.study(),
+            record: &record,
+            validation: validation.as_ref(),
+            settings: DiagnoseSettings {
+                seed: noise.seed().unwrap_or_default(),
+                without: without.into_iter().map(Into::into).collect(),
+                detection_only: own.detection_only,
+                ablated: own.ablated.clone(),
+                ..DiagnoseSettings::default()
+            },
+        })
     }
 
-    /// Diagnoses one trial.
+    /// Diagnoses one trial, and answers it by the baselines. A baseline that fails says nothing.
     fn one(
         &self,
         trial: usize,
-        left_out: Vec<String>,
+        question: &Question<'_>,
         progress: &Progress,
-    ) -> Result<Answer, EvaluateError> {
-        let (study, own) = (self.trials.sampler.study(), &self.trials.settings);
-        let (record, validation) = self.given(trial)?;
-        let settings = self.diagnosis(trial, left_out);
-        let given = (&record, validation.as_ref());
-        let mut answer = Answer::of(trial, study, given, &settings, progress)?;
-        // A baseline that fails says nothing.
-        answer.correlated = recoverable(correlated(study, &record))?.flatten();
-        answer.greedy = greedy(study, &record, &settings.without).ok().flatten();
-        if trial < own.steadiness {
-            let is_even = (own.like.as_ref()).is_none_or(|like| like.drive().is_uniform());
-            let doubled = (is_even)
-                .then(|| self.folder.record(trial, Which::Doubled))
-                .transpose()?;
-            answer.repeats = repeats(study, given, doubled.as_ref(), &settings, progress)?;
-        }
-        Ok(answer)
+    ) -> Result<TrialAnswer, EvaluateError> {
+        let (study, record, own) = (question.study, question.record, &self.trials.settings);
+        let clock = Instant::now();
+        let (outcome, failure) = match question.ask(progress)? {
+            Ok(outcome) => (Some(outcome), None),
+            Err(failure) => (None, Some(failure)),
+        };
+        let seconds = clock.elapsed().as_secs_f64();
+        let is_even = (own.like.as_ref()).is_none_or(|like| like.drive().is_uniform());
+        let is_repeated = trial < own.steadiness;
+        let doubled = (is_repeated && is_even)
+            .then(|| self.folder.record(trial, Which::Doubled))
+            .transpose()?;
+        Ok(TrialAnswer {
+            trial,
+            outcome,
+            failure,
+            seconds,
+            correlated: recoverable(correlated(study, record))?.flatten(),
+            greedy: greedy(study, record, &question.settings.without)
+                .ok()
+                .flatten(),
+            repeats: match is_repeated {
+                true => repeats(question, doubled.as_ref(), progress)?,
+                false => vec![],
+            },
+        })
     }
 
     /// Puts a result into the folder, in place of an earlier one.
@@ -352,7 +386,7 @@ impl Sealed<'_> {
 
     /// The effects that each trial's library does without.
     fn left_out(&self) -> Result<Vec<Vec<String>>, EvaluateError> {
-        let Settings {
+        let TrialSettings {
             trials, without, ..
         } = self.trials.settings;
         if without {
@@ -361,25 +395,9 @@ impl Sealed<'_> {
             Ok(vec![vec![]; trials])
         }
     }
-
-    /// Settings of a trial's diagnosis.
-    fn diagnosis(&self, trial: usize, without: Vec<String>) -> DiagnoseSettings {
-        let noise = Noise::new(
-            self.trials.settings.seed,
-            "withheld diagnosis",
-            trial as u64,
-        );
-        DiagnoseSettings {
-            seed: noise.seed().unwrap_or_default(),
-            without: without.into_iter().map(Into::into).collect(),
-            detection_only: self.trials.settings.detection_only,
-            ablated: self.trials.settings.ablated.clone(),
-            ..DiagnoseSettings::default()
-        }
-    }
 }
 
-impl Piece for Answer {
+impl Piece for TrialAnswer {
     fn number(&self) -> usize {
         self.trial
     }

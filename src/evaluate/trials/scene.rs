@@ -1,7 +1,7 @@
 //! Sizes of a twin's signals: one record of its world without departures.
 
-use super::law::{Argument, Moment, Place, Variable};
-use super::world::{Conditions, Draws, Run, System, World};
+use super::law::{Argument, DeparturePlace, LawVariable, Moment};
+use super::world::{Conditions, RecordNoise, System, World, WorldRun};
 use crate::math::{deviation, ends};
 use crate::record::{Drive, Signal};
 
@@ -10,7 +10,7 @@ const REACH: f64 = 20.0;
 
 /// Range and spread of one signal.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Size {
+pub(super) struct Extent {
     pub low: f64,
     pub high: f64,
     pub deviation: f64,
@@ -18,7 +18,7 @@ pub(super) struct Size {
     pub rms: f64,
 }
 
-impl Size {
+impl Extent {
     fn of(values: &[f64]) -> Self {
         let present: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
         let (low, high) = ends(&present);
@@ -40,25 +40,25 @@ impl Size {
 /// A record of the world without departures, and its sizes.
 #[derive(Debug, Clone)]
 pub(super) struct Scene {
-    pub run: Run,
-    pub states: Vec<Size>,
-    pub rates: Vec<Size>,
-    pub inputs: Vec<Size>,
-    pub outputs: Vec<Size>,
+    pub run: WorldRun,
+    pub states: Vec<Extent>,
+    pub rates: Vec<Extent>,
+    pub inputs: Vec<Extent>,
+    pub outputs: Vec<Extent>,
     /// In seconds.
     pub duration: f64,
     pub dt: f64,
 }
 
-fn sizes(signal: &Signal) -> Vec<Size> {
+fn sizes(signal: &Signal) -> Vec<Extent> {
     (signal.columns().into_iter())
-        .map(|column| Size::of(&column.to_vec()))
+        .map(|column| Extent::of(&column.to_vec()))
         .collect()
 }
 
 impl Scene {
     /// Simulates the world at θ; `None` where it diverges.
-    pub fn new(world: &World, theta: &[f64], drive: &Drive, draws: Draws) -> Option<Self> {
+    pub fn new(world: &World, theta: &[f64], drive: &Drive, draws: RecordNoise) -> Option<Self> {
         let conditions = Conditions::declared();
         let system = System {
             theta,
@@ -83,7 +83,7 @@ impl Scene {
     }
 
     /// Returns true if a record stays near this one.
-    pub fn is_near(&self, run: &Run) -> bool {
+    pub fn is_near(&self, run: &WorldRun) -> bool {
         (run.outputs.columns().into_iter().zip(&self.outputs)).all(|(column, size)| {
             let middle = 0.5 * (size.low + size.high);
             let most = REACH * size.span();
@@ -93,17 +93,19 @@ impl Scene {
     }
 
     /// The signal that a variable stands for, standardised; `None` for one that does not move.
-    pub fn argument(&self, variable: Variable, place: Place) -> Option<Argument> {
+    pub fn argument(&self, variable: LawVariable, place: DeparturePlace) -> Option<Argument> {
         let (low, high) = match (variable, place) {
-            (Variable::Time, _) => (0.0, self.duration),
-            (Variable::State(i), _) | (Variable::Own, Place::State(i)) => {
+            (LawVariable::Time, _) => (0.0, self.duration),
+            (LawVariable::State(i), _) | (LawVariable::Own, DeparturePlace::State(i)) => {
                 (self.states[i].low, self.states[i].high)
             }
-            (Variable::Input(j), _) | (Variable::Own, Place::Actuator(j)) => {
+            (LawVariable::Input(j), _) | (LawVariable::Own, DeparturePlace::Actuator(j)) => {
                 (self.inputs[j].low, self.inputs[j].high)
             }
-            (Variable::Own, Place::Sensor(j)) => (self.outputs[j].low, self.outputs[j].high),
-            (Variable::Own, Place::Parameter(_)) => return None,
+            (LawVariable::Own, DeparturePlace::Sensor(j)) => {
+                (self.outputs[j].low, self.outputs[j].high)
+            }
+            (LawVariable::Own, DeparturePlace::Parameter(_)) => return None,
         };
         let half_width = 0.5 * (high - low);
         (half_width > 0.0 && half_width.is_finite()).then_some(Argument {
@@ -114,21 +116,21 @@ impl Scene {
     }
 
     /// Variables that move at a place.
-    pub fn variables(&self, place: Place) -> Vec<Variable> {
-        let states = (0..self.states.len()).map(Variable::State);
-        let inputs = (0..self.inputs.len()).map(Variable::Input);
-        let mut all: Vec<Variable> = states.chain(inputs).collect();
+    pub fn variables(&self, place: DeparturePlace) -> Vec<LawVariable> {
+        let states = (0..self.states.len()).map(LawVariable::State);
+        let inputs = (0..self.inputs.len()).map(LawVariable::Input);
+        let mut all: Vec<LawVariable> = states.chain(inputs).collect();
         match place {
-            Place::Sensor(_) | Place::Actuator(_) => all.push(Variable::Own),
+            DeparturePlace::Sensor(_) | DeparturePlace::Actuator(_) => all.push(LawVariable::Own),
             // Nothing else moves in an autonomous black box.
-            Place::Parameter(_) | Place::State(_) => all.push(Variable::Time),
+            DeparturePlace::Parameter(_) | DeparturePlace::State(_) => all.push(LawVariable::Time),
         }
         all.retain(|variable| self.argument(*variable, place).is_some());
         all
     }
 
     /// The moments of the record, as a law at this place sees them.
-    pub fn moments(&self, place: Place) -> Vec<Moment<'_>> {
+    pub fn moments(&self, place: DeparturePlace) -> Vec<Moment<'_>> {
         let run = &self.run;
         (0..run.drive.samples())
             .map(|k| Moment {
@@ -136,23 +138,23 @@ impl Scene {
                 x: row(&run.states, k),
                 u: run.drive.input(k),
                 own: match place {
-                    Place::State(i) => run.states[[k, i]],
-                    Place::Actuator(j) => run.drive.inputs()[[k, j]],
-                    Place::Sensor(j) => run.outputs[[k, j]],
-                    Place::Parameter(_) => 0.0,
+                    DeparturePlace::State(i) => run.states[[k, i]],
+                    DeparturePlace::Actuator(j) => run.drive.inputs()[[k, j]],
+                    DeparturePlace::Sensor(j) => run.outputs[[k, j]],
+                    DeparturePlace::Parameter(_) => 0.0,
                 },
             })
             .collect()
     }
 
     /// A departure of size 1 at a place: as large as the twin's own terms there; of a parameter, a factor e.
-    pub fn unit(&self, place: Place) -> f64 {
+    pub fn unit(&self, place: DeparturePlace) -> f64 {
         match place {
-            Place::State(i) if self.rates[i].rms > 0.0 => self.rates[i].rms,
-            Place::State(i) => self.states[i].span().max(1e-9) / self.duration,
-            Place::Actuator(j) => self.inputs[j].rms.max(1e-9),
-            Place::Sensor(j) => self.outputs[j].deviation,
-            Place::Parameter(_) => 1.0,
+            DeparturePlace::State(i) if self.rates[i].rms > 0.0 => self.rates[i].rms,
+            DeparturePlace::State(i) => self.states[i].span().max(1e-9) / self.duration,
+            DeparturePlace::Actuator(j) => self.inputs[j].rms.max(1e-9),
+            DeparturePlace::Sensor(j) => self.outputs[j].deviation,
+            DeparturePlace::Parameter(_) => 1.0,
         }
     }
 }

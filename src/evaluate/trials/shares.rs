@@ -1,10 +1,9 @@
 //! A trial's true effects, fitted: the evidence that the record holds for them, and the share that they close, which must be 1.
 
+use super::answer::Question;
 use super::truth::Truth;
-use crate::diagnose::{DiagnoseSettings, true_fit};
-use crate::record::Record;
+use crate::diagnose::true_fit;
 use crate::storage::work::Piece;
-use crate::study::Study;
 use serde::{Deserialize, Serialize};
 
 /// The true effects of one trial.
@@ -31,16 +30,17 @@ impl Piece for TrueShare {
 
 impl TrueShare {
     /// Fits a trial's true effects, where they are listed ones. A fit that fails tells nothing.
-    pub(super) fn of(
-        truth: &Truth,
-        study: &Study,
-        (record, validation): (&Record, Option<&Record>),
-        settings: &DiagnoseSettings,
-    ) -> Self {
+    pub(super) fn new(truth: &Truth, question: &Question<'_>) -> Self {
         let keys = &truth.effects;
         let is_listed = !keys.is_empty() && keys.len() == truth.departures.len();
+        let Question {
+            study,
+            record,
+            validation,
+            settings,
+        } = question;
         let fit = (is_listed)
-            .then(|| true_fit(study, record, validation, keys, settings))
+            .then(|| true_fit(study, record, *validation, keys, settings))
             .and_then(|fit| fit.ok().flatten());
         let share = fit.as_ref().and_then(|fit| fit.share.as_ref());
         Self {

@@ -1,60 +1,61 @@
 //! The same question asked otherwise: an answer that depends on the asking is none.
 
-use super::answer::{Repeat, ask};
+use super::answer::{Question, Repeat};
 use super::units::rescaled;
 use crate::diagnose::DiagnoseSettings;
 use crate::evaluate::EvaluateError;
 use crate::progress::Progress;
 use crate::record::Record;
-use crate::study::Study;
 
 /// Seeds besides the trial's own.
 const SEEDS: u64 = 4;
 
 /// Answers under other seeds, from a record twice as long, in other units, and with the library in another order.
 pub(super) fn repeats(
-    study: &Study,
-    (record, validation): (&Record, Option<&Record>),
+    question: &Question<'_>,
     doubled: Option<&Record>,
-    settings: &DiagnoseSettings,
     progress: &Progress,
 ) -> Result<Vec<Repeat>, EvaluateError> {
-    let mut repeats = Vec::new();
-    let mut again = |change: &str,
-                     study: &Study,
-                     record: &Record,
-                     validation: Option<&Record>,
-                     settings: &DiagnoseSettings| {
-        let outcome = ask(study, record, validation, settings, progress)?.ok();
-        repeats.push(Repeat {
-            change: change.into(),
-            outcome,
-        });
-        Ok::<(), EvaluateError>(())
+    let (study, own) = (question.study, &question.settings);
+    let seeds = (1..=SEEDS).map(|seed| DiagnoseSettings {
+        seed: own.seed.wrapping_add(seed),
+        ..own.clone()
+    });
+    let with = |settings| Question {
+        settings,
+        ..question.clone()
     };
-    for seed in 1..=SEEDS {
-        let other = DiagnoseSettings {
-            seed: settings.seed.wrapping_add(seed),
-            ..settings.clone()
+    let mut questions: Vec<(&str, Question<'_>)> = seeds.map(|s| ("seed", with(s))).collect();
+    if let Some(record) = doubled {
+        let longer = Question {
+            record,
+            ..question.clone()
         };
-        again("seed", study, record, validation, &other)?;
+        questions.push(("record twice as long", longer));
     }
-    if let Some(doubled) = doubled {
-        again("record twice as long", study, doubled, validation, settings)?;
-    }
-    if let Some((study, record, validation)) = rescaled(study, record, validation)? {
-        again("units", &study, &record, validation.as_ref(), settings)?;
+    let scaled = rescaled(study, question.record, question.validation)?;
+    if let Some((study, record, validation)) = &scaled {
+        let scaled = Question {
+            study,
+            record,
+            validation: validation.as_ref(),
+            settings: own.clone(),
+        };
+        questions.push(("units", scaled));
     }
     let kinds: Vec<_> = study.catalogue().kinds().iter().rev().cloned().collect();
-    let reordered = study
-        .clone()
-        .with_effects(kinds.iter().map(|kind| kind.as_ref().clone()));
-    again(
-        "order of the library",
-        &reordered,
-        record,
-        validation,
-        settings,
-    )?;
-    Ok(repeats)
+    let kinds = kinds.iter().map(|kind| kind.as_ref().clone());
+    let reordered = study.clone().with_effects(kinds);
+    let reordered = Question {
+        study: &reordered,
+        ..question.clone()
+    };
+    questions.push(("order of the library", reordered));
+    (questions.into_iter())
+        .map(|(change, question)| {
+            let outcome = question.ask(progress)?.ok();
+            let change = change.into();
+            Ok(Repeat { change, outcome })
+        })
+        .collect()
 }

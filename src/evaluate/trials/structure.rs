@@ -8,8 +8,8 @@
 //!
 //! A law missing at the first place is as well a law missing at the second: no record tells which.
 
-use super::law::Place;
-use super::scene::{Scene, Size};
+use super::law::DeparturePlace;
+use super::scene::{Extent, Scene};
 use crate::twin::{Now, StateSpace};
 
 /// Moments of the record at which equations are compared.
@@ -23,17 +23,17 @@ const SAME: f64 = 1e-6;
 
 /// States and outputs that something enters.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Entered {
+struct Entries {
     states: Vec<usize>,
     outputs: Vec<usize>,
 }
 
-impl Entered {
+impl Entries {
     /// The state or sensor, where it is the only one.
-    fn only(&self) -> Option<Place> {
+    fn only(&self) -> Option<DeparturePlace> {
         match (&self.states[..], &self.outputs[..]) {
-            ([state], []) => Some(Place::State(*state)),
-            ([], [output]) => Some(Place::Sensor(*output)),
+            ([state], []) => Some(DeparturePlace::State(*state)),
+            ([], [output]) => Some(DeparturePlace::Sensor(*output)),
             _ => None,
         }
     }
@@ -42,8 +42,8 @@ impl Entered {
 /// Entries of a twin's parameters and inputs into its equations.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Structure {
-    parameters: Vec<Entered>,
-    inputs: Vec<Entered>,
+    parameters: Vec<Entries>,
+    inputs: Vec<Entries>,
     /// Input that each parameter is the gain of.
     gains: Vec<Option<usize>>,
 }
@@ -109,7 +109,7 @@ impl Structure {
                 }
                 (0..n).filter(|i| changed[*i]).collect()
             };
-            Entered {
+            Entries {
                 states: changes(&|at| at.rates(twin), outline.states.len()),
                 outputs: changes(&|at| at.outputs(twin, outputs), outputs),
             }
@@ -117,10 +117,10 @@ impl Structure {
         let steps: Vec<f64> = (outline.parameters.iter())
             .map(|p| STEP * p.prior.width())
             .collect();
-        let parameters: Vec<Entered> = (steps.iter().enumerate())
+        let parameters: Vec<Entries> = (steps.iter().enumerate())
             .map(|(p, step)| entered(&|at: &mut At| at.theta[p] += step))
             .collect();
-        let inputs: Vec<Entered> = (scene.inputs.iter().enumerate())
+        let inputs: Vec<Entries> = (scene.inputs.iter().enumerate())
             .map(|(j, size)| entered(&|at: &mut At| at.u[j] += OTHER * size.span()))
             .collect();
         let gains = (steps.iter().enumerate())
@@ -137,21 +137,23 @@ impl Structure {
     }
 
     /// Returns the other places that mean the same as this one.
-    pub fn same_as(&self, place: Place) -> Vec<Place> {
+    pub fn same_as(&self, place: DeparturePlace) -> Vec<DeparturePlace> {
         match place {
-            Place::Parameter(p) => {
+            DeparturePlace::Parameter(p) => {
                 let gain = self.gains.get(p).copied().flatten();
-                let only = self.parameters.get(p).and_then(Entered::only);
-                only.into_iter().chain(gain.map(Place::Actuator)).collect()
+                let only = self.parameters.get(p).and_then(Entries::only);
+                only.into_iter()
+                    .chain(gain.map(DeparturePlace::Actuator))
+                    .collect()
             }
-            Place::Actuator(j) => {
-                let only = self.inputs.get(j).and_then(Entered::only);
+            DeparturePlace::Actuator(j) => {
+                let only = self.inputs.get(j).and_then(Entries::only);
                 let gains = (self.gains.iter().enumerate())
                     .filter(|(_, gain)| **gain == Some(j))
-                    .map(|(p, _)| Place::Parameter(p));
+                    .map(|(p, _)| DeparturePlace::Parameter(p));
                 only.into_iter().chain(gains).collect()
             }
-            Place::State(_) | Place::Sensor(_) => vec![],
+            DeparturePlace::State(_) | DeparturePlace::Sensor(_) => vec![],
         }
     }
 }
@@ -162,7 +164,7 @@ fn gain(
     scene: &Scene,
     moments: &[At],
     (p, step): (usize, f64),
-    entered: &Entered,
+    entered: &Entries,
 ) -> Option<usize> {
     if entered.states.is_empty() || !entered.outputs.is_empty() {
         return None;
@@ -183,7 +185,7 @@ fn gain(
         })
     };
     let by_state =
-        |(i, size): (usize, &Size)| decides(&|at: &mut At| at.x[i] += OTHER * size.span());
+        |(i, size): (usize, &Extent)| decides(&|at: &mut At| at.x[i] += OTHER * size.span());
     if decides(&|at: &mut At| at.t += OTHER * scene.duration)
         || scene.states.iter().enumerate().any(by_state)
     {
@@ -198,7 +200,7 @@ fn gain(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::trials::world::{Draws, World};
+    use crate::evaluate::trials::world::{RecordNoise, World};
     use crate::record::Drive;
     use crate::twin::{Noise, Outline, Parameter, Twin};
     use crate::twins::{CascadedTanks, VanDerPol};
@@ -210,7 +212,13 @@ mod tests {
         });
         let world = World::new(&twin);
         let drive = Drive::new(0.1, levels).unwrap();
-        let scene = Scene::new(&world, theta, &drive, Draws::of(Noise::new(1, "s", 0))).unwrap();
+        let scene = Scene::new(
+            &world,
+            theta,
+            &drive,
+            RecordNoise::of(Noise::new(1, "s", 0)),
+        )
+        .unwrap();
         let World::Equations(twin) = &world else {
             panic!("a black box");
         };
@@ -221,17 +229,20 @@ mod tests {
     #[test]
     fn tanks_have_one_gain_and_parameters_of_one_tank_each() {
         let tanks = structure(Twin::new(CascadedTanks), &[0.6, 0.5, 0.55, 1.0]);
-        let [upper, lower] = [0, 1].map(Place::State);
-        let pump = Place::Actuator(0);
-        assert_eq!(tanks.same_as(Place::Parameter(0)), [upper]);
-        assert_eq!(tanks.same_as(Place::Parameter(1)), [lower]);
-        assert_eq!(tanks.same_as(Place::Parameter(2)), [lower]);
-        assert_eq!(tanks.same_as(Place::Parameter(3)), [upper, pump]);
-        assert_eq!(tanks.same_as(pump), [upper, Place::Parameter(3)]);
+        let [upper, lower] = [0, 1].map(DeparturePlace::State);
+        let pump = DeparturePlace::Actuator(0);
+        assert_eq!(tanks.same_as(DeparturePlace::Parameter(0)), [upper]);
+        assert_eq!(tanks.same_as(DeparturePlace::Parameter(1)), [lower]);
+        assert_eq!(tanks.same_as(DeparturePlace::Parameter(2)), [lower]);
+        assert_eq!(tanks.same_as(DeparturePlace::Parameter(3)), [upper, pump]);
+        assert_eq!(tanks.same_as(pump), [upper, DeparturePlace::Parameter(3)]);
         assert_eq!(tanks.same_as(upper), []);
-        assert_eq!(tanks.same_as(Place::Sensor(0)), []);
+        assert_eq!(tanks.same_as(DeparturePlace::Sensor(0)), []);
         let oscillator = structure(Twin::new(VanDerPol), &[1.5]);
-        assert_eq!(oscillator.same_as(Place::Parameter(0)), [Place::State(1)]);
+        assert_eq!(
+            oscillator.same_as(DeparturePlace::Parameter(0)),
+            [DeparturePlace::State(1)]
+        );
     }
 
     /// ẋ₁ = −a·x₁ + b·u·x₂ + u, ẋ₂ = −a·x₂, y = c·x₁: a enters two rates, b·u depends on a state, c is the sensor's.
@@ -262,9 +273,18 @@ mod tests {
     #[test]
     fn parameters_of_several_rates_or_of_a_state_are_no_gains() {
         let mixed = structure(Twin::new(Mixed), &[0.7, 0.8, 0.9]);
-        assert_eq!(mixed.same_as(Place::Parameter(0)), []);
-        assert_eq!(mixed.same_as(Place::Parameter(1)), [Place::State(0)]);
-        assert_eq!(mixed.same_as(Place::Parameter(2)), [Place::Sensor(0)]);
-        assert_eq!(mixed.same_as(Place::Actuator(0)), [Place::State(0)]);
+        assert_eq!(mixed.same_as(DeparturePlace::Parameter(0)), []);
+        assert_eq!(
+            mixed.same_as(DeparturePlace::Parameter(1)),
+            [DeparturePlace::State(0)]
+        );
+        assert_eq!(
+            mixed.same_as(DeparturePlace::Parameter(2)),
+            [DeparturePlace::Sensor(0)]
+        );
+        assert_eq!(
+            mixed.same_as(DeparturePlace::Actuator(0)),
+            [DeparturePlace::State(0)]
+        );
     }
 }

@@ -15,113 +15,87 @@ const ERROR: f64 = 110.0;
 /// For each parameter, over its true value: the share of intervals that held it, with its 95 % interval, and the root mean square
 /// error of the refitted estimate. Bars below the axes mark the prior. `None` without a grid.
 pub fn coverage_svg(study: &Study, points: &[PointScore]) -> Option<String> {
-    let (first, records) = (points.first()?, points.iter().map(records).sum::<u64>());
+    let records = |point: &PointScore| point.coverage.first().map_or(0, |c| c.held.of);
+    let (least, all) = (
+        points.iter().map(records).min()?,
+        points.iter().map(records).sum::<u64>(),
+    );
+    let each = match all == least * points.len() as u64 {
+        true => least.to_string(),
+        false => format!("at least {least}"),
+    };
     let space = study.twin().parameters();
-    let parameters = space.iter().enumerate().take(SHOWN);
-    let panels = parameters.flat_map(|(j, parameter)| {
-        let x = format!("true {}", named(parameter));
-        [
-            (x.clone(), coverage(parameter, points, j)),
-            (x, error(parameter, points, j)),
-        ]
-    });
-    let level = 100.0 * INTERVAL_LEVEL;
+    let panels = space
+        .iter()
+        .enumerate()
+        .take(SHOWN)
+        .flat_map(|(j, parameter)| {
+            let dots = |dot: &dyn Fn(&PointScore) -> Dot| -> Vec<Dot> {
+                let mut dots: Vec<Dot> = points.iter().map(dot).collect();
+                dots.sort_by(|a, b| a.x.total_cmp(&b.x));
+                dots
+            };
+            let shares = dots(&|point| {
+                let (coverage, (low, high)) =
+                    (&point.coverage[j], point.coverage[j].held.interval());
+                Dot {
+                    x: point.theta[j],
+                    y: coverage.share,
+                    low,
+                    high,
+                }
+            });
+            let errors = dots(&|point| {
+                let y = point.rmse[j];
+                Dot {
+                    x: point.theta[j],
+                    y,
+                    low: y,
+                    high: y,
+                }
+            });
+            let x = match parameter.unit.as_str() {
+                "" | "-" => format!("true {}", parameter.name),
+                unit => format!("true {} in {unit}", parameter.name),
+            };
+            let share = panel(parameter, "share held", ("nominal", INTERVAL_LEVEL))
+                .height(COVERAGE)
+                .range(0.0, 1.0)
+                .dots(Dots {
+                    label: "records at one θ, 95 % interval".into(),
+                    points: shares,
+                });
+            let error = panel(parameter, "rms error", ("", 0.0))
+                .height(ERROR)
+                .dots(Dots {
+                    label: String::new(),
+                    points: errors,
+                });
+            [(x.clone(), share), (x, error)]
+        });
     let picture = Curves {
         title: format!("{}: coverage and error over the truth", study.name()),
         description: format!(
-            "Share of {level:.0} % intervals that held the true value, and root mean square error, at {} fixed points with {} records \
-             each, {records} in all.",
+            "Share of {:.0} % intervals that held the true value, and root mean square error, at {} fixed points with {each} records \
+             each, {all} in all.",
+            100.0 * INTERVAL_LEVEL,
             points.len(),
-            records_each(first, points),
         ),
         panels: panels.collect(),
     };
     Some(picture.svg())
 }
 
-/// Records at a point.
-fn records(point: &PointScore) -> u64 {
-    point.coverage.first().map_or(0, |c| c.of)
-}
-
-fn records_each(first: &PointScore, points: &[PointScore]) -> String {
-    let least = points.iter().map(records).min().unwrap_or(0);
-    match points.iter().all(|p| records(p) == records(first)) {
-        true => least.to_string(),
-        false => format!("at least {least}"),
-    }
-}
-
-/// Shares of intervals that held parameter `j`, beside the nominal level.
-fn coverage(parameter: &Parameter, points: &[PointScore], j: usize) -> Panel {
-    let level = over(parameter, INTERVAL_LEVEL);
-    let line = Series::new("nominal", Style::ZERO, level);
-    let dots = points.iter().map(|point| {
-        let c = &point.coverage[j];
-        let [low, high] = c.interval;
-        Dot {
-            x: point.theta[j],
-            y: c.share,
-            low,
-            high,
-        }
-    });
-    Panel::new(&format!("{}: share held", parameter.name), vec![line])
-        .height(COVERAGE)
-        .range(0.0, 1.0)
-        .dots(Dots {
-            label: "records at one θ, 95 % interval".into(),
-            points: sorted(dots),
-        })
-        .spans(vec![prior(parameter)])
-}
-
-/// Root mean square errors of parameter `j`.
-fn error(parameter: &Parameter, points: &[PointScore], j: usize) -> Panel {
-    let dots = points.iter().map(|point| {
-        let y = point.rmse[j];
-        Dot {
-            x: point.theta[j],
-            y,
-            low: y,
-            high: y,
-        }
-    });
-    let zero = Series::new("", Style::ZERO, over(parameter, 0.0));
-    Panel::new(&format!("{}: rms error", parameter.name), vec![zero])
-        .height(ERROR)
-        .dots(Dots {
-            label: String::new(),
-            points: sorted(dots),
-        })
-        .spans(vec![prior(parameter)])
-}
-
-/// A level over all possible values.
-fn over(parameter: &Parameter, level: f64) -> [(f64, f64); 2] {
-    let bounds = parameter.bounds;
-    [(bounds.low(), level), (bounds.high(), level)]
-}
-
-fn prior(parameter: &Parameter) -> Span {
-    Span {
-        from: parameter.prior.low(),
-        to: parameter.prior.high(),
+/// A panel over the bounds of a parameter, with a line at a level and a bar at the prior.
+fn panel(parameter: &Parameter, what: &str, (label, level): (&str, f64)) -> Panel {
+    let (bounds, prior) = (parameter.bounds, parameter.prior);
+    let line = [(bounds.low(), level), (bounds.high(), level)];
+    let series = vec![Series::new(label, Style::ZERO, line)];
+    Panel::new(&format!("{}: {what}", parameter.name), series).spans(vec![Span {
+        from: prior.low(),
+        to: prior.high(),
         label: "prior".into(),
         weight: 0.3,
         clear: false,
-    }
-}
-
-fn sorted(dots: impl Iterator<Item = Dot>) -> Vec<Dot> {
-    let mut dots: Vec<Dot> = dots.collect();
-    dots.sort_by(|a, b| a.x.total_cmp(&b.x));
-    dots
-}
-
-fn named(parameter: &Parameter) -> String {
-    match parameter.unit.as_str() {
-        "" | "-" => parameter.name.clone(),
-        unit => format!("{} in {unit}", parameter.name),
-    }
+    }])
 }

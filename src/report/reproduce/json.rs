@@ -2,7 +2,8 @@
 
 use crate::estimator::INTERVAL_LEVEL;
 use crate::estimator::PresetName;
-use crate::evaluate::paper::{COVERAGE_LEVEL, MonteCarlo, Scenario, Scores};
+use crate::evaluate::LEVEL;
+use crate::evaluate::paper::{MonteCarlo, Scenario, Scores};
 use crate::study::Study;
 use serde_json::{Value, json};
 
@@ -44,7 +45,7 @@ pub fn reproduce_json(
         "points": scores.points,
         "heads": scores.heads,
         "coverage": {
-            "level": INTERVAL_LEVEL, "interval_level": COVERAGE_LEVEL, "parameters": scores.coverage,
+            "level": INTERVAL_LEVEL, "interval_level": LEVEL, "parameters": scores.coverage,
         },
     })
 }

@@ -3,8 +3,8 @@
 use super::{coverage_svg, first_run_svg, mean_runs_svg, reproduce_json, reproduce_text};
 use crate::estimator::{PresetName, PretrainOptions, pretrain};
 use crate::evaluate::paper::{
-    AnswerRuns, Benchmark, MeanRuns, Method, MonteCarlo, Run, Scenario, Scores, reference_projects,
-    score,
+    AnswerRuns, Benchmark, BenchmarkRun, MeanRuns, MonteCarlo, Scenario, ScoredMethod, Scores,
+    reference_projects, score,
 };
 use crate::progress::Progress;
 use crate::report::fixture::validator;
@@ -14,7 +14,7 @@ use std::sync::OnceLock;
 struct Made {
     study: Study,
     plan: MonteCarlo,
-    runs: Vec<Run>,
+    runs: Vec<BenchmarkRun>,
     scores: Scores,
 }
 
@@ -49,7 +49,7 @@ fn made() -> &'static Made {
 }
 
 /// The same runs, in which a method never answers.
-fn without(silent: Method) -> (Vec<Run>, Scores) {
+fn without(silent: ScoredMethod) -> (Vec<BenchmarkRun>, Scores) {
     let mut runs = made().runs.clone();
     for answer in runs.iter_mut().flat_map(|run| &mut run.answers) {
         if answer.method == silent {
@@ -63,7 +63,7 @@ fn without(silent: Method) -> (Vec<Run>, Scores) {
 #[test]
 fn the_json_is_the_contracts_in_every_scenario() {
     let Made { study, plan, .. } = made();
-    let (_, silent) = without(Method::Final);
+    let (_, silent) = without(ScoredMethod::Final);
     for scenario in [
         Scenario::InDistribution,
         Scenario::First,
@@ -91,16 +91,16 @@ fn the_json_is_the_contracts_in_every_scenario() {
 #[test]
 fn the_table_has_every_row_beside_the_papers() {
     let Made { study, plan, .. } = made();
-    let (_, silent) = without(Method::TsFine);
+    let (_, silent) = without(ScoredMethod::TsFine);
     let text = reproduce_text(study, plan, PresetName::Paper, &silent);
     for expected in ["paper: MSE", "1.47e1", "13088"] {
         assert!(text.contains(expected), "{expected} is not in:\n{text}");
     }
-    for method in Method::all() {
+    for method in ScoredMethod::all() {
         let rows = text.lines().filter(|l| l.starts_with(&method.label()));
         assert_eq!(
             rows.count(),
-            1 + usize::from(method == Method::TsFine),
+            1 + usize::from(method == ScoredMethod::TsFine),
             "{text}"
         );
     }
@@ -118,7 +118,7 @@ fn the_table_has_every_row_beside_the_papers() {
 #[test]
 fn the_figures_show_every_family_and_leave_out_who_is_silent() {
     let Made { study, plan, .. } = made();
-    let (runs, _) = without(Method::TsPre);
+    let (runs, _) = without(ScoredMethod::TsPre);
     let means = MeanRuns::of(study, plan, &runs).unwrap().unwrap();
     let svg = mean_runs_svg(study, &means).unwrap();
     for expected in [

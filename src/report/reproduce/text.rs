@@ -1,10 +1,10 @@
 //! Scores over many records as tables for people.
 
-use crate::estimator::INTERVAL_LEVEL;
-use crate::estimator::PresetName;
-use crate::evaluate::paper::{COVERAGE_LEVEL, MonteCarlo, Scenario, Scores};
+use crate::estimator::{INTERVAL_LEVEL, PresetName};
+use crate::evaluate::LEVEL;
+use crate::evaluate::paper::{Coverage, MethodScore, MonteCarlo, Scenario, Scores};
 use crate::report::digits::short;
-use crate::report::table::table;
+use crate::report::document::{Block, Column, Document};
 use crate::study::Study;
 
 /// The paper's table with ours beside it; then, where there is such, the errors of what a record determines; then how
@@ -24,170 +24,153 @@ pub fn reproduce_text(
     };
     let (name, runs, seed) = (study.name(), plan.runs, plan.seed);
     let title = format!("{name}, scenario {theta}, {runs} runs, preset {preset}, seed {seed}");
-    let mut parts = vec![
-        format!("{title}\n\n{}", errors(scores)),
+    let names = study.twin().parameters();
+    let names = names.names();
+    let failures = (scores.methods.iter().filter(|s| s.failed > 0)).map(|s| {
+        format!(
+            "{}: no answer on {} of {runs} runs",
+            s.method.label(),
+            s.failed
+        )
+    });
+    let tables = [
+        Some(errors(&title, scores)),
         invariants(scores),
         coverage(scores),
-        points(study, scores),
-        heads(study, scores),
-        failures(plan, scores),
+        points(&names, scores),
+        heads(&names, scores),
     ];
-    parts.retain(|part| !part.is_empty());
-    parts.join("\n")
+    Document {
+        answer: (tables.into_iter().flatten())
+            .chain(failures.map(Block::Paragraph))
+            .collect(),
+        ..Document::default()
+    }
+    .text()
+}
+
+/// A table of one line a method.
+fn by_method(
+    caption: impl Into<String>,
+    columns: &[&str],
+    scores: &Scores,
+    cells: impl Fn(&MethodScore) -> Vec<String>,
+) -> Block {
+    let row = |score: &MethodScore| [vec![score.method.label()], cells(score)].concat();
+    rows(caption, "method", columns, scores.methods.iter().map(row))
+}
+
+/// A table whose lines begin with a name and go on with numbers.
+fn rows(
+    caption: impl Into<String>,
+    name: &str,
+    columns: &[&str],
+    rows: impl Iterator<Item = Vec<String>>,
+) -> Block {
+    let numbers = columns.iter().map(|column| (*column, Column::Number));
+    let head: Vec<_> = [(name, Column::Text)].into_iter().chain(numbers).collect();
+    Block::table(caption, &head, rows.collect())
 }
 
 /// Mean squared errors and times.
-fn errors(scores: &Scores) -> String {
-    let paper = scores.methods.iter().any(|s| s.published.is_some());
-    let mut head = vec!["method", "MSE", "± std. error", "median", "ms"];
-    if paper {
-        head.extend(["paper: MSE", "ms"]);
+fn errors(title: &str, scores: &Scores) -> Block {
+    let mut columns = vec!["MSE", "± std. error", "median", "ms"];
+    if scores.methods.iter().any(|s| s.published.is_some()) {
+        columns.extend(["paper: MSE", "ms"]);
     }
-    let mut rows = vec![head.into_iter().map(str::to_owned).collect::<Vec<_>>()];
-    for s in &scores.methods {
-        let mut row = vec![
-            s.method.label(),
-            figure(s.mse),
-            figure(s.mse_std_error),
-            figure(s.median),
-            time(s.milliseconds),
-        ];
-        if paper {
-            let published = s.published.map(|p| [figure(p.mse), time(p.milliseconds)]);
-            row.extend(published.unwrap_or_default());
-        }
-        rows.push(row);
-    }
-    table(&rows)
+    by_method(title, &columns, scores, |s| {
+        let own = [s.mse, s.mse_std_error, s.median].map(figure);
+        let published = s.published.map(|p| [figure(p.mse), time(p.milliseconds)]);
+        let published = published.into_iter().flatten();
+        own.into_iter()
+            .chain([time(s.milliseconds)])
+            .chain(published)
+            .collect()
+    })
 }
 
-/// Mean squared errors of what a record determines.
-fn invariants(scores: &Scores) -> String {
-    let Some(first) = scores.methods.first() else {
-        return String::new();
+/// Mean squared errors of what a record determines; none where that is all of θ.
+fn invariants(scores: &Scores) -> Option<Block> {
+    let first = scores.methods.first()?;
+    let mut columns: Vec<&str> = first.invariants.iter().map(|(name, _)| *name).collect();
+    columns.extend(first.mse_without_scale.map(|_| "θ without scale"));
+    let caption = "MSE of what the output determines";
+    (!columns.is_empty()).then(|| {
+        by_method(caption, &columns, scores, |s| {
+            let values = s.invariants.iter().map(|(_, mse)| *mse);
+            values.chain(s.mse_without_scale).map(figure).collect()
+        })
+    })
+}
+
+/// Coverage of the intervals; none without estimates.
+fn coverage(scores: &Scores) -> Option<Block> {
+    let known = || scores.coverage.iter().filter(|c| c.held.of > 0);
+    let caption = format!(
+        "Runs whose {:.0} % interval of the refitted estimate held the truth, and what that rate may be ({:.0} %)",
+        100.0 * INTERVAL_LEVEL,
+        100.0 * LEVEL
+    );
+    let row = |c: &Coverage| {
+        let (low, high) = c.held.interval();
+        let share = format!("{:.0} %", 100.0 * c.share);
+        vec![
+            c.name.clone(),
+            held(c),
+            share,
+            format!("[{:.0}, {:.0}] %", 100.0 * low, 100.0 * high),
+        ]
     };
-    let scale = first.mse_without_scale.is_some();
-    if first.invariants.is_empty() && !scale {
-        return String::new();
-    }
-    let names = first.invariants.iter().map(|(name, _)| (*name).to_owned());
-    let mut rows = vec![
-        std::iter::once("method".to_owned())
-            .chain(names)
-            .chain(scale.then(|| "θ without scale".to_owned()))
-            .collect::<Vec<_>>(),
-    ];
-    for s in &scores.methods {
-        let values = s.invariants.iter().map(|(_, mse)| *mse);
-        let row = values.chain(s.mse_without_scale).map(figure);
-        rows.push(std::iter::once(s.method.label()).chain(row).collect());
-    }
-    format!("MSE of what the output determines\n\n{}", table(&rows))
+    let columns = ["held", "share", "rate"];
+    known().next()?;
+    Some(rows(caption, "parameter", &columns, known().map(row)))
 }
 
-/// Returns the parts of TS-fine; nothing without a layer.
-fn heads(study: &Study, scores: &Scores) -> String {
-    let Some(heads) = &scores.heads else {
-        return String::new();
-    };
-    let head = [
-        "TS-fine",
-        "layer explains",
-        "layer and heads",
-        "α of the heads",
-    ];
-    let mut rows = vec![head.map(str::to_owned).to_vec()];
-    let space = study.twin().parameters();
-    for (j, name) in space.names().into_iter().enumerate() {
-        let shares = [
-            heads.explained_layer[j],
-            heads.explained_both[j],
-            heads.alpha[j],
-        ];
-        let shares = shares.map(|share| format!("{share:.3}"));
-        rows.push([vec![name.to_owned()], shares.to_vec()].concat());
-    }
-    format!(
-        "Parts of TS-fine, on simulations that neither saw; MSE of the quadratic layer alone: {}\n\n{}",
-        figure(heads.mse_layer),
-        table(&rows)
-    )
-}
-
-/// Returns coverage and error at each point of a grid; nothing without one.
-fn points(study: &Study, scores: &Scores) -> String {
-    if scores.points.is_empty() {
-        return String::new();
-    }
-    let space = study.twin().parameters();
-    let mut head = vec!["θ".to_owned(), "prior".to_owned()];
-    for name in space.names() {
-        head.extend([format!("{name} held"), "rms error".to_owned()]);
-    }
-    let mut rows = vec![head];
-    for point in &scores.points {
+/// Coverage and error at each point of a grid; none without one.
+fn points(names: &[&str], scores: &Scores) -> Option<Block> {
+    scores.points.first()?;
+    let held_of: Vec<String> = names.iter().map(|name| format!("{name} held")).collect();
+    let columns = held_of.iter().flat_map(|held| [held.as_str(), "rms error"]);
+    let columns: Vec<&str> = ["prior"].into_iter().chain(columns).collect();
+    let lines = scores.points.iter().map(|point| {
         let theta: Vec<String> = point.theta.iter().map(|v| short(*v)).collect();
         let side = if point.in_prior { "inside" } else { "outside" };
-        let mut row = vec![theta.join(", "), side.to_owned()];
-        for (covered, rmse) in point.coverage.iter().zip(&point.rmse) {
-            row.extend([
-                format!("{} of {}", covered.covered, covered.of),
-                short(*rmse),
-            ]);
-        }
-        rows.push(row);
-    }
-    format!(
-        "Intervals that held the truth and errors of the tuned heads, by true θ\n\n{}",
-        table(&rows)
-    )
+        let each = point.coverage.iter().zip(&point.rmse);
+        let each = each.flat_map(|(covered, rmse)| [held(covered), short(*rmse)]);
+        [theta.join(", "), side.to_owned()]
+            .into_iter()
+            .chain(each)
+            .collect()
+    });
+    let caption = "Intervals that held the truth and errors of the tuned heads, by true θ";
+    Some(rows(caption, "θ", &columns, lines))
 }
 
-/// Returns the coverage of the intervals.
-fn coverage(scores: &Scores) -> String {
-    let rows: Vec<Vec<String>> = (scores.coverage.iter())
-        .filter(|c| c.of > 0)
-        .map(|c| {
-            vec![
-                c.name.clone(),
-                format!("{} of {}", c.covered, c.of),
-                format!("{:.0} %", 100.0 * c.share),
-                format!(
-                    "[{:.0}, {:.0}] %",
-                    100.0 * c.interval[0],
-                    100.0 * c.interval[1]
-                ),
-            ]
-        })
-        .collect();
-    if rows.is_empty() {
-        String::new()
-    } else {
-        format!(
-            "Runs whose {:.0} % interval of the refitted estimate held the truth, and what that rate may be ({:.0} %)\n\n{}",
-            100.0 * INTERVAL_LEVEL,
-            100.0 * COVERAGE_LEVEL,
-            table(&rows)
-        )
-    }
+/// Contributions to TS-fine; none without a layer.
+fn heads(names: &[&str], scores: &Scores) -> Option<Block> {
+    let heads = scores.heads.as_ref()?;
+    let caption = format!(
+        "Parts of TS-fine, on simulations that neither saw; MSE of the quadratic layer alone: {}",
+        figure(heads.mse_layer)
+    );
+    let lines = names.iter().enumerate().map(|(j, name)| {
+        let shares = [&heads.explained_layer, &heads.explained_both, &heads.alpha];
+        let shares = shares.map(|share| format!("{:.3}", share[j]));
+        [vec![(*name).to_owned()], shares.to_vec()].concat()
+    });
+    let columns = ["layer explains", "layer and heads", "α of the heads"];
+    Some(rows(caption, "TS-fine", &columns, lines))
 }
 
-/// Returns the methods without an answer.
-fn failures(plan: &MonteCarlo, scores: &Scores) -> String {
-    (scores.methods.iter().filter(|s| s.failed > 0))
-        .map(|s| {
-            let label = s.method.label();
-            format!("{label}: no answer on {} of {} runs\n", s.failed, plan.runs)
-        })
-        .collect()
+fn held(coverage: &Coverage) -> String {
+    format!("{} of {}", coverage.held.count, coverage.held.of)
 }
 
 /// A squared error: three significant digits.
 fn figure(value: f64) -> String {
-    if value.is_finite() {
-        format!("{value:.2e}")
-    } else {
-        "–".into()
+    match value.is_finite() {
+        true => format!("{value:.2e}"),
+        false => "–".into(),
     }
 }
 

@@ -1,18 +1,24 @@
 //! The pictures of a scorecard: answers by expected information, and reliability.
 
-use super::text::{nats, of};
-use crate::evaluate::trials::{Bin, Count, Scorecard};
+use super::tables::{nats, of};
+use crate::evaluate::trials::{BreakdownLine, Scorecard};
 use crate::report::chart::{Bar, BarChart, BarGroup, Chart, Dot, Dots, Panel, Series, Style};
 
 /// Delivered answers by expected information as bars; `None` without gaps.
 pub(super) fn delivered_svg(card: &Scorecard) -> Option<String> {
-    let last = card.by_information.last()?;
-    let bar = |bin: &Bin| {
-        let (low, high) = bin.delivered.interval();
-        let share = bin.delivered.share().unwrap_or(f64::NAN);
-        Bar::new(&nats(bin), share, &of(bin.delivered))
-            .clear(true)
-            .interval(Some([low, high]))
+    let bins = card.breakdown("by_information")?;
+    let last = bins.lines.last()?;
+    let delivered = |line: &BreakdownLine| bins.count(line, "delivered").unwrap_or_default();
+    let bar = |line: &BreakdownLine| {
+        let delivered = delivered(line);
+        let (low, high) = delivered.interval();
+        Bar::new(
+            &nats(line),
+            delivered.share().unwrap_or(f64::NAN),
+            &of(delivered),
+        )
+        .clear(true)
+        .interval(Some([low, high]))
     };
     let groups = [
         ("listed", "a listed effect is there"),
@@ -23,10 +29,12 @@ pub(super) fn delivered_svg(card: &Scorecard) -> Option<String> {
             label: format!("{label}: share of right answers, 95 % interval"),
             full: Some(1.0),
             per_cent: true,
-            bars: (card.by_information.iter())
-                .filter(|bin| bin.truths == truths)
-                .map(bar)
-                .collect(),
+            bars: (bins
+                .lines
+                .iter()
+                .filter(|line| line.label("truths") == truths))
+            .map(bar)
+            .collect(),
         })
         .filter(|group: &BarGroup| !group.bars.is_empty())
         .collect();
@@ -35,7 +43,7 @@ pub(super) fn delivered_svg(card: &Scorecard) -> Option<String> {
         description: format!(
             "Bars with 95 % intervals; {} {} delivered.",
             nats(last),
-            of(last.delivered)
+            of(delivered(last))
         ),
         groups,
     };
@@ -44,41 +52,34 @@ pub(super) fn delivered_svg(card: &Scorecard) -> Option<String> {
 
 /// Right answers by stated probability; `None` where no effect was stated.
 pub(super) fn reliability_svg(card: &Scorecard) -> Option<String> {
-    let dot = |stated: f64, count: Count| {
-        let (low, high) = count.interval();
+    let dot = |line: &BreakdownLine| {
+        let right = line.counts.first().copied().flatten()?;
+        let (low, high) = right.interval();
         Some(Dot {
-            x: stated,
-            y: count.share()?,
+            x: line.label("stated").as_f64()?,
+            y: right.share()?,
             low,
             high,
         })
     };
-    let points: Vec<Dot> = (card.reliability.iter())
-        .filter_map(|bin| dot(bin.stated, bin.right))
-        .collect();
+    let lines = &card.breakdown("reliability")?.lines;
+    let points: Vec<Dot> = lines.iter().filter_map(dot).collect();
     if points.is_empty() {
         return None;
     }
-    let series = vec![Series::new(
-        "as stated",
-        Style::RECORD,
-        [(0.0, 0.0), (1.0, 1.0)],
-    )];
+    let diagonal = [(0.0, 0.0), (1.0, 1.0)];
+    let series = vec![Series::new("as stated", Style::RECORD, diagonal)];
     let dots = Dots {
         label: "share, 95 % interval".into(),
         points,
     };
     let chart = Chart {
-        title: "How often the effect on top is right".into(),
+        title: "How often the most probable effect is right".into(),
         description:
             "Share of right answers by stated probability, with 95 % intervals; the diagonal is perfect."
                 .into(),
         x: "stated probability".into(),
-        panels: vec![
-            Panel::new("share right", series)
-                .dots(dots)
-                .range(-0.03, 1.03),
-        ],
+        panels: vec![Panel::new("share right", series).dots(dots).range(-0.03, 1.03)],
     };
     Some(chart.svg())
 }

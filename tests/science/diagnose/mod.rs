@@ -16,27 +16,50 @@ use truetwin::record::{Drive, Record, Signal};
 use truetwin::study::StudyFile;
 use truetwin::twin::{Integrator, Noise, Twin};
 
-/// Records of the twin itself, half of them with θ outside the prior: alarms stay within the binomial bound.
-#[test]
-fn a_perfect_twin_is_rarely_accused() {
-    const RECORDS: u64 = 12;
+/// Rate of false alarms that the tests of it claim. Measured: none in 251 sealed trials (docs/withheld.md).
+pub const FALSE_ALARMS: f64 = 0.01;
+
+/// Checks that records of the twins themselves, half of them with θ outside the prior, are rarely called a gap, and that nothing is named
+/// of the first two of each twin.
+fn rarely_accused(records: u64) {
+    let verdict_alone = DiagnoseSettings {
+        detection_only: true,
+        ..DiagnoseSettings::default()
+    };
     let mut alarms = 0;
     for name in ["van-der-pol", "tanks"] {
         let study = study(name);
-        for i in 0..RECORDS / 2 {
+        for i in 0..records / 2 {
             let noise = Noise::new(31, name, i);
-            let outside = i % 2 == 1;
-            let theta = theta(&study, outside, noise);
-            let drive = drive(&study, noise);
-            let found = found(&study, record(study.twin(), "", &theta, drive, noise), None);
-            alarms += usize::from(found.verdict == Verdict::StructuralGap);
+            let theta = theta(&study, i % 2 == 1, noise);
+            let record = record(study.twin(), "", &theta, drive(&study, noise), noise);
+            let found = match i < 2 {
+                true => found(&study, record, None),
+                false => with_settings(&study, record, &verdict_alone),
+            };
+            alarms += u64::from(found.verdict == Verdict::StructuralGap);
             if found.verdict != Verdict::StructuralGap {
                 assert!(found.cause.accepted.is_empty() && found.location.targets.is_empty());
             }
         }
     }
-    let bounds = binomial_bounds(RECORDS, 0.05, 0.99);
-    assert!(alarms as u64 <= *bounds.end(), "{alarms} of {RECORDS}");
+    let most = *binomial_bounds(records, FALSE_ALARMS, 0.99).end();
+    assert!(alarms <= most, "{alarms} of {records}, at most {most}");
+}
+
+/// At most 3 alarms: a version that accuses one perfect twin in five fails with a probability of 0.97.
+#[test]
+fn a_perfect_twin_is_rarely_accused() {
+    rarely_accused(40);
+}
+
+/// At most 10 alarms: a version that accuses one perfect twin in twenty fails with a probability of 0.99.
+///
+/// `cargo test --release --test science a_perfect_twin -- --ignored`
+#[test]
+#[ignore = "minutes; run it in release"]
+fn a_perfect_twin_is_rarely_accused_over_many_records() {
+    rarely_accused(400);
 }
 
 /// Effects that a record shows clearly are detected, located, and named or among the rivals.

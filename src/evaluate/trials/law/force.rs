@@ -21,7 +21,7 @@ pub(in crate::evaluate::trials) enum Wave {
 /// Where a law has a width (`onset`, `width`, `span`, `rounding`), 0 or nothing is its textbook form.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(in crate::evaluate::trials) enum ForceLaw {
+pub(in crate::evaluate::trials) enum ForceDeparture {
     /// Constant once `onset` seconds are over.
     Constant { force: f64, onset: f64 },
     /// −force·sign x; within `width` it grows smoothly.
@@ -48,7 +48,7 @@ pub(in crate::evaluate::trials) enum ForceLaw {
     },
 }
 
-impl ForceLaw {
+impl ForceDeparture {
     /// The term at a moment.
     pub fn at(&self, now: &Moment<'_>) -> f64 {
         let x = |of: usize| now.x[of];
@@ -108,7 +108,7 @@ impl ForceLaw {
 mod tests {
     use super::*;
 
-    fn at(law: &ForceLaw, t: f64, x: [f64; 2]) -> f64 {
+    fn at(law: &ForceDeparture, t: f64, x: [f64; 2]) -> f64 {
         law.at(&Moment {
             t,
             x: &x,
@@ -119,7 +119,7 @@ mod tests {
 
     #[test]
     fn known_values() {
-        let drag = |rounding| ForceLaw::Power {
+        let drag = |rounding| ForceDeparture::Power {
             coefficient: 0.5,
             exponent: 2.0,
             of: 1,
@@ -127,14 +127,14 @@ mod tests {
         };
         assert_eq!(at(&drag(0.0), 0.0, [9.0, -3.0]), 4.5);
         assert!((at(&drag(0.1), 0.0, [9.0, -3.0]) - 4.5).abs() < 0.01);
-        let root = ForceLaw::Power {
+        let root = ForceDeparture::Power {
             coefficient: 1.0,
             exponent: 0.5,
             of: 0,
             rounding: 0.0,
         };
         assert_eq!(at(&root, 0.0, [0.0, 0.0]), 0.0);
-        let triangle = ForceLaw::Periodic {
+        let triangle = ForceDeparture::Periodic {
             amplitude: 2.0,
             frequency: 0.25,
             phase: 0.0,

@@ -14,17 +14,17 @@ mod signal;
 mod tree;
 mod waves;
 
-pub(super) use force::{ForceLaw, Wave};
-pub(super) use parameter::ParameterLaw;
-pub(super) use random::{Argument, Family, RandomLaw, Variable};
-pub(super) use signal::SignalLaw;
+pub(super) use force::{ForceDeparture, Wave};
+pub(super) use parameter::ParameterDeparture;
+pub(super) use random::{Argument, LawFamily, LawVariable, RandomLaw};
+pub(super) use signal::SignalDeparture;
 
 use serde::{Deserialize, Serialize};
 
 /// Place where a system differs from its twin; indices are those of the twin's outline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum Place {
+pub(super) enum DeparturePlace {
     State(usize),
     Actuator(usize),
     Sensor(usize),
@@ -34,11 +34,11 @@ pub(super) enum Place {
 /// Law of a departure.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum Law {
+pub(super) enum DepartureLaw {
     /// Distortion of a sensor's or an actuator's signal.
-    Signal(SignalLaw),
+    Signal(SignalDeparture),
     /// Term in the rate of a state.
-    Force(ForceLaw),
+    Force(ForceDeparture),
     /// The excess of a state over a level is lost, but for a part that another state takes.
     Ceiling {
         level: f64,
@@ -47,12 +47,12 @@ pub(super) enum Law {
         softness: f64,
     },
     /// Factor on a parameter.
-    Parameter(ParameterLaw),
+    Parameter(ParameterDeparture),
     /// Added function: of a rate, of a signal, or of the logarithm of a parameter.
     Random(RandomLaw),
 }
 
-impl Law {
+impl DepartureLaw {
     /// A signal behind a sensor's or actuator's law; `now.own` is the signal before it. Other laws leave it alone.
     pub fn through(&self, now: &Moment<'_>, dt: f64, memory: &mut Vec<f64>) -> f64 {
         match self {
@@ -70,8 +70,8 @@ impl Law {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Departure {
-    pub place: Place,
-    pub law: Law,
+    pub place: DeparturePlace,
+    pub law: DepartureLaw,
 }
 
 /// Values that a law may depend on at one instant.

@@ -5,14 +5,14 @@ use serde::{Deserialize, Serialize};
 /// A factor on a parameter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(in crate::evaluate::trials) enum ParameterLaw {
+pub(in crate::evaluate::trials) enum ParameterDeparture {
     /// 1 + size from `time` on, reached over `ramp` seconds.
     Step { size: f64, time: f64, ramp: f64 },
     /// 1 + rate·t, or exp(rate·t).
     Drift { rate: f64, exponential: bool },
 }
 
-impl ParameterLaw {
+impl ParameterDeparture {
     /// The factor at time `t`.
     pub fn at(&self, t: f64) -> f64 {
         match *self {
@@ -33,7 +33,7 @@ mod tests {
 
     #[test]
     fn a_step_and_its_ramp_meet_at_both_ends() {
-        let law = |ramp| ParameterLaw::Step {
+        let law = |ramp| ParameterDeparture::Step {
             size: 0.5,
             time: 1.0,
             ramp,

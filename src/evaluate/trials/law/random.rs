@@ -20,7 +20,7 @@ pub(in crate::evaluate::trials) enum Generator {
 /// Shape of the functions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(in crate::evaluate::trials) enum Shape {
+pub(in crate::evaluate::trials) enum LawShape {
     Smooth,
     /// With corners.
     Kinked,
@@ -33,19 +33,19 @@ pub(in crate::evaluate::trials) enum Shape {
 /// Family of random functions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(in crate::evaluate::trials) struct Family {
+pub(in crate::evaluate::trials) struct LawFamily {
     pub generator: Generator,
-    pub shape: Shape,
+    pub shape: LawShape,
 }
 
-impl Family {
+impl LawFamily {
     /// All families.
     pub fn all() -> Vec<Self> {
         let shapes = [
-            Shape::Smooth,
-            Shape::Kinked,
-            Shape::Hysteretic,
-            Shape::Memory,
+            LawShape::Smooth,
+            LawShape::Kinked,
+            LawShape::Hysteretic,
+            LawShape::Memory,
         ];
         [Generator::Tree, Generator::Process]
             .into_iter()
@@ -54,13 +54,13 @@ impl Family {
     }
 }
 
-impl fmt::Display for Family {
+impl fmt::Display for LawFamily {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let shape = match self.shape {
-            Shape::Smooth => "smooth",
-            Shape::Kinked => "kinked",
-            Shape::Hysteretic => "hysteretic",
-            Shape::Memory => "memory",
+            LawShape::Smooth => "smooth",
+            LawShape::Kinked => "kinked",
+            LawShape::Hysteretic => "hysteretic",
+            LawShape::Memory => "memory",
         };
         let generator = match self.generator {
             Generator::Tree => "tree",
@@ -73,7 +73,7 @@ impl fmt::Display for Family {
 /// Signal that a law depends on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(in crate::evaluate::trials) enum Variable {
+pub(in crate::evaluate::trials) enum LawVariable {
     State(usize),
     Input(usize),
     Time,
@@ -85,7 +85,7 @@ pub(in crate::evaluate::trials) enum Variable {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(in crate::evaluate::trials) struct Argument {
-    pub variable: Variable,
+    pub variable: LawVariable,
     pub centre: f64,
     pub half_width: f64,
 }
@@ -93,10 +93,10 @@ pub(in crate::evaluate::trials) struct Argument {
 impl Argument {
     fn at(&self, now: &Moment<'_>) -> f64 {
         let value = match self.variable {
-            Variable::State(i) => now.x[i],
-            Variable::Input(j) => now.u[j],
-            Variable::Time => now.t,
-            Variable::Own => now.own,
+            LawVariable::State(i) => now.x[i],
+            LawVariable::Input(j) => now.u[j],
+            LawVariable::Time => now.t,
+            LawVariable::Own => now.own,
         };
         (value - self.centre) / self.half_width
     }
@@ -104,7 +104,7 @@ impl Argument {
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-enum Function {
+enum RandomFunction {
     Tree(Tree),
     Process(Waves),
     /// The larger of two samples: smooth but for a corner.
@@ -115,9 +115,9 @@ enum Function {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(in crate::evaluate::trials) struct RandomLaw {
-    pub family: Family,
+    pub family: LawFamily,
     pub arguments: Vec<Argument>,
-    function: Function,
+    function: RandomFunction,
     /// Play of the first argument, or time constant of its mean in seconds.
     keeps: f64,
     /// Mean and deviation of the function over a record of the twin.
@@ -130,17 +130,17 @@ pub(in crate::evaluate::trials) struct RandomLaw {
 impl RandomLaw {
     /// Draws a law of these arguments; `duration` is that of a record, in seconds.
     pub fn draw(
-        family: Family,
+        family: LawFamily,
         arguments: Vec<Argument>,
         duration: f64,
         source: &mut Source,
     ) -> Self {
-        let (n, kinked) = (arguments.len(), family.shape == Shape::Kinked);
+        let (n, kinked) = (arguments.len(), family.shape == LawShape::Kinked);
         let waves = |source: &mut Source| Waves::draw(n, 0.3 + 0.5 * source.uniform(), source);
         let function = match family.generator {
-            Generator::Tree => Function::Tree(Tree::draw(n, kinked, source)),
-            Generator::Process if kinked => Function::Larger(waves(source), waves(source)),
-            Generator::Process => Function::Process(waves(source)),
+            Generator::Tree => RandomFunction::Tree(Tree::draw(n, kinked, source)),
+            Generator::Process if kinked => RandomFunction::Larger(waves(source), waves(source)),
+            Generator::Process => RandomFunction::Process(waves(source)),
         };
         let part = source.uniform();
         Self {
@@ -148,9 +148,9 @@ impl RandomLaw {
             arguments,
             function,
             keeps: match family.shape {
-                Shape::Hysteretic => 0.3 + 0.5 * part,
-                Shape::Memory => duration * (0.02 + 0.1 * part),
-                Shape::Smooth | Shape::Kinked => 0.0,
+                LawShape::Hysteretic => 0.3 + 0.5 * part,
+                LawShape::Memory => duration * (0.02 + 0.1 * part),
+                LawShape::Smooth | LawShape::Kinked => 0.0,
             },
             mean: 0.0,
             deviation: 1.0,
@@ -181,9 +181,9 @@ impl RandomLaw {
             memory.push(z);
         }
         match self.family.shape {
-            Shape::Hysteretic => memory[0] = memory[0].clamp(z - self.keeps, z + self.keeps),
-            Shape::Memory => memory[0] += (1.0 - (-dt / self.keeps).exp()) * (z - memory[0]),
-            Shape::Smooth | Shape::Kinked => {}
+            LawShape::Hysteretic => memory[0] = memory[0].clamp(z - self.keeps, z + self.keeps),
+            LawShape::Memory => memory[0] += (1.0 - (-dt / self.keeps).exp()) * (z - memory[0]),
+            LawShape::Smooth | LawShape::Kinked => {}
         }
     }
 
@@ -198,22 +198,22 @@ impl RandomLaw {
         for (z, argument) in z.iter_mut().zip(&self.arguments) {
             *z = argument.at(now).clamp(-2.0, 2.0);
         }
-        if matches!(self.family.shape, Shape::Hysteretic | Shape::Memory) {
+        if matches!(self.family.shape, LawShape::Hysteretic | LawShape::Memory) {
             z[0] = memory.first().map_or(z[0], |m| m.clamp(-2.0, 2.0));
         }
         let z = &z[..self.arguments.len()];
         match &self.function {
-            Function::Tree(tree) => tree.at(z),
-            Function::Process(waves) => waves.at(z),
-            Function::Larger(a, b) => a.at(z).max(b.at(z)),
+            RandomFunction::Tree(tree) => tree.at(z),
+            RandomFunction::Process(waves) => waves.at(z),
+            RandomFunction::Larger(a, b) => a.at(z).max(b.at(z)),
         }
     }
 
     /// Returns the expression of a tree, in standardised arguments z1, z2, …
     pub fn formula(&self) -> Option<String> {
         match &self.function {
-            Function::Tree(tree) => Some(tree.to_string()),
-            Function::Process(_) | Function::Larger(..) => None,
+            RandomFunction::Tree(tree) => Some(tree.to_string()),
+            RandomFunction::Process(_) | RandomFunction::Larger(..) => None,
         }
     }
 }
@@ -239,10 +239,10 @@ mod tests {
             centre,
             half_width,
         };
-        for (i, family) in Family::all().into_iter().enumerate() {
+        for (i, family) in LawFamily::all().into_iter().enumerate() {
             let arguments = vec![
-                argument(Variable::State(0), 0.0, 1.0),
-                argument(Variable::Time, 15.0, 15.0),
+                argument(LawVariable::State(0), 0.0, 1.0),
+                argument(LawVariable::Time, 15.0, 15.0),
             ];
             let mut source = Noise::new(3, "families", i as u64).source("law");
             let law = RandomLaw::draw(family, arguments, 30.0, &mut source);

@@ -13,7 +13,7 @@ const FINE: usize = 20;
 /// physics with smooth edges.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(in crate::evaluate::trials) enum SignalLaw {
+pub(in crate::evaluate::trials) enum SignalDeparture {
     /// An offset that is reached with the time constant `settling`, in seconds.
     Bias { offset: f64, settling: f64 },
     /// A factor.
@@ -44,7 +44,7 @@ pub(in crate::evaluate::trials) enum SignalLaw {
     RateLimit { rate: f64, knee: f64 },
 }
 
-impl SignalLaw {
+impl SignalDeparture {
     /// Returns true for a law that acts on the noisy reading, not on the signal before its noise.
     pub fn is_of_readings(&self) -> bool {
         matches!(self, Self::Saturation { .. } | Self::Quantization { .. })
@@ -142,7 +142,7 @@ mod tests {
         (0..200).map(|k| 0.1 * f64::from(k) - 5.0).collect()
     }
 
-    fn distorted(law: &SignalLaw) -> Vec<f64> {
+    fn distorted(law: &SignalDeparture) -> Vec<f64> {
         let mut memory = vec![];
         (ramp().iter().enumerate())
             .map(|(k, v)| law.at(0.1 * k as f64, 0.1, &mut memory, *v))
@@ -152,25 +152,25 @@ mod tests {
     /// Behind a ramp of slope 1 a second both forms of a lag end up τ late, and both of a delay its length.
     #[test]
     fn two_forms_of_one_law_agree_where_theory_says() {
-        let late = |law: SignalLaw| ramp()[199] - distorted(&law)[199];
+        let late = |law: SignalDeparture| ramp()[199] - distorted(&law)[199];
         let (tau, cutoff) = (0.8, 1.0 / (2.0 * PI * 0.8));
-        assert!((late(SignalLaw::LowPass { cutoff }) - tau).abs() < 0.02);
-        assert!((late(SignalLaw::Lag { tau }) - tau).abs() < 0.06);
+        assert!((late(SignalDeparture::LowPass { cutoff }) - tau).abs() < 0.02);
+        assert!((late(SignalDeparture::Lag { tau }) - tau).abs() < 0.06);
         for cubic in [false, true] {
             let delay = 0.734;
-            let late = late(SignalLaw::Delay { delay, cubic });
+            let late = late(SignalDeparture::Delay { delay, cubic });
             assert!((late - delay).abs() < 1e-9, "{late}");
         }
     }
 
     #[test]
     fn smooth_edges_are_smooth_and_close() {
-        let saturation = |knee| SignalLaw::Saturation {
+        let saturation = |knee| SignalDeparture::Saturation {
             low: Some(-2.0),
             high: Some(3.0),
             knee,
         };
-        let zone = |knee| SignalLaw::DeadZone { width: 2.0, knee };
+        let zone = |knee| SignalDeparture::DeadZone { width: 2.0, knee };
         for (hard, soft) in [(saturation(0.0), saturation(0.1)), (zone(0.0), zone(0.1))] {
             let apart = (distorted(&hard).iter().zip(distorted(&soft)))
                 .map(|(a, b)| (a - b).abs())
@@ -183,12 +183,12 @@ mod tests {
 
     #[test]
     fn memories_keep_within_their_limits() {
-        let limited = distorted(&SignalLaw::RateLimit {
+        let limited = distorted(&SignalDeparture::RateLimit {
             rate: 0.5,
             knee: 0.0,
         });
         assert!((limited[199] - limited[99] - 5.0).abs() < 1e-9);
-        let play = distorted(&SignalLaw::Play {
+        let play = distorted(&SignalDeparture::Play {
             width: 1.0,
             compliance: 0.0,
         });

@@ -9,18 +9,18 @@ fn oscillator() -> Study {
     Study::new("van-der-pol", VanDerPol, RecordPlan::autonomous(0.05, 120)).unwrap()
 }
 
-fn two() -> Settings {
-    Settings {
+fn two() -> TrialSettings {
+    TrialSettings {
         trials: 2,
         kinds: vec![Kind::None],
         detection_only: true,
-        ..Settings::default()
+        ..TrialSettings::default()
     }
 }
 
 fn sealed<'a>(
     study: &'a Study,
-    settings: Settings,
+    settings: TrialSettings,
     path: &Path,
 ) -> Result<Sealed<'a>, EvaluateError> {
     Withheld::new(study, settings)?.seal(path, &Progress::silent())
@@ -44,7 +44,7 @@ fn trials_are_gone_on_with_and_keys_stay_as_they_were_sealed() {
     let answer = path.join("answers/0001.json");
     fs::remove_file(&answer).unwrap();
     let mut second = score().unwrap();
-    second.rows[1].seconds = first.rows[1].seconds;
+    second.rows[1].answer.seconds = first.rows[1].answer.seconds;
     assert_eq!(second.rows, first.rows);
     fs::write(&answer, "{").unwrap();
     let error = score().unwrap_err().to_string();
@@ -80,18 +80,18 @@ fn the_same_seed_seals_the_same_keys_and_other_calls_are_refused() {
     let study = oscillator();
     let place = tempfile::tempdir().unwrap();
     let at = |name: &str| place.path().join(name);
-    let all = |trials| Settings {
+    let all = |trials| TrialSettings {
         trials,
-        ..Settings::default()
+        ..TrialSettings::default()
     };
     let one = sealed(&study, all(20), &at("one")).unwrap();
     let two = sealed(&study, all(20), &at("two")).unwrap();
     assert_eq!(one.seal(), two.seal());
-    let refused = |settings: Settings, path: &Path| match sealed(&study, settings, path) {
+    let refused = |settings: TrialSettings, path: &Path| match sealed(&study, settings, path) {
         Ok(_) => panic!("{} was taken", path.display()),
         Err(error) => error.to_string(),
     };
-    let seed = Settings { seed: 2, ..all(20) };
+    let seed = TrialSettings { seed: 2, ..all(20) };
     assert!(refused(seed, &at("one")).contains("seed was 1, now it is 2"));
     assert!(refused(all(21), &at("one")).contains("trials was 20, now it is 21"));
     assert!(refused(all(1), place.path()).contains("no withheld folder"));
@@ -108,11 +108,11 @@ fn the_same_seed_seals_the_same_keys_and_other_calls_are_refused() {
 fn what_a_library_leaves_out_is_known_before_the_keys_are() {
     let study = oscillator();
     let place = tempfile::tempdir().unwrap();
-    let settings = Settings {
+    let settings = TrialSettings {
         trials: 5,
         kinds: vec![Kind::None, Kind::Listed],
         without: true,
-        ..Settings::default()
+        ..TrialSettings::default()
     };
     let sealed = sealed(&study, settings, &place.path().join("t")).unwrap();
     let left_out = sealed.folder.left_out(5).unwrap();
@@ -126,16 +126,16 @@ fn what_a_library_leaves_out_is_known_before_the_keys_are() {
 #[test]
 fn calls_that_cannot_be_made_are_refused_with_the_limit() {
     let study = oscillator();
-    let refused = |settings: Settings| match Withheld::new(&study, settings) {
+    let refused = |settings: TrialSettings| match Withheld::new(&study, settings) {
         Ok(_) => panic!("taken"),
         Err(error) => error.to_string(),
     };
-    let many = Settings {
+    let many = TrialSettings {
         trials: 1_000_000_000_000,
         ..two()
     };
     assert!(refused(many).contains("at most 1000000"));
-    let no_kinds = Settings {
+    let no_kinds = TrialSettings {
         kinds: vec![],
         ..two()
     };
@@ -143,7 +143,7 @@ fn calls_that_cannot_be_made_are_refused_with_the_limit() {
     let text = "twin = 'van-der-pol'\n[library]\nonly = ['actuator-gain']";
     let file = StudyFile::parse(text, Path::new("s.toml")).unwrap();
     let study = oscillator().configure(&file).unwrap();
-    let error = match Withheld::new(&study, Settings::default()) {
+    let error = match Withheld::new(&study, TrialSettings::default()) {
         Ok(_) => panic!("taken"),
         Err(error) => error.to_string(),
     };
@@ -155,21 +155,21 @@ fn a_verdict_alone_is_the_verdict_of_the_whole() {
     let study = oscillator();
     let place = tempfile::tempdir().unwrap();
     let card = |detection_only, name: &str| {
-        let settings = Settings {
+        let settings = TrialSettings {
             trials: 1,
             kinds: vec![Kind::Listed],
             detection_only,
-            ..Settings::default()
+            ..TrialSettings::default()
         };
         let sealed = sealed(&study, settings, &place.path().join(name)).unwrap();
         sealed.score(&Progress::silent()).unwrap()
     };
     let (whole, alone) = (card(false, "whole"), card(true, "verdicts"));
-    let outcome = |card: &Scorecard| card.rows[0].outcome.clone().unwrap();
+    let outcome = |card: &Scorecard| card.rows[0].outcome().cloned().unwrap();
     let (all, only) = (outcome(&whole), outcome(&alone));
     assert_eq!((all.verdict, all.p_value), (only.verdict, only.p_value));
     assert!(only.accepted.is_empty());
-    assert_eq!(whole.rows[0].information, alone.rows[0].information);
+    assert_eq!(whole.rows[0].truth, alone.rows[0].truth);
 }
 
 /// The parts that are taken out are stated, and change no trial.
@@ -178,21 +178,23 @@ fn a_diagnosis_with_parts_taken_out_is_another() {
     let study = oscillator();
     let place = tempfile::tempdir().unwrap();
     let card = |ablated: &[Ablation], name: &str| {
-        let settings = Settings {
+        let settings = TrialSettings {
             trials: 1,
             kinds: vec![Kind::Listed],
             ablated: ablated.to_vec(),
-            ..Settings::default()
+            ..TrialSettings::default()
         };
         let sealed = sealed(&study, settings, &place.path().join(name)).unwrap();
         sealed.score(&Progress::silent()).unwrap()
     };
     let whole = card(&[], "whole");
-    assert!(whole.rows[0].greedy.is_some() && whole.setup.taken_out().is_empty());
+    assert!(whole.rows[0].answer.greedy.is_some() && whole.setup.ablated.is_empty());
     let without = card(&Ablation::ALL, "without");
-    assert_eq!(without.rows[0].information, whole.rows[0].information);
+    assert_eq!(without.rows[0].truth, whole.rows[0].truth);
     let all = "without fitted-noise, unknown-functions, evidence";
-    assert!(without.setup.taken_out().ends_with(all));
+    assert!(
+        without.json()["ablated"].as_array().unwrap().len() == 3 && without.text().contains(all)
+    );
 }
 
 /// Every change of the question is asked, and counted.
@@ -200,14 +202,20 @@ fn a_diagnosis_with_parts_taken_out_is_another() {
 fn steadiness_asks_every_question_again() {
     let study = oscillator();
     let place = tempfile::tempdir().unwrap();
-    let settings = Settings {
+    let settings = TrialSettings {
         steadiness: 1,
         ..two()
     };
     let sealed = sealed(&study, settings, &place.path().join("t")).unwrap();
     let card = sealed.score(&Progress::silent()).unwrap();
-    let asked: Vec<(&str, u64)> = (card.steadiness.iter())
-        .map(|s| (s.change.as_str(), s.same.of))
+    let repeats = card.breakdown("steadiness").unwrap();
+    let asked: Vec<(&str, u64)> = (repeats.lines.iter())
+        .map(|line| {
+            (
+                line.label("change").as_str().unwrap(),
+                line.counts[0].unwrap().of,
+            )
+        })
         .collect();
     assert_eq!(
         asked,

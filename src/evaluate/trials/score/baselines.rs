@@ -1,85 +1,101 @@
 //! Simple answers to the same trials.
 
-use super::count::Count;
+use super::breakdown::{Breakdown, BreakdownLine};
 use crate::effect::EffectKey;
-use crate::evaluate::trials::row::{Fate, Row};
-use serde::Serialize;
+use crate::evaluate::Count;
+use crate::evaluate::trials::row::{Fate, TrialRow};
+use serde_json::json;
 use std::collections::BTreeMap;
 
-/// Scores of one way to answer.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Baseline {
-    pub name: &'static str,
-    /// Verdicts that are right, of all trials.
-    pub verdict: Count,
-    /// Answers that are right and complete, or rightly quiet, of all trials.
-    pub right: Count,
-    /// Places that are right, of trials with a gap; none for a way that states no place.
-    #[serde(rename = "where")]
-    pub place: Option<Count>,
-}
+/// An answer to one trial: whether it states a gap, its worth, its place where answers of its kind have one.
+type Claim<'r> = (bool, Fate, Option<Option<&'r str>>);
 
-fn is_right(fate: Fate) -> bool {
-    matches!(fate, Fate::Delivered | Fate::Quiet)
-}
-
-/// The diagnosis, and what it is to be held against. A null whose twin steps too coarsely is left out.
-pub(super) fn baselines(rows: &[Row]) -> Vec<Baseline> {
-    let over = |count: &dyn Fn(&Row) -> bool| Count::over(rows, |row| !row.is_coarse(), count);
-    let gaps = |count: &dyn Fn(&Row) -> bool| Count::over(rows, |row| !row.is_null(), count);
-    let constant = |name, structural: bool, accepted: &[String]| Baseline {
-        name,
-        verdict: over(&|row| structural != row.is_null()),
-        right: over(&|row| is_right(row.fate_of(structural, accepted, || false))),
-        place: None,
-    };
+/// The diagnosis and the simple answers that it is compared with. A null whose twin steps too coarsely is left out.
+pub(super) fn baselines(rows: &[TrialRow]) -> Breakdown {
     let commonest = commonest(rows);
-    let accepted: Vec<String> = (commonest.iter())
+    let always: Vec<String> = (commonest.iter())
         .filter(|truth| truth.parse::<EffectKey>().is_ok())
         .cloned()
         .collect();
     let is_gap = commonest.as_deref().is_some_and(|truth| truth != "nothing");
-    let correlated = |row: &Row| {
-        let place = row.correlated.as_ref();
-        place.is_some_and(|place| row.is_true_place(place))
+    let naming = |row: &TrialRow, structural: bool, accepted: &[String]| {
+        (structural, row.fate_of(structural, accepted))
     };
-    vec![
-        Baseline {
-            name: "diagnosis",
-            verdict: over(&|row| row.outcome.is_some() && row.called() != row.is_null()),
-            right: over(&|row| is_right(row.fate())),
-            place: Some(gaps(&|row| row.called() && row.place_is_right())),
-        },
-        Baseline {
-            name: "largest residual correlation",
-            verdict: over(&|row| row.correlated.is_some() != row.is_null()),
-            right: over(&|row| is_right(row.fate_of(row.correlated.is_some(), &[], || false))),
-            place: Some(gaps(&correlated)),
-        },
-        Baseline {
-            name: "forward selection by BIC, declared noise",
-            verdict: over(&|row| selected(row).is_empty() == row.is_null()),
-            right: over(&|row| {
-                is_right(row.fate_of(!selected(row).is_empty(), selected(row), || false))
-            }),
-            place: None,
-        },
-        constant("always no gap", false, &[]),
-        constant("always the most frequent truth", is_gap, &accepted),
-    ]
+    let unplaced = |(structural, fate)| (structural, fate, None);
+    let lines = vec![
+        line("diagnosis", rows, |row| {
+            let place = row.outcome().filter(|_| row.called());
+            let place = place.and_then(|o| o.target.as_deref());
+            (row.called(), row.fate(), Some(place))
+        }),
+        line("largest residual correlation", rows, |row| {
+            let place = row.answer.correlated.as_deref();
+            let (structural, fate) = naming(row, place.is_some(), &[]);
+            (structural, fate, Some(place))
+        }),
+        line("forward selection by BIC, declared noise", rows, |row| {
+            let selected = row.answer.greedy.as_deref().unwrap_or_default();
+            unplaced(naming(row, !selected.is_empty(), selected))
+        }),
+        line("always no gap", rows, |row| {
+            unplaced(naming(row, false, &[]))
+        }),
+        line("always the most frequent truth", rows, |row| {
+            unplaced(naming(row, is_gap, &always))
+        }),
+    ];
+    Breakdown {
+        key: "baselines",
+        columns: vec![
+            ("verdict", "verdict right"),
+            ("right", "answer right"),
+            ("where", "place right"),
+        ],
+        lines,
+    }
 }
 
-/// Effects that forward selection added; none where it failed or was not asked.
-fn selected(row: &Row) -> &[String] {
-    row.greedy.as_deref().unwrap_or_default()
+/// Verdicts and answers that are right, of all trials; places that are right, of trials with a gap.
+fn line<'r>(
+    name: &str,
+    rows: &'r [TrialRow],
+    claim: impl Fn(&'r TrialRow) -> Claim<'r>,
+) -> BreakdownLine {
+    let claims: Vec<(&TrialRow, Claim<'_>)> = rows.iter().map(|row| (row, claim(row))).collect();
+    let sum = |case: &dyn Fn(&TrialRow, &Claim<'_>) -> Count| -> Count {
+        claims.iter().map(|(row, claim)| case(row, claim)).sum()
+    };
+    let verdict = sum(&|row, (structural, fate, _)| {
+        let is_right = *fate != Fate::Failed && *structural != row.is_null();
+        Count::case(!row.is_coarse_null(), is_right)
+    });
+    let right = sum(&|row, (_, fate, _)| {
+        Count::case(
+            !row.is_coarse_null(),
+            matches!(fate, Fate::Delivered | Fate::Quiet),
+        )
+    });
+    let place = sum(&|row, (.., place)| {
+        let is_right = place
+            .flatten()
+            .is_some_and(|place| row.is_true_place(place));
+        Count::case(place.is_some() && !row.is_null(), is_right)
+    });
+    let has_place = claims.iter().any(|(_, (.., place))| place.is_some());
+    let counts = [
+        Some(verdict),
+        Some(right),
+        Some(place).filter(|_| has_place),
+    ];
+    BreakdownLine::new(json!({ "name": name }), counts)
 }
 
 /// The truth of most trials.
-fn commonest(rows: &[Row]) -> Option<String> {
-    let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
-    for row in rows.iter().filter(|row| !row.is_coarse()) {
-        *counts.entry(&row.truth.name).or_default() += 1;
+fn commonest(rows: &[TrialRow]) -> Option<String> {
+    let mut counts: BTreeMap<String, u64> = BTreeMap::new();
+    for row in rows.iter().filter(|row| !row.is_coarse_null()) {
+        *counts.entry(row.truth_name()).or_default() += 1;
     }
-    let most = counts.iter().max_by_key(|(_, count)| **count);
-    most.map(|(truth, _)| (*truth).to_owned())
+    let most = counts.into_iter().max_by_key(|(_, count)| *count);
+    most.map(|(truth, _)| truth)
 }

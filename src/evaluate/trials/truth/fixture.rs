@@ -3,15 +3,15 @@
 use super::sizing::Stage;
 use crate::evaluate::trials::draft::Draft;
 use crate::evaluate::trials::information::Information;
-use crate::evaluate::trials::law::Place;
+use crate::evaluate::trials::law::DeparturePlace;
+use crate::evaluate::trials::listed::Variant;
 use crate::evaluate::trials::scene::Scene;
-use crate::evaluate::trials::variant::Variant;
-use crate::evaluate::trials::world::{Conditions, Draws, World};
+use crate::evaluate::trials::world::{Conditions, RecordNoise, World};
 use crate::study::Study;
 use crate::twin::Noise;
 
 /// A listed law of positive sign and its first shape.
-pub(super) fn plain(id: &str, place: Place) -> Draft {
+pub(super) fn plain(id: &str, place: DeparturePlace) -> Draft {
     Draft::variant(id, place, None, Variant::of(id)[0]).unwrap()
 }
 
@@ -25,7 +25,7 @@ pub(super) fn on_stage<R>(
     let conditions = Conditions::declared();
     let noise = Noise::new(1, "theory", 0);
     let drive = study.drives().unwrap().draw(noise).unwrap();
-    let draws = Draws::of(noise);
+    let draws = RecordNoise::of(noise);
     let scene = Scene::new(&world, theta, &drive, draws).unwrap();
     let stage = Stage {
         world: &world,

@@ -13,7 +13,7 @@ use super::sizing::{FIRST, Sized, Stage};
 use crate::evaluate::EvaluateError;
 use crate::evaluate::trials::draft::Draft;
 use crate::evaluate::trials::information::{Change, Information, Match};
-use crate::evaluate::trials::variant::{Variant, is_proportional, is_signed};
+use crate::evaluate::trials::listed::{ListedLaw, Sign, Variant};
 
 /// An effect is a right answer if it leaves less than this share of the information, and less than this in nats.
 const IMITATES: (f64, f64) = (0.02, 1.0);
@@ -146,11 +146,10 @@ fn screened(
     };
     let nats = information.nats(&small);
     let small = information.matched(&sized.change, &small);
-    let is_signed = is_signed(&effect.id);
-    let sign = if is_signed {
-        small.multiple.signum()
-    } else {
-        1.0
+    let signs = ListedLaw::named(&effect.id).map_or(Sign::One, |law| law.sign);
+    let sign = match signs.is_both() {
+        true => small.multiple.signum(),
+        false => 1.0,
     };
     let Some(draft) = draft(Variant { sign, ..variant }) else {
         return Ok(None);
@@ -161,7 +160,7 @@ fn screened(
         size: FIRST * sign * small.multiple,
         unexplained: small.unexplained,
     };
-    if !is_proportional(&effect.id) || (best.size > 0.0 && small.unexplained < UNLIKE) {
+    if signs == Sign::Threshold || (best.size > 0.0 && small.unexplained < UNLIKE) {
         // An end of a range, a play, a level at its limit: the size at which the effect changes as much as the departure does.
         let same = match nats > 0.0 {
             true => FIRST * (information.nats(&sized.change) / nats).sqrt(),

@@ -38,13 +38,13 @@ pub(crate) struct Rival {
 /// Difference between system and twin in a trial: the key that is sealed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Truth {
+pub(crate) struct Truth {
     pub trial: usize,
     pub kind: Kind,
     /// True parameters of the twin.
     pub theta: Vec<f64>,
-    pub conditions: Conditions,
-    pub departures: Vec<Departure>,
+    pub(super) conditions: Conditions,
+    pub(super) departures: Vec<Departure>,
     /// Names of the departures: `id@target`, or the family of a random law and its place.
     pub labels: Vec<String>,
     /// Expressions of random laws, in standardised arguments.

@@ -3,7 +3,7 @@
 use crate::evaluate::trials::Kind;
 use crate::evaluate::trials::draft::index;
 use crate::evaluate::trials::scene::Scene;
-use crate::evaluate::trials::world::{Conditions, Feedback, Nuisance};
+use crate::evaluate::trials::world::{Conditions, Feedback, NuisanceKind};
 use crate::twin::{Parameter, ParameterSpace, Role, Source};
 
 /// Probability that a trial has a nuisance.
@@ -72,16 +72,20 @@ pub(super) fn theta(
 }
 
 /// Kinds of nuisance that a twin can have.
-pub(super) fn nuisances(scene: &Scene, is_noisy: bool) -> Vec<Nuisance> {
+pub(super) fn nuisances(scene: &Scene, is_noisy: bool) -> Vec<NuisanceKind> {
     let has_states = !scene.states.is_empty();
-    let mut all = vec![Nuisance::Gaps];
+    let mut all = vec![NuisanceKind::Gaps];
     if is_noisy {
-        all.extend([Nuisance::Level, Nuisance::Coloured, Nuisance::HeavyTailed]);
+        all.extend([
+            NuisanceKind::Level,
+            NuisanceKind::Coloured,
+            NuisanceKind::HeavyTailed,
+        ]);
     }
     if has_states {
-        all.push(Nuisance::Start);
+        all.push(NuisanceKind::Start);
         if !scene.inputs.is_empty() {
-            all.push(Nuisance::ClosedLoop);
+            all.push(NuisanceKind::ClosedLoop);
         }
     }
     all
@@ -91,7 +95,7 @@ pub(super) fn nuisances(scene: &Scene, is_noisy: bool) -> Vec<Nuisance> {
 pub(super) fn conditions(
     scene: &Scene,
     is_silent: bool,
-    allowed: &[Nuisance],
+    allowed: &[NuisanceKind],
     source: &mut Source,
 ) -> Conditions {
     let mut conditions = Conditions::declared();
@@ -107,20 +111,20 @@ pub(super) fn conditions(
     let choice = (choice * allowed.len() as f64) as usize;
     conditions.nuisance = allowed[choice.min(allowed.len() - 1)];
     match conditions.nuisance {
-        Nuisance::None => {}
-        Nuisance::Level => {
+        NuisanceKind::None => {}
+        NuisanceKind::Level => {
             let mut factor = || FACTOR.powf(between(source, -1.0, 1.0));
             (conditions.process, conditions.measurement) = (factor(), factor());
         }
-        Nuisance::Coloured => conditions.colour = between(source, 0.3, 0.9),
-        Nuisance::HeavyTailed => conditions.freedom = Some(3 + index(source, 3) as u32),
-        Nuisance::Start => {
+        NuisanceKind::Coloured => conditions.colour = between(source, 0.3, 0.9),
+        NuisanceKind::HeavyTailed => conditions.freedom = Some(3 + index(source, 3) as u32),
+        NuisanceKind::Start => {
             conditions.start = (scene.states.iter())
                 .map(|size| 0.3 * size.deviation * source.normal())
                 .collect();
         }
-        Nuisance::ClosedLoop => conditions.feedback = feedback(scene, source),
-        Nuisance::Gaps => conditions.gaps = between(source, 0.05, 0.2),
+        NuisanceKind::ClosedLoop => conditions.feedback = feedback(scene, source),
+        NuisanceKind::Gaps => conditions.gaps = between(source, 0.05, 0.2),
     }
     conditions
 }

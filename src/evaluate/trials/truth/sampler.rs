@@ -7,12 +7,13 @@ use super::prior::{conditions, has_room, nuisances, theta};
 use super::reject::Reject;
 use super::sizing::Stage;
 use crate::evaluate::EvaluateError;
-use crate::evaluate::trials::draft::{Draft, Form, index};
+use crate::evaluate::trials::draft::{Draft, index};
 use crate::evaluate::trials::information::Information;
-use crate::evaluate::trials::places::Places;
+use crate::evaluate::trials::listed::LawForm;
+use crate::evaluate::trials::places::TwinPlaces;
 use crate::evaluate::trials::scene::Scene;
 use crate::evaluate::trials::structure::Structure;
-use crate::evaluate::trials::world::{Conditions, Draws, System, World};
+use crate::evaluate::trials::world::{Conditions, RecordNoise, System, World};
 use crate::evaluate::trials::{Families, Kind};
 use crate::record::{Drive, Record, Signal};
 use crate::study::{DriveSource, Study};
@@ -51,7 +52,7 @@ pub(in crate::evaluate::trials) struct Extra {
 pub(in crate::evaluate::trials) struct TruthSampler<'a> {
     study: &'a Study,
     world: World,
-    places: Places,
+    places: TwinPlaces,
     space: ParameterSpace,
     plan: Plan,
     listed: Vec<Listed>,
@@ -67,7 +68,7 @@ impl<'a> TruthSampler<'a> {
         like: Option<&Record>,
     ) -> Result<Self, EvaluateError> {
         let twin = study.twin();
-        let places = Places::new(twin);
+        let places = TwinPlaces::new(twin);
         let plan = match like {
             Some(record) => {
                 record.check_channels(&twin.signals())?;
@@ -101,7 +102,9 @@ impl<'a> TruthSampler<'a> {
         let noise = Noise::new(1, "silence", 0);
         let drive = self.drive(noise)?;
         let outputs = |i: u64| {
-            let run = self.world.run(system, &drive, Draws::of(noise.sample(i)));
+            let run = self
+                .world
+                .run(system, &drive, RecordNoise::of(noise.sample(i)));
             run.map(|run| run.outputs)
         };
         Ok(matches!((outputs(0), outputs(1)), (Some(a), Some(b)) if a == b))
@@ -180,7 +183,7 @@ impl<'a> TruthSampler<'a> {
         let source = &mut noise.source("truth");
         let theta = theta(kind, &self.space, self.space.draw_prior(noise), source);
         let drive = self.drive(noise)?;
-        let draws = Draws::of(noise);
+        let draws = RecordNoise::of(noise);
         let Some(scene) = Scene::new(&self.world, &theta, &drive, draws) else {
             return Ok(Err(Reject::Diverged));
         };
@@ -297,8 +300,8 @@ impl<'a> TruthSampler<'a> {
         source: &mut Source,
     ) -> Option<Vec<(Draft, Option<String>)>> {
         let form = match kind {
-            Kind::Otherwise => Form::Other,
-            _ => Form::Listed,
+            Kind::Otherwise => LawForm::Other,
+            _ => LawForm::Listed,
         };
         let listed = |among: &[&Listed], source: &mut Source| {
             let chosen = *among.get(index(source, among.len().max(1)))?;
@@ -351,7 +354,7 @@ impl<'a> TruthSampler<'a> {
             departures: &truth.departures,
             conditions: &truth.conditions,
         };
-        let run = self.world.run(system, drive, Draws::of(noise))?;
+        let run = self.world.run(system, drive, RecordNoise::of(noise))?;
         if !scene.is_near(&run) {
             return None;
         }

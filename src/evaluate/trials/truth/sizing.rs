@@ -6,7 +6,7 @@ use crate::evaluate::trials::draft::Draft;
 use crate::evaluate::trials::information::{Change, Information};
 use crate::evaluate::trials::law::Departure;
 use crate::evaluate::trials::scene::Scene;
-use crate::evaluate::trials::world::{Conditions, Draws, System, World};
+use crate::evaluate::trials::world::{Conditions, RecordNoise, System, World};
 use crate::record::{Drive, Record};
 
 /// First size that is tried: small.
@@ -29,7 +29,7 @@ pub(super) struct Stage<'a> {
     pub theta: &'a [f64],
     pub conditions: &'a Conditions,
     pub drive: &'a Drive,
-    pub draws: Draws,
+    pub draws: RecordNoise,
     pub scene: &'a Scene,
 }
 
@@ -55,7 +55,7 @@ impl Stage<'_> {
         Some([own?, again?])
     }
 
-    fn record(&self, departures: &[Departure], draws: Draws) -> Option<Record> {
+    fn record(&self, departures: &[Departure], draws: RecordNoise) -> Option<Record> {
         let system = System {
             theta: self.theta,
             departures,

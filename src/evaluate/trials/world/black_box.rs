@@ -1,7 +1,7 @@
 //! A world of a simulator: departures before its inputs, after its outputs, and of its parameters.
 
-use super::{Draws, Run, System};
-use crate::evaluate::trials::law::{Law, Moment, Place};
+use super::{RecordNoise, System, WorldRun};
+use crate::evaluate::trials::law::{DepartureLaw, DeparturePlace, Moment};
 use crate::record::{Drive, Signal};
 use crate::twin::DigitalTwin;
 
@@ -15,11 +15,11 @@ pub(super) fn run(
     twin: &dyn DigitalTwin,
     system: System<'_>,
     drive: &Drive,
-    draws: Draws,
-) -> Option<Run> {
+    draws: RecordNoise,
+) -> Option<WorldRun> {
     let mut inputs = drive.inputs().clone();
     for departure in system.departures {
-        if let Place::Actuator(j) = departure.place {
+        if let DeparturePlace::Actuator(j) = departure.place {
             pass(&departure.law, j, drive, &mut inputs);
         }
     }
@@ -31,8 +31,9 @@ pub(super) fn run(
         .collect();
     for late in [false, true] {
         for departure in system.departures {
-            if let Place::Sensor(j) = departure.place {
-                let is_late = matches!(&departure.law, Law::Signal(law) if law.is_of_readings());
+            if let DeparturePlace::Sensor(j) = departure.place {
+                let is_late =
+                    matches!(&departure.law, DepartureLaw::Signal(law) if law.is_of_readings());
                 if is_late == late {
                     pass(&departure.law, j, drive, &mut outputs);
                 }
@@ -51,7 +52,7 @@ pub(super) fn run(
     }
     conditions.empty(&mut outputs, draws.process);
     let none = Signal::zeros((drive.samples(), 0));
-    Some(Run {
+    Some(WorldRun {
         drive: drive.clone(),
         outputs,
         states: none.clone(),
@@ -65,10 +66,10 @@ fn simulated(
     twin: &dyn DigitalTwin,
     system: System<'_>,
     drive: &Drive,
-    draws: Draws,
+    draws: RecordNoise,
 ) -> Option<Signal> {
     let changing = (system.departures.iter()).find_map(|departure| match departure.place {
-        Place::Parameter(i) => Some((i, &departure.law)),
+        DeparturePlace::Parameter(i) => Some((i, &departure.law)),
         _ => None,
     });
     let one = |theta: &[f64]| twin.simulate(theta, drive, draws.process).ok();
@@ -85,8 +86,8 @@ fn simulated(
                 own: system.theta[i],
             };
             let factor = match law {
-                Law::Parameter(law) => law.at(now.t),
-                Law::Random(law) => {
+                DepartureLaw::Parameter(law) => law.at(now.t),
+                DepartureLaw::Random(law) => {
                     law.remember(&now, drive.step(k), &mut memory);
                     law.at(&now, &memory).clamp(-5.0, 5.0).exp()
                 }
@@ -118,7 +119,7 @@ fn simulated(
 }
 
 /// Puts one channel of a signal through a law.
-fn pass(law: &Law, channel: usize, drive: &Drive, signal: &mut Signal) {
+fn pass(law: &DepartureLaw, channel: usize, drive: &Drive, signal: &mut Signal) {
     let mut memory = vec![];
     for k in 0..drive.samples() {
         let now = Moment {
@@ -134,7 +135,7 @@ fn pass(law: &Law, channel: usize, drive: &Drive, signal: &mut Signal) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::trials::law::{Departure, ParameterLaw, SignalLaw};
+    use crate::evaluate::trials::law::{Departure, ParameterDeparture, SignalDeparture};
     use crate::evaluate::trials::world::Conditions;
     use crate::twin::Noise;
     use crate::twin::fixture::AtOnce;
@@ -154,25 +155,25 @@ mod tests {
                 &AtOnce::<1>(|a, u| a[0] * u),
                 system,
                 &drive,
-                Draws::of(Noise::OFF),
+                RecordNoise::of(Noise::OFF),
             )
             .unwrap()
             .outputs
         };
         let bias = || {
-            Law::Signal(SignalLaw::Bias {
+            DepartureLaw::Signal(SignalDeparture::Bias {
                 offset: 0.5,
                 settling: 0.0,
             })
         };
-        assert_eq!(made(Place::Sensor(0), bias())[[4, 0]], 2.5);
-        assert_eq!(made(Place::Actuator(0), bias())[[4, 0]], 2.5);
-        let step = Law::Parameter(ParameterLaw::Step {
+        assert_eq!(made(DeparturePlace::Sensor(0), bias())[[4, 0]], 2.5);
+        assert_eq!(made(DeparturePlace::Actuator(0), bias())[[4, 0]], 2.5);
+        let step = DepartureLaw::Parameter(ParameterDeparture::Step {
             size: 0.5,
             time: 5.0,
             ramp: 0.0,
         });
-        let stepped = made(Place::Parameter(0), step);
+        let stepped = made(DeparturePlace::Parameter(0), step);
         assert!((stepped[[4, 0]] - 2.0).abs() < 1e-9 && (stepped[[5, 0]] - 3.0).abs() < 1e-9);
     }
 }

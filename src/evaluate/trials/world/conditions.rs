@@ -11,7 +11,7 @@ const GAP: f64 = 4.0;
 /// Kind of condition that the twin does not describe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(in crate::evaluate::trials) enum Nuisance {
+pub(in crate::evaluate::trials) enum NuisanceKind {
     /// Everything as declared.
     None,
     /// Noise levels other than those declared.
@@ -28,7 +28,7 @@ pub(in crate::evaluate::trials) enum Nuisance {
     Gaps,
 }
 
-impl fmt::Display for Nuisance {
+impl fmt::Display for NuisanceKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::None => "none",
@@ -56,7 +56,7 @@ pub(in crate::evaluate::trials) struct Feedback {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(in crate::evaluate::trials) struct Conditions {
-    pub nuisance: Nuisance,
+    pub nuisance: NuisanceKind,
     /// Factors on the declared standard deviations.
     pub process: f64,
     pub measurement: f64,
@@ -77,7 +77,7 @@ impl Conditions {
     /// The conditions that the twin describes.
     pub fn declared() -> Self {
         Self {
-            nuisance: Nuisance::None,
+            nuisance: NuisanceKind::None,
             process: 1.0,
             measurement: 1.0,
             colour: 0.0,

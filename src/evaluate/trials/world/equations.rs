@@ -1,7 +1,7 @@
 //! A world of equations: Runge–Kutta steps of its own, ten a sample.
 
-use super::{Draws, Run, System};
-use crate::evaluate::trials::law::{Departure, Law, Moment, Place, above};
+use super::{RecordNoise, System, WorldRun};
+use crate::evaluate::trials::law::{Departure, DepartureLaw, DeparturePlace, Moment, above};
 use crate::record::{Drive, Signal};
 use crate::twin::{Acting, DeadTime, Interval, Noise, Now, StateSpace};
 use ndarray::ArrayView1;
@@ -16,8 +16,8 @@ pub(super) fn run(
     twin: &dyn StateSpace,
     system: System<'_>,
     drive: &Drive,
-    draws: Draws,
-) -> Option<Run> {
+    draws: RecordNoise,
+) -> Option<WorldRun> {
     let outline = twin.outline();
     let (n, p) = (outline.states.len(), outline.outputs.len());
     let conditions = system.conditions;
@@ -105,7 +105,7 @@ pub(super) fn run(
     }
     twin.corrupt_outputs(system.theta, draws.measurement, &mut outputs);
     conditions.empty(&mut outputs, draws.process);
-    Some(Run {
+    Some(WorldRun {
         drive: drive.with_inputs(inputs).ok()?,
         outputs,
         states,
@@ -179,7 +179,7 @@ impl Plant<'_> {
     fn inputs(&mut self, t: f64, dt: f64, x: &[f64], command: &[f64]) -> Vec<f64> {
         let mut u = command.to_vec();
         for (departure, memory) in self.departures.iter().zip(&mut self.memories) {
-            if let Place::Actuator(j) = departure.place {
+            if let DeparturePlace::Actuator(j) = departure.place {
                 let now = Moment {
                     t,
                     x,
@@ -197,8 +197,10 @@ impl Plant<'_> {
         let mut theta = own.to_vec();
         for (departure, memory) in self.departures.iter().zip(&mut self.memories) {
             match (departure.place, &departure.law) {
-                (Place::Parameter(i), Law::Parameter(law)) => theta[i] *= law.at(t),
-                (Place::Parameter(i), Law::Random(law)) => {
+                (DeparturePlace::Parameter(i), DepartureLaw::Parameter(law)) => {
+                    theta[i] *= law.at(t)
+                }
+                (DeparturePlace::Parameter(i), DepartureLaw::Random(law)) => {
                     let now = Moment {
                         t,
                         x,
@@ -208,7 +210,7 @@ impl Plant<'_> {
                     law.remember(&now, dt, memory);
                     theta[i] *= law.at(&now, memory).clamp(-5.0, 5.0).exp();
                 }
-                (Place::State(i), Law::Random(law)) => {
+                (DeparturePlace::State(i), DepartureLaw::Random(law)) => {
                     let now = Moment { t, x, u, own: x[i] };
                     law.remember(&now, dt, memory);
                 }
@@ -221,10 +223,10 @@ impl Plant<'_> {
     /// Puts the outputs through the sensors' laws, before or after their noise.
     fn sense(&mut self, t: f64, dt: f64, x: &[f64], u: &[f64], readings: bool, y: &mut [f64]) {
         for (departure, memory) in self.departures.iter().zip(&mut self.memories) {
-            let Place::Sensor(j) = departure.place else {
+            let DeparturePlace::Sensor(j) = departure.place else {
                 continue;
             };
-            let late = matches!(&departure.law, Law::Signal(law) if law.is_of_readings());
+            let late = matches!(&departure.law, DepartureLaw::Signal(law) if law.is_of_readings());
             if late == readings {
                 let now = Moment { t, x, u, own: y[j] };
                 y[j] = departure.law.through(&now, dt, memory);
@@ -257,10 +259,10 @@ impl Plant<'_> {
                     own: 0.0,
                 };
                 for (departure, memory) in self.departures.iter().zip(&self.memories) {
-                    if let Place::State(i) = departure.place {
+                    if let DeparturePlace::State(i) = departure.place {
                         self.slopes[stage][i] += match &departure.law {
-                            Law::Force(law) => law.at(&moment),
-                            Law::Random(law) => law.at(&moment, memory),
+                            DepartureLaw::Force(law) => law.at(&moment),
+                            DepartureLaw::Random(law) => law.at(&moment, memory),
                             _ => 0.0,
                         };
                     }
@@ -278,8 +280,8 @@ impl Plant<'_> {
     fn overflow(&self, x: &mut [f64]) {
         for departure in self.departures {
             if let (
-                Place::State(i),
-                Law::Ceiling {
+                DeparturePlace::State(i),
+                DepartureLaw::Ceiling {
                     level,
                     spill,
                     to,
@@ -306,7 +308,7 @@ impl Plant<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::trials::law::ForceLaw;
+    use crate::evaluate::trials::law::ForceDeparture;
     use crate::evaluate::trials::world::Conditions;
     use crate::twin::{DigitalTwin, Integrator, Outline, Parameter};
 
@@ -337,11 +339,11 @@ mod tests {
         }
     }
 
-    fn draws(noise: Noise) -> Draws {
-        Draws::of(noise)
+    fn draws(noise: Noise) -> RecordNoise {
+        RecordNoise::of(noise)
     }
 
-    fn made(noise: f64, departures: &[Departure], conditions: &Conditions) -> Run {
+    fn made(noise: f64, departures: &[Departure], conditions: &Conditions) -> WorldRun {
         let drive = Drive::new(0.1, Signal::from_elem((200, 1), 0.5)).unwrap();
         let system = System {
             theta: &[0.7],
@@ -360,8 +362,8 @@ mod tests {
             assert!((a - b).abs() < 1e-6, "{a} {b}");
         }
         let force = Departure {
-            place: Place::State(0),
-            law: Law::Force(ForceLaw::Constant {
+            place: DeparturePlace::State(0),
+            law: DepartureLaw::Force(ForceDeparture::Constant {
                 force: 0.2,
                 onset: 0.0,
             }),

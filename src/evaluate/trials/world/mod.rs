@@ -7,7 +7,7 @@ mod black_box;
 mod conditions;
 mod equations;
 
-pub(super) use conditions::{Conditions, Feedback, Nuisance};
+pub(super) use conditions::{Conditions, Feedback, NuisanceKind};
 
 use super::law::Departure;
 use crate::record::{Drive, Signal};
@@ -31,7 +31,7 @@ pub(super) struct System<'s> {
 
 /// Everything random in one record, in two parts that can be drawn apart.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Draws {
+pub(super) struct RecordNoise {
     /// Process noise, start, gaps.
     pub process: Noise,
     pub measurement: Noise,
@@ -39,7 +39,7 @@ pub(super) struct Draws {
     pub sign: f64,
 }
 
-impl Draws {
+impl RecordNoise {
     /// Draws of one record.
     pub fn of(noise: Noise) -> Self {
         Self {
@@ -68,7 +68,7 @@ impl Draws {
 
 /// A record of a world, with what no sensor sees.
 #[derive(Debug, Clone)]
-pub(super) struct Run {
+pub(super) struct WorldRun {
     /// Inputs as commanded.
     pub drive: Drive,
     /// Outputs, NaN where one is missing.
@@ -94,7 +94,7 @@ impl World {
     }
 
     /// Makes a record; `None` where the system diverges.
-    pub fn run(&self, system: System<'_>, drive: &Drive, draws: Draws) -> Option<Run> {
+    pub fn run(&self, system: System<'_>, drive: &Drive, draws: RecordNoise) -> Option<WorldRun> {
         match self {
             Self::Equations(twin) => equations::run(twin.as_ref(), system, drive, draws),
             Self::BlackBox(twin) => black_box::run(twin.as_ref(), system, drive, draws),

@@ -1,8 +1,8 @@
 //! Exact equivalents are right answers, and the same with the other sign are not.
 
 use super::*;
-use crate::evaluate::trials::law::Place;
-use crate::evaluate::trials::places::Places;
+use crate::evaluate::trials::law::DeparturePlace;
+use crate::evaluate::trials::places::TwinPlaces;
 use crate::evaluate::trials::truth::fixture::on_stage;
 use crate::study::{RecordPlan, Study};
 use crate::twin::{Now, Outline, Parameter, StateSpace, Stepping};
@@ -39,10 +39,10 @@ impl StateSpace for Vessel {
 }
 
 /// Right answers to a departure of about 40 nats; its rival is none of them and leaves less than all.
-fn right(id: &str, place: Place, sign: f64) -> Vec<String> {
+fn right(id: &str, place: DeparturePlace, sign: f64) -> Vec<String> {
     let plan = RecordPlan::levels(0.3, 200, 1.0, 3.0, 10);
     let study = Study::new("vessel", Vessel, plan).unwrap();
-    let listed = Listed::all(&study, &Places::new(study.twin()));
+    let listed = Listed::all(&study, &TwinPlaces::new(study.twin()));
     let variant = *Variant::of(id).last().unwrap();
     let variant = Variant { sign, ..variant };
     on_stage(&study, &[0.7], |stage, information| {
@@ -63,8 +63,8 @@ fn holds(right: &[String], key: &str) -> bool {
 /// A push against a level that is never negative is friction, and a bias of the input; a push upwards is no friction.
 #[test]
 fn a_negative_push_on_a_level_is_friction() {
-    let down = right("constant-forcing", Place::State(0), -1.0);
-    let up = right("constant-forcing", Place::State(0), 1.0);
+    let down = right("constant-forcing", DeparturePlace::State(0), -1.0);
+    let up = right("constant-forcing", DeparturePlace::State(0), 1.0);
     for key in ["constant-forcing@h", "actuator-bias@actuator"] {
         assert!(holds(&down, key) && holds(&up, key), "{down:?} {up:?}");
     }
@@ -76,7 +76,7 @@ fn a_negative_push_on_a_level_is_friction() {
 /// A power law of exponent 2 is a quadratic drag, which is no push.
 #[test]
 fn a_quadratic_drag_is_a_power_law() {
-    let drag = right("quadratic-drag", Place::State(0), 1.0);
+    let drag = right("quadratic-drag", DeparturePlace::State(0), 1.0);
     assert!(holds(&drag, "power-law@h"), "{drag:?}");
     assert!(!holds(&drag, "sensor-lag@sensor"), "{drag:?}");
 }
@@ -84,7 +84,7 @@ fn a_quadratic_drag_is_a_power_law() {
 /// Where the input stays beyond it, a dead zone is a bias of half its width. A lag is nothing of the kind.
 #[test]
 fn a_dead_zone_that_is_never_entered_is_a_bias() {
-    let zone = right("actuator-dead-zone", Place::Actuator(0), 1.0);
+    let zone = right("actuator-dead-zone", DeparturePlace::Actuator(0), 1.0);
     for key in [
         "actuator-dead-zone@actuator",
         "actuator-bias@actuator",

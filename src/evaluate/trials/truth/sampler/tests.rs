@@ -4,7 +4,7 @@ use super::*;
 use crate::diagnose::fixture::tanks;
 use crate::evaluate::paper::reference_studies;
 use crate::evaluate::trials::information::Information;
-use crate::evaluate::trials::law::{Departure, Law, Place, SignalLaw};
+use crate::evaluate::trials::law::{Departure, DepartureLaw, DeparturePlace, SignalDeparture};
 use crate::evaluate::trials::truth::fixture::{on_stage, plain};
 use crate::evaluate::trials::truth::sizing::FIRST;
 use crate::study::RecordPlan;
@@ -165,7 +165,7 @@ fn information_is_that_of_theory() {
 
 fn bias_has_its_information(stage: &Stage<'_>, information: &Information) {
     let scene = stage.scene;
-    let draft = plain("sensor-bias", Place::Sensor(0));
+    let draft = plain("sensor-bias", DeparturePlace::Sensor(0));
     let departure = draft.of_size(0.05, scene).unwrap();
     let bias = 0.05 * scene.outputs[0].deviation;
     let [own, again, mirrored] = stage.records(&[departure]).unwrap();
@@ -180,7 +180,7 @@ fn bias_has_its_information(stage: &Stage<'_>, information: &Information) {
     let absorbed = 0.5 * 400.0 * (1.0 + (bias / 0.1).powi(2)).ln();
     assert!((lost / absorbed - 1.0).abs() < 0.15, "{lost} {absorbed}");
     // The gain of the actuator is what θ does; the bias is no gain.
-    let gain = plain("actuator-gain", Place::Actuator(0));
+    let gain = plain("actuator-gain", DeparturePlace::Actuator(0));
     let gain = stage.changed(&gain, FIRST, information).unwrap().unwrap();
     assert!(
         information.nats(&gain) < 0.05 * nats,
@@ -288,9 +288,9 @@ fn departures_that_are_alike_have_no_information_beside_each_other() {
             let change = stage.changed(&plain(id, place), 0.1, information);
             change.unwrap().unwrap()
         };
-        let push = changed("constant-forcing", Place::State(0));
-        let bias = changed("actuator-bias", Place::Actuator(0));
-        let lag = changed("sensor-lag", Place::Sensor(0));
+        let push = changed("constant-forcing", DeparturePlace::State(0));
+        let bias = changed("actuator-bias", DeparturePlace::Actuator(0));
+        let lag = changed("sensor-lag", DeparturePlace::Sensor(0));
         assert!(information.unexplained(&push, &bias) < 0.01);
         assert!(information.unexplained(&push, &lag) > 0.1);
     });
@@ -325,8 +325,8 @@ fn what_a_distant_theta_absorbs_has_no_information() {
     let study = Study::new("tank", Tank, RecordPlan::levels(0.1, 300, 0.0, 1.0, 20)).unwrap();
     on_stage(&study, &[0.49, 1.04], |stage, information| {
         let gain = Departure {
-            place: Place::Actuator(0),
-            law: Law::Signal(SignalLaw::Gain { factor: 2.35 }),
+            place: DeparturePlace::Actuator(0),
+            law: DepartureLaw::Signal(SignalDeparture::Gain { factor: 2.35 }),
         };
         let [own, _, mirrored] = stage.records(&[gain]).unwrap();
         let lost = information.lost([&own, &mirrored]).unwrap().unwrap();

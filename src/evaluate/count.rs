@@ -1,12 +1,11 @@
 //! Counts with their intervals.
 
-use crate::evaluate::trials::row::Row;
 use crate::math::clopper_pearson;
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
 /// Level of the Clopper–Pearson intervals.
-pub(super) const LEVEL: f64 = 0.95;
+pub(crate) const LEVEL: f64 = 0.95;
 
 /// A count and the number of cases.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -26,14 +25,12 @@ impl Serialize for Count {
 }
 
 impl Count {
-    /// Counts the rows in `of` that are in `count`, too.
-    pub fn over<'r>(
-        rows: impl IntoIterator<Item = &'r Row>,
-        of: impl Fn(&Row) -> bool,
-        count: impl Fn(&Row) -> bool,
-    ) -> Self {
-        let rows = rows.into_iter().filter(|row| of(row));
-        rows.map(count).collect()
+    /// One case where `of` holds; it counts where `count` does.
+    pub fn case(of: bool, count: bool) -> Self {
+        Self {
+            count: (of && count).into(),
+            of: of.into(),
+        }
     }
 
     /// The share; none of nothing.
@@ -48,14 +45,12 @@ impl Count {
     }
 }
 
-impl FromIterator<bool> for Count {
-    fn from_iter<I: IntoIterator<Item = bool>>(cases: I) -> Self {
-        let mut all = Self::default();
-        for case in cases {
-            all.of += 1;
-            all.count += u64::from(case);
-        }
-        all
+impl std::iter::Sum for Count {
+    fn sum<I: Iterator<Item = Self>>(counts: I) -> Self {
+        counts.fold(Self::default(), |sum, one| Self {
+            count: sum.count + one.count,
+            of: sum.of + one.of,
+        })
     }
 }
 
@@ -69,7 +64,11 @@ mod tests {
         assert!((low - 0.066_739_5).abs() < 1e-6 && (high - 0.652_452_9).abs() < 1e-6);
         assert_eq!(Count::default().interval(), (0.0, 1.0));
         assert_eq!(Count::default().share(), None);
-        let count: Count = [true, false, true].into_iter().collect();
-        assert_eq!(count, Count { count: 2, of: 3 });
+        let cases = [(true, true), (true, false), (false, true)];
+        let count: Count = cases
+            .map(|(of, count)| Count::case(of, count))
+            .into_iter()
+            .sum();
+        assert_eq!(count, Count { count: 1, of: 2 });
     }
 }
