@@ -1,7 +1,6 @@
 //! Reasons to doubt a result: one list for `fit`, `estimate` and `diagnose`, one wording each.
 
 use super::certificate::Side;
-use super::effects::magnitude::Kind;
 use super::outcome::{Convergence, FittedNoise, FittedValue, NOT_CONVERGED, OutputErrors, Warning};
 use super::problem::Problem;
 use crate::math::{is_constant, three_digits};
@@ -185,7 +184,7 @@ impl<'a> Doubts<'a> {
         &mut self,
         parameters: &[FittedValue],
         noise: &[FittedNoise],
-        kinds: &BTreeMap<String, Kind>,
+        off: &BTreeMap<String, f64>,
     ) {
         let id = |side: Side| match side {
             Side::Low => "low",
@@ -194,9 +193,7 @@ impl<'a> Doubts<'a> {
         for p in parameters {
             let Some(side) = p.at_bound else { continue };
             let mut doubt = Warning::at_bound("at-bound", &p.name, id(side));
-            if let Some(Kind::Switch { off, .. } | Kind::Size(off)) = kinds.get(&p.name)
-                && p.value == *off
-            {
+            if off.get(&p.name) == Some(&p.value) {
                 doubt.what = format!("{} lies where the effect is off", p.name);
                 doubt.remedy = "leave the effect out: the record does not ask for it";
             }

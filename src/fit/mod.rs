@@ -3,7 +3,7 @@
 //! | file | question |
 //! |---|---|
 //! | `run.rs`, `outcome.rs` | a fit from beginning to end, and its result |
-//! | `effects/` | searches without and with the effects of a study |
+//! | `searched.rs` | its searches and where they ended |
 //! | `problem.rs`, `axis.rs` | what is unknown, in which bounds, and what is known before |
 //! | `score.rs` | how well a fit predicts a record that it has not seen |
 //! | `follow.rs` | how the fitted twin follows its records |
@@ -21,7 +21,6 @@ pub(crate) mod axis;
 pub(crate) mod certificate;
 pub(crate) mod climb;
 pub(crate) mod doubts;
-mod effects;
 pub(crate) mod evidence;
 pub(crate) mod follow;
 pub(crate) mod growing;
@@ -33,11 +32,11 @@ pub(crate) mod problem;
 pub(crate) mod reference;
 mod run;
 mod score;
+mod searched;
 mod slope;
 pub(crate) mod starts;
 
 pub use certificate::Side;
-pub(crate) use effects::magnitude;
 pub(crate) use outcome::NOT_CONVERGED;
 pub use outcome::{
     Convergence, Fit, FitEvidence, FitSettings, FittedNoise, FittedStart, FittedValue, Nuisance,
@@ -47,3 +46,4 @@ pub use posterior::Posterior;
 pub(crate) use run::{Subject, run};
 pub use score::FitScore;
 pub(crate) use score::score;
+pub(crate) use searched::{Searched, fits};

@@ -3,6 +3,7 @@
 use super::certificate::Side;
 use super::posterior::{Posterior, Region};
 use crate::record::Signal;
+use crate::twin::Noise;
 use serde::Serialize;
 
 /// Settings of a fit.
@@ -14,6 +15,13 @@ pub struct FitSettings {
     pub level: f64,
     /// Number of posterior draws to return; each costs four likelihoods, of a black box an ensemble of simulations each.
     pub draws: usize,
+}
+
+impl FitSettings {
+    /// Source of everything random.
+    pub(crate) fn noise(&self) -> Noise {
+        Noise::new(self.seed, "fit", 0)
+    }
 }
 
 impl Default for FitSettings {

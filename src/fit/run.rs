@@ -3,7 +3,6 @@
 use super::certificate::Certificate;
 use super::climb::{Fitted, climb};
 use super::doubts::Doubts;
-use super::effects::search::{ITERATIONS, Searched, searched};
 use super::evidence::evidence;
 use super::follow::{free_runs, starts};
 use super::outcome::{
@@ -11,12 +10,12 @@ use super::outcome::{
 };
 use super::posterior::{Draws, Region, Spread, posterior, table};
 use super::problem::Problem;
+use super::searched::{ITERATIONS, Searched};
 use super::starts::polish;
-use crate::effect::Effect;
 use crate::likelihood::kalman::FilterError;
-use crate::likelihood::{Beliefs, Level, measured};
+use crate::likelihood::{Beliefs, Level, Measured};
 use crate::math::deviation;
-use crate::record::{Record, Signal};
+use crate::record::Signal;
 use crate::twin::{Noise, Role, Twin};
 use std::time::Instant;
 
@@ -29,27 +28,24 @@ const RESTARTS: usize = 6;
 /// Subject of a fit: a twin in its study's setting.
 pub(crate) struct Subject<'a> {
     pub twin: &'a Twin,
-    /// Effects whose free magnitudes are entries of θ.
-    pub effects: &'a [Effect],
     pub beliefs: &'a Beliefs,
 }
 
-/// Fits a twin to records; `None` where it works at no start.
+/// Weighs the ends of searches, those of the twin of a study with noise levels in θ; `None` where it works at no start.
 pub(crate) fn run(
-    subject: &Subject<'_>,
-    records: &[Record],
+    measured: &Measured,
+    searched: Searched,
     settings: &FitSettings,
 ) -> Result<Option<Fit>, FilterError> {
     let clock = Instant::now();
-    let noise = Noise::new(settings.seed, "fit", 0);
-    let measured = measured(subject.twin, records, subject.beliefs)?;
+    let noise = settings.noise();
     let Searched {
         problem,
         mut fits,
         without,
-        kinds,
-    } = searched(&measured, subject.effects, records, noise)?;
-    let levels = measured.levels;
+        off,
+    } = searched;
+    let levels = &measured.levels;
     let asked = (settings.draws > 0).then_some(settings.draws);
     let draws = match problem.is_simulated() && asked.is_none() {
         true => Draws::default(),
@@ -62,11 +58,11 @@ pub(crate) fn run(
     };
     let evidence = evidence(&problem, &fitted, &draws.proposals, noise.child("evidence"))?;
     let spread = Spread::new(&problem, &fitted, &draws.thetas, settings.level);
-    let (parameters, noise_levels) = values(&problem, &fitted, &certificate, &levels, &spread);
+    let (parameters, noise_levels) = values(&problem, &fitted, &certificate, levels, &spread);
     let smoothed = problem.smoothed(&fitted.theta)?;
     let free_runs = free_runs(&problem, &fitted.theta, &smoothed);
     let starts = starts(&problem, &smoothed);
-    let own = subject.twin.parameters().len();
+    let own = measured.twin.parameters().len() - levels.len();
     let start = |state: &str| {
         let start = starts.iter().find(|start| start.name == state)?;
         Some((start.value, start.std_error))
@@ -83,7 +79,7 @@ pub(crate) fn run(
     let mut doubts = Doubts::new(&problem, &fitted.theta);
     doubts.below(without.filter(|_| !ends), fitted.log_likelihood);
     doubts.search(&convergence);
-    doubts.bounds(&parameters, &noise_levels, &kinds);
+    doubts.bounds(&parameters, &noise_levels, &off);
     doubts.runs(&errors);
     doubts.records(free_runs.iter().all(Option::is_some));
     Ok(Some(Fit {

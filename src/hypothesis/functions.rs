@@ -113,6 +113,7 @@ fn term(
         id: effect.id().into(),
         target: target.into(),
         nature,
+        entries: None,
         axes,
         family: Some((weights, largest)),
         starts,
@@ -226,6 +227,7 @@ pub(super) fn entered(target: &str, entry: Entry, variable: &Variable, largest: 
             of: variable.of,
             ends,
         }),
+        entries: None,
         axes: vec![coefficient(largest); TERMS],
         family: Some((weights(1), largest)),
         starts: vec![Start {

@@ -1,22 +1,20 @@
-//! Listed effects as hypotheses: sizes and shapes of their magnitudes in the units of the record.
+//! Listed effects as hypotheses: their magnitudes in the units of the record.
 
+use super::magnitude::{Ranges, frequency};
 use super::scales::Scales;
+use super::size::largest;
 use super::term::{Nature, Part, Start, Term, with_terms};
-use crate::effect::{Effect, Law, Magnitude, Mark, Shape, TargetKind, on_levels, targets};
+use crate::effect::{Effect, Law, Magnitude, Mark, TargetKind, on_levels, targets};
 use crate::fit::axis::{Axis, EvidencePrior};
-use crate::fit::magnitude::{LONGEST, largest, level_axis, levels, size_axis, uniform_axis};
 use crate::likelihood::kalman::FilterError;
-use crate::math::ends;
-use crate::twin::{Interval, Parameter, Twin};
+use crate::record::Signal;
+use crate::twin::{Parameter, Twin};
 use std::collections::BTreeMap;
-use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Shares of its range at which a size with two ends is tried, besides next to nothing. A part of a signal that is rectified, the only such
 /// size of the library, folds the output at a half.
 const LARGE: [f64; 4] = [0.3, 0.6, 0.9, 1.0];
 
-/// Times of a change that are tried, evenly over the record.
-pub(super) const TIMES: usize = 9;
 /// Nats for a mark that outputs bear, such as repeated values of a quantiser.
 const MARK_PRESENT: f64 = 12.0;
 
@@ -31,16 +29,10 @@ pub(crate) struct Library<'a> {
 }
 
 impl Library<'_> {
-    /// Hypotheses of one effect: one for each way to use its magnitudes.
+    /// Hypotheses of an effect that the twin lacks: one for each way to use its magnitudes.
     pub fn terms(&self, effect: &Effect) -> Result<Vec<Term>, FilterError> {
-        let known = targets(
-            effect.law().target(),
-            Some(&self.scales.outline),
-            &self.twin.signals(),
-        );
-        let target = known.iter().position(|k| k == effect.target()).unwrap_or(0);
         let kind = effect.law().target();
-        let values = self.scales.columns(kind, target);
+        let (target, values) = self.bent(effect);
         if values.is_empty() && kind != TargetKind::Parameter {
             return Ok(vec![]);
         }
@@ -57,260 +49,124 @@ impl Library<'_> {
             return Ok(vec![]);
         }
         let mut terms = vec![];
-        for off in Self::ways(effect, &mark) {
-            if let Some(term) = self.term(effect, &values, &mark, &off)? {
-                terms.push(term);
-            }
+        for off in ways(effect, &mark) {
+            let held = (off.iter())
+                .map(|&i| &effect.magnitudes()[i])
+                .map(|m| (m.name.to_owned(), m.off.unwrap_or(0.0)));
+            let term = bare(effect, held.collect());
+            let twin = with_terms(self.twin, std::iter::once(&term))?;
+            terms.extend(self.ranged(term, &values, &twin, false)?);
+        }
+        if let Mark::Present(shown) = mark {
+            terms
+                .iter_mut()
+                .for_each(|term| marked(term, &shown, &values));
         }
         Ok(terms)
     }
 
-    /// Magnitudes that are off in each way to use an effect: of several thresholds, one is used at a time.
-    fn ways(effect: &Effect, mark: &Mark) -> Vec<Vec<usize>> {
-        let magnitudes = effect.magnitudes();
-        if let Mark::Present(m) = mark {
-            return vec![(0..m.len()).filter(|&i| m[i].is_infinite()).collect()];
-        }
-        let thresholds: Vec<usize> = (0..magnitudes.len())
-            .filter(|&i| magnitudes[i].is_threshold())
-            .collect();
-        match thresholds.len() {
-            0 | 1 => vec![vec![]],
-            _ => (thresholds.iter())
-                .map(|i| thresholds.iter().copied().filter(|j| j != i).collect())
-                .collect(),
-        }
+    /// The hypothesis of an effect that the twin has, all of whose free magnitudes are used together; `None` where none is free.
+    pub fn own(&self, effect: &Effect) -> Result<Option<Term>, FilterError> {
+        let space = self.twin.parameters();
+        let entry = |m: &Magnitude| space.position(&effect.key().magnitude(m.name)).ok();
+        let held = (effect.magnitudes().iter())
+            .filter(|m| entry(m).is_none())
+            .map(|m| {
+                (
+                    m.name.to_owned(),
+                    effect.given(m.name).or(m.off).unwrap_or(0.0),
+                )
+            });
+        let mut term = bare(effect, held.collect());
+        term.entries = Some(effect.magnitudes().iter().filter_map(entry).collect());
+        let (_, values) = self.bent(effect);
+        self.ranged(term, &values, self.twin, true)
     }
 
-    fn term(
+    /// Position of what an effect bends among its kind, and its values; none of a parameter.
+    fn bent(&self, effect: &Effect) -> (usize, Vec<f64>) {
+        let kind = effect.law().target();
+        let known = targets(kind, Some(&self.scales.outline), &self.twin.signals());
+        let target = known.iter().position(|k| k == effect.target()).unwrap_or(0);
+        (target, self.scales.columns(kind, target))
+    }
+
+    /// The term with axes and starts of its free magnitudes; `None` where none is free, or where one has no range. `twin` has the effect.
+    fn ranged(
         &self,
-        effect: &Effect,
+        mut term: Term,
         values: &[f64],
-        mark: &Mark,
-        off: &[usize],
+        twin: &Twin,
+        is_own: bool,
     ) -> Result<Option<Term>, FilterError> {
-        let magnitudes = effect.magnitudes();
-        let held: BTreeMap<String, f64> = (off.iter())
-            .map(|&i| {
-                (
-                    magnitudes[i].name.to_owned(),
-                    magnitudes[i].off.unwrap_or(0.0),
-                )
-            })
-            .collect();
-        let free: Vec<&Magnitude> = (magnitudes.iter())
-            .filter(|m| !held.contains_key(m.name))
-            .collect();
-        if free.is_empty() {
+        let Part::Effect { effect, .. } = &term.part else {
             return Ok(None);
-        }
-        let rounds = matches!(effect.law(), Law::Rounding(_));
-        let mut term = Term {
-            id: effect.id().into(),
-            target: effect.target().into(),
-            nature: Nature::Listed,
-            part: Part::Effect {
-                effect: effect.clone(),
-                held,
-            },
-            axes: vec![],
-            family: None,
-            starts: vec![],
-            variables: vec![],
-            mark: match mark {
-                Mark::Unmarked | Mark::Absent => 0.0,
-                // Values on few levels repeat at an end without a limit there.
-                Mark::Present(_) if !rounds && on_levels(values) => 0.0,
-                Mark::Present(_) => MARK_PRESENT,
-            },
-            also: vec![],
         };
-        let twin = with_terms(self.twin, std::iter::once(&term))?;
+        let effect = effect.clone();
+        let free: Vec<Magnitude> = term.free().into_iter().cloned().collect();
+        let Some(first) = free.first() else {
+            return Ok(None);
+        };
+        let ranges = Ranges {
+            effect: &effect,
+            values,
+            dt: self.scales.dt(),
+            duration: self.scales.duration(),
+            frequencies: self.frequencies,
+        };
         let space = twin.parameters();
-        let names = term.names();
+        let entries: Vec<usize> = (term.names().iter())
+            .map(|name| space.position(name))
+            .collect::<Result<_, _>>()?;
         let mut grids: Vec<Vec<f64>> = vec![];
-        let mut scales = false;
-        for (i, (m, name)) in free.iter().zip(&names).enumerate() {
-            let j = space.position(name)?;
-            let (grid, axis) = self.magnitude(m, effect, values, (&twin, j, &space[j]));
-            if matches!(axis.evidence, EvidencePrior::Magnitude { .. }) && i == 0 {
-                scales = true;
+        for (m, &j) in free.iter().zip(&entries) {
+            let largest = || self.largest(twin, &entries, (j, &space[j]));
+            let (mut grid, axis) = ranges.of(m, &space[j], largest);
+            if is_own && m.is_threshold() && free.len() > 1 {
+                // One of several thresholds may be enough.
+                grid.push(axis.bounds.clamp(m.off.unwrap_or(f64::INFINITY)));
             }
             grids.push(grid);
             term.axes.push(axis);
         }
-        if let Mark::Present(m) = mark {
-            // What the outputs show is not to be fitted.
-            let shown = m.iter().enumerate().filter(|(i, _)| !off.contains(i));
-            grids = shown.map(|(_, v)| vec![*v]).collect();
-            term.axes.iter_mut().for_each(|axis| axis.held = true);
-            scales = false;
-        }
-        let starts = |grids: &[Vec<f64>], scales| {
-            let all = product(grids).into_iter();
-            all.map(move |m| Start { m, scales })
-        };
+        let scales = matches!(term.axes[0].evidence, EvidencePrior::Magnitude { .. });
         let small = starts(&grids, scales);
-        let limits = free[0].limits;
-        if scales && limits.is_finite() {
+        if scales && first.limits.is_finite() {
             // A size between two ends is as likely large, where the twin folds: from nothing, no slope leads there.
-            grids[0] = LARGE.map(|s| limits.low() + s * limits.width()).to_vec();
+            let (low, width) = (first.limits.low(), first.limits.width());
+            grids[0] = LARGE
+                .map(|s| term.axes[0].bounds.clamp(low + s * width))
+                .to_vec();
             term.starts.extend(starts(&grids, false));
         }
         term.starts.extend(small);
         Ok((term.axes.iter().all(|a| a.bounds.low() <= a.bounds.high())).then_some(term))
     }
 
-    /// Values of one magnitude to try, and its axis.
-    fn magnitude(
+    /// The size of entry `j` at which the effect is as large as the twin's own terms; all `entries` of the effect are off or in the middle of
+    /// their range.
+    fn largest(
         &self,
-        m: &Magnitude,
-        effect: &Effect,
-        values: &[f64],
-        (twin, j, parameter): (&Twin, usize, &Parameter),
-    ) -> (Vec<f64>, Axis) {
-        let (dt, duration) = (self.scales.dt(), self.scales.duration());
-        let law = effect.law();
-        let (low, high) = if values.is_empty() {
-            (0.0, 1.0)
-        } else {
-            ends(values)
-        };
-        let span = (high - low).max(1e-9);
-        let size = {
-            let s = crate::math::deviation(values).max(1e-3 * low.abs().max(high.abs()));
-            if s > 0.0 { s } else { 1.0 }
-        };
-        let logarithmic = |low: f64, high: f64, grid: Vec<f64>| {
-            let parameter = within(parameter, low, high);
-            let axis = Axis {
-                counts: false,
-                longest: 0.7,
-                deviation: 3.0,
-                ..uniform_axis(&parameter, (low, high), true)
-            };
-            (grid.into_iter().map(|v| v.clamp(low, high)).collect(), axis)
-        };
-        let linear = |low: f64, high: f64, grid: Vec<f64>| {
-            let parameter = within(parameter, low, high);
-            let axis = Axis {
-                counts: false,
-                ..uniform_axis(&parameter, (low, high), false)
-            };
-            (grid.into_iter().map(|v| v.clamp(low, high)).collect(), axis)
-        };
-        if matches!(law, Law::Outliers(_)) {
-            return match m.shape {
-                Shape::Share => logarithmic(0.003, 0.3, vec![0.03, 0.08]),
-                _ => logarithmic(0.05 * size, 10.0 * size, vec![0.5 * size, 2.0 * size]),
-            };
+        twin: &Twin,
+        entries: &[usize],
+        (j, parameter): (usize, &Parameter),
+    ) -> Option<f64> {
+        let outline = twin.outline()?;
+        let space = twin.parameters();
+        let mut theta = self.theta.to_vec();
+        theta.resize(space.len(), 0.0);
+        for &k in entries {
+            theta[k] = if k == j { 0.0 } else { space[k].prior.centre() };
         }
-        if law.is_noise() {
-            return logarithmic(
-                1e-4 * size,
-                2.0 * size,
-                vec![3e-3 * size, 0.02 * size, 0.1 * size],
-            );
-        }
-        if m.is_threshold() && m.shape == Shape::Rate {
-            let grid = [0.05, 0.2].map(|v| v * size / dt).to_vec();
-            return logarithmic(2.0 * size / duration, 2.0 * size / dt, grid);
-        }
-        if m.is_threshold() {
-            let upper = m.off.is_some_and(|off| off > 0.0);
-            let parameter = within(parameter, low, low + span);
-            let axis = Axis {
-                counts: false,
-                ..level_axis(&parameter, (low, low + span))
-            };
-            return (levels(values, upper), axis);
-        }
-        match (m.shape, m.off) {
-            (Shape::Delay | Shape::TimeConstant, Some(_)) => {
-                let mut longest = (LONGEST * duration).max(0.6 * dt);
-                if let Some(most) = effect.kind().longest_dead_time(dt) {
-                    longest = longest.min(most);
-                }
-                let octaves = std::iter::successors(Some(0.5 * dt), |tau| Some(2.0 * tau));
-                let octaves = octaves.take_while(|tau| *tau < longest);
-                let grid = octaves.chain([longest]).collect();
-                logarithmic(0.3 * dt, longest, grid)
-            }
-            (Shape::Time, _) => {
-                let times = (1..=TIMES).map(|i| duration * i as f64 / (TIMES + 1) as f64);
-                let (grid, axis) = linear(0.0, duration, times.collect());
-                (
-                    grid,
-                    Axis {
-                        held: false,
-                        ..axis
-                    },
-                )
-            }
-            (Shape::Frequency, _) => self.frequency(parameter),
-            (Shape::Phase, _) => {
-                let grid = vec![-FRAC_PI_2, 0.0, FRAC_PI_2, 2.0 * FRAC_PI_2];
-                let (grid, axis) = linear(m.limits.low(), m.limits.high(), grid);
-                // Each angle counts once, however often the limits hold it.
-                let evidence = EvidencePrior::Uniform { low: -PI, high: PI };
-                (grid, Axis { evidence, ..axis })
-            }
-            (Shape::Level, Some(_)) => {
-                // Beyond, a dead zone or a play of that width lets nothing pass.
-                let widest = (2.0 * low.abs().max(high.abs())).max(span);
-                let grid = [0.2, 0.6, 1.5, 3.0].map(|share| share * size);
-                linear(0.0, widest, grid.to_vec())
-            }
-            (_, Some(_)) => {
-                let found = twin.outline().and_then(|outline| {
-                    let mut theta = self.theta.to_vec();
-                    theta.resize(twin.parameters().len(), 0.0);
-                    for (k, value) in theta.iter_mut().enumerate().skip(self.theta.len()) {
-                        // Shapes somewhere in their range, sizes off.
-                        let p = &twin.parameters()[k];
-                        *value = if k == j { 0.0 } else { p.prior.centre() };
-                    }
-                    let states = self.padded(outline.states.len());
-                    largest(twin, &theta, (j, parameter), &self.scales.records, &states)
-                });
-                let found = found.unwrap_or_else(|| {
-                    // Laws on parameters are relative.
-                    let is_share = m.shape == Shape::Share || values.is_empty();
-                    let whole = if is_share { 0.5 } else { size };
-                    match m.shape {
-                        Shape::Rate => 2.0 * whole / duration,
-                        _ => whole,
-                    }
-                });
-                let axis = Axis {
-                    counts: false,
-                    ..size_axis(parameter, found)
-                };
-                (vec![0.0], axis)
-            }
-            _ => {
-                let (first, last) = ends(m.starts);
-                let (low, high) = match m.limits.is_finite() {
-                    true => (m.limits.low(), m.limits.high()),
-                    false => (
-                        m.limits.low().max(first - 3.0 * (last - first)),
-                        m.limits.high().min(last + 3.0 * (last - first)),
-                    ),
-                };
-                let grid = match m.limits.is_finite() {
-                    true => [0.1, 0.3, 0.6].map(|s| low + s * (high - low)).to_vec(),
-                    false => m.starts.to_vec(),
-                };
-                linear(low, high, grid)
-            }
-        }
+        let states = self.padded(outline.states.len());
+        largest(twin, &theta, (j, parameter), &self.scales.records, &states)
     }
 
     /// States of the twin, and zeros for memories that an effect adds.
-    fn padded(&self, count: usize) -> Vec<crate::record::Signal> {
+    fn padded(&self, count: usize) -> Vec<Signal> {
         (self.scales.states.iter())
             .map(|states| {
-                crate::record::Signal::from_shape_fn((states.nrows(), count), |(k, i)| {
+                Signal::from_shape_fn((states.nrows(), count), |(k, i)| {
                     if i < states.ncols() {
                         states[[k, i]]
                     } else {
@@ -321,35 +177,78 @@ impl Library<'_> {
             .collect()
     }
 
-    /// Frequencies to try, and their axis: uniform up to half the sampling rate.
+    /// Frequencies to try, and their axis.
     pub fn frequency(&self, parameter: &Parameter) -> (Vec<f64>, Axis) {
-        let (low, high) = (0.7 / self.scales.duration(), 0.5 / self.scales.dt());
-        let parameter = within(parameter, low, high);
-        let axis = Axis {
-            counts: false,
-            // A search must stay at its peak of the spectrum.
-            longest: 0.02,
-            deviation: 10.0,
-            ..uniform_axis(&parameter, (low, high), true)
-        };
-        (self.frequencies.to_vec(), axis)
+        let times = (self.scales.dt(), self.scales.duration());
+        frequency(parameter, times, self.frequencies)
     }
 }
 
-/// A magnitude whose bounds are what the record can show, not the user's.
-fn within(parameter: &Parameter, low: f64, high: f64) -> Parameter {
-    let mut parameter = parameter.clone();
-    parameter.bounds = Interval::unchecked(low, high);
-    parameter
+/// Magnitudes that are off in each way to use an effect: of several thresholds, one is used at a time.
+fn ways(effect: &Effect, mark: &Mark) -> Vec<Vec<usize>> {
+    let magnitudes = effect.magnitudes();
+    if let Mark::Present(m) = mark {
+        return vec![(0..m.len()).filter(|&i| m[i].is_infinite()).collect()];
+    }
+    let thresholds: Vec<usize> = (0..magnitudes.len())
+        .filter(|&i| magnitudes[i].is_threshold())
+        .collect();
+    match thresholds.len() {
+        0 | 1 => vec![vec![]],
+        _ => (thresholds.iter())
+            .map(|i| thresholds.iter().copied().filter(|j| j != i).collect())
+            .collect(),
+    }
 }
 
-/// Every combination of one value of each list.
-fn product(lists: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    lists.iter().fold(vec![vec![]], |all, list| {
+/// The term of an effect, some of its magnitudes held, without axes and starts.
+fn bare(effect: &Effect, held: BTreeMap<String, f64>) -> Term {
+    Term {
+        id: effect.id().into(),
+        target: effect.target().into(),
+        nature: Nature::Listed,
+        part: Part::Effect {
+            effect: effect.clone(),
+            held,
+        },
+        entries: None,
+        axes: vec![],
+        family: None,
+        starts: vec![],
+        variables: vec![],
+        mark: 0.0,
+        also: vec![],
+    }
+}
+
+/// Holds magnitudes where the outputs show them: they are not to be fitted.
+fn marked(term: &mut Term, shown: &[f64], values: &[f64]) {
+    let Part::Effect { effect, held } = &term.part else {
+        return;
+    };
+    let free = effect.magnitudes().iter().zip(shown);
+    let m = free.filter(|(m, _)| !held.contains_key(m.name));
+    term.starts = vec![Start {
+        m: m.map(|(_, value)| *value).collect(),
+        scales: false,
+    }];
+    // Values on few levels repeat at an end without a limit there.
+    let rounds = matches!(effect.law(), Law::Rounding(_));
+    term.mark = match !rounds && on_levels(values) {
+        true => 0.0,
+        false => MARK_PRESENT,
+    };
+    term.axes.iter_mut().for_each(|axis| axis.held = true);
+}
+
+/// Starts at every combination of one value of each list.
+fn starts(lists: &[Vec<f64>], scales: bool) -> Vec<Start> {
+    let all = lists.iter().fold(vec![vec![]], |all: Vec<Vec<f64>>, list| {
         (all.iter())
             .flat_map(|head| list.iter().map(move |v| [&head[..], &[*v]].concat()))
             .collect()
-    })
+    });
+    all.into_iter().map(|m| Start { m, scales }).collect()
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 //! | `listed.rs`, `alike.rs` | effects of the library, in the units of the record; those that are one term of the equations |
 //! | `unknown.rs`, `functions.rs`, `basis.rs` | unknown functions and disturbances at every place |
 //! | `noise.rs` | other kinds of noise |
-//! | `scales.rs`, `magnitude.rs`, `frequencies.rs` | sizes of signals, states and rates; ranges of magnitudes; frequencies that residuals show |
+//! | `scales.rs`, `size.rs`, `magnitude.rs`, `frequencies.rs` | sizes of signals, states and rates; ranges of magnitudes; frequencies that residuals show |
 //! | `model.rs` | a twin with a set of terms, fitted: its evidence |
 //! | `screen.rs` | promise of each term along a grid of its magnitudes, before any fit |
 //! | `fits.rs`, `fold.rs`, `valleys.rs` | fits of a term from all starts: answered, annealed, from the prior's centre, unfolded, from other laws' tops |
@@ -17,6 +17,7 @@ mod alike;
 pub(crate) mod basis;
 pub(crate) mod disturbed_equations;
 mod disturbed_signals;
+pub(crate) mod effects;
 mod entered;
 mod entered_black_box;
 pub(crate) mod entry;
@@ -26,12 +27,14 @@ mod fold;
 pub(crate) mod frequencies;
 pub(crate) mod functions;
 pub(crate) mod listed;
+mod magnitude;
 pub(crate) mod model;
 pub(crate) mod noise;
 pub(crate) mod scales;
 mod screen;
 pub(crate) mod search;
 pub(crate) mod set;
+mod size;
 pub(crate) mod term;
 pub(crate) mod unknown;
 mod valleys;

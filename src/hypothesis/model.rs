@@ -101,7 +101,15 @@ impl Model {
         let d = self.problem.twin.parameters().len();
         let mut axes = self.problem.axes[..d].to_vec();
         let mut families = self.problem.families.clone();
+        let mut entries = vec![];
         for term in new {
+            if let Some(own) = &term.entries {
+                for (&j, axis) in own.iter().zip(&term.axes) {
+                    axes[j] = axis.clone();
+                }
+                entries.extend(own);
+                continue;
+            }
             if let Some((weights, largest)) = &term.family {
                 families.push(Family {
                     entries: (axes.len()..).take(weights[0].len()).collect(),
@@ -109,9 +117,9 @@ impl Model {
                     largest: *largest,
                 });
             }
+            entries.extend(axes.len()..axes.len() + term.axes.len());
             axes.extend(term.axes.iter().cloned());
         }
-        let entries: Vec<usize> = (d..axes.len()).collect();
         let mut problem = self.problem.with_twin(twin, axes);
         problem.families = families;
         Ok(Extended {
@@ -153,13 +161,16 @@ impl Model {
 }
 
 impl Extended {
-    /// Full θ of a new start: θ of the twin from elsewhere, in the first `known` entries.
+    /// Full θ of a new start: θ of the twin from elsewhere, the magnitudes of the new term as they are.
     pub fn from(&self, own: &[f64], mut theta: Vec<f64>) -> Vec<f64> {
-        let d = own.len();
+        let (d, begun) = (own.len(), theta.clone());
         for r in 0..self.problem.records.len() {
             let mut of_record = self.problem.of_record(r, &theta);
             of_record[..d].copy_from_slice(own);
             self.problem.place(r, &of_record, &mut theta);
+        }
+        for &j in &self.entries {
+            theta[j] = begun[j];
         }
         theta
     }

@@ -92,6 +92,15 @@ impl Breadth {
         }
     }
 
+    /// The same, every fit of every term where a likelihood is cheap.
+    pub fn thorough(self) -> Self {
+        Self {
+            deep: self.annealed > 0,
+            least: f64::NEG_INFINITY,
+            ..self.afresh().of_all()
+        }
+    }
+
     /// The same without fits from loud noise: what changes the noise itself has no valley that loud noise would fill.
     pub fn shallow(self) -> Self {
         Self {

@@ -61,6 +61,8 @@ pub(crate) struct Term {
     pub target: String,
     pub nature: Nature,
     pub part: Part,
+    /// Entries of θ of the free magnitudes, where the twin has the effect already: those of its study.
+    pub entries: Option<Vec<usize>>,
     /// One for each free magnitude.
     pub axes: Vec<Axis>,
     /// Weights of an unknown function's coefficients, and its largest size.
@@ -138,7 +140,7 @@ impl Term {
     }
 
     /// Free magnitudes of an effect, in the order of the axes; none of other terms.
-    fn free(&self) -> Vec<&Magnitude> {
+    pub(super) fn free(&self) -> Vec<&Magnitude> {
         match &self.part {
             Part::Effect { effect, held, .. } => (effect.magnitudes().iter())
                 .filter(|m| !held.contains_key(m.name))
@@ -188,7 +190,7 @@ pub(crate) fn with_terms<'t>(
 ) -> Result<Twin, FilterError> {
     let mut effects = vec![];
     let mut off = BTreeMap::new();
-    for term in terms.clone() {
+    for term in terms.clone().filter(|term| term.entries.is_none()) {
         if let Part::Effect { effect, held } = &term.part {
             effects.push(effect.clone());
             off.extend((held.iter()).map(|(name, v)| (effect.key().magnitude(name), *v)));
@@ -226,6 +228,7 @@ pub(crate) mod fixture {
             target: target.into(),
             nature,
             part,
+            entries: None,
             axes: vec![],
             family: None,
             starts: vec![],

@@ -6,11 +6,11 @@ use super::functions::{
     PASTS, Trace, Variable, entered, of_past, of_signal, of_state, of_trace, wave,
 };
 use super::listed::Library;
+use super::magnitude::uniform_axis;
 use super::scales::Scales;
 use super::term::{Nature, Part, Start, Term};
 use crate::effect::{TargetKind, targets};
 use crate::fit::axis::Axis;
-use crate::fit::magnitude::uniform_axis;
 use crate::math::quantile;
 use crate::record::Record;
 use crate::twin::{Interval, Parameter, Role, is_memory};
@@ -210,7 +210,7 @@ pub(super) fn disturbances(
         counts: false,
         deviation: 3.0,
         longest: 0.7,
-        ..uniform_axis(&parameter, (low, high), true)
+        ..uniform_axis(&parameter, true)
     };
     (times.into_iter())
         .map(|time| Term {
@@ -222,6 +222,7 @@ pub(super) fn disturbances(
                 memory: (-dt / time).exp(),
             },
             axes: vec![axis.clone()],
+            entries: None,
             family: None,
             starts: SIZES
                 .map(|s| Start {

@@ -2,7 +2,7 @@
 
 use super::explanation::Explanation;
 use super::fits::{CARRIED, settling_last};
-use super::listed::TIMES;
+use super::magnitude::TIMES;
 use super::model::Model;
 use super::search::{BETTER, CANDIDATES, NULL_LIKE};
 use super::term::Term;

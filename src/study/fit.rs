@@ -3,11 +3,13 @@
 use super::{Study, StudyError};
 use crate::effect::Effect;
 use crate::fit::{Fit, FitScore, FitSettings, Subject, run, score};
-use crate::likelihood::Beliefs;
+use crate::hypothesis::effects::searched;
+use crate::likelihood::{Beliefs, measured};
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::setting::SettingError;
 use crate::twin::{NoiseLevel, StartLevel};
+use std::time::Instant;
 
 impl Study {
     /// Finds the most probable parameters of the twin, given measured records of one system: no training, no simulations of a prior.
@@ -57,15 +59,14 @@ impl Study {
         for record in records {
             record.check_channels(&self.twin.signals())?;
         }
+        let clock = Instant::now();
         let study = self.for_records(records)?;
         let effects = study.added_effects()?;
-        let subject = Subject {
-            twin: &study.twin,
-            effects: &effects,
-            beliefs: &study.beliefs(),
-        };
         let stage = progress.stage("fit", 1);
-        let fit = run(&subject, records, settings)?.ok_or(StudyError::NoFit)?;
+        let measured = measured(&study.twin, records, &study.beliefs())?;
+        let searched = searched(&measured, &effects, records.into(), settings.noise())?;
+        let mut fit = run(&measured, searched, settings)?.ok_or(StudyError::NoFit)?;
+        fit.seconds = clock.elapsed().as_secs_f64();
         stage.tick()?;
         Ok(fit)
     }
@@ -78,10 +79,8 @@ impl Study {
     pub fn score(&self, fit: &Fit, record: &Record) -> Result<FitScore, StudyError> {
         record.check_channels(&self.twin.signals())?;
         let study = self.for_records(std::slice::from_ref(record))?;
-        let effects = study.added_effects()?;
         let subject = Subject {
             twin: &study.twin,
-            effects: &effects,
             beliefs: &study.beliefs(),
         };
         score(&subject, fit, record)?.ok_or(StudyError::NoFit)

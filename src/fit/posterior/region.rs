@@ -111,8 +111,8 @@ fn first_order(problem: &Problem, fitted: &Fitted, own: usize) -> (DVector<f64>,
 mod tests {
     use super::*;
     use crate::fit::climb::climb;
-    use crate::fit::{FitSettings, Subject, run};
-    use crate::likelihood::Beliefs;
+    use crate::fit::{FitSettings, Searched, run};
+    use crate::likelihood::{Beliefs, measured};
     use crate::record::{Drive, Record};
     use crate::twin::{DigitalTwin, Noise, Twin};
     use crate::twins::VanDerPol;
@@ -146,18 +146,17 @@ mod tests {
             step: 0.05,
             ..Beliefs::default()
         };
-        let subject = Subject {
-            twin: &Twin::new(VanDerPol),
-            effects: &[],
-            beliefs: &beliefs,
-        };
+        let twin = Twin::new(VanDerPol);
         let drive = Drive::autonomous(0.05, 100).unwrap();
         let squares: f64 = (0..40)
             .map(|seed| {
                 let noise = Noise::new(seed, "region", 0);
                 let outputs = VanDerPol.simulate(&[1.5], &drive, noise).unwrap();
-                let record = Record::new(drive.clone(), outputs).unwrap();
-                let fit = run(&subject, &[record], &FitSettings::default());
+                let records = [Record::new(drive.clone(), outputs).unwrap()];
+                let measured = measured(&twin, &records, &beliefs).unwrap();
+                let problem = Problem::of_measured(&measured, records);
+                let searched = Searched::alone(problem, noise).unwrap();
+                let fit = run(&measured, searched, &FitSettings::default());
                 let region = fit.unwrap().unwrap().region.unwrap();
                 ((region.theta[0] - 1.5) / region.axes[(0, 0)]).powi(2)
             })

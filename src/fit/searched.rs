@@ -1,0 +1,49 @@
+//! The searches of a fit, and where they ended.
+
+use super::climb::Fitted;
+use super::growing::base_fit;
+use super::problem::Problem;
+use super::starts::{Care, polish, search};
+use crate::likelihood::kalman::FilterError;
+use crate::twin::Noise;
+use std::collections::BTreeMap;
+
+/// Iterations of each search: loud noise has a way to go.
+pub(crate) const ITERATIONS: usize = 80;
+
+/// Ends of all searches.
+pub(crate) struct Searched {
+    pub problem: Problem,
+    /// Best first.
+    pub fits: Vec<Fitted>,
+    /// Log-likelihood of the twin with all effects off; none without effects that are fitted.
+    pub without: Option<f64>,
+    /// Values of magnitudes, by name, at which their effects are off.
+    pub off: BTreeMap<String, f64>,
+}
+
+impl Searched {
+    /// Fits a twin from the prior's centre and from random points.
+    pub fn alone(problem: Problem, noise: Noise) -> Result<Self, FilterError> {
+        Ok(Self {
+            fits: fits(&problem, &[], noise)?,
+            problem,
+            without: None,
+            off: BTreeMap::new(),
+        })
+    }
+}
+
+/// Fits from `initial`, from the prior's centre and from random points, best first.
+pub(crate) fn fits(
+    problem: &Problem,
+    initial: &[Vec<f64>],
+    noise: Noise,
+) -> Result<Vec<Fitted>, FilterError> {
+    if !problem.is_simulated() {
+        return search(problem, initial, noise, ITERATIONS, Care::Thorough);
+    }
+    let theta = initial.first().map(Vec::as_slice);
+    let fit = base_fit(problem, theta, noise)?;
+    polish(problem, fit.into_iter().collect(), ITERATIONS)
+}

@@ -1,0 +1,147 @@
+//! A fit with the effects of a study: of the twin without them, then with one more at a time, the one that explains most first.
+
+use super::frequencies::frequencies;
+use super::listed::Library;
+use super::model::Model;
+use super::scales::Scales;
+use super::search::{Breadth, listed};
+use super::shared;
+use super::term::{Part, Term};
+use crate::effect::Effect;
+use crate::fit::axis::Axis;
+use crate::fit::problem::Problem;
+use crate::fit::{Searched, fits};
+use crate::likelihood::Measured;
+use crate::likelihood::kalman::FilterError;
+use crate::record::Record;
+use crate::twin::{Noise, ParameterSpace, Role};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Frequencies in 1/T that are tried beside those of the residuals: half a cycle apart, since a gain falls off within one; up to a fifth of
+/// the sampling rate.
+const FREQUENCIES_PER_CYCLE: f64 = 2.0;
+const HIGHEST: f64 = 0.2;
+/// Most of them; a longer record has them closer together and more of them, each of more samples.
+const MOST: usize = 2000;
+
+/// Fits a twin whose θ holds the free magnitudes of effects.
+pub(crate) fn searched(
+    measured: &Measured,
+    effects: &[Effect],
+    records: Arc<[Record]>,
+    noise: Noise,
+) -> Result<Searched, FilterError> {
+    let plain = Problem::of_measured(measured, records);
+    let space = measured.twin.parameters();
+    if space.iter().all(|p| p.role != Role::Magnitude) {
+        return Searched::alone(plain, noise);
+    }
+    let off = switched_off(&plain, effects);
+    let base = fits(&off, &[], noise)?.into_iter().next();
+    let model = base
+        .clone()
+        .and_then(|base| Model::bare(measured.twin.clone(), off, base, false));
+    let Some((base, model)) = base.zip(model) else {
+        return Searched::alone(plain, noise);
+    };
+    let terms = shared(own_terms(&model, effects)?);
+    let (problem, ends) = opened(&model, &terms);
+    let mut without = model.fitted.theta.clone();
+    for (j, value) in without.iter_mut().enumerate().take(space.len()) {
+        *value = ends.get(&space[j].name).copied().unwrap_or(*value);
+    }
+    let grown = grown(model, terms)?.fitted.theta;
+    let initial = [grown, without].map(|theta| problem.clamp(&theta));
+    Ok(Searched {
+        fits: fits(&problem, &initial, noise)?,
+        problem,
+        without: Some(base.log_likelihood),
+        off: ends,
+    })
+}
+
+/// The problem with every effect held where it is off.
+fn switched_off(problem: &Problem, effects: &[Effect]) -> Problem {
+    with_axes(problem, |axes, space| {
+        for effect in effects {
+            for m in effect.magnitudes() {
+                if let Ok(j) = space.position(&effect.key().magnitude(m.name)) {
+                    let off = m.off.unwrap_or(space[j].prior.centre());
+                    axes[j].centre = space[j].bounds.clamp(off);
+                    axes[j].held = true;
+                }
+            }
+        }
+    })
+}
+
+/// The effects of the study as terms that the twin has already.
+fn own_terms(model: &Model, effects: &[Effect]) -> Result<Vec<Term>, FilterError> {
+    let theta = model.theta();
+    let records = model.problem.records.clone();
+    let outline = model.problem.outline();
+    let scales = Scales::new(&model.base, &theta, records, model.states()?, outline);
+    let (dt, duration) = (scales.dt(), scales.duration());
+    let dense = (HIGHEST / dt * duration * FREQUENCIES_PER_CYCLE) as usize;
+    let dense = (2..=dense.clamp(2, MOST)).map(|i| i as f64 / (FREQUENCIES_PER_CYCLE * duration));
+    let mut all: Vec<f64> = frequencies(model)?.into_iter().chain(dense).collect();
+    all.sort_by(f64::total_cmp);
+    let library = Library {
+        twin: &model.base,
+        theta: &theta,
+        scales: &scales,
+        frequencies: &all,
+    };
+    let terms = effects.iter().map(|effect| library.own(effect));
+    Ok(terms
+        .collect::<Result<Vec<_>, _>>()?
+        .into_iter()
+        .flatten()
+        .collect())
+}
+
+/// The problem with all magnitudes free, and where each effect is off in it.
+fn opened(model: &Model, terms: &[Arc<Term>]) -> (Problem, BTreeMap<String, f64>) {
+    let mut off = BTreeMap::new();
+    let problem = with_axes(&model.problem, |axes, space| {
+        for term in terms {
+            let Part::Effect { effect, .. } = &term.part else {
+                continue;
+            };
+            let entries = term.entries.iter().flatten();
+            for (&j, axis) in entries.zip(&term.axes) {
+                axes[j] = axis.clone();
+                let m = (effect.magnitudes().iter())
+                    .find(|m| effect.key().magnitude(m.name) == space[j].name);
+                if let Some(end) = m.and_then(|m| m.off) {
+                    off.insert(space[j].name.clone(), axis.bounds.clamp(end));
+                }
+            }
+        }
+    });
+    (problem, off)
+}
+
+/// The twin with one effect more at a time, as long as one can be fitted.
+fn grown(mut model: Model, mut terms: Vec<Arc<Term>>) -> Result<Model, FilterError> {
+    let breadth = Breadth::of(&model, false).thorough();
+    while !terms.is_empty() {
+        let found = listed(&model, &terms, &[], breadth)?;
+        let best = (found.into_iter()).find_map(|found| Some((found.last().clone(), found.model?)));
+        let Some((term, better)) = best else {
+            break;
+        };
+        terms.retain(|other| !Arc::ptr_eq(other, &term));
+        model = better;
+    }
+    Ok(model)
+}
+
+/// The problem with other axes of the twin's parameters.
+fn with_axes(problem: &Problem, change: impl FnOnce(&mut [Axis], &ParameterSpace)) -> Problem {
+    let space = problem.twin.parameters();
+    let mut axes = problem.axes[..space.len()].to_vec();
+    change(&mut axes, &space);
+    problem.with_twin(problem.twin.clone(), axes)
+}
