@@ -14,7 +14,8 @@ use truetwin::prelude::*;
 /// wall'   = 0.3·(heater − wall) − 0.2·(wall − room)
 /// room'   = 0.2·(wall − room) − loss·room
 /// ```
-struct Rooms;
+#[derive(Debug)]
+pub struct Rooms;
 
 impl StateSpace for Rooms {
     fn outline(&self) -> Outline {

@@ -8,6 +8,7 @@
     reason = "helpers of tests; measured figures show with --nocapture"
 )]
 
+mod agreement;
 mod armax;
 mod diagnose;
 mod effects;
