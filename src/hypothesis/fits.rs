@@ -5,7 +5,9 @@ use super::screen::{Beginning, Linear, Promise};
 use crate::fit::climb::{Fitted, climb, fit, settling};
 use crate::fit::evidence::{CREDIT, laplace};
 use crate::fit::problem::Problem;
+use crate::fit::starts::{Care, search};
 use crate::likelihood::kalman::{FilterError, recoverable};
+use crate::twin::Noise;
 use rayon::prelude::*;
 
 /// Shares of the step to the top of the quadratic that a function's fit may begin at.
@@ -90,10 +92,10 @@ pub(super) fn fit_unfolded(model: &Model, promise: &Promise) -> Result<Option<Mo
     let mut from = vec![];
     for records in sides {
         let problem = model.problem.on(records);
-        let starts = [problem.begin(&problem.centre()), model.fitted.theta.clone()];
-        if let Some(fitted) = fit(&problem, &starts, RELEASED)? {
-            from.push(model.beside_at(&extended, &fitted.theta, &m));
-        }
+        let (initial, noise) = ([model.fitted.theta.clone()], Noise::new(0, "unfolded", 0));
+        let fits = search(&problem, &initial, noise, RELEASED, Care::Loud)?;
+        let best = fits.first();
+        from.extend(best.map(|fitted| model.beside_at(&extended, &fitted.theta, &m)));
     }
     let fitted = fit(&extended.problem, &from, RELEASED)?;
     let problem = extended.problem.clone();
