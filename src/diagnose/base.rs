@@ -10,6 +10,7 @@ use crate::fit::climb::{Fitted, climb, fit};
 use crate::fit::growing::base_fit;
 use crate::fit::passes::Passes;
 use crate::fit::problem::Problem;
+use crate::fit::spectral_starts;
 use crate::fit::starts::{Care, search};
 use crate::hypothesis::frequencies::frequencies;
 use crate::hypothesis::listed::Library;
@@ -82,7 +83,9 @@ impl Base {
         // The same starts whatever the seed: which optimum is found must not depend on it.
         let starts = Noise::new(0, "diagnose/starts", 0);
         let fitted = if !problem.is_simulated() {
-            let initial: Vec<Vec<f64>> = initial.iter().map(|theta| problem.full(theta)).collect();
+            let mut initial: Vec<Vec<f64>> =
+                initial.iter().map(|theta| problem.full(theta)).collect();
+            initial.extend(spectral_starts(&problem));
             // The twin is fitted again beside each explanation. With more starts 60 open trials were decided alike, and the record of the
             // quick start asked for a finer step than it has.
             let found = search(&problem, &initial, starts, ITERATIONS, Care::Loud)?;

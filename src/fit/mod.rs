@@ -7,7 +7,7 @@
 //! | `problem.rs`, `axis.rs` | what is unknown, in which bounds, and what is known before |
 //! | `score.rs` | how well a fit predicts a record that it has not seen |
 //! | `follow.rs` | how the fitted twin follows its records |
-//! | `starts.rs`, `growing.rs` | where does a search begin |
+//! | `starts.rs`, `spectral.rs`, `growing.rs` | where does a search begin |
 //! | `climb.rs`, `slope.rs` | the most probable θ |
 //! | `certificate.rs` | has the search arrived, and what lies at a bound |
 //! | `passes.rs` | what a search costs |
@@ -34,6 +34,7 @@ mod run;
 mod score;
 mod searched;
 mod slope;
+mod spectral;
 pub(crate) mod starts;
 
 pub use certificate::Side;
@@ -47,3 +48,4 @@ pub(crate) use run::{Subject, run};
 pub use score::FitScore;
 pub(crate) use score::score;
 pub(crate) use searched::{Searched, fits};
+pub(crate) use spectral::spectral_starts;

@@ -3,6 +3,7 @@
 use super::climb::Fitted;
 use super::growing::base_fit;
 use super::problem::Problem;
+use super::spectral::spectral_starts;
 use super::starts::{Care, polish, search};
 use crate::likelihood::kalman::FilterError;
 use crate::twin::Noise;
@@ -34,14 +35,15 @@ impl Searched {
     }
 }
 
-/// Fits from `initial`, from the prior's centre and from random points, best first.
+/// Fits from `initial`, from the prior's centre, from where the twin swings as the records do and from random points, best first.
 pub(crate) fn fits(
     problem: &Problem,
     initial: &[Vec<f64>],
     noise: Noise,
 ) -> Result<Vec<Fitted>, FilterError> {
     if !problem.is_simulated() {
-        return search(problem, initial, noise, ITERATIONS, Care::Thorough);
+        let initial = [initial, &spectral_starts(problem)].concat();
+        return search(problem, &initial, noise, ITERATIONS, Care::Thorough);
     }
     let theta = initial.first().map(Vec::as_slice);
     let fit = base_fit(problem, theta, noise)?;

@@ -5,6 +5,7 @@ use super::screen::{Beginning, Linear, Promise};
 use crate::fit::climb::{Fitted, climb, fit, settling};
 use crate::fit::evidence::{CREDIT, laplace};
 use crate::fit::problem::Problem;
+use crate::fit::spectral_starts;
 use crate::fit::starts::{Care, search};
 use crate::likelihood::kalman::{FilterError, recoverable};
 use crate::twin::Noise;
@@ -92,7 +93,9 @@ pub(super) fn fit_unfolded(model: &Model, promise: &Promise) -> Result<Option<Mo
     let mut from = vec![];
     for records in sides {
         let problem = model.problem.on(records);
-        let (initial, noise) = ([model.fitted.theta.clone()], Noise::new(0, "unfolded", 0));
+        let mut initial = spectral_starts(&problem);
+        initial.push(model.fitted.theta.clone());
+        let noise = Noise::new(0, "unfolded", 0);
         let fits = search(&problem, &initial, noise, RELEASED, Care::Loud)?;
         let best = fits.first();
         from.extend(best.map(|fitted| model.beside_at(&extended, &fitted.theta, &m)));
