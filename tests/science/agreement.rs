@@ -5,7 +5,6 @@ use crate::real_records::data;
 use truetwin::diagnose::{DiagnoseSettings, Diagnosis, diagnose};
 use truetwin::effect::{Effect, augment};
 use truetwin::evaluate::paper::reference_studies;
-use truetwin::fit::FitSettings;
 use truetwin::prelude::*;
 use truetwin::study::StudyFile;
 
@@ -40,11 +39,7 @@ fn log_evidence(study: &Study, effects: &str, record: &Record) -> f64 {
     let text = format!("twin = '{}'\n{effects}", study.name());
     let file = StudyFile::parse(&text, "agreement.toml".as_ref()).unwrap();
     let study = study.configure(&file).unwrap();
-    let fit = study.fit(
-        std::slice::from_ref(record),
-        &FitSettings::default(),
-        &Progress::silent(),
-    );
+    let fit = study.fit(std::slice::from_ref(record));
     let evidence = fit.ok().and_then(|fit| fit.evidence);
     evidence.map_or(f64::NAN, |evidence| evidence.log_evidence)
 }
