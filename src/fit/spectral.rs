@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! y(k) = Σ aᵢ·y(k − i) + Σ bᵢ·u(k − i) + c,  i = 1 … 2n        zᵐ = Σ aᵢ·zᵐ⁻ⁱ,  λ = ln z/Δt
-//! distance = min over the twin's eigenvalues μ of |ln(μ/λ)|     λ: the least damped pole of the record that swings
+//! distance = min over the twin's eigenvalues μ of |ln(μ/λ)|     λ: the pole of the record that swings longest
 //! ```
 //!
 //! A likelihood has a narrow top at each frequency, and few points drawn over the bounds lie near the right one; the poles of a record are
@@ -60,7 +60,7 @@ pub(crate) fn spectral_starts(problem: &Problem) -> Vec<Vec<f64>> {
     found.into_iter().map(|(_, theta)| theta).collect()
 }
 
-/// The least damped pole of an output that swings, in 1/s.
+/// The pole of an output that swings longest, in 1/s.
 fn swing(record: &Record, output: usize, order: usize) -> Option<Complex<f64>> {
     let (y, u) = (record.outputs().column(output), record.drive().inputs());
     let columns = order * (1 + u.ncols()) + 1;
@@ -94,7 +94,7 @@ fn swing(record: &Record, output: usize, order: usize) -> Option<Complex<f64>> {
         .filter(|z| z.im > 0.0 && z.im.atan2(z.re) < FASTEST * std::f64::consts::PI)
         .map(|z| z.ln() / dt)
         .filter(|pole| pole.re.abs() < DAMPED * pole.norm())
-        .min_by(|a, b| (a.re.abs() / a.norm()).total_cmp(&(b.re.abs() / b.norm())))
+        .min_by(|a, b| a.re.abs().total_cmp(&b.re.abs()))
 }
 
 /// Eigenvalues of the twin's equations at its start that swing, in 1/s.

@@ -87,7 +87,8 @@ fn sources(grid: &[(f64, f64)], y: f64) -> Vec<f64> {
         .filter_map(|pair| {
             let [(s, shown), (next, shown_next)] = [pair[0], pair[1]];
             let (before, after) = (shown - y, shown_next - y);
-            (before * after < 0.0 || before == 0.0)
+            // On a level that the law holds, the last signal stands for all.
+            (before * after < 0.0 || before == 0.0 && after != 0.0)
                 .then(|| s + (next - s) * before / (before - after))
         })
         .filter(|s| s.is_finite())

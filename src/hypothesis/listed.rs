@@ -80,7 +80,16 @@ impl Library<'_> {
         let mut term = bare(effect, held.collect());
         term.entries = Some(effect.magnitudes().iter().filter_map(entry).collect());
         let (_, values) = self.bent(effect);
-        self.ranged(term, &values, self.twin, true)
+        let term = self.ranged(term, &values, self.twin, true)?;
+        Ok(term.map(|mut term| {
+            if let Mark::Present(shown) = effect.kind().marks(&values) {
+                let m = (shown_free(&term, &shown).iter().zip(&term.axes))
+                    .map(|(value, axis)| axis.bounds.clamp(*value))
+                    .collect();
+                term.starts.insert(0, Start { m, scales: false });
+            }
+            term
+        }))
     }
 
     /// Position of what an effect bends among its kind, and its values; none of a parameter.
@@ -221,19 +230,24 @@ fn bare(effect: &Effect, held: BTreeMap<String, f64>) -> Term {
     }
 }
 
+/// What outputs show of a term's free magnitudes, of those of its effect.
+fn shown_free(term: &Term, shown: &[f64]) -> Vec<f64> {
+    let Part::Effect { effect, held } = &term.part else {
+        return vec![];
+    };
+    let all = effect.magnitudes().iter().zip(shown);
+    let free = all.filter(|(m, _)| !held.contains_key(m.name));
+    free.map(|(_, value)| *value).collect()
+}
+
 /// Holds magnitudes where the outputs show them: they are not to be fitted.
 fn marked(term: &mut Term, shown: &[f64], values: &[f64]) {
-    let Part::Effect { effect, held } = &term.part else {
-        return;
-    };
-    let free = effect.magnitudes().iter().zip(shown);
-    let m = free.filter(|(m, _)| !held.contains_key(m.name));
     term.starts = vec![Start {
-        m: m.map(|(_, value)| *value).collect(),
+        m: shown_free(term, shown),
         scales: false,
     }];
     // Values on few levels repeat at an end without a limit there.
-    let rounds = matches!(effect.law(), Law::Rounding(_));
+    let rounds = matches!(&term.part, Part::Effect { effect, .. } if matches!(effect.law(), Law::Rounding(_)));
     term.mark = match !rounds && on_levels(values) {
         true => 0.0,
         false => MARK_PRESENT,

@@ -13,7 +13,7 @@ use crate::effect::{TargetKind, targets};
 use crate::fit::axis::Axis;
 use crate::math::quantile;
 use crate::record::Record;
-use crate::twin::{Interval, Parameter, Role, is_memory};
+use crate::twin::{Parameter, Role, is_memory};
 
 /// Time constants of disturbances between three steps and a sixth of the record.
 const TIMES: usize = 3;
@@ -77,7 +77,7 @@ pub(crate) fn unknown(library: &Library<'_>, seen: &[Scales]) -> Vec<Term> {
     });
     let times: [f64; TIMES] = spread(3.0 * scales.dt(), scales.duration() / 6.0);
     let frequency = |target: &str| {
-        let parameter = Parameter::new(target, "Hz", 0.1, 1.0);
+        let parameter = Parameter::new(target, "Hz", 0.1, 1.0).within(0.0, f64::INFINITY);
         library.frequency(&parameter)
     };
     for &i in own.iter().filter(|&&i| !scales.defined[i]) {
@@ -204,8 +204,7 @@ pub(super) fn disturbances(
     times: impl IntoIterator<Item = f64>,
 ) -> Vec<Term> {
     let (low, high) = (0.003 * largest, 2.0 * largest);
-    let mut parameter = Parameter::new("disturbance", "", low, high);
-    parameter.bounds = Interval::unchecked(low, high);
+    let parameter = Parameter::new("disturbance", "", low, high);
     let axis = Axis {
         counts: false,
         deviation: 3.0,
