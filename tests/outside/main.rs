@@ -7,6 +7,7 @@
     reason = "measured figures show with --nocapture"
 )]
 
+mod agreement;
 #[path = "../browser/mod.rs"]
 mod browser;
 mod fits;
@@ -39,6 +40,7 @@ fn main() {
         browser::a_broken_page_is_complained_of,
     ];
     let records = trials![are_records;
+        agreement::fits_and_diagnoses_of_rigs_weigh_effects_alike,
         fits::the_overflow_of_real_tanks_is_found_by_fits,
         fits::the_carriage_shows_its_friction,
         fits::the_heater_shows_its_lag,
