@@ -28,6 +28,7 @@
 //! ```
 
 mod chart;
+mod check;
 mod compare;
 mod digits;
 mod document;
@@ -45,6 +46,7 @@ mod residuals;
 mod scorecard;
 mod units;
 
+pub(crate) use check::check_document;
 pub(crate) use compare::{Compared, compare_document, compare_json, compare_svg};
 pub(crate) use document::Document;
 pub(crate) use estimate::{together_document, together_json};

@@ -2,7 +2,8 @@
 
 use crate::cli::prelude::*;
 use crate::estimator::PresetName;
-use crate::twin::conformance::{Finding, Severity, check, check_step};
+use crate::report::check_document;
+use crate::twin::conformance::{Severity, check, check_step};
 use crate::twin::{Noise, SimulationError, Twin};
 use std::sync::Arc;
 
@@ -56,7 +57,9 @@ impl Verb for Check {
             "schema": "truetwin.check/1", "twin": study.name(), "passed": !failed, "findings": findings,
         });
         let provenance = Provenance::new(context, Some(&self.subject));
-        let done = provenance.print_beside(context, json, || lines(&findings))?;
+        let done = provenance.print_beside(context, json, || {
+            check_document(study.name(), &findings).text()
+        })?;
         Ok(if failed { ExitCode::FAILURE } else { done })
     }
 }
@@ -76,21 +79,10 @@ impl Check {
             "findings": result.findings, "parameters": result.parameters,
         });
         let provenance = Provenance::new(context, Some(&self.subject)).files("record", [path]);
-        provenance.print_beside(context, json, || lines(&result.findings))
+        provenance.print_beside(context, json, || {
+            check_document(study.name(), &result.findings).text()
+        })
     }
-}
-
-/// One line a finding.
-fn lines(findings: &[Finding]) -> String {
-    let word = |severity| match severity {
-        Severity::Pass => "pass",
-        Severity::Warning => "warning",
-        Severity::Failure => "failure",
-    };
-    let lines: Vec<String> = (findings.iter())
-        .map(|f| format!("{:<8} {:<13} {}", word(f.severity), f.check, f.message))
-        .collect();
-    lines.join("\n")
 }
 
 /// Estimates the number of runs: corners of the prior, differences for each parameter; a black box's free run is the mean of 32.

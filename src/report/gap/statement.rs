@@ -125,10 +125,9 @@ fn unnamed(units: &Units, diagnosis: &Diagnosis) -> String {
             "most likely at",
         ),
     };
-    match somewhere(units, &diagnosis.location) {
-        None => format!("{what}."),
-        Some(places) => short_enough(places.map(|place| format!("{what}; {at} {place}."))),
-    }
+    let places = somewhere(units, &diagnosis.location).into_iter().flatten();
+    let placed = places.map(|place| format!("{what}; {at} {place}."));
+    short_enough(placed.chain([format!("{what}.")]))
 }
 
 /// A gap with names: those that are known, then rivals, then what remains.
@@ -139,7 +138,7 @@ fn lacking(units: &Units, diagnosis: &Diagnosis) -> String {
     let is_alias = names.known.iter().any(|e| !e.also.is_empty());
     let count = all_keys(&names.open).len();
     // A list of effects, in words, by id, or by their number.
-    let told = |list: &dyn Fn(&[&EffectFit], &str) -> String| {
+    let told = |list: &dyn Fn(&[&EffectFit], &str) -> String, lead: bool| {
         let last = if is_alias && names.known.len() == 1 {
             "or"
         } else {
@@ -147,7 +146,7 @@ fn lacking(units: &Units, diagnosis: &Diagnosis) -> String {
         };
         let known = list(&names.known, last);
         let open = match (count <= MOST_NAMES, names.open.first()) {
-            (false, Some(first)) if first.probability >= SAID => {
+            (false, Some(first)) if lead && first.probability >= SAID => {
                 format!(
                     "one of {count} effects, most likely {}",
                     list(&[*first], "or")
@@ -170,19 +169,20 @@ fn lacking(units: &Units, diagnosis: &Diagnosis) -> String {
             (true, false) => format!("the twin lacks {open}; {APART}"),
         }
     };
-    let full = told(&|all, last| {
+    let in_words = |all: &[&EffectFit], last: &str| {
         let keys = all_keys(all);
-        effects(
-            units,
-            &keys.iter().map(String::as_str).collect::<Vec<_>>(),
-            last,
-        )
-    });
-    let ids = told(&|all, last| joined(&all_keys(all), last));
-    let counted = told(&|all, _| match all {
-        [one] if one.also.is_empty() => effect(units, &one.key()),
-        all => format!("{} effects", all_keys(all).len()),
-    });
+        let keys: Vec<&str> = keys.iter().map(String::as_str).collect();
+        effects(units, &keys, last)
+    };
+    let full = told(&in_words, true);
+    let ids = told(&|all, last| joined(&all_keys(all), last), true);
+    let counted = told(
+        &|all, _| match all_keys(all).as_slice() {
+            [one] => one.clone(),
+            all => format!("{} effects", all.len()),
+        },
+        false,
+    );
     let remains = match (is_partial, &cause.remains) {
         (false, _) => [String::new(), String::new()],
         (true, None) => ["; more remains"; 2].map(String::from),

@@ -9,7 +9,6 @@ mod next;
 mod places;
 mod runs;
 mod time;
-mod windows;
 
 pub(super) use discovery::terms;
 pub(super) use explanations::explanations;

@@ -1,6 +1,6 @@
 //! Measured outputs and the twin.
 
-use super::windows::{mark, windows};
+use super::time::{mark, windows};
 use crate::diagnose::Diagnosis;
 use crate::report::chart::{Span, Style};
 use crate::report::record::{RecordPicture, Run};
