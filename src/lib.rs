@@ -138,5 +138,32 @@ pub mod cli;
 
 pub mod prelude;
 
+/// Entries for the fuzz tests. Not part of the library's interface.
+#[doc(hidden)]
+pub mod fuzzing {
+    /// Banks.
+    pub mod banks {
+        pub use crate::estimator::fuzzing::*;
+    }
+    /// Model descriptions of FMUs.
+    #[cfg(feature = "fmi")]
+    pub mod fmus {
+        pub use crate::external::fmu::fuzzing::*;
+    }
+    /// Lines of programs.
+    pub mod programs {
+        pub use crate::external::program::fuzzing::*;
+    }
+    /// Runs of evaluations.
+    #[cfg(feature = "evaluate")]
+    pub mod runs {
+        pub use crate::evaluate::fuzzing::*;
+    }
+    /// Work folders.
+    pub mod work {
+        pub use crate::storage::fuzzing::*;
+    }
+}
+
 #[cfg(doctest)]
 mod book;

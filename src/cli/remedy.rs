@@ -41,9 +41,9 @@ impl Remedy for StorageError {
     fn remedy(&self) -> Option<String> {
         Some(match self {
             Self::Taken { .. } | Self::OtherCall { .. } | Self::Busy { .. } => {
-                "--out names another place".into()
+                "choose another --out".into()
             }
-            Self::Foreign { verb, .. } => format!("`truetwin {verb}` makes such folders"),
+            Self::Foreign { verb, .. } => format!("`truetwin {verb}` makes them"),
             Self::Threads { .. } => "--threads N takes fewer".into(),
             Self::NoMpi { .. } => {
                 "`cargo install --features mpi`, or --shard i/n in a job array".into()
@@ -56,6 +56,10 @@ impl Remedy for StorageError {
 impl Remedy for TwinError {
     fn remedy(&self) -> Option<String> {
         Some(match self {
+            Self::UnknownIn { table, .. } | Self::Value { table, .. } => {
+                format!("[{table}] of the study file")
+            }
+            Self::BlackBox(table) => format!("[{table}] of the study file"),
             Self::NoPrior(name) => format!("[prior] \"{name}\" = [low, high] in the study file"),
             Self::EffectText { .. } => "each effect is a table [[effect]]".into(),
             _ => return None,
@@ -69,6 +73,7 @@ impl Remedy for StudyError {
             Self::Record(error) | Self::Channels { error, .. } => return error.remedy(),
             Self::Adaptation(error) => return error.remedy(),
             Self::NoTwin(_) | Self::Twin { .. } => "`truetwin twins` lists them".into(),
+            Self::Twice { table, .. } => format!("[fixed] and [{table}] of the study file"),
             Self::AllFixed => "`truetwin fit` tests the twin on a record".into(),
             Self::UnknownEffect(_) | Self::Without(_) => {
                 "`truetwin effects --twin T` lists those of a twin".into()

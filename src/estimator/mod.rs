@@ -48,8 +48,7 @@ pub(crate) mod readout;
 mod recipe;
 mod settings;
 
-#[doc(hidden)]
-pub mod fuzzing;
+pub(crate) mod fuzzing;
 
 pub(crate) mod bank;
 mod cloud;

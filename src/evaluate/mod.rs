@@ -8,8 +8,7 @@
 pub(crate) mod baseline;
 mod count;
 mod error;
-#[doc(hidden)]
-pub mod fuzzing;
+pub(crate) mod fuzzing;
 pub mod paper;
 pub mod trials;
 

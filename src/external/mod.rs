@@ -10,3 +10,26 @@ pub mod fmu;
 mod lending;
 mod name;
 pub mod program;
+
+use crate::record::{Drive, Signals};
+use crate::twin::{ParameterSpace, SimulationError};
+
+/// Checks that a simulator can be asked: as many parameters and inputs as it has, and finite numbers, since JSON has no others.
+fn check_call(
+    space: &ParameterSpace,
+    signals: &Signals,
+    theta: &[f64],
+    drive: &Drive,
+) -> Result<(), SimulationError> {
+    let given = (theta.len(), drive.inputs().ncols());
+    let expected = (space.len(), signals.inputs.len());
+    if given != expected {
+        return Err(SimulationError::fatal(format!(
+            "{given:?} parameters and inputs were given, the simulator has {expected:?}"
+        )));
+    }
+    match theta.iter().all(|value| value.is_finite()) {
+        true => Ok(()),
+        false => Err(SimulationError::Diverged { at: 0.0 }),
+    }
+}

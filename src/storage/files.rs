@@ -1,6 +1,6 @@
 //! Files that appear complete or not at all.
 
-pub(crate) use super::remedy::{folder, with_remedy};
+pub(crate) use super::error::{folder, with_remedy};
 use super::unfinished::file_beside;
 use sha2::{Digest, Sha256};
 use std::io::{self, BufRead, BufReader, Write};

@@ -9,9 +9,7 @@
 
 mod error;
 pub(crate) mod files;
-#[doc(hidden)]
-pub mod fuzzing;
-mod remedy;
+pub(crate) mod fuzzing;
 mod unfinished;
 pub(crate) mod untrusted;
 pub(crate) mod work;

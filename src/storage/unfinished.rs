@@ -5,7 +5,7 @@
 //! file in between, so that no writer loses a file. On file systems without locks nothing is removed.
 
 use super::StorageError;
-use super::remedy::folder;
+use super::error::folder;
 use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};

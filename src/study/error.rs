@@ -60,6 +60,14 @@ pub enum StudyError {
     /// The twin's own parameters, or values of the study, are wrong.
     #[error("{0}")]
     Table(String),
+    /// A parameter in two tables of a study.
+    #[error("{name} appears in both fixed and {table}; remove one")]
+    Twice {
+        /// Parameter.
+        name: String,
+        /// The other table.
+        table: &'static str,
+    },
     /// No parameter is left to estimate.
     #[error("all parameters are fixed, nothing is left to estimate; free one")]
     AllFixed,

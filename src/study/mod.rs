@@ -155,9 +155,10 @@ impl Study {
         };
         for (table, boxes) in [("prior", &file.prior.boxes), ("bounds", &file.bounds)] {
             if let Some(name) = boxes.keys().find(|name| file.fixed.contains_key(*name)) {
-                return Err(StudyError::Table(format!(
-                    "{name} appears in both fixed and {table}; remove one"
-                )));
+                return Err(StudyError::Twice {
+                    name: name.clone(),
+                    table,
+                });
             }
         }
         self.check_library(&file.library)?;

@@ -75,14 +75,14 @@ fn wrong_calls_are_refused_with_the_remedy() {
         ),
         ("merge half --out whole", "1 of 3 shards"),
         ("merge half --out half", "exists already"),
-        ("merge nowhere --out x", "no folder of `truetwin bank`"),
+        ("merge nowhere --out x", "no bank folder"),
         (
             "pretrain --twin van-der-pol --bank half --out x.est",
             "1 of 3 shards",
         ),
         (
             "pretrain --twin van-der-pol --bank nowhere --out x.est",
-            "no folder of `truetwin bank`",
+            "no bank folder",
         ),
         (
             "pretrain --twin van-der-pol --bank no.npz --out x.est",

@@ -5,12 +5,12 @@
 mod archive;
 mod description;
 mod error;
-#[doc(hidden)]
-pub mod fuzzing;
+pub(crate) mod fuzzing;
 mod instance;
 mod unpack;
 mod worker;
 
+use super::check_call;
 use super::lending::Lending;
 use super::name;
 use crate::record::{Drive, Signal, Signals};
@@ -162,16 +162,7 @@ impl DigitalTwin for FmuTwin {
         drive: &Drive,
         _noise: Noise,
     ) -> Result<Signal, SimulationError> {
-        let given = (theta.len(), drive.inputs().ncols());
-        let expected = (self.parameters.len(), self.signals.inputs.len());
-        if given != expected {
-            return Err(SimulationError::fatal(format!(
-                "{given:?} parameters and inputs were given, the FMU has {expected:?}"
-            )));
-        }
-        if theta.iter().any(|value| !value.is_finite()) {
-            return Err(SimulationError::Diverged { at: 0.0 });
-        }
+        check_call(&self.parameters, &self.signals, theta, drive)?;
         let (idle, place) = self.workers.take(false, |_| true);
         let mut worker = idle.unwrap_or_else(|| {
             Worker::new(self.archive.clone(), self.references.clone(), self.start)

@@ -1,5 +1,7 @@
 //! The command that starts a program.
 
+use crate::storage::files::with_remedy;
+use crate::study::StudyError;
 use std::process::Command;
 
 /// A program and its arguments. No shell is run: `*`, `|`, `$` and the like mean themselves.
@@ -25,6 +27,21 @@ impl ProgramCommand {
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         command
+    }
+
+    /// Creates the error of a program that the system cannot start.
+    pub(super) fn not_started(&self, error: &std::io::Error) -> StudyError {
+        StudyError::Simulator(format!(
+            "the program `{self}` cannot be started: {}",
+            with_remedy(error)
+        ))
+    }
+
+    /// Creates the error of a program that does not describe itself.
+    pub(super) fn not_described(&self, problem: &str) -> StudyError {
+        StudyError::Simulator(format!(
+            "the program `{self}` {problem}; asked to describe itself, it must answer one line of JSON with name, parameters, outputs and record, within the time-out"
+        ))
     }
 }
 

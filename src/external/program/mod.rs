@@ -20,18 +20,16 @@
 
 mod command;
 mod description;
-mod error;
-#[doc(hidden)]
-pub mod fuzzing;
+pub(crate) mod fuzzing;
 mod health;
 mod pool;
 mod protocol;
 mod settings;
-mod text;
 mod worker;
 
 pub use settings::ProgramSettings;
 
+use super::check_call;
 use crate::record::{Drive, Signal, Signals};
 use crate::study::{RecordPlan, Study, StudyError};
 use crate::twin::{DigitalTwin, Noise, ParameterSpace, SimulationError};
@@ -94,9 +92,9 @@ impl ProgramTwin {
         settings.check()?;
         let most = (settings.workers).unwrap_or_else(rayon::current_num_threads);
         let introduced = introduce(&command, settings.timeout);
-        let met = introduced.map_err(|error| error::start(&command, &error))?;
+        let met = introduced.map_err(|error| command.not_started(&error))?;
         let (worker, description) =
-            met.map_err(|trouble| error::describe(&command, &trouble.text()))?;
+            met.map_err(|trouble| command.not_described(&trouble.text()))?;
         let pool = Pool::new(command, settings.timeout, most);
         pool.adopt(worker);
         Ok(Self {
@@ -135,16 +133,11 @@ impl ProgramTwin {
         drive: &Drive,
         noise: Noise,
     ) -> Result<Signal, SimulationError> {
-        let Description {
-            parameters,
-            signals,
-            ..
-        } = &self.description;
+        let signals = &self.description.signals;
         let id = self.requests.fetch_add(1, Ordering::Relaxed);
         // Whole numbers up to 2⁵³ survive languages that know only floats.
         let seed = noise.seed().map(|seed| seed >> 11);
-        let names = parameters.names();
-        let line = protocol::simulate(id, &names, theta, &signals.inputs, drive, seed);
+        let line = protocol::simulate(id, &self.description, theta, drive, seed);
         let longest = protocol::longest_answer(signals, drive.samples());
         let read = |answer: &str| protocol::answer(answer, id, signals, drive);
         let named = |problem: String| format!("`{}` {problem}", self.pool.command());
@@ -198,20 +191,12 @@ impl DigitalTwin for ProgramTwin {
         noise: Noise,
     ) -> Result<Signal, SimulationError> {
         self.health.check()?;
-        let given = (theta.len(), drive.inputs().ncols());
-        let expected = (
-            self.description.parameters.len(),
-            self.description.signals.inputs.len(),
-        );
-        if given != expected {
-            return Err(SimulationError::fatal(format!(
-                "{given:?} parameters and inputs were given, the program has {expected:?}"
-            )));
-        }
-        // JSON has no word for it.
-        if theta.iter().any(|value| !value.is_finite()) {
-            return Err(SimulationError::Diverged { at: 0.0 });
-        }
+        let Description {
+            parameters,
+            signals,
+            ..
+        } = &self.description;
+        check_call(parameters, signals, theta, drive)?;
         self.answer(theta, drive, noise)
     }
 }

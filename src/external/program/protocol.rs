@@ -1,6 +1,7 @@
 //! The lines that go to a program and come from it.
 
-use crate::record::{Drive, Quantity, Signal, Signals};
+use super::description::Description;
+use crate::record::{Drive, Signal, Signals};
 use crate::setting::number;
 use crate::storage::untrusted::{excerpt, message};
 use serde::{Deserialize, Serialize, Serializer};
@@ -39,17 +40,18 @@ struct Simulate<'a> {
 /// The line that asks for one run; numbers survive it bit for bit.
 pub(super) fn simulate(
     id: u64,
-    names: &[&str],
+    description: &Description,
     theta: &[f64],
-    inputs: &[Quantity],
     drive: &Drive,
     seed: Option<u64>,
 ) -> String {
+    let names = description.parameters.names();
+    let inputs = &description.signals.inputs;
     let columns = drive.inputs().columns().into_iter();
     let request = Simulate {
         request: "simulate",
         id,
-        theta: Named(names.iter().copied().zip(theta.iter().copied()).collect()),
+        theta: Named(names.into_iter().zip(theta.iter().copied()).collect()),
         step: drive.dt(),
         samples: drive.samples(),
         inputs: Named(
@@ -217,8 +219,10 @@ mod tests {
         let values = [0.1 + 0.2, -1e-310, 1.0, 5e300 / 3.0];
         let inputs = Signal::from_shape_vec((4, 1), values.to_vec()).unwrap();
         let drive = Drive::new(1.0 / 3.0, inputs).unwrap();
-        let inputs = [Quantity::new("u", "V")];
-        let line = simulate(3, &["b", "a"], &[1.0 / 7.0, 2.0], &inputs, &drive, None);
+        let line = r#"{"name": "two", "parameters": [{"name": "b", "prior": [0, 1]}, {"name": "a", "prior": [0, 3]}],
+            "inputs": [{"name": "u", "unit": "V"}], "outputs": [{"name": "y"}], "record": {"step": 0.1, "samples": 9}}"#;
+        let description = Description::parse(line).unwrap();
+        let line = simulate(3, &description, &[1.0 / 7.0, 2.0], &drive, None);
         assert_eq!(line.matches('\n').count(), 1);
         assert!(
             line.starts_with("{\"request\":\"simulate\",\"id\":3,\"theta\":{\"b\":"),

@@ -1,7 +1,6 @@
 //! Settings of a program.
 
-use super::error;
-use crate::setting::number;
+use crate::setting::SettingError;
 use crate::study::StudyError;
 use std::time::Duration;
 
@@ -42,27 +41,24 @@ impl Default for ProgramSettings {
 impl ProgramSettings {
     /// Checks whether each field is in its range.
     pub(super) fn check(&self) -> Result<(), StudyError> {
-        let wrong = |text: String| Err(error::setting(&text));
-        if let Some(workers) = self.workers
-            && !(1..=MOST_WORKERS).contains(&workers)
-        {
-            return wrong(format!(
-                "workers = {workers}; choose between 1 and {MOST_WORKERS}"
-            ));
+        if let Some(workers) = self.workers {
+            let valid = (1..=MOST_WORKERS).contains(&workers);
+            let remedy = format!("choose between 1 and {MOST_WORKERS}");
+            SettingError::unless(valid, "workers", workers, remedy)?;
         }
-        if self.timeout.is_zero() || self.timeout > LONGEST {
-            let seconds = number(self.timeout.as_secs_f64());
-            return wrong(format!(
-                "timeout = {seconds} s; choose more than 0 s, at most {} s",
-                LONGEST.as_secs()
-            ));
-        }
-        if self.retries > MOST_RETRIES {
-            return wrong(format!(
-                "retries = {}; choose at most {MOST_RETRIES}",
-                self.retries
-            ));
-        }
+        SettingError::unless(
+            !self.timeout.is_zero() && self.timeout <= LONGEST,
+            "timeout",
+            self.timeout.as_secs_f64(),
+            format!("choose more than 0 s, at most {} s", LONGEST.as_secs()),
+        )?;
+        let remedy = format!("choose at most {MOST_RETRIES}");
+        SettingError::unless(
+            self.retries <= MOST_RETRIES,
+            "retries",
+            self.retries,
+            remedy,
+        )?;
         Ok(())
     }
 }

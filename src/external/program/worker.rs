@@ -1,8 +1,7 @@
 //! One running copy of a program, asked line by line.
 
 use super::command::ProgramCommand;
-use super::text::last_words;
-use crate::storage::untrusted::excerpt;
+use crate::storage::untrusted::{excerpt, one_line};
 use std::io::{self, Read, Write};
 use std::process::{Child, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
@@ -15,6 +14,8 @@ const KEPT: usize = 2048;
 /// Bytes that are read at once, and how many such pieces may wait to be looked at.
 const PIECE: usize = 1 << 16;
 const PIECES: usize = 4;
+/// Longest end of standard error that a message quotes, in characters.
+const LAST_WORDS: usize = 400;
 /// Time that an ending program gets for its status and last words.
 const LAST_BREATH: Duration = Duration::from_millis(300);
 
@@ -233,5 +234,35 @@ fn read(from: &mut impl Read, piece: &mut [u8]) -> Option<usize> {
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
             Err(_) => return None,
         }
+    }
+}
+
+/// The end of what a program wrote to standard error, in one line; its lines are parted by ` | `.
+pub(super) fn last_words(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(bytes);
+    let lines: Vec<String> = (text.lines().map(|line| one_line(line, usize::MAX)))
+        .filter(|line| !line.is_empty())
+        .collect();
+    let joined = lines.join(" | ");
+    let surplus = joined.chars().count().saturating_sub(LAST_WORDS);
+    match joined.char_indices().nth(surplus) {
+        Some((from, _)) if surplus > 0 => format!("… {}", &joined[from..]),
+        _ => joined,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_are_short_and_in_one_line() {
+        assert_eq!(
+            last_words(b"Traceback:\n  File x\n\nValueError: no\n"),
+            "Traceback: | File x | ValueError: no"
+        );
+        let long = last_words(format!("{}end", "ö".repeat(999)).as_bytes());
+        assert!(long.starts_with("… ö") && long.ends_with("end"), "{long}");
+        assert_eq!(last_words(&[0xff, 0xfe]), "\u{fffd}\u{fffd}");
     }
 }

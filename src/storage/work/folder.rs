@@ -1,10 +1,10 @@
 //! A folder that keeps finished pieces of long work.
 
-use super::{Manifest, NewWork};
-use crate::storage::StorageError;
+use super::Manifest;
 use crate::storage::files::{folder, replace, write_new};
 use crate::storage::unfinished;
 use crate::storage::untrusted::{check_folder, message, read_kept_text};
+use crate::storage::{NewFolder, StorageError};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -170,6 +170,41 @@ impl WorkFolder {
             if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
                 unfinished::sweep(&entry.path());
             }
+        }
+    }
+}
+
+/// A new work folder, to which the call adds files before the folder appears.
+pub(crate) struct NewWork<'a> {
+    filling: NewFolder,
+    place: &'a Path,
+}
+
+impl<'a> NewWork<'a> {
+    /// Creates a folder for `place` with a folder for each of `parts`.
+    pub(super) fn new(place: &'a Path, parts: &[&str]) -> Result<Self, StorageError> {
+        let failed = |error| StorageError::io(place, error);
+        let filling = NewFolder::new(place).map_err(failed)?;
+        for part in parts {
+            std::fs::create_dir(filling.file(part)).map_err(failed)?;
+        }
+        Ok(Self { filling, place })
+    }
+
+    /// Adds a file.
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), StorageError> {
+        std::fs::write(self.filling.file(name), bytes)
+            .map_err(|error| StorageError::io(&self.place.join(name), error))
+    }
+
+    /// Moves the folder to its place, unless another process was faster.
+    pub(super) fn finish(self) -> Result<(), StorageError> {
+        use std::io::ErrorKind::{AlreadyExists, DirectoryNotEmpty};
+        match self.filling.finish() {
+            Err(error) if !matches!(error.kind(), AlreadyExists | DirectoryNotEmpty) => {
+                Err(StorageError::io(self.place, error))
+            }
+            _ => Ok(()),
         }
     }
 }

@@ -11,15 +11,14 @@
 mod folder;
 mod lock;
 mod manifest;
-mod new_work;
 mod pieces;
 mod ranks;
 mod share;
 mod thread_groups;
 
+pub(crate) use folder::NewWork;
 pub use folder::WorkFolder;
 pub(crate) use manifest::{Manifest, checksum};
-pub(crate) use new_work::NewWork;
 pub(crate) use pieces::{Piece, Pieces};
 pub(crate) use ranks::Ranks;
 pub use share::Share;

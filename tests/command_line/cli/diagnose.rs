@@ -113,7 +113,7 @@ fn wrong_calls_are_refused_in_one_line_that_names_what_and_where() {
     refuses(&[&tanks], &["of-tanks.csv: the record has 1 inputs"]);
     refuses(
         &[&record, "--without", "cubic"],
-        &["unknown effect cubic in --without", "truetwin effects"],
+        &["unknown effect cubic", "truetwin effects"],
     );
     refuses(
         &[&record, "--without", "cubic-stiffness@h7"],

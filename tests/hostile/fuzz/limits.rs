@@ -4,7 +4,7 @@ use super::readers;
 use crate::memory;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use truetwin::estimator::fuzzing as bank;
+use truetwin::fuzzing::banks as bank;
 use truetwin::record::Record;
 use truetwin::study::StudyFile;
 

@@ -109,7 +109,8 @@ fuzzed!(
 #[test]
 #[ignore = "writes into tests/hostile/fuzz/seeds"]
 fn seeds_that_are_not_text() {
-    use truetwin::estimator::{PresetName, PretrainOptions, fuzzing, pretrain};
+    use truetwin::estimator::{PresetName, PretrainOptions, pretrain};
+    use truetwin::fuzzing::banks;
     use truetwin::progress::Progress;
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/hostile/fuzz/seeds");
     let new = |name: &str| {
@@ -135,7 +136,7 @@ fn seeds_that_are_not_text() {
     estimator.save(&new("estimator/tiny.est")).unwrap();
     let place = tempfile::tempdir().unwrap();
     let folder = place.path().join("bank");
-    fuzzing::fill(project, 20, &folder).unwrap();
+    banks::fill(project, 20, &folder).unwrap();
     let mut text = std::fs::read_to_string(folder.join("manifest.json")).unwrap();
     text.push_str(readers::NAMES);
     for entry in std::fs::read_dir(folder.join("shards")).unwrap() {

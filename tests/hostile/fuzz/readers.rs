@@ -12,14 +12,11 @@ use std::sync::OnceLock;
 use truetwin::effect::{Catalogue, augment};
 use truetwin::estimator::Estimator;
 use truetwin::estimator::Project;
-use truetwin::estimator::fuzzing as banks;
-use truetwin::evaluate::fuzzing as runs;
 use truetwin::evaluate::paper::reference_projects;
-use truetwin::external::program::fuzzing as program;
+use truetwin::fuzzing::{banks, programs as program, runs, work};
 use truetwin::network::HeadArchitecture;
 use truetwin::network::layers::*;
 use truetwin::record::{Drive, Record};
-use truetwin::storage::fuzzing as work;
 use truetwin::study::{RecordPlan, Study, StudyFile};
 use truetwin::twins::VanDerPol;
 
@@ -272,7 +269,7 @@ pub fn answer(data: &[u8]) -> Result<(), String> {
 /// Reads an FMU's description of itself.
 #[cfg(feature = "fmi")]
 pub fn fmu(data: &[u8]) -> Result<(), String> {
-    truetwin::external::fmu::fuzzing::description(line(data)?)
+    truetwin::fuzzing::fmus::description(line(data)?)
 }
 
 /// A reader on one input: it reads, or says in such a message why not. For the targets of `fuzz/`.
