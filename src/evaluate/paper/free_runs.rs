@@ -1,6 +1,5 @@
 //! Noise-free runs of the twin at the methods' answers.
 
-use super::record::simulated;
 use super::{BenchmarkRun, MonteCarlo, ScoredMethod};
 use crate::evaluate::EvaluateError;
 use crate::record::{Record, Signal};
@@ -22,7 +21,7 @@ impl AnswerRuns {
     /// Simulates the twin at the truth and the answers of a run of `plan`.
     pub fn of(study: &Study, plan: &MonteCarlo, run: &BenchmarkRun) -> Result<Self, EvaluateError> {
         let draws = plan.draws(study)?;
-        let record = simulated(study, &draws, plan.seed, run.run)?.record;
+        let record = draws.simulated(plan.seed, run.run)?.record;
         // A free run may diverge where noisy runs do not.
         let at = |theta: &[f64]| study.twin().free_run(theta, record.drive()).ok();
         let answers = (run.answers.iter())

@@ -10,22 +10,19 @@
 //! # Ok::<(), truetwin::study::StudyError>(())
 //! ```
 
-mod folder;
 mod free_runs;
 mod invariant;
 mod method;
 mod monte_carlo;
 mod presets;
-mod record;
 mod run;
 mod scenario;
 mod score;
 
-pub(crate) use folder::Origin;
 pub(crate) use free_runs::{AnswerRuns, MeanRuns};
 use invariant::{Invariant, Symmetry};
 pub(crate) use method::ScoredMethod;
-pub(crate) use monte_carlo::MonteCarlo;
+pub(crate) use monte_carlo::{MonteCarlo, Origin};
 pub use presets::{reference_projects, reference_studies};
 pub(crate) use run::BenchmarkRun;
 pub(crate) use scenario::{Benchmark, Scenario};

@@ -1,20 +1,34 @@
 //! Every method on many simulated records.
 
-use super::record::simulated;
 use super::scenario::ScenarioDraws;
 use super::{Benchmark, BenchmarkRun, Scenario};
-use crate::estimator::Estimator;
+use crate::estimator::{Estimator, PretrainOptions, Recipe};
 use crate::evaluate::EvaluateError;
 use crate::progress::Progress;
 use crate::setting::SettingError;
-use crate::storage::work::{Piece, Pieces, Share, WorkFolder};
+use crate::storage::StorageError;
+use crate::storage::work::{Manifest, Piece, Pieces, Share, WorkFolder, checksum};
 use crate::study::Study;
+use serde_json::json;
+use std::path::Path;
 
 /// Most runs of a study; they are in memory.
 const MOST: usize = 1_000_000;
 
 /// Folder of kept runs.
 pub(super) const RUNS: &str = "runs";
+
+/// Layout of the folder; raised when it changes.
+const LAYOUT: u32 = 3;
+
+/// Source of a study's estimator.
+#[derive(Debug, Clone, Copy)]
+pub enum Origin<'a> {
+    /// Trained for it, and kept in the folder.
+    Trained(&'a Recipe, &'a PretrainOptions),
+    /// From a file.
+    File(&'a Path),
+}
 
 /// Plan of a study over many simulated records.
 #[derive(Debug, Clone)]
@@ -85,10 +99,42 @@ impl MonteCarlo {
                 false => Err("its methods or parameters are those of another study"),
             },
             |run| {
-                let record = simulated(study, &draws, self.seed, run)?;
+                let record = draws.simulated(self.seed, run)?;
                 BenchmarkRun::new(estimator, run, &record, progress)
             },
         )
+    }
+
+    /// A folder for the runs of this plan over `study`, a new one or the one of the same call: `runs/0000.json`, … hold a
+    /// [`BenchmarkRun`](super::Run) each; `estimator.est` is for an estimator that is trained for the study.
+    pub(crate) fn folder(
+        &self,
+        path: &Path,
+        study: &Study,
+        origin: Origin<'_>,
+    ) -> Result<WorkFolder, StorageError> {
+        let manifest = self.manifest(study, origin)?;
+        WorkFolder::open(path, &manifest, &[RUNS], |_| Ok(()))
+    }
+
+    /// Everything that the runs depend on; files by their checksums.
+    fn manifest(&self, study: &Study, origin: Origin<'_>) -> Result<Manifest, StorageError> {
+        let manifest = study
+            .manifest("reproduce", LAYOUT)?
+            .with("scenario", self.scenario.number())
+            .with("runs", self.runs)
+            .with("seed", self.seed);
+        Ok(match origin {
+            Origin::File(path) => manifest.with("estimator", checksum(path)?),
+            Origin::Trained(recipe, options) => manifest
+                .with("preset", options.preset.to_string())
+                .with("bank size", options.bank_size)
+                .with("epochs", options.epochs)
+                .with("training seed", options.seed)
+                .with("network", recipe.architecture.id())
+                .with("features", json!(recipe.features))
+                .with("preset settings", json!(recipe.settings)),
+        })
     }
 }
 

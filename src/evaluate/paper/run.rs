@@ -1,7 +1,7 @@
 //! Every method on one simulated record.
 
 use super::ScoredMethod;
-use super::record::Simulated;
+use super::scenario::Simulated;
 use crate::estimator::{Contributions, Estimate, EstimateOptions, Estimator};
 use crate::evaluate::EvaluateError;
 use crate::evaluate::baseline::{Initialisation, dual_filter, prediction_error};

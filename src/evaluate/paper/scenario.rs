@@ -3,7 +3,7 @@
 use super::{Invariant, ScoredMethod, Symmetry};
 use crate::evaluate::EvaluateError;
 use crate::fit::least_squares::{Bounds, space_filling};
-use crate::record::{Drive, RecordError, Signal};
+use crate::record::{Drive, Record, RecordError, Signal};
 use crate::study::{DriveSource, RecordPlan, Study, StudyError};
 use crate::twin::{Interval, Noise, Parameter, ParameterSpace};
 use nalgebra::DVector;
@@ -29,6 +29,8 @@ pub enum Scenario {
 const POINTS: usize = 6;
 /// Space-filling points of the bounds that are looked at for some outside the prior.
 const LOOKED_AT: usize = 200;
+/// Draws of θ that are tried before a diverging twin is given up.
+const ATTEMPTS: u64 = 20;
 
 impl Scenario {
     /// Its number in `truetwin.reproduce/1`.
@@ -82,6 +84,13 @@ pub struct Published {
     /// Milliseconds a record, on the authors' machine.
     #[serde(rename = "ms")]
     pub milliseconds: f64,
+}
+
+/// A simulated record and what it came from.
+pub(super) struct Simulated {
+    pub(super) truth: Vec<f64>,
+    pub(super) record: Record,
+    pub(super) noise: Noise,
 }
 
 /// A scenario of one study, ready to be drawn from.
@@ -176,9 +185,30 @@ impl<'a> ScenarioDraws<'a> {
         Ok((theta, drive))
     }
 
-    /// Returns true if another draw may help where this one diverged.
-    pub(super) fn can_redraw(&self) -> bool {
-        !self.scenario.is_point() && self.scenario != Scenario::Grid
+    /// Record number `run` under `seed`. Where θ is drawn, a draw that diverges is drawn again.
+    pub(super) fn simulated(&self, seed: u64, run: usize) -> Result<Simulated, EvaluateError> {
+        let first = Noise::new(seed, "record", run as u64);
+        let can_redraw = !self.scenario.is_point() && self.scenario != Scenario::Grid;
+        let mut attempt = 0;
+        loop {
+            let noise = match attempt {
+                0 => first,
+                _ => first.child("again").sample(attempt),
+            };
+            attempt += 1;
+            let (truth, drive) = self.draw(run, noise)?;
+            match self.study.twin().simulate(&truth, &drive, noise) {
+                Ok(outputs) => {
+                    return Ok(Simulated {
+                        truth,
+                        record: Record::complete(drive, outputs)?,
+                        noise,
+                    });
+                }
+                Err(error) if error.costs_one_run() && can_redraw && attempt < ATTEMPTS => {}
+                Err(error) => return Err(error.into()),
+            }
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use super::score::{Scorecard, Setup};
 use super::shares::TrueShare;
 use super::truth::Truth;
 use super::world::Conditions;
-use super::{Families, Kind};
+use super::{Kind, TrialSettings};
 use crate::diagnose::{Decision, Verdict};
 
 fn target(key: &str) -> String {
@@ -98,13 +98,7 @@ pub(crate) fn failed(kind: Kind, truth: &[&str]) -> TrialRow {
 pub(crate) fn card(rows: Vec<TrialRow>) -> Scorecard {
     let setup = Setup {
         twin: "twin".into(),
-        seed: 1,
-        families: Families::Open,
-        without: false,
-        validation: false,
-        like: false,
-        detection_only: false,
-        ablated: vec![],
+        settings: TrialSettings::default(),
         seal: "seal".into(),
     };
     Scorecard::new(setup, rows)

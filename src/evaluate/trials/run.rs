@@ -9,7 +9,7 @@ use super::row::TrialRow;
 use super::score::Setup;
 use super::shares::TrueShare;
 use super::steadiness::repeats;
-use super::truth::{Drawn, Extra, Truth, TruthSampler};
+use super::truth::{Extra, Truth, TruthSampler};
 use super::{Families, Kind, Scorecard};
 use crate::diagnose::{Ablation, DiagnoseSettings, greedy};
 use crate::evaluate::EvaluateError;
@@ -95,7 +95,7 @@ impl Default for TrialSettings {
 /// ```
 /// use truetwin::evaluate::paper::reference_studies;
 /// use truetwin::progress::Progress;
-/// use truetwin::evaluate::trials::{Kind, Settings, Withheld};
+/// use truetwin::evaluate::trials::{Kind, TrialSettings, Withheld};
 ///
 /// let study = &reference_studies()?[0];
 /// let settings = TrialSettings { trials: 1, kinds: vec![Kind::None], ..TrialSettings::default() };
@@ -169,21 +169,18 @@ impl<'a> Withheld<'a> {
                 Ok::<_, EvaluateError>(drawn)
             };
             let drawn = part.par_iter().map(draw).collect::<Result<Vec<_>, _>>()?;
-            for Drawn {
-                truth,
-                record,
-                validation,
-                doubled,
-            } in drawn
-            {
-                filling.record(truth.trial, Which::Own, &record)?;
-                for (which, record) in [(Which::Validation, validation), (Which::Doubled, doubled)]
-                {
-                    if let Some(record) = &record {
-                        filling.record(truth.trial, which, record)?;
+            for drawn in drawn {
+                let records = [
+                    (Which::Own, Some(&drawn.record)),
+                    (Which::Validation, drawn.validation.as_ref()),
+                    (Which::Doubled, drawn.doubled.as_ref()),
+                ];
+                for (which, record) in records {
+                    if let Some(record) = record {
+                        filling.record(drawn.truth.trial, which, record)?;
                     }
                 }
-                keys.push(truth);
+                keys.push(drawn.truth);
             }
         }
         if self.settings.without {
@@ -252,13 +249,7 @@ impl Sealed<'_> {
             .collect();
         let setup = Setup {
             twin: sampler.study().name().into(),
-            seed: settings.seed,
-            families: settings.families,
-            without: settings.without,
-            validation: settings.validation,
-            like: settings.like.is_some(),
-            detection_only: settings.detection_only,
-            ablated: settings.ablated.clone(),
+            settings: settings.clone(),
             seal: self.seal().into(),
         };
         Ok(Scorecard::new(setup, rows))

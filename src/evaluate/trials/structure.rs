@@ -21,19 +21,15 @@ const OTHER: f64 = 0.1;
 /// Relative change of a slope that rounding makes.
 const SAME: f64 = 1e-6;
 
-/// States and outputs that something enters.
+/// States and sensors that something enters.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Entries {
-    states: Vec<usize>,
-    outputs: Vec<usize>,
-}
+struct Entries(Vec<DeparturePlace>);
 
 impl Entries {
     /// The state or sensor, where it is the only one.
     fn only(&self) -> Option<DeparturePlace> {
-        match (&self.states[..], &self.outputs[..]) {
-            ([state], []) => Some(DeparturePlace::State(*state)),
-            ([], [output]) => Some(DeparturePlace::Sensor(*output)),
+        match self.0[..] {
+            [place] => Some(place),
             _ => None,
         }
     }
@@ -59,24 +55,18 @@ struct At {
 }
 
 impl At {
-    fn rates(&self, twin: &dyn StateSpace) -> Vec<f64> {
+    /// Rates of the states, then outputs.
+    fn values(&self, twin: &dyn StateSpace, outputs: usize) -> Vec<f64> {
         let now = Now::new(self.t, self.dt, &self.u, &self.theta);
-        let mut rates = vec![0.0; self.x.len()];
+        let (mut rates, mut y) = (vec![0.0; self.x.len()], vec![0.0; outputs]);
         twin.drift(&now, &self.x, &mut rates);
-        rates
-    }
-
-    fn outputs(&self, twin: &dyn StateSpace, outputs: usize) -> Vec<f64> {
-        let now = Now::new(self.t, self.dt, &self.u, &self.theta);
-        let mut y = vec![0.0; outputs];
         twin.observe(&now, &self.x, &mut y);
-        y
+        [rates, y].concat()
     }
 
-    /// With one parameter moved.
-    fn moved(&self, parameter: usize, by: f64) -> Self {
+    fn changed(&self, change: &dyn Fn(&mut Self)) -> Self {
         let mut at = self.clone();
-        at.theta[parameter] += by;
+        change(&mut at);
         at
     }
 }
@@ -85,7 +75,7 @@ impl Structure {
     /// Compares the equations of a twin at some moments of a record at θ. What does not enter leaves every digit as it is.
     pub fn of(twin: &dyn StateSpace, theta: &[f64], scene: &Scene) -> Self {
         let outline = twin.outline();
-        let outputs = outline.outputs.len();
+        let (states, outputs) = (outline.states.len(), outline.outputs.len());
         let (run, samples) = (&scene.run, scene.run.drive.samples());
         let moments: Vec<At> = (0..MOMENTS.min(samples))
             .map(|m| (2 * m + 1) * samples / (2 * MOMENTS))
@@ -97,22 +87,27 @@ impl Structure {
                 theta: theta.to_vec(),
             })
             .collect();
+        let values = |at: &At| at.values(twin, outputs);
+        let place = |k: usize| match k < states {
+            true => DeparturePlace::State(k),
+            false => DeparturePlace::Sensor(k - states),
+        };
         let entered = |change: &dyn Fn(&mut At)| {
-            let changes = |values: &dyn Fn(&At) -> Vec<f64>, n: usize| -> Vec<usize> {
-                let mut changed = vec![false; n];
-                for at in &moments {
-                    let mut moved = at.clone();
-                    change(&mut moved);
-                    for (i, (own, there)) in values(at).iter().zip(values(&moved)).enumerate() {
-                        changed[i] |= own.to_bits() != there.to_bits();
-                    }
-                }
-                (0..n).filter(|i| changed[*i]).collect()
+            let pairs = moments
+                .iter()
+                .map(|at| (values(at), values(&at.changed(change))));
+            let pairs: Vec<_> = pairs.collect();
+            let is_changed = |k: &usize| {
+                let differs =
+                    |(own, there): &(Vec<f64>, Vec<f64>)| own[*k].to_bits() != there[*k].to_bits();
+                pairs.iter().any(differs)
             };
-            Entries {
-                states: changes(&|at| at.rates(twin), outline.states.len()),
-                outputs: changes(&|at| at.outputs(twin, outputs), outputs),
-            }
+            Entries(
+                (0..states + outputs)
+                    .filter(is_changed)
+                    .map(place)
+                    .collect(),
+            )
         };
         let steps: Vec<f64> = (outline.parameters.iter())
             .map(|p| STEP * p.prior.width())
@@ -123,10 +118,14 @@ impl Structure {
         let inputs: Vec<Entries> = (scene.inputs.iter().enumerate())
             .map(|(j, size)| entered(&|at: &mut At| at.u[j] += OTHER * size.span()))
             .collect();
-        let gains = (steps.iter().enumerate())
-            .map(|(p, step)| {
-                let gain = gain(twin, scene, &moments, (p, *step), &parameters[p])?;
-                (inputs[gain] == parameters[p]).then_some(gain)
+        let is_state = |place: &DeparturePlace| matches!(place, DeparturePlace::State(_));
+        let gains = (steps.iter().zip(&parameters).enumerate())
+            .map(|(p, (step, entries))| {
+                if entries.0.is_empty() || !entries.0.iter().all(is_state) {
+                    return None;
+                }
+                let gain = gain(&values, scene, &moments, (p, *step))?;
+                (inputs[gain] == *entries).then_some(gain)
             })
             .collect();
         Self {
@@ -160,39 +159,33 @@ impl Structure {
 
 /// Input that alone decides the slope of the rates in a parameter; none where a state or the time does, too.
 fn gain(
-    twin: &dyn StateSpace,
+    values: &dyn Fn(&At) -> Vec<f64>,
     scene: &Scene,
     moments: &[At],
     (p, step): (usize, f64),
-    entered: &Entries,
 ) -> Option<usize> {
-    if entered.states.is_empty() || !entered.outputs.is_empty() {
-        return None;
-    }
     let slope = |at: &At| -> Vec<f64> {
-        let [low, high] = [-step, step].map(|by| at.moved(p, by).rates(twin));
+        let [low, high] = [-step, step].map(|by| values(&at.changed(&|at| at.theta[p] += by)));
         high.iter().zip(low).map(|(high, low)| high - low).collect()
     };
     let slopes: Vec<Vec<f64>> = moments.iter().map(slope).collect();
     let most = (slopes.iter().flatten()).fold(0.0_f64, |most, s| most.max(s.abs()));
     let decides = |change: &dyn Fn(&mut At)| {
         moments.iter().zip(&slopes).any(|(at, own)| {
-            let mut moved = at.clone();
-            change(&mut moved);
-            let there = slope(&moved);
+            let there = slope(&at.changed(change));
             // A slope that is no number is nobody's gain.
             !(own.iter().zip(there)).all(|(own, there)| (own - there).abs() <= SAME * most)
         })
     };
-    let by_state =
-        |(i, size): (usize, &Extent)| decides(&|at: &mut At| at.x[i] += OTHER * size.span());
+    let step_of = |size: &Extent| OTHER * size.span();
+    let mut states = scene.states.iter().enumerate();
     if decides(&|at: &mut At| at.t += OTHER * scene.duration)
-        || scene.states.iter().enumerate().any(by_state)
+        || states.any(|(i, size)| decides(&|at: &mut At| at.x[i] += step_of(size)))
     {
         return None;
     }
     let mut deciding = (scene.inputs.iter().enumerate())
-        .filter(|(j, size)| decides(&|at: &mut At| at.u[*j] += OTHER * size.span()))
+        .filter(|(j, size)| decides(&|at: &mut At| at.u[*j] += step_of(size)))
         .map(|(j, _)| j);
     deciding.next().filter(|_| deciding.next().is_none())
 }

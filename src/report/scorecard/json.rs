@@ -7,15 +7,21 @@ use serde_json::{Value, json};
 /// The scorecard as one JSON object. Each count is `{ count, of, interval }`, the interval Clopper–Pearson's at `interval_level`;
 /// docs/withheld.md defines each. All keys are always there; numbers that are not finite are null.
 pub(super) fn scorecard_json(card: &Scorecard) -> Value {
-    let mut object = json!({ "schema": "truetwin.scorecard/2" });
-    // Fails for keys that are no strings; there are none.
-    if let Value::Object(setup) = serde_json::to_value(&card.setup).unwrap_or_default() {
-        setup
-            .into_iter()
-            .for_each(|(key, value)| object[key] = value);
-    }
-    object["trials"] = card.trials.into();
-    object["interval_level"] = LEVEL.into();
+    let (setup, settings) = (&card.setup, &card.setup.settings);
+    let mut object = json!({
+        "schema": "truetwin.scorecard/2",
+        "twin": setup.twin,
+        "seed": settings.seed,
+        "families": settings.families,
+        "without": settings.without,
+        "validation": settings.validation,
+        "like": settings.like.is_some(),
+        "detection_only": settings.detection_only,
+        "ablated": settings.ablated,
+        "seal": setup.seal,
+        "trials": card.trials,
+        "interval_level": LEVEL,
+    });
     let scores = card
         .scores
         .iter()

@@ -108,15 +108,15 @@ fn headline(card: &Scorecard) -> String {
 }
 
 fn setup(card: &Scorecard) -> String {
-    let setup = &card.setup;
-    let parts: Vec<&str> = setup.ablated.iter().map(|part| part.id()).collect();
+    let (setup, settings) = (&card.setup, &card.setup.settings);
+    let parts: Vec<&str> = settings.ablated.iter().map(|part| part.id()).collect();
     let without = match parts.is_empty() {
         true => String::new(),
         false => format!(", diagnosed without {}", parts.join(", ")),
     };
     format!(
         "{}: {} withheld trials, seed {}, families {}{without}. Truths were sealed before the first diagnosis: sha256 of the key file {}",
-        setup.twin, card.trials, setup.seed, setup.families, setup.seal
+        setup.twin, card.trials, settings.seed, settings.families, setup.seal
     )
 }
 

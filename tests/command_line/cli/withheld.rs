@@ -38,7 +38,7 @@ fn a_few_sealed_trials_are_scored_kept_and_refused_to_another_call() {
     );
     let text = done(&words(&first));
     assert!(
-        text.contains("2 withheld trials") && text.contains("nothing missing, called structural"),
+        text.contains("2 withheld trials") && text.contains("nothing missing: gap stated"),
         "{text}"
     );
     let path = place.join("trials/scorecard.json");

@@ -188,12 +188,12 @@ fn a_diagnosis_with_parts_taken_out_is_another() {
         sealed.score(&Progress::silent()).unwrap()
     };
     let whole = card(&[], "whole");
-    assert!(whole.rows[0].answer.greedy.is_some() && whole.setup.ablated.is_empty());
+    assert!(whole.rows[0].answer.greedy.is_some() && whole.setup.settings.ablated.is_empty());
     let without = card(&Ablation::ALL, "without");
     assert_eq!(without.rows[0].truth, whole.rows[0].truth);
     let all = "without fitted-noise, unknown-functions, evidence";
     assert!(
-        without.json()["ablated"].as_array().unwrap().len() == 3 && without.text().contains(all)
+        without.json()["ablated"].as_array().unwrap().len() == 3 && without.html().contains(all)
     );
 }
 

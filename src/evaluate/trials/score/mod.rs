@@ -7,31 +7,17 @@ mod statistics;
 
 pub(crate) use breakdown::{Breakdown, BreakdownLine};
 
-use super::Families;
+use super::TrialSettings;
 use super::row::TrialRow;
-use crate::diagnose::Ablation;
 use crate::evaluate::Count;
-use serde::Serialize;
 use serde_json::Value;
 use statistics::{FIGURES, SCORES};
 
-/// Settings of trials, as far as the scorecard states them.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// Origin of a scorecard.
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Setup {
     pub twin: String,
-    pub seed: u64,
-    /// Half of the generator's families that random laws come from.
-    pub families: Families,
-    /// True if the true effects were taken out of the library.
-    pub without: bool,
-    /// True if each diagnosis had a validation record.
-    pub validation: bool,
-    /// True if inputs, length, step and gaps are those of a measured record.
-    pub like: bool,
-    /// True if each diagnosis ended with its verdict: nothing is named then.
-    pub detection_only: bool,
-    /// Parts taken out of the diagnosis.
-    pub ablated: Vec<Ablation>,
+    pub settings: TrialSettings,
     /// SHA-256 of the key file.
     pub seal: String,
 }

@@ -18,7 +18,7 @@ mod reject;
 mod sampler;
 mod sizing;
 
-pub(super) use sampler::{Drawn, Extra, TruthSampler};
+pub(super) use sampler::{Extra, TruthSampler};
 
 use super::Kind;
 use super::law::Departure;
