@@ -18,10 +18,10 @@ use crate::hypothesis::model::Model;
 use crate::hypothesis::scales::Scales;
 use crate::hypothesis::shared;
 use crate::hypothesis::term::{Part, Term};
-use crate::likelihood::Measured;
+use crate::likelihood::measured;
 use crate::record::Record;
 use crate::study::{Study, StudyError};
-use crate::twin::{Noise, Role};
+use crate::twin::{Noise, Role, Twin};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::sync::Arc;
 
@@ -55,22 +55,15 @@ impl Base {
             .collect()
     }
 
-    /// Fits the twin.
+    /// Fits the twin of a study, or the same with another step; passes are added to these.
     pub fn new(
-        measured: &Measured,
-        records: Arc<[Record]>,
-        settings: &DiagnoseSettings,
-    ) -> Result<Self, StudyError> {
-        Self::counted(measured, records, settings, &Passes::default())
-    }
-
-    /// Fits the twin, its passes added to these.
-    pub fn counted(
-        measured: &Measured,
+        study: &Study,
+        twin: &Twin,
         records: Arc<[Record]>,
         settings: &DiagnoseSettings,
         passes: &Passes,
     ) -> Result<Self, StudyError> {
+        let measured = measured(twin, &records, &settings.beliefs(study))?;
         let twin = &measured.twin;
         let space = twin.parameters();
         let own = space.len() - measured.levels.len();
@@ -79,7 +72,7 @@ impl Base {
             let theta: Vec<f64> = initial.iter().copied().take(own).chain(levels).collect();
             theta
         });
-        let problem = Problem::of_measured(measured, records.clone()).counted_with(passes);
+        let problem = Problem::of_measured(&measured, records.clone()).counted_with(passes);
         // The same starts whatever the seed: which optimum is found must not depend on it.
         let starts = Noise::new(0, "diagnose/starts", 0);
         let fitted = if !problem.is_simulated() {

@@ -3,8 +3,8 @@
 use super::base::Base;
 use super::settings::DiagnoseSettings;
 use crate::effect::{Catalogue, augment};
+use crate::fit::passes::Passes;
 use crate::hypothesis::term::Term;
-use crate::likelihood::measured;
 use crate::record::Record;
 use crate::study::{RecordPlan, Study};
 use crate::twin::{Noise, Twin};
@@ -36,7 +36,7 @@ pub(crate) fn biased_record(study: &Study, bias: f64, seed: u64) -> Record {
 /// Listed effects as hypotheses beside the fitted twin of a study.
 pub(crate) fn listed_terms(study: &Study, records: &[Record]) -> Vec<Arc<Term>> {
     let settings = DiagnoseSettings::default();
-    let measured = measured(study.twin(), records, &study.beliefs()).unwrap();
-    let base = Base::new(&measured, records.into(), &settings).unwrap();
+    let passes = Passes::default();
+    let base = Base::new(study, study.twin(), records.into(), &settings, &passes).unwrap();
     base.listed(study, &settings).unwrap()
 }

@@ -1,10 +1,10 @@
 //! Forward selection by BIC, noise levels as declared: what a diagnosis is to be held against.
 
 use super::base::Base;
-use super::explain::search::{Breadth, listed};
 use super::settings::{Ablation, DiagnoseSettings};
 use crate::effect::EffectPattern;
-use crate::likelihood::measured;
+use crate::fit::passes::Passes;
+use crate::hypothesis::search::{Breadth, listed};
 use crate::record::Record;
 use crate::study::{Study, StudyError};
 use std::sync::Arc;
@@ -28,16 +28,16 @@ pub(crate) fn greedy(
         quick: true,
         ..DiagnoseSettings::default()
     };
-    let records: Arc<[Record]> = Arc::from([record.clone()]);
-    let measured = measured(study.twin(), &records, &settings.beliefs(study))?;
-    let base = Base::new(&measured, records.clone(), &settings)?;
+    let records = Arc::from([record.clone()]);
+    let passes = Passes::default();
+    let base = Base::new(study, study.twin(), records, &settings, &passes)?;
     let mut terms = base.listed(study, &settings)?;
     let mut model = base.model.clone();
     let breadth = Breadth::of(&model, settings.quick);
     let mut keys = vec![];
     while keys.len() < MOST {
-        let found = listed(&model, &terms, model.log_evidence, &[], breadth)?;
-        let best = (found.into_iter().next()).filter(|best| best.gain > 0.0);
+        let found = listed(&model, &terms, &[], breadth)?;
+        let best = (found.into_iter().next()).filter(|best| best.log_z > model.log_evidence);
         let Some((key, better)) = best.and_then(|best| Some((best.last().key(), best.model?)))
         else {
             break;

@@ -2,14 +2,13 @@
 //!
 //! | room | question |
 //! |---|---|
-//! | `run.rs`, `base.rs` | order of the steps; the fitted twin that they begin with |
-//! | `rounds.rs` | the search, again with another kind of noise or a finer step |
-//! | `long.rs` | long records: searched in part, fitted whole |
+//! | `run.rs`, `report.rs` | entry; everything that is reported of a search |
+//! | `base.rs` | the fitted twin that a search begins with |
 //! | `greedy.rs` | a baseline: forward selection by BIC |
-//! | `known.rs` | the share that effects close which are known to be there |
+//! | `true_effects.rs` | the share that effects close which are known to be there |
 //! | `step.rs` | whether a finer step of the integrator explains the records better |
 //! | `candidates.rs` | effects that the study lets a diagnosis name |
-//! | `explain/` | which hypotheses of the engine (`hypothesis`): weighed, compared |
+//! | `search/` | which hypotheses of the engine (`hypothesis`) explain the records: one map, one loop |
 //! | `answer/` | the answer: posterior of what was found, decision, names, places |
 //! | `residuals/` | innovations cut by time, state, lag and frequency |
 //! | `locate/` | where: places, missing functions, maps of the residuals |
@@ -22,24 +21,22 @@
 pub(crate) mod answer;
 mod base;
 mod candidates;
-mod explain;
 #[cfg(test)]
 pub(crate) mod fixture;
 mod greedy;
-mod known;
 mod locate;
-mod long;
 mod outcome;
 mod quantify;
+mod report;
 mod residuals;
-mod rounds;
 mod run;
+mod search;
 mod settings;
 mod step;
 mod thresholds;
+mod true_effects;
 
 pub(crate) use greedy::greedy;
-pub(crate) use known::true_fit;
 pub(crate) use outcome::Cell;
 pub use outcome::{
     Band, Cause, Channel, Decision, Detection, Diagnosis, Discovery, EffectFit, FittedParameter,
@@ -49,6 +46,7 @@ pub use outcome::{
 pub(crate) use quantify::share::SHORTEST_SPLIT;
 pub use run::diagnose;
 pub use settings::{Ablation, DiagnoseSettings};
+pub(crate) use true_effects::true_fit;
 
 /// Nats within which explanations are rivals.
 pub(crate) const RIVALS: f64 = thresholds::Thresholds::RIVALS;

@@ -126,7 +126,7 @@ mod tests {
     use crate::diagnose::base::Base;
     use crate::diagnose::fixture::{self, tanks};
     use crate::diagnose::{DiagnoseSettings, Verdict, diagnose};
-    use crate::likelihood::measured;
+    use crate::fit::passes::Passes;
     use crate::progress::Progress;
     use crate::record::Record;
     use crate::study::Study;
@@ -143,8 +143,9 @@ mod tests {
         let exact = study.twin().stepped(|_, to| to.substeps = 64).unwrap();
         let settings = DiagnoseSettings::default();
         let asked = |records: &[Record]| {
-            let measured = measured(study.twin(), records, &study.beliefs()).unwrap();
-            let base = Base::new(&measured, records.into(), &settings).unwrap();
+            let passes = Passes::default();
+            let base = Base::new(&study, study.twin(), records.into(), &settings, &passes);
+            let base = base.unwrap();
             finer_step(&base.model, Thresholds::STEP_SHOWS, 0.0).unwrap()
         };
         for seed in 0..3 {

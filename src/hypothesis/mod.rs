@@ -43,7 +43,6 @@ use self::term::Term;
 use std::sync::Arc;
 
 pub(crate) use alike::merged;
-pub(crate) use valleys::leave_valleys;
 
 /// Terms that several models hold.
 pub(crate) fn shared(terms: Vec<Term>) -> Vec<Arc<Term>> {

@@ -43,7 +43,7 @@ pub(crate) const BETTER: f64 = 1.0;
 const DEEP: f64 = 30.0;
 
 /// Numbers of hypotheses that are refitted.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Breadth {
     /// Listed effects in the first round.
     pub listed: usize,
@@ -98,14 +98,6 @@ impl Breadth {
             deep: self.annealed > 0,
             least: f64::NEG_INFINITY,
             ..self.afresh().of_all()
-        }
-    }
-
-    /// The same without fits from loud noise: what changes the noise itself has no valley that loud noise would fill.
-    pub fn shallow(self) -> Self {
-        Self {
-            deep: false,
-            ..self
         }
     }
 

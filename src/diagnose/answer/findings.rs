@@ -1,33 +1,34 @@
-//! Findings of the search as hypotheses to be weighed.
+//! Explanations of the search as hypotheses to be weighed.
 
 use super::posterior::{Function, Hypotheses, Places, Posterior, Set, log_sum};
-use crate::diagnose::explain::findings::Findings;
-use crate::diagnose::explain::found::Found;
+use crate::diagnose::search::Explanations;
 use crate::effect::TargetKind;
 use crate::fit::evidence::log_mean;
+use crate::hypothesis::explanation::Explanation;
 use crate::hypothesis::term::{Nature, Part, Term};
 use std::sync::Arc;
 
-impl Findings {
-    /// The findings as hypotheses.
+impl Explanations {
+    /// The explanations as hypotheses.
     pub fn hypotheses(&self) -> Hypotheses {
-        let sets = (self.listed.iter().chain(&self.several)).map(|found| {
-            let keys = found.keys();
-            let beside = (self.beside(&keys))
-                .map(|(_, on_top)| on_top.iter().map(|f| self.function(f)).collect());
-            Set {
-                log_z: found.gain,
-                places: places(&found.terms),
-                keys,
-                beside,
-            }
+        let sets = (self.listed().into_iter().chain(self.pairs())).map(|e| Set {
+            log_z: self.gain(e),
+            places: places(&e.terms),
+            keys: e.terms.iter().map(|term| term.key()).collect(),
+            beside: (self.beside(&e.set()))
+                .map(|all| all.into_iter().map(|f| self.function(f)).collect()),
         });
-        let aliased = (self.listed.iter()).filter(|found| !found.last().also.is_empty());
+        let listed = self.listed();
+        let aliased = listed.iter().filter(|e| !e.last().also.is_empty());
         Hypotheses {
             nothing: self.nothing(),
             sets: sets.collect(),
-            functions: self.rivals().map(|f| self.function(f)).collect(),
-            searched: self.unknown.len(),
+            functions: self
+                .rivals()
+                .into_iter()
+                .map(|f| self.function(f))
+                .collect(),
+            searched: self.unknown().len(),
             has_equations: true,
             aliases: (aliased.map(|f| (f.last().key(), f.last().keys().split_off(1)))).collect(),
         }
@@ -43,11 +44,11 @@ impl Findings {
         self.posterior().log_odds + self.nothing()
     }
 
-    fn function(&self, found: &Found) -> Function {
-        let function = found.last();
-        let held = (self.listed.iter()).filter(|f| holds(function, f.last()));
+    fn function(&self, explanation: &Explanation) -> Function {
+        let function = explanation.last();
+        let held = (self.listed().into_iter()).filter(|f| holds(function, f.last()));
         Function {
-            log_z: found.gain,
+            log_z: self.gain(explanation),
             places: places(std::slice::from_ref(function)),
             holds: held.map(|f| f.last().key()).collect(),
         }
@@ -55,10 +56,10 @@ impl Findings {
 
     /// log of the evidence of nothing missing, whatever the noise, over that of the twin.
     fn nothing(&self) -> f64 {
-        let [alone, pairs] = [&self.noise, &self.noise_pairs]
-            .map(|all| log_mean(&all.iter().map(|f| f.gain).collect::<Vec<f64>>()));
+        let [alone, pairs] = [self.noise(), self.noise_pairs()]
+            .map(|all| log_mean(&all.iter().map(|e| self.gain(e)).collect::<Vec<f64>>()));
         // The best of n kinds makes n − 1 of the n(n − 1)/2 pairs.
-        let pairs = pairs - (0.5 * self.noise.len() as f64).ln();
+        let pairs = pairs - (0.5 * self.noise().len() as f64).ln();
         log_sum([0.0, alone, pairs].into_iter().filter(|z| z.is_finite()))
     }
 }

@@ -15,4 +15,4 @@ pub(in crate::diagnose) mod summary;
 pub(crate) mod tests;
 
 pub(in crate::diagnose) use decide::Answer;
-pub(in crate::diagnose) use posterior::{Hypotheses, Posterior};
+pub(in crate::diagnose) use posterior::Hypotheses;

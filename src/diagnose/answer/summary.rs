@@ -1,15 +1,16 @@
 //! Summary of fits for a report.
 
 use super::Answer;
-use crate::diagnose::explain::findings::Findings;
-use crate::diagnose::explain::found::Found;
 use crate::diagnose::outcome::{Decision, EffectFit, FittedParameter, Onset, Remains};
+use crate::diagnose::search::Explanations;
 use crate::diagnose::settings::DiagnoseSettings;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::Nuisance;
 use crate::fit::follow::starts;
 use crate::fit::posterior::Spread;
+use crate::hypothesis::explanation::Explanation;
 use crate::hypothesis::model::Model;
+use crate::hypothesis::set::TermSet;
 use crate::hypothesis::term::{Part, Term};
 use crate::likelihood::kalman::recoverable;
 use crate::study::StudyError;
@@ -18,22 +19,27 @@ use std::sync::Arc;
 
 /// Listed effects as they are reported: the accepted ones first, then by probability.
 pub(in crate::diagnose) fn effects(
-    findings: &Findings,
+    known: &Explanations,
     answer: &Answer,
     accepted: Option<&Model>,
 ) -> Vec<EffectFit> {
-    let mut all: Vec<EffectFit> = (findings.listed.iter())
-        .filter_map(|found| {
-            let model = found.model.as_ref()?;
-            let probability = answer.posterior.name(&found.last().key());
-            Some(fit_of(model, found.last(), probability, found.gain))
+    let mut all: Vec<EffectFit> = (known.listed().into_iter())
+        .filter_map(|e| {
+            let probability = answer.posterior.name(&e.last().key());
+            Some(fit_of(
+                e.model.as_ref()?,
+                e.last(),
+                probability,
+                known.gain(e),
+            ))
         })
         .collect();
     all.sort_by(|a, b| {
         (b.probability.total_cmp(&a.probability)).then(b.log_evidence.total_cmp(&a.log_evidence))
     });
     if let Some(model) = accepted {
-        let gain = findings.gain(&answer.accepted).unwrap_or(0.0);
+        let set = known.get(&answer.accepted.iter().cloned().collect());
+        let gain = set.map_or(0.0, |e| known.gain(e));
         let mut first: Vec<EffectFit> = (model.terms.iter())
             .map(|term| {
                 let probability = answer.posterior.name(&term.key());
@@ -48,11 +54,11 @@ pub(in crate::diagnose) fn effects(
     all
 }
 
-/// Effects that absorb a parameter gap; each is as probable as the others.
-pub(in crate::diagnose) fn absorbed(found: &[Found]) -> Vec<EffectFit> {
-    let share = 1.0 / found.len().max(1) as f64;
-    (found.iter())
-        .filter_map(|f| Some(fit_of(f.model.as_ref()?, f.last(), share, f.gain)))
+/// Effects that absorb a parameter gap beside the twin within its prior, of this log Z; each is as probable as the others.
+pub(in crate::diagnose) fn absorbed(all: &[Explanation], within: f64) -> Vec<EffectFit> {
+    let share = 1.0 / all.len().max(1) as f64;
+    (all.iter())
+        .filter_map(|e| Some(fit_of(e.model.as_ref()?, e.last(), share, e.log_z - within)))
         .take(Thresholds::REPORTED)
         .collect()
 }
@@ -209,22 +215,19 @@ pub(in crate::diagnose) fn onset(model: &Model) -> Option<Onset> {
 }
 
 /// Unknown rest on top of the accepted effects, or else of the best single one: what a function adds.
-pub(in crate::diagnose) fn remains(findings: &Findings, answer: &Answer) -> Option<Remains> {
+pub(in crate::diagnose) fn remains(known: &Explanations, answer: &Answer) -> Option<Remains> {
     if answer.decision == Decision::NotNeeded {
         return None;
     }
-    let best = || findings.listed.first().map(Found::keys);
-    let keys = match answer.accepted.is_empty() {
-        true => best()?,
-        false => answer.accepted.clone(),
+    let set: TermSet = match answer.accepted.is_empty() {
+        true => known.listed().first()?.set(),
+        false => answer.accepted.iter().cloned().collect(),
     };
-    let (keys, on_top) = findings.beside(&keys)?;
-    let own = findings.gain(keys)?;
-    let rest = on_top.first()?;
-    let added = (rest.gain - own).max(0.0);
+    let rest = known.beside(&set)?.into_iter().next()?;
+    let added = (rest.log_z - known.get(&set)?.log_z).max(0.0);
     Some(Remains {
         place: rest.last().target.clone(),
         log_evidence: added,
-        share: added / rest.gain.max(f64::MIN_POSITIVE),
+        share: added / known.gain(rest).max(f64::MIN_POSITIVE),
     })
 }

@@ -1,8 +1,8 @@
 //! Missing functions as they were fitted: values, errors, the range that the records show.
 
-use crate::diagnose::explain::found::Found;
 use crate::diagnose::outcome::MissingFunction;
 use crate::hypothesis::basis::basis;
+use crate::hypothesis::explanation::Explanation;
 use crate::hypothesis::model::Model;
 use crate::hypothesis::term::Nature;
 use nalgebra::{DMatrix, DVector};
@@ -53,36 +53,28 @@ pub(in crate::diagnose) fn curve(model: &Model) -> Option<Curve> {
     })
 }
 
-/// Fitted functions of one variable, those at `place` first, then the clearest; `floor` is the evidence of the model that they stand
-/// beside.
-pub(in crate::diagnose) fn told(
-    all: &[Found],
+/// Fitted functions of one variable beside an explanation, those at `place` first, then the clearest.
+pub(in crate::diagnose) fn missing_functions(
+    all: &[&Explanation],
+    beside: &Explanation,
     place: Option<&str>,
-    on_top: bool,
-    floor: f64,
 ) -> Vec<MissingFunction> {
-    let is_there = |found: &Found| Some(found.last().target.as_str()) == place;
-    let there = all.iter().filter(|found| is_there(found));
-    let elsewhere = all.iter().filter(|found| !is_there(found));
-    (there.chain(elsewhere))
-        .filter(|f| [Nature::Function, Nature::Reading].contains(&f.last().nature))
-        .filter(|f| f.gain > floor)
-        .filter_map(|found| {
-            let model = found.model.as_ref()?;
-            let curve = curve(model)?;
-            let term = found.last();
+    let (there, elsewhere): (Vec<&Explanation>, Vec<&Explanation>) =
+        (all.iter()).partition(|e| Some(e.last().target.as_str()) == place);
+    (there.into_iter().chain(elsewhere))
+        .filter(|e| [Nature::Function, Nature::Reading].contains(&e.last().nature))
+        .filter(|e| e.log_z > beside.log_z)
+        .filter_map(|e| {
+            let curve = curve(e.model.as_ref()?)?;
+            let term = e.last();
+            let variances = curve.covariance.diagonal();
             Some(MissingFunction {
                 place: term.target.clone(),
                 variable: term.variables[0].0.clone(),
-                on_top,
-                log_evidence: found.gain - floor,
+                on_top: !beside.terms.is_empty(),
+                log_evidence: e.log_z - beside.log_z,
                 mean: curve.mean.iter().copied().collect(),
-                std_error: curve
-                    .covariance
-                    .diagonal()
-                    .iter()
-                    .map(|v| v.max(0.0).sqrt())
-                    .collect(),
+                std_error: variances.iter().map(|v| v.max(0.0).sqrt()).collect(),
                 values: curve.values,
             })
         })

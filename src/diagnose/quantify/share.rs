@@ -2,7 +2,6 @@
 
 use super::free_run::{Runner, root};
 use super::horizon::{HeldOutRows, Predictor, compare};
-use crate::diagnose::explain::found::Found;
 use crate::diagnose::outcome::Shrinkage;
 use crate::diagnose::thresholds::Thresholds;
 use crate::fit::climb::{Fitted, climb};
@@ -116,7 +115,7 @@ pub(in crate::diagnose) struct Measures<'m> {
     /// The same with the accepted effects, if any were accepted.
     pub accepted: Option<&'m Model>,
     /// The listed effects that were fitted, best first.
-    pub others: &'m [Found],
+    pub others: &'m [&'m Model],
     /// Rivals of the accepted effects, as `id@target`.
     pub class: &'m [String],
     /// A record that nothing before has seen.
@@ -239,12 +238,14 @@ pub(in crate::diagnose) fn shrinkage(
     };
     // Fitted effects outside the class: the best, and some at random.
     let used = keys(&accepted.terms);
-    let outside: Vec<&Model> = (measures.others.iter())
-        .filter(|found| {
-            let key = found.last().key();
-            !found.last().is_noise() && !used.contains(&key) && !measures.class.contains(&key)
+    let outside: Vec<&Model> = (measures.others.iter().copied())
+        .filter(|model| {
+            let others = model.terms.iter().map(|term| (term.is_noise(), term.key()));
+            let mut is_used = others.map(|(is_noise, key)| {
+                is_noise || used.contains(&key) || measures.class.contains(&key)
+            });
+            !is_used.any(|is_used| is_used)
         })
-        .filter_map(|found| found.model.as_ref())
         .collect();
     let of_wrong = |model: &Model| match held_out.refitted(model)? {
         Some(predictor) => error(&predictor),

@@ -1,17 +1,18 @@
 //! The effects that are truly there, fitted: how much evidence the record holds for them, and the share of the gap that they close.
 
 use super::base::Base;
-use super::explain::search::{Breadth, listed};
 use super::outcome::Shrinkage;
 use super::quantify::share::{Measures, shrinkage};
 use super::run::finished;
 use super::settings::DiagnoseSettings;
 use super::step::finer_step;
 use super::thresholds::Thresholds;
+use crate::fit::passes::Passes;
 use crate::hypothesis::model::Model;
-use crate::likelihood::measured;
+use crate::hypothesis::search::{Breadth, listed};
 use crate::record::Record;
 use crate::study::{Study, StudyError};
+use crate::twin::Twin;
 use std::sync::Arc;
 
 /// A fit of the true effects: what an answer is to be held against.
@@ -36,44 +37,41 @@ pub(crate) fn true_fit(
     if study.twin().outline().is_none() {
         return Ok(None);
     }
-    let records: Arc<[Record]> = Arc::from([record.clone()]);
-    let measure = |base: &Base, with: &Model| {
-        let accepted = finished(Some(with))?;
-        let measures = Measures {
-            base: &base.model,
-            accepted: accepted.as_ref(),
-            others: &[],
-            class: &[],
-            validation: validation.map(std::slice::from_ref),
-            initial: None,
-        };
-        Ok(Some(TrueFit {
-            held: with.log_evidence - base.model.log_evidence,
-            share: shrinkage(&measures, settings.noise())?,
-        }))
+    let fit = |twin: &Twin, settings: &DiagnoseSettings| {
+        let (records, passes) = (Arc::from([record.clone()]), Passes::default());
+        let base = Base::new(study, twin, records, settings, &passes)?;
+        let with = fitted(study, &base, keys, settings)?;
+        Ok::<_, StudyError>(with.map(|with| (base, with)))
     };
-    let own = measured(study.twin(), &records, &settings.beliefs(study))?;
-    let base = Base::new(&own, records.clone(), settings)?;
-    let Some(with) = fitted(study, &base, keys, settings)? else {
+    let Some(mut found) = fit(study.twin(), settings)? else {
         return Ok(None);
     };
-    let finer = match finer_step(&with, Thresholds::STEP_SHOWS, 0.0)? {
-        Some((step, _)) => step.of(study.twin()),
-        None => None,
-    };
-    let Some(finer) = finer else {
-        return measure(&base, &with);
-    };
-    let begin = DiagnoseSettings {
-        initial: Some(base.theta.clone()),
-        ..settings.clone()
-    };
-    let finer = measured(&finer, &records, &settings.beliefs(study))?;
-    let base = Base::new(&finer, records.clone(), &begin)?;
-    match fitted(study, &base, keys, settings)? {
-        Some(with) => measure(&base, &with),
-        None => Ok(None),
+    if let Some((step, _)) = finer_step(&found.1, Thresholds::STEP_SHOWS, 0.0)?
+        && let Some(finer) = step.of(study.twin())
+    {
+        let begin = DiagnoseSettings {
+            initial: Some(found.0.theta.clone()),
+            ..settings.clone()
+        };
+        match fit(&finer, &begin)? {
+            Some(finer) => found = finer,
+            None => return Ok(None),
+        }
     }
+    let (base, with) = found;
+    let accepted = finished(&with)?;
+    let measures = Measures {
+        base: &base.model,
+        accepted: Some(&accepted),
+        others: &[],
+        class: &[],
+        validation: validation.map(std::slice::from_ref),
+        initial: None,
+    };
+    Ok(Some(TrueFit {
+        held: with.log_evidence - base.model.log_evidence,
+        share: shrinkage(&measures, settings.noise())?,
+    }))
 }
 
 /// The twin with these effects, added one after the other; `None` where one cannot be fitted.
@@ -86,16 +84,14 @@ fn fitted(
     let terms = base.listed(study, settings)?;
     let mut model = base.model.clone();
     for key in keys {
-        let ways: Vec<_> = (terms.iter())
-            .filter(|term| term.key() == *key)
-            .cloned()
-            .collect();
+        let mut ways = terms.clone();
+        ways.retain(|term| term.key() == *key);
         let breadth = Breadth {
             least: f64::NEG_INFINITY,
             ..Breadth::of(&model, false).of_all().for_gap(f64::INFINITY)
         };
-        let found = listed(&model, &ways, model.log_evidence, &[], breadth)?;
-        match found.into_iter().find_map(|found| found.model) {
+        let found = listed(&model, &ways, &[], breadth)?;
+        match found.into_iter().find_map(|e| e.model) {
             Some(with) => model = with,
             None => return Ok(None),
         }

@@ -1,0 +1,106 @@
+//! What a search asks to be changed: the noise, the step, the rows.
+
+use super::Search;
+use super::evidence::{Evidence, Purpose};
+use crate::diagnose::step::FinerStep;
+use crate::diagnose::thresholds::Thresholds;
+use crate::hypothesis::set::TermSet;
+use crate::study::StudyError;
+
+/// A change of the twin, or of the rows that are seen.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::diagnose) enum Change {
+    /// Another kind of noise in the place of the twin's own.
+    Noise(TermSet),
+    /// A finer step.
+    Step {
+        step: FinerStep,
+        /// True where it matters little beside what was found: explanations are carried on.
+        is_minor: bool,
+    },
+    /// All rows: explanations are carried on.
+    AllRows,
+    /// More of the first rows.
+    MoreRows,
+}
+
+impl Change {
+    /// Nats by which the change must raise log Z of all hypotheses together.
+    pub fn least_gain(&self) -> f64 {
+        match self {
+            Self::Noise(_) => 0.0,
+            Self::Step { .. } => Thresholds::STEP_WINS,
+            // Of other records.
+            Self::AllRows | Self::MoreRows => f64::NEG_INFINITY,
+        }
+    }
+
+    /// Returns whether explanations are carried on.
+    pub fn carries(&self) -> bool {
+        matches!(self, Self::AllRows | Self::Step { is_minor: true, .. })
+    }
+}
+
+impl<E: Evidence> Search<E> {
+    /// The change that the records ask for. A gap may pass for another kind of noise or for the error of a step, and hide it.
+    pub(super) fn asks_for(&mut self) -> Result<Option<Change>, StudyError> {
+        if self.is_partial {
+            return Ok(None);
+        }
+        if let Some(noise) = self.asks_for_noise() {
+            return Ok(Some(noise));
+        }
+        // A second effect may imitate the step's error, and so may an effect that explains a little more than the right one. Where nothing
+        // listed does, noise levels are fitted loud beside a gap, and hide it: the twin alone is asked.
+        let top = self.known.top();
+        let candidates = self.known.candidates().into_iter().map(|e| e.set());
+        let twin = (self.evidence.has_own_step() && self.is_gap()).then(TermSet::default);
+        for set in candidates.chain(twin).collect::<Vec<_>>() {
+            if !self.asked.insert((Purpose::Step, set.clone())) {
+                continue;
+            }
+            let finer = match self.known.get(&set) {
+                Some(beside) => self.evidence.finer_step(beside, &self.known)?,
+                None => None,
+            };
+            if let Some((step, gain)) = finer {
+                let is_minor = gain < self.budget.minor * top && self.evidence.has_own_noise();
+                let change = Change::Step { step, is_minor };
+                if !self.refused.contains(&change) {
+                    return Ok(Some(change));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// The rows that are to be seen next. A wave's frequency is known as sharply as the record is long: it is looked for in all rows.
+    pub(super) fn asks_for_rows(&self) -> Option<Change> {
+        let (seen, all) = self.evidence.rows();
+        let is_clear = self.known.posterior().log_odds >= self.budget.clear
+            && !self.known.leads_with_wave()
+            && !self.refused.contains(&Change::AllRows);
+        match is_clear {
+            _ if seen >= all => None,
+            true => Some(Change::AllRows),
+            false => (!self.is_partial).then_some(Change::MoreRows),
+        }
+    }
+
+    /// The kind of noise that the records ask for: where something is missing beside it, where nothing is without it.
+    fn asks_for_noise(&self) -> Option<Change> {
+        let alone = || {
+            let best = self.known.noise().into_iter().next()?;
+            let is_enough = self.known.gain(best) > Thresholds::NOISE && !self.is_gap();
+            is_enough.then(|| Change::Noise(best.set()))
+        };
+        let noise = self.asks_for_noise_beside().or_else(alone);
+        noise.filter(|noise| !self.refused.contains(noise))
+    }
+
+    /// The kind of noise that the records ask for beside listed effects.
+    pub(super) fn asks_for_noise_beside(&self) -> Option<Change> {
+        let noise = Change::Noise(self.known.asks_for_noise_beside()?.set());
+        (!self.refused.contains(&noise)).then_some(noise)
+    }
+}

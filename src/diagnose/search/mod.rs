@@ -1,0 +1,228 @@
+//! Search for what explains the records: one map of explanations, and one loop that asks what is not known yet.
+//!
+//! ```text
+//! stages    unknown functions ▸ listed effects ▸ kinds of noise ▸ what effects leave ▸ pairs      again from the start if the twin fits better
+//! changes   another kind of noise | a finer step | all rows      kept where log Z of all hypotheses together rises
+//! rest      what the best sets leave, once the twin stays as it is
+//! ```
+//!
+//! | file | holds |
+//! |---|---|
+//! | `explanations.rs` | the map, and lists as queries of it |
+//! | `agenda.rs` | the next question of each stage |
+//! | `change.rs` | what is asked to be changed |
+//! | `evidence.rs` | the interface to the records: questions and answers |
+//! | `setup.rs` | that interface over the engine of hypotheses |
+//! | `carry.rs` | explanations carried on to another step or to all rows |
+//! | `budget.rs` | numbers of rows, sets, starts |
+
+mod agenda;
+mod budget;
+mod carry;
+mod change;
+mod evidence;
+mod explanations;
+mod setup;
+#[cfg(test)]
+mod tests;
+
+use self::agenda::{Begin, Stage};
+use self::change::Change;
+use self::evidence::{Evidence, Purpose};
+use super::settings::DiagnoseSettings;
+use super::thresholds::Thresholds;
+use crate::hypothesis::set::TermSet;
+use crate::progress::{Cancelled, Progress};
+use crate::study::StudyError;
+use std::collections::BTreeSet;
+
+pub(in crate::diagnose) use budget::Budget;
+pub(in crate::diagnose) use explanations::Explanations;
+pub(in crate::diagnose) use setup::{Setup, absorbing};
+
+/// Stages of a search for one twin.
+const STAGES: [Stage; 5] = [
+    Stage::Functions,
+    Stage::Effects,
+    Stage::Noise,
+    Stage::Remains,
+    Stage::Pairs,
+];
+
+/// A search: the twin and the records, and everything that is known of them.
+pub(in crate::diagnose) struct Search<E> {
+    pub evidence: E,
+    pub known: Explanations,
+    /// True where the search was cancelled: what is known is all that was found until then.
+    pub is_partial: bool,
+    begin: Begin,
+    asked: BTreeSet<(Purpose, TermSet)>,
+    refused: Vec<Change>,
+    /// log Z of the explanations from which the twin was fitted again last, to no avail.
+    tried: Vec<f64>,
+    budget: Budget,
+    detection_only: bool,
+}
+
+/// Settings of a search and its progress.
+#[derive(Clone, Copy)]
+pub(in crate::diagnose) struct Watch<'w> {
+    pub settings: &'w DiagnoseSettings,
+    pub progress: &'w Progress,
+}
+
+/// Searches with one twin, then with each change that the records ask for, and keeps those that raise log Z.
+pub(in crate::diagnose) fn search<E: Evidence>(
+    evidence: E,
+    budget: Budget,
+    watch: Watch<'_>,
+) -> Result<Search<E>, StudyError> {
+    let mut best = Search::new(evidence, budget, watch).settled(watch)?;
+    while let Some(change) = best.asks_for_rows() {
+        match best.with(&change, watch)? {
+            Some(all) if change == Change::AllRows => best = all.ended(best.is_partial, watch)?,
+            Some(more) => best = more.settled(watch)?,
+            None => best.refused.push(change),
+        }
+    }
+    Ok(best)
+}
+
+impl<E: Evidence> Search<E> {
+    fn new(evidence: E, budget: Budget, watch: Watch<'_>) -> Self {
+        Self {
+            known: Explanations::new(evidence.twin()),
+            evidence,
+            is_partial: false,
+            begin: Begin::Afresh,
+            asked: BTreeSet::new(),
+            refused: vec![],
+            tried: vec![],
+            budget,
+            detection_only: watch.settings.detection_only,
+        }
+    }
+
+    /// Searches these rows until they ask for no change, and then for what the best sets leave.
+    fn settled(self, watch: Watch<'_>) -> Result<Self, StudyError> {
+        let mut best = self.run(watch)?;
+        while let Some(change) = best.asks_for()? {
+            let next = match best.with(&change, watch) {
+                Ok(Some(next)) => next.run(watch),
+                Ok(None) => Err(StudyError::NoStart),
+                Err(error) => Err(error),
+            };
+            match next {
+                Ok(next) if next.log_z() > best.log_z() + change.least_gain() => best = next,
+                // A twin that its own step holds together may go nowhere with a finer one.
+                Ok(_) | Err(StudyError::NoStart) => {
+                    best.refused.push(change);
+                    best = best.run(watch)?;
+                }
+                Err(StudyError::Cancelled(_)) if watch.settings.give_partial => {
+                    best.is_partial = true;
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        best.finish(watch)
+    }
+
+    /// Asks all stages, again from the start where the twin fits better from θ of an explanation than from its own.
+    fn run(mut self, watch: Watch<'_>) -> Result<Self, StudyError> {
+        let progress = watch.progress.stage("explain", STAGES.len());
+        let mut stages = STAGES.into_iter();
+        while let Some(stage) = stages.next().filter(|_| !self.is_partial) {
+            self.ask_all(stage)?;
+            let are_singles_known = !self.known.listed().is_empty() && stage != Stage::Functions;
+            match progress.tick() {
+                Err(Cancelled) if watch.settings.give_partial && are_singles_known => {
+                    self.is_partial = true;
+                }
+                other => other?,
+            }
+            let may_be_better = matches!(stage, Stage::Effects | Stage::Pairs);
+            if may_be_better && !self.is_partial && self.fit_again()? {
+                stages = STAGES.into_iter();
+            }
+        }
+        progress.finish();
+        Ok(self)
+    }
+
+    /// The search whose explanations are carried on to all rows: nothing more is asked.
+    fn ended(self, is_partial: bool, watch: Watch<'_>) -> Result<Self, StudyError> {
+        let progress = watch.progress.stage("all rows", 1);
+        let is_cancelled = watch.settings.ends(progress.tick())?;
+        Ok(Self {
+            is_partial: is_partial || is_cancelled,
+            ..self
+        })
+    }
+
+    /// Asks what the best sets leave.
+    fn finish(mut self, watch: Watch<'_>) -> Result<Self, StudyError> {
+        if !self.is_partial && self.next(Stage::Rest).is_some() {
+            let progress = watch.progress.stage("what is left", 1);
+            self.ask_all(Stage::Rest)?;
+            self.is_partial = watch.settings.ends(progress.tick())?;
+        }
+        Ok(self)
+    }
+
+    fn ask_all(&mut self, stage: Stage) -> Result<(), StudyError> {
+        while let Some(question) = self.next(stage) {
+            let answer = self.evidence.answer(&question, &self.known)?;
+            let (purpose, beside) = (question.purpose, question.beside);
+            match answer {
+                Some(found) if purpose == Purpose::Remains => {
+                    self.known.extend(beside.clone(), found);
+                }
+                found => (found.into_iter().flatten()).for_each(|e| self.known.add(e)),
+            }
+            self.asked.insert((purpose, beside));
+        }
+        Ok(())
+    }
+
+    /// Fits the twin again from θ of the best explanations, beside which it may have gone further; returns whether that is better.
+    fn fit_again(&mut self) -> Result<bool, StudyError> {
+        let starts = self.known.starts(self.budget.starts);
+        let tried: Vec<f64> = starts.iter().map(|e| e.log_z).collect();
+        if tried == self.tried {
+            return Ok(false);
+        }
+        let Some(evidence) = self.evidence.fitted_from(&starts)? else {
+            self.tried = tried;
+            return Ok(false);
+        };
+        self.known.set_twin(evidence.twin());
+        self.evidence = evidence;
+        self.begin = Begin::WithFits;
+        self.asked.clear();
+        Ok(true)
+    }
+
+    /// The search with a change of the twin or the records, and what is carried on to it; `None` where the twin cannot be fitted.
+    fn with(&self, change: &Change, watch: Watch<'_>) -> Result<Option<Self>, StudyError> {
+        let Some(evidence) = self.evidence.changed(change, &self.known)? else {
+            return Ok(None);
+        };
+        let mut next = Self::new(evidence, self.budget.clone(), watch);
+        if change.carries() {
+            next.known = self.carried(&next.evidence)?;
+            next.begin = Begin::Carried;
+        }
+        Ok(Some(next))
+    }
+
+    /// log Z of all hypotheses together.
+    fn log_z(&self) -> f64 {
+        self.known.twin().log_z + self.known.posterior().log_evidence
+    }
+
+    /// Returns whether something is missing.
+    fn is_gap(&self) -> bool {
+        self.known.posterior().log_odds > Thresholds::GAP
+    }
+}

@@ -1,0 +1,437 @@
+//! Evidence of explanations from the engine of hypotheses.
+
+use super::budget::Budget;
+use super::change::Change;
+use super::evidence::{Evidence, Family, Purpose, Question};
+use super::explanations::Explanations;
+use crate::diagnose::base::Base;
+use crate::diagnose::candidates;
+use crate::diagnose::settings::{Ablation, DiagnoseSettings};
+use crate::diagnose::step::{FinerStep, finer_step};
+use crate::diagnose::thresholds::Thresholds;
+use crate::fit::passes::Passes;
+use crate::hypothesis::explanation::Explanation;
+use crate::hypothesis::model::Model;
+use crate::hypothesis::noise::kinds;
+use crate::hypothesis::scales::Scales;
+use crate::hypothesis::search::{Breadth, listed, unknown as functions};
+use crate::hypothesis::shared;
+use crate::hypothesis::term::Term;
+use crate::hypothesis::unknown::unknown;
+use crate::record::Record;
+use crate::study::{Study, StudyError};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// What a search is about: a study, its records or their first rows, and settings.
+#[derive(Clone)]
+struct Task<'s> {
+    study: &'s Study,
+    settings: &'s DiagnoseSettings,
+    budget: Budget,
+    records: Arc<[Record]>,
+    passes: Passes,
+}
+
+/// A fitted twin, and the terms that are looked for beside it.
+pub(in crate::diagnose) struct Setup<'s> {
+    task: Task<'s>,
+    pub base: Base,
+    pub listed: Vec<Arc<Term>>,
+    noise: Vec<Arc<Term>>,
+    /// The twin with θ inside its prior, if its fit has left that.
+    inside: Option<Model>,
+    /// Rows that the search saw, where it did not see all.
+    pub searched: Option<usize>,
+}
+
+impl<'s> Setup<'s> {
+    /// Fits the twin to the records, to their first rows where they are long, with a finer step where the records ask for it at once.
+    pub fn new(
+        study: &'s Study,
+        records: Arc<[Record]>,
+        settings: &'s DiagnoseSettings,
+        budget: &Budget,
+    ) -> Result<Self, StudyError> {
+        let task = Task {
+            study,
+            settings,
+            budget: budget.clone(),
+            records,
+            passes: Passes::default(),
+        };
+        let is_long = task.rows() >= budget.long_rows && study.twin().outline().is_some();
+        task.setup(if is_long {
+            budget.first_rows
+        } else {
+            task.rows()
+        })
+    }
+}
+
+impl<'s> Task<'s> {
+    /// Rows of all records together.
+    fn rows(&self) -> usize {
+        self.records.iter().map(Record::samples).sum()
+    }
+
+    /// Fits the twin to so many first rows, or to more where nothing moves in them yet.
+    fn setup(&self, rows: usize) -> Result<Setup<'s>, StudyError> {
+        let all = self.rows();
+        let part = (self.budget.more_rows * rows <= all).then(|| self.first_rows(rows));
+        let Some(part) = part.flatten() else {
+            return self.fitted(self.records.clone());
+        };
+        match self.fitted(part) {
+            Err(StudyError::NoStart) => self.setup(self.budget.more_rows * rows),
+            other => Ok(Setup {
+                searched: Some(rows),
+                ..other?
+            }),
+        }
+    }
+
+    /// The same share of each record, so many rows in all; `None` where an output has no value in them.
+    fn first_rows(&self, rows: usize) -> Option<Arc<[Record]>> {
+        let all = self.rows();
+        (self.records.iter())
+            .map(|record| record.first_part((record.samples() * rows).div_ceil(all)))
+            .collect()
+    }
+
+    fn fitted(&self, records: Arc<[Record]>) -> Result<Setup<'s>, StudyError> {
+        let own = self.study.twin();
+        let base = Base::new(self.study, own, records, self.settings, &self.passes)?;
+        match self.step_at_once(&base)? {
+            Some(step) => self.with_step(&base, step, &[]),
+            None => self.with_base(base),
+        }
+    }
+
+    /// The finer step that the records ask for beside the twin alone. A gap may pass for one: an effect that is more probable, as one of all
+    /// that are listed, is asked first.
+    fn step_at_once(&self, base: &Base) -> Result<Option<FinerStep>, StudyError> {
+        let (model, least) = (&base.model, Thresholds::STEP_SHOWS);
+        let Some((step, gain)) = finer_step(model, least, 0.0)? else {
+            return Ok(None);
+        };
+        let terms = base.listed(self.study, self.settings)?;
+        let breadth = Breadth {
+            listed: self.budget.starts,
+            ..Breadth::of(model, self.settings.quick)
+        };
+        let effects = listed(model, &terms, &[], breadth)?;
+        let price = (effects.len() as f64 / Thresholds::LISTED).ln();
+        let best = (effects.first()).filter(|e| e.log_z - model.log_evidence - price > gain);
+        match best.and_then(|effect| effect.model.as_ref()) {
+            Some(beside) => Ok(finer_step(beside, least, 0.0)?.map(|(step, _)| step)),
+            None => Ok(Some(step)),
+        }
+    }
+
+    /// The twin of the study with a finer step, fitted from where another one is and from these θ.
+    fn with_step(
+        &self,
+        base: &Base,
+        step: FinerStep,
+        thetas: &[Vec<f64>],
+    ) -> Result<Setup<'s>, StudyError> {
+        let own = self.study.twin();
+        let twin = step.of(own).unwrap_or_else(|| own.clone());
+        let begin = DiagnoseSettings {
+            initial: Some(base.theta.clone()),
+            ..self.settings.clone()
+        };
+        let records = base.model.problem.records.clone();
+        let base = Base {
+            step: Some(step),
+            ..Base::new(self.study, &twin, records, &begin, &self.passes)?
+        };
+        let better = base.fitted_from(thetas)?;
+        self.with_base(better.unwrap_or(base))
+    }
+
+    fn with_base(&self, base: Base) -> Result<Setup<'s>, StudyError> {
+        let listed = base.listed(self.study, self.settings)?;
+        let mut noise = vec![];
+        if base.noises.len() < self.budget.kinds_of_noise {
+            let outliers = candidates::outliers(self.study, &self.settings.without);
+            noise = shared(kinds(&outliers, &base.library(), &base.noisy)?);
+            noise.retain(|term| !base.noises.iter().any(|own| own.key() == term.key()));
+        }
+        Ok(Setup {
+            task: self.clone(),
+            inside: base.inside()?,
+            base,
+            listed,
+            noise,
+            searched: None,
+        })
+    }
+}
+
+impl<'s> Setup<'s> {
+    /// Unknown functions that a question is about, over the states of the twin and of the models that it names.
+    fn functions(
+        &self,
+        question: &Question,
+        known: &Explanations,
+    ) -> Result<Vec<Arc<Term>>, StudyError> {
+        if self.task.settings.lacks(Ablation::UnknownFunctions) {
+            return Ok(vec![]);
+        }
+        let models = question.from.iter().filter_map(|set| known.model(set));
+        let seen = models.map(states).collect::<Result<Vec<_>, _>>()?;
+        Ok(chosen(
+            shared(unknown(&self.base.library(), &seen)),
+            question,
+        ))
+    }
+
+    /// The same from the twin with θ inside its prior: what those promise that are not fitted counts what θ gains on its way back.
+    fn answer_inside(
+        &self,
+        question: &Question,
+        terms: &[Arc<Term>],
+    ) -> Result<Vec<Explanation>, StudyError> {
+        let Some(inside) = &self.inside else {
+            return Ok(vec![]);
+        };
+        let breadth = question.breadth;
+        let mut found = match question.purpose {
+            Purpose::Functions => functions(inside, terms, breadth.few())?,
+            Purpose::Effects | Purpose::AllEffects => {
+                let afresh = false;
+                listed(inside, terms, &[], Breadth { afresh, ..breadth })?
+            }
+            _ => vec![],
+        };
+        found.retain(|e| e.model.is_some());
+        Ok(found)
+    }
+
+    /// Returns whether the twin or one of the best explanations, each carried on with a finer step, is likelier than all are with their own.
+    fn helps(&self, step: FinerStep, known: &Explanations) -> Result<bool, StudyError> {
+        let Some(twin) = step.of(&self.base.model.base) else {
+            return Ok(false);
+        };
+        let trials = |all: Vec<&Explanation>| -> Vec<Model> {
+            let models = all.into_iter().filter_map(|e| e.model.clone());
+            models.take(self.task.budget.step_trials).collect()
+        };
+        let mut models = vec![self.base.model.clone()];
+        for all in [known.listed(), known.unknown(), known.pairs()] {
+            models.extend(trials(all));
+        }
+        let own = models.iter().map(|model| model.log_evidence);
+        let least = own.fold(f64::NEG_INFINITY, f64::max);
+        let is_likelier: Vec<bool> = (models.into_par_iter())
+            .map(|model| {
+                let problem = model.problem_of(&twin)?;
+                let finer = Model { problem, ..model }.carried_on()?;
+                Ok(finer.is_some_and(|finer| finer.log_evidence > least))
+            })
+            .collect::<Result<_, StudyError>>()?;
+        Ok(is_likelier.contains(&true))
+    }
+}
+
+impl Evidence for Setup<'_> {
+    fn twin(&self) -> Explanation {
+        Explanation::of(self.base.model.clone())
+    }
+
+    fn answer(
+        &self,
+        question: &Question,
+        known: &Explanations,
+    ) -> Result<Option<Vec<Explanation>>, StudyError> {
+        let Some(model) = known.model(&question.beside) else {
+            return Ok(None);
+        };
+        let (family, breadth) = (question.family(), question.breadth);
+        let terms = match family {
+            Family::Unknown => self.functions(question, known)?,
+            Family::Listed => chosen(self.listed.clone(), question),
+            Family::Noise => chosen(self.noise.clone(), question),
+        };
+        let thetas: Vec<Vec<f64>> = (question.from.iter())
+            .filter_map(|set| known.get(set)?.own_theta())
+            .collect();
+        let mut found = match family {
+            Family::Unknown => functions(model, &terms, breadth)?,
+            Family::Listed => listed(model, &terms, &thetas, breadth)?,
+            Family::Noise => listed(model, &terms, &[], breadth)?,
+        };
+        if matches!(
+            question.purpose,
+            Purpose::Pairs | Purpose::RivalPairs | Purpose::WiderFunctions
+        ) {
+            found.retain(|e| e.model.is_some());
+        }
+        found.extend(self.answer_inside(question, &terms)?);
+        Ok(Some(found))
+    }
+
+    fn fitted_from(&self, explanations: &[&Explanation]) -> Result<Option<Self>, StudyError> {
+        let thetas: Vec<Vec<f64>> = explanations.iter().filter_map(|e| e.own_theta()).collect();
+        let better = self.base.fitted_from(&thetas)?;
+        let setup = better.map(|base| self.task.with_base(base)).transpose()?;
+        Ok(setup.map(|setup| Self {
+            searched: self.searched,
+            ..setup
+        }))
+    }
+
+    fn changed(&self, change: &Change, known: &Explanations) -> Result<Option<Self>, StudyError> {
+        let base = match change {
+            Change::MoreRows => {
+                let rows = self.task.budget.more_rows * self.rows().0;
+                return self.task.setup(rows).map(Some);
+            }
+            Change::Step { step, .. } => {
+                let best = known.starts(self.task.budget.starts);
+                let thetas: Vec<Vec<f64>> = best.iter().filter_map(|e| e.own_theta()).collect();
+                let setup = self.task.with_step(&self.base, *step, &thetas)?;
+                return Ok(Some(Self {
+                    searched: self.searched,
+                    ..setup
+                }));
+            }
+            Change::Noise(set) => match known.model(set) {
+                Some(model) => self.base.with_noise(model)?,
+                None => None,
+            },
+            Change::AllRows => self.base.on(self.task.records.clone())?,
+        };
+        let Some(base) = base else { return Ok(None) };
+        let setup = self.task.with_base(base)?;
+        Ok(Some(Self {
+            searched: self.searched,
+            ..setup
+        }))
+    }
+
+    fn carried(&self, other: &Explanation) -> Result<Option<Explanation>, StudyError> {
+        let Some(old) = &other.model else {
+            return Ok(None);
+        };
+        let new = old.beside_twin(&self.base.model)?;
+        Ok(new.map(|new| Explanation {
+            terms: other.terms.clone(),
+            log_z: other.log_z + new.log_evidence - old.log_evidence,
+            model: Some(new),
+        }))
+    }
+
+    fn finer_step(
+        &self,
+        beside: &Explanation,
+        known: &Explanations,
+    ) -> Result<Option<(FinerStep, f64)>, StudyError> {
+        let Some(model) = &beside.model else {
+            return Ok(None);
+        };
+        let top = known.top();
+        let is_twin = beside.terms.is_empty();
+        let least = match is_twin {
+            true => Thresholds::STEP_SHOWS.max(Thresholds::FINE_PRINT * top),
+            false => Thresholds::STEP_SHOWS,
+        };
+        let finer = finer_step(model, least, top)?;
+        let finer = finer.filter(|(step, _)| self.base.step != Some(*step));
+        match finer {
+            Some((step, _)) if is_twin && !self.helps(step, known)? => Ok(None),
+            finer => Ok(finer),
+        }
+    }
+
+    fn breadth(&self) -> Breadth {
+        Breadth::of(&self.base.model, self.task.settings.quick)
+    }
+
+    fn rows(&self) -> (usize, usize) {
+        let seen = self.base.model.problem.samples();
+        (seen, self.task.rows())
+    }
+
+    fn has_own_step(&self) -> bool {
+        self.base.step.is_none()
+    }
+
+    fn has_own_noise(&self) -> bool {
+        self.base.noises.is_empty()
+    }
+}
+
+/// The terms that a question is about, in every way that they may be used: a hypothesis pays for all its ways.
+fn chosen(mut terms: Vec<Arc<Term>>, question: &Question) -> Vec<Arc<Term>> {
+    terms.retain(|term| {
+        let key = term.key();
+        let is_asked = question
+            .only
+            .as_ref()
+            .is_none_or(|only| only.contains(&key));
+        is_asked && !question.beside.iter().any(|own| own == key)
+    });
+    terms
+}
+
+/// Sizes of the states along a fitted model.
+fn states(model: &Model) -> Result<Scales, StudyError> {
+    Ok(Scales {
+        records: model.problem.records.clone(),
+        states: model.states()?,
+        outline: model.problem.outline(),
+        rates: vec![],
+        defined: vec![],
+    })
+}
+
+/// Listed effects that explain a parameter gap with θ inside the prior, as well as θ outside does: best first.
+pub(in crate::diagnose) fn absorbing(
+    free: &Model,
+    within: &Model,
+    terms: &[Arc<Term>],
+) -> Result<Vec<Explanation>, StudyError> {
+    let breadth = Breadth::of(within, false).of_all();
+    let mut found = listed(within, terms, &[], breadth)?;
+    let best = free.fitted.log_likelihood - Thresholds::ABSORBS;
+    let is_as_good = |model: &Model| model.fitted.log_likelihood >= best;
+    found.retain(|e| e.model.as_ref().is_some_and(is_as_good));
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::fixture::{record, tanks};
+    use crate::diagnose::search::{Watch, search};
+    use crate::progress::Progress;
+
+    /// Where the first rows show no clear gap, all rows are searched.
+    #[test]
+    fn no_gap_is_told_of_all_rows() {
+        let budget = Budget {
+            long_rows: 1024,
+            first_rows: 256,
+            ..Budget::default()
+        };
+        let study = tanks(budget.long_rows);
+        let theta = study.twin().parameters().centre();
+        let records = Arc::from([record(&study, study.twin(), &theta, 3)]);
+        let settings = DiagnoseSettings {
+            detection_only: true,
+            ..DiagnoseSettings::default()
+        };
+        let setup = Setup::new(&study, records, &settings, &budget).unwrap();
+        let progress = &Progress::silent();
+        let watch = Watch {
+            settings: &settings,
+            progress,
+        };
+        let found = search(setup, budget, watch).unwrap();
+        assert_eq!(found.evidence.searched, None);
+        assert!(found.known.posterior().log_odds < 3.0);
+    }
+}
