@@ -226,6 +226,13 @@ fn inside(problem: &Problem) -> Problem {
     problem.with_twin(problem.twin.clone(), axes)
 }
 
+/// A model with its fit carried on to its end: the search stops where a hypothesis is known well enough to be compared.
+pub(in crate::diagnose) fn finished(model: &Model) -> Result<Model, StudyError> {
+    let fitted = climb(&model.problem, &model.fitted.theta, ITERATIONS)?;
+    let finished = fitted.and_then(|fitted| model.refitted(fitted));
+    Ok(finished.unwrap_or_else(|| model.clone()))
+}
+
 /// Number of the twin's own parameters outside their prior.
 fn beyond(model: &Model) -> usize {
     let theta = model.theta();

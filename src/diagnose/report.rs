@@ -2,19 +2,18 @@
 
 use super::answer::summary::{absorbed, effects, nuisance, onset, parameters, remains};
 use super::answer::{Answer, Hypotheses};
-use super::base::left_the_prior;
+use super::base::{finished, left_the_prior};
 use super::candidates::not_tested;
 use super::locate::discover::discover;
 use super::locate::functions::{curve, missing_functions};
 use super::locate::maps::maps;
 use super::outcome::*;
-use super::quantify::calibrate::calibrate;
+use super::quantify::calibrate::{calibrate, p_value};
 use super::quantify::free_run::{Runner, free_runs, root};
 use super::quantify::next_input::next_input;
 use super::quantify::power::power;
 use super::quantify::share::{Measures, shrinkage};
-use super::run::{finished, searched};
-use super::search::{Search, Setup, Watch, absorbing};
+use super::search::{Search, Setup, Watch, absorbing, searched};
 use super::settings::DiagnoseSettings;
 use super::thresholds::Thresholds;
 use crate::hypothesis::explanation::Explanation;
@@ -26,7 +25,7 @@ use crate::progress::{Progress, Stage};
 use crate::record::Record;
 use crate::study::{Study, StudyError};
 
-/// What a search found, and what a report of it is to hold.
+/// A search and what its report is to hold.
 pub(super) struct Report<'d> {
     pub study: &'d Study,
     pub found: &'d Search<Setup<'d>>,
@@ -35,7 +34,7 @@ pub(super) struct Report<'d> {
     pub watch: Watch<'d>,
 }
 
-/// How far: the next input, the smallest visible effects, the share closed.
+/// Extent of a gap: the next input, the smallest visible effects, the share closed.
 #[derive(Default)]
 struct Extent {
     next_input: Option<NextInput>,
@@ -162,13 +161,12 @@ impl Report<'_> {
         };
         let model = &self.found.evidence.base.model;
         let noise = settings.noise().child("null");
-        match calibrate(model, settings.calibrate, own, log_odds, noise, &stage) {
-            Err(StudyError::Cancelled(_)) if settings.give_partial => {}
-            calibrated => {
-                if let Some((p, at_floor)) = calibrated? {
-                    (detection.p_value, detection.at_floor) = (Some(p), at_floor);
-                }
-            }
+        let simulated = match calibrate(model, settings.calibrate, log_odds, noise, &stage) {
+            Err(StudyError::Cancelled(_)) if settings.give_partial => vec![],
+            simulated => simulated?,
+        };
+        if let Some((p, at_floor)) = p_value(own, &simulated) {
+            (detection.p_value, detection.at_floor) = (Some(p), at_floor);
         }
         Ok(detection)
     }

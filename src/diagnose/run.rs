@@ -2,19 +2,14 @@
 
 use super::outcome::Diagnosis;
 use super::report::Report;
-use super::search::{Budget, Search, Setup, Watch, search};
+use super::search::{Watch, searched};
 use super::settings::DiagnoseSettings;
-use crate::fit::climb::climb;
-use crate::hypothesis::model::Model;
 use crate::math::six_digits;
 use crate::progress::Progress;
 use crate::record::Record;
 use crate::setting::SettingError;
 use crate::study::{Study, StudyError};
 use std::time::Instant;
-
-/// Most iterations of the last fit of what is accepted.
-const FINISH: usize = 80;
 
 /// Diagnoses the gap between a twin and records of one real system.
 ///
@@ -83,26 +78,6 @@ impl Study {
         let settings = DiagnoseSettings::default();
         diagnose(self, records, None, &settings, &Progress::silent())
     }
-}
-
-/// Fits the twin of a study, and searches for what explains the records beside it.
-pub(super) fn searched<'s>(
-    study: &'s Study,
-    records: &[Record],
-    watch: Watch<'s>,
-) -> Result<Search<Setup<'s>>, StudyError> {
-    let stage = watch.progress.stage("fit", 1);
-    let budget = Budget::default();
-    let setup = Setup::new(study, records.into(), watch.settings, &budget)?;
-    stage.tick()?;
-    search(setup, budget, watch)
-}
-
-/// A model with its fit carried on to its end: the search stops where a hypothesis is known well enough to be compared.
-pub(super) fn finished(model: &Model) -> Result<Model, StudyError> {
-    let fitted = climb(&model.problem, &model.fitted.theta, FINISH)?;
-    let finished = fitted.and_then(|fitted| model.refitted(fitted));
-    Ok(finished.unwrap_or_else(|| model.clone()))
 }
 
 /// Checks records and settings.

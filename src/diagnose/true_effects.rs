@@ -1,9 +1,8 @@
 //! The effects that are truly there, fitted: how much evidence the record holds for them, and the share of the gap that they close.
 
-use super::base::Base;
+use super::base::{Base, finished};
 use super::outcome::Shrinkage;
 use super::quantify::share::{Measures, shrinkage};
-use super::run::finished;
 use super::settings::DiagnoseSettings;
 use super::step::finer_step;
 use super::thresholds::Thresholds;

@@ -1,4 +1,4 @@
-//! Calibration: how much evidence for a gap do records show that the fitted twin itself has made?
+//! Calibration: evidence for a gap in records that the fitted twin itself has made.
 
 use crate::hypothesis::model::Model;
 use crate::progress::Stage;
@@ -7,15 +7,14 @@ use crate::study::StudyError;
 use crate::twin::Noise;
 use rayon::prelude::*;
 
-/// Evidence of simulated records, and the p-value of the measured ones: (p, at its floor).
+/// Returns the evidence for a gap in each simulated record.
 pub(in crate::diagnose) fn calibrate(
     model: &Model,
     count: usize,
-    own: f64,
     log_odds: impl Fn(&[Record]) -> Result<f64, StudyError> + Sync,
     noise: Noise,
     stage: &Stage,
-) -> Result<Option<(f64, bool)>, StudyError> {
+) -> Result<Vec<f64>, StudyError> {
     let theta = &model.fitted.theta;
     let problem = &model.problem;
     let values: Vec<Option<f64>> = (0..count as u64)
@@ -49,11 +48,12 @@ pub(in crate::diagnose) fn calibrate(
             Ok(value)
         })
         .collect::<Result<_, StudyError>>()?;
-    let all: Vec<f64> = values.into_iter().flatten().collect();
-    if all.is_empty() {
-        return Ok(None);
-    }
-    let above = all.iter().filter(|v| **v >= own).count();
-    let n = all.len() as f64;
-    Ok(Some(((above as f64 + 1.0) / (n + 1.0), above == 0)))
+    Ok(values.into_iter().flatten().collect())
+}
+
+/// p-value of measured evidence among simulated, and whether it is as small as so many simulations allow; `None` without any.
+pub(in crate::diagnose) fn p_value(own: f64, simulated: &[f64]) -> Option<(f64, bool)> {
+    let above = simulated.iter().filter(|v| **v >= own).count();
+    let p = (above as f64 + 1.0) / (simulated.len() as f64 + 1.0);
+    (!simulated.is_empty()).then_some((p, above == 0))
 }

@@ -35,7 +35,28 @@ struct HeldOut<'r> {
     what: &'static str,
 }
 
-impl HeldOut<'_> {
+impl<'r> HeldOut<'r> {
+    /// The validation record, or the last third of the first record; `None` where that is too short.
+    fn of(measures: &Measures<'r>) -> Option<Self> {
+        if let Some(records) = measures.validation {
+            return Some(Self {
+                record: &records[0],
+                begins: records.into(),
+                from: 0,
+                what: "validation record",
+            });
+        }
+        let record = &measures.base.problem.records[0];
+        let from = held_out_from(record.samples());
+        let part = (record.samples() >= SHORTEST_SPLIT).then(|| record.first_part(from));
+        Some(Self {
+            record,
+            begins: Arc::from([part??]),
+            from,
+            what: "last third of the record",
+        })
+    }
+
     /// The problem of a model without what is held out, and its fit; `None` where it cannot be fitted.
     fn refit(&self, model: &Model) -> Result<Option<Refit>, FilterError> {
         if self.from == 0 {
@@ -108,7 +129,7 @@ impl Refit {
     }
 }
 
-/// Means to measure the share of a gap.
+/// Models and records from which the share of a gap is measured.
 pub(in crate::diagnose) struct Measures<'m> {
     /// The twin alone.
     pub base: &'m Model,
@@ -124,54 +145,48 @@ pub(in crate::diagnose) struct Measures<'m> {
     pub initial: Option<&'m [f64]>,
 }
 
+impl Measures<'_> {
+    /// θ before any fit: the prior's centre, or what an estimator gave.
+    fn unfitted(&self) -> Vec<f64> {
+        let problem = &self.base.problem;
+        let mut theta = problem.of_record(0, &problem.centre());
+        let initial = self.initial.into_iter().flatten();
+        theta.iter_mut().zip(initial).for_each(|(v, initial)| *v = *initial);
+        theta
+    }
+
+    /// Fitted effects outside the class, best first.
+    fn outside(&self, accepted: &Model) -> Vec<&Model> {
+        let used = keys(&accepted.terms);
+        let is_used = |key: String| used.contains(&key) || self.class.contains(&key);
+        let is_outside = |model: &&&Model| {
+            (model.terms.iter()).all(|term| !term.is_noise() && !is_used(term.key()))
+        };
+        self.others.iter().filter(is_outside).copied().collect()
+    }
+}
+
 /// Measures how far the accepted effects close the gap on held-out data.
 pub(in crate::diagnose) fn shrinkage(
     measures: &Measures<'_>,
     noise: Noise,
 ) -> Result<Option<Shrinkage>, StudyError> {
-    let base = measures.base;
-    let whole = &base.problem.records[0];
-    let held_out = match measures.validation {
-        Some(records) => HeldOut {
-            record: &records[0],
-            begins: records.into(),
-            from: 0,
-            what: "validation record",
-        },
-        None if whole.samples() >= SHORTEST_SPLIT => {
-            let split = held_out_from(whole.samples());
-            let Some(part) = whole.first_part(split) else {
-                return Ok(None);
-            };
-            HeldOut {
-                record: whole,
-                begins: Arc::from([part]),
-                from: split,
-                what: "last third of the record",
-            }
-        }
-        None => return Ok(None),
-    };
-    let (record, from, rows) = (held_out.record, held_out.from, held_out.rows());
-    let Some(before) = held_out.refitted(base)? else {
+    let Some(held_out) = HeldOut::of(measures) else {
         return Ok(None);
     };
-    let free_run = |p: Predictor| p.runner.errors(record, from).map(|e| root(&e));
-    let Some(error) = (before.runner.errors(record, from)).filter(|errors| !errors.is_empty())
-    else {
+    let (record, from) = (held_out.record, held_out.from);
+    let Some(before) = held_out.refitted(measures.base)? else {
         return Ok(None);
     };
-    let mut unfitted = base.problem.of_record(0, &base.problem.centre());
-    for (value, initial) in unfitted
-        .iter_mut()
-        .zip(measures.initial.into_iter().flatten())
-    {
-        *value = *initial;
-    }
-    let unfitted = held_out.predictor(base, unfitted)?;
-    let mut result = Shrinkage {
+    let errors = before.runner.errors(record, from);
+    let Some(errors) = errors.filter(|errors| !errors.is_empty()) else {
+        return Ok(None);
+    };
+    let unfitted = held_out.predictor(measures.base, measures.unfitted())?;
+    let free_run = |p: &Predictor| p.runner.errors(record, from).map(|e| root(&e));
+    let alone = Shrinkage {
         metric: Shrinkage::FREE_RUN,
-        before: root(&error),
+        before: root(&errors),
         after: None,
         floor: None,
         closed: None,
@@ -180,88 +195,84 @@ pub(in crate::diagnose) fn shrinkage(
         horizon: None,
         horizons: vec![],
         log_score: None,
-        unfitted: None,
+        unfitted: unfitted.as_ref().and_then(free_run),
         placebo: None,
         random: vec![],
     };
     let Some(accepted) = measures.accepted else {
-        result.floor = before.runner.floor(record, from, noise.child("floor"));
-        result.unfitted = unfitted.and_then(free_run);
-        return Ok(Some(result));
+        let floor = before.runner.floor(record, from, noise.child("floor"));
+        return Ok(Some(Shrinkage { floor, ..alone }));
     };
-    let refit = held_out.refit(accepted)?;
-    let after = refit
-        .as_ref()
-        .map(|refit| held_out.predictor(accepted, refit.theta()));
-    let (Some(refit), Some(after)) = (&refit, after.transpose()?.flatten()) else {
-        result.unfitted = unfitted.and_then(free_run);
-        return Ok(Some(result));
+    let Some(refit) = held_out.refit(accepted)? else {
+        return Ok(Some(alone));
     };
-    let scores = (before.log_score(rows)?, after.log_score(rows)?);
-    result.log_score = match scores {
-        (Some(before), Some(after)) => Some([before, after]),
-        _ => None,
+    let Some(after) = held_out.predictor(accepted, refit.theta())? else {
+        return Ok(Some(alone));
     };
+    let rows = held_out.rows();
+    let scores = before.log_score(rows)?.zip(after.log_score(rows)?);
+    let log_score = scores.map(|(before, after)| [before, after]);
     if accepted.terms.iter().all(|term| term.is_noise()) {
         // No prediction moves: the density of what was held out does.
-        let Some([before, after]) = result.log_score else {
-            return Ok(None);
-        };
-        result.metric = Shrinkage::LOG_SCORE;
-        (result.before, result.after) = (before, Some(after));
-        return Ok(Some(result));
+        return Ok(log_score.map(|[before, after]| Shrinkage {
+            metric: Shrinkage::LOG_SCORE,
+            before,
+            after: Some(after),
+            log_score,
+            unfitted: None,
+            ..alone
+        }));
     }
-    let draws = held_out.draws(accepted, refit, noise.child("posterior"))?;
+    let draws = held_out.draws(accepted, &refit, noise.child("posterior"))?;
     let compared = compare(&before, &after, &draws, rows, noise.child("floor"))?;
-    result.horizons.clone_from(&compared.horizons);
     let shown = compared.headline.or(compared.horizons.len().checked_sub(1));
+    let interval = compared.interval(&before, &after, &draws, rows, noise.child("share"))?;
+    let mut closed = Shrinkage {
+        interval,
+        log_score,
+        horizons: compared.horizons.clone(),
+        ..alone
+    };
     if let Some(horizon) = shown.map(|at| &compared.horizons[at]) {
-        result.metric = match horizon.samples {
+        let is_narrow = |[low, high]: [f64; 2]| high - low < Thresholds::WIDEST;
+        closed.metric = match horizon.samples {
             Some(_) => Shrinkage::PREDICTION,
             None => Shrinkage::FREE_RUN,
         };
-        result.before = horizon.before;
-        result.after = Some(horizon.after);
-        result.floor = Some(horizon.floor);
-        result.closed = horizon.closed;
-        result.horizon = horizon.seconds;
+        closed.before = horizon.before;
+        closed.after = Some(horizon.after);
+        closed.floor = Some(horizon.floor);
+        closed.closed = horizon.closed.filter(|_| interval.is_some_and(is_narrow));
+        closed.horizon = horizon.seconds;
     }
-    result.interval = compared.interval(&before, &after, &draws, rows, noise.child("share"))?;
-    let is_narrow = |[low, high]: [f64; 2]| high - low < Thresholds::WIDEST;
-    result.closed = result
-        .closed
-        .filter(|_| result.interval.is_some_and(is_narrow));
     let error = |p: &Predictor| compared.error(shown, p, rows);
-    result.unfitted = match &unfitted {
-        Some(unfitted) => error(unfitted)?,
-        None => None,
+    closed.unfitted = unfitted.as_ref().map(error).transpose()?.flatten();
+    controls(&mut closed, measures.outside(accepted), noise, |model| {
+        let wrong = held_out.refitted(model)?;
+        Ok(wrong.as_ref().map(error).transpose()?.flatten())
+    })?;
+    Ok(Some(closed))
+}
+
+/// Adds errors of wrong effects, best first: those of the best, and where fits are cheap of some at random.
+fn controls(
+    shrinkage: &mut Shrinkage,
+    mut wrong: Vec<&Model>,
+    noise: Noise,
+    error: impl Fn(&Model) -> Result<Option<f64>, StudyError>,
+) -> Result<(), StudyError> {
+    let Some(best) = wrong.first() else {
+        return Ok(());
     };
-    // Fitted effects outside the class: the best, and some at random.
-    let used = keys(&accepted.terms);
-    let outside: Vec<&Model> = (measures.others.iter().copied())
-        .filter(|model| {
-            let others = model.terms.iter().map(|term| (term.is_noise(), term.key()));
-            let mut is_used = others.map(|(is_noise, key)| {
-                is_noise || used.contains(&key) || measures.class.contains(&key)
-            });
-            !is_used.any(|is_used| is_used)
-        })
-        .collect();
-    let of_wrong = |model: &Model| match held_out.refitted(model)? {
-        Some(predictor) => error(&predictor),
-        None => Ok(None),
-    };
-    if let Some(best) = outside.first() {
-        result.placebo = of_wrong(best)?;
+    shrinkage.placebo = error(best)?;
+    if best.problem.is_simulated() {
+        return Ok(());
     }
-    if !accepted.problem.is_simulated() {
-        let (mut drawn, mut source) = (outside, noise.source("random effects"));
-        for _ in 0..Thresholds::RANDOM_EFFECTS.min(drawn.len()) {
-            let at = (source.uniform() * drawn.len() as f64) as usize;
-            result
-                .random
-                .extend(of_wrong(drawn.swap_remove(at.min(drawn.len() - 1)))?);
-        }
+    let mut source = noise.source("random effects");
+    for _ in 0..Thresholds::RANDOM_EFFECTS.min(wrong.len()) {
+        let at = (source.uniform() * wrong.len() as f64) as usize;
+        let drawn = wrong.swap_remove(at.min(wrong.len() - 1));
+        shrinkage.random.extend(error(drawn)?);
     }
-    Ok(Some(result))
+    Ok(())
 }

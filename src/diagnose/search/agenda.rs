@@ -16,11 +16,11 @@ pub(super) enum Stage {
     Noise,
     Remains,
     Pairs,
-    /// What remains beside the sets that may be accepted, once the twin stays as it is.
+    /// Functions beside the sets that may be accepted, once the twin stays as it is.
     Rest,
 }
 
-/// What is known when a search begins.
+/// Knowledge with which a search begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Begin {
     Afresh,

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 /// Explanations of a kind, best first.
 struct List<'k> {
     all: Vec<&'k Explanation>,
-    /// So many of the best are carried on, if they have more nats than `least`.
+    /// Number of the best that are carried on, if they have more nats than `least`.
     most: usize,
     least: f64,
     /// The set that they stand beside.
@@ -19,8 +19,7 @@ struct List<'k> {
 }
 
 impl<E: Evidence> Search<E> {
-    /// What is known, for other evidence: the best explanations fitted on; of the rest, log Z of what does not stand out stays for another
-    /// step, and nats grow with the rows.
+    /// Explanations for other evidence: the best ones fitted on; of the others, log Z stays with another step, and nats grow with the rows.
     pub(super) fn carried(&self, new: &E) -> Result<Explanations, StudyError> {
         let old = &self.known;
         let ratio = new.rows().0 as f64 / self.evidence.rows().0 as f64;

@@ -1,45 +1,10 @@
-//! What a search asks to be changed: the noise, the step, the rows.
+//! Changes that a search asks for: another kind of noise, a finer step, more rows.
 
 use super::Search;
-use super::evidence::{Evidence, Purpose};
-use crate::diagnose::step::FinerStep;
+use super::evidence::{Change, Evidence, Purpose};
 use crate::diagnose::thresholds::Thresholds;
 use crate::hypothesis::set::TermSet;
 use crate::study::StudyError;
-
-/// A change of the twin, or of the rows that are seen.
-#[derive(Debug, Clone, PartialEq)]
-pub(in crate::diagnose) enum Change {
-    /// Another kind of noise in the place of the twin's own.
-    Noise(TermSet),
-    /// A finer step.
-    Step {
-        step: FinerStep,
-        /// True where it matters little beside what was found: explanations are carried on.
-        is_minor: bool,
-    },
-    /// All rows: explanations are carried on.
-    AllRows,
-    /// More of the first rows.
-    MoreRows,
-}
-
-impl Change {
-    /// Nats by which the change must raise log Z of all hypotheses together.
-    pub fn least_gain(&self) -> f64 {
-        match self {
-            Self::Noise(_) => 0.0,
-            Self::Step { .. } => Thresholds::STEP_WINS,
-            // Of other records.
-            Self::AllRows | Self::MoreRows => f64::NEG_INFINITY,
-        }
-    }
-
-    /// Returns whether explanations are carried on.
-    pub fn carries(&self) -> bool {
-        matches!(self, Self::AllRows | Self::Step { is_minor: true, .. })
-    }
-}
 
 impl<E: Evidence> Search<E> {
     /// The change that the records ask for. A gap may pass for another kind of noise or for the error of a step, and hide it.

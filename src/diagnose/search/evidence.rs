@@ -1,8 +1,8 @@
-//! What a search asks of the records, and their answer.
+//! Interface between a search and the records: questions, changes of the twin, answers.
 
-use super::change::Change;
 use super::explanations::Explanations;
 use crate::diagnose::step::FinerStep;
+use crate::diagnose::thresholds::Thresholds;
 use crate::hypothesis::explanation::Explanation;
 use crate::hypothesis::search::Breadth;
 use crate::hypothesis::set::TermSet;
@@ -68,6 +68,40 @@ impl Question {
             Effects | AllEffects | Pairs | RivalPairs | Singles | Step => Family::Listed,
             Noise | NoisePairs | Outliers | NoiseInstead => Family::Noise,
         }
+    }
+}
+
+/// A change of the twin, or of the rows that are seen.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::diagnose) enum Change {
+    /// Another kind of noise in the place of the twin's own.
+    Noise(TermSet),
+    /// A finer step.
+    Step {
+        step: FinerStep,
+        /// True where it matters little beside what was found: explanations are carried on.
+        is_minor: bool,
+    },
+    /// All rows: explanations are carried on.
+    AllRows,
+    /// More of the first rows.
+    MoreRows,
+}
+
+impl Change {
+    /// Nats by which the change must raise log Z of all hypotheses together.
+    pub fn least_gain(&self) -> f64 {
+        match self {
+            Self::Noise(_) => 0.0,
+            Self::Step { .. } => Thresholds::STEP_WINS,
+            // Of other records.
+            Self::AllRows | Self::MoreRows => f64::NEG_INFINITY,
+        }
+    }
+
+    /// Returns whether explanations are carried on.
+    pub fn carries(&self) -> bool {
+        matches!(self, Self::AllRows | Self::Step { is_minor: true, .. })
     }
 }
 

@@ -10,7 +10,7 @@
 //! |---|---|
 //! | `explanations.rs` | the map, and lists as queries of it |
 //! | `agenda.rs` | the next question of each stage |
-//! | `change.rs` | what is asked to be changed |
+//! | `change.rs` | changes that the records ask for |
 //! | `evidence.rs` | the interface to the records: questions and answers |
 //! | `setup.rs` | that interface over the engine of hypotheses |
 //! | `carry.rs` | explanations carried on to another step or to all rows |
@@ -27,16 +27,16 @@ mod setup;
 mod tests;
 
 use self::agenda::{Begin, Stage};
-use self::change::Change;
-use self::evidence::{Evidence, Purpose};
+use self::budget::Budget;
+use self::evidence::{Change, Evidence, Purpose};
 use super::settings::DiagnoseSettings;
 use super::thresholds::Thresholds;
 use crate::hypothesis::set::TermSet;
 use crate::progress::{Cancelled, Progress};
-use crate::study::StudyError;
+use crate::record::Record;
+use crate::study::{Study, StudyError};
 use std::collections::BTreeSet;
 
-pub(in crate::diagnose) use budget::Budget;
 pub(in crate::diagnose) use explanations::Explanations;
 pub(in crate::diagnose) use setup::{Setup, absorbing};
 
@@ -71,8 +71,21 @@ pub(in crate::diagnose) struct Watch<'w> {
     pub progress: &'w Progress,
 }
 
+/// Fits the twin of a study, and searches for what explains the records beside it.
+pub(in crate::diagnose) fn searched<'s>(
+    study: &'s Study,
+    records: &[Record],
+    watch: Watch<'s>,
+) -> Result<Search<Setup<'s>>, StudyError> {
+    let stage = watch.progress.stage("fit", 1);
+    let budget = Budget::default();
+    let setup = Setup::new(study, records.into(), watch.settings, &budget)?;
+    stage.tick()?;
+    search(setup, budget, watch)
+}
+
 /// Searches with one twin, then with each change that the records ask for, and keeps those that raise log Z.
-pub(in crate::diagnose) fn search<E: Evidence>(
+fn search<E: Evidence>(
     evidence: E,
     budget: Budget,
     watch: Watch<'_>,

@@ -1,8 +1,7 @@
 //! Evidence of explanations from the engine of hypotheses.
 
 use super::budget::Budget;
-use super::change::Change;
-use super::evidence::{Evidence, Family, Purpose, Question};
+use super::evidence::{Change, Evidence, Family, Purpose, Question};
 use super::explanations::Explanations;
 use crate::diagnose::base::Base;
 use crate::diagnose::candidates;
@@ -23,7 +22,7 @@ use crate::study::{Study, StudyError};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// What a search is about: a study, its records or their first rows, and settings.
+/// A study, all its records, and the settings of a search.
 #[derive(Clone)]
 struct Task<'s> {
     study: &'s Study,

@@ -1,7 +1,6 @@
 //! The search beside a table of log Z.
 
-use super::change::Change;
-use super::evidence::{Evidence, Family, Purpose, Question};
+use super::evidence::{Family, Question};
 use super::*;
 use crate::diagnose::step::FinerStep;
 use crate::effect::Catalogue;
