@@ -151,7 +151,10 @@ impl Measures<'_> {
         let problem = &self.base.problem;
         let mut theta = problem.of_record(0, &problem.centre());
         let initial = self.initial.into_iter().flatten();
-        theta.iter_mut().zip(initial).for_each(|(v, initial)| *v = *initial);
+        theta
+            .iter_mut()
+            .zip(initial)
+            .for_each(|(v, initial)| *v = *initial);
         theta
     }
 
