@@ -92,10 +92,19 @@ fn search<E: Evidence>(
 ) -> Result<Search<E>, StudyError> {
     let mut best = Search::new(evidence, budget, watch).settled(watch)?;
     while let Some(change) = best.asks_for_rows() {
-        match best.with(&change, watch)? {
-            Some(all) if change == Change::AllRows => best = all.ended(best.is_partial, watch)?,
-            Some(more) => best = more.settled(watch)?,
-            None => best.refused.push(change),
+        let next = best.with(&change, watch).and_then(|next| match next {
+            Some(all) if change == Change::AllRows => all.ended(best.is_partial, watch).map(Some),
+            Some(more) => more.settled(watch).map(Some),
+            None => Ok(None),
+        });
+        match next {
+            Ok(Some(next)) => best = next,
+            Ok(None) => best.refused.push(change),
+            Err(StudyError::Cancelled(_)) if watch.settings.give_partial => {
+                best.is_partial = true;
+                break;
+            }
+            Err(error) => return Err(error),
         }
     }
     Ok(best)
@@ -143,19 +152,18 @@ impl<E: Evidence> Search<E> {
 
     /// Asks all stages, again from the start where the twin fits better from θ of an explanation than from its own.
     fn run(mut self, watch: Watch<'_>) -> Result<Self, StudyError> {
-        let progress = watch.progress.stage("explain", STAGES.len());
+        let mut progress = watch.progress.stage("explain", STAGES.len());
         let mut stages = STAGES.into_iter();
         while let Some(stage) = stages.next().filter(|_| !self.is_partial) {
             self.ask_all(stage)?;
-            let are_singles_known = !self.known.listed().is_empty() && stage != Stage::Functions;
+            let is_known = !self.known.listed().is_empty();
             match progress.tick() {
-                Err(Cancelled) if watch.settings.give_partial && are_singles_known => {
-                    self.is_partial = true;
-                }
+                Err(Cancelled) if watch.settings.give_partial && is_known => self.is_partial = true,
                 other => other?,
             }
             let may_be_better = matches!(stage, Stage::Effects | Stage::Pairs);
             if may_be_better && !self.is_partial && self.fit_again()? {
+                progress = watch.progress.stage("explain", STAGES.len());
                 stages = STAGES.into_iter();
             }
         }
