@@ -5,8 +5,7 @@ use super::settings::{Ablation, DiagnoseSettings};
 use super::step::FinerStep;
 use super::thresholds::Thresholds;
 use crate::effect::{TargetKind, targets};
-use crate::fit::axis::Axis;
-use crate::fit::climb::{Fitted, climb, fit};
+use crate::fit::climb::{climb, fit};
 use crate::fit::growing::base_fit;
 use crate::fit::passes::Passes;
 use crate::fit::problem::Problem;
@@ -22,13 +21,10 @@ use crate::likelihood::measured;
 use crate::record::Record;
 use crate::study::{Study, StudyError};
 use crate::twin::{Noise, Role, Twin};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::sync::Arc;
 
 /// Iterations of a search: loud noise has a way to go.
 const ITERATIONS: usize = 80;
-/// Iterations of a fit inside the prior.
-const INSIDE: usize = 20;
 
 /// The fitted twin and the units of its records.
 pub(in crate::diagnose) struct Base {
@@ -152,20 +148,6 @@ impl Base {
         (model.map(|model| self.carried_on(model, self.noises.clone()))).transpose()
     }
 
-    /// The twin where its fit inside the prior ends, if its own has left that: what is missing may have driven it out. `None` for a black
-    /// box, whose fits cost too much.
-    pub fn inside(&self) -> Result<Option<Model>, StudyError> {
-        let problem = &self.model.problem;
-        if problem.is_simulated() || beyond(&self.model) == 0 {
-            return Ok(None);
-        }
-        let Some(fitted) = fitted_inside(&self.model)? else {
-            return Ok(None);
-        };
-        let fitted = climb(problem, &fitted.theta, 0)?;
-        Ok(fitted.and_then(|fitted| self.model.refitted(fitted)))
-    }
-
     /// The fitted twin with its units, as terms are made from it.
     pub fn library(&self) -> Library<'_> {
         Library {
@@ -214,59 +196,9 @@ impl Base {
     }
 }
 
-/// The problem with the twin's own parameters held within their prior box.
-fn inside(problem: &Problem) -> Problem {
-    let space = problem.twin.parameters();
-    let axes = (space.iter().zip(&problem.axes))
-        .map(|(p, axis)| match p.role {
-            Role::Parameter => axis.clone().inside(p.prior),
-            _ => axis.clone(),
-        })
-        .collect::<Vec<Axis>>();
-    problem.with_twin(problem.twin.clone(), axes)
-}
-
 /// A model with its fit carried on to its end: the search stops where a hypothesis is known well enough to be compared.
 pub(in crate::diagnose) fn finished(model: &Model) -> Result<Model, StudyError> {
     let fitted = climb(&model.problem, &model.fitted.theta, ITERATIONS)?;
     let finished = fitted.and_then(|fitted| model.refitted(fitted));
     Ok(finished.unwrap_or_else(|| model.clone()))
-}
-
-/// Number of the twin's own parameters outside their prior.
-fn beyond(model: &Model) -> usize {
-    let theta = model.theta();
-    let space = model.problem.twin.parameters();
-    (space.iter().zip(&theta))
-        .filter(|(p, v)| p.role == Role::Parameter && !p.prior.contains(**v))
-        .count()
-}
-
-/// The best fit with the twin's own parameters within their prior box.
-fn fitted_inside(model: &Model) -> Result<Option<Fitted>, StudyError> {
-    let boxed = inside(&model.problem);
-    let starts = [model.fitted.theta.clone(), boxed.centre()];
-    Ok(fit(&boxed, &starts, INSIDE)?)
-}
-
-/// Tests whether θ lies outside its prior box: likelihood ratio of the best θ anywhere over the best inside. Returns the model inside as
-/// well.
-pub(in crate::diagnose) fn left_the_prior(
-    model: &Model,
-    alpha: f64,
-) -> Result<(bool, Option<Model>), StudyError> {
-    let beyond = beyond(model);
-    if beyond == 0 {
-        return Ok((false, None));
-    }
-    let within = fitted_inside(model)?;
-    let ratio = within.as_ref().map_or(f64::INFINITY, |w| {
-        2.0 * (model.fitted.log_likelihood - w.log_likelihood)
-    });
-    // As many bounds as bind are what chance can gain from.
-    let limit =
-        ChiSquared::new(beyond as f64).map_or(f64::INFINITY, |c| c.inverse_cdf(1.0 - alpha));
-    let boxed = inside(&model.problem);
-    let within = within.and_then(|w| Model::bare(model.base.clone(), boxed, w, model.by_bic));
-    Ok((ratio > limit, within))
 }

@@ -3,7 +3,7 @@
 //! | room | question |
 //! |---|---|
 //! | `run.rs`, `report.rs` | entry; everything that is reported of a search |
-//! | `base.rs` | the fitted twin that a search begins with |
+//! | `base.rs`, `prior.rs` | the fitted twin that a search begins with; the same within its prior |
 //! | `greedy.rs` | a baseline: forward selection by BIC |
 //! | `true_effects.rs` | the share that effects close which are known to be there |
 //! | `step.rs` | whether a finer step of the integrator explains the records better |
@@ -26,6 +26,7 @@ pub(crate) mod fixture;
 mod greedy;
 mod locate;
 mod outcome;
+mod prior;
 mod quantify;
 mod report;
 mod residuals;

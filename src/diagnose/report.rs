@@ -2,18 +2,19 @@
 
 use super::answer::summary::{absorbed, effects, nuisance, onset, parameters, remains};
 use super::answer::{Answer, Hypotheses};
-use super::base::{finished, left_the_prior};
+use super::base::finished;
 use super::candidates::not_tested;
 use super::locate::discover::discover;
 use super::locate::functions::{curve, missing_functions};
 use super::locate::maps::maps;
 use super::outcome::*;
+use super::prior::{absorbing, left_the_prior};
 use super::quantify::calibrate::{calibrate, p_value};
 use super::quantify::free_run::{Runner, free_runs, root};
 use super::quantify::next_input::next_input;
 use super::quantify::power::power;
 use super::quantify::share::{Measures, shrinkage};
-use super::search::{Search, Setup, Watch, absorbing, searched};
+use super::search::{Search, Setup, Watch, searched};
 use super::settings::DiagnoseSettings;
 use super::thresholds::Thresholds;
 use crate::hypothesis::explanation::Explanation;
@@ -75,7 +76,7 @@ impl Report<'_> {
                 self.validation.map(|records| &records[0]),
                 &parameters,
                 base.step.is_some(),
-                self.found.evidence.searched,
+                self.found.evidence.searched(),
             ),
             residuals: (records.iter().zip(filtered.into_iter().flatten()))
                 .filter_map(|(record, filtered)| {

@@ -2,7 +2,7 @@
 
 use crate::diagnose::outcome::{Band, Cell, Channel, Lag, Maps, Region, Window};
 use crate::diagnose::residuals::cut::{Bins, Cut, Past};
-use crate::diagnose::residuals::local::excess;
+use crate::diagnose::residuals::excess::excess;
 use crate::diagnose::residuals::shares::shares;
 use crate::hypothesis::model::Model;
 use crate::study::StudyError;

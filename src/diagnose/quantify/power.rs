@@ -18,7 +18,6 @@ use crate::hypothesis::term::{Part, Term};
 use crate::likelihood::kalman::recoverable;
 use crate::study::StudyError;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// The smallest visible magnitude of each listed effect.
@@ -45,25 +44,15 @@ pub(in crate::diagnose) fn power(
         })
         .collect::<Result<_, StudyError>>()?;
     // Of several ways to use one effect, the one that shows best.
-    let mut best: BTreeMap<String, (Visible, f64)> = BTreeMap::new();
-    let mut order = vec![];
-    for (key, visible, distance) in each {
-        match best.get(&key) {
-            Some((_, old)) if *old <= distance => {}
-            Some(_) => {
-                best.insert(key, (visible, distance));
-            }
-            None => {
-                order.push(key.clone());
-                best.insert(key, (visible, distance));
-            }
+    let mut best: Vec<(String, Visible, f64)> = vec![];
+    for way in each {
+        match best.iter_mut().find(|(key, ..)| *key == way.0) {
+            Some(old) if old.2 <= way.2 => {}
+            Some(old) => *old = way,
+            None => best.push(way),
         }
     }
-    Ok(order
-        .iter()
-        .filter_map(|key| best.remove(key))
-        .map(|(visible, _)| visible)
-        .collect())
+    Ok(best.into_iter().map(|(_, visible, _)| visible).collect())
 }
 
 fn first_magnitude(term: &Term) -> String {

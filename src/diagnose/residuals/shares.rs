@@ -1,7 +1,7 @@
 //! Share of the misfit in each cut.
 
-use crate::diagnose::residuals::cut::{Bins, Cut};
-use crate::diagnose::residuals::local::excess;
+use super::cut::{Bins, Cut};
+use super::excess::excess;
 use crate::likelihood::kalman::Filtered;
 use crate::record::{Record, Signal};
 

@@ -38,7 +38,7 @@ use crate::study::{Study, StudyError};
 use std::collections::BTreeSet;
 
 pub(in crate::diagnose) use explanations::Explanations;
-pub(in crate::diagnose) use setup::{Setup, absorbing};
+pub(in crate::diagnose) use setup::Setup;
 
 /// Stages of a search for one twin.
 const STAGES: [Stage; 5] = [

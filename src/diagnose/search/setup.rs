@@ -5,6 +5,7 @@ use super::evidence::{Change, Evidence, Family, Purpose, Question};
 use super::explanations::Explanations;
 use crate::diagnose::base::Base;
 use crate::diagnose::candidates;
+use crate::diagnose::prior::inside;
 use crate::diagnose::settings::{Ablation, DiagnoseSettings};
 use crate::diagnose::step::{FinerStep, finer_step};
 use crate::diagnose::thresholds::Thresholds;
@@ -29,6 +30,8 @@ struct Task<'s> {
     settings: &'s DiagnoseSettings,
     budget: Budget,
     records: Arc<[Record]>,
+    /// Number of rows that the search sees, where it does not see all.
+    searched: Option<usize>,
     passes: Passes,
 }
 
@@ -40,8 +43,6 @@ pub(in crate::diagnose) struct Setup<'s> {
     noise: Vec<Arc<Term>>,
     /// The twin with θ inside its prior, if its fit has left that.
     inside: Option<Model>,
-    /// Rows that the search saw, where it did not see all.
-    pub searched: Option<usize>,
 }
 
 impl<'s> Setup<'s> {
@@ -57,6 +58,7 @@ impl<'s> Setup<'s> {
             settings,
             budget: budget.clone(),
             records,
+            searched: None,
             passes: Passes::default(),
         };
         let is_long = task.rows() >= budget.long_rows && study.twin().outline().is_some();
@@ -78,15 +80,16 @@ impl<'s> Task<'s> {
     fn setup(&self, rows: usize) -> Result<Setup<'s>, StudyError> {
         let all = self.rows();
         let part = (self.budget.more_rows * rows <= all).then(|| self.first_rows(rows));
-        let Some(part) = part.flatten() else {
-            return self.fitted(self.records.clone());
+        let seeing = |searched| Self {
+            searched,
+            ..self.clone()
         };
-        match self.fitted(part) {
+        let Some(part) = part.flatten() else {
+            return seeing(None).fitted(self.records.clone());
+        };
+        match seeing(Some(rows)).fitted(part) {
             Err(StudyError::NoStart) => self.setup(self.budget.more_rows * rows),
-            other => Ok(Setup {
-                searched: Some(rows),
-                ..other?
-            }),
+            other => other,
         }
     }
 
@@ -160,11 +163,10 @@ impl<'s> Task<'s> {
         }
         Ok(Setup {
             task: self.clone(),
-            inside: base.inside()?,
+            inside: inside(&base.model)?,
             base,
             listed,
             noise,
-            searched: None,
         })
     }
 }
@@ -275,11 +277,7 @@ impl Evidence for Setup<'_> {
     fn fitted_from(&self, explanations: &[&Explanation]) -> Result<Option<Self>, StudyError> {
         let thetas: Vec<Vec<f64>> = explanations.iter().filter_map(|e| e.own_theta()).collect();
         let better = self.base.fitted_from(&thetas)?;
-        let setup = better.map(|base| self.task.with_base(base)).transpose()?;
-        Ok(setup.map(|setup| Self {
-            searched: self.searched,
-            ..setup
-        }))
+        better.map(|base| self.task.with_base(base)).transpose()
     }
 
     fn changed(&self, change: &Change, known: &Explanations) -> Result<Option<Self>, StudyError> {
@@ -291,11 +289,7 @@ impl Evidence for Setup<'_> {
             Change::Step { step, .. } => {
                 let best = known.starts(self.task.budget.starts);
                 let thetas: Vec<Vec<f64>> = best.iter().filter_map(|e| e.own_theta()).collect();
-                let setup = self.task.with_step(&self.base, *step, &thetas)?;
-                return Ok(Some(Self {
-                    searched: self.searched,
-                    ..setup
-                }));
+                return self.task.with_step(&self.base, *step, &thetas).map(Some);
             }
             Change::Noise(set) => match known.model(set) {
                 Some(model) => self.base.with_noise(model)?,
@@ -303,12 +297,7 @@ impl Evidence for Setup<'_> {
             },
             Change::AllRows => self.base.on(self.task.records.clone())?,
         };
-        let Some(base) = base else { return Ok(None) };
-        let setup = self.task.with_base(base)?;
-        Ok(Some(Self {
-            searched: self.searched,
-            ..setup
-        }))
+        base.map(|base| self.task.with_base(base)).transpose()
     }
 
     fn carried(&self, other: &Explanation) -> Result<Option<Explanation>, StudyError> {
@@ -387,20 +376,6 @@ fn states(model: &Model) -> Result<Scales, StudyError> {
     })
 }
 
-/// Listed effects that explain a parameter gap with θ inside the prior, as well as θ outside does: best first.
-pub(in crate::diagnose) fn absorbing(
-    free: &Model,
-    within: &Model,
-    terms: &[Arc<Term>],
-) -> Result<Vec<Explanation>, StudyError> {
-    let breadth = Breadth::of(within, false).of_all();
-    let mut found = listed(within, terms, &[], breadth)?;
-    let best = free.fitted.log_likelihood - Thresholds::ABSORBS;
-    let is_as_good = |model: &Model| model.fitted.log_likelihood >= best;
-    found.retain(|e| e.model.as_ref().is_some_and(is_as_good));
-    Ok(found)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -430,7 +405,7 @@ mod tests {
             progress,
         };
         let found = search(setup, budget, watch).unwrap();
-        assert_eq!(found.evidence.searched, None);
+        assert_eq!(found.evidence.searched(), None);
         assert!(found.known.posterior().log_odds < 3.0);
     }
 }

@@ -1,7 +1,6 @@
 //! Statistic of each cut: departure of its innovations from white noise N(0, 1).
 
-use crate::diagnose::residuals::correlation::{centred, correlation};
-use crate::diagnose::residuals::cut::{Bins, Cut, Past};
+use super::cut::{Bins, Cut, Past};
 use crate::diagnose::thresholds::Thresholds;
 use crate::likelihood::kalman::Filtered;
 use crate::record::{Record, Signal};
@@ -62,7 +61,7 @@ pub(in crate::diagnose) fn excess(
 }
 
 /// Statistic of a count, a sum and a sum of squares.
-pub(in crate::diagnose) fn level((n, sum, square): (f64, f64, f64)) -> Excess {
+fn level((n, sum, square): (f64, f64, f64)) -> Excess {
     if n < Thresholds::LEAST_IN_CUT {
         return Excess::default();
     }
@@ -151,6 +150,23 @@ impl Series {
             expected: 1.0,
         }
     }
+}
+
+/// Less the mean.
+fn centred(values: &[f64]) -> Vec<f64> {
+    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    values.iter().map(|v| v - mean).collect()
+}
+
+/// Correlation of a(k) with b(k − lag), both centred.
+fn correlation(a: &[f64], b: &[f64], lag: usize) -> f64 {
+    if lag >= a.len() {
+        return 0.0;
+    }
+    let dot: f64 = a[lag..].iter().zip(b).map(|(a, b)| a * b).sum();
+    let norm = |x: &[f64]| x.iter().map(|v| v * v).sum::<f64>();
+    let scale = (norm(a) * norm(b)).sqrt();
+    if scale > 0.0 { dot / scale } else { 0.0 }
 }
 
 /// |DFT|²/n at j/n cycles a sample, j = 1 … n/2.
