@@ -62,7 +62,11 @@ impl<'s> Setup<'s> {
             passes: Passes::default(),
         };
         let is_long = task.rows() >= budget.long_rows && study.twin().outline().is_some();
-        task.setup(if is_long { budget.first_rows } else { task.rows() })
+        task.setup(if is_long {
+            budget.first_rows
+        } else {
+            task.rows()
+        })
     }
 
     /// Number of rows that the search saw, where it did not see all.
