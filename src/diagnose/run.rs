@@ -135,3 +135,63 @@ fn check(
 
 /// Most simulations of a calibration.
 const MOST_SIMULATIONS: usize = 100_000;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::Verdict;
+    use crate::diagnose::fixture::{biased_record, tanks};
+    use crate::progress::Listener;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    /// Stops the work once effects were tried one at a time.
+    #[derive(Default)]
+    struct Impatient(AtomicBool);
+
+    impl Listener for Impatient {
+        fn advanced(&self, stage: &str, done: u64, _: u64) {
+            self.0
+                .fetch_or(stage == "explain" && done >= 3, Ordering::Relaxed);
+        }
+        fn cancelled(&self) -> bool {
+            self.0.load(Ordering::Relaxed)
+        }
+    }
+
+    #[test]
+    fn a_cancelled_search_gives_what_was_found() {
+        let study = tanks(150);
+        let records = [biased_record(&study, 2.0, 5)];
+        let found = |give_partial| {
+            let settings = DiagnoseSettings {
+                give_partial,
+                ..DiagnoseSettings::default()
+            };
+            let progress = Progress::new(Arc::new(Impatient::default()));
+            diagnose(&study, &records, None, &settings, &progress)
+        };
+        let partial = found(true).unwrap();
+        assert!(partial.interrupted && partial.quick);
+        assert_eq!(partial.verdict, Verdict::StructuralGap);
+        assert!(partial.cause.effects.iter().any(|e| e.id == "sensor-bias"));
+        assert!(matches!(found(false), Err(StudyError::Cancelled(_))));
+    }
+
+    /// A gap of a long record is found in its first rows and fitted to all of them: the magnitude is known as well as all rows let it be.
+    #[test]
+    fn a_long_record_is_searched_in_part() {
+        let study = tanks(4096);
+        let settings = DiagnoseSettings {
+            quick: true,
+            ..DiagnoseSettings::default()
+        };
+        let record = biased_record(&study, 2.0, 5);
+        let biased = diagnose(&study, &[record], None, &settings, &Progress::silent()).unwrap();
+        assert_eq!(biased.cause.accepted, ["sensor-bias@sensor"]);
+        let bias = biased.cause.effects[0].magnitudes[0].1;
+        assert!((bias - 2.0).abs() < 0.1, "{bias}");
+        assert!(biased.warnings.iter().any(|w| w.code == "first-rows"));
+        assert_eq!(biased.residuals[0].samples(), 4096);
+    }
+}
